@@ -1,1 +1,51 @@
-//! .
+//! The contracts of Tandem: what a planner, a feed strategy, a driver or a kinematics sees, and nothing else.
+//!
+//! Units inside are mm, s, rad and mm/s. A rotary axis is in rad wherever a linear one is in mm. Every type that
+//! crosses a contract is `repr(C)` and begins with its size, so that the same structures serve shared libraries.
+//!
+//! Which loop calls what:
+//!
+//! | contract | loop | may allocate |
+//! |---|---|---|
+//! | [`Planner`], [`FeedStrategy`] | rough (soft) | yes, but not in a steady state |
+//! | [`Driver::exchange`], [`Driver::quick_stop`], [`Kinematics`] | fine (hard) | no |
+//! | factories, [`Driver::open`], [`Driver::start`], [`Driver::stop`] | host, outside the loops | yes |
+//!
+//! No plugin reads a clock or a source of randomness: time and seeds are arguments.
+
+mod axis;
+mod block;
+mod driver;
+mod event;
+mod kinematics;
+mod limits;
+mod planner;
+mod plugin;
+mod segment;
+mod slice;
+mod strategy;
+
+pub use axis::{Axes, AxisVector, MAX_AXES};
+pub use block::{ArcGeometry, Block, BlockKind, NurbsGeometry, PathMode};
+pub use driver::{Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_LATCHES, Setpoint};
+pub use event::{Event, EventKind};
+pub use kinematics::{Identity, Kinematics};
+pub use limits::{AxisLimits, Limits, PathLimits};
+pub use planner::{
+    Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription, SegmentSink,
+};
+pub use plugin::{Plugin, PluginError, PluginKind, parse_options};
+pub use segment::{Edge, RingEntry, Segment, SegmentFlags, StopOn};
+pub use slice::RawSlice;
+pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
+
+/// Number of the plugin contract. A plugin built against another number is refused.
+pub const ABI_VERSION: u32 = 1;
+
+/// The size field of a `repr(C)` structure, as every contract structure begins with it.
+///
+/// # Panics
+/// Never: the contract structures are far below 4 GiB.
+pub const fn size_of_contract<T>() -> u32 {
+    size_of::<T>() as u32
+}

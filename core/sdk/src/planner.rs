@@ -1,0 +1,171 @@
+//! The planner contract: blocks in, segments out.
+
+use crate::{Axes, AxisVector, Block, Limits, MAX_AXES, PluginError, Segment, size_of_contract};
+
+/// What a planner is told when it is opened.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct PlannerContext {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// The machine's axes.
+    pub axes: Axes,
+    /// The machine's limits. They are the limits themselves: planners aim at 0.999 of them.
+    pub limits: Limits,
+    /// Fine period, s: the period at which limits are judged.
+    pub fine_period_s: f64,
+    /// Rough period, s.
+    pub rough_period_s: f64,
+    /// Path tolerance where a block states none, mm.
+    pub path_tolerance_mm: f64,
+    /// Time constant where a block states none, s.
+    pub time_constant_s: f64,
+    /// Highest feed ratio that can be asked while running; blocks are planned at this multiple of their feed.
+    pub max_feed_ratio: f64,
+    /// Where the machine stands.
+    pub position: AxisVector,
+}
+
+/// What a planner says of itself, once, after it is opened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct PlannerDescription {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// Order of the limits that it keeps: 2 velocity and acceleration, 3 also jerk.
+    pub order: u32,
+    /// Allowable speed difference that it makes use of, per axis, mm/s: zero for continuous velocity. Judge and guard
+    /// allow no more than this.
+    pub speed_difference_mm_per_s: [f64; MAX_AXES],
+    /// 1 where this form breaks limits on purpose, as published: simulated drives with `guard.mode = "count"` only.
+    pub breaks_limits: u32,
+    /// 1 where the path left is not the path programmed (filters behind the interpolation, corner rounding).
+    pub leaves_path: u32,
+}
+
+impl PlannerDescription {
+    /// A planner that keeps velocity and acceleration limits, continuous in velocity, on the path.
+    pub fn order_2() -> Self {
+        Self {
+            size: size_of_contract::<Self>(),
+            order: 2,
+            speed_difference_mm_per_s: [0.0; MAX_AXES],
+            breaks_limits: 0,
+            leaves_path: 0,
+        }
+    }
+}
+
+/// Whether a block was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Accepted {
+    /// Taken.
+    Accepted = 0,
+    /// The buffer is full: `advance`, then offer the same block again.
+    Full = 1,
+}
+
+/// How far `advance` came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Advanced {
+    /// Program time emitted by this call, s.
+    pub duration_s: f64,
+    /// 1 where all accepted blocks are emitted (and `finish` was called): the plan is at rest.
+    pub done: u32,
+}
+
+/// What held a block's feed down most.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum LimitedBy {
+    /// The programmed feed (or the rapid feed) was reached.
+    #[default]
+    Feed = 0,
+    /// Too short to reach it: acceleration from and to the ends.
+    Acceleration = 1,
+    /// Curvature of the path.
+    Curvature = 2,
+    /// The junctions at the ends.
+    Junction = 3,
+    /// An axis speed limit.
+    Velocity = 4,
+    /// The end of the planner's buffer.
+    Buffer = 5,
+    /// The time constant.
+    TimeConstant = 6,
+    /// The path tolerance.
+    Tolerance = 7,
+    /// Jerk.
+    Jerk = 8,
+    /// A policy's cap.
+    Policy = 9,
+}
+
+/// How a block is driven; becomes a row of the blocks CSV.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct BlockReport {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// What held the feed down.
+    pub limited_by: LimitedBy,
+    /// Index of the block.
+    pub block: u64,
+    /// Feed at the start, mm/s.
+    pub start_feed_mm_per_s: f64,
+    /// Highest feed inside, mm/s.
+    pub peak_feed_mm_per_s: f64,
+    /// Feed at the end, mm/s.
+    pub end_feed_mm_per_s: f64,
+    /// Duration, s.
+    pub time_s: f64,
+    /// Time constant used, s; NaN for planners that know none.
+    pub time_constant_s: f64,
+}
+
+/// Takes what a planner emits.
+pub trait SegmentSink {
+    /// The next segment, in order of program time.
+    fn segment(&mut self, segment: &Segment);
+    /// A block is planned for good: called once a block, before its first segment.
+    fn block(&mut self, report: &BlockReport);
+}
+
+/// Turns blocks into motion. All methods are called on the rough loop.
+///
+/// The life of a planner: opened at rest at [`PlannerContext::position`]; then `accept` until it says
+/// [`Accepted::Full`] or the program ends (`finish`), `advance` by rough periods until done; then `accept` again (a new
+/// stretch of program) or `reset`. In a steady state no method allocates.
+///
+/// What has been emitted can always be brought to rest on the path by the fine loop: each segment declares the path
+/// deceleration it leaves ([`Segment::stop_deceleration_mm_per_s2`]).
+pub trait Planner: Send {
+    /// What it keeps and what it does not.
+    fn describe(&self) -> PlannerDescription;
+
+    /// Whether this planner can drive `block`. Pure: the first pass asks for every block before anything moves.
+    ///
+    /// # Errors
+    /// Why not.
+    fn check(&self, block: &Block) -> Result<(), PluginError>;
+
+    /// Takes the next block. Blocks follow each other: `start` is the `end` of the one before.
+    ///
+    /// # Errors
+    /// A block that `check` refuses.
+    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError>;
+
+    /// No block follows for now: what is buffered ends at rest.
+    fn finish(&mut self);
+
+    /// Emits at least `duration_s` of program time (or all there is), cutting the last segment at `duration_s`.
+    ///
+    /// # Errors
+    /// A defect of the planner: the machine comes to a controlled stop and names it.
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError>;
+
+    /// Forgets everything; the machine rests at `position`.
+    fn reset(&mut self, position: &AxisVector);
+}

@@ -1,0 +1,190 @@
+//! What the rough loop hands to the fine loop.
+
+use crate::{AxisVector, Event, MAX_AXES, size_of_contract};
+
+/// Facts about a [`Segment`], as bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct SegmentFlags(pub u32);
+
+impl SegmentFlags {
+    /// Rapid motion: the rapid override applies, not the feed override.
+    pub const RAPID: Self = Self(1);
+    /// The machine is at rest at the end: the fine loop puts a sample exactly there.
+    pub const ENDS_AT_REST: Self = Self(2);
+    /// The block named by the segment begins here.
+    pub const BLOCK_BEGINS: Self = Self(4);
+    /// The block named by the segment ends with this segment.
+    pub const BLOCK_ENDS: Self = Self(8);
+    /// Nothing moves (a dwell).
+    pub const DWELL: Self = Self(16);
+    /// Part of a plan to rest that the next `advance` replaces.
+    pub const TAIL: Self = Self(32);
+
+    /// Whether all bits of `other` are set.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Both sets of bits.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// Which change of an input ends a motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Edge {
+    /// None: an ordinary motion.
+    #[default]
+    None = 0,
+    /// The input becomes 1 (G38.2, G38.3, homing onto a switch).
+    Rising = 1,
+    /// The input becomes 0 (G38.4, G38.5, homing off a switch).
+    Falling = 2,
+}
+
+/// What ends a motion early, and whether it is an error when nothing does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct StopOn {
+    /// Number of the input, 0 to 63.
+    pub input: u32,
+    /// The change waited for.
+    pub edge: Edge,
+    /// 1 where reaching the end without the edge is a fault (G38.2, G38.4), else 0.
+    pub miss_is_fault: u32,
+}
+
+/// A piece of motion: one polynomial of degree ≤ 5 per axis over `0 ≤ t ≤ duration_s`, in the powers of t.
+///
+/// The constant terms are the exact planned position; between, the polynomial stays within 1e-6 mm of the planned path.
+/// The fine loop can evaluate it at any instant, which is what makes hold and override possible without the planner.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Segment {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// Entries of an older epoch are dropped by the fine loop: abort, probe and jog raise it.
+    pub epoch: u32,
+    /// Index of the block that moves (the later one where two overlap).
+    pub block: u64,
+    /// Line of the part program.
+    pub line: u32,
+    /// Facts about the segment.
+    pub flags: SegmentFlags,
+    /// Order of the limits that hold: 2 velocity and acceleration, 3 also jerk.
+    pub order: u32,
+    /// What ends the motion early.
+    pub stop_on: StopOn,
+    /// Duration, s of program time; zero only for a rest (constant position).
+    pub duration_s: f64,
+    /// Coefficients per axis, `position = Σ c[n]·tⁿ`, mm or rad.
+    pub coefficients: [[f64; 6]; MAX_AXES],
+    /// Path coordinate from the start of the run, same form, mm.
+    pub path: [f64; 6],
+    /// Programmed feed, mm/s: the highest of the blocks that move here; infinite for rapids.
+    pub feed_mm_per_s: f64,
+    /// Path deceleration that the plan leaves everywhere in this segment, its own braking counted, mm/s².
+    pub stop_deceleration_mm_per_s2: f64,
+    /// Where velocity steps are allowed: the mean acceleration per axis that stands for the steps at the segment's ends,
+    /// mm/s². With it `velocity − step` is continuous and the governor has something smooth to limit. Zero for planners
+    /// with continuous velocity. See `ARCHITECTURE.md`, "Velocity steps and the governor".
+    pub step_acceleration: AxisVector,
+    /// Bound on |dσ/dt| that keeps the jerk limit, 1/s; infinite for order 2.
+    pub max_sigma_rate_per_s: f64,
+    /// Bound on |d²σ/dt²| that keeps the jerk limit, 1/s²; infinite for order 2.
+    pub max_sigma_acceleration_per_s2: f64,
+}
+
+impl Segment {
+    /// A rest at `position` of `duration_s`, order 2.
+    pub fn rest(position: &AxisVector, duration_s: f64) -> Self {
+        let mut coefficients = [[0.0; 6]; MAX_AXES];
+        for (axis, value) in position.0.iter().enumerate() {
+            coefficients[axis][0] = *value;
+        }
+        Self {
+            size: size_of_contract::<Self>(),
+            epoch: 0,
+            block: 0,
+            line: 0,
+            flags: SegmentFlags::ENDS_AT_REST,
+            order: 2,
+            stop_on: StopOn::default(),
+            duration_s,
+            coefficients,
+            path: [0.0; 6],
+            feed_mm_per_s: f64::INFINITY,
+            stop_deceleration_mm_per_s2: f64::INFINITY,
+            step_acceleration: AxisVector::ZERO,
+            max_sigma_rate_per_s: f64::INFINITY,
+            max_sigma_acceleration_per_s2: f64::INFINITY,
+        }
+    }
+
+    /// Position at local time `t_s`, mm or rad. Any loop; does not allocate.
+    pub fn position(&self, t_s: f64) -> AxisVector {
+        AxisVector(std::array::from_fn(|axis| polynomial(&self.coefficients[axis], t_s)))
+    }
+
+    /// Velocity at local time `t_s`, per s of program time. Any loop; does not allocate.
+    pub fn velocity(&self, t_s: f64) -> AxisVector {
+        AxisVector(std::array::from_fn(|axis| polynomial_rate(&self.coefficients[axis], t_s)))
+    }
+
+    /// Acceleration at local time `t_s`, per s² of program time. Any loop; does not allocate.
+    pub fn acceleration(&self, t_s: f64) -> AxisVector {
+        AxisVector(std::array::from_fn(|axis| {
+            let c = &self.coefficients[axis];
+            2.0 * c[2] + t_s * (6.0 * c[3] + t_s * (12.0 * c[4] + t_s * 20.0 * c[5]))
+        }))
+    }
+
+    /// Path coordinate at local time `t_s`, mm.
+    pub fn path_mm(&self, t_s: f64) -> f64 {
+        polynomial(&self.path, t_s)
+    }
+
+    /// Path speed at local time `t_s`, mm/s of program time.
+    pub fn path_speed_mm_per_s(&self, t_s: f64) -> f64 {
+        polynomial_rate(&self.path, t_s)
+    }
+}
+
+fn polynomial(c: &[f64; 6], t: f64) -> f64 {
+    c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
+}
+
+fn polynomial_rate(c: &[f64; 6], t: f64) -> f64 {
+    c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])))
+}
+
+/// What travels from the rough to the fine loop, in the order of the path.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+#[allow(clippy::large_enum_variant)] // one slot of a pre-allocated ring; boxing would allocate for every segment
+pub enum RingEntry {
+    /// A piece of motion.
+    Segment(Segment),
+    /// Something that happens between two pieces.
+    Event(Event),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_match_differences() {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.coefficients[1] = [1.0, -2.0, 3.0, -4.0, 5.0, -6.0];
+        let (t, h) = (0.3, 1e-5);
+        let rate = (segment.position(t + h)[1] - segment.position(t - h)[1]) / (2.0 * h);
+        assert!((segment.velocity(t)[1] - rate).abs() < 1e-8);
+        let curve = (segment.velocity(t + h)[1] - segment.velocity(t - h)[1]) / (2.0 * h);
+        assert!((segment.acceleration(t)[1] - curve).abs() < 1e-8);
+    }
+}

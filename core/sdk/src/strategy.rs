@@ -1,0 +1,102 @@
+//! The feed-strategy contract: the samples of one rough period in, a feed ratio out.
+
+use crate::{AxisVector, PluginError, RawSlice};
+
+/// Most named signals a strategy publishes.
+pub const MAX_SIGNALS: usize = 8;
+
+/// One fine period as it happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct FineSample {
+    /// Number of the fine period since the start of the run.
+    pub tick: u64,
+    /// Program line that moved.
+    pub line: u32,
+    /// Reserved, zero.
+    pub reserved: u32,
+    /// Position commanded, mm or rad.
+    pub command: AxisVector,
+    /// Position measured at the start of the period, mm or rad.
+    pub position: AxisVector,
+    /// Speed measured, mm/s or rad/s.
+    pub speed: AxisVector,
+    /// Mean motor current over the past period, A.
+    pub current_a: AxisVector,
+    /// Path speed commanded, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Programmed feed, mm/s.
+    pub programmed_feed_mm_per_s: f64,
+    /// Rate of program time, 0 to 1.
+    pub sigma: f64,
+    /// Spindle speed measured, rad/s.
+    pub spindle_rad_per_s: f64,
+}
+
+/// What a strategy is told when it is opened.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct StrategyContext {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// Number of axes.
+    pub axis_count: u32,
+    /// Fine period, s.
+    pub fine_period_s: f64,
+    /// Rough period, s.
+    pub rough_period_s: f64,
+    /// Highest ratio that may be answered.
+    pub max_feed_ratio: f64,
+}
+
+/// One rough period.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Window {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// Number of the rough period since the start of the run.
+    pub period: u64,
+    /// Every fine sample of it. Valid for the call only.
+    pub samples: RawSlice<FineSample>,
+}
+
+/// What a strategy asks for beside the ratio.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub enum Request {
+    /// Nothing.
+    #[default]
+    None,
+    /// A feed hold, on the path.
+    Hold,
+    /// A fault with a code of the strategy's own.
+    Fault(u32),
+}
+
+/// A strategy's answer for one rough period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Answer {
+    /// Feed ratio asked for: at most `ratio × programmed feed` is driven.
+    pub ratio: f64,
+    /// What else is asked for.
+    pub request: Request,
+    /// Values of the named signals, in the order of [`FeedStrategy::signals`].
+    pub signals: [f64; MAX_SIGNALS],
+}
+
+/// Adapts the feed to what the machine feels. Called once a rough period, on the rough loop; allocates nothing in a
+/// steady state. The ratio made from the samples of rough period k takes effect at the first tick of period k + 2.
+pub trait FeedStrategy: Send {
+    /// Names of the signals, at most [`MAX_SIGNALS`], lower case with underscores and a unit.
+    fn signals(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The answer for one rough period.
+    ///
+    /// # Errors
+    /// A defect of the strategy: the machine comes to a controlled stop and names it.
+    fn update(&mut self, window: &Window) -> Result<Answer, PluginError>;
+}
