@@ -26,6 +26,7 @@ impl AxisVector {
     }
 
     /// Applies `f` to every entry.
+    #[must_use]
     pub fn map(self, f: impl FnMut(f64) -> f64) -> Self {
         Self(self.0.map(f))
     }

@@ -34,7 +34,7 @@ pub use limits::{AxisLimits, Limits, PathLimits};
 pub use planner::{
     Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription, SegmentSink,
 };
-pub use plugin::{Plugin, PluginError, PluginKind, parse_options};
+pub use plugin::{Made, Plugin, PluginError, PluginKind, parse_options};
 pub use segment::{Edge, RingEntry, Segment, SegmentFlags, StopOn};
 pub use slice::RawSlice;
 pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};

@@ -31,17 +31,20 @@ impl fmt::Display for PluginError {
 
 impl std::error::Error for PluginError {}
 
+/// What a factory gives: the plugin, or why it refuses to start.
+pub type Made<T> = Result<Box<T>, PluginError>;
+
 /// The factory of each kind of plugin. `options` is the TOML text of the plugin's `options` table.
 #[derive(Clone, Copy)]
 pub enum PluginKind {
     /// Makes a [`Planner`].
-    Planner(fn(options: &str, context: &PlannerContext) -> Result<Box<dyn Planner>, PluginError>),
+    Planner(fn(options: &str, context: &PlannerContext) -> Made<dyn Planner>),
     /// Makes a [`FeedStrategy`].
-    FeedStrategy(fn(options: &str, context: &StrategyContext) -> Result<Box<dyn FeedStrategy>, PluginError>),
+    FeedStrategy(fn(options: &str, context: &StrategyContext) -> Made<dyn FeedStrategy>),
     /// Makes a [`Driver`].
-    Driver(fn(options: &str) -> Result<Box<dyn Driver>, PluginError>),
+    Driver(fn(options: &str) -> Made<dyn Driver>),
     /// Makes a [`Kinematics`].
-    Kinematics(fn(options: &str) -> Result<Box<dyn Kinematics>, PluginError>),
+    Kinematics(fn(options: &str) -> Made<dyn Kinematics>),
 }
 
 impl PluginKind {

@@ -89,9 +89,12 @@ pub struct Segment {
     pub feed_mm_per_s: f64,
     /// Path deceleration that the plan leaves everywhere in this segment, its own braking counted, mm/s².
     pub stop_deceleration_mm_per_s2: f64,
-    /// Where velocity steps are allowed: the mean acceleration per axis that stands for the steps at the segment's ends,
-    /// mm/s². With it `velocity − step` is continuous and the governor has something smooth to limit. Zero for planners
-    /// with continuous velocity. See `ARCHITECTURE.md`, "Velocity steps and the governor".
+    /// Where velocity steps are allowed: how far the velocity at the start of the segment is ahead of a velocity that is
+    /// continuous over the junctions, mm/s. Zero for planners with continuous velocity.
+    pub step_velocity: AxisVector,
+    /// How fast that lead is taken back, mm/s²: at local time t the continuous velocity is
+    /// `velocity(t) − step_velocity + step_acceleration · t`, and it is what the governor limits. See `ARCHITECTURE.md`,
+    /// "Velocity steps and the governor".
     pub step_acceleration: AxisVector,
     /// Bound on |dσ/dt| that keeps the jerk limit, 1/s; infinite for order 2.
     pub max_sigma_rate_per_s: f64,
@@ -119,6 +122,7 @@ impl Segment {
             path: [0.0; 6],
             feed_mm_per_s: f64::INFINITY,
             stop_deceleration_mm_per_s2: f64::INFINITY,
+            step_velocity: AxisVector::ZERO,
             step_acceleration: AxisVector::ZERO,
             max_sigma_rate_per_s: f64::INFINITY,
             max_sigma_acceleration_per_s2: f64::INFINITY,
