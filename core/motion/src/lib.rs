@@ -1,1 +1,16 @@
-//! .
+//! Mathematics that planners share: paths by path coordinate, speed profiles along a block, segments from both.
+//!
+//! Units: mm, s, rad. Nothing here allocates unless it says so; everything is called on the rough loop.
+
+mod arc;
+mod geometry;
+mod path;
+mod profile;
+mod segment;
+mod vector;
+
+pub use geometry::{half_angle_turn_rad, one_minus_cos};
+pub use path::Path;
+pub use profile::Profile;
+pub use segment::{Builder, SpeedPiece};
+pub use vector::{from_nalgebra, to_nalgebra};
