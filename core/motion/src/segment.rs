@@ -61,6 +61,11 @@ impl Builder {
         &mut self.blank
     }
 
+    /// Where the block starts on the path of the run, mm.
+    pub fn path_start_mm(&self) -> f64 {
+        self.path_start_mm
+    }
+
     /// The longest duration, s, that one segment from `piece` may have and stay within its fit.
     pub fn longest_s(&self, piece: &SpeedPiece) -> f64 {
         if self.path.is_straight() {
