@@ -34,7 +34,14 @@ impl Buffer {
     /// An empty buffer for `capacity` blocks. Allocates for good.
     pub fn new(capacity: usize) -> Self {
         let room = 2 * capacity;
-        Self { nodes: Vec::with_capacity(room), entries: Vec::with_capacity(room), first: 0, dirty: 0, capacity, last_own: 0.0 }
+        Self {
+            nodes: Vec::with_capacity(room),
+            entries: Vec::with_capacity(room),
+            first: 0,
+            dirty: 0,
+            capacity,
+            last_own: 0.0,
+        }
     }
 
     /// Blocks waiting.

@@ -137,10 +137,7 @@ fn profile(entry: &Entry, (start, end): (f64, f64)) -> Profile {
 fn steps(entry: &Entry, profile: &Profile, rule: Junction) -> [AxisVector; 2] {
     match rule {
         Junction::Tangent => [AxisVector::ZERO; 2],
-        Junction::Axis => [
-            entry.half_steps[0] * profile.start_mm_per_s,
-            entry.half_steps[1] * profile.end_mm_per_s,
-        ],
+        Junction::Axis => [entry.half_steps[0] * profile.start_mm_per_s, entry.half_steps[1] * profile.end_mm_per_s],
     }
 }
 

@@ -116,7 +116,9 @@ impl Planner for LookAhead {
 
     fn check(&self, block: &Block) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
-            return Err(PluginError::fixed("the look-ahead planner drives lines and arcs; for NURBS use planner nurbs"));
+            return Err(PluginError::fixed(
+                "the look-ahead planner drives lines and arcs; for NURBS use planner nurbs",
+            ));
         }
         if block.kind == BlockKind::Dwell {
             let possible = block.dwell_s >= 0.0 && block.dwell_s.is_finite();
@@ -124,7 +126,11 @@ impl Planner for LookAhead {
         }
         let sound = block.start.is_finite() && block.end.is_finite() && block.length_mm > 0.0;
         let feed = block.command_feed_mm_per_s();
-        if sound && feed > 0.0 { Ok(()) } else { Err(PluginError::fixed("a block needs a length and a feed above zero")) }
+        if sound && feed > 0.0 {
+            Ok(())
+        } else {
+            Err(PluginError::fixed("a block needs a length and a feed above zero"))
+        }
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {

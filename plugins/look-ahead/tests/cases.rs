@@ -114,5 +114,8 @@ fn rough_records_and_fine_increments() {
         assert_close(&(to - from).0[..2], &numbers(increment), 1e-9);
     }
     let end = collected.segments.last().unwrap();
-    assert_eq!(end.position(end.duration_s), *points(&common::case("000_square")["input"]["points_mm"]).last().unwrap());
+    assert_eq!(
+        end.position(end.duration_s),
+        *points(&common::case("000_square")["input"]["points_mm"]).last().unwrap()
+    );
 }
