@@ -1,1 +1,112 @@
-//! .
+//! What crosses between the rough and the fine loop: three rings and a handful of atomics.
+//!
+//! Segments and events go one way, samples the other, feed ratios beside them. The operator's commands are atomics: a
+//! stop never shares a queue with work. Nothing here locks; nothing allocates after [`bridge`].
+
+mod atomics;
+mod controls;
+mod sample;
+
+pub use atomics::{AtomicF64, Depth};
+pub use controls::{Controls, Status};
+pub use sample::{MachineState, Sample};
+
+use std::sync::Arc;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+use tandem_sdk::RingEntry;
+
+/// An entry of the segment ring with its place in program time.
+#[derive(Clone, Copy, Debug)]
+pub struct Queued {
+    /// The segment or event.
+    pub entry: RingEntry,
+    /// Program time at which it starts, s, from the start of the epoch.
+    pub start_s: f64,
+}
+
+/// A feed ratio asked for by the strategy and the policy, with the tick from which it counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ratio {
+    /// First tick at which it acts. One that comes later acts at once and is counted.
+    pub tick: u64,
+    /// The ratio.
+    pub ratio: f64,
+}
+
+/// Sizes of the rings, in entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Segments and events.
+    pub segments: usize,
+    /// Samples on their way to the feed strategy and the recorder.
+    pub samples: usize,
+}
+
+impl Default for Sizes {
+    /// 8192 segments (6 MB) hold the worst stop of blocks a tenth of a millimetre long at any sensible feed; 16384
+    /// samples hold 16 s of a recorder that is not looking.
+    fn default() -> Self {
+        Self { segments: 8192, samples: 16_384 }
+    }
+}
+
+/// The rough loop's end.
+#[derive(Debug)]
+pub struct RoughEnd {
+    /// Segments and events out.
+    pub segments: Producer<Queued>,
+    /// Ratios out.
+    pub ratios: Producer<Ratio>,
+    /// How far the queue reaches.
+    pub depth: Arc<Depth>,
+    /// What the fine loop says of itself.
+    pub status: Arc<Status>,
+}
+
+/// The fine loop's end.
+#[derive(Debug)]
+pub struct FineEnd {
+    /// Segments and events in.
+    pub segments: Consumer<Queued>,
+    /// Ratios in.
+    pub ratios: Consumer<Ratio>,
+    /// How far the queue reaches.
+    pub depth: Arc<Depth>,
+    /// The operator's commands.
+    pub controls: Arc<Controls>,
+    /// What the fine loop says of itself.
+    pub status: Arc<Status>,
+    /// Samples out.
+    pub samples: Producer<Sample>,
+}
+
+/// The host's end.
+#[derive(Debug)]
+pub struct HostEnd {
+    /// The operator's commands.
+    pub controls: Arc<Controls>,
+    /// What the fine loop says of itself.
+    pub status: Arc<Status>,
+    /// Every sample.
+    pub samples: Consumer<Sample>,
+}
+
+/// Makes the bridge between the loops. Allocates for good.
+pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
+    let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
+    let (ratios_in, ratios_out) = RingBuffer::new(64);
+    let (samples_in, samples_out) = RingBuffer::new(sizes.samples);
+    let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());
+    let rough =
+        RoughEnd { segments: segments_in, ratios: ratios_in, depth: Arc::clone(&depth), status: Arc::clone(&status) };
+    let fine = FineEnd {
+        segments: segments_out,
+        ratios: ratios_out,
+        depth,
+        controls: Arc::clone(&controls),
+        status: Arc::clone(&status),
+        samples: samples_in,
+    };
+    (rough, fine, HostEnd { controls, status, samples: samples_out })
+}

@@ -1,0 +1,56 @@
+//! The operator's commands and the fine loop's status, as atomics.
+
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
+
+use crate::AtomicF64;
+
+/// The operator's commands. Each acts in the next fine period.
+#[derive(Debug)]
+pub struct Controls {
+    /// Feed hold: true holds, false resumes.
+    pub hold: AtomicBool,
+    /// Feed override, 1 for the programmed feed.
+    pub feed_override: AtomicF64,
+    /// Rapid override, 1 for the machine's rapid feed.
+    pub rapid_override: AtomicF64,
+    /// Emergency stop: ramp out off the path, then the drives' quick stop. Sticky.
+    pub emergency_stop: AtomicBool,
+    /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
+    pub soft_fault: AtomicBool,
+    /// Programmed permission for the feed override (M48 to M53); written by the fine loop at the event's tick.
+    pub override_permitted: AtomicBool,
+}
+
+impl Default for Controls {
+    fn default() -> Self {
+        Self {
+            hold: AtomicBool::new(false),
+            feed_override: AtomicF64::new(1.0),
+            rapid_override: AtomicF64::new(1.0),
+            emergency_stop: AtomicBool::new(false),
+            soft_fault: AtomicBool::new(false),
+            override_permitted: AtomicBool::new(true),
+        }
+    }
+}
+
+/// What the fine loop says of itself; for looking at, not for deciding.
+#[derive(Debug, Default)]
+pub struct Status {
+    /// Fine periods done.
+    pub tick: AtomicU64,
+    /// Program time in the current epoch, s.
+    pub program_time_s: AtomicF64,
+    /// Path speed commanded, mm/s.
+    pub feed_mm_per_s: AtomicF64,
+    /// Program line that moves.
+    pub line: AtomicU32,
+    /// A [`crate::MachineState`] as its number.
+    pub state: AtomicU32,
+    /// True while nothing moves and nothing is queued.
+    pub idle: AtomicBool,
+    /// Digital inputs as last read.
+    pub inputs: AtomicU64,
+    /// Samples lost because nobody took them from the ring.
+    pub lost_samples: AtomicU64,
+}

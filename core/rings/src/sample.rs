@@ -1,0 +1,75 @@
+//! One fine period, as the fine loop reports it.
+
+use tandem_sdk::AxisVector;
+
+/// What the machine is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum MachineState {
+    /// At rest, nothing to do, or waiting for the queue to fill.
+    #[default]
+    Standstill = 0,
+    /// Following the program.
+    Running = 1,
+    /// Feed hold: stopping or stopped on the path.
+    Holding = 2,
+    /// The queue ran low: stopping or stopped on the path until it has filled.
+    Starved = 3,
+    /// Ramping out after a fault, off the path.
+    Stopping = 4,
+    /// Stopped by a fault.
+    Fault = 5,
+}
+
+impl MachineState {
+    /// The state of a number, as [`crate::Status::state`] holds it.
+    pub fn from_number(number: u32) -> Self {
+        [Self::Standstill, Self::Running, Self::Holding, Self::Starved, Self::Stopping, Self::Fault]
+            .into_iter()
+            .find(|s| *s as u32 == number)
+            .unwrap_or_default()
+    }
+
+    /// The state's name as traces and people read it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Standstill => "standstill",
+            Self::Running => "running",
+            Self::Holding => "holding",
+            Self::Starved => "starved",
+            Self::Stopping => "stopping",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// One fine period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Number of the period.
+    pub tick: u64,
+    /// Block that moved.
+    pub block: u64,
+    /// Program line that moved.
+    pub line: u32,
+    /// What the machine was doing.
+    pub state: MachineState,
+    /// Position sent, axis space, mm or rad.
+    pub command: AxisVector,
+    /// Position read back, axis space, mm or rad.
+    pub feedback: AxisVector,
+    /// Speed read back, axis space.
+    pub speed: AxisVector,
+    /// Mean motor current per joint, A.
+    pub current_a: AxisVector,
+    /// Path speed commanded, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Programmed feed, mm/s; infinite for rapids.
+    pub programmed_feed_mm_per_s: f64,
+    /// Rate of program time at the end of the period.
+    pub sigma: f64,
+    /// Feed ratio in force.
+    pub ratio: f64,
+    /// Spindle speed read back, rad/s.
+    pub spindle_rad_per_s: f64,
+}
