@@ -1,1 +1,44 @@
-//! .
+//! Simulated drives: the driver `sim`.
+//!
+//! The same contract as real hardware ([`tandem_sdk::Driver`]), so that a simulation is the same host with another driver.
+//! Two models, chosen by the option `model`:
+//!
+//! - `"ideal"` (default): the feedback of an exchange is the setpoint of that exchange.
+//! - `"second-order"`: every joint is a position servo of second order with a following error.
+//!
+//! ```toml
+//! [driver]
+//! plugin = "sim"
+//! [driver.options]
+//! model = "second-order"
+//! natural_frequency_hz = 30
+//! damping_ratio = 0.7
+//! spindle_time_constant_s = 0.3
+//! quick_stop_deceleration_mm_per_s2 = 5000
+//!
+//! [[driver.options.switches]]      # input 0 is 1 while joint 0 stands above 12.5 mm: a touch plane to probe
+//! input = 0
+//! joint = 0
+//! above_mm = 12.5
+//! ```
+//!
+//! Everything is computed from the setpoints and the fine period: no clock, no randomness, so a run repeats bit for bit.
+
+mod driver;
+mod joint;
+mod options;
+mod spindle;
+
+pub use driver::SimulatedDrives;
+pub use joint::CURRENT_A_PER_MM_PER_S2;
+pub use options::{Model, Options, Switch};
+
+use tandem_sdk::{Driver, Plugin, PluginError, PluginKind};
+
+/// The plugin as a host registers it.
+pub const PLUGIN: Plugin = Plugin { name: "sim", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Driver(make) };
+
+/// Makes the driver from the TOML text of its options.
+fn make(options: &str) -> Result<Box<dyn Driver>, PluginError> {
+    Ok(Box::new(SimulatedDrives::new(Options::parse(options)?)))
+}

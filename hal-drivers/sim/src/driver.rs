@@ -1,0 +1,200 @@
+//! The driver contract over the simulated joints, spindle and switches.
+
+use std::f64::consts::TAU;
+
+use tandem_sdk::{
+    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, PluginError, Setpoint,
+};
+
+use crate::joint::{CURRENT_A_PER_MM_PER_S2, Motion, Servo};
+use crate::options::{Model, Options};
+use crate::spindle::Spindle;
+
+/// Where the driver is in its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Life {
+    Closed,
+    Opened,
+    Running,
+}
+
+/// Simulated drives behind the driver contract.
+///
+/// Joints stand at [`DriverContext::start_position`] when started. While `enable` is 0 they do not follow: they run out at
+/// the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are
+/// then reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its
+/// command in every state. Latches are not simulated.
+#[derive(Debug)]
+pub struct SimulatedDrives {
+    options: Options,
+    life: Life,
+    joint_count: usize,
+    period_s: f64,
+    start_position: AxisVector,
+    servo: Servo,
+    joints: [Motion; MAX_AXES],
+    /// The setpoint that the joints followed last; none while they follow nothing.
+    followed: Option<AxisVector>,
+    quick_stopping: bool,
+    spindle: Spindle,
+}
+
+impl SimulatedDrives {
+    /// Drives with checked options, not yet opened.
+    pub fn new(options: Options) -> Self {
+        let period_s = 0.001; // replaced by `open`
+        Self {
+            servo: servo(&options, period_s),
+            spindle: Spindle::new(options.spindle_time_constant_s, period_s),
+            options,
+            life: Life::Closed,
+            joint_count: 0,
+            period_s,
+            start_position: AxisVector::ZERO,
+            joints: [Motion::default(); MAX_AXES],
+            followed: None,
+            quick_stopping: false,
+        }
+    }
+
+    fn check_machine(&self, context: &DriverContext) -> Result<(), PluginError> {
+        let count = context.joint_count as usize;
+        if !(1..=MAX_AXES).contains(&count) {
+            return Err(PluginError::new(format!("sim: a machine has 1 to {MAX_AXES} joints, not {count}")));
+        }
+        if !(context.fine_period_s.is_finite() && context.fine_period_s > 0.0) {
+            return Err(PluginError::new(format!("sim: no fine period: {} s", context.fine_period_s)));
+        }
+        if !context.start_position.is_finite() {
+            return Err(PluginError::fixed("sim: the start position is not a finite number"));
+        }
+        match self.options.switches.iter().find(|switch| switch.joint >= count) {
+            Some(switch) => Err(PluginError::new(format!(
+                "sim: options: switches: joint = {}: the machine has joints 0 to {}",
+                switch.joint,
+                count - 1
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Moves all joints over one period. Fine loop.
+    fn move_joints(&mut self, setpoint: &Setpoint) {
+        if setpoint.enable == 0 || setpoint.reset != 0 {
+            self.quick_stopping = false;
+        }
+        if setpoint.enable == 0 || self.quick_stopping {
+            self.followed = None;
+            let deceleration = self.options.quick_stop_deceleration_mm_per_s2;
+            self.joints[..self.joint_count].iter_mut().for_each(|joint| joint.brake(deceleration, self.period_s));
+            return;
+        }
+        // Drives that just begin to follow have no setpoint to interpolate from: for them it is a step.
+        let from = self.followed.unwrap_or(setpoint.position);
+        for (index, joint) in self.joints[..self.joint_count].iter_mut().enumerate() {
+            match self.options.model {
+                Model::Ideal => {
+                    *joint = Motion { position: setpoint.position[index], speed: setpoint.velocity[index] };
+                }
+                Model::SecondOrder => self.servo.follow(joint, from[index], setpoint.position[index]),
+            }
+        }
+        self.followed = Some(setpoint.position);
+    }
+
+    fn report(&self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
+        *feedback = Feedback::default();
+        for (index, joint) in self.joints[..self.joint_count].iter().enumerate() {
+            feedback.position[index] = joint.position;
+            feedback.speed[index] = joint.speed;
+            feedback.current_a[index] = self.mean_current_a(&before[index], joint);
+            feedback.state[index] = self.state(enable, joint);
+        }
+        feedback.inputs = self.inputs();
+        feedback.spindle_rad_per_s = self.spindle.speed;
+        feedback.spindle_angle_rad = self.spindle.angle;
+    }
+
+    fn mean_current_a(&self, before: &Motion, now: &Motion) -> f64 {
+        match self.options.model {
+            Model::Ideal => 0.0,
+            Model::SecondOrder => CURRENT_A_PER_MM_PER_S2 * (now.speed - before.speed) / self.period_s,
+        }
+    }
+
+    fn state(&self, enable: bool, joint: &Motion) -> JointState {
+        let at_rest_for_good = self.quick_stopping && joint.speed == 0.0;
+        if enable && !at_rest_for_good { JointState::Enabled } else { JointState::Disabled }
+    }
+
+    fn inputs(&self) -> u64 {
+        let on = self.options.switches.iter().filter(|switch| self.joints[switch.joint].position > switch.above_mm);
+        on.fold(0, |inputs, switch| inputs | 1 << switch.input)
+    }
+
+    fn refuse_unless(&self, wanted: Life, refusals: [&'static str; 3]) -> Result<(), PluginError> {
+        if self.life == wanted { Ok(()) } else { Err(PluginError::fixed(refusals[self.life as usize])) }
+    }
+}
+
+fn servo(options: &Options, period_s: f64) -> Servo {
+    Servo::new(TAU * options.natural_frequency_hz, options.damping_ratio, period_s)
+}
+
+impl Driver for SimulatedDrives {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::simulated()
+    }
+
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        const REFUSED: [&str; 3] =
+            ["", "sim: open is refused: the driver is already opened", "sim: open is refused: the driver is running"];
+        self.refuse_unless(Life::Closed, REFUSED)?;
+        self.check_machine(context)?;
+        self.joint_count = context.joint_count as usize;
+        self.period_s = context.fine_period_s;
+        self.start_position = context.start_position;
+        self.servo = servo(&self.options, self.period_s);
+        self.life = Life::Opened;
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<(), PluginError> {
+        const REFUSED: [&str; 3] =
+            ["sim: start is refused: the driver is closed", "", "sim: start is refused: the driver is already running"];
+        self.refuse_unless(Life::Opened, REFUSED)?;
+        self.joints = std::array::from_fn(|i| Motion { position: self.start_position[i], speed: 0.0 });
+        self.spindle = Spindle::new(self.options.spindle_time_constant_s, self.period_s);
+        self.followed = None;
+        self.quick_stopping = false;
+        self.life = Life::Running;
+        Ok(())
+    }
+
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        const REFUSED: [&str; 3] = [
+            "sim: exchange is refused: the driver is closed",
+            "sim: exchange is refused: the driver is opened but not started",
+            "",
+        ];
+        self.refuse_unless(Life::Running, REFUSED)?;
+        let finite = setpoint.position.is_finite() && setpoint.velocity.is_finite();
+        if !(finite && setpoint.spindle_rad_per_s.is_finite()) {
+            return Err(PluginError::fixed("sim: exchange is refused: the setpoint is not a finite number"));
+        }
+        let before = self.joints;
+        self.move_joints(setpoint);
+        self.spindle.follow(setpoint.spindle_rad_per_s);
+        self.report(&before, setpoint.enable != 0, feedback);
+        Ok(())
+    }
+
+    fn quick_stop(&mut self) {
+        self.quick_stopping = self.life == Life::Running;
+    }
+
+    fn stop(&mut self) {
+        self.life = Life::Closed;
+        self.quick_stopping = false;
+    }
+}
