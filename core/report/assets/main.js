@@ -1,0 +1,128 @@
+function byId(id) {
+  return document.getElementById(id);
+}
+
+function readout() {
+  const i = state.cursor, span = state.to - state.from;
+  const parts = i === null
+    ? [["selected", `${seconds(state.from, span)} – ${seconds(state.to, span)}`], ["", `${number(span)} s`]]
+    : [["t", columns.t[i].toFixed(4) + " s"], ["line", columns.line[i]],
+      ...about.axes.map((axis, k) => [axis.letter, minus(positionOf(k, i).toFixed(4))])];
+  byId("readout").replaceChildren(...parts.flatMap(([name, value]) => [name + " ", element("b", "", value)]));
+}
+
+function makeViews(view) {
+  const buttons = ["XY", "XZ", "YZ", "3D"].map((name) => {
+    const button = element("button", "", name === "3D" ? "3-D" : name);
+    button.onclick = () => showView(view, name, buttons);
+    button.dataset.view = name;
+    return button;
+  });
+  byId("views").append(...buttons);
+  const wanted = new URLSearchParams(location.hash.slice(1)).get("view");
+  showView(view, buttons.some((b) => b.dataset.view === wanted) ? wanted : flatView(view), buttons);
+}
+
+function showView(view, name, buttons) {
+  buttons.forEach((button) => button.setAttribute("aria-pressed", button.dataset.view === name));
+  const turn = name === "3D" ? "drag: turn · shift-drag: move" : "drag: move";
+  byId("path-hint").textContent = `wheel: zoom · ${turn} · double-click: whole path · grey: outside the selected time`;
+  view.show(name);
+}
+
+// The plane in which most happens.
+function flatView(view) {
+  const extent = view.points.map((values) => {
+    const [low, high] = new Extremes(values).of(0, values.length);
+    return high - low;
+  });
+  const least = extent.indexOf(Math.min(...extent));
+  return extent[least] > 0.2 * Math.max(...extent) ? "3D" : ["YZ", "XZ", "XY"][least];
+}
+
+function makeColourChoice(view) {
+  const choice = byId("colour-by");
+  choice.append(...view.sources.map((source) => element("option", "", source.name)));
+  choice.onchange = () => {
+    view.source = view.sources[choice.selectedIndex];
+    changed("look");
+  };
+}
+
+function makeButtons(view) {
+  byId("fit-all").onclick = () => view.fit(0, columns.t.length);
+  byId("fit-window").onclick = () => view.fit(...selectedRange());
+  byId("all-time").onclick = selectAllTime;
+  const unit = byId("unit");
+  unit.textContent = feedUnit();
+  unit.onclick = () => {
+    state.perMinute = !state.perMinute;
+    unit.textContent = feedUnit();
+    changed("look");
+  };
+  byId("go-to-line").onkeydown = (event) => event.key === "Enter" && goToLine(Number(event.target.value), view);
+}
+
+function goToLine(number, view) {
+  const from = columns.line.indexOf(number), to = columns.line.lastIndexOf(number);
+  byId("go-to-line").setCustomValidity(from < 0 ? "no sample belongs to this line" : "");
+  byId("go-to-line").reportValidity();
+  if (from >= 0) goToTime(columns.t[from], columns.t[to], view);
+}
+
+function goToTime(from, to, view) {
+  const margin = Math.max((to - from) * 0.1, 0.01);
+  selectTime(from - margin, to + margin);
+  view.fit(...selectedRange());
+}
+
+function makeFindings(view) {
+  const rows = document.querySelectorAll("#findings tr[data-from]");
+  byId("findings").hidden = rows.length === 0;
+  for (const row of rows) {
+    row.onclick = () => goToTime(Number(row.dataset.from), Number(row.dataset.to), view);
+    row.onkeydown = (event) => event.key === "Enter" && row.onclick();
+  }
+}
+
+function followTheme() {
+  const reload = () => {
+    loadTheme();
+    changed("look");
+  };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", reload);
+  reload();
+}
+
+function makeDrawings() {
+  const plots = allPlots(), overview = new Overview(byId("overview")), view = new PathView(byId("path"));
+  byId("plots").append(...plots.map((plot) => plot.root));
+  on("window cursor look", () => plots.forEach((plot) => plot.draw()));
+  on("window look", () => overview.draw());
+  on("window look", drawTimeAxis);
+  on("window cursor look", () => view.draw());
+  on("window cursor look", readout);
+  return view;
+}
+
+async function start() {
+  loadTheme();
+  await readColumns();
+  if (columns.t.length === 0) {
+    document.querySelector("main").replaceChildren(element("p", "", "This run has no samples."));
+  } else {
+    const view = makeDrawings();
+    restoreTime();
+    makeViews(view);
+    makeColourChoice(view);
+    makeButtons(view);
+    makeFindings(view);
+    listenToKeys();
+    followTheme();
+    addEventListener("resize", () => changed("look"));
+    addEventListener("hashchange", restoreTime);
+  }
+  requestAnimationFrame(() => requestAnimationFrame(() => (document.documentElement.dataset.ready = "1")));
+}
+
+start();

@@ -1,0 +1,96 @@
+// Which plots a run has.
+
+function feedScale() {
+  return state.perMinute ? 60 : 1;
+}
+
+function feedUnit() {
+  return state.perMinute ? "mm/min" : "mm/s";
+}
+
+function main() {
+  return THEMES[theme.name].main;
+}
+
+function second() {
+  return THEMES[theme.name].second;
+}
+
+function feedPlot() {
+  const look = (key, label, colour) => ({ key, label, colour, scale: feedScale });
+  const curves = [new Curve(columns.feed, null, look("feed", "path", main))];
+  if (columns.programmed) curves.unshift(new Curve(columns.programmed, null, look("programmed", "programmed", second)));
+  return new Plot({ title: "Feed", unit: feedUnit, curves, fromZero: true, major: true });
+}
+
+// One plot for the linear and one for the rotary axes: their units have nothing in common.
+function axisPlots(title, column, what) {
+  return ["mm", "deg"].flatMap((unit) => {
+    const curves = about.axes.map((axis, i) => [axis, i]).filter(([axis, i]) => axis.unit === unit && columns[column + i])
+      .map(([axis, i]) => axisCurve(axis, i, column, what));
+    return curves.length === 0 ? [] : [new Plot({ title, curves, ...what.plot(unit) })];
+  });
+}
+
+function axisCurve(axis, i, column, what) {
+  return new Curve(columns[column + i], columns["marks" + i], {
+    key: "axis " + axis.letter, label: axis.letter, colour: () => axisColour(axis.letter), bit: what.bit,
+    limit: what.limit ? axis[what.limit] : null, scale: what.scale ? what.scale(axis) : () => 1, judged: what.judged !== false,
+  });
+}
+
+function velocityPlots() {
+  const scale = (axis) => (axis.linear ? feedScale : () => 1);
+  const plot = (unit) => ({ unit: () => (unit === "mm" ? feedUnit() : "deg/s"), major: true });
+  return axisPlots("Velocity", "velocity", { bit: 1, limit: "max_velocity", scale, plot });
+}
+
+function accelerationPlots() {
+  const plot = (unit) => ({ unit: () => unit + "/s²", note: stepNote(unit), major: true });
+  return axisPlots("Acceleration", "acceleration", { bit: 2, limit: "max_acceleration", plot });
+}
+
+function stepNote(unit) {
+  const step = Math.max(0, ...about.axes.filter((axis) => axis.unit === unit).map((axis) => axis.speed_difference));
+  if (step === 0) return "";
+  return `finite differences; steps up to ${number(step)} ${unit}/s where blocks meet are allowed`;
+}
+
+function jerkPlots() {
+  const judged = about.jerk_is_judged;
+  const note = !judged && about.axes.some((axis) => axis.max_jerk !== null) ? "reported, not judged" : "";
+  return axisPlots("Jerk", "jerk", { bit: 4, limit: "max_jerk", judged, plot: (unit) => ({ unit: () => unit + "/s³", note }) });
+}
+
+function deviationPlot() {
+  if (!columns.deviation) return [];
+  const curve = new Curve(columns.deviation, columns.offpath, {
+    key: "deviation", label: "deviation", colour: main, scale: () => 1000, limit: about.path_tolerance_mm, twoSided: false, bit: 1,
+  });
+  return [new Plot({ title: "Path deviation", unit: () => "µm", curves: [curve], fromZero: true })];
+}
+
+function followingPlots() {
+  const scale = (axis) => (axis.linear ? () => 1000 : () => 1);
+  return axisPlots("Following error", "following", { scale, bit: 0, plot: (unit) => ({ unit: () => (unit === "mm" ? "µm" : "deg") }) });
+}
+
+function sigmaPlot() {
+  if (!columns.sigma) return [];
+  const curve = new Curve(columns.sigma, null, { key: "sigma", label: "σ", colour: main });
+  return [new Plot({ title: "Rate of program time", unit: () => "", curves: [curve], fixed: [0, 1.08] })];
+}
+
+function signalPlots() {
+  return about.signals.map((signal, k) => {
+    const curve = new Curve(columns["signal" + k], null, { key: "signal " + k, label: signal.name, colour: main });
+    return new Plot({ title: signal.name, unit: () => signal.unit, curves: [curve] });
+  });
+}
+
+function allPlots() {
+  return [
+    feedPlot(), ...velocityPlots(), ...accelerationPlots(), ...jerkPlots(), ...deviationPlot(), ...followingPlots(),
+    ...sigmaPlot(), ...signalPlots(),
+  ];
+}

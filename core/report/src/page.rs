@@ -1,0 +1,180 @@
+//! The page as a whole: a template whose gaps are filled while it is written.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use crate::columns::Derived;
+use crate::model::{Report, Unit};
+use crate::sections;
+use crate::text::escape;
+
+/// Samples that a browser still draws fluently; more are thinned.
+pub(crate) const MAX_SAMPLES: usize = 2_000_000;
+
+const TEMPLATE: &str = include_str!("../assets/page.html");
+const STYLE: &str = include_str!("../assets/style.css");
+/// In the order in which they build on each other.
+const SCRIPTS: [&str; 12] = [
+    include_str!("../assets/data.js"),
+    include_str!("../assets/format.js"),
+    include_str!("../assets/colour.js"),
+    include_str!("../assets/state.js"),
+    include_str!("../assets/curve.js"),
+    include_str!("../assets/plot.js"),
+    include_str!("../assets/timeline.js"),
+    include_str!("../assets/path.js"),
+    include_str!("../assets/scene.js"),
+    include_str!("../assets/pointer.js"),
+    include_str!("../assets/plots.js"),
+    include_str!("../assets/main.js"),
+];
+
+/// Writes the page with at most about `cap` points in each curve.
+pub(crate) fn write(report: &Report, out: &mut dyn Write, cap: usize) -> io::Result<()> {
+    let derived = Derived::of(report, cap)?;
+    let mut pieces = TEMPLATE.split("{{");
+    out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
+    for piece in pieces {
+        let (gap, rest) = piece.split_once("}}").unwrap_or((piece, ""));
+        fill(gap, report, &derived, out)?;
+        out.write_all(rest.as_bytes())?;
+    }
+    out.flush()
+}
+
+fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> io::Result<()> {
+    let text = match gap {
+        "title" => escape(&report.title),
+        "subtitle" => sections::subtitle(report),
+        "verdict" => sections::verdict(report, derived),
+        "notes" => sections::notes(report, derived),
+        "facts" => sections::facts(report),
+        "peaks-head" => sections::peaks_head(report),
+        "peaks" => sections::peaks(report, derived),
+        "findings" => sections::findings(derived),
+        "style" => STYLE.into(),
+        "script" => SCRIPTS.concat(),
+        "about" => about(report, derived)?,
+        "columns" => return derived.columns(report).try_for_each(|column| column.write(out)),
+        unknown => unreachable!("the template has an unknown gap {unknown}"),
+    };
+    out.write_all(text.as_bytes())
+}
+
+/// What the script must know besides the columns.
+#[derive(Serialize)]
+struct About<'a> {
+    axes: Vec<AboutAxis>,
+    signals: Vec<AboutSignal<'a>>,
+    path_tolerance_mm: Option<f64>,
+    jerk_is_judged: bool,
+}
+
+#[derive(Serialize)]
+struct AboutAxis {
+    letter: String,
+    unit: &'static str,
+    linear: bool,
+    centre: f64,
+    max_velocity: f64,
+    max_acceleration: f64,
+    max_jerk: Option<f64>,
+    speed_difference: f64,
+}
+
+#[derive(Serialize)]
+struct AboutSignal<'a> {
+    name: &'a str,
+    unit: &'a str,
+}
+
+/// The JSON of [`About`], with `<` written so that it cannot end the element it stands in.
+fn about(report: &Report, derived: &Derived) -> io::Result<String> {
+    let axes = report.axes.iter().zip(&derived.centres).map(|(axis, &centre)| AboutAxis {
+        letter: axis.letter.into(),
+        unit: axis.unit.as_str(),
+        linear: axis.unit == Unit::Mm,
+        centre,
+        max_velocity: axis.max_velocity,
+        max_acceleration: axis.max_acceleration,
+        max_jerk: axis.max_jerk,
+        speed_difference: axis.speed_difference,
+    });
+    let signals = report.signals.iter().map(|signal| AboutSignal { name: &signal.name, unit: &signal.unit });
+    let about = About {
+        axes: axes.collect(),
+        signals: signals.collect(),
+        path_tolerance_mm: report.path_tolerance_mm,
+        jerk_is_judged: report.jerk_is_judged,
+    };
+    Ok(serde_json::to_string(&about)?.replace('<', "\\u003c"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Axis, Samples, Signal};
+
+    fn report(n: usize) -> Report {
+        Report {
+            title: "<b>title</b>".into(),
+            program: "a<script>alert(1)</script>.ngc".into(),
+            facts: vec![("a<b".into(), "c&d".into())],
+            axes: vec![Axis { letter: 'X', max_velocity: 1.0, max_acceleration: 1.0, ..Axis::default() }],
+            fine_period_s: 0.001,
+            signals: vec![Signal { name: "</script>".into(), unit: "%".into(), values: vec![0.0; n] }],
+            samples: Samples {
+                t_s: (0..n).map(|i| i as f64 * 0.001).collect(),
+                line: vec![0; n],
+                command: vec![vec![0.0; n]],
+                feed_mm_s: vec![0.0; n],
+                ..Samples::default()
+            },
+            ..Report::default()
+        }
+    }
+
+    fn html(report: &Report, cap: usize) -> String {
+        let mut page = Vec::new();
+        write(report, &mut page, cap).unwrap();
+        String::from_utf8(page).unwrap()
+    }
+
+    #[test]
+    fn text_is_escaped_everywhere() {
+        let html = html(&report(3), MAX_SAMPLES);
+        assert!(html.contains("&lt;b&gt;title") && html.contains("a&lt;script&gt;alert(1)&lt;/script&gt;.ngc"));
+        assert!(!html.contains("<b>title") && !html.contains("<script>alert"));
+        assert!(html.contains(r#""name":"\u003c/script>""#));
+        assert!(html.contains("<th>a&lt;b<td>c&amp;d"));
+    }
+
+    #[test]
+    fn nothing_is_fetched() {
+        let html = html(&report(3), MAX_SAMPLES);
+        assert!(html.contains("default-src 'none'"));
+        assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("src="));
+    }
+
+    #[test]
+    fn long_runs_are_thinned_and_say_so() {
+        assert!(!html(&report(1000), 1000).contains("too many for a page"));
+        assert!(html(&report(1001), 1000).contains("1001 samples are too many for a page"));
+    }
+
+    #[test]
+    fn a_run_without_samples_is_a_page() {
+        assert!(html(&report(0), MAX_SAMPLES).contains("0 samples"));
+    }
+
+    #[test]
+    fn columns_of_other_lengths_are_refused() {
+        let mut odd = report(3);
+        odd.samples.sigma = vec![1.0; 2];
+        let error = odd.write(&mut Vec::new()).unwrap_err();
+        assert_eq!(error.to_string(), "a column has 2 samples, t_s has 3");
+        let still = Report { fine_period_s: 0.0, ..report(3) };
+        assert_eq!(still.write(&mut Vec::new()).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+    }
+}
