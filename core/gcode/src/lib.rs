@@ -1,1 +1,56 @@
-//! .
+//! Part programs to blocks and events.
+//!
+//! The language is RS274/NGC as LinuxCNC reads it and Fanuc-style CAM output writes it, without flow control. What is
+//! supported and what is refused stands in one table; [`docs`] prints it. Two passes make a run: [`check`] reads the
+//! whole program and lists its errors, [`Stream`] hands out its items on demand. [`Interpreter`] is the part in
+//! between for single lines.
+//!
+//! Where the dialects differ:
+//! - G4 P is in seconds, as in LinuxCNC. `TA` is a time constant in ms.
+//! - The units (G20, G21) and the feed mode (G93, G94) of a line hold for all its words.
+//! - G80 beside a motion word only cancels canned cycles (the usual first line of CAM output); alone it ends the motion
+//!   mode as in LinuxCNC.
+//! - G0 or G1 without axis words sets the mode. G0 or G1 beside G28 or G30 sets the mode too, the axis words are G28's.
+//! - G64 Q is accepted and has no effect.
+//! - EQ and NE forgive a difference of 0.0001, as in LinuxCNC. A blank within a number is an error.
+//! - Stored positions and offsets (#5161 to #5410) read in mm and degrees, the current position (#5420…) in program
+//!   units. A run writes no parameter file.
+
+#![allow(clippy::doc_markdown, reason = "LinuxCNC is a name, not code")]
+
+mod arc;
+mod check;
+mod config;
+mod diagnostic;
+mod execute;
+mod expression;
+mod fault;
+mod function;
+mod interpreter;
+mod item;
+mod letters;
+mod lines;
+mod machine;
+mod motion;
+mod number;
+mod offsets;
+mod orders;
+mod parameters;
+mod parse;
+mod scan;
+mod source;
+mod state;
+mod stream;
+mod table;
+mod table_g;
+mod table_m;
+mod words;
+
+pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
+pub use config::{Config, Tool};
+pub use diagnostic::Diagnostic;
+pub use interpreter::{Interpreter, MAX_LINE_BYTES};
+pub use item::{Input, InputMode, InputWait, Item};
+pub use source::{Program, ProgramError};
+pub use stream::Stream;
+pub use table::docs;

@@ -1,0 +1,121 @@
+//! The first pass: the whole program, before anything moves.
+
+use tandem_sdk::Block;
+
+use crate::config::Config;
+use crate::diagnostic::Diagnostic;
+use crate::interpreter::Interpreter;
+use crate::item::Item;
+use crate::lines::{Lines, Next, Pass};
+use crate::source::{Program, ProgramError};
+
+/// Most errors that are listed.
+pub const MAX_DIAGNOSTICS: usize = 1000;
+/// The answer of M66 that the first pass assumes: the time-out.
+const NO_ANSWER: f64 = -1.0;
+
+/// What the first pass found.
+#[derive(Clone, Debug, Default)]
+pub struct CheckReport {
+    /// The first [`MAX_DIAGNOSTICS`] errors, in the order of the lines. A missing feed is listed once.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Number of errors beyond those.
+    pub unlisted: u64,
+    /// Lines read: to the end of the program.
+    pub lines: u32,
+    /// Blocks, dwells included.
+    pub blocks: u64,
+    /// Length of all paths, mm (a block that only turns counts in rad).
+    pub length_mm: f64,
+}
+
+impl CheckReport {
+    /// Whether the program may run.
+    pub fn is_ok(&self) -> bool {
+        self.diagnostics.is_empty()
+    }
+
+    fn add(&mut self, diagnostic: Diagnostic) {
+        let once = |d: &Diagnostic| d.code == "feed-missing" && diagnostic.code == d.code;
+        if self.diagnostics.len() >= MAX_DIAGNOSTICS || self.diagnostics.iter().any(once) {
+            self.unlisted += 1;
+        } else {
+            self.diagnostics.push(diagnostic);
+        }
+    }
+}
+
+/// Runs the whole of `program` on the machine `config`. Each block goes to `per_block` (a policy, a planner's check),
+/// whose refusal becomes an error of the block's line. M66 is taken to have timed out.
+///
+/// # Errors
+/// The file cannot be read. What is wrong with the program is in the report.
+pub fn check(
+    program: &mut Program,
+    config: &Config,
+    per_block: &mut dyn FnMut(&Block) -> Result<(), String>,
+) -> Result<CheckReport, ProgramError> {
+    let mut pass = FirstPass::new(program, config, per_block);
+    match pass.run(program) {
+        Ok(()) => {}
+        Err(ProgramError::Text(diagnostic)) => pass.report.add(diagnostic),
+        Err(other) => return Err(other),
+    }
+    Ok(pass.report)
+}
+
+struct FirstPass<'a> {
+    interpreter: Interpreter,
+    per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>,
+    items: Vec<Item>,
+    report: CheckReport,
+}
+
+impl<'a> FirstPass<'a> {
+    fn new(program: &Program, config: &Config, per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>) -> Self {
+        let mut interpreter = Interpreter::new(config.clone());
+        interpreter.set_file(&program.name);
+        Self { interpreter, per_block, items: Vec::new(), report: CheckReport::default() }
+    }
+
+    fn run(&mut self, program: &mut Program) -> Result<(), ProgramError> {
+        let mut lines = Lines::new(program, Pass::First)?;
+        while !self.interpreter.ended() {
+            match lines.next(program)? {
+                Next::Line(range) => self.line(program, lines.number, lines.text(&range)),
+                Next::Bad(diagnostic) => self.report.add(diagnostic),
+                Next::End => break,
+            }
+            self.report.lines = lines.number;
+        }
+        self.items.clear();
+        self.interpreter.finish(&mut self.items)?;
+        self.take_items(program, b"");
+        Ok(())
+    }
+
+    fn line(&mut self, program: &Program, number: u32, text: &[u8]) {
+        self.items.clear();
+        if let Err(diagnostic) = self.interpreter.line(number, text, &mut self.items) {
+            self.report.add(diagnostic);
+        }
+        self.take_items(program, text);
+    }
+
+    fn take_items(&mut self, program: &Program, text: &[u8]) {
+        for item in &self.items {
+            match item {
+                Item::Block(block) => {
+                    self.report.blocks += 1;
+                    self.report.length_mm += block.length_mm;
+                    if let Err(why) = (self.per_block)(block) {
+                        let refused = Diagnostic::whole_line(&program.name, block.line, text, "block-refused", why);
+                        self.report.add(refused);
+                    }
+                }
+                Item::Wait(_) => self.interpreter.provide_input(NO_ANSWER),
+                Item::Event(_) | Item::End => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! What the interpreter must know of the machine.
+
+use tandem_sdk::{Axes, AxisVector, MAX_AXES};
+
+/// One row of the tool table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tool {
+    /// Number by which T and H call it; not 0, which is the empty spindle.
+    pub number: u32,
+    /// Pocket of the magazine, where there is one.
+    pub pocket: Option<u32>,
+    /// Length offset per axis, mm or rad: added to programmed coordinates while G43 is on.
+    pub offset: AxisVector,
+    /// Diameter, mm.
+    pub diameter_mm: f64,
+}
+
+/// The machine as a part program sees it. A run starts from this alone and writes nothing back.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// The axes.
+    pub axes: Axes,
+    /// Lowest and highest machine coordinate per axis, mm or rad; infinite where there is no limit.
+    pub travel_mm: [(f64, f64); MAX_AXES],
+    /// Where the machine stands when the program starts, machine coordinates, mm or rad.
+    pub start: AxisVector,
+    /// Reference positions of G28 and G30 before the program stores others, machine coordinates, mm or rad.
+    pub reference: [AxisVector; 2],
+    /// The tool table. Where it is empty any T number is accepted.
+    pub tools: Vec<Tool>,
+    /// Tool in the spindle at the start, 0 for none.
+    pub tool_in_spindle: u32,
+    /// Whether lines that begin with `/` are skipped.
+    pub block_delete: bool,
+}
+
+impl Config {
+    /// A machine with `axes`, without travel limits and tools, standing at zero.
+    pub fn new(axes: Axes) -> Self {
+        Self {
+            axes,
+            travel_mm: [(f64::NEG_INFINITY, f64::INFINITY); MAX_AXES],
+            start: AxisVector::ZERO,
+            reference: [AxisVector::ZERO; 2],
+            tools: Vec::new(),
+            tool_in_spindle: 0,
+            block_delete: false,
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! One line after the other to items.
+
+use std::sync::Arc;
+
+use tandem_sdk::AxisVector;
+
+use crate::config::Config;
+use crate::diagnostic::Diagnostic;
+use crate::expression::Context;
+use crate::fault::{Checked, Fault, Span};
+use crate::item::Item;
+use crate::letters::Letters;
+use crate::orders::Orders;
+use crate::parameters::Parameters;
+use crate::parse::parse;
+use crate::scan::Scanner;
+use crate::state::State;
+use crate::words::{Target, Words};
+
+/// Longest line, bytes.
+pub const MAX_LINE_BYTES: usize = 4096;
+
+/// How far a program is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Only empty lines so far.
+    Fresh,
+    /// The first line was `%`: another one must close the program.
+    Opened,
+    Running,
+    Ended,
+}
+
+/// The state of one part program and of the machine as the program knows it.
+pub struct Interpreter {
+    pub(crate) config: Config,
+    pub(crate) letters: Letters,
+    pub(crate) state: State,
+    pub(crate) words: Words,
+    pub(crate) orders: Orders,
+    parameters: Parameters,
+    file: Arc<str>,
+    phase: Phase,
+    /// Whether a word of the program has been read; a program number may only come before.
+    begun: bool,
+    /// The axis words of the current line have been used up.
+    pub(crate) moved: bool,
+}
+
+impl Interpreter {
+    /// An interpreter at the start of a program on the machine `config`.
+    pub fn new(config: Config) -> Self {
+        Self {
+            letters: Letters::new(&config.axes),
+            state: State::new(&config),
+            words: Words::default(),
+            orders: Orders::new(),
+            parameters: Parameters::new(),
+            file: "program".into(),
+            phase: Phase::Fresh,
+            begun: false,
+            moved: false,
+            config,
+        }
+    }
+
+    /// Names the program in diagnostics.
+    pub fn set_file(&mut self, name: &str) {
+        self.file = name.into();
+    }
+
+    /// Whether the program has ended: further lines are passed over.
+    pub fn ended(&self) -> bool {
+        self.phase == Phase::Ended
+    }
+
+    /// The programmed position, machine coordinates, mm or rad.
+    pub fn position(&self) -> AxisVector {
+        self.state.position
+    }
+
+    /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.
+    pub fn set_position(&mut self, position: AxisVector) {
+        self.state.position = position;
+        self.state.last_end = position;
+        self.state.uncertain = 0;
+        self.state.at_rest = true;
+    }
+
+    /// The answer to [`Item::Wait`]: 1 or 0, the analogue value, or −1 after the time-out. It becomes #5399.
+    pub fn provide_input(&mut self, value: f64) {
+        self.state.input = value;
+    }
+
+    /// Interprets line `number` (from 1), given without its line end, and appends what it orders to `out`. Blocks are
+    /// numbered through from 0.
+    ///
+    /// # Errors
+    /// The first error of the line; `out` is then as before. The interpreter can go on with the next line (to find
+    /// more errors), at the programmed end of this one where that is known.
+    pub fn line(&mut self, number: u32, text: &[u8], out: &mut Vec<Item>) -> Result<(), Diagnostic> {
+        if self.phase == Phase::Ended {
+            return Ok(());
+        }
+        let before = (out.len(), self.state.next_index, self.state.at_rest);
+        self.state.line = number;
+        self.run(text, out).map_err(|fault| {
+            out.truncate(before.0);
+            (self.state.next_index, self.state.at_rest) = (before.1, before.2);
+            self.state.last_end = self.state.position;
+            Diagnostic::new(&self.file, number, text, fault)
+        })
+    }
+
+    /// Ends the program at the end of its text, as M2 would.
+    ///
+    /// # Errors
+    /// A program that `%` has opened and nothing has closed: it is truncated.
+    pub fn finish(&mut self, out: &mut Vec<Item>) -> Result<(), Diagnostic> {
+        match self.phase {
+            Phase::Ended => Ok(()),
+            Phase::Opened => {
+                self.phase = Phase::Ended;
+                let why = "the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
+                Err(Diagnostic::whole_line(&self.file, self.state.line.max(1), b"", "truncated", why.into()))
+            }
+            Phase::Fresh | Phase::Running => {
+                self.end(out);
+                Ok(())
+            }
+        }
+    }
+
+    /// Switches off what still runs and ends the stream.
+    pub(crate) fn end(&mut self, out: &mut Vec<Item>) {
+        self.switch_off(out);
+        out.push(Item::End);
+        self.phase = Phase::Ended;
+    }
+
+    fn run(&mut self, text: &[u8], out: &mut Vec<Item>) -> Checked<()> {
+        if text.len() > MAX_LINE_BYTES {
+            return Err(too_long(text.len()));
+        }
+        let Some(from) = self.lead(text, out)? else { return Ok(()) };
+        self.words.clear();
+        self.moved = false;
+        let context = Context { parameters: &self.parameters, state: &self.state, letters: &self.letters };
+        let parsed = parse(text, from, &context, &mut self.words);
+        let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
+        let complete = parsed.is_ok();
+        let done = parsed.and(sorted).and_then(|()| self.obey(out));
+        if done.is_err() {
+            self.recover(complete);
+        }
+        done
+    }
+
+    fn obey(&mut self, out: &mut Vec<Item>) -> Checked<()> {
+        self.assign()?;
+        if self.words.has(b'O') && self.begun {
+            return Err(self.words.fault(b'O', "o-word", crate::parse::O_WORDS));
+        }
+        self.begun |=
+            self.words.present != 0 || !self.words.g.as_slice().is_empty() || !self.words.m.as_slice().is_empty();
+        self.execute(out)
+    }
+
+    /// Deals with what may stand at the start of a line. Where the words begin; `None` where there are none.
+    #[inline]
+    fn lead(&mut self, text: &[u8], out: &mut Vec<Item>) -> Checked<Option<usize>> {
+        let mut scanner = Scanner::new(text, 0);
+        scanner.skip_blanks();
+        match scanner.peek() {
+            _ if scanner.at_end() => return Ok(None),
+            b'%' => return self.percent(&mut scanner, out),
+            b'/' if self.config.block_delete => return Ok(None),
+            b'/' => scanner.advance(1),
+            b'(' | b';' => {}
+            _ if self.phase == Phase::Fresh => self.phase = Phase::Running,
+            _ => {}
+        }
+        Ok(Some(scanner.at()))
+    }
+
+    fn percent(&mut self, scanner: &mut Scanner, out: &mut Vec<Item>) -> Checked<Option<usize>> {
+        let start = scanner.at();
+        scanner.advance(1);
+        scanner.skip_ignorable()?;
+        if !scanner.at_end() {
+            return Err(Fault::new(scanner.since(start), "percent", "% stands on a line of its own"));
+        }
+        if self.phase == Phase::Fresh {
+            self.phase = Phase::Opened;
+        } else {
+            self.end(out);
+        }
+        Ok(None)
+    }
+
+    fn assign(&mut self) -> Checked<()> {
+        for assignment in &self.words.assignments {
+            match &assignment.target {
+                Target::Numbered(number) => self.parameters.set_numbered(*number, assignment.value),
+                Target::Named(range) => {
+                    if !self.parameters.set_named(&self.words.names[range.clone()], assignment.value) {
+                        return Err(Fault::new(
+                            assignment.span,
+                            "parameter-name",
+                            "there are too many named parameters",
+                        ));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cold]
+fn too_long(length: usize) -> Fault {
+    let message = format!("the line has {length} bytes, {MAX_LINE_BYTES} are allowed: this is hardly a part program");
+    Fault::new(Span::new(0, 1), "line-long", message)
+}

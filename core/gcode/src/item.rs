@@ -1,0 +1,56 @@
+//! What comes out of the interpreter.
+
+use tandem_sdk::{Block, Event};
+
+/// One element of the stream, in program order.
+#[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "blocks are by far the most frequent item; boxing them would allocate")]
+pub enum Item {
+    /// A path element, or rest.
+    Block(Block),
+    /// A non-motion word, tied to the block before which it acts.
+    Event(Event),
+    /// M66: the program goes on when the input has answered.
+    Wait(InputWait),
+    /// The program is over (M2, M30, `%` or the end of the file). Nothing follows.
+    End,
+}
+
+/// Which input M66 reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// Digital input P.
+    Digital(u32),
+    /// Analogue input E.
+    Analog(u32),
+}
+
+/// What M66 waits for (the L word).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputMode {
+    /// L0: nothing, the value is read at once.
+    Immediate,
+    /// L1: a change from low to high.
+    Rise,
+    /// L2: a change from high to low.
+    Fall,
+    /// L3: the high state.
+    High,
+    /// L4: the low state.
+    Low,
+}
+
+/// M66: wait for an input. The machine is at rest; the answer becomes parameter #5399.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputWait {
+    /// Line of the part program, from 1.
+    pub line: u32,
+    /// The wait lies before the block of this index.
+    pub before_block: u64,
+    /// The input.
+    pub input: Input,
+    /// What is waited for.
+    pub mode: InputMode,
+    /// Longest wait, s; after it the answer is −1. Zero for [`InputMode::Immediate`].
+    pub timeout_s: f64,
+}

@@ -1,0 +1,102 @@
+//! Decimal numbers: a sign, digits, a point, digits. There are no exponents in part programs.
+
+use crate::fault::{Checked, Fault};
+use crate::scan::Scanner;
+
+/// Most characters of a number.
+const MAX_LENGTH: usize = 64;
+/// Digits that always fit a 53-bit mantissa, so that the quotient by an exact power of ten is correctly rounded.
+const EXACT_DIGITS: usize = 15;
+const POWERS_OF_TEN: [f64; EXACT_DIGITS + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// Whether a number begins at the cursor.
+#[inline]
+pub(crate) fn starts_here(scanner: &Scanner) -> bool {
+    match scanner.peek() {
+        b'0'..=b'9' | b'.' => true,
+        b'+' | b'-' => matches!(scanner.peek_at(1), b'0'..=b'9' | b'.'),
+        _ => false,
+    }
+}
+
+/// Reads the number at the cursor, correctly rounded.
+///
+/// # Errors
+/// No digit, a second point, or more than 64 characters.
+#[inline]
+pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
+    let text = scanner.rest();
+    let signed = usize::from(matches!(text.first(), Some(b'+' | b'-')));
+    let whole = digits(&text[signed..]);
+    let mut length = signed + whole;
+    let mut fraction = 0;
+    if text.get(length) == Some(&b'.') {
+        fraction = digits(&text[length + 1..]);
+        length += 1 + fraction;
+    }
+    let start = scanner.at();
+    scanner.advance(length);
+    if whole + fraction == 0 || length > MAX_LENGTH || scanner.peek() == b'.' {
+        return Err(refuse(scanner, start, whole + fraction, length));
+    }
+    Ok(value(&text[..length], signed, whole + fraction, fraction))
+}
+
+#[inline]
+fn digits(text: &[u8]) -> usize {
+    text.iter().take_while(|b| b.is_ascii_digit()).count()
+}
+
+#[inline]
+fn value(text: &[u8], signed: usize, count: usize, fraction: usize) -> f64 {
+    if count > EXACT_DIGITS {
+        // The bytes are ASCII digits, a sign and a point, which `parse` always understands.
+        return std::str::from_utf8(text).ok().and_then(|t| t.parse().ok()).unwrap_or(f64::NAN);
+    }
+    let mantissa = text[signed..].iter().filter(|b| **b != b'.').fold(0, |m, b| m * 10 + u64::from(b - b'0'));
+    let magnitude = mantissa as f64 / POWERS_OF_TEN[fraction];
+    if text[0] == b'-' { -magnitude } else { magnitude }
+}
+
+#[cold]
+fn refuse(scanner: &Scanner, start: usize, digits: usize, length: usize) -> Fault {
+    if length > MAX_LENGTH {
+        let message = format!("the number has {length} characters, {MAX_LENGTH} are allowed");
+        Fault::new(scanner.since(start), "number-long", message)
+    } else if digits == 0 {
+        Fault::new(scanner.since(start), "number", "a number needs at least one digit")
+    } else {
+        Fault::new(scanner.here(), "number", "a number has one decimal point only")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number(text: &str) -> Result<f64, String> {
+        let mut scanner = Scanner::new(text.as_bytes(), 0);
+        let value = read(&mut scanner).map_err(|f| f.message)?;
+        assert!(scanner.at_end());
+        Ok(value)
+    }
+
+    #[test]
+    fn forms_of_a_number() {
+        for (text, value) in [("1", 1.0), ("-.5", -0.5), ("+3.", 3.0), ("007.2500", 7.25), ("0", 0.0)] {
+            assert_eq!(number(text), Ok(value), "{text}");
+        }
+        assert!(number(".").unwrap_err().contains("digit"));
+        assert!(number("1.2.3").unwrap_err().contains("one decimal point"));
+        assert!(number(&"1".repeat(65)).unwrap_err().contains("65 characters"));
+    }
+
+    proptest! {
+        #[test]
+        fn every_number_is_correctly_rounded(text in r"[+-]?[0-9]{1,20}(\.[0-9]{0,20})?") {
+            prop_assert_eq!(number(&text), Ok(text.parse().unwrap()));
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The text of a line to its words.
+
+use crate::expression::{Context, Parameter};
+use crate::fault::{Checked, Fault, Span};
+use crate::parameters::read_only;
+use crate::scan::Scanner;
+use crate::words::{Assignment, Code, Target, Words};
+
+/// Largest magnitude of a word: more is a slip, and would lose the precision of positions.
+const MAX_VALUE: f64 = 1e9;
+
+/// Reads the words of `text` from byte `from` on.
+///
+/// # Errors
+/// The first thing that is no word; the words before it have been read.
+pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut Words) -> Checked<()> {
+    let mut scanner = Scanner::new(text, from);
+    loop {
+        scanner.skip_ignorable()?;
+        match scanner.peek() {
+            _ if scanner.at_end() => return Ok(()),
+            b'#' => assignment(&mut scanner, context, words)?,
+            letter @ (b'a'..=b'z' | b'A'..=b'Z') => word(letter.to_ascii_uppercase(), &mut scanner, context, words)?,
+            other => return Err(unexpected(other, scanner.here())),
+        }
+    }
+}
+
+#[inline]
+fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+    let start = scanner.at();
+    if letter == b'T' && starts_time_constant(scanner) {
+        return time_constant(scanner, context, words);
+    }
+    scanner.advance(1);
+    scanner.skip_blanks();
+    let value = match context.value(scanner) {
+        Ok(value) => value,
+        Err(fault) => return Err(in_word(letter, start, fault)),
+    };
+    let span = scanner.since(start);
+    if value.abs() > MAX_VALUE || value.is_nan() {
+        return Err(Fault::new(span, "word-range", format!("{} is too large a number", letter as char)));
+    }
+    match letter {
+        b'G' => words.g.push(code('G', value, span)?),
+        b'M' => words.m.push(code('M', value, span)?),
+        b'O' => program_number(scanner, start, value, words),
+        _ => words.add(letter, value, span),
+    }
+}
+
+/// Adds which word lacks its value.
+#[cold]
+fn in_word(letter: u8, start: usize, fault: Fault) -> Fault {
+    if letter == b'O' {
+        let span = Span::new(start, fault.span.end.max(start as u32 + 1) as usize);
+        return Fault::new(span, "o-word", O_WORDS);
+    }
+    if fault.code != "value-missing" {
+        return fault;
+    }
+    let span = Span::new(start, start + 1);
+    Fault::new(span, fault.code, format!("{} has no value: {}", letter as char, fault.message))
+}
+
+fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
+    let tenths = (value * 10.0).round();
+    if (value * 10.0 - tenths).abs() > 1e-3 || !(0.0..=9999.0).contains(&tenths) {
+        let message = format!("{letter}{} is not known", crate::fault::show(value));
+        return Err(Fault::new(span, "unknown-code", message));
+    }
+    Ok(Code { tenths: tenths as u16, span })
+}
+
+pub(crate) const O_WORDS: &str =
+    "O-words (subprograms, IF, WHILE, REPEAT) are not supported: let the CAM system write the program out flat";
+
+/// `O1234` alone is the number of a program and harmless; with a word after it, it is flow control.
+fn program_number(scanner: &mut Scanner, start: usize, value: f64, words: &mut Words) -> Checked<()> {
+    scanner.skip_ignorable()?;
+    if scanner.at_end() {
+        return words.add(b'O', value, scanner.since(start));
+    }
+    scanner.advance(scanner.name().1);
+    Err(Fault::new(scanner.since(start), "o-word", O_WORDS))
+}
+
+/// `TA` with a value is the time constant; `TABS[…]` and the like are T with a function.
+fn starts_time_constant(scanner: &Scanner) -> bool {
+    if scanner.peek_at(1) != b'A' {
+        return false;
+    }
+    let blanks = scanner.rest().iter().skip(2).take_while(|b| matches!(b, b' ' | b'\t')).count();
+    !scanner.peek_at(2 + blanks).is_ascii_alphabetic()
+}
+
+fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+    let start = scanner.at();
+    scanner.advance(2);
+    scanner.skip_blanks();
+    let value = context.value(scanner).map_err(|fault| {
+        if fault.code != "value-missing" {
+            return fault;
+        }
+        Fault::new(Span::new(start, start + 2), fault.code, format!("TA has no value: {}", fault.message))
+    })?;
+    let span = scanner.since(start);
+    if words.time_constant.is_some() {
+        return Err(Fault::new(span, "word-twice", "TA stands in this line twice"));
+    }
+    words.time_constant = Some((value, span));
+    Ok(())
+}
+
+fn assignment(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+    let start = scanner.at();
+    let parameter = context.parameter(scanner, 0)?;
+    let target = match parameter {
+        Parameter::Numbered(number) => Target::Numbered(number),
+        Parameter::Named(name, length) => {
+            let from = words.names.len();
+            words.names.extend_from_slice(&name[..length]);
+            Target::Named(from..words.names.len())
+        }
+    };
+    let span = scanner.since(start);
+    if let Target::Numbered(number) = target
+        && let Some(why) = read_only(number)
+    {
+        return Err(Fault::new(span, "read-only", format!("parameter #{number} cannot be assigned: {why}")));
+    }
+    if !scanner.take(b'=') {
+        return Err(Fault::new(span, "assignment", "a parameter stands here for a word; an assignment needs ="));
+    }
+    scanner.skip_blanks();
+    let value = context.value(scanner)?;
+    words.assignments.push(Assignment { target, value, span });
+    Ok(())
+}
+
+#[cold]
+fn unexpected(byte: u8, span: Span) -> Fault {
+    let why = match byte {
+        b'0'..=b'9' | b'.' | b'+' | b'-' => "a number without a letter before it",
+        b')' => "a comment ends here that has not begun",
+        b'%' => "% stands on a line of its own",
+        b'/' => "/ (block delete) stands at the start of a line only",
+        b'*' => "checksums (*) are not supported",
+        b'[' | b']' => "a bracket without a letter before it",
+        0x80.. => "only comments may hold characters outside ASCII",
+        _ => "no word begins with this character",
+    };
+    Fault::new(span, "unexpected", why)
+}

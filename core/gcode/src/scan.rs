@@ -1,0 +1,115 @@
+//! The cursor over the bytes of one line.
+
+use crate::fault::{Checked, Fault, Span};
+
+/// A cursor over one line. Blanks and comments may stand between any two words.
+pub(crate) struct Scanner<'t> {
+    text: &'t [u8],
+    at: usize,
+}
+
+impl<'t> Scanner<'t> {
+    pub fn new(text: &'t [u8], at: usize) -> Self {
+        Self { text, at }
+    }
+
+    pub fn at(&self) -> usize {
+        self.at
+    }
+
+    /// The rest of the line.
+    pub fn rest(&self) -> &'t [u8] {
+        &self.text[self.at..]
+    }
+
+    /// The next byte; 0 at the end of the line, where no valid text has it.
+    #[inline]
+    pub fn peek(&self) -> u8 {
+        self.text.get(self.at).copied().unwrap_or(0)
+    }
+
+    /// The byte `ahead` of the next one, upper case.
+    pub fn peek_at(&self, ahead: usize) -> u8 {
+        self.text.get(self.at + ahead).copied().unwrap_or(0).to_ascii_uppercase()
+    }
+
+    pub fn at_end(&self) -> bool {
+        self.at >= self.text.len()
+    }
+
+    #[inline]
+    pub fn advance(&mut self, count: usize) {
+        self.at = (self.at + count).min(self.text.len());
+    }
+
+    /// Takes `byte` if it comes next after blanks.
+    pub fn take(&mut self, byte: u8) -> bool {
+        self.skip_blanks();
+        let found = self.peek() == byte && !self.at_end();
+        if found {
+            self.at += 1;
+        }
+        found
+    }
+
+    #[inline]
+    pub fn skip_blanks(&mut self) {
+        while matches!(self.peek(), b' ' | b'\t') {
+            self.at += 1;
+        }
+    }
+
+    /// Skips blanks and comments.
+    #[inline]
+    pub fn skip_ignorable(&mut self) -> Checked<()> {
+        loop {
+            self.skip_blanks();
+            match self.peek() {
+                b'(' => self.skip_comment()?,
+                b';' => self.at = self.text.len(),
+                _ => return Ok(()),
+            }
+        }
+    }
+
+    fn skip_comment(&mut self) -> Checked<()> {
+        let start = self.at;
+        let inside = &self.text[start + 1..];
+        match inside.iter().position(|b| matches!(b, b'(' | b')')) {
+            Some(length) if inside[length] == b')' => {
+                self.at = start + length + 2;
+                Ok(())
+            }
+            Some(length) => {
+                let place = Span::new(start + length + 1, start + length + 2);
+                Err(Fault::new(place, "comment", "a comment cannot hold another one"))
+            }
+            None => {
+                let span = Span::new(start, self.text.len());
+                Err(Fault::new(span, "comment", "the comment is not closed: ) is missing"))
+            }
+        }
+    }
+
+    /// The run of letters that comes next, at most 8, upper case, zero-padded; the cursor stays.
+    pub fn name(&self) -> ([u8; 8], usize) {
+        let mut name = [0; 8];
+        let mut length = 0;
+        while length < 8 && self.peek_at(length).is_ascii_uppercase() {
+            name[length] = self.peek_at(length);
+            length += 1;
+        }
+        (name, length)
+    }
+
+    /// From `start` to the cursor.
+    pub fn since(&self, start: usize) -> Span {
+        Span::new(start, self.at)
+    }
+
+    /// The next character (all bytes of it, so that it can be shown).
+    pub fn here(&self) -> Span {
+        let tail = self.rest().iter().skip(1).take_while(|b| **b & 0xc0 == 0x80).count();
+        Span::new(self.at, (self.at + 1 + tail).min(self.text.len()))
+    }
+}

@@ -1,0 +1,72 @@
+//! The second pass: items on demand.
+
+use std::sync::Arc;
+
+use tandem_sdk::AxisVector;
+
+use crate::config::Config;
+use crate::interpreter::Interpreter;
+use crate::item::Item;
+use crate::lines::{Lines, Next, Pass};
+use crate::source::{Program, ProgramError};
+
+/// A checked program, read again through the same file and handed out as far as it is asked for. Each chunk of text is
+/// compared with what the first pass read before a line of it is interpreted.
+pub struct Stream {
+    program: Program,
+    lines: Lines,
+    interpreter: Interpreter,
+    waiting: bool,
+}
+
+impl Stream {
+    /// The items of `program`, from the first line.
+    ///
+    /// # Errors
+    /// The program has not gone through [`crate::check`], or cannot be read.
+    pub fn new(mut program: Program, config: &Config) -> Result<Self, ProgramError> {
+        if program.hashes.is_none() {
+            return Err(ProgramError::Unchecked(Arc::clone(&program.name)));
+        }
+        let lines = Lines::new(&mut program, Pass::Second)?;
+        let mut interpreter = Interpreter::new(config.clone());
+        interpreter.set_file(&program.name);
+        Ok(Self { program, lines, interpreter, waiting: false })
+    }
+
+    /// Appends the items of the next line that has any; false when the program is over. The last item is
+    /// [`Item::End`]. After [`Item::Wait`], [`Stream::provide_input`] must come first.
+    ///
+    /// # Errors
+    /// The file has changed or cannot be read, a line is wrong (which after a check only the answer of M66 can cause),
+    /// or an input has not been provided.
+    pub fn next_items(&mut self, out: &mut Vec<Item>) -> Result<bool, ProgramError> {
+        if self.waiting {
+            return Err(ProgramError::WaitsForInput(Arc::clone(&self.program.name)));
+        }
+        let before = out.len();
+        while out.len() == before {
+            if self.interpreter.ended() {
+                return Ok(false);
+            }
+            match self.lines.next(&mut self.program)? {
+                Next::Line(range) => self.interpreter.line(self.lines.number, self.lines.text(&range), out)?,
+                Next::Bad(diagnostic) => return Err(diagnostic.into()),
+                Next::End => self.interpreter.finish(out)?,
+            }
+        }
+        self.waiting = out[before..].iter().any(|item| matches!(item, Item::Wait(_)));
+        Ok(true)
+    }
+
+    /// The answer to [`Item::Wait`]: 1 or 0, the analogue value, or −1 after the time-out.
+    pub fn provide_input(&mut self, value: f64) {
+        self.interpreter.provide_input(value);
+        self.waiting = false;
+    }
+
+    /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.
+    pub fn set_position(&mut self, position: AxisVector) {
+        self.interpreter.set_position(position);
+    }
+}

@@ -1,0 +1,143 @@
+//! The words of one line.
+
+use crate::fault::{Checked, Fault, Span};
+use crate::letters::index;
+
+/// Most G words, and most M words, of a line.
+const MAX_CODES: usize = 16;
+
+/// A G or M word: its number in tenths (G61.1 is 611) and its place.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Code {
+    pub tenths: u16,
+    pub span: Span,
+}
+
+/// The G or the M words of a line in their order.
+#[derive(Default)]
+pub(crate) struct Codes {
+    codes: [Code; MAX_CODES],
+    count: usize,
+}
+
+impl Codes {
+    pub fn push(&mut self, code: Code) -> Checked<()> {
+        if self.count == MAX_CODES {
+            return Err(Fault::new(
+                code.span,
+                "too-many",
+                format!("a line holds at most {MAX_CODES} G and M words each"),
+            ));
+        }
+        self.codes[self.count] = code;
+        self.count += 1;
+        Ok(())
+    }
+
+    pub fn as_slice(&self) -> &[Code] {
+        &self.codes[..self.count]
+    }
+}
+
+/// What a `#…=` assigns to: a number, or a range of [`Words::names`].
+#[derive(Clone, Debug)]
+pub(crate) enum Target {
+    Numbered(usize),
+    Named(std::ops::Range<usize>),
+}
+
+/// An assignment; it takes effect when the whole line has been read.
+#[derive(Clone, Debug)]
+pub(crate) struct Assignment {
+    pub target: Target,
+    pub value: f64,
+    pub span: Span,
+}
+
+/// The words of one line. Kept from line to line so that nothing is allocated.
+#[derive(Default)]
+pub(crate) struct Words {
+    /// Bit per letter that the line has, G and M apart.
+    pub present: u32,
+    values: [f64; 26],
+    spans: [Span; 26],
+    pub g: Codes,
+    pub m: Codes,
+    /// TA in ms.
+    pub time_constant: Option<(f64, Span)>,
+    pub assignments: Vec<Assignment>,
+    pub names: Vec<u8>,
+}
+
+impl Words {
+    pub fn clear(&mut self) {
+        self.present = 0;
+        self.g.count = 0;
+        self.m.count = 0;
+        self.time_constant = None;
+        self.assignments.clear();
+        self.names.clear();
+    }
+
+    /// Adds a word other than G and M.
+    #[inline]
+    pub fn add(&mut self, letter: u8, value: f64, span: Span) -> Checked<()> {
+        let bit = 1 << index(letter);
+        if self.present & bit != 0 {
+            let message = format!("{} stands in this line twice", letter as char);
+            return Err(Fault::new(span, "word-twice", message));
+        }
+        self.present |= bit;
+        self.values[index(letter)] = value;
+        self.spans[index(letter)] = span;
+        Ok(())
+    }
+
+    #[inline]
+    pub fn has(&self, letter: u8) -> bool {
+        self.present >> index(letter) & 1 != 0
+    }
+
+    #[inline]
+    pub fn get(&self, letter: u8) -> Option<f64> {
+        self.has(letter).then(|| self.values[index(letter)])
+    }
+
+    pub fn span(&self, letter: u8) -> Span {
+        self.spans[index(letter)]
+    }
+
+    /// A fault at the word `letter`.
+    pub fn fault(&self, letter: u8, code: &'static str, message: impl Into<String>) -> Fault {
+        Fault::new(self.span(letter), code, message)
+    }
+
+    /// The place of the first (leftmost) letter of `mask`.
+    pub fn first_of(&self, mask: u32) -> Option<(u8, Span)> {
+        let present = self.present & mask;
+        let letters = (b'A'..=b'Z').filter(|l| present >> index(*l) & 1 != 0);
+        letters.map(|l| (l, self.span(l))).min_by_key(|(_, span)| span.start)
+    }
+
+    /// The word `letter` as a whole number of `range`; `None` where the line lacks it.
+    pub fn integer(&self, letter: u8, range: std::ops::RangeInclusive<u32>) -> Checked<Option<u32>> {
+        let Some(value) = self.get(letter) else { return Ok(None) };
+        let rounded = value.round();
+        if (value - rounded).abs() > 1e-4 || !(f64::from(*range.start())..=f64::from(*range.end())).contains(&rounded) {
+            let name = letter as char;
+            let message = format!("{name} must be a whole number from {} to {}", range.start(), range.end());
+            return Err(self.fault(letter, "word-range", message));
+        }
+        Ok(Some(rounded as u32))
+    }
+
+    /// The word `letter` where it must not be negative; `None` where the line lacks it.
+    pub fn not_negative(&self, letter: u8) -> Checked<Option<f64>> {
+        match self.get(letter) {
+            Some(value) if value < 0.0 => {
+                Err(self.fault(letter, "word-range", format!("{} must not be negative", letter as char)))
+            }
+            other => Ok(other),
+        }
+    }
+}
