@@ -1,0 +1,110 @@
+//! Every configuration key: one table, from which unknown keys find their nearest and the reference is written.
+
+/// A key of a configuration file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Dotted path. `<axis>` and `<joint>` stand for a name; a last part in angle brackets for anything, at any depth.
+    pub path: &'static str,
+    /// Unit, or kind of value where it has none.
+    pub unit: &'static str,
+    /// Value where the file states none, or `required`.
+    pub default: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+const fn key(path: &'static str, unit: &'static str, default: &'static str, meaning: &'static str) -> Key {
+    Key { path, unit, default, meaning }
+}
+
+#[rustfmt::skip]
+static MACHINE: &[Key] = &[
+    key("format", "number", "required", "Number of the file format: 1"),
+    key("include", "files", "[]", "Files whose keys come first, relative to this file; its own keys override them"),
+    key("machine.name", "text", "the file's name", "Name of the machine in reports"),
+    key("loops.rough_period_ms", "ms", "8", "Period of the rough loop, which plans; a whole multiple of the fine period"),
+    key("loops.fine_period_ms", "ms", "1", "Period of the fine loop, which interpolates and talks to the drives"),
+    key("loops.max_missed_periods", "count", "2", "Fine periods missed in a row above which the machine faults"),
+    key("motion.allowable_speed_difference_mm_per_min", "mm/min", "0", "Velocity step that linear axes accept where blocks meet"),
+    key("motion.allowable_speed_difference_deg_per_min", "deg/min", "the same number as for linear axes", "Velocity step that rotary axes accept where blocks meet"),
+    key("motion.path_tolerance_mm", "mm", "0.01", "Distance allowed from the programmed path where a block states none"),
+    key("motion.time_constant_ms", "ms", "50", "Time constant of acceleration where a block states none"),
+    key("motion.jerk", "limit or report", "limit", "What max_jerk means to a planner that does not know jerk: refuse to start, or only report"),
+    key("motion.max_feed_ratio", "ratio", "1", "Highest feed ratio that may be asked while running; at least 1"),
+    key("axes.<axis>.kind", "linear or rotary", "linear", "Whether the axis slides (keys in mm) or turns (keys in deg)"),
+    key("axes.<axis>.travel_mm", "mm", "required", "Lowest and highest position of a linear axis"),
+    key("axes.<axis>.travel_deg", "deg", "required", "Lowest and highest position of a rotary axis"),
+    key("axes.<axis>.start_mm", "mm", "0", "Where a simulated machine stands at power-on"),
+    key("axes.<axis>.start_deg", "deg", "0", "Where a simulated machine stands at power-on"),
+    key("axes.<axis>.home_mm", "mm", "start", "Reference position, in machine coordinates"),
+    key("axes.<axis>.home_deg", "deg", "start", "Reference position, in machine coordinates"),
+    key("axes.<axis>.max_feed_mm_per_min", "mm/min", "required", "Highest speed in feed motion"),
+    key("axes.<axis>.max_feed_deg_per_min", "deg/min", "required", "Highest speed in feed motion"),
+    key("axes.<axis>.max_rapid_mm_per_min", "mm/min", "max_feed", "Highest speed in rapid motion"),
+    key("axes.<axis>.max_rapid_deg_per_min", "deg/min", "max_feed", "Highest speed in rapid motion"),
+    key("axes.<axis>.max_acceleration_mm_per_s2", "mm/s²", "required", "Highest acceleration"),
+    key("axes.<axis>.max_acceleration_deg_per_s2", "deg/s²", "required", "Highest acceleration"),
+    key("axes.<axis>.max_jerk_mm_per_s3", "mm/s³", "no limit", "Highest jerk"),
+    key("axes.<axis>.max_jerk_deg_per_s3", "deg/s³", "no limit", "Highest jerk"),
+    key("joints.<joint>.axis", "axis", "required", "Axis that the joint moves; two joints on one axis are a gantry"),
+    key("joints.<joint>.travel_mm", "mm", "the axis's", "Lowest and highest position of a linear joint"),
+    key("joints.<joint>.travel_deg", "deg", "the axis's", "Lowest and highest position of a rotary joint"),
+    key("joints.<joint>.home_mm", "mm", "the axis's", "Reference position, in machine coordinates"),
+    key("joints.<joint>.home_deg", "deg", "the axis's", "Reference position, in machine coordinates"),
+    key("joints.<joint>.max_feed_mm_per_min", "mm/min", "the axis's", "Highest speed in feed motion"),
+    key("joints.<joint>.max_feed_deg_per_min", "deg/min", "the axis's", "Highest speed in feed motion"),
+    key("joints.<joint>.max_rapid_mm_per_min", "mm/min", "the axis's", "Highest speed in rapid motion"),
+    key("joints.<joint>.max_rapid_deg_per_min", "deg/min", "the axis's", "Highest speed in rapid motion"),
+    key("joints.<joint>.max_acceleration_mm_per_s2", "mm/s²", "the axis's", "Highest acceleration"),
+    key("joints.<joint>.max_acceleration_deg_per_s2", "deg/s²", "the axis's", "Highest acceleration"),
+    key("joints.<joint>.max_jerk_mm_per_s3", "mm/s³", "the axis's", "Highest jerk"),
+    key("joints.<joint>.max_jerk_deg_per_s3", "deg/s³", "the axis's", "Highest jerk"),
+    key("kinematics.plugin", "name or file", "identity", "Map between axes and joints"),
+    key("kinematics.options.<option>", "plugin's", "none", "Options of the kinematics"),
+    key("planner.plugin", "name or file", "required", "A built-in's name, or the path of a shared library"),
+    key("planner.options.<option>", "plugin's", "none", "Options of the planner"),
+    key("feed_strategy.plugin", "name or file", "required", "Feed strategy; without the table there is none"),
+    key("feed_strategy.options.<option>", "plugin's", "none", "Options of the feed strategy"),
+    key("driver.plugin", "name or file", "required", "Driver of the drives, simulated or not"),
+    key("driver.options.<option>", "plugin's", "none", "Options of the driver"),
+    key("faults.<fault>", "wrapper's", "none", "Seeded faults around the driver"),
+    key("guard.mode", "stop or count", "stop", "What a sample beyond a limit does: stops the machine, or is counted (simulated drives only)"),
+    key("policy.script", "file", "required", "Policy script, a WASM module; without the table there is none"),
+    key("policy.parameters.<parameter>", "script's", "none", "Parameters of the policy script"),
+    key("spindle.max_rpm", "rpm", "no limit", "Highest spindle speed"),
+    key("spindle.min_rpm", "rpm", "0", "Lowest spindle speed that turns"),
+    key("tools.table", "file", "required", "Tool table; without it there are no tools"),
+];
+
+#[rustfmt::skip]
+static TOOLS: &[Key] = &[
+    key("format", "number", "1", "Number of the file format: 1"),
+    key("tool.number", "number", "required", "Number by which T calls the tool"),
+    key("tool.pocket", "number", "the tool's number", "Pocket of the magazine"),
+    key("tool.name", "text", "none", "What people call the tool"),
+    key("tool.diameter_mm", "mm", "0", "Diameter of the tool"),
+    key("tool.length_mm", "mm", "0", "Length offset along z; short for offset_mm.z"),
+    key("tool.offset_mm.<axis>", "mm", "0", "Offset along a linear axis"),
+    key("tool.offset_deg.<axis>", "deg", "0", "Offset about a rotary axis"),
+];
+
+/// Every key of `machine.toml`.
+pub fn keys() -> &'static [Key] {
+    MACHINE
+}
+
+/// Every key of a tool table.
+pub fn tool_keys() -> &'static [Key] {
+    TOOLS
+}
+
+/// The reference of both files as Markdown tables.
+pub fn markdown() -> String {
+    format!("## machine.toml\n\n{}\n## Tool table\n\n{}", table(MACHINE), table(TOOLS))
+}
+
+fn table(keys: &[Key]) -> String {
+    let row = |k: &Key| format!("| `{}` | {} | {} | {} |\n", k.path, k.unit, k.default, k.meaning);
+    let rows: String = keys.iter().map(row).collect();
+    format!("| key | unit | default | meaning |\n|---|---|---|---|\n{rows}")
+}

@@ -1,0 +1,188 @@
+//! The whole machine.
+
+use std::path::{Path, PathBuf};
+
+use tandem_sdk::{Axes, AxisVector, Limits};
+
+use crate::axes::AxisSet;
+use crate::error::{MachineError, Place};
+use crate::joints::{self, Joint};
+use crate::keys::keys;
+use crate::load::Loader;
+use crate::motion::{Loops, Motion};
+use crate::node::plain;
+use crate::overrides;
+use crate::parts::{GuardMode, PluginChoice, Policy, Spindle, text};
+use crate::places::Places;
+use crate::problems::{Origin, Problems};
+use crate::schema::check;
+use crate::section::Section;
+use crate::tools::ToolTable;
+
+/// A machine as `machine.toml` describes it, in internal units: mm, s, rad. A rotary axis is in rad wherever a name
+/// says mm.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    /// Name in reports; the file's name where it states none.
+    pub name: String,
+    /// The file, as it was named.
+    pub path: PathBuf,
+    /// Period of the rough loop, s: [`Machine::fine_periods_per_rough`] fine periods.
+    pub rough_period_s: f64,
+    /// Period of the fine loop, s.
+    pub fine_period_s: f64,
+    /// How many fine periods a rough one has; at least 1.
+    pub fine_periods_per_rough: u32,
+    /// Fine periods missed in a row above which the machine faults.
+    pub max_missed_periods: u32,
+    /// How the machine moves where a block says nothing.
+    pub motion: Motion,
+    /// Axes, in the order of the file.
+    pub axes: Axes,
+    /// What each axis may do.
+    pub limits: Limits,
+    /// Where a simulated machine stands at power-on, within the travel.
+    pub start: AxisVector,
+    /// Reference position, within the travel.
+    pub home: AxisVector,
+    /// The joints that the file states; none where the joints are the axes.
+    pub joints: Vec<Joint>,
+    /// Map between axes and joints.
+    pub kinematics: PluginChoice,
+    /// Planner.
+    pub planner: PluginChoice,
+    /// Feed strategy, if there is one.
+    pub feed_strategy: Option<PluginChoice>,
+    /// Driver.
+    pub driver: PluginChoice,
+    /// Faults around the driver, as the file states them: the wrappers read them.
+    pub faults: Option<toml::Table>,
+    /// What the guard does.
+    pub guard: GuardMode,
+    /// Policy script, if there is one.
+    pub policy: Option<Policy>,
+    /// What the spindle may do.
+    pub spindle: Spindle,
+    /// Tools; empty without a tool table.
+    pub tools: ToolTable,
+    effective: String,
+    places: Places,
+}
+
+impl Machine {
+    /// Reads the machine of `path`. `overrides` are dotted paths and values, as `--set path=value` gives them, the
+    /// later ones on top; a value that is not TOML is a string.
+    ///
+    /// # Errors
+    /// Everything that is wrong: what cannot be read or is not TOML, unknown keys with the nearest known one, missing
+    /// keys, values of the wrong kind or beyond sense.
+    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, MachineError> {
+        let problems = Problems::default();
+        let Some(mut root) = Loader::new(&problems).machine(path, None) else {
+            return problems.verdict(None);
+        };
+        for (key, value) in overrides {
+            overrides::apply(&mut root, key, value, &problems);
+        }
+        check(keys(), &mut Vec::new(), &root, &problems);
+        let section = Section::new(Vec::new(), Origin::default(), &root, &problems);
+        let tables = Tables::read(&section);
+        let moving = AxisSet::read(&section, &tables.motion).map(|axes| Moving::read(&section, axes, &problems));
+        let effective = text(&section, "format", &root);
+        let moving = problems.verdict(moving)?;
+        Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
+    }
+
+    /// The configuration in force as TOML text: includes and overrides applied, files named absolutely. Reading it as
+    /// a machine file gives this machine again.
+    pub fn effective_toml(&self) -> &str {
+        &self.effective
+    }
+
+    /// Where the key at a dotted path was written, else the table around it, else the beginning of the file: for
+    /// refusals by those who read more than this crate does, such as a plugin its options.
+    pub fn place(&self, key: &str) -> Place {
+        self.places.of(key)
+    }
+}
+
+/// What the axes say, and the tables that speak of axes.
+struct Moving {
+    axes: AxisSet,
+    joints: Vec<Joint>,
+    tools: ToolTable,
+}
+
+impl Moving {
+    fn read(root: &Section<'_>, axes: AxisSet, problems: &Problems) -> Self {
+        let tools = Some(root.section("tools")).filter(Section::exists);
+        let tools = tools.and_then(|section| ToolTable::read(&section, &axes.axes, problems));
+        Self { joints: joints::read(root, &axes), tools: tools.unwrap_or_default(), axes }
+    }
+}
+
+/// What the other tables say. Where one is wrong, which is reported, something stands in for it.
+struct Tables {
+    name: Option<String>,
+    loops: Loops,
+    motion: Motion,
+    kinematics: PluginChoice,
+    planner: PluginChoice,
+    feed_strategy: Option<PluginChoice>,
+    driver: PluginChoice,
+    faults: Option<toml::Table>,
+    guard: GuardMode,
+    policy: Option<Policy>,
+    spindle: Spindle,
+}
+
+impl Tables {
+    fn read(root: &Section<'_>) -> Self {
+        let optional = |key: &str| Some(root.section(key)).filter(Section::exists);
+        let required = |key: &str| PluginChoice::read(&root.section(key)).unwrap_or_else(|| PluginChoice::named(""));
+        let kinematics = optional("kinematics").and_then(|s| PluginChoice::read(&s));
+        Self {
+            name: root.section("machine").text("name").map(str::to_owned),
+            loops: Loops::read(&root.section("loops")),
+            motion: Motion::read(&root.section("motion")),
+            kinematics: kinematics.unwrap_or_else(|| PluginChoice::named("identity")),
+            planner: required("planner"),
+            feed_strategy: optional("feed_strategy").and_then(|s| PluginChoice::read(&s)),
+            driver: required("driver"),
+            faults: optional("faults").and_then(|s| s.table().map(plain)),
+            guard: GuardMode::read(&root.section("guard")),
+            policy: optional("policy").and_then(|s| Policy::read(&s)),
+            spindle: Spindle::read(&root.section("spindle")),
+        }
+    }
+
+    fn into_machine(self, path: &Path, moving: Moving, effective: String, places: Places) -> Machine {
+        let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let AxisSet { axes, limits, start, home } = moving.axes;
+        Machine {
+            name: self.name.unwrap_or_else(stem),
+            path: path.to_owned(),
+            rough_period_s: self.loops.rough_period_s,
+            fine_period_s: self.loops.fine_period_s,
+            fine_periods_per_rough: self.loops.fine_periods_per_rough,
+            max_missed_periods: self.loops.max_missed_periods,
+            motion: self.motion,
+            axes,
+            limits,
+            start,
+            home,
+            joints: moving.joints,
+            kinematics: self.kinematics,
+            planner: self.planner,
+            feed_strategy: self.feed_strategy,
+            driver: self.driver,
+            faults: self.faults,
+            guard: self.guard,
+            policy: self.policy,
+            spindle: self.spindle,
+            tools: moving.tools,
+            effective,
+            places,
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! `[loops]` and `[motion]`.
+
+use crate::section::Section;
+
+/// Most fine periods in a rough one: the rough loop keeps every sample of its period.
+const MOST_FINE_PERIODS: f64 = 10_000.0;
+
+/// What a stated jerk limit means to a planner that keeps only velocity and acceleration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum JerkMode {
+    /// It is a limit: such a planner does not start.
+    #[default]
+    Limit,
+    /// It is only reported.
+    Report,
+}
+
+/// How the machine moves where a block says nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Velocity step that linear axes accept where blocks meet, mm/s.
+    pub speed_difference_mm_per_s: f64,
+    /// Velocity step that rotary axes accept where blocks meet, rad/s.
+    pub speed_difference_rad_per_s: f64,
+    /// Distance allowed from the programmed path, mm.
+    pub path_tolerance_mm: f64,
+    /// Time constant of acceleration, s.
+    pub time_constant_s: f64,
+    /// What a stated jerk limit means to a planner of order 2.
+    pub jerk: JerkMode,
+    /// Highest feed ratio that may be asked while running; at least 1.
+    pub max_feed_ratio: f64,
+}
+
+impl Motion {
+    /// Reads `[motion]`.
+    pub(crate) fn read(motion: &Section<'_>) -> Self {
+        let linear = motion.at_least("allowable_speed_difference_mm_per_min", 0.0).unwrap_or(0.0);
+        let rotary = motion.at_least("allowable_speed_difference_deg_per_min", 0.0).unwrap_or(linear);
+        let modes = [("limit", JerkMode::Limit), ("report", JerkMode::Report)];
+        Self {
+            speed_difference_mm_per_s: linear / 60.0,
+            speed_difference_rad_per_s: rotary.to_radians() / 60.0,
+            path_tolerance_mm: motion.at_least("path_tolerance_mm", 0.0).unwrap_or(0.01),
+            time_constant_s: motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0,
+            jerk: motion.choice("jerk", &modes).unwrap_or_default(),
+            max_feed_ratio: motion.at_least("max_feed_ratio", 1.0).unwrap_or(1.0),
+        }
+    }
+}
+
+/// The periods of the two loops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Loops {
+    pub rough_period_s: f64,
+    pub fine_period_s: f64,
+    pub fine_periods_per_rough: u32,
+    pub max_missed_periods: u32,
+}
+
+impl Loops {
+    /// Reads `[loops]`.
+    pub fn read(loops: &Section<'_>) -> Self {
+        let period = |key, default| if loops.has(key) { loops.positive(key) } else { Some(default) };
+        let (rough, fine) = (period("rough_period_ms", 8.0), period("fine_period_ms", 1.0));
+        let count = rough.zip(fine).and_then(|(rough, fine)| fine_periods(loops, rough, fine));
+        Self {
+            rough_period_s: rough.unwrap_or(8.0) / 1000.0,
+            fine_period_s: fine.unwrap_or(1.0) / 1000.0,
+            fine_periods_per_rough: count.unwrap_or(1),
+            max_missed_periods: loops.whole("max_missed_periods", 0, u32::MAX).unwrap_or(2),
+        }
+    }
+}
+
+fn fine_periods(loops: &Section<'_>, rough: f64, fine: f64) -> Option<u32> {
+    let count = (rough / fine).round();
+    let key = if loops.has("rough_period_ms") { "rough_period_ms" } else { "fine_period_ms" };
+    if count < 1.0 || (rough / fine - count).abs() > 1e-9 * count {
+        loops.refuse(
+            key,
+            format!("the rough period, {rough} ms, is not a whole multiple of the fine period, {fine} ms"),
+        );
+        return None;
+    }
+    if count > MOST_FINE_PERIODS {
+        let most = format!("the rough period, {rough} ms, is more than {MOST_FINE_PERIODS} fine periods of {fine} ms");
+        loops.refuse(key, most);
+        return None;
+    }
+    Some(count as u32)
+}

@@ -1,0 +1,98 @@
+//! The smaller tables: plugins, guard, policy, spindle.
+
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+use crate::node::{Table, plain};
+use crate::paths::is_library;
+use crate::section::Section;
+
+/// A plugin that the machine asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginChoice {
+    /// A built-in's name, or the path of a shared library (absolute where a file states it).
+    pub plugin: String,
+    /// The path of the shared library, where `plugin` is one: it holds a `/` or ends in `.so`, `.dylib` or `.dll`.
+    pub library: Option<PathBuf>,
+    /// The `options` table as TOML text; empty where there is none.
+    pub options: String,
+}
+
+impl PluginChoice {
+    /// The plugin called `name`, without options.
+    pub(crate) fn named(name: &str) -> Self {
+        let library = is_library(name).then(|| PathBuf::from(name));
+        Self { plugin: name.to_owned(), library, options: String::new() }
+    }
+
+    /// Reads a table with `plugin` and `options`; `None` where it is wrong, which is reported.
+    pub(crate) fn read(section: &Section<'_>) -> Option<Self> {
+        let choice = section.required("plugin", Section::text).map(Self::named)?;
+        let options = section.section("options").table().map(|table| text(section, "options", table));
+        Some(Self { options: options.unwrap_or_default(), ..choice })
+    }
+}
+
+/// A table as TOML text.
+pub(crate) fn text(section: &Section<'_>, key: &str, table: &Table) -> String {
+    toml::to_string(&plain(table)).unwrap_or_else(|error| {
+        section.refuse(key, format!("cannot be written as TOML: {error}"));
+        String::new()
+    })
+}
+
+/// What the guard does with a sample beyond a limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GuardMode {
+    /// Does not send it, and brings the machine to rest.
+    #[default]
+    Stop,
+    /// Sends and counts it; simulated drives only.
+    Count,
+}
+
+impl GuardMode {
+    /// Reads `[guard]`.
+    pub(crate) fn read(guard: &Section<'_>) -> Self {
+        guard.choice("mode", &[("stop", Self::Stop), ("count", Self::Count)]).unwrap_or_default()
+    }
+}
+
+/// The policy script of the machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Policy {
+    /// The WASM module; absolute where a file states it.
+    pub script: PathBuf,
+    /// Its parameters, by name.
+    pub parameters: toml::Table,
+}
+
+impl Policy {
+    /// Reads `[policy]`; `None` where it is wrong, which is reported.
+    pub(crate) fn read(policy: &Section<'_>) -> Option<Self> {
+        let script = policy.required("script", Section::text)?.into();
+        let parameters = policy.section("parameters").table().map(plain).unwrap_or_default();
+        Some(Self { script, parameters })
+    }
+}
+
+/// What the spindle may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spindle {
+    /// Lowest speed that turns, rad/s.
+    pub min_rad_per_s: f64,
+    /// Highest speed, rad/s; infinite where the machine states none.
+    pub max_rad_per_s: f64,
+}
+
+impl Spindle {
+    /// Reads `[spindle]`.
+    pub(crate) fn read(spindle: &Section<'_>) -> Self {
+        let (min, max) = (spindle.at_least("min_rpm", 0.0).unwrap_or(0.0), spindle.positive("max_rpm"));
+        if let Some(max) = max.filter(|max| *max < min) {
+            spindle.refuse("min_rpm", format!("the lowest speed, {min}, is above the highest, {max}"));
+        }
+        let rad_per_s = |rpm: f64| rpm * 2.0 * PI / 60.0;
+        Self { min_rad_per_s: rad_per_s(min), max_rad_per_s: max.map_or(f64::INFINITY, rad_per_s) }
+    }
+}
