@@ -1,1 +1,18 @@
-//! .
+//! The hard loop: governor, evaluation, guard, drives. One call of [`FineLoop::tick`] is one fine period.
+//!
+//! A crate of its own so that it stays clean: nothing here allocates, locks, opens a file or makes text after
+//! [`FineLoop::new`].
+
+mod config;
+mod cursor;
+mod fault;
+mod governor;
+mod guard;
+mod outputs;
+mod points;
+mod ramp;
+mod tick;
+
+pub use config::{AxisConfig, FineConfig, GuardMode};
+pub use fault::{Breach, Fault, FaultKind};
+pub use tick::{Counters, FineLoop};

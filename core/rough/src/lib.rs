@@ -1,1 +1,20 @@
-//! .
+//! The soft loop: part-program items in, segments queued for the fine loop. One call of [`RoughLoop::step`] is one rough
+//! period; it may allocate and be late, but what it queues can always be brought to rest on the path.
+
+mod depth;
+mod queue;
+mod rough;
+mod source;
+mod window;
+
+pub use depth::QueueDepth;
+pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
+pub use source::Source;
+
+use tandem_sdk::{Block, BlockReport};
+
+/// Is told of blocks as they are planned for good; in order, each once.
+pub trait Observer {
+    /// `block` is driven as `report` says.
+    fn block(&mut self, block: &Block, report: &BlockReport);
+}

@@ -1,0 +1,40 @@
+//! What the fine loop knows of the machine.
+
+use tandem_sdk::{AxisLimits, AxisVector, Limits, MAX_AXES};
+
+/// What the guard does with a sample beyond a limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GuardMode {
+    /// Does not send it: the machine ramps out and faults.
+    #[default]
+    Stop,
+    /// Sends and counts it. Simulated drivers only; the host sees to that.
+    Count,
+}
+
+/// Limits of one axis as the fine loop needs them.
+pub type AxisConfig = AxisLimits;
+
+/// Everything the fine loop is told before it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct FineConfig {
+    /// Fine period, s.
+    pub period_s: f64,
+    /// Limits of the axes.
+    pub limits: Limits,
+    /// Allowable speed difference that the planner makes use of, per axis, mm/s.
+    pub speed_difference_mm_per_s: [f64; MAX_AXES],
+    /// What the guard does.
+    pub guard: GuardMode,
+    /// Where the machine stands.
+    pub position: AxisVector,
+    /// M0, M1 and M6 wait for the operator.
+    pub pause_at_stops: bool,
+}
+
+impl FineConfig {
+    /// Number of axes.
+    pub fn axis_count(&self) -> usize {
+        self.limits.count as usize
+    }
+}

@@ -1,0 +1,191 @@
+//! Where the fine loop is in the queue of segments.
+
+use rtrb::Consumer;
+use tandem_rings::Queued;
+use tandem_sdk::{AxisVector, Event, RingEntry, Segment, SegmentFlags};
+
+use crate::points::Points;
+
+/// A place in the queue: a segment and the time in it.
+#[derive(Debug)]
+pub struct Cursor {
+    entries: Consumer<Queued>,
+    segment: Segment,
+    start_s: f64,
+    local_s: f64,
+    epoch: u32,
+    /// At the end of a segment that ends at rest: the next move starts with the next segment.
+    resting: bool,
+}
+
+/// What a move met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reached {
+    /// A place inside the queue.
+    Inside,
+    /// A rest: what was left of the time is not used.
+    Rest,
+    /// The end of the queue, in motion.
+    Wall,
+}
+
+impl Cursor {
+    /// At rest at `position`, in front of an empty queue.
+    pub fn new(entries: Consumer<Queued>, position: &AxisVector) -> Self {
+        Self { entries, segment: Segment::rest(position, 0.0), start_s: 0.0, local_s: 0.0, epoch: 0, resting: true }
+    }
+
+    /// The segment that the place lies in.
+    pub fn segment(&self) -> &Segment {
+        &self.segment
+    }
+
+    /// Program time of the place, s.
+    pub fn program_time_s(&self) -> f64 {
+        self.start_s + self.local_s
+    }
+
+    /// Planned position here.
+    pub fn position(&self) -> AxisVector {
+        self.segment.position(self.local_s)
+    }
+
+    /// Planned path speed here, mm/s of program time.
+    pub fn path_speed_mm_per_s(&self) -> f64 {
+        if self.resting { 0.0 } else { self.segment.path_speed_mm_per_s(self.local_s) }
+    }
+
+    /// Path coordinate here, mm.
+    pub fn path_mm(&self) -> f64 {
+        self.segment.path_mm(self.local_s)
+    }
+
+    /// Whether the place is a rest of the plan.
+    pub fn is_resting(&self) -> bool {
+        self.resting
+    }
+
+    /// Whether nothing is queued behind the current segment.
+    pub fn is_last(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Collects where the plan goes within `horizon_s` from here, without moving.
+    pub fn scan(&mut self, horizon_s: f64, points: &mut Points) {
+        points.clear();
+        let mut left_s = horizon_s;
+        if !self.resting {
+            let here_s = self.segment.duration_s - self.local_s;
+            points.add(&self.segment, self.local_s, here_s.min(left_s));
+            left_s -= here_s;
+            if ends(&self.segment) {
+                return;
+            }
+        }
+        let waiting = self.entries.slots().min(Points::SEGMENTS);
+        let Ok(chunk) = self.entries.read_chunk(waiting) else { return };
+        let (first, second) = chunk.as_slices();
+        for queued in first.iter().chain(second) {
+            if left_s <= 0.0 || points.is_full() {
+                return;
+            }
+            let RingEntry::Segment(segment) = &queued.entry else { continue };
+            points.add(segment, 0.0, segment.duration_s.min(left_s));
+            left_s -= segment.duration_s;
+            if ends(segment) {
+                return;
+            }
+        }
+    }
+
+    /// Path speed planned `ahead_s` from here, without moving, with the programmed feed and whether it is a rapid.
+    pub fn ahead(&mut self, ahead_s: f64) -> Ahead {
+        let mut left_s = ahead_s;
+        if !self.resting {
+            let here_s = self.segment.duration_s - self.local_s;
+            if left_s < here_s || ends(&self.segment) {
+                return Ahead::at(&self.segment, self.local_s + left_s.min(here_s));
+            }
+            left_s -= here_s;
+        }
+        let waiting = self.entries.slots().min(Points::SEGMENTS);
+        let mut last = Ahead::at(&self.segment, self.segment.duration_s);
+        let Ok(chunk) = self.entries.read_chunk(waiting) else { return last };
+        let (first, second) = chunk.as_slices();
+        for queued in first.iter().chain(second) {
+            let RingEntry::Segment(segment) = &queued.entry else { continue };
+            last = Ahead::at(segment, left_s.min(segment.duration_s));
+            if left_s < segment.duration_s || ends(segment) {
+                return last;
+            }
+            left_s -= segment.duration_s;
+        }
+        last
+    }
+
+    /// Moves on by `delta_s` of program time. Events on the way are given to `event`.
+    pub fn advance(&mut self, delta_s: f64, mut event: impl FnMut(&Event)) -> Reached {
+        let mut left_s = delta_s;
+        loop {
+            let here_s = if self.resting { 0.0 } else { self.segment.duration_s - self.local_s };
+            if !self.resting && left_s < here_s {
+                self.local_s += left_s;
+                return Reached::Inside;
+            }
+            if !self.resting && ends(&self.segment) {
+                self.local_s = self.segment.duration_s;
+                self.resting = true;
+                return Reached::Rest;
+            }
+            left_s -= here_s;
+            if !self.next(&mut event) {
+                return if self.resting { Reached::Rest } else { Reached::Wall };
+            }
+        }
+    }
+
+    /// Steps to the start of the next segment; `false` where there is none.
+    fn next(&mut self, event: &mut impl FnMut(&Event)) -> bool {
+        while let Ok(queued) = self.entries.pop() {
+            match queued.entry {
+                RingEntry::Event(it) if it.epoch >= self.epoch => event(&it),
+                RingEntry::Segment(segment) if segment.epoch >= self.epoch => {
+                    self.epoch = segment.epoch;
+                    (self.segment, self.start_s, self.local_s) = (segment, queued.start_s, 0.0);
+                    self.resting = false;
+                    return true;
+                }
+                _ => {}
+            }
+        }
+        if !self.resting {
+            self.local_s = self.segment.duration_s;
+        }
+        false
+    }
+}
+
+fn ends(segment: &Segment) -> bool {
+    segment.flags.contains(SegmentFlags::ENDS_AT_REST)
+}
+
+/// The plan a little ahead.
+#[derive(Clone, Copy, Debug)]
+pub struct Ahead {
+    /// Planned path speed, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Programmed feed, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Rapid motion.
+    pub rapid: bool,
+}
+
+impl Ahead {
+    fn at(segment: &Segment, local_s: f64) -> Self {
+        Self {
+            speed_mm_per_s: segment.path_speed_mm_per_s(local_s),
+            feed_mm_per_s: segment.feed_mm_per_s,
+            rapid: segment.flags.contains(SegmentFlags::RAPID),
+        }
+    }
+}

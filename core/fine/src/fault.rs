@@ -1,0 +1,56 @@
+//! What can go wrong on the fine loop, as numbers; the host turns them into words.
+
+/// Which limit a sample broke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Breach {
+    /// Not a finite number.
+    NotFinite,
+    /// Outside the travel.
+    Position,
+    /// Faster than the axis may go.
+    Velocity,
+    /// More change of velocity than `A·Δt + V` over some window.
+    Acceleration,
+}
+
+/// The cause of a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// The guard refused a sample of the planner.
+    Guard {
+        /// Which limit.
+        breach: Breach,
+        /// Axis index.
+        axis: usize,
+        /// What the sample would have been, in the limit's unit.
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// A drive reports a fault.
+    Drive {
+        /// Joint index.
+        joint: usize,
+        /// The drive's code.
+        code: u32,
+    },
+    /// The driver failed to exchange.
+    Driver,
+    /// The operator's emergency stop.
+    EmergencyStop,
+    /// A fault on the soft side: the machine stopped on the path.
+    Soft,
+    /// More fine periods were missed than the machine allows.
+    MissedPeriods,
+}
+
+/// A fault with its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// The cause.
+    pub kind: FaultKind,
+    /// Fine period in which it was seen.
+    pub tick: u64,
+    /// Program line that moved.
+    pub line: u32,
+}

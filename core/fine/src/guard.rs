@@ -1,0 +1,96 @@
+//! The guard: the last word on every sample. It knows limits and nothing else.
+
+use tandem_sdk::{AxisVector, MAX_AXES};
+
+use crate::config::FineConfig;
+use crate::fault::{Breach, FaultKind};
+
+/// The one tolerance on velocity and acceleration, relative.
+const TOLERANCE: f64 = 1e-6;
+
+/// Checks samples against the ones already sent.
+#[derive(Debug)]
+pub struct Guard {
+    config: FineConfig,
+    position: AxisVector,
+    velocity: AxisVector,
+    /// Per sign and axis: by how much the velocity has changed more than the acceleration limit explains, mm/s.
+    buckets: [[f64; MAX_AXES]; 2],
+}
+
+/// A sample that passed, or was let pass, as the guard will remember it.
+#[derive(Clone, Copy, Debug)]
+pub struct Checked {
+    velocity: AxisVector,
+    buckets: [[f64; MAX_AXES]; 2],
+    /// The first limit broken, if any.
+    pub breach: Option<FaultKind>,
+}
+
+impl Guard {
+    /// At rest at the configured position.
+    pub fn new(config: &FineConfig) -> Self {
+        let position = config.position;
+        Self { config: *config, position, velocity: AxisVector::ZERO, buckets: [[0.0; MAX_AXES]; 2] }
+    }
+
+    /// The last position sent.
+    pub fn position(&self) -> &AxisVector {
+        &self.position
+    }
+
+    /// The velocity of the last period, mm/s.
+    pub fn velocity(&self) -> &AxisVector {
+        &self.velocity
+    }
+
+    /// Judges `next` as the sample after the last one sent.
+    pub fn check(&self, next: &AxisVector) -> Checked {
+        let mut checked = Checked { velocity: AxisVector::ZERO, buckets: self.buckets, breach: None };
+        for axis in 0..self.config.axis_count() {
+            let breach = self.check_axis(axis, next[axis], &mut checked);
+            checked.breach = checked.breach.or(breach);
+        }
+        checked
+    }
+
+    /// Remembers that `next` was sent.
+    pub fn sent(&mut self, next: &AxisVector, checked: &Checked) {
+        self.position = *next;
+        self.velocity = checked.velocity;
+        self.buckets = checked.buckets;
+    }
+
+    fn check_axis(&self, axis: usize, next: f64, checked: &mut Checked) -> Option<FaultKind> {
+        let limits = &self.config.limits.axes[axis];
+        let period_s = self.config.period_s;
+        // Each velocity is a difference of two positions that are known to half a unit in the last place.
+        let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
+        let velocity = (next - self.position[axis]) / period_s;
+        let change = velocity - self.velocity[axis];
+        checked.velocity[axis] = velocity;
+        let leak = limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * period_s + rounding;
+        let mut fullest = 0.0f64;
+        for (sign, bucket) in [change, -change].into_iter().zip(&mut checked.buckets) {
+            bucket[axis] = (bucket[axis] + sign - leak).max(0.0);
+            fullest = fullest.max(bucket[axis]);
+        }
+        let breach = |breach, value, limit| Some(FaultKind::Guard { breach, axis, value, limit });
+        if !next.is_finite() {
+            return breach(Breach::NotFinite, next, 0.0);
+        }
+        if next < limits.min_mm - rounding || next > limits.max_mm + rounding {
+            let nearest = if next < limits.min_mm { limits.min_mm } else { limits.max_mm };
+            return breach(Breach::Position, next, nearest);
+        }
+        let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
+        if velocity.abs() > fastest * (1.0 + TOLERANCE) + rounding {
+            return breach(Breach::Velocity, velocity, fastest);
+        }
+        let allowed = self.config.speed_difference_mm_per_s[axis];
+        if fullest > allowed * (1.0 + TOLERANCE) + rounding {
+            return breach(Breach::Acceleration, change / period_s, limits.acceleration_mm_per_s2);
+        }
+        None
+    }
+}

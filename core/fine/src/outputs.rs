@@ -1,0 +1,61 @@
+//! What events switch: outputs, spindle, permissions. They travel to the drives with the setpoint.
+
+use tandem_sdk::{Event, EventKind};
+
+/// Number of the output that stands for mist coolant; user outputs are 0 to 61.
+pub const MIST: u32 = 62;
+/// Number of the output that stands for flood coolant.
+pub const FLOOD: u32 = 63;
+
+/// The switched state.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools)] // independent modal states of the program, as the program has them
+pub struct Outputs {
+    /// Digital outputs, bit n is output n.
+    pub bits: u64,
+    /// Spindle speed, rad/s.
+    pub spindle_rad_per_s: f64,
+    /// The program permits the feed override.
+    pub override_permitted: bool,
+    /// The program permits the adaptive feed.
+    pub adaptive_permitted: bool,
+    /// The program has ended.
+    pub ended: bool,
+    /// The program asks to wait for the operator.
+    pub stop_requested: bool,
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self {
+            bits: 0,
+            spindle_rad_per_s: 0.0,
+            override_permitted: true,
+            adaptive_permitted: true,
+            ended: false,
+            stop_requested: false,
+        }
+    }
+}
+
+impl Outputs {
+    /// Takes an event that the path has reached.
+    pub fn apply(&mut self, event: &Event) {
+        let on = event.value != 0.0;
+        match event.kind {
+            EventKind::Spindle => self.spindle_rad_per_s = event.value,
+            EventKind::Mist => self.switch(MIST, on),
+            EventKind::Flood => self.switch(FLOOD, on),
+            EventKind::DigitalOutput => self.switch(event.index.clamp(0, 63).unsigned_abs(), on),
+            EventKind::FeedOverride => self.override_permitted = on,
+            EventKind::AdaptiveFeed => self.adaptive_permitted = on,
+            EventKind::ProgramStop | EventKind::OptionalStop | EventKind::ToolChange => self.stop_requested = true,
+            EventKind::ProgramEnd => self.ended = true,
+            EventKind::ToolSelect | EventKind::SpindleOverride | EventKind::FeedHold => {}
+        }
+    }
+
+    fn switch(&mut self, output: u32, on: bool) {
+        self.bits = if on { self.bits | 1 << output } else { self.bits & !(1 << output) };
+    }
+}

@@ -1,0 +1,84 @@
+//! Where the plan goes within one fine period: velocity and acceleration at the points that matter.
+
+use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags};
+
+/// One point of the plan, per axis and per s of program time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Point {
+    /// Velocity that is continuous over junctions, mm/s.
+    pub velocity: [f64; MAX_AXES],
+    /// Its rate of change, mm/s².
+    pub acceleration: [f64; MAX_AXES],
+}
+
+/// The points of one fine period.
+#[derive(Debug)]
+pub struct Points {
+    list: Box<[Point]>,
+    count: usize,
+    limits: [AxisLimits; MAX_AXES],
+    axes: usize,
+    /// Largest |velocity| / limit.
+    pub speed_ratio: f64,
+    /// Largest |acceleration| / limit.
+    pub acceleration_ratio: f64,
+    /// Program time that the points cover, s.
+    pub covered_s: f64,
+}
+
+impl Points {
+    /// Most segments looked at in one period.
+    pub const SEGMENTS: usize = 64;
+    const POINTS: usize = 3 * Self::SEGMENTS;
+
+    /// No points; the limits are those of the machine's `axes` first axes.
+    pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize) -> Self {
+        let list = vec![Point::default(); Self::POINTS].into_boxed_slice();
+        Self { list, count: 0, limits: *limits, axes, speed_ratio: 0.0, acceleration_ratio: 0.0, covered_s: 0.0 }
+    }
+
+    /// Forgets all points.
+    pub fn clear(&mut self) {
+        self.count = 0;
+        (self.speed_ratio, self.acceleration_ratio, self.covered_s) = (0.0, 0.0, 0.0);
+    }
+
+    /// Whether another segment might not fit.
+    pub fn is_full(&self) -> bool {
+        self.count + 3 > Self::POINTS
+    }
+
+    /// The points so far.
+    pub fn iter(&self) -> impl Iterator<Item = &Point> {
+        self.list[..self.count].iter()
+    }
+
+    /// Adds a stretch of `segment`: its ends, and the middle where the segment is curved.
+    pub fn add(&mut self, segment: &Segment, from_s: f64, duration_s: f64) {
+        self.point(segment, from_s);
+        self.point(segment, from_s + duration_s);
+        if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
+            self.point(segment, from_s + duration_s / 2.0);
+        }
+        self.covered_s += duration_s;
+    }
+
+    fn point(&mut self, segment: &Segment, t: f64) {
+        let rapid = segment.flags.contains(SegmentFlags::RAPID);
+        let point = &mut self.list[self.count];
+        for axis in 0..self.axes {
+            let c = &segment.coefficients[axis];
+            let velocity = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
+            let acceleration = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
+            let takeback = segment.step_acceleration[axis];
+            let smooth = acceleration + takeback;
+            point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
+            point.acceleration[axis] = smooth;
+            let limits = &self.limits[axis];
+            let fastest = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
+            self.speed_ratio = self.speed_ratio.max(velocity.abs() / fastest);
+            self.acceleration_ratio = self.acceleration_ratio.max(smooth.abs() / limits.acceleration_mm_per_s2);
+        }
+        self.count += 1;
+    }
+}

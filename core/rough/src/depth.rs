@@ -1,0 +1,51 @@
+//! How much program time must be queued so that the machine can stop within it.
+
+use crate::window::SlidingMax;
+use tandem_sdk::{Segment, SegmentFlags};
+
+/// Share of the declared stop deceleration that is counted on; the fine loop counts on the same.
+const STOP_SHARE: f64 = 0.95;
+
+/// The worst stop over what is queued.
+#[derive(Debug)]
+pub struct QueueDepth {
+    /// Path speeds, mm/s.
+    speeds: SlidingMax,
+    /// Negative stop decelerations, mm/s²: their largest is the smallest deceleration.
+    decelerations: SlidingMax,
+    rough_period_s: f64,
+}
+
+impl QueueDepth {
+    /// Nothing queued.
+    pub fn new(rough_period_s: f64) -> Self {
+        Self { speeds: SlidingMax::default(), decelerations: SlidingMax::default(), rough_period_s }
+    }
+
+    /// A segment has been queued that ends at `until_s`.
+    pub fn push(&mut self, segment: &Segment, until_s: f64) {
+        if segment.flags.contains(SegmentFlags::DWELL) || segment.duration_s == 0.0 {
+            return;
+        }
+        let speed = segment.path_speed_mm_per_s(0.0).max(segment.path_speed_mm_per_s(segment.duration_s));
+        self.speeds.push(speed, until_s);
+        self.decelerations.push(-segment.stop_deceleration_mm_per_s2, until_s);
+    }
+
+    /// The fine loop has come to `now_s`.
+    pub fn passed(&mut self, now_s: f64) {
+        self.speeds.forget(now_s);
+        self.decelerations.forget(now_s);
+    }
+
+    /// Smallest stop deceleration queued, mm/s²; infinite where nothing moves.
+    pub fn stop_deceleration_mm_per_s2(&self) -> f64 {
+        self.decelerations.max().map_or(f64::INFINITY, |negative| -negative)
+    }
+
+    /// Program time that must be queued, s: the worst stop `v/a_s` and two rough periods.
+    pub fn required_s(&self) -> f64 {
+        let worst_s = self.speeds.max().map_or(0.0, |v| v / (STOP_SHARE * self.stop_deceleration_mm_per_s2()));
+        worst_s + 2.0 * self.rough_period_s
+    }
+}

@@ -1,0 +1,142 @@
+//! The rough loop's side of the segment ring.
+
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_rings::{Queued, RoughEnd};
+use tandem_sdk::{Block, BlockReport, Event, RingEntry, Segment, SegmentFlags, SegmentSink};
+
+use crate::depth::QueueDepth;
+
+/// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
+pub struct Queue {
+    end: RoughEnd,
+    depth: QueueDepth,
+    /// Emitted, not yet in the ring.
+    staged: VecDeque<Queued>,
+    /// Events whose block has not been emitted yet.
+    events: VecDeque<Event>,
+    /// Blocks accepted by the planner, not yet reported.
+    pub blocks: VecDeque<Block>,
+    /// Blocks planned for good since the last look.
+    pub reported: Vec<(Block, BlockReport)>,
+    /// Program time at the end of what was emitted, s.
+    emitted_s: f64,
+    /// Program time at the end of what is in the ring, s.
+    queued_s: f64,
+    ends_at_rest: bool,
+    defect: Option<&'static str>,
+}
+
+impl Queue {
+    /// An empty queue.
+    pub fn new(end: RoughEnd, rough_period_s: f64) -> Self {
+        Self {
+            end,
+            depth: QueueDepth::new(rough_period_s),
+            staged: VecDeque::new(),
+            events: VecDeque::new(),
+            blocks: VecDeque::new(),
+            reported: Vec::new(),
+            emitted_s: 0.0,
+            queued_s: 0.0,
+            ends_at_rest: true,
+            defect: None,
+        }
+    }
+
+    /// Takes an event that belongs in front of a block still to come.
+    pub fn event(&mut self, event: Event) {
+        self.events.push_back(event);
+    }
+
+    /// Nothing more will be emitted for now: events that wait for a block take their place at the end.
+    pub fn release_events(&mut self) {
+        while let Some(event) = self.events.pop_front() {
+            self.stage_event(event);
+        }
+    }
+
+    /// The planner's defect met while emitting, if any.
+    pub fn defect(&self) -> Option<&'static str> {
+        self.defect
+    }
+
+    /// Digital inputs as the fine loop last read them.
+    pub fn inputs(&self) -> u64 {
+        self.end.status.inputs.load(Relaxed)
+    }
+
+    /// Whether all is driven: nothing staged, and the fine loop rests at the end of its queue.
+    pub fn is_driven(&self) -> bool {
+        self.staged.is_empty()
+            && self.end.segments.slots() == self.end.segments.buffer().capacity()
+            && self.end.status.idle.load(Relaxed)
+    }
+
+    /// Whether the fine loop has as much as the worst stop asks for, with a margin of `margin_s`; or the ring is full.
+    pub fn is_deep(&mut self, margin_s: f64) -> bool {
+        let now_s = self.end.status.program_time_s.load();
+        self.depth.passed(now_s);
+        !self.staged.is_empty() || self.emitted_s - now_s >= self.depth.required_s() + margin_s
+    }
+
+    /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
+    pub fn flush(&mut self, over: bool) {
+        while let Some(next) = self.staged.front() {
+            if self.end.segments.push(*next).is_err() {
+                break;
+            }
+            if let RingEntry::Segment(segment) = &next.entry {
+                self.queued_s = next.start_s + segment.duration_s;
+                self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
+            }
+            self.staged.pop_front();
+        }
+        self.tell(over);
+    }
+
+    fn tell(&mut self, over: bool) {
+        let now_s = self.end.status.program_time_s.load();
+        self.depth.passed(now_s);
+        let shared = &self.end.depth;
+        shared.stop_deceleration_mm_per_s2.store(self.depth.stop_deceleration_mm_per_s2());
+        shared.wall_s.store(if self.ends_at_rest { f64::INFINITY } else { self.queued_s });
+        let deep = self.queued_s - now_s >= self.depth.required_s();
+        let full = !self.staged.is_empty();
+        let complete = over && self.staged.is_empty();
+        shared.may_start.store(deep || full || complete, Relaxed);
+    }
+
+    fn stage_event(&mut self, mut event: Event) {
+        event.program_time_s = self.emitted_s;
+        self.staged.push_back(Queued { entry: RingEntry::Event(event), start_s: self.emitted_s });
+    }
+}
+
+impl SegmentSink for Queue {
+    fn segment(&mut self, segment: &Segment) {
+        let numbers = segment.coefficients.iter().flatten().chain(&segment.path).chain([&segment.duration_s]);
+        if !numbers.into_iter().all(|v| v.is_finite()) || segment.duration_s < 0.0 {
+            self.defect = Some("a segment with a number that is not finite, or a negative duration");
+            return;
+        }
+        while self.events.front().is_some_and(|event| event.before_block <= segment.block) {
+            let event = self.events.pop_front().unwrap_or_else(|| unreachable!("looked at above"));
+            self.stage_event(event);
+        }
+        self.staged.push_back(Queued { entry: RingEntry::Segment(*segment), start_s: self.emitted_s });
+        self.emitted_s += segment.duration_s;
+        self.depth.push(segment, self.emitted_s);
+    }
+
+    fn block(&mut self, report: &BlockReport) {
+        while let Some(block) = self.blocks.pop_front() {
+            if block.index == report.block {
+                self.reported.push((block, *report));
+                return;
+            }
+        }
+        self.defect = Some("a report of a block that it was not given");
+    }
+}

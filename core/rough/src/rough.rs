@@ -1,0 +1,199 @@
+//! The rough loop itself.
+
+use tandem_gcode::{Input, InputMode, InputWait, Item};
+use tandem_rings::RoughEnd;
+use tandem_sdk::{Accepted, Event, EventKind, Planner};
+
+use crate::Observer;
+use crate::queue::Queue;
+use crate::source::Source;
+
+/// What the rough loop is told before it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct RoughConfig {
+    /// Rough period, s.
+    pub rough_period_s: f64,
+}
+
+/// How far the rough loop is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// There is more to come.
+    Working,
+    /// Everything is queued, the end of the program included.
+    Done,
+}
+
+/// What stops the rough loop.
+#[derive(Debug, thiserror::Error)]
+pub enum RoughError {
+    /// The program cannot go on.
+    #[error("{0}")]
+    Program(String),
+    /// The planner failed or refused what it had checked.
+    #[error("planner: line {line}: {cause}")]
+    Planner {
+        /// Program line of the block.
+        line: u32,
+        /// The planner's words.
+        cause: String,
+    },
+}
+
+/// Rough periods that are queued beyond what the worst stop asks for.
+const MARGIN_PERIODS: f64 = 3.0;
+
+/// The soft loop of one program run.
+pub struct RoughLoop {
+    config: RoughConfig,
+    source: Box<dyn Source + Send>,
+    planner: Box<dyn Planner>,
+    queue: Queue,
+    items: Vec<Item>,
+    next: usize,
+    /// The program gives nothing more.
+    dry: bool,
+    /// The planner has been told that nothing follows for now.
+    finished: bool,
+    waiting: Option<InputWait>,
+    waited_s: f64,
+    line: u32,
+    last_block: u64,
+    done: bool,
+}
+
+impl RoughLoop {
+    /// A rough loop at the start of its program.
+    pub fn new(config: RoughConfig, source: Box<dyn Source + Send>, planner: Box<dyn Planner>, end: RoughEnd) -> Self {
+        Self {
+            config,
+            source,
+            planner,
+            queue: Queue::new(end, config.rough_period_s),
+            items: Vec::new(),
+            next: 0,
+            dry: false,
+            finished: false,
+            waiting: None,
+            waited_s: 0.0,
+            line: 0,
+            last_block: 0,
+            done: false,
+        }
+    }
+
+    /// One rough period: fills the planner, advances it until the fine loop has enough, queues what came out.
+    ///
+    /// # Errors
+    /// The program or the planner cannot go on; what is queued is still driven to its end.
+    pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
+        let result = self.fill();
+        self.queue.flush(self.finished || result.is_err());
+        for (block, report) in self.queue.reported.drain(..) {
+            observer.block(&block, &report);
+        }
+        result?;
+        self.answer_wait();
+        Ok(if self.done { Progress::Done } else { Progress::Working })
+    }
+
+    fn fill(&mut self) -> Result<(), RoughError> {
+        let period_s = self.config.rough_period_s;
+        while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
+            self.feed()?;
+            let advanced = self
+                .planner
+                .advance(period_s, &mut self.queue)
+                .map_err(|e| planner_error(self.line, &e.to_string()))?;
+            if let Some(defect) = self.queue.defect() {
+                return Err(planner_error(self.line, defect));
+            }
+            if advanced.done != 0 {
+                self.stretch_is_over();
+                return Ok(());
+            }
+            if advanced.duration_s == 0.0 && !self.finished {
+                return Err(planner_error(self.line, "it is full and emits nothing"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The planner has emitted all it was given: the program has ended, or it waits for an input.
+    fn stretch_is_over(&mut self) {
+        self.queue.release_events();
+        if self.waiting.is_none() && self.dry {
+            self.queue.event(Event::new(EventKind::ProgramEnd, self.line, self.last_block + 1, 0, 0.0));
+            self.queue.release_events();
+            self.done = true;
+        }
+    }
+
+    /// Offers blocks until the planner is full or the program gives no more for now.
+    fn feed(&mut self) -> Result<(), RoughError> {
+        while self.waiting.is_none() && self.load()? {
+            match &self.items[self.next] {
+                Item::Block(block) => {
+                    (self.line, self.last_block) = (block.line, block.index);
+                    let accepted = self.planner.accept(block).map_err(|e| planner_error(block.line, &e.to_string()))?;
+                    if accepted == Accepted::Full {
+                        return Ok(());
+                    }
+                    self.queue.blocks.push_back(*block);
+                }
+                Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
+                Item::Event(event) => self.queue.event(*event),
+                Item::Wait(wait) => self.waiting = Some(*wait),
+                Item::End => self.dry = true,
+            }
+            self.finished = false;
+            self.next += 1;
+        }
+        if !self.finished {
+            self.planner.finish();
+            self.finished = true;
+        }
+        Ok(())
+    }
+
+    /// Sees to it that there is a next item; `false` where the program is over.
+    fn load(&mut self) -> Result<bool, RoughError> {
+        while self.next == self.items.len() && !self.dry {
+            self.items.clear();
+            self.next = 0;
+            self.dry = !self.source.next_items(&mut self.items).map_err(RoughError::Program)? && self.items.is_empty();
+        }
+        Ok(self.next < self.items.len())
+    }
+
+    /// Answers M66 once the machine has come to rest.
+    fn answer_wait(&mut self) {
+        let Some(wait) = self.waiting else { return };
+        if !self.finished || !self.queue.is_driven() {
+            return;
+        }
+        let answer = read_input(&wait, self.queue.inputs());
+        self.waited_s += self.config.rough_period_s;
+        if let Some(value) = answer.or((self.waited_s > wait.timeout_s).then_some(-1.0)) {
+            self.source.provide_input(value);
+            (self.waiting, self.waited_s) = (None, 0.0);
+        }
+    }
+}
+
+fn planner_error(line: u32, cause: &str) -> RoughError {
+    RoughError::Planner { line, cause: cause.to_string() }
+}
+
+/// The answer of an input now, if what is waited for is there. Edges are taken as levels: the machine was at rest
+/// before the wait began, and an edge shorter than a rough period is not promised to be seen.
+fn read_input(wait: &InputWait, inputs: u64) -> Option<f64> {
+    let Input::Digital(number) = wait.input else { return Some(0.0) };
+    let high = inputs >> number.min(63) & 1 == 1;
+    let met = match wait.mode {
+        InputMode::Immediate => true,
+        InputMode::Rise | InputMode::High => high,
+        InputMode::Fall | InputMode::Low => !high,
+    };
+    met.then_some(if high { 1.0 } else { 0.0 })
+}
