@@ -27,12 +27,12 @@ function minus(text) {
   return text.replace("-", "\u2212");
 }
 
-// A value with about five significant digits.
+// A value with about four significant digits.
 function number(value) {
   if (!isFinite(value)) return "–";
   if (Math.abs(value) >= 1e6) return thousands(value, 1e6);
   const magnitude = Math.floor(Math.log10(Math.max(Math.abs(value), 1e-9)));
-  const decimals = Math.min(Math.max(4 - magnitude, 0), 5);
+  const decimals = Math.min(Math.max(3 - magnitude, 0), 5);
   const rounded = Number(value.toFixed(decimals));
   return minus(String(rounded === 0 ? 0 : rounded));
 }

@@ -26,7 +26,7 @@ function makeViews(view) {
 function showView(view, name, buttons) {
   buttons.forEach((button) => button.setAttribute("aria-pressed", button.dataset.view === name));
   const turn = name === "3D" ? "drag: turn · shift-drag: move" : "drag: move";
-  byId("path-hint").textContent = `wheel: zoom · ${turn} · double-click: whole path · grey: outside the selected time`;
+  byId("path-hint").textContent = `wheel: zoom · ${turn} · double-click: fit all`;
   view.show(name);
 }
 

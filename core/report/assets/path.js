@@ -144,7 +144,9 @@ class PathView {
     this.walk(0, from + 1, add);
     this.walk(to - 1, columns.t.length, add);
     this.context.lineWidth = 1;
-    this.strokeAll(lines, theme.css.line);
+    this.context.globalAlpha = 0.55;
+    this.strokeAll(lines, theme.css.faint);
+    this.context.globalAlpha = 1;
   }
 
   drawHits(from, to) {

@@ -24,7 +24,11 @@ class Plot {
       legend.append(key);
       return key;
     });
-    if (this.note) legend.append(element("i", "", this.note));
+    if (this.note) {
+      const note = element("i", "note", this.note);
+      note.title = this.note;
+      legend.append(note);
+    }
     return legend;
   }
 
@@ -69,7 +73,7 @@ class Plot {
       const [least_, most] = curve.range();
       low = Math.min(low, least_);
       high = Math.max(high, most);
-      if (curve.limit === null) continue;
+      if (!curve.limit) continue;
       const limit = curve.limit * curve.scale();
       least = Math.max(least, limit * 1e-4);
       if (most > limit * 0.25) high = Math.max(high, limit);
@@ -81,7 +85,7 @@ class Plot {
   }
 
   drawGrid({ context, left, top, width, bottom, low, high, x, y }) {
-    const places = ticks(low, high, (bottom - top) / 22);
+    const places = ticks(low, high, (bottom - top) / 15);
     const labels = tickLabels(places);
     context.lineWidth = 1;
     context.fillStyle = theme.css.soft;
@@ -99,17 +103,20 @@ class Plot {
 
   drawLimits(frame, visible) {
     const limits = new Map();
-    for (const curve of visible.filter((c) => c.limit !== null)) {
+    for (const curve of visible.filter((c) => c.limit)) {
       const value = curve.limit * curve.scale();
       for (const side of curve.twoSided ? [value, -value] : [value]) {
         limits.set(side, limits.has(side) ? theme.css.soft : curve.colour());
       }
     }
-    for (const [value, colour] of limits) this.drawLimit(frame, value, colour);
+    const seen = [...limits].filter(([value]) => value >= frame.low && value <= frame.high);
+    for (const [value, colour] of seen) {
+      const mirrored = seen.some(([other]) => other === -value);
+      this.drawLimit(frame, value, colour, mirrored && value < 0 ? "" : (mirrored ? "limit ±" : "limit ") + number(value));
+    }
   }
 
-  drawLimit({ context, left, width, top, bottom, low, high, y }, value, colour) {
-    if (value < low || value > high) return;
+  drawLimit({ context, left, width, top, bottom, y }, value, colour, text) {
     const middle = Math.round(y(value)) + 0.5;
     context.strokeStyle = context.fillStyle = colour;
     context.lineWidth = 1.1;
@@ -117,9 +124,9 @@ class Plot {
     line(context, left, middle, left + width, middle);
     context.setLineDash([]);
     context.textAlign = "right";
-    const below = middle - top < 14;
+    const below = value < 0 ? bottom - middle > 14 : middle - top < 14;
     context.textBaseline = below ? "top" : "bottom";
-    plate(context, "limit " + number(value), left + width - 4, middle + (below ? 2 : -1));
+    plate(context, text, left + width - 4, middle + (below ? 2 : -1));
   }
 
   drawSelection({ context, top, bottom, x }) {

@@ -35,7 +35,7 @@ Object.assign(PathView.prototype, {
     context.font = "600 12px system-ui, 'Liberation Sans', Arial, sans-serif";
     const name = (place) => (this.space[place] < 0 ? "XYZ"[place] : about.axes[this.space[place]].letter);
     context.fillStyle = axisColour(name(across));
-    plate(context, name(across) + " →", 28, height - 4);
+    plate(context, name(across) + " →", 32, height - 4);
     context.fillStyle = axisColour(name(upward));
     plate(context, name(upward) + " ↑", 4, height - 4);
     context.font = "11px system-ui, 'Liberation Sans', Arial, sans-serif";
@@ -85,7 +85,7 @@ Object.assign(PathView.prototype, {
 
   drawScaleBar() {
     const { context, width, height } = this;
-    const length = ticks(0, 90 / this.scale, 1).pop() || 1;
+    const length = roundBelow(110 / this.scale);
     const right = width - 14, left = right - length * this.scale, y = height - 12;
     context.strokeStyle = context.fillStyle = theme.css.soft;
     context.lineWidth = 1.5;
@@ -97,6 +97,12 @@ Object.assign(PathView.prototype, {
     plate(context, lengthText(length), right, y - 5);
   },
 });
+
+// The largest of 1, 2, 5, 10, 20, … that is not above `value`.
+function roundBelow(value) {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [5, 2, 1].find((m) => m * power <= value) * power;
+}
 
 function lengthText(mm) {
   if (mm >= 1000) return number(mm / 1000) + " m";

@@ -66,7 +66,7 @@ function listenToKeys() {
 }
 
 function drawTimeAxis() {
-  const { context, width, height } = prepare(document.getElementById("time-axis"));
+  const { context, width } = prepare(document.getElementById("time-axis"));
   const inner = width - GUTTER.left - GUTTER.right;
   const places = timeTicks(inner);
   context.fillStyle = theme.css.soft;
@@ -76,11 +76,11 @@ function drawTimeAxis() {
   tickLabels(places).forEach((label, k) => {
     const x = GUTTER.left + (places[k] - state.from) / (state.to - state.from) * inner;
     line(context, Math.round(x) + 0.5, 0, Math.round(x) + 0.5, 4);
-    context.fillText(label, x, 6);
+    const half = context.measureText(label).width / 2;
+    if (x - half > GUTTER.left - 4) context.fillText(label, Math.min(x, width - half - 2), 6);
   });
   context.textAlign = "right";
-  context.textBaseline = "bottom";
-  context.fillText("time in s", width - GUTTER.right, height);
+  context.fillText("time in s", GUTTER.left - 6, 6);
 }
 
 // The whole run in one strip: its feed, and the selected time as a window that can be dragged.

@@ -1,6 +1,4 @@
-//! Stretches of a run that exceed a limit, for people: where, by how much.
-
-use serde::Serialize;
+//! Stretches of a run that exceed a judged limit, for people: where, by how much.
 
 use crate::judge::{ACCELERATION, AxisMotion, JERK, VELOCITY};
 use crate::model::{Axis, Report};
@@ -11,7 +9,7 @@ const LISTED: usize = 200;
 const GAP: usize = 3;
 
 /// A stretch of samples that exceed one limit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Finding {
     /// What is exceeded, such as `X acceleration`.
     pub what: String,
@@ -29,8 +27,6 @@ pub(crate) struct Finding {
     pub limit: f64,
     /// Samples that exceed the limit.
     pub samples: usize,
-    /// `false` where the limit is only reported.
-    pub judged: bool,
 }
 
 /// All that exceeds a limit.
@@ -54,7 +50,7 @@ impl Findings {
             findings.add_axis(report, axis, motion);
         }
         if let (Some(limit), Some(values)) = (report.path_tolerance_mm, &report.samples.deviation_mm) {
-            let kind = Finding { what: "path deviation".into(), unit: "mm".into(), limit, ..judged() };
+            let kind = Finding { what: "path deviation".into(), unit: "mm".into(), limit, ..Finding::default() };
             findings.off_path = findings.add(report, &kind, values, off_path, 1);
         }
         findings.listed.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
@@ -67,16 +63,16 @@ impl Findings {
             what: format!("{} {name}", axis.letter),
             unit: format!("{unit}/{per}"),
             limit,
-            ..judged()
+            ..Finding::default()
         };
         let velocity = kind("velocity", "s", axis.max_velocity);
         self.limit_violations += self.add(report, &velocity, &motion.velocity, &motion.marks, VELOCITY);
         let acceleration = kind("acceleration", "s²", axis.max_acceleration);
         self.limit_violations += self.add(report, &acceleration, &motion.acceleration, &motion.marks, ACCELERATION);
-        let jerk = kind("jerk", "s³", axis.max_jerk.unwrap_or(f64::INFINITY));
-        let jerk = Finding { judged: report.jerk_is_judged, ..jerk };
-        let samples = self.add(report, &jerk, &motion.jerk, &motion.marks, JERK);
-        self.limit_violations += if jerk.judged { samples } else { 0 };
+        if let Some(limit) = axis.max_jerk.filter(|_| report.jerk_is_judged) {
+            let jerk = kind("jerk", "s³", limit);
+            self.limit_violations += self.add(report, &jerk, &motion.jerk, &motion.marks, JERK);
+        }
     }
 
     /// Adds the stretches in which `bit` is marked; answers the number of samples.
@@ -111,20 +107,6 @@ impl Finding {
         self.to_s = t_s;
         self.peak = self.peak.max(value.abs());
         self.samples += 1;
-    }
-}
-
-fn judged() -> Finding {
-    Finding {
-        what: String::new(),
-        unit: String::new(),
-        from_s: 0.0,
-        to_s: 0.0,
-        line: 0,
-        peak: 0.0,
-        limit: 0.0,
-        samples: 0,
-        judged: true,
     }
 }
 

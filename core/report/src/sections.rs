@@ -130,8 +130,7 @@ pub(crate) fn findings(derived: &Derived) -> String {
     for finding in &derived.findings.listed {
         let _ = write!(
             rows,
-            "<tr class=\"{}\" tabindex=\"0\" data-from=\"{}\" data-to=\"{}\"><td>{}<td>{:.4} s<td>line {}<td>{} {}<td>limit {}<td>{}",
-            if finding.judged { "over" } else { "above" },
+            "<tr class=\"over\" tabindex=\"0\" data-from=\"{}\" data-to=\"{}\"><td>{}<td>{:.4} s<td>{}<td>{} {}<td>{}<td>{}",
             finding.from_s,
             finding.to_s,
             escape(&finding.what),
@@ -140,7 +139,7 @@ pub(crate) fn findings(derived: &Derived) -> String {
             number(finding.peak),
             finding.unit,
             number(finding.limit),
-            if finding.samples == 1 { "1 sample".into() } else { format!("{} samples", count(finding.samples)) },
+            count(finding.samples),
         );
     }
     if derived.findings.unlisted > 0 {

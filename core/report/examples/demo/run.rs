@@ -115,26 +115,37 @@ fn simulate(turns: u32) -> Samples {
         }
     }
     samples.deviation_mm =
-        Some(samples.feed_mm_s.iter().map(|feed| feed * feed * 2.5e-7 + 2e-5 * feed.sin().abs()).collect());
+        Some(samples.feed_mm_s.iter().map(|feed| feed * feed * 1.4e-7 + 2e-5 * feed.sin().abs()).collect());
     samples
 }
 
-/// Length, speed and σ at each tick: a trapezoid, with a feed hold in the middle of it where asked for.
+/// Length, speed and σ at each tick: a trapezoid over program time, with a feed hold at its middle where asked for.
 fn speeds(piece: &Piece, hold: bool) -> Vec<(f64, f64, f64)> {
     let acceleration = 0.6 * MAX_ACCELERATION;
-    let (mut s, mut speed, mut ticks, mut held) = (0.0, 0.0, Vec::new(), 0);
-    loop {
-        let stopping = speed * speed / (2.0 * acceleration) + speed * PERIOD_S;
-        let holding = hold && s > 0.4 * piece.length && held < 300;
+    let top = f64::min(piece.feed, (piece.length * acceleration).sqrt());
+    let duration = piece.length / top + top / acceleration;
+    // Stretched to whole ticks, so that the last sample is the end itself.
+    let stretch = duration / ((duration / PERIOD_S).ceil() * PERIOD_S);
+    let (mut t, mut held, mut sigma, mut ticks) = (0.0, 0, 1.0_f64, Vec::new());
+    while t < duration - 1e-9 {
+        let holding = hold && t > duration / 2.0 && held < 500;
         held += i32::from(holding);
-        let wanted = if holding || s + stopping >= piece.length { 0.0 } else { piece.feed };
-        let step = acceleration * PERIOD_S;
-        speed = f64::max(speed + (wanted - speed).clamp(-step, step), if holding { 0.0 } else { step });
-        s = f64::min(s + speed * PERIOD_S, piece.length);
-        ticks.push((s, speed, if holding { speed / piece.feed } else { 1.0 }));
-        if s >= piece.length {
-            return ticks;
-        }
+        let step = 0.8 * acceleration / top * PERIOD_S;
+        sigma += ((if holding { 0.0 } else { 1.0 }) - sigma).clamp(-step, step);
+        t = f64::min(t + sigma * PERIOD_S * stretch, duration);
+        let (s, speed) = trapezoid(t, duration, top, acceleration, piece.length);
+        ticks.push((s, speed * sigma, sigma));
+    }
+    ticks
+}
+
+fn trapezoid(t: f64, duration: f64, top: f64, acceleration: f64, length: f64) -> (f64, f64) {
+    let ramp = top / acceleration;
+    let from_rest = |t: f64| 0.5 * acceleration * t * t;
+    match t {
+        _ if t < ramp => (from_rest(t), acceleration * t),
+        _ if t > duration - ramp => (length - from_rest(duration - t), acceleration * (duration - t)),
+        _ => (from_rest(ramp) + (t - ramp) * top, top),
     }
 }
 
