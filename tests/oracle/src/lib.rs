@@ -1,1 +1,32 @@
-//! .
+//! The independent judge of a run: it reads a trace, the part program and the machine, and says whether every sample
+//! kept the machine's limits and the programmed path.
+//!
+//! It shares no code with interpreter, planner or host, and reads nothing of theirs but the trace format. What it
+//! cannot read it reports as *not judged*, never as passed.
+//!
+//! Trace, program and `machine.toml` all speak of degrees, so rotary axes stay in degrees here; every name that ends
+//! in `_mm` means degrees for a rotary axis. A distance in axis space counts one degree as one millimetre.
+
+mod axis;
+mod error;
+mod feed;
+mod follow;
+mod geometry;
+mod judge;
+mod limits;
+mod machine;
+mod options;
+mod path;
+mod program;
+mod trace;
+mod verdict;
+mod vertices;
+mod walk;
+
+pub use axis::{Axes, LETTERS, Position, axis_index};
+pub use error::Error;
+pub use judge::judge;
+pub use machine::{Axis, Machine};
+pub use options::{Check, Options};
+pub use trace::{Row, Trace};
+pub use verdict::{AxisMaxima, Finding, Kind, Maxima, Outcome, Verdict};

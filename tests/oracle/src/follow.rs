@@ -1,0 +1,119 @@
+//! Which place of the programmed path each sample belongs to.
+
+use crate::{
+    Options, Position,
+    path::{Element, Path, Place},
+    walk::Walker,
+};
+
+/// Deviations below this are rounding, and are not resolved further.
+const SMALLEST_DEVIATION_MM: f64 = 1e-13;
+/// How closely the smallest sufficient tolerance is found.
+const RESOLUTION: f64 = 1.05;
+
+/// The samples laid along the path.
+pub struct Followed {
+    /// The samples without repetitions.
+    pub chain: Vec<Position>,
+    /// The first sample of each link of the chain.
+    pub samples: Vec<usize>,
+    /// The link of each sample.
+    pub links: Vec<usize>,
+    /// The place of each link; places never go back.
+    pub places: Vec<Place>,
+    /// Links off the path, with their distance from it.
+    pub misses: Vec<(usize, f64)>,
+    /// Where the walk ended.
+    pub end: Place,
+    /// Greatest distance of a sample from the path, mm.
+    pub deviation_mm: f64,
+}
+
+/// Lays samples along a path that has at least one element.
+pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed {
+    let mut followed = Followed::chain(commands);
+    let walker = Walker::new(&path.elements, options);
+    let Some(last) = followed.chain.last().copied() else { return followed };
+    let Some((cap_mm, first)) = smallest_tolerance(&walker, &followed.chain) else {
+        let walk = walker.recovering(&followed.chain);
+        followed.end = walker.end(walk.places.last().copied().unwrap_or_default(), &last);
+        followed.deviation_mm = walk.misses.iter().map(|&(_, off_mm)| off_mm).fold(0.0, f64::max);
+        (followed.places, followed.misses) = (walk.places, walk.misses);
+        return followed;
+    };
+    followed.end = walker.end(first.last().copied().unwrap_or_default(), &last);
+    let latest = latest(&path.elements, followed.end, &followed.chain, cap_mm, options);
+    followed.settle(&path.elements, &first, latest.as_deref().unwrap_or(&first));
+    followed
+}
+
+impl Followed {
+    fn chain(commands: &[Position]) -> Self {
+        let (mut chain, mut samples, mut links) = (Vec::<Position>::new(), Vec::new(), Vec::new());
+        for (index, command) in commands.iter().enumerate() {
+            if chain.last() != Some(command) {
+                chain.push(*command);
+                samples.push(index);
+            }
+            links.push(chain.len() - 1);
+        }
+        let (places, misses) = (Vec::new(), Vec::new());
+        Self { chain, samples, links, places, misses, end: Place::default(), deviation_mm: 0.0 }
+    }
+
+    /// Takes the nearest place between the first and the last that a sample may have.
+    fn settle(&mut self, elements: &[Element], first: &[Place], latest: &[Place]) {
+        let mut before = Place::default();
+        for ((sample, &first), &latest) in self.chain.iter().zip(first).zip(latest) {
+            let low = if first > before { first } else { before };
+            let (place, off_mm) = nearest_between(elements, low, if latest > low { latest } else { low }, sample);
+            self.deviation_mm = self.deviation_mm.max(off_mm);
+            self.places.push(place);
+            before = place;
+        }
+    }
+}
+
+/// The smallest tolerance with which the walk succeeds, and that walk; none where the allowed one is too small.
+fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
+    let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
+    let (mut low_mm, mut high_mm) = (SMALLEST_DEVIATION_MM, walker.widest_mm());
+    let mut places = walk(high_mm)?;
+    while high_mm > RESOLUTION * low_mm {
+        let middle_mm = (low_mm * high_mm).sqrt();
+        match walk(middle_mm) {
+            Some(found) => (places, high_mm) = (found, middle_mm),
+            None => low_mm = middle_mm,
+        }
+    }
+    Some((high_mm, places))
+}
+
+/// The last places that samples may have: the first ones on the way back.
+fn latest(elements: &[Element], end: Place, chain: &[Position], cap_mm: f64, options: &Options) -> Option<Vec<Place>> {
+    let back: Vec<Element> = elements[..=end.element].iter().rev().map(reversed).collect();
+    let start = Place { element: 0, fraction: 1.0 - end.fraction };
+    let mut places = Walker::new(&back, options).capped(cap_mm).strict(start, chain.iter().rev().copied())?;
+    for place in &mut places {
+        *place = Place { element: end.element - place.element, fraction: 1.0 - place.fraction };
+    }
+    places.reverse();
+    Some(places)
+}
+
+fn reversed(element: &Element) -> Element {
+    Element { shape: element.shape.reversed(), ..element.clone() }
+}
+
+fn nearest_between(elements: &[Element], low: Place, high: Place, sample: &Position) -> (Place, f64) {
+    let mut best = (low, f64::INFINITY);
+    for index in low.element..=high.element {
+        let from = if index == low.element { low.fraction } else { 0.0 };
+        let to = if index == high.element { high.fraction } else { 1.0 };
+        let (fraction, off_mm) = elements[index].shape.nearest(sample, from, to);
+        if off_mm < best.1 {
+            best = (Place { element: index, fraction }, off_mm);
+        }
+    }
+    best
+}

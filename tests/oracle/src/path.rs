@@ -1,0 +1,106 @@
+//! The programmed path as a chain of lines and arcs.
+
+mod arc;
+mod line;
+
+pub use arc::Arc;
+pub use line::Line;
+
+use crate::{Position, geometry::distance};
+
+/// The whole path in the order of travel.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    /// Pieces with a length; each starts where the one before ends.
+    pub elements: Vec<Element>,
+    /// The programmed end.
+    pub end: Position,
+}
+
+/// A block, or a part of an arc short enough to be curved one way only.
+#[derive(Clone, Debug)]
+pub struct Element {
+    /// Line of the part program, from 1.
+    pub line: u32,
+    pub shape: Shape,
+    pub feed: Feed,
+    /// Whether path speed counts linear axes here; degrees otherwise.
+    pub moves_linear: bool,
+    /// Tolerance in force, mm.
+    pub tolerance_mm: f64,
+    /// The element ends at a position where motion has to stop.
+    pub exact_stop: bool,
+}
+
+#[derive(Clone, Debug)]
+pub enum Shape {
+    Line(Line),
+    Arc(Arc),
+}
+
+/// How fast a block may be travelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Feed {
+    /// As fast as the axes may.
+    Rapid,
+    /// mm/s, or deg/s where only rotary axes move.
+    PerSecond(f64),
+}
+
+/// A place on the path; places compare in the order of travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+pub struct Place {
+    pub element: usize,
+    /// From 0 at the start of the element to 1 at its end.
+    pub fraction: f64,
+}
+
+impl Shape {
+    pub fn at(&self, fraction: f64) -> Position {
+        match self {
+            Self::Line(line) => line.at(fraction),
+            Self::Arc(arc) => arc.at(fraction),
+        }
+    }
+
+    pub fn length_mm(&self) -> f64 {
+        match self {
+            Self::Line(line) => line.length_mm(),
+            Self::Arc(arc) => arc.length_mm(),
+        }
+    }
+
+    /// The same piece, travelled the other way.
+    pub fn reversed(&self) -> Self {
+        match self {
+            Self::Line(line) => Self::Line(line.reversed()),
+            Self::Arc(arc) => Self::Arc(arc.reversed()),
+        }
+    }
+
+    /// The nearest point with a fraction in `[low, high]`: fraction and distance.
+    pub fn nearest(&self, point: &Position, low: f64, high: f64) -> (f64, f64) {
+        let free = match self {
+            Self::Line(line) => line.foot(point),
+            Self::Arc(arc) => arc.foot(point),
+        };
+        let fraction = free.clamp(low, high.max(low));
+        (fraction, distance(&self.at(fraction), point))
+    }
+
+    /// The first fraction from `low` on that lies within a distance of the point.
+    pub fn first_within(&self, point: &Position, reach_mm: f64, low: f64) -> Option<f64> {
+        let (nearest, off_mm) = self.nearest(point, low, 1.0);
+        if off_mm > reach_mm {
+            return None;
+        }
+        if distance(&self.at(low), point) <= reach_mm {
+            return Some(low);
+        }
+        let first = match self {
+            Self::Line(line) => line.entry(point, reach_mm),
+            Self::Arc(arc) => arc.entry(point, reach_mm, low, nearest),
+        };
+        Some(first.clamp(low, nearest))
+    }
+}

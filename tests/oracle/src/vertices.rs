@@ -1,0 +1,103 @@
+//! Whether the samples meet every programmed vertex.
+
+use crate::{
+    Options, Position,
+    follow::Followed,
+    geometry::{distance, distance_to_chord},
+    path::{Element, Place},
+};
+
+/// A vertex and how far the samples stay away from it.
+pub struct Vertex {
+    /// Program line of the block that ends there.
+    pub line: u32,
+    /// The sample before it.
+    pub sample: usize,
+    /// Distance from the chords between samples, or from the samples where motion has to stop, mm.
+    pub off_mm: f64,
+    /// What is allowed, mm.
+    pub limit_mm: f64,
+    /// Motion has to stop there.
+    pub exact_stop: bool,
+}
+
+/// Samples laid along a path, with lengths from its start.
+struct Laid<'a> {
+    followed: &'a Followed,
+    elements: &'a [Element],
+    lengths_mm: Vec<f64>,
+    links_mm: Vec<f64>,
+}
+
+/// Every vertex up to where the samples end, the corners and the places where an arc is cut into pieces.
+pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) -> Vec<Vertex> {
+    let laid = Laid::new(elements, followed);
+    let mut link = 0;
+    let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end);
+    let vertices = reached.map(|(index, element)| {
+        while link + 1 < followed.places.len() && followed.places[link + 1] <= end_of(index) {
+            link += 1;
+        }
+        let limit_mm = limit_mm(elements, index, options);
+        let off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + followed.deviation_mm));
+        Vertex { line: element.line, sample: followed.samples[link], off_mm, limit_mm, exact_stop: element.exact_stop }
+    });
+    vertices.collect()
+}
+
+/// Length from the start of the path to the start of each element and to its end, mm.
+pub fn lengths_mm(elements: &[Element]) -> Vec<f64> {
+    let mut lengths_mm = vec![0.0];
+    for element in elements {
+        lengths_mm.push(lengths_mm[lengths_mm.len() - 1] + element.shape.length_mm());
+    }
+    lengths_mm
+}
+
+/// Length from the start of the path to a place, mm.
+pub fn length_to_mm(lengths_mm: &[f64], place: Place) -> f64 {
+    let start_mm = lengths_mm[place.element];
+    start_mm + place.fraction * (lengths_mm[place.element + 1] - start_mm)
+}
+
+fn end_of(element: usize) -> Place {
+    Place { element, fraction: 1.0 }
+}
+
+fn limit_mm(elements: &[Element], index: usize, options: &Options) -> f64 {
+    if elements[index].exact_stop {
+        return options.exact_stop_tolerance_mm;
+    }
+    let next = elements.get(index + 1).unwrap_or(&elements[index]);
+    options.vertex_tolerance_mm.unwrap_or_else(|| elements[index].tolerance_mm.max(next.tolerance_mm))
+}
+
+impl<'a> Laid<'a> {
+    fn new(elements: &'a [Element], followed: &'a Followed) -> Self {
+        let lengths_mm = lengths_mm(elements);
+        let links_mm = followed.places.iter().map(|&place| length_to_mm(&lengths_mm, place)).collect();
+        Self { followed, elements, lengths_mm, links_mm }
+    }
+
+    /// Distance of a vertex from the chords that belong to the path around it; `link` is the last one before it.
+    fn distance_mm(&self, vertex: usize, link: usize, span_mm: f64) -> f64 {
+        let element = &self.elements[vertex];
+        let point = element.shape.at(1.0);
+        let at_mm = self.lengths_mm[vertex + 1];
+        let chord = |from| self.from_link(from, &point, element.exact_stop);
+        let before = (0..=link).rev();
+        let near_before = before.take_while(|&from| from == link || at_mm - self.links_mm[from + 1] <= span_mm);
+        let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - at_mm <= span_mm);
+        near_before.chain(near_after).map(chord).fold(f64::INFINITY, f64::min)
+    }
+
+    fn from_link(&self, from: usize, point: &Position, samples_only: bool) -> f64 {
+        let chain = &self.followed.chain;
+        let to = (from + 1).min(chain.len() - 1);
+        if samples_only {
+            distance(point, &chain[from]).min(distance(point, &chain[to]))
+        } else {
+            distance_to_chord(point, &chain[from], &chain[to])
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The programmed path: lines, corners, arcs, helices, rotary axes, and what a judge could be fooled by.
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::{
+    Profile, assert_finds, assert_passes, at, machine, polyline, smooth_machine, stop_at_all, trace, verdict,
+};
+use tandem_oracle::{Kind, Options, Position, judge};
+
+const CORNER: &str = "G64 P0.002\nG1 X20 F3000\nY15\nM2\n";
+
+/// Through the corner at a speed that the look-ahead may step by.
+fn corner_run(step: f64) -> Vec<Position> {
+    let corner = vec![at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 15.0, 0.0)];
+    let profile = Profile::default().then(0.0, 50.0, step, 20.0, 990.0).then(step, 50.0, 0.0, 15.0, 990.0);
+    profile.samples(polyline(corner))
+}
+
+fn exact() -> Options {
+    Options { sample_tolerance_mm: Some(2e-6), ..Options::default() }
+}
+
+#[test]
+fn a_corner_with_an_allowed_step_passes_and_a_larger_one_does_not() {
+    let good = judge(&trace(&corner_run(1.6)), CORNER, &machine(), &exact());
+    assert_passes(&good);
+    assert!(good.maxima.sample_deviation_mm < 1e-11, "{good}");
+    assert!(good.maxima.vertex_deviation_mm > 1e-5 && good.maxima.vertex_deviation_mm < 1e-3, "{good}");
+    let fast = judge(&trace(&corner_run(3.0)), CORNER, &machine(), &exact());
+    assert_finds(&fast, &[Kind::SpeedStep]);
+}
+
+#[test]
+fn a_corner_cut_off_is_found() {
+    let cut = [at(0.0, 0.0, 0.0), at(19.0, 0.0, 0.0), at(20.0, 1.0, 0.0), at(20.0, 15.0, 0.0)];
+    let verdict = verdict(&stop_at_all(&cut, 50.0, 990.0), CORNER);
+    assert_finds(&verdict, &[Kind::PathDeviation, Kind::VertexMissed]);
+    let vertex = verdict.findings.iter().find(|finding| finding.kind == Kind::VertexMissed).expect("found");
+    assert_eq!(vertex.line, 2);
+    assert!((vertex.value - 0.5_f64.sqrt()).abs() < 1e-3, "{verdict}");
+}
+
+#[test]
+fn an_axis_shifted_is_off_the_path_and_off_its_ends() {
+    let mut samples = corner_run(1.6);
+    samples.iter_mut().for_each(|sample| sample[1] += 0.005);
+    let verdict = judge(&trace(&samples), CORNER, &machine(), &Options::default());
+    assert_finds(&verdict, &[Kind::StartPoint, Kind::PathDeviation, Kind::VertexMissed, Kind::EndPoint]);
+}
+
+#[test]
+fn a_wrong_end_point_is_found() {
+    let ends = [at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 15.0 - 1e-8, 0.0)];
+    assert_finds(&verdict(&stop_at_all(&ends, 50.0, 990.0), CORNER), &[Kind::EndPoint]);
+    let short = [at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 14.0, 0.0)];
+    assert_finds(&verdict(&stop_at_all(&short, 50.0, 990.0), CORNER), &[Kind::NotCovered, Kind::EndPoint]);
+    let far = [at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 16.0, 0.0)];
+    assert_finds(&verdict(&stop_at_all(&far, 50.0, 990.0), CORNER), &[Kind::PathDeviation, Kind::EndPoint]);
+}
+
+#[test]
+fn a_run_that_ends_early_is_judged_as_far_as_it_went() {
+    let short = [at(0.0, 0.0, 0.0), at(12.0, 0.0, 0.0)];
+    let samples = stop_at_all(&short, 50.0, 990.0);
+    let early = Options { ends_early: true, ..Options::default() };
+    assert_passes(&judge(&trace(&samples), CORNER, &smooth_machine(), &early));
+    // A fault ramps out beside the path.
+    let mut off: Vec<Position> = samples.clone();
+    off.extend(stop_at_all(&[at(12.0, 0.0, 0.0), at(12.0, 1.0, 0.0)], 50.0, 990.0));
+    assert_finds(&judge(&trace(&off), CORNER, &smooth_machine(), &early), &[Kind::PathDeviation]);
+    let until = Options { path_until_s: Some((samples.len() - 1) as f64 * common::PERIOD_S), ..early };
+    assert_passes(&judge(&trace(&off), CORNER, &smooth_machine(), &until));
+}
+
+#[test]
+fn a_reversal_and_a_crossing_fool_nobody() {
+    let points = [(0.0, 0.0), (20.0, 0.0), (5.0, 0.0), (5.0, 5.0), (10.0, 5.0), (10.0, -5.0), (0.0, 0.0), (20.0, 0.0)];
+    let points = points.map(|(x, y)| at(x, y, 0.0));
+    let program = "F3000\nG1 X20\nX5\nY5\nX10\nY-5\nX0Y0\nX20\n";
+    let judge =
+        |points: &[Position]| judge(&trace(&stop_at_all(points, 50.0, 990.0)), program, &smooth_machine(), &exact());
+    assert_passes(&judge(&points));
+    // Turning back before the far end, leaving out the loop, taking it the other way round.
+    let early = [&[points[0], at(19.0, 0.0, 0.0)], &points[2..]].concat();
+    assert_finds(&judge(&early), &[Kind::PathDeviation, Kind::VertexMissed]);
+    let no_loop = [&points[..3], &[at(10.0, 0.0, 0.0)], &points[5..]].concat();
+    assert_finds(&judge(&no_loop), &[Kind::PathDeviation, Kind::VertexMissed]);
+    let other_way =
+        [points[0], points[1], at(10.0, 0.0, 0.0), points[4], points[3], points[2], at(10.0, 0.0, 0.0), points[5]];
+    let other_way = [&other_way[..], &points[6..]].concat();
+    assert!(judge(&other_way).kinds().contains(&Kind::PathDeviation));
+}
+
+#[test]
+fn stopping_and_going_back_a_little_is_off_the_order_of_travel() {
+    let back = [at(0.0, 0.0, 0.0), at(10.0, 0.0, 0.0), at(9.9, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 15.0, 0.0)];
+    assert_finds(&verdict(&stop_at_all(&back, 50.0, 990.0), CORNER), &[Kind::PathDeviation]);
+}
+
+/// An arc in XY around (0, 10) from the origin, counter-clockwise, rising along Z.
+fn arc(radius: f64, rise_per_rad: f64) -> impl Fn(f64) -> Position {
+    let per_rad = radius.hypot(rise_per_rad);
+    move |length| {
+        let angle = length / per_rad;
+        at(radius * angle.sin(), 10.0 - radius * angle.cos(), rise_per_rad * angle)
+    }
+}
+
+fn arc_run(radius: f64, rise_per_rad: f64, speed: f64, turn_rad: f64) -> Vec<Position> {
+    let length = turn_rad * radius.hypot(rise_per_rad);
+    Profile::rest_to_rest(speed, length, 700.0).samples(arc(radius, rise_per_rad))
+}
+
+/// Samples whose last one is the programmed end to the last bit.
+fn ending_at(mut samples: Vec<Position>, end: Position) -> Vec<Position> {
+    let last = samples[samples.len() - 1];
+    samples.iter_mut().filter(|sample| **sample == last).for_each(|sample| *sample = end);
+    samples
+}
+
+#[test]
+fn an_arc_passes_and_its_chords_do_not() {
+    let samples = ending_at(arc_run(10.0, 0.0, 70.0, PI / 2.0), at(10.0, 10.0, 0.0));
+    for program in [
+        "G3 X10 Y10 I0 J10 F4200",
+        "G3 X10 Y10 J10.0001 F4200",
+        "G3 X10 Y10 R10 F4200",
+        "G90.1 G3 X10 Y10 I0 J10 F4200",
+    ] {
+        let verdict = judge(&trace(&samples), program, &smooth_machine(), &Options::default());
+        assert_passes(&verdict);
+    }
+    let exactly = judge(&trace(&samples), "G3 X10 Y10 J10 F4200", &smooth_machine(), &exact());
+    assert_passes(&exactly);
+    assert!(exactly.maxima.sample_deviation_mm < 1e-12, "{exactly}");
+    let other_side = verdict(&samples, "G2 X10 Y10 R10 F4200");
+    assert!(other_side.kinds().contains(&Kind::PathDeviation), "{other_side}");
+    let chord = stop_at_all(&[at(0.0, 0.0, 0.0), at(10.0, 10.0, 0.0)], 50.0, 700.0);
+    assert!(verdict(&chord, "G3 X10 Y10 J10 F4200").kinds().contains(&Kind::PathDeviation));
+    let wide = ending_at(arc_run(10.0, 0.0, 70.7, PI / 2.0), at(10.0, 10.0, 0.0));
+    assert_finds(&verdict(&wide, "G3 X10 Y10 J10 F4200"), &[Kind::Feed]);
+}
+
+#[test]
+fn a_full_circle_cannot_be_left_out() {
+    let circle = ending_at(arc_run(10.0, 0.0, 70.0, 2.0 * PI), at(0.0, 0.0, 0.0));
+    let line = stop_at_all(&[at(0.0, 0.0, 0.0), at(-20.0, 0.0, 0.0)], 50.0, 700.0);
+    let program = "G3 J10 F4200\nG1 X-20 F3000\n";
+    assert_passes(&verdict(&[&circle[..], &line].concat(), program));
+    let left_out = verdict(&line, program);
+    assert!(left_out.kinds().contains(&Kind::VertexMissed), "{left_out}");
+    assert!(!verdict(&line[..1], "G3 J10 F4200").passed());
+    let twice = "G3 J10 P2 F4200\nG1 X-20 F3000\n";
+    assert!(!verdict(&[&circle[..], &line].concat(), twice).passed());
+    assert_passes(&verdict(&[&circle[..], &circle, &line].concat(), twice));
+}
+
+#[test]
+fn a_helix_passes_and_a_wrong_pitch_does_not() {
+    let samples = ending_at(arc_run(10.0, 0.8, 70.0, 1.5 * PI), at(-10.0, 10.0, 1.2 * PI));
+    let program = format!("G3 X-10 Y10 Z{} J10 F4200", 1.2 * PI);
+    let good = judge(&trace(&samples), &program, &smooth_machine(), &exact());
+    assert_passes(&good);
+    assert!(good.maxima.sample_deviation_mm < 1e-11, "{good}");
+    let mut bent = samples.clone();
+    let middle = bent.len() / 2;
+    bent[middle][2] += 1e-5;
+    let options = Options { checks: vec![tandem_oracle::Check::Path], ..exact() };
+    let verdict = judge(&trace(&bent), &program, &smooth_machine(), &options);
+    assert_finds(&verdict, &[Kind::PathDeviation]);
+    assert_eq!((verdict.findings.len(), verdict.findings[0].sample), (1, middle));
+    assert!((verdict.findings[0].value - 1e-5).abs() < 1e-7, "{verdict}");
+}
+
+#[test]
+fn arcs_lie_in_the_plane_chosen() {
+    let xy = arc_run(10.0, 0.8, 70.0, PI / 2.0);
+    let turned = |order: [usize; 3]| -> Vec<Position> {
+        xy.iter()
+            .map(|sample| {
+                let mut turned = Position::default();
+                (0..3).for_each(|axis| turned[order[axis]] = sample[axis]);
+                turned
+            })
+            .collect()
+    };
+    let rise = 0.4 * PI;
+    let zx = ending_at(turned([2, 0, 1]), at(10.0, rise, 10.0));
+    assert_passes(&verdict(&zx, &format!("G18 G3 Z10 X10 Y{rise} K0 I10 F4200")));
+    let yz = ending_at(turned([1, 2, 0]), at(rise, 10.0, 10.0));
+    assert_passes(&verdict(&yz, &format!("G19 G3 Y10 Z10 X{rise} K10 F4200")));
+    assert!(!verdict(&yz, &format!("G19 G2 Y10 Z10 X{rise} R10 F4200")).passed());
+}
+
+#[test]
+fn a_rotary_axis_is_judged_in_degrees() {
+    let turn = |speed, acceleration| {
+        let path = |degrees| {
+            let mut position = Position::default();
+            position[3] = degrees;
+            position
+        };
+        Profile::rest_to_rest(speed, 90.0, acceleration).samples(path)
+    };
+    assert_passes(&verdict(&turn(60.0, 1990.0), "G20 G1 A90 F3600"));
+    assert_finds(&verdict(&turn(60.6, 1990.0), "G1 A90 F3600"), &[Kind::Feed]);
+    assert_finds(&verdict(&turn(60.0, 2020.0), "G1 A90 F3600"), &[Kind::Acceleration]);
+    assert_finds(&verdict(&turn(60.0, 1990.0), "G1 A90.001 F3600"), &[Kind::EndPoint]);
+}
+
+#[test]
+fn an_exact_stop_is_met_by_a_sample() {
+    let program = "G61.1\nG1 X20 F3000\nX30\n";
+    let stops = [at(0.0, 0.0, 0.0), at(20.0, 0.0, 0.0), at(30.0, 0.0, 0.0)];
+    assert_passes(&verdict(&stop_at_all(&stops, 50.0, 990.0), program));
+    let through = stop_at_all(&[stops[0], stops[2]], 50.0, 990.0);
+    assert_finds(&verdict(&through, program), &[Kind::VertexMissed]);
+    assert_passes(&verdict(&through, &program.replace("G61.1", "G64")));
+}
