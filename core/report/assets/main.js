@@ -121,8 +121,15 @@ async function start() {
     followTheme();
     addEventListener("resize", () => changed("look"));
     addEventListener("hashchange", restoreTime);
+    redraw();
   }
-  requestAnimationFrame(() => requestAnimationFrame(() => (document.documentElement.dataset.ready = "1")));
+  document.documentElement.dataset.ready = "1";
 }
 
-start();
+function showFailure(error) {
+  reportError(error);
+  const text = `The drawings need a newer browser, or this file is damaged (${error}).`;
+  document.querySelector("header").append(element("p", "failure", text));
+}
+
+start().catch(showFailure);

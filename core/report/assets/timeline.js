@@ -49,8 +49,7 @@ function drag(event, target, moved, done = () => {}) {
     done();
   };
   target.addEventListener("pointermove", moved);
-  target.addEventListener("pointerup", end, { once: true });
-  target.addEventListener("lostpointercapture", () => target.removeEventListener("pointermove", moved), { once: true });
+  target.addEventListener("lostpointercapture", end, { once: true });
 }
 
 function listenToKeys() {
@@ -80,7 +79,7 @@ function drawTimeAxis() {
     if (x - half > GUTTER.left - 4) context.fillText(label, Math.min(x, width - half - 2), 6);
   });
   context.textAlign = "right";
-  context.fillText("time in s", GUTTER.left - 6, 6);
+  context.fillText("time in s", GUTTER.left - 10, 6);
 }
 
 // The whole run in one strip: its feed, and the selected time as a window that can be dragged.

@@ -69,7 +69,9 @@ impl Derived {
     fn axis_columns(&self, report: &Report, axis: usize) -> Vec<Option<Column>> {
         let motion = &self.motions[axis];
         let mut position = self.thinning.picks(&report.samples.command[axis]);
-        position.iter_mut().for_each(|value| *value -= self.centres[axis]);
+        for value in &mut position {
+            *value -= self.centres[axis];
+        }
         vec![
             Some(Column::f32(format!("position{axis}"), &position)),
             self.curve(format!("velocity{axis}"), &motion.velocity),

@@ -61,10 +61,10 @@ impl AxisMotion {
         let full = axis.speed_difference * (1.0 + TOLERANCE) + noise;
         let leak = axis.max_acceleration * (1.0 + TOLERANCE);
         let mut bucket = [0.0_f64; 2];
-        for i in 2..self.marks.len() {
+        for (i, step_s) in steps_s.iter().enumerate().skip(2) {
             let change = self.velocity[i] - self.velocity[i - 1];
             for (level, rise) in bucket.iter_mut().zip([change, -change]) {
-                let gain = rise - leak * steps_s[i];
+                let gain = rise - leak * step_s;
                 *level = (*level + gain).max(0.0);
                 self.max_step = self.max_step.max(*level);
                 // While a full bucket empties, the samples are innocent: only what adds to it is marked.

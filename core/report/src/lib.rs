@@ -34,6 +34,7 @@ mod judge;
 mod model;
 mod page;
 mod sections;
+mod tables;
 mod text;
 mod thin;
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::columns::Derived;
 use crate::model::{Report, Unit};
 use crate::sections;
+use crate::tables;
 use crate::text::escape;
 
 /// Samples that a browser still draws fluently; more are thinned.
@@ -49,10 +50,10 @@ fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> i
         "subtitle" => sections::subtitle(report),
         "verdict" => sections::verdict(report, derived),
         "notes" => sections::notes(report, derived),
-        "facts" => sections::facts(report),
-        "peaks-head" => sections::peaks_head(report),
-        "peaks" => sections::peaks(report, derived),
-        "findings" => sections::findings(derived),
+        "facts" => tables::facts(report),
+        "peaks-head" => tables::peaks_head(report),
+        "peaks" => tables::peaks(report, derived),
+        "findings" => tables::findings(derived),
         "style" => STYLE.into(),
         "script" => SCRIPTS.concat(),
         "about" => about(report, derived)?,

@@ -1,23 +1,15 @@
-//! The parts of the page that are text: facts, verdict, peaks, findings. They read the same without a script.
-
-use std::fmt::Write;
+//! The head of the page: what ran, the verdict, what a reader must know. It reads the same without a script.
 
 use crate::columns::Derived;
 use crate::differences::peak;
-use crate::model::{Axis, Report};
+use crate::model::Report;
 use crate::text::{count, escape, number};
 
 /// One line under the heading: program, machine, planner.
 pub(crate) fn subtitle(report: &Report) -> String {
     let parts = [("program", &report.program), ("machine", &report.machine), ("planner", &report.planner)];
     let shown = parts.iter().filter(|(_, value)| !value.is_empty());
-    shown.map(|(name, value)| format!("<span><i>{name}</i> {}</span>", escape(value))).collect()
-}
-
-/// The summary as rows of a table.
-pub(crate) fn facts(report: &Report) -> String {
-    let row = |(name, value): &(String, String)| format!("<tr><th>{}<td>{}", escape(name), escape(value));
-    report.facts.iter().map(row).collect()
+    shown.map(|(name, value)| format!("<span><i>{name}</i> {}</span>", escape(value))).collect::<Vec<_>>().concat()
 }
 
 /// The verdict strip: what was judged, and how it went.
@@ -78,77 +70,6 @@ fn chip(state: &str, name: &str, value: &str, note: &str) -> String {
     format!("<li class=\"{state}\"><i>{name}</i><b>{value}</b><small>{}</small>", escape(note))
 }
 
-/// Per axis the peaks, as rows of a table, with the part of the limit that they use.
-pub(crate) fn peaks(report: &Report, derived: &Derived) -> String {
-    let mut rows = String::new();
-    for (axis, motion) in report.axes.iter().zip(&derived.motions) {
-        let unit = axis.unit.as_str();
-        let _ = write!(rows, "<tr><th>{}<small>{unit}</small>", escape(&axis.letter.to_string()));
-        rows += &usage(peak(&motion.velocity), Some(axis.max_velocity), 1e-6, true);
-        rows += &usage(peak(&motion.acceleration), Some(axis.max_acceleration), 1e-6, axis.speed_difference == 0.0);
-        rows += &usage(peak(&motion.jerk), axis.max_jerk, 1e-2, report.jerk_is_judged);
-        if steps_are_allowed(&report.axes) {
-            rows += &usage(motion.max_step, Some(axis.speed_difference), 1e-6, true);
-        }
-    }
-    rows
-}
-
-/// The heading of [`peaks`].
-pub(crate) fn peaks_head(report: &Report) -> String {
-    let step = if steps_are_allowed(&report.axes) { "<th>step /s" } else { "" };
-    format!("<tr><th>axis<th>velocity /s<th>acceleration /s²<th>jerk /s³{step}")
-}
-
-fn steps_are_allowed(axes: &[Axis]) -> bool {
-    axes.iter().any(|axis| axis.speed_difference > 0.0)
-}
-
-/// A cell: the value, and a bar that says how much of the limit it is. Red only where exceeding it is a violation.
-fn usage(value: f64, limit: Option<f64>, tolerance: f64, judged: bool) -> String {
-    let Some(limit) = limit.filter(|limit| *limit > 0.0) else {
-        return format!("<td>{}", number(value));
-    };
-    let part = value / limit;
-    let state = match part > 1.0 + tolerance {
-        true if judged => "over",
-        true => "above",
-        false => "",
-    };
-    let width = (part * 100.0).clamp(0.0, 100.0);
-    let of = format!("{} of {}", number(value), number(limit));
-    format!(
-        "<td class=\"{state}\" title=\"{of}\">{}<small>/{}</small><u style=\"width:{width:.1}%\"></u>",
-        number(value),
-        number(limit)
-    )
-}
-
-/// What exceeds a limit, as rows of a table; the script makes them lead to the place.
-pub(crate) fn findings(derived: &Derived) -> String {
-    let mut rows = String::new();
-    for finding in &derived.findings.listed {
-        let _ = write!(
-            rows,
-            "<tr class=\"over\" tabindex=\"0\" data-from=\"{}\" data-to=\"{}\"><td>{}<td>{:.4} s<td>{}<td>{} {}<td>{}<td>{}",
-            finding.from_s,
-            finding.to_s,
-            escape(&finding.what),
-            finding.from_s,
-            finding.line,
-            number(finding.peak),
-            finding.unit,
-            number(finding.limit),
-            count(finding.samples),
-        );
-    }
-    if derived.findings.unlisted > 0 {
-        let _ =
-            write!(rows, "<tr><td colspan=\"6\">and {} more, marked in the plots", count(derived.findings.unlisted));
-    }
-    rows
-}
-
 /// Sentences that a reader must know to read the curves right.
 pub(crate) fn notes(report: &Report, derived: &Derived) -> String {
     let mut notes: Vec<String> = report.decimated.iter().map(|note| escape(note)).collect();
@@ -163,5 +84,5 @@ pub(crate) fn notes(report: &Report, derived: &Derived) -> String {
     if !report.jerk_is_judged && report.axes.iter().any(|axis| axis.max_jerk.is_some()) {
         notes.push("Jerk is reported, not judged: this planner does not promise to limit it.".into());
     }
-    notes.iter().map(|note| format!("<p>{note}</p>")).collect()
+    notes.iter().map(|note| format!("<p>{note}</p>")).collect::<Vec<_>>().concat()
 }

@@ -40,7 +40,7 @@ fn group(text: &str) -> String {
     if end - start < 5 {
         return grouped;
     }
-    for place in (start + 1..end).rev().filter(|place| (end - place) % 3 == 0) {
+    for place in (start + 1..end).rev().filter(|place| (end - place).is_multiple_of(3)) {
         grouped.insert(place, '\u{202f}');
     }
     grouped

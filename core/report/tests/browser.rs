@@ -11,13 +11,14 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use tandem_report::{Axis, Report, Samples, Unit};
+
 const CHROMIUM: &str = "/usr/bin/chromium";
 const PATIENCE: Duration = Duration::from_secs(120);
 
 #[test]
 fn a_report_draws_without_errors() {
-    if !Path::new(CHROMIUM).exists() {
-        println!("skipped: chromium is not installed (apt-get install chromium)");
+    if chromium_is_missing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -25,7 +26,9 @@ fn a_report_draws_without_errors() {
         let page = folder.path().join(format!("{name}.html"));
         run::report(6, broken).write(&mut File::create(&page).unwrap()).unwrap();
         let address = format!("file://{}#{hash}", page.display());
-        assert_ready(&browse(folder.path(), &["--dump-dom"], &address));
+        let dom = browse(folder.path(), &["--dump-dom"], &address);
+        assert_ready(&dom);
+        assert!(dom.contains("square &lt;and&gt; spiral.ngc"));
         let picture = folder.path().join(format!("{name}.png"));
         browse(folder.path(), &[&format!("--screenshot={}", picture.display())], &address);
         let colours = distinct_colours(&picture);
@@ -33,11 +36,70 @@ fn a_report_draws_without_errors() {
     }
 }
 
+#[test]
+fn a_run_with_little_to_show_draws() {
+    if chromium_is_missing() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for n in [0, 1, 2, 50] {
+        let page = folder.path().join("lathe.html");
+        lathe(n).write(&mut File::create(&page).unwrap()).unwrap();
+        let dom = browse(folder.path(), &["--dump-dom"], &format!("file://{}", page.display()));
+        assert_ready(&dom);
+    }
+}
+
+#[test]
+fn a_damaged_report_says_so() {
+    if chromium_is_missing() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut html = Vec::new();
+    lathe(50).write(&mut html).unwrap();
+    let damaged = String::from_utf8(html).unwrap().replace("data-kind=\"f32\">", "data-kind=\"f32\">AAAA");
+    let page = folder.path().join("damaged.html");
+    fs::write(&page, damaged).unwrap();
+    let dom = browse(folder.path(), &["--dump-dom"], &format!("file://{}", page.display()));
+    assert!(root_of(&dom).contains("data-errors") && dom.contains("this file is damaged"));
+}
+
+/// Two linear axes and a rotary one, and none of the optional columns.
+fn lathe(n: usize) -> Report {
+    let ramp = |slope: f64| (0..n).map(|i| i as f64 * slope).collect::<Vec<f64>>();
+    let axis = |letter, unit| Axis { letter, unit, max_velocity: 100.0, max_acceleration: 500.0, ..Axis::default() };
+    Report {
+        title: "lathe".into(),
+        axes: vec![axis('X', Unit::Mm), axis('Z', Unit::Mm), axis('C', Unit::Deg)],
+        fine_period_s: 0.001,
+        samples: Samples {
+            t_s: ramp(0.001),
+            line: vec![1; n],
+            command: vec![ramp(0.01), ramp(-0.02), ramp(0.05)],
+            feed_mm_s: ramp(0.1),
+            ..Samples::default()
+        },
+        ..Report::default()
+    }
+}
+
+fn chromium_is_missing() -> bool {
+    let missing = !Path::new(CHROMIUM).exists();
+    if missing {
+        println!("skipped: chromium is not installed (apt-get install chromium)");
+    }
+    missing
+}
+
+fn root_of(dom: &str) -> &str {
+    dom.lines().find(|line| line.starts_with("<html")).unwrap_or_default()
+}
+
 /// The page says itself whether it is drawn and what went wrong.
 fn assert_ready(dom: &str) {
-    let root = dom.lines().find(|line| line.starts_with("<html")).unwrap_or_default();
+    let root = root_of(dom);
     assert!(root.contains("data-ready=\"1\"") && !root.contains("data-errors"), "{root}");
-    assert!(dom.contains("square &lt;and&gt; spiral.ngc"));
 }
 
 /// Runs the browser on an address; answers what it prints. Ends it when it takes too long.
