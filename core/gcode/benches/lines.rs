@@ -31,10 +31,10 @@ fn raster() -> String {
 fn arcs() -> String {
     let mut text = String::from("G21 G90 G94 G17 F3000 G0 X0 Y0\n");
     for n in 0..LINES {
-        let x = f64::from(n % 100) + 1.0;
-        let _ = writeln!(text, "G2 X{x:.3} Y0 I{:.3} J0 F{}", if n % 100 == 0 { -49.0 } else { 0.5 }, 1000 + n % 7);
+        let (x, i) = if n % 2 == 0 { (1.0, 0.5) } else { (0.0, -0.5) };
+        let _ = writeln!(text, "G2 X{x:.3} Y0 I{i:.3} J0 F{}", 1000 + n % 7);
     }
-    text.replace("I-49.000", "I-49.500")
+    text
 }
 
 fn interpret(text: &str, items: &mut Vec<Item>) -> usize {

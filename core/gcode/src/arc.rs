@@ -28,6 +28,31 @@ pub(crate) struct Ends {
     pub turns: u32,
 }
 
+/// An arc with its ends.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Part {
+    pub arc: ArcGeometry,
+    pub start: Point,
+    pub end: Point,
+}
+
+/// The one or two arcs of a line.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Parts {
+    parts: [Part; 2],
+    count: usize,
+}
+
+impl Parts {
+    fn one(part: Part) -> Self {
+        Self { parts: [part, Part::default()], count: 1 }
+    }
+
+    pub fn as_slice(&self) -> &[Part] {
+        &self.parts[..self.count]
+    }
+}
+
 /// Why there is no such arc: a stable code and words.
 pub(crate) type Impossible = (&'static str, String);
 
@@ -41,8 +66,26 @@ fn tolerance(radius: f64) -> f64 {
 
 impl Ends {
     /// The arc about `center`. Where the radii at both ends differ within the tolerance, the centre moves to the nearest
-    /// point with the same distance from both, and the arc may leave the programmed circles by no more than that.
-    pub fn about(&self, center: Point) -> Result<ArcGeometry, Impossible> {
+    /// point with the same distance from both. Where the arc would then leave the programmed circle by more than the
+    /// tolerance (it is nearly closed, so that a small difference moves the centre far), its last half turn becomes an
+    /// arc of its own.
+    pub fn about(&self, center: Point) -> Result<Parts, Impossible> {
+        let radii = self.radii(center)?;
+        let chord = distance(self.start, self.end);
+        if chord < SAME_POINT_MM {
+            return Ok(Parts::one(self.part(center)));
+        }
+        if let Some(part) = self.near(center, chord, radii) {
+            return Ok(Parts::one(part));
+        }
+        self.halves(center, radii).ok_or_else(|| {
+            let off = show(tolerance(radii[0].max(radii[1])));
+            let why = format!("{}; no circle through both ends stays within {off} mm of it", unequal(radii));
+            ("arc-radius", why)
+        })
+    }
+
+    fn radii(&self, center: Point) -> Result<[f64; 2], Impossible> {
         let radii = [distance(self.start, center), distance(self.end, center)];
         let largest = radii[0].max(radii[1]);
         if largest < SAME_POINT_MM {
@@ -51,18 +94,34 @@ impl Ends {
         if (radii[0] - radii[1]).abs() > tolerance(largest) {
             return Err(("arc-radius", unequal(radii)));
         }
-        let chord = distance(self.start, self.end);
-        if chord < SAME_POINT_MM {
-            return Ok(self.circle(center, radii[0]));
+        Ok(radii)
+    }
+
+    /// The arc about the point nearest to `center` that is as far from both ends, if it stays near the programmed one.
+    fn near(&self, center: Point, chord: f64, radii: [f64; 2]) -> Option<Part> {
+        let part = self.part(self.onto_bisector(center, chord));
+        let turned = (part.arc.sweep_rad - self.part(center).arc.sweep_rad).abs();
+        let near = deviation(&part.arc, center, radii) <= tolerance(radii[0].max(radii[1])) && turned <= SWEEP_CHANGE;
+        near.then_some(part)
+    }
+
+    /// The arc in two parts, the second one half a turn about `center`.
+    fn halves(&self, center: Point, radii: [f64; 2]) -> Option<Parts> {
+        let whole = self.part(center).arc.sweep_rad;
+        let before = whole - PI.copysign(whole);
+        if before * whole <= 0.0 {
+            return None;
         }
-        let moved = self.onto_bisector(center, chord);
-        let arc = self.circle(moved, distance(self.start, moved));
-        let turned = (arc.sweep_rad - self.circle(center, radii[0]).sweep_rad).abs();
-        if deviation(&arc, center, radii) > tolerance(largest) || turned > SWEEP_CHANGE {
-            let why = format!("; no circle through both ends stays within {} mm of it", show(tolerance(largest)));
-            return Err(("arc-radius", unequal(radii) + &why));
-        }
-        Ok(arc)
+        let from_end = [0, 1].map(|axis| (self.end[axis] - center[axis]) / radii[1]);
+        let radius = f64::midpoint(radii[0], radii[1]);
+        let middle = [0, 1].map(|axis| center[axis] - from_end[axis] * radius);
+        let turns = (before.abs() / TAU).floor() as u32 + 1;
+        let ends = [Self { end: middle, turns, ..*self }, Self { start: middle, turns: 1, ..*self }];
+        let [first, last] = ends.map(|ends| {
+            let chord = distance(ends.start, ends.end);
+            if chord < SAME_POINT_MM { None } else { ends.near(center, chord, ends.radii(center).ok()?) }
+        });
+        Some(Parts { parts: [first?, last?], count: 2 })
     }
 
     fn onto_bisector(&self, center: Point, chord: f64) -> Point {
@@ -78,7 +137,7 @@ impl Ends {
     }
 
     /// The arc of `radius`: the short one, or for a negative radius the long one.
-    pub fn of_radius(&self, radius: f64) -> Result<ArcGeometry, Impossible> {
+    pub fn of_radius(&self, radius: f64) -> Result<Parts, Impossible> {
         let chord = distance(self.start, self.end);
         if chord < SAME_POINT_MM {
             let why = "an arc by radius (R) cannot end where it starts: a full circle needs I J K";
@@ -94,23 +153,24 @@ impl Ends {
         let height = if self.clockwise == (radius > 0.0) { -height } else { height };
         let (middle, normal) = self.bisector(chord);
         let center = [middle[0] + height * normal[0], middle[1] + height * normal[1]];
-        Ok(self.circle(center, distance(self.start, center)))
+        Ok(Parts::one(self.part(center)))
     }
 
-    fn circle(&self, center: Point, radius: f64) -> ArcGeometry {
+    fn part(&self, center: Point) -> Part {
         let angle = |p: Point| (p[1] - center[1]).atan2(p[0] - center[0]);
         let start_angle = angle(self.start);
         let turn = if self.clockwise { start_angle - angle(self.end) } else { angle(self.end) - start_angle };
         let same = distance(self.start, self.end) < SAME_POINT_MM;
         let turn = if same || turn == 0.0 { TAU } else { turn.rem_euclid(TAU) };
         let sweep = turn + TAU * f64::from(self.turns - 1);
-        ArcGeometry {
+        let arc = ArcGeometry {
             plane: [0, 1],
             center_mm: center,
-            radius_mm: radius,
+            radius_mm: distance(self.start, center),
             start_angle_rad: start_angle,
             sweep_rad: if self.clockwise { -sweep } else { sweep },
-        }
+        };
+        Part { arc, start: self.start, end: self.end }
     }
 }
 
@@ -135,11 +195,12 @@ pub(crate) fn contains(arc: &ArcGeometry, angle: f64) -> bool {
     from_start.rem_euclid(TAU) <= arc.sweep_rad.abs()
 }
 
-/// The box of the arc beyond its ends: lowest and highest coordinate of each axis of the plane, `ends` included.
-pub(crate) fn extent(arc: &ArcGeometry, ends: [Point; 2]) -> [(f64, f64); 2] {
+/// The box of the arc: lowest and highest coordinate of each axis of the plane.
+pub(crate) fn extent(part: &Part) -> [(f64, f64); 2] {
+    let arc = &part.arc;
     std::array::from_fn(|axis| {
         let high_angle = axis as f64 * PI / 2.0;
-        let (a, b) = (ends[0][axis], ends[1][axis]);
+        let (a, b) = (part.start[axis], part.end[axis]);
         let reach =
             |angle, sign: f64, end| if contains(arc, angle) { arc.center_mm[axis] + sign * arc.radius_mm } else { end };
         (reach(high_angle + PI, -1.0, a.min(b)), reach(high_angle, 1.0, a.max(b)))
@@ -147,74 +208,4 @@ pub(crate) fn extent(arc: &ArcGeometry, ends: [Point; 2]) -> [(f64, f64); 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn ends(start: Point, end: Point, clockwise: bool) -> Ends {
-        Ends { start, end, clockwise, turns: 1 }
-    }
-
-    #[test]
-    fn quarter_and_full_circles() {
-        let quarter = ends([10.0, 0.0], [0.0, 10.0], false).about([0.0, 0.0]).unwrap();
-        assert!((quarter.sweep_rad - PI / 2.0).abs() < 1e-15);
-        let rest = ends([10.0, 0.0], [0.0, 10.0], true).about([0.0, 0.0]).unwrap();
-        assert!((rest.sweep_rad + 1.5 * PI).abs() < 1e-15);
-        let full = ends([10.0, 0.0], [10.0, 0.0], true).about([0.0, 0.0]).unwrap();
-        assert_eq!(full.sweep_rad, -TAU);
-        let three = Ends { turns: 3, ..ends([10.0, 0.0], [10.0, 0.0], false) }.about([0.0, 0.0]).unwrap();
-        assert_eq!(three.sweep_rad, 3.0 * TAU);
-    }
-
-    #[test]
-    fn radius_arcs_take_the_short_or_the_long_way() {
-        let short = ends([10.0, 0.0], [0.0, 10.0], false).of_radius(10.0).unwrap();
-        assert!(distance(short.center_mm, [0.0, 0.0]) < 1e-12 && (short.sweep_rad - PI / 2.0).abs() < 1e-12);
-        let long = ends([10.0, 0.0], [0.0, 10.0], false).of_radius(-10.0).unwrap();
-        assert!(distance(long.center_mm, [10.0, 10.0]) < 1e-12 && (long.sweep_rad - 1.5 * PI).abs() < 1e-12);
-        let half = ends([10.0, 0.0], [-10.0, 0.0], true).of_radius(9.9999).unwrap();
-        assert!((half.radius_mm - 10.0).abs() < 1e-12 && (half.sweep_rad + PI).abs() < 1e-12);
-        assert_eq!(ends([0.0, 0.0], [20.0, 0.0], true).of_radius(9.0).unwrap_err().0, "arc-radius");
-        assert_eq!(ends([0.0, 0.0], [0.0, 0.0], true).of_radius(9.0).unwrap_err().0, "arc-ends");
-    }
-
-    #[test]
-    fn radii_that_differ_too_much_are_refused_with_both() {
-        let (code, why) = ends([10.0, 0.0], [0.0, 10.02], false).about([0.0, 0.0]).unwrap_err();
-        assert_eq!(code, "arc-radius");
-        assert_eq!(why, "the arc does not fit: its radius is 10.0000 mm at the start and 10.0200 mm at the end");
-        // Radially apart, at the same angle: the circle through both ends would be tiny.
-        assert!(ends([10.0, 0.0], [10.004, 0.0], false).about([0.0, 0.0]).unwrap_err().1.contains("no circle"));
-    }
-
-    #[test]
-    fn extents_know_the_quadrants() {
-        let arc = ends([10.0, 0.0], [0.0, -10.0], false).about([0.0, 0.0]).unwrap();
-        let [x, y] = extent(&arc, [[10.0, 0.0], [0.0, -10.0]]);
-        assert_eq!((x, y), ((-10.0, 10.0), (-10.0, 10.0)));
-        let arc = ends([10.0, 0.0], [0.0, 10.0], false).about([0.0, 0.0]).unwrap();
-        assert_eq!(extent(&arc, [[10.0, 0.0], [0.0, 10.0]]), [(0.0, 10.0), (0.0, 10.0)]);
-    }
-
-    proptest! {
-        /// Ends rounded to 0.001 mm: both lie on the circle of the arc, and sweeping it from the start meets the end.
-        #[test]
-        fn rounded_arcs_hold_together(
-            r in 0.5..200.0f64, a in 0.0..TAU, sweep in 0.2..6.0f64, cx in -50.0..50.0f64, clockwise: bool,
-        ) {
-            let round = |v: f64| (v * 1000.0).round() / 1000.0;
-            let at = |angle: f64| [round(cx + r * angle.cos()), round(r * angle.sin())];
-            let b = if clockwise { a - sweep } else { a + sweep };
-            let ends = ends(at(a), at(b), clockwise);
-            let arc = ends.about([round(cx), 0.0]).unwrap();
-            for end in [ends.start, ends.end] {
-                prop_assert!((distance(end, arc.center_mm) - arc.radius_mm).abs() < 1e-9);
-            }
-            let last = arc.start_angle_rad + arc.sweep_rad;
-            let reached = [arc.center_mm[0] + arc.radius_mm * last.cos(), arc.center_mm[1] + arc.radius_mm * last.sin()];
-            prop_assert!(distance(reached, ends.end) < 1e-9);
-            prop_assert!((arc.sweep_rad.abs() - sweep).abs() < 0.02);
-        }
-    }
-}
+mod tests;

@@ -86,8 +86,11 @@ fn escape(bytes: &[u8], to: &mut String) {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}:{}:{}: error: {}", self.file, self.line, self.column, self.message)?;
-        writeln!(f, "  {}", self.excerpt)?;
+        write!(f, "{}:{}:{}: error: {}", self.file, self.line, self.column, self.message)?;
+        if self.excerpt.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "\n  {}", self.excerpt)?;
         let room = (CONTEXT as u32).min((self.excerpt.chars().count() as u32).saturating_sub(self.caret)).max(1);
         let width = (self.end_column - self.column).clamp(1, room);
         write!(f, "  {}{}", " ".repeat(self.caret as usize), "^".repeat(width as usize))
@@ -108,7 +111,7 @@ mod tests {
     #[test]
     fn the_caret_points_at_the_text() {
         assert_eq!(shown(b"G1 X1 Q2", 6, 8), "part.ngc:7:7: error: no good\n  G1 X1 Q2\n        ^^");
-        assert_eq!(shown(b"", 0, 0), "part.ngc:7:1: error: no good\n  \n  ^");
+        assert_eq!(shown(b"", 0, 0), "part.ngc:7:1: error: no good");
     }
 
     #[test]

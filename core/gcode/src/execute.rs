@@ -77,10 +77,6 @@ impl Interpreter {
 
     /// Modes that only change how later words are read.
     fn set_modes(&mut self) -> Checked<()> {
-        if self.orders.get(Group::NonModal) == Some(40) {
-            // The dwell comes before the modes of its line, but they do not touch it.
-            self.dwell_s()?;
-        }
         if let Some(plane) = self.orders.get(Group::Plane) {
             self.state.plane = match plane {
                 170 => Plane::Xy,
@@ -129,6 +125,7 @@ impl Interpreter {
     /// whether all words of the line have been read.
     #[cold]
     pub(crate) fn recover(&mut self, complete: bool) {
+        self.assign_anyway();
         self.set_units();
         // Errors of what follows have been reported already, or do not matter now.
         let _ = self.set_feed().and_then(|()| self.set_modes());

@@ -198,6 +198,11 @@ impl Interpreter {
         Ok(None)
     }
 
+    /// After an erroneous line: what it would have assigned exists, so that no later line complains of that.
+    pub(crate) fn assign_anyway(&mut self) {
+        let _ = self.assign();
+    }
+
     fn assign(&mut self) -> Checked<()> {
         for assignment in &self.words.assignments {
             match &assignment.target {

@@ -19,6 +19,7 @@
 #![allow(clippy::doc_markdown, reason = "LinuxCNC is a name, not code")]
 
 mod arc;
+mod arc_motion;
 mod check;
 mod config;
 mod diagnostic;
@@ -26,6 +27,7 @@ mod execute;
 mod expression;
 mod fault;
 mod function;
+mod input_output;
 mod interpreter;
 mod item;
 mod letters;
@@ -44,6 +46,7 @@ mod stream;
 mod table;
 mod table_g;
 mod table_m;
+mod travel;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};

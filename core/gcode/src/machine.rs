@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use tandem_sdk::{BlockKind, Event, EventKind};
 
-use crate::fault::{Checked, Fault};
+use crate::fault::Checked;
 use crate::interpreter::Interpreter;
-use crate::item::{Input, InputMode, InputWait, Item};
+use crate::item::Item;
 use crate::table::Group;
 
 /// The permissions of M48 to M53, in the order of the state.
@@ -154,59 +154,6 @@ impl Interpreter {
             }
         }
         Ok(())
-    }
-
-    /// M62 to M66.
-    fn input_output(&mut self, out: &mut Vec<Item>) -> Checked<()> {
-        let Some(code) = self.orders.get(Group::InputOutput) else { return Ok(()) };
-        if code == 660 {
-            return self.wait_for_input(out);
-        }
-        let missing =
-            || self.orders.fault(Group::InputOutput, "word-missing", "P, the number of the output, is missing");
-        let number = self.words.integer(b'P', 0..=63)?.ok_or_else(missing)?;
-        let on = matches!(code, 620 | 640);
-        let bit = 1 << number;
-        if self.state.outputs_set & bit == 0 || (self.state.outputs & bit != 0) != on {
-            self.state.outputs_set |= bit;
-            self.state.outputs = if on { self.state.outputs | bit } else { self.state.outputs & !bit };
-            self.event(EventKind::DigitalOutput, number, f64::from(u8::from(on)), out);
-        }
-        Ok(())
-    }
-
-    fn wait_for_input(&mut self, out: &mut Vec<Item>) -> Checked<()> {
-        let input = match (self.words.integer(b'P', 0..=63)?, self.words.integer(b'E', 0..=63)?) {
-            (Some(number), None) => Input::Digital(number),
-            (None, Some(number)) => Input::Analog(number),
-            _ => return Err(self.wait_fault("M66 needs either P (digital input) or E (analogue input)")),
-        };
-        let mode = self.wait_mode()?;
-        let timeout_s = self.words.not_negative(b'Q')?.unwrap_or(0.0);
-        if mode != InputMode::Immediate && matches!(input, Input::Analog(_)) {
-            return Err(self.wait_fault("an analogue input can only be read at once (L0)"));
-        }
-        if mode != InputMode::Immediate && timeout_s == 0.0 {
-            return Err(self.wait_fault("M66 needs Q, the longest wait in seconds, greater than zero"));
-        }
-        self.rest(out);
-        let (line, before_block) = (self.state.line, self.state.next_index);
-        out.push(Item::Wait(InputWait { line, before_block, input, mode, timeout_s }));
-        Ok(())
-    }
-
-    fn wait_mode(&self) -> Checked<InputMode> {
-        Ok(match self.words.integer(b'L', 0..=4)? {
-            None | Some(0) => InputMode::Immediate,
-            Some(1) => InputMode::Rise,
-            Some(2) => InputMode::Fall,
-            Some(3) => InputMode::High,
-            Some(_) => InputMode::Low,
-        })
-    }
-
-    fn wait_fault(&self, message: &str) -> Fault {
-        self.orders.fault(Group::InputOutput, "input", message)
     }
 
     /// M0, M1, M2, M30: after the motion of the line.

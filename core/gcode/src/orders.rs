@@ -9,8 +9,6 @@ use crate::words::{Code, Words};
 /// Letters that any line may have.
 const ALWAYS: u32 = mask("NOFST");
 const ARC_LETTERS: u32 = mask("IJKR");
-/// Letters whose absence is allowed even where two words of the line could take them.
-const SHARED: u32 = AXIS_MASK;
 
 /// What a line orders.
 pub(crate) struct Orders {
@@ -121,7 +119,7 @@ impl Orders {
                 Ok(())
             }
             _ if word.is_some() => Ok(()),
-            _ => claims.add_letters(implied(motion), words),
+            _ => claims.add('G', implied(motion), words),
         }
     }
 
@@ -166,25 +164,15 @@ struct Claims {
 }
 
 impl Claims {
-    fn add(&mut self, letter: char, row: &Row, words: &Words) -> Checked<()> {
-        self.add_letters(row, words).map_err(|fault| {
-            let message = format!("{}, {} too", fault.message, written(letter, row.tenths));
-            Fault { message, ..fault }
-        })
-    }
-
     /// A letter that two words of the line could take belongs to neither: the author must split the line.
     #[inline]
-    fn add_letters(&mut self, row: &Row, words: &Words) -> Checked<()> {
-        let both = self.letters & row.mask & words.present & !SHARED;
+    fn add(&mut self, letter: char, row: &Row, words: &Words) -> Checked<()> {
+        let both = self.letters & row.mask & words.present & !AXIS_MASK;
         self.letters |= row.mask;
-        match words.first_of(both) {
-            None => Ok(()),
-            Some((letter, span)) => {
-                let message = format!("two words of this line take {}: split the line", letter as char);
-                Err(Fault::new(span, "ambiguous", message))
-            }
-        }
+        let Some((shared, span)) = words.first_of(both) else { return Ok(()) };
+        let word = written(letter, row.tenths);
+        let message = format!("{word} takes {}, but so does another word of this line: split it", shared as char);
+        Err(Fault::new(span, "ambiguous", message))
     }
 }
 

@@ -134,9 +134,10 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Ch
         return Err(Fault::new(span, "assignment", "a parameter stands here for a word; an assignment needs ="));
     }
     scanner.skip_blanks();
-    let value = context.value(scanner)?;
-    words.assignments.push(Assignment { target, value, span });
-    Ok(())
+    let value = context.value(scanner);
+    // Where the value is at fault, zero stands in, so that later lines are not blamed for a parameter never set.
+    words.assignments.push(Assignment { target, value: *value.as_ref().unwrap_or(&0.0), span });
+    value.map(|_| ())
 }
 
 #[cold]

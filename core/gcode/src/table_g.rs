@@ -2,7 +2,7 @@
 
 use crate::table::Group::{
     ArcDistance, CannedCycle, CoordinateSystem, CutterRadius, CycleReturn, Distance, FeedMode, LatheDiameter, Motion,
-    NonModal, PathControl, Plane, SpindleMode, ToolLength, Transformation, Units,
+    NonModal, PathControl, Plane, Polar, Rotation, Scaling, SpindleMode, ToolLength, Units,
 };
 use crate::table::{Row, refused, works};
 
@@ -31,8 +31,8 @@ pub(crate) static G_ROWS: &[Row] = &[
     refused(80, LatheDiameter, "radius mode", LATHE),
     refused(90, NonModal, "exact stop in this line only", "not supported: use G61.1 and G64"),
     works(100, NonModal, "LPRXYZABCUVW", "L1 tool table, L2 and L20 coordinate systems"),
-    works(150, Transformation, "", "polar coordinates off (nothing to do)"),
-    refused(160, Transformation, "polar coordinates", FRAMES),
+    works(150, Polar, "", "polar coordinates off (nothing to do)"),
+    refused(160, Polar, "polar coordinates", FRAMES),
     works(170, Plane, "", "arcs in the plane XY"),
     works(180, Plane, "", "arcs in the plane ZX"),
     works(190, Plane, "", "arcs in the plane YZ"),
@@ -62,8 +62,8 @@ pub(crate) static G_ROWS: &[Row] = &[
     refused(432, ToolLength, "additional tool length offset", "not supported: use G43 with the tool table"),
     refused(440, ToolLength, "negative tool length offset", "not supported: use G43 with the tool table"),
     works(490, ToolLength, "", "tool length offset off"),
-    works(500, Transformation, "", "scaling off (nothing to do)"),
-    refused(510, Transformation, "scaling", FRAMES),
+    works(500, Scaling, "", "scaling off (nothing to do)"),
+    refused(510, Scaling, "scaling", FRAMES),
     refused(520, NonModal, "local coordinate system", "not supported: use G92 or G10 L2"),
     works(530, NonModal, "", "machine coordinates, in this line"),
     works(540, CoordinateSystem, "", "coordinate system 1"),
@@ -80,9 +80,9 @@ pub(crate) static G_ROWS: &[Row] = &[
     works(640, PathControl, "PQ", "continuous path within P; Q is accepted and has no effect"),
     refused(650, NonModal, "macro call", "macros are not supported"),
     refused(660, NonModal, "modal macro call", "macros are not supported"),
-    refused(680, Transformation, "rotation", FRAMES),
-    refused(682, Transformation, "tilted plane", FRAMES),
-    works(690, Transformation, "", "rotation off (nothing to do)"),
+    refused(680, Rotation, "rotation", FRAMES),
+    refused(682, Rotation, "tilted plane", FRAMES),
+    works(690, Rotation, "", "rotation off (nothing to do)"),
     refused(730, CannedCycle, "drilling, chip breaking", CYCLES),
     refused(740, CannedCycle, "left-hand tapping", CYCLES),
     refused(760, CannedCycle, "threading", CYCLES),

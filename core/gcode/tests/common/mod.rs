@@ -1,0 +1,103 @@
+//! Helpers of the tests: a machine, and items as short text.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::path::PathBuf;
+
+use tandem_gcode::{Config, Diagnostic, Interpreter, Item, Tool};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PathMode};
+
+/// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools.
+pub fn mill() -> Config {
+    let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).unwrap();
+    let mut config = Config::new(axes);
+    config.travel_mm[0] = (-250.0, 250.0);
+    config.travel_mm[1] = (-250.0, 250.0);
+    config.travel_mm[2] = (-100.0, 100.0);
+    for (number, length) in [(1, 20.0), (2, 25.0)] {
+        let offset = AxisVector::from_slice(&[0.0, 0.0, length]);
+        config.tools.push(Tool { number, pocket: Some(number), offset, diameter_mm: 6.0 });
+    }
+    config
+}
+
+/// All items of a program without errors.
+pub fn run(text: &str) -> Vec<Item> {
+    let (items, errors) = run_on(mill(), text);
+    assert!(errors.is_empty(), "{}", errors[0]);
+    items
+}
+
+/// All items and all errors of a program.
+pub fn run_on(config: Config, text: &str) -> (Vec<Item>, Vec<Diagnostic>) {
+    let mut interpreter = Interpreter::new(config);
+    interpreter.set_file("t.ngc");
+    let (mut items, mut errors) = (Vec::new(), Vec::new());
+    for (number, line) in (1..).zip(text.lines()) {
+        errors.extend(interpreter.line(number, line.as_bytes(), &mut items).err());
+    }
+    errors.extend(interpreter.finish(&mut items).err());
+    (items, errors)
+}
+
+/// The blocks of a program without errors.
+pub fn blocks(text: &str) -> Vec<Block> {
+    only_blocks(&run(text))
+}
+
+pub fn only_blocks(items: &[Item]) -> Vec<Block> {
+    let block = |item: &Item| if let Item::Block(block) = item { Some(*block) } else { None };
+    items.iter().filter_map(block).collect()
+}
+
+/// The messages of a program, without the excerpts.
+pub fn messages(text: &str) -> Vec<String> {
+    let (_, errors) = run_on(mill(), text);
+    errors.iter().map(|e| format!("{}:{} [{}] {}", e.line, e.column, e.code, e.message)).collect()
+}
+
+/// One short line per item.
+pub fn shown(items: &[Item]) -> Vec<String> {
+    items.iter().map(show).collect()
+}
+
+fn show(item: &Item) -> String {
+    match item {
+        Item::Block(block) => show_block(block),
+        Item::Event(e) => format!("{}: {:?} {} {} before {}", e.line, e.kind, e.index, short(e.value), e.before_block),
+        Item::Wait(w) => {
+            let (input, mode) = (w.input, w.mode);
+            format!("{}: Wait {input:?} {mode:?} {} before {}", w.line, short(w.timeout_s), w.before_block)
+        }
+        Item::End => "End".into(),
+    }
+}
+
+fn show_block(block: &Block) -> String {
+    let end: Vec<_> = block.end.0[..4].iter().map(|v| short(*v)).collect();
+    let mut text = format!("{}: {:?} {} to {}", block.line, block.kind, block.index, end.join(" "));
+    text += &match block.kind {
+        BlockKind::Dwell => format!(" for {}", short(block.dwell_s)),
+        BlockKind::Rapid => String::new(),
+        _ => format!(" length {} feed {}", short(block.length_mm), short(block.feed_mm_per_s)),
+    };
+    if block.kind == BlockKind::Arc {
+        let (arc, [a, b]) = (&block.arc, block.arc.center_mm.map(short));
+        let (radius, sweep) = (short(arc.radius_mm), short(arc.sweep_rad.to_degrees()));
+        text += &[" about ", &a, " ", &b, " radius ", &radius, " sweep ", &sweep].concat();
+    }
+    if block.path_mode == PathMode::ExactStop {
+        text += " exact";
+    }
+    text
+}
+
+pub fn short(value: f64) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    if text == "-0" { "0".into() } else { text }
+}
+
+/// The folder of program fixtures.
+pub fn programs() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/programs")
+}
