@@ -1,2 +1,34 @@
-//! The `tandem` command.
-fn main() {}
+//! The `tandem` command: the only crate that prints.
+
+mod args;
+mod blocks_csv;
+mod built_in;
+mod check;
+mod output;
+mod program;
+mod progress;
+mod report;
+mod run;
+mod trace_csv;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Args, Command};
+
+/// Exit status: bad input, nothing moved. (0 is done; 2, a wrong command line, is clap's.)
+const REFUSED: u8 = 1;
+/// Exit status: a fault or stop while running.
+const FAULT: u8 = 3;
+
+fn main() -> ExitCode {
+    let status = match Args::parse().command {
+        Command::Run(options) => run::run(&options),
+        Command::Check(options) => check::check(&options),
+    };
+    ExitCode::from(status.unwrap_or_else(|error| {
+        eprintln!("{error}");
+        REFUSED
+    }))
+}

@@ -1,1 +1,27 @@
-//! .
+//! The host: plugins by name, both loops on a clock, what they did as numbers.
+//!
+//! [`Run::prepare`] reads nothing but the machine and the program, checks the whole program, and refuses before
+//! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
+
+mod command;
+mod error;
+mod fault_text;
+mod monitor;
+mod path_watch;
+mod pump;
+mod registry;
+mod rules;
+mod run;
+mod setup;
+mod strategy;
+mod summary;
+mod virtual_clock;
+mod wall_clock;
+
+pub use command::{Command, Timed};
+pub use error::HostError;
+pub use monitor::Monitor;
+pub use pump::RunObserver;
+pub use registry::Registry;
+pub use run::{Clock, Outcome, Run, check_program};
+pub use summary::Summary;

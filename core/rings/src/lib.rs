@@ -56,8 +56,6 @@ impl Default for Sizes {
 pub struct RoughEnd {
     /// Segments and events out.
     pub segments: Producer<Queued>,
-    /// Ratios out.
-    pub ratios: Producer<Ratio>,
     /// How far the queue reaches.
     pub depth: Arc<Depth>,
     /// What the fine loop says of itself.
@@ -90,6 +88,8 @@ pub struct HostEnd {
     pub status: Arc<Status>,
     /// Every sample.
     pub samples: Consumer<Sample>,
+    /// Ratios out.
+    pub ratios: Producer<Ratio>,
 }
 
 /// Makes the bridge between the loops. Allocates for good.
@@ -98,8 +98,7 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let (ratios_in, ratios_out) = RingBuffer::new(64);
     let (samples_in, samples_out) = RingBuffer::new(sizes.samples);
     let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());
-    let rough =
-        RoughEnd { segments: segments_in, ratios: ratios_in, depth: Arc::clone(&depth), status: Arc::clone(&status) };
+    let rough = RoughEnd { segments: segments_in, depth: Arc::clone(&depth), status: Arc::clone(&status) };
     let fine = FineEnd {
         segments: segments_out,
         ratios: ratios_out,
@@ -108,5 +107,5 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
         status: Arc::clone(&status),
         samples: samples_in,
     };
-    (rough, fine, HostEnd { controls, status, samples: samples_out })
+    (rough, fine, HostEnd { controls, status, samples: samples_out, ratios: ratios_in })
 }

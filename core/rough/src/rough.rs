@@ -55,6 +55,8 @@ pub struct RoughLoop {
     dry: bool,
     /// The planner has been told that nothing follows for now.
     finished: bool,
+    /// The planner has emitted all of it.
+    stretch_over: bool,
     waiting: Option<InputWait>,
     waited_s: f64,
     line: u32,
@@ -74,6 +76,7 @@ impl RoughLoop {
             next: 0,
             dry: false,
             finished: false,
+            stretch_over: false,
             waiting: None,
             waited_s: 0.0,
             line: 0,
@@ -88,7 +91,7 @@ impl RoughLoop {
     /// The program or the planner cannot go on; what is queued is still driven to its end.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
         let result = self.fill();
-        self.queue.flush(self.finished || result.is_err());
+        self.queue.flush(self.stretch_over || result.is_err());
         for (block, report) in self.queue.reported.drain(..) {
             observer.block(&block, &report);
         }
@@ -108,10 +111,12 @@ impl RoughLoop {
             if let Some(defect) = self.queue.defect() {
                 return Err(planner_error(self.line, defect));
             }
-            if advanced.done != 0 {
+            self.stretch_over = advanced.done != 0;
+            if self.stretch_over {
                 self.stretch_is_over();
                 return Ok(());
             }
+            self.queue.flush(false);
             if advanced.duration_s == 0.0 && !self.finished {
                 return Err(planner_error(self.line, "it is full and emits nothing"));
             }

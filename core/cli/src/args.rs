@@ -1,0 +1,82 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+
+/// Tandem, an open CNC motion controller.
+#[derive(Parser)]
+#[command(
+    version,
+    about,
+    after_help = "Exit status: 0 done, 1 refused (nothing moved), 2 usage, 3 fault or stop while running."
+)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Run a part program
+    Run(Run),
+    /// List every error of a part program; nothing moves
+    Check(Check),
+}
+
+#[derive(Group)]
+pub struct Machine {
+    /// The machine file
+    #[arg(long = "machine", value_name = "M.toml")]
+    pub path: PathBuf,
+    /// Override a key of the machine file, as in planner.plugin=look-ahead
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    pub overrides: Vec<(String, String)>,
+}
+
+#[derive(Group)]
+pub struct Run {
+    /// The part program; - reads it from standard input
+    pub program: PathBuf,
+    #[command(flatten)]
+    pub machine: Machine,
+    /// The clock that drives the loops
+    #[arg(long, default_value = "virtual")]
+    pub clock: Clock,
+    /// Wait for Enter at M0, M1 and M6 instead of logging them
+    #[arg(long)]
+    pub pause: bool,
+    /// Write every sample
+    #[arg(long, value_name = "F.csv")]
+    pub trace: Option<PathBuf>,
+    /// Write the summary
+    #[arg(long, value_name = "F.json")]
+    pub summary: Option<PathBuf>,
+    /// Draw the run
+    #[arg(long, value_name = "F.html")]
+    pub report: Option<PathBuf>,
+    /// Write every block as it was driven
+    #[arg(long, value_name = "F.csv")]
+    pub blocks: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Check {
+    /// The part program; - reads it from standard input
+    pub program: PathBuf,
+    #[command(flatten)]
+    pub machine: Machine,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Clock {
+    /// In lockstep, as fast as the processor allows
+    Virtual,
+    /// In real time
+    Wall,
+}
+
+fn key_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("it has the form key=value")?;
+    Ok((key.trim().to_string(), value.to_string()))
+}

@@ -1,0 +1,110 @@
+//! The blocks as they were driven.
+
+use std::path::Path;
+
+use tandem_machine::Machine;
+use tandem_sdk::{Axes, Block, BlockKind, BlockReport, LimitedBy};
+
+use crate::output::Output;
+
+/// Writes a blocks CSV.
+pub struct BlocksCsv {
+    writer: csv::Writer<Output>,
+    axes: Axes,
+    rapid_mm_per_s: Vec<f64>,
+    failed: Option<String>,
+}
+
+impl BlocksCsv {
+    /// Starts the file with its head line.
+    pub fn create(path: &Path, machine: &Machine) -> Result<Self, String> {
+        let mut writer = csv::Writer::from_writer(Output::create(path)?);
+        let columns = "index,line,kind,length_mm,feed_mm_s,start_feed_mm_s,peak_feed_mm_s,end_feed_mm_s,time_s,time_constant_ms,limited_by";
+        let mut head: Vec<String> = columns.split(',').map(str::to_string).collect();
+        for axis in 0..machine.axes.count() {
+            let unit = if machine.axes.is_rotary(axis) { "deg" } else { "mm" };
+            head.push(format!("{}_end_{unit}", machine.axes.letter(axis).to_ascii_lowercase()));
+        }
+        writer.write_record(&head).map_err(|e| format!("{}: {e}", path.display()))?;
+        let rapid_mm_per_s = machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect();
+        Ok(Self { writer, axes: machine.axes, rapid_mm_per_s, failed: None })
+    }
+
+    /// Adds a block.
+    pub fn block(&mut self, block: &Block, report: &BlockReport) {
+        let row = self.row(block, report);
+        if self.failed.is_none()
+            && let Err(error) = self.writer.write_record(&row)
+        {
+            self.failed = Some(error.to_string());
+        }
+    }
+
+    /// Ends the file.
+    pub fn finish(self) -> Result<(), String> {
+        match self.failed {
+            Some(error) => Err(format!("blocks: {error}")),
+            None => self.writer.into_inner().map_err(|e| format!("blocks: {e}"))?.finish(),
+        }
+    }
+
+    fn row(&self, block: &Block, report: &BlockReport) -> Vec<String> {
+        let feed = if block.kind == BlockKind::Rapid { self.rapid_feed(block) } else { block.command_feed_mm_per_s() };
+        let time_constant_ms = report.time_constant_s * 1e3;
+        let mut row = vec![block.index.to_string(), block.line.to_string(), kind(block).to_string()];
+        let feed = if block.kind == BlockKind::Dwell { 0.0 } else { feed };
+        let numbers = [
+            block.length_mm,
+            feed,
+            report.start_feed_mm_per_s,
+            report.peak_feed_mm_per_s,
+            report.end_feed_mm_per_s,
+            report.time_s,
+        ];
+        row.extend(numbers.iter().map(f64::to_string));
+        row.push(if time_constant_ms.is_nan() { String::new() } else { time_constant_ms.to_string() });
+        row.push(limited_by(report.limited_by).to_string());
+        for axis in 0..self.axes.count() {
+            let end = block.end[axis];
+            row.push(if self.axes.is_rotary(axis) { end.to_degrees() } else { end }.to_string());
+        }
+        row
+    }
+
+    /// The feed that the axes' rapid speeds give along the block.
+    fn rapid_feed(&self, block: &Block) -> f64 {
+        let each = self.rapid_mm_per_s.iter().enumerate().filter(|(i, _)| block.end[*i] != block.start[*i]);
+        each.map(|(i, v)| v * block.length_mm / (block.end[i] - block.start[i]).abs()).fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn kind(block: &Block) -> &'static str {
+    match block.kind {
+        BlockKind::Rapid => "rapid",
+        BlockKind::Line => "line",
+        BlockKind::Nurbs => "nurbs",
+        BlockKind::Dwell => "dwell",
+        BlockKind::Arc if is_helix(block) => "helix",
+        BlockKind::Arc => "arc",
+    }
+}
+
+fn is_helix(block: &Block) -> bool {
+    let plane = block.arc.plane.map(|axis| axis as usize);
+    (0..block.end.0.len()).any(|axis| !plane.contains(&axis) && block.end[axis] != block.start[axis])
+}
+
+fn limited_by(reason: LimitedBy) -> &'static str {
+    match reason {
+        LimitedBy::Feed => "feed",
+        LimitedBy::Acceleration => "acceleration",
+        LimitedBy::Curvature => "curvature",
+        LimitedBy::Junction => "junction",
+        LimitedBy::Velocity => "velocity",
+        LimitedBy::Buffer => "buffer",
+        LimitedBy::TimeConstant => "time-constant",
+        LimitedBy::Tolerance => "tolerance",
+        LimitedBy::Jerk => "jerk",
+        LimitedBy::Policy => "policy",
+    }
+}

@@ -1,0 +1,12 @@
+//! The built-in plugins, one line each.
+
+use tandem_host::Registry;
+
+/// A registry with everything that is linked in.
+pub fn registry() -> Result<Registry, String> {
+    let mut registry = Registry::default();
+    registry.register(tandem_look_ahead::PLUGIN)?;
+    registry.register(tandem_after_interpolation::PLUGIN)?;
+    registry.register(tandem_sim::PLUGIN)?;
+    Ok(registry)
+}

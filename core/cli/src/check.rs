@@ -1,0 +1,25 @@
+//! `tandem check`.
+
+use std::error::Error;
+
+use tandem_host::check_program;
+use tandem_machine::Machine;
+
+use crate::args::Check;
+use crate::{REFUSED, built_in, program};
+
+/// Lists every error of a program.
+pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
+    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let mut program = program::open(&options.program)?;
+    let name = program.name().to_string();
+    let report = check_program(&machine, &built_in::registry()?, &mut program)?;
+    if report.is_ok() {
+        println!("{name}: {} lines, {} blocks, {:.3} mm, no errors", report.lines, report.blocks, report.length_mm);
+        return Ok(0);
+    }
+    program::print_errors(&report);
+    let count = report.diagnostics.len() as u64 + report.unlisted;
+    eprintln!("{name}: {count} error{}", if count == 1 { "" } else { "s" });
+    Ok(REFUSED)
+}

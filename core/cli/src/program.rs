@@ -1,0 +1,21 @@
+//! Opening part programs and printing their errors.
+
+use std::io;
+use std::path::Path;
+
+use tandem_gcode::{CheckReport, Program, ProgramError};
+
+/// Opens `path`; `-` is standard input.
+pub fn open(path: &Path) -> Result<Program, ProgramError> {
+    if path.as_os_str() == "-" { Program::spool("standard input", io::stdin().lock()) } else { Program::open(path) }
+}
+
+/// Prints the errors of a program.
+pub fn print_errors(report: &CheckReport) {
+    for diagnostic in &report.diagnostics {
+        eprintln!("{diagnostic}");
+    }
+    if report.unlisted > 0 {
+        eprintln!("and {} more errors", report.unlisted);
+    }
+}

@@ -1,0 +1,102 @@
+//! Collecting a run for its report.
+
+use std::path::Path;
+
+use tandem_host::Summary;
+use tandem_machine::{JerkMode, Machine};
+use tandem_report::{Axis, Report, Samples, Signal, Unit};
+use tandem_rings::Sample;
+use tandem_sdk::{Axes, AxisVector};
+
+use crate::output::Output;
+
+/// Keeps every sample in memory: about 150 bytes a sample for three axes.
+pub struct Collector {
+    report: Report,
+    axes: Axes,
+    deviation_mm: Vec<f64>,
+}
+
+impl Collector {
+    /// Nothing collected yet.
+    pub fn new(machine: &Machine, program: &str, signals: &[&str], steps_allowed: bool) -> Self {
+        let count = machine.axes.count();
+        let samples = Samples { command: vec![vec![]; count], feedback: vec![vec![]; count], ..Samples::default() };
+        let report = Report {
+            title: format!("{program} on {}", machine.name),
+            program: program.to_string(),
+            machine: machine.name.clone(),
+            planner: machine.planner.plugin.clone(),
+            axes: (0..count).map(|i| axis(machine, i, steps_allowed)).collect(),
+            fine_period_s: machine.fine_period_s,
+            samples,
+            signals: signals.iter().map(|name| Signal { name: (*name).to_string(), ..Signal::default() }).collect(),
+            path_tolerance_mm: Some(machine.motion.path_tolerance_mm),
+            jerk_is_judged: machine.motion.jerk == JerkMode::Limit,
+            ..Report::default()
+        };
+        Self { report, axes: machine.axes, deviation_mm: vec![] }
+    }
+
+    /// Adds a sample.
+    pub fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
+        let samples = &mut self.report.samples;
+        samples.t_s.push(sample.tick as f64 * self.report.fine_period_s);
+        samples.line.push(sample.line);
+        samples.feed_mm_s.push(sample.feed_mm_per_s);
+        samples.sigma.push(sample.sigma);
+        let programmed = sample.programmed_feed_mm_per_s;
+        samples.programmed_feed_mm_s.push(if programmed.is_finite() { programmed } else { f64::NAN });
+        self.deviation_mm.push(deviation_mm);
+        push(&mut samples.command, &sample.command, &self.axes);
+        push(&mut samples.feedback, &sample.feedback, &self.axes);
+        for (signal, value) in self.report.signals.iter_mut().zip(signals) {
+            signal.values.push(*value);
+        }
+    }
+
+    /// Writes the page.
+    pub fn write(mut self, path: &Path, summary: &Summary) -> Result<(), String> {
+        self.report.samples.deviation_mm = Some(self.deviation_mm);
+        self.report.facts = facts(summary);
+        let mut out = Output::create(path)?;
+        self.report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
+        out.finish()
+    }
+}
+
+fn push(columns: &mut [Vec<f64>], position: &AxisVector, axes: &Axes) {
+    for (axis, column) in columns.iter_mut().enumerate() {
+        column.push(if axes.is_rotary(axis) { position[axis].to_degrees() } else { position[axis] });
+    }
+}
+
+fn axis(machine: &Machine, index: usize, steps_allowed: bool) -> Axis {
+    let limits = &machine.limits.axes()[index];
+    let rotary = machine.axes.is_rotary(index);
+    let shown = |value: f64| if rotary { value.to_degrees() } else { value };
+    Axis {
+        letter: machine.axes.letter(index),
+        unit: if rotary { Unit::Deg } else { Unit::Mm },
+        max_velocity: shown(limits.feed_mm_per_s.max(limits.rapid_mm_per_s)),
+        max_acceleration: shown(limits.acceleration_mm_per_s2),
+        max_jerk: Some(shown(limits.jerk_mm_per_s3)).filter(|j| j.is_finite()),
+        speed_difference: if steps_allowed { shown(limits.speed_difference_mm_per_s) } else { 0.0 },
+    }
+}
+
+fn facts(summary: &Summary) -> Vec<(String, String)> {
+    let fact = |name: &str, value: String| (name.to_string(), value);
+    let mut facts = vec![
+        fact("time", format!("{:.3} s", summary.motion_time_s)),
+        fact("nominal time", format!("{:.3} s", summary.nominal_time_s)),
+        fact("path", format!("{:.3} mm in {} blocks", summary.length_mm, summary.blocks)),
+        fact("clock", summary.clock.clone()),
+        fact("samples", format!("{} at {} ms", summary.samples, summary.fine_period_s * 1e3)),
+        fact("largest distance from the path", format!("{:.3} µm", summary.max_path_deviation_mm * 1e3)),
+        fact("limit violations, guard stops", format!("{}, {}", summary.limit_violations, summary.guard_stops)),
+        fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
+    ];
+    facts.extend(summary.fault.iter().map(|fault| fact("fault", fault.clone())));
+    facts
+}

@@ -1,0 +1,137 @@
+//! `tandem run`.
+
+use std::error::Error;
+use std::io::Write;
+use std::path::Path;
+
+use tandem_host::{Clock, HostError, Outcome, Run, RunObserver, Summary};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::{Block, BlockReport};
+
+use crate::blocks_csv::BlocksCsv;
+use crate::output::Output;
+use crate::progress::Progress;
+use crate::report::Collector;
+use crate::trace_csv::TraceCsv;
+use crate::{FAULT, REFUSED, args, built_in, program};
+
+/// Runs a program.
+pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
+    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let program = program::open(&options.program)?;
+    let name = program.name().to_string();
+    let registry = built_in::registry()?;
+    let run = match Run::prepare(machine.clone(), &registry, program, options.pause) {
+        Err(HostError::Check(report)) => {
+            program::print_errors(&report);
+            return Ok(REFUSED);
+        }
+        other => other?,
+    };
+    let clock = match options.clock {
+        args::Clock::Virtual => Clock::Virtual,
+        args::Clock::Wall => Clock::Wall,
+    };
+    let mut sinks = Sinks::create(options, &machine, &name, &run)?;
+    let outcome = run.drive(clock, &[], &mut sinks)?;
+    sinks.finish(options, &outcome.summary)?;
+    Ok(conclude(options, &outcome))
+}
+
+/// Everything that a run is written to.
+struct Sinks {
+    progress: Progress,
+    trace: Option<TraceCsv>,
+    blocks: Option<BlocksCsv>,
+    report: Option<Collector>,
+}
+
+impl Sinks {
+    fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run) -> Result<Self, String> {
+        let signals = run.signals();
+        let trace = options.trace.as_ref().map(|path| TraceCsv::create(path, machine, signals));
+        let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
+        let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
+        Ok(Self {
+            progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
+            trace: trace.transpose()?,
+            blocks: blocks.transpose()?,
+            report,
+        })
+    }
+
+    fn finish(self, options: &args::Run, summary: &Summary) -> Result<(), String> {
+        self.progress.finish();
+        self.trace.map_or(Ok(()), TraceCsv::finish)?;
+        self.blocks.map_or(Ok(()), BlocksCsv::finish)?;
+        if let (Some(report), Some(path)) = (self.report, &options.report) {
+            report.write(path, summary)?;
+        }
+        options.summary.as_ref().map_or(Ok(()), |path| write_summary(path, summary))
+    }
+}
+
+impl RunObserver for Sinks {
+    fn block(&mut self, block: &Block, report: &BlockReport) {
+        if let Some(blocks) = &mut self.blocks {
+            blocks.block(block, report);
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
+        self.progress.sample(sample);
+        if let Some(trace) = &mut self.trace {
+            trace.sample(sample, signals);
+        }
+        if let Some(report) = &mut self.report {
+            report.sample(sample, deviation_mm, signals);
+        }
+    }
+}
+
+fn write_summary(path: &Path, summary: &Summary) -> Result<(), String> {
+    let mut out = Output::create(path)?;
+    let text = serde_json::to_string_pretty(summary).map_err(|e| format!("{}: {e}", path.display()))?;
+    writeln!(out, "{text}").map_err(|e| format!("{}: {e}", path.display()))?;
+    out.finish()
+}
+
+fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
+    let summary = &outcome.summary;
+    println!(
+        "{}: {} blocks, {:.3} mm in {:.3} s (nominal {:.3} s) with {} on {}",
+        summary.program,
+        summary.blocks,
+        summary.length_mm,
+        summary.motion_time_s,
+        summary.nominal_time_s,
+        summary.planner,
+        summary.machine
+    );
+    println!(
+        "limit violations {}, guard stops {}, governed samples {}, starvations {}, path deviation {:.3} µm",
+        summary.limit_violations,
+        summary.guard_stops,
+        summary.governed_samples,
+        summary.starvations,
+        summary.max_path_deviation_mm * 1e3
+    );
+    for (what, path) in [
+        ("trace", &options.trace),
+        ("blocks", &options.blocks),
+        ("summary", &options.summary),
+        ("report", &options.report),
+    ] {
+        if let Some(path) = path {
+            println!("{what}: {}", path.display());
+        }
+    }
+    match &summary.fault {
+        Some(fault) => {
+            eprintln!("fault: {fault}");
+            FAULT
+        }
+        None => 0,
+    }
+}

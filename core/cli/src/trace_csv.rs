@@ -1,0 +1,95 @@
+//! The trace: one row a fine period, 17 significant digits.
+
+use std::io::Write;
+use std::path::Path;
+
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::Axes;
+
+use crate::output::Output;
+
+/// Writes a trace CSV.
+pub struct TraceCsv {
+    out: Output,
+    axes: Axes,
+    period_s: f64,
+    failed: Option<String>,
+}
+
+impl TraceCsv {
+    /// Starts the file with its head line.
+    pub fn create(path: &Path, machine: &Machine, signals: &[&str]) -> Result<Self, String> {
+        let mut out = Output::create(path)?;
+        let head = head(&machine.axes, signals);
+        writeln!(out, "{head}").map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Self { out, axes: machine.axes, period_s: machine.fine_period_s, failed: None })
+    }
+
+    /// Adds a row.
+    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) {
+        if self.failed.is_none()
+            && let Err(error) = self.row(sample, signals)
+        {
+            self.failed = Some(error.to_string());
+        }
+    }
+
+    /// Ends the file.
+    pub fn finish(self) -> Result<(), String> {
+        match self.failed {
+            Some(error) => Err(format!("trace: {error}")),
+            None => self.out.finish(),
+        }
+    }
+
+    fn row(&mut self, sample: &Sample, signals: &[f64]) -> std::io::Result<()> {
+        // A whole number of periods divided by a round number of periods a second keeps t_s free of rounding dust.
+        let t_s = sample.tick as f64 / (1.0 / self.period_s).round_if_close();
+        write!(self.out, "{},{}", number(t_s), sample.line)?;
+        for position in [&sample.command, &sample.feedback] {
+            for axis in 0..self.axes.count() {
+                let value = if self.axes.is_rotary(axis) { position[axis].to_degrees() } else { position[axis] };
+                write!(self.out, ",{}", number(value))?;
+            }
+        }
+        write!(self.out, ",{},{}", number(sample.feed_mm_per_s), number(sample.sigma))?;
+        write!(self.out, ",{},{}", sample.state.name(), number(sample.ratio))?;
+        for signal in signals {
+            write!(self.out, ",{}", number(*signal))?;
+        }
+        writeln!(self.out)
+    }
+}
+
+fn head(axes: &Axes, signals: &[&str]) -> String {
+    let mut head = "t_s,line".to_string();
+    for kind in ["cmd", "fb"] {
+        for axis in 0..axes.count() {
+            let unit = if axes.is_rotary(axis) { "deg" } else { "mm" };
+            head += &format!(",{}_{kind}_{unit}", axes.letter(axis).to_ascii_lowercase());
+        }
+    }
+    head += ",feed_mm_s,sigma,state,ratio";
+    for signal in signals {
+        head += &format!(",sig_{signal}");
+    }
+    head
+}
+
+/// 17 significant digits: reading it back gives the same number.
+fn number(value: f64) -> String {
+    if value == 0.0 { "0".to_string() } else { format!("{value:.16e}") }
+}
+
+trait RoundIfClose {
+    /// The nearest whole number where it is within rounding, else the number itself.
+    fn round_if_close(self) -> f64;
+}
+
+impl RoundIfClose for f64 {
+    fn round_if_close(self) -> f64 {
+        let whole = self.round();
+        if (self - whole).abs() <= 1e-9 * whole { whole } else { self }
+    }
+}

@@ -1,0 +1,43 @@
+//! Faults in words.
+
+use tandem_fine::{Breach, Fault, FaultKind};
+use tandem_machine::Machine;
+
+/// What happened, who did it, where.
+pub fn describe(machine: &Machine, fault: &Fault, soft: Option<&str>) -> String {
+    let t_s = fault.tick as f64 * machine.fine_period_s;
+    format!("{} (line {}, tick {}, {t_s:.3} s)", cause(machine, &fault.kind, soft), fault.line, fault.tick)
+}
+
+fn cause(machine: &Machine, kind: &FaultKind, soft: Option<&str>) -> String {
+    match kind {
+        FaultKind::Guard { breach, axis, value, limit } => guard(machine, *breach, *axis, *value, *limit),
+        FaultKind::Drive { joint, code } => {
+            format!("driver {}: the drive of joint {joint} reports fault {code}", machine.driver.plugin)
+        }
+        FaultKind::Driver => format!("driver {}: the exchange failed", machine.driver.plugin),
+        FaultKind::EmergencyStop => "emergency stop".to_string(),
+        FaultKind::Soft => soft.unwrap_or("stopped by the operator").to_string(),
+        FaultKind::MissedPeriods => {
+            format!("more than {} fine periods were missed: the drives saw a step", machine.max_missed_periods)
+        }
+    }
+}
+
+fn guard(machine: &Machine, breach: Breach, axis: usize, value: f64, limit: f64) -> String {
+    let letter = machine.axes.letter(axis);
+    let (value, limit, unit) = if machine.axes.is_rotary(axis) {
+        (value.to_degrees(), limit.to_degrees(), "deg")
+    } else {
+        (value, limit, "mm")
+    };
+    let what = match breach {
+        Breach::NotFinite => format!("position {value}"),
+        Breach::Position => format!("position {value:.6} {unit}, travel ends at {limit:.6} {unit}"),
+        Breach::Velocity => format!("velocity {value:.6} {unit}/s, limit {limit:.6} {unit}/s"),
+        Breach::Acceleration => {
+            format!("acceleration {value:.3} {unit}/s² in a window already full, limit {limit:.3} {unit}/s²")
+        }
+    };
+    format!("guard: planner {} asks for axis {letter} {what}; the sample was not sent", machine.planner.plugin)
+}

@@ -1,0 +1,87 @@
+//! Peaks and totals of a run, from its samples and blocks.
+
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::{AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
+
+use crate::path_watch::PathWatch;
+
+/// Watches a run. Finite differences at the fine period, with rest before the first sample.
+#[derive(Debug)]
+pub struct Monitor {
+    rapid_mm_per_s: Vec<f64>,
+    period_s: f64,
+    last: [AxisVector; 3],
+    /// Samples seen.
+    pub samples: u64,
+    /// Largest velocity, acceleration, jerk per axis.
+    pub peaks: [AxisVector; 3],
+    /// Blocks driven.
+    pub blocks: u64,
+    /// Their path length, mm.
+    pub length_mm: f64,
+    /// Their nominal time, s.
+    pub nominal_s: f64,
+    /// The last position sent.
+    pub position: AxisVector,
+    watch: PathWatch,
+}
+
+impl Monitor {
+    /// Nothing seen yet.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            rapid_mm_per_s: machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect(),
+            period_s: machine.fine_period_s,
+            last: [AxisVector::ZERO; 3],
+            samples: 0,
+            peaks: [AxisVector::ZERO; 3],
+            blocks: 0,
+            length_mm: 0.0,
+            nominal_s: 0.0,
+            position: machine.start,
+            watch: PathWatch::default(),
+        }
+    }
+
+    /// Largest distance of a sample from the path, mm.
+    pub fn max_path_deviation_mm(&self) -> f64 {
+        self.watch.max_mm
+    }
+
+    /// A block is planned for good.
+    pub fn block(&mut self, block: &Block, _report: &BlockReport) {
+        self.watch.block(block);
+        self.blocks += 1;
+        self.length_mm += block.length_mm;
+        self.nominal_s += match block.kind {
+            BlockKind::Dwell => block.dwell_s,
+            BlockKind::Rapid => self.rapid_time_s(block),
+            _ => block.length_mm / block.command_feed_mm_per_s(),
+        };
+    }
+
+    fn rapid_time_s(&self, block: &Block) -> f64 {
+        let each = self.rapid_mm_per_s.iter().enumerate().map(|(i, v)| (block.end[i] - block.start[i]).abs() / v);
+        each.fold(0.0, f64::max)
+    }
+
+    /// A sample was sent. Gives its distance from the path, mm.
+    pub fn sample(&mut self, sample: &Sample) -> f64 {
+        if self.samples == 0 {
+            self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
+        }
+        self.samples += 1;
+        let velocity = (sample.command - self.last[0]) * (1.0 / self.period_s);
+        let acceleration = (velocity - self.last[1]) * (1.0 / self.period_s);
+        let jerk = (acceleration - self.last[2]) * (1.0 / self.period_s);
+        for (peak, now) in self.peaks.iter_mut().zip([&velocity, &acceleration, &jerk]) {
+            for axis in 0..MAX_AXES {
+                peak[axis] = peak[axis].max(now[axis].abs());
+            }
+        }
+        self.last = [sample.command, velocity, acceleration];
+        self.position = sample.command;
+        self.watch.sample(sample.block, &sample.command)
+    }
+}

@@ -1,0 +1,101 @@
+//! The soft side of one run: rough loop, strategy, recorder, in the order that both clocks share.
+
+use std::time::Instant;
+
+use tandem_rings::{HostEnd, Sample};
+use tandem_rough::{Observer, Progress, RoughLoop};
+use tandem_sdk::{Block, BlockReport};
+
+use crate::command::Command;
+use crate::monitor::Monitor;
+use crate::strategy::StrategyRunner;
+
+/// Is told of everything that happens in a run, on the soft side.
+pub trait RunObserver {
+    /// A block is planned for good.
+    fn block(&mut self, _block: &Block, _report: &BlockReport) {}
+
+    /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
+    fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
+}
+
+impl RunObserver for () {}
+
+/// Rough loop, strategy and recorder.
+pub struct Pump<'a> {
+    rough: RoughLoop,
+    pub host: HostEnd,
+    strategy: Option<StrategyRunner>,
+    pub monitor: Monitor,
+    observer: &'a mut dyn RunObserver,
+    /// The defect on the soft side that ends the run, in words.
+    pub soft_error: Option<String>,
+    done: bool,
+    pub planning_ns: u128,
+}
+
+impl<'a> Pump<'a> {
+    pub fn new(
+        rough: RoughLoop,
+        host: HostEnd,
+        strategy: Option<StrategyRunner>,
+        monitor: Monitor,
+        observer: &'a mut dyn RunObserver,
+    ) -> Self {
+        Self { rough, host, strategy, monitor, observer, soft_error: None, done: false, planning_ns: 0 }
+    }
+
+    /// One rough period.
+    pub fn step(&mut self) {
+        if self.done {
+            return;
+        }
+        let started = Instant::now();
+        let mut both = Both { monitor: &mut self.monitor, observer: self.observer };
+        match self.rough.step(&mut both) {
+            Ok(progress) => self.done = progress == Progress::Done,
+            Err(error) => self.fail(error.to_string()),
+        }
+        self.planning_ns += started.elapsed().as_nanos();
+    }
+
+    /// Takes the samples that have come.
+    pub fn drain(&mut self) {
+        while let Ok(sample) = self.host.samples.pop() {
+            let deviation_mm = self.monitor.sample(&sample);
+            let signals = self.strategy.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
+            let count = self.strategy.as_ref().map_or(0, |s| s.signals().len());
+            self.observer.sample(&sample, deviation_mm, &signals[..count]);
+            self.ask_strategy(&sample);
+        }
+    }
+
+    fn ask_strategy(&mut self, sample: &Sample) {
+        if self.done && self.soft_error.is_some() {
+            return;
+        }
+        let Some(strategy) = &mut self.strategy else { return };
+        if let Err(cause) = strategy.sample(sample, &mut self.host.ratios, &self.host.controls) {
+            self.fail(format!("feed strategy: {cause}"));
+        }
+    }
+
+    /// A defect on the soft side: the fine loop stops on the path.
+    fn fail(&mut self, cause: String) {
+        self.done = true;
+        self.soft_error.get_or_insert(cause);
+        Command::Abort.give(&self.host.controls);
+    }
+}
+
+struct Both<'a> {
+    monitor: &'a mut Monitor,
+    observer: &'a mut dyn RunObserver,
+}
+
+impl Observer for Both<'_> {
+    fn block(&mut self, block: &Block, report: &BlockReport) {
+        self.monitor.block(block, report);
+        self.observer.block(block, report);
+    }
+}

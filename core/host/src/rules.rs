@@ -1,0 +1,37 @@
+//! What does not go together: refusals before a run starts.
+
+use tandem_machine::{GuardMode, JerkMode, Machine};
+use tandem_sdk::{DriverDescription, PlannerDescription};
+
+use crate::error::HostError;
+
+/// Checks planner, driver and guard against each other.
+pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDescription) -> Result<(), HostError> {
+    let refuse = |key: &str, cause: String| Err(refusal(machine, key, cause));
+    let simulated = driver.simulated != 0;
+    let name = &machine.planner.plugin;
+    if machine.guard == GuardMode::Count && !simulated {
+        let cause =
+            format!("\"count\" sends samples beyond the limits: not with {}, which moves metal", machine.driver.plugin);
+        return refuse("guard.mode", cause);
+    }
+    if planner.breaks_limits != 0 && machine.guard != GuardMode::Count {
+        let cause = format!(
+            "this form of {name} breaks limits, as published: it runs on simulated drives with guard.mode = \"count\" only"
+        );
+        return refuse("planner.plugin", cause);
+    }
+    let jerk_stated = machine.limits.axes().iter().any(|a| a.jerk_mm_per_s3.is_finite());
+    if jerk_stated && planner.order < 3 && machine.motion.jerk == JerkMode::Limit {
+        let cause = format!(
+            "the machine states a jerk limit and {name} keeps none; with motion.jerk = \"report\" it is only reported"
+        );
+        return refuse("planner.plugin", cause);
+    }
+    Ok(())
+}
+
+/// A refusal with the place in the machine file.
+pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
+    HostError::Setup { place: format!("{}: {key}", machine.place(key)), cause: cause.into() }
+}

@@ -1,0 +1,211 @@
+//! One run of one program on one machine.
+
+use std::time::Instant;
+
+use tandem_fine::{Fault, FineLoop};
+use tandem_gcode::{CheckReport, Program, Stream, check};
+use tandem_machine::{JerkMode, Machine};
+use tandem_rings::{HostEnd, Sizes, bridge};
+use tandem_rough::{RoughConfig, RoughLoop};
+use tandem_sdk::{Driver, Planner};
+
+use crate::command::Timed;
+use crate::error::HostError;
+use crate::fault_text::describe;
+use crate::monitor::Monitor;
+use crate::pump::{Pump, RunObserver};
+use crate::registry::Registry;
+use crate::strategy::StrategyRunner;
+use crate::summary::{FORMAT, Summary};
+use crate::wall_clock::{Periods, Timing};
+use crate::{rules, setup, virtual_clock, wall_clock};
+
+/// Which clock drives the loops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// Lockstep, as fast as the processor allows.
+    Virtual,
+    /// Real time.
+    Wall,
+}
+
+/// A run that is ready: the program is checked, the plugins are open, nothing has moved.
+pub struct Run {
+    machine: Machine,
+    program: String,
+    rough: RoughLoop,
+    fine: FineLoop,
+    host: HostEnd,
+    strategy: Option<StrategyRunner>,
+    steps: bool,
+    /// What the first pass found: totals.
+    pub checked: CheckReport,
+}
+
+/// What a run did.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Everything as numbers.
+    pub summary: Summary,
+    /// The fault that ended it.
+    pub fault: Option<Fault>,
+}
+
+/// Runs the whole program through interpreter and planner; nothing moves.
+///
+/// # Errors
+/// The program cannot be read; a plugin refuses. What is wrong with the program is in the report.
+pub fn check_program(machine: &Machine, registry: &Registry, program: &mut Program) -> Result<CheckReport, HostError> {
+    let planner = setup::planner(machine, registry)?;
+    let config = setup::interpreter_config(machine);
+    Ok(check(program, &config, &mut |block| planner.check(block).map_err(|e| e.to_string()))?)
+}
+
+impl Run {
+    /// Checks the whole program and opens the plugins.
+    ///
+    /// # Errors
+    /// Everything that refuses: the program's errors, plugins, what does not go together.
+    pub fn prepare(
+        machine: Machine,
+        registry: &Registry,
+        mut program: Program,
+        pause_at_stops: bool,
+    ) -> Result<Self, HostError> {
+        let planner = setup::planner(&machine, registry)?;
+        let driver = setup::driver(&machine, registry)?;
+        rules::check(&machine, &planner.describe(), driver.describe())?;
+        let checked = check_program(&machine, registry, &mut program)?;
+        if !checked.is_ok() {
+            return Err(HostError::Check(Box::new(checked)));
+        }
+        let name = program.name().to_string();
+        let stream = Stream::new(program, &setup::interpreter_config(&machine))?;
+        Self::assemble(machine, registry, name, stream, planner, driver, checked, pause_at_stops)
+    }
+
+    #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
+    fn assemble(
+        machine: Machine,
+        registry: &Registry,
+        program: String,
+        stream: Stream,
+        planner: Box<dyn Planner>,
+        mut driver: Box<dyn Driver>,
+        checked: CheckReport,
+        pause_at_stops: bool,
+    ) -> Result<Self, HostError> {
+        let kinematics = setup::kinematics(&machine, registry)?;
+        let strategy = setup::strategy(&machine, registry)?;
+        let axes = machine.axes.count();
+        let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
+        setup::open(&machine, driver.as_mut(), joints)?;
+        let (rough_end, fine_end, host) = bridge(Sizes::default());
+        let description = planner.describe();
+        let fine_config = setup::fine_config(&machine, &description, pause_at_stops);
+        let rough_config = RoughConfig { rough_period_s: machine.rough_period_s };
+        Ok(Self {
+            rough: RoughLoop::new(rough_config, Box::new(stream), planner, rough_end),
+            fine: FineLoop::new(&fine_config, fine_end, driver, kinematics),
+            machine,
+            program,
+            host,
+            strategy,
+            steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
+            checked,
+        })
+    }
+
+    /// The operator's end of the run, to give commands from other threads.
+    pub fn controls(&self) -> std::sync::Arc<tandem_rings::Controls> {
+        std::sync::Arc::clone(&self.host.controls)
+    }
+
+    /// The fine loop's status, to look at from other threads.
+    pub fn status(&self) -> std::sync::Arc<tandem_rings::Status> {
+        std::sync::Arc::clone(&self.host.status)
+    }
+
+    /// Whether the planner makes use of velocity steps where blocks meet.
+    pub fn allows_steps(&self) -> bool {
+        self.steps
+    }
+
+    /// Names of the feed strategy's signals.
+    pub fn signals(&self) -> &'static [&'static str] {
+        self.strategy.as_ref().map_or(&[], StrategyRunner::signals)
+    }
+
+    /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
+    ///
+    /// # Errors
+    /// The computer refuses: a thread cannot be started.
+    pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
+        let started = Instant::now();
+        let machine = self.machine;
+        let mut fine = self.fine;
+        let monitor = Monitor::new(&machine);
+        let mut pump = Pump::new(self.rough, self.host, self.strategy, monitor, observer);
+        let mut timing = Timing::default();
+        match clock {
+            Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
+            Clock::Wall => (fine, timing) = wall_clock::drive(&mut pump, fine, periods(&machine))?,
+        }
+        let fault = fine.fault();
+        let text = fault.map(|f| describe(&machine, &f, pump.soft_error.as_deref()));
+        let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
+        (summary.overruns, summary.fault) = (timing.overruns, text);
+        fine.into_driver().stop();
+        summary.wall_time_s = started.elapsed().as_secs_f64();
+        Ok(Outcome { summary, fault })
+    }
+}
+
+fn periods(machine: &Machine) -> Periods {
+    let ns = |seconds: f64| (seconds * 1e9).round() as i64;
+    Periods {
+        rough_ns: ns(machine.rough_period_s),
+        fine_ns: ns(machine.fine_period_s),
+        max_missed: u64::from(machine.max_missed_periods),
+    }
+}
+
+fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {
+    let (monitor, counters) = (&pump.monitor, fine.counters());
+    let each = |values: &tandem_sdk::AxisVector| {
+        let shown = |i: usize| if machine.axes.is_rotary(i) { values[i].to_degrees() } else { values[i] };
+        (0..machine.axes.count()).map(|i| (machine.axes.letter(i).to_lowercase().to_string(), shown(i))).collect()
+    };
+    Summary {
+        format: FORMAT,
+        program: program.to_string(),
+        machine: machine.name.clone(),
+        planner: machine.planner.plugin.clone(),
+        clock: if clock == Clock::Virtual { "virtual" } else { "wall" }.to_string(),
+        blocks: monitor.blocks,
+        length_mm: monitor.length_mm,
+        nominal_time_s: monitor.nominal_s,
+        motion_time_s: monitor.samples.saturating_sub(1) as f64 * machine.fine_period_s,
+        fine_period_s: machine.fine_period_s,
+        rough_period_s: machine.rough_period_s,
+        samples: counters.samples,
+        max_velocity_mm_s: each(&monitor.peaks[0]),
+        max_acceleration_mm_s2: each(&monitor.peaks[1]),
+        max_jerk_mm_s3: each(&monitor.peaks[2]),
+        max_path_deviation_mm: monitor.max_path_deviation_mm(),
+        jerk: if machine.motion.jerk == JerkMode::Limit { "limit" } else { "report" }.to_string(),
+        limit_violations: counters.limit_violations,
+        guard_stops: counters.guard_stops,
+        governed_samples: counters.governed_samples,
+        jerk_relaxed_samples: 0,
+        overruns: 0,
+        missed_periods: counters.missed_periods,
+        starvations: counters.starvations,
+        late_ratios: counters.late_ratios,
+        lost_samples: pump.host.status.lost_samples.load(std::sync::atomic::Ordering::Relaxed),
+        end_position_mm: each(&monitor.position),
+        wall_time_s: 0.0,
+        planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
+        fault: None,
+    }
+}

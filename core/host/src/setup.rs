@@ -1,0 +1,101 @@
+//! From a machine to the parts of a run.
+
+use tandem_fine::FineConfig;
+use tandem_gcode::{Config, Tool};
+use tandem_machine::{GuardMode, Machine};
+use tandem_sdk::{
+    Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext, size_of_contract,
+};
+
+use crate::error::HostError;
+use crate::registry::Registry;
+use crate::rules::refusal;
+use crate::strategy::StrategyRunner;
+
+/// The interpreter's view of the machine.
+pub fn interpreter_config(machine: &Machine) -> Config {
+    let mut config = Config::new(machine.axes);
+    config.start = machine.start;
+    config.reference = [machine.home; 2];
+    for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
+        *travel = (axis.min_mm, axis.max_mm);
+    }
+    config.tools = machine.tools.tools.iter().map(tool).collect();
+    config
+}
+
+fn tool(tool: &tandem_machine::Tool) -> Tool {
+    Tool { number: tool.number, pocket: Some(tool.pocket), offset: tool.offset, diameter_mm: tool.diameter_mm }
+}
+
+/// Opens the machine's planner.
+pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
+    let context = PlannerContext {
+        size: size_of_contract::<PlannerContext>(),
+        axes: machine.axes,
+        limits: machine.limits,
+        fine_period_s: machine.fine_period_s,
+        rough_period_s: machine.rough_period_s,
+        path_tolerance_mm: machine.motion.path_tolerance_mm,
+        time_constant_s: machine.motion.time_constant_s,
+        max_feed_ratio: machine.motion.max_feed_ratio,
+        position: machine.start,
+    };
+    let choice = &machine.planner;
+    registry.planner(&choice.plugin, &choice.options, &context).map_err(|e| refusal(machine, "planner.plugin", e))
+}
+
+/// Makes the machine's driver; it is not open yet.
+pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>, HostError> {
+    let choice = &machine.driver;
+    registry.driver(&choice.plugin, &choice.options).map_err(|e| refusal(machine, "driver.plugin", e))
+}
+
+/// Claims the drives.
+pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: usize) -> Result<(), HostError> {
+    let mut context = DriverContext::new(joints, machine.fine_period_s);
+    context.start_position = machine.start;
+    let opened = driver.open(&context).and_then(|()| driver.start());
+    opened.map_err(|e| refusal(machine, "driver.plugin", format!("driver {}: {e}", machine.driver.plugin)))
+}
+
+/// Makes the machine's kinematics; `None` where joints are axes, so that identity costs nothing.
+pub fn kinematics(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Kinematics>>, HostError> {
+    let choice = &machine.kinematics;
+    if choice.plugin == "identity" {
+        return Ok(None);
+    }
+    let made = registry.kinematics(&choice.plugin, &choice.options);
+    made.map(Some).map_err(|e| refusal(machine, "kinematics.plugin", e))
+}
+
+/// Makes the machine's feed strategy, if it names one.
+pub fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<StrategyRunner>, HostError> {
+    let Some(choice) = &machine.feed_strategy else { return Ok(None) };
+    let context = StrategyContext {
+        size: size_of_contract::<StrategyContext>(),
+        axis_count: machine.axes.count() as u32,
+        fine_period_s: machine.fine_period_s,
+        rough_period_s: machine.rough_period_s,
+        max_feed_ratio: machine.motion.max_feed_ratio,
+    };
+    let made = registry.strategy(&choice.plugin, &choice.options, &context);
+    let strategy = made.map_err(|e| refusal(machine, "feed_strategy.plugin", e))?;
+    let per_window = machine.fine_periods_per_rough as usize;
+    Ok(Some(StrategyRunner::new(strategy, per_window, machine.motion.max_feed_ratio)))
+}
+
+/// The fine loop's view of the machine.
+pub fn fine_config(machine: &Machine, planner: &PlannerDescription, pause_at_stops: bool) -> FineConfig {
+    FineConfig {
+        period_s: machine.fine_period_s,
+        limits: machine.limits,
+        speed_difference_mm_per_s: planner.speed_difference_mm_per_s,
+        guard: match machine.guard {
+            GuardMode::Stop => tandem_fine::GuardMode::Stop,
+            GuardMode::Count => tandem_fine::GuardMode::Count,
+        },
+        position: machine.start,
+        pause_at_stops,
+    }
+}

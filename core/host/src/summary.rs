@@ -1,0 +1,73 @@
+//! The summary of a run, as `--summary` writes it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Number of the summary format.
+pub const FORMAT: u32 = 1;
+
+/// What a run was and did. Rotary axes are in deg.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// The program's path.
+    pub program: String,
+    /// The machine's name.
+    pub machine: String,
+    /// The planner's name.
+    pub planner: String,
+    /// `virtual` or `wall`.
+    pub clock: String,
+    /// Blocks driven.
+    pub blocks: u64,
+    /// Path length of the blocks driven, mm.
+    pub length_mm: f64,
+    /// Length / feed (rapids at the machine's rapid feed) and dwells, s.
+    pub nominal_time_s: f64,
+    /// From the first to the last sample, s.
+    pub motion_time_s: f64,
+    /// Fine period, s.
+    pub fine_period_s: f64,
+    /// Rough period, s.
+    pub rough_period_s: f64,
+    /// Samples sent.
+    pub samples: u64,
+    /// Largest |velocity| per axis, finite differences, mm/s.
+    pub max_velocity_mm_s: BTreeMap<String, f64>,
+    /// Largest |acceleration| per axis, finite differences, mm/s².
+    pub max_acceleration_mm_s2: BTreeMap<String, f64>,
+    /// Largest |jerk| per axis, finite differences, mm/s³.
+    pub max_jerk_mm_s3: BTreeMap<String, f64>,
+    /// Largest distance of a sample from the programmed path, mm.
+    pub max_path_deviation_mm: f64,
+    /// What the machine does with jerk: `limit` or `report`.
+    pub jerk: String,
+    /// Samples beyond a limit that were sent all the same.
+    pub limit_violations: u64,
+    /// Samples the guard stopped.
+    pub guard_stops: u64,
+    /// Samples with σ < 1 though nothing asked for it.
+    pub governed_samples: u64,
+    /// Samples in which the jerk limit was given up to keep velocity and acceleration.
+    pub jerk_relaxed_samples: u64,
+    /// Fine periods whose work took longer than the period.
+    pub overruns: u64,
+    /// Fine periods that passed without a sample.
+    pub missed_periods: u64,
+    /// How often the queue ran low.
+    pub starvations: u64,
+    /// Ratios that came late.
+    pub late_ratios: u64,
+    /// Samples the recorder lost.
+    pub lost_samples: u64,
+    /// Where the machine came to rest.
+    pub end_position_mm: BTreeMap<String, f64>,
+    /// Time the run took on the wall, s.
+    pub wall_time_s: f64,
+    /// Time spent in the rough loop a block, ns.
+    pub planning_ns_per_block: f64,
+    /// The fault that ended the run, in words.
+    pub fault: Option<String>,
+}
