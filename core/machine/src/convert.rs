@@ -51,7 +51,7 @@ impl<'a> Convert<'a> {
     fn nested(&mut self, value: &DeValue<'_>, origin: Origin) -> Value {
         if self.depth >= MOST_DEPTH {
             self.report(origin, format!("nested more than {MOST_DEPTH} levels deep"));
-            return Value::Bool(false);
+            return Value::Wrong;
         }
         self.depth += 1;
         let nodes = match value {
@@ -72,11 +72,11 @@ impl<'a> Convert<'a> {
     }
 
     fn integer(&self, number: &DeInteger<'_>, origin: Origin) -> Value {
-        let value = i64::from_str_radix(number.as_str(), number.radix());
-        Value::Integer(value.unwrap_or_else(|_| {
-            self.report(origin, format!("the integer {} has more than 64 bits", shorten(number.as_str())));
-            0
-        }))
+        if let Ok(value) = i64::from_str_radix(number.as_str(), number.radix()) {
+            return Value::Integer(value);
+        }
+        self.report(origin, format!("the integer {} has more than 64 bits", shorten(number.as_str())));
+        Value::Wrong
     }
 
     fn float(&self, number: &DeFloat<'_>, origin: Origin) -> Value {
@@ -84,6 +84,7 @@ impl<'a> Convert<'a> {
         let value = text.parse().unwrap_or(f64::NAN);
         if f64::is_infinite(value) && !text.contains("inf") {
             self.report(origin, format!("the number {} is out of range", shorten(text)));
+            return Value::Wrong;
         }
         Value::Float(value)
     }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::shown::one_line;
+
 /// Where a value comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -44,12 +46,9 @@ pub struct Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.place)?;
         let said = matches!(&self.place, Place::Override(key) if *key == self.key);
-        if !said && !self.key.is_empty() {
-            write!(f, "{}: ", self.key)?;
-        }
-        f.write_str(&self.what)
+        let key = if said || self.key.is_empty() { String::new() } else { format!("{}: ", self.key) };
+        f.write_str(&one_line(&format!("{}: {key}{}", self.place, self.what)))
     }
 }
 

@@ -34,7 +34,10 @@ pub(crate) fn read(root: &Section<'_>, axes: &AxisSet) -> Vec<Joint> {
 fn joint(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<Joint> {
     let letter = section.required("axis", Section::text)?;
     let Some(axis) = index(&set.axes, letter) else {
-        section.refuse("axis", format!("no axis is called \"{}\"; there is {}", shorten(letter), letters(&set.axes)));
+        section.refuse(
+            "axis",
+            format!("no axis is called \"{}\"; the machine has {}", shorten(letter), letters(&set.axes)),
+        );
         return None;
     };
     refuse_other_kind(section, set.axes.is_rotary(axis));

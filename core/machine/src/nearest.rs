@@ -76,7 +76,7 @@ fn candidate(pattern: &str, name: &str, table: &[&str]) -> Candidate {
     }
     let edits = distance(name, last);
     let cost = if same_table { edits } else { edits + OTHER_TABLE };
-    let close = edits <= (name.chars().count() / 3).max(1);
+    let close = edits <= (name.chars().count() / 3).max(2);
     Candidate { cost, nearest: Nearest { path: written(parents, last, table), same_table, close } }
 }
 
@@ -92,7 +92,14 @@ fn written(parents: &[&str], last: &str, table: &[&str]) -> String {
     path.join(".")
 }
 
-/// Edits from one name to the other; a name cut short, as in `max_feed`, is one edit away.
+/// Edits from one name to the other. A name without its end, as in `max_feed`, is one edit away; one that is part of
+/// the other, as in `speed_difference`, two.
 fn distance(name: &str, known: &str) -> usize {
-    if name.len() >= 3 && known.starts_with(name) { 1 } else { damerau_levenshtein(name, known) }
+    let part = name.len() >= 3 && known.contains(name);
+    match part {
+        true if known == name => 0,
+        true if known.starts_with(name) => 1,
+        true => 2,
+        false => damerau_levenshtein(name, known),
+    }
 }

@@ -24,6 +24,8 @@ pub enum Value {
     Date(Datetime),
     Array(Vec<Node>),
     Table(Table),
+    /// Something that does not fit, which is reported: nobody reports it again.
+    Wrong,
 }
 
 impl Node {
@@ -36,6 +38,7 @@ impl Node {
             Value::Date(_) => "a date",
             Value::Array(_) => "an array",
             Value::Table(_) => "a table",
+            Value::Wrong => "what it is",
         }
     }
 
@@ -60,6 +63,7 @@ impl Node {
             Value::Integer(number) => toml::Value::Integer(*number),
             Value::Float(number) => toml::Value::Float(*number),
             Value::Bool(truth) => toml::Value::Boolean(*truth),
+            Value::Wrong => toml::Value::Boolean(false),
             Value::Date(date) => toml::Value::Datetime(*date),
             Value::Array(array) => toml::Value::Array(array.iter().map(Self::plain).collect()),
             Value::Table(table) => toml::Value::Table(plain(table)),

@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn positions_count_characters_from_one() {
         assert_eq!(position("", 0), (1, 1));
-        assert_eq!(position("a = 1\nµ = é!", 12), (2, 6));
+        assert_eq!(position("a = 1\nµ = é!", 13), (2, 6));
         assert_eq!(position("\u{feff}a = 1", 7), (1, 5));
         assert_eq!(position("é", 1), (1, 2), "an offset inside a character does not panic");
     }

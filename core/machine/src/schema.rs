@@ -3,7 +3,7 @@
 use crate::error::Place;
 use crate::keys::Key;
 use crate::nearest::nearest;
-use crate::node::{Node, Table};
+use crate::node::{Node, Table, Value};
 use crate::problems::Problems;
 use crate::shown::dotted;
 
@@ -68,6 +68,9 @@ pub fn check<'a>(keys: &[Key], path: &mut Vec<&'a str>, table: &'a Table, proble
 }
 
 fn must_be_table(path: &[&str], node: &Node, problems: &Problems) {
+    if matches!(node.value, Value::Wrong) {
+        return;
+    }
     problems.report(node.origin, &dotted(path), format!("must be a table, not {}", node.kind()));
 }
 

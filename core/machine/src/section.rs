@@ -63,6 +63,11 @@ impl<'a> Section<'a> {
         self.table.and_then(|table| table.get(key))
     }
 
+    /// The value of `key` where it was not reported already.
+    fn right(&self, key: &str) -> Option<&'a Node> {
+        self.node(key).filter(|node| !matches!(node.value, Value::Wrong))
+    }
+
     /// Whether `key` is stated.
     pub fn has(&self, key: &str) -> bool {
         self.node(key).is_some()
@@ -97,7 +102,7 @@ impl<'a> Section<'a> {
 
     /// A text that is not empty.
     pub fn text(&self, key: &str) -> Option<&'a str> {
-        let node = self.node(key)?;
+        let node = self.right(key)?;
         match node.text() {
             Some("") => self.refuse(key, "must not be empty"),
             None => self.refuse_kind(key, "a string", node),
@@ -119,7 +124,7 @@ impl<'a> Section<'a> {
 
     /// A whole number from `least` to `most`.
     pub fn whole(&self, key: &str, least: u32, most: u32) -> Option<u32> {
-        let node = self.node(key)?;
+        let node = self.right(key)?;
         let number = match node.value {
             Value::Integer(number) => number,
             Value::Float(number) => {
@@ -140,7 +145,7 @@ impl<'a> Section<'a> {
 
     /// A finite number.
     pub fn number(&self, key: &str) -> Option<f64> {
-        self.finite(key, self.node(key)?)
+        self.finite(key, self.right(key)?)
     }
 
     /// A finite number of at least `least`.
@@ -165,7 +170,7 @@ impl<'a> Section<'a> {
 
     /// A lower and a higher number.
     pub fn range(&self, key: &str) -> Option<(f64, f64)> {
-        let node = self.node(key)?;
+        let node = self.right(key)?;
         let Some([low, high]) = node.array() else {
             self.refuse(key, "must be [lowest, highest]");
             return None;
@@ -182,6 +187,7 @@ impl<'a> Section<'a> {
         match node.value {
             Value::Integer(number) => self.bounded(key, number as f64),
             Value::Float(number) => self.bounded(key, number),
+            Value::Wrong => None,
             _ => {
                 self.refuse_kind(key, "a number", node);
                 None

@@ -12,6 +12,12 @@ pub fn shorten(text: &str) -> String {
     short
 }
 
+/// `text` on one line: names of files and values of the command line may hold anything.
+pub fn one_line(text: &str) -> String {
+    let shown = |c: char| if c.is_control() { c.escape_debug().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
+}
+
 /// A dotted path as it would be written in TOML: quoted where a part needs it.
 pub fn dotted<S: AsRef<str>>(path: &[S]) -> String {
     let parts: Vec<_> = path.iter().map(|part| quoted(part.as_ref())).collect();
@@ -31,6 +37,7 @@ mod tests {
     fn paths_are_quoted_and_shortened() {
         assert_eq!(dotted(&["axes", "x"]), "axes.x");
         assert_eq!(dotted(&["a b", "", "c\n"]), "\"a b\".\"\".\"c\\n\"");
+        assert_eq!(one_line("a\nb\"µ"), "a\\nb\"µ");
         assert_eq!(shorten(&"a".repeat(70)), format!("{}…", "a".repeat(64)));
     }
 }

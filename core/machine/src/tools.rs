@@ -109,7 +109,10 @@ fn offsets(tool: &Section<'_>, key: &str, rotary: bool, axes: &Axes, offset: &mu
             Some(_) if rotary => section.refuse(name, "a linear axis is in mm; did you mean `offset_mm`?"),
             Some(_) => section.refuse(name, "a rotary axis is in degrees; did you mean `offset_deg`?"),
             None => {
-                section.refuse(name, format!("no axis is called \"{}\"; there is {}", shorten(name), letters(axes)));
+                section.refuse(
+                    name,
+                    format!("no axis is called \"{}\"; the machine has {}", shorten(name), letters(axes)),
+                );
             }
         }
     }

@@ -1,0 +1,8 @@
+//! Machine files, good and bad.
+
+mod common;
+mod overrides;
+mod properties;
+mod reading;
+mod reference;
+mod refusals;
