@@ -1,8 +1,8 @@
 // One curve of a plot: a column, how it is shown, and where it is too large.
 class Curve {
-  // look: { key, label, colour(), scale(), limit, twoSided, bit, judged }
+  // look: { key, label, colour(), scale(), limit, twoSided, bit, judged, least: changes that are only rounding }
   constructor(values, marks, look) {
-    Object.assign(this, { scale: () => 1, limit: null, twoSided: true, judged: true }, look);
+    Object.assign(this, { scale: () => 1, limit: null, least: 1e-9, twoSided: true, judged: true }, look);
     this.values = values;
     this.extremes = new Extremes(values);
     this.hits = marks ? hitsOf(marks, this.bit) : [];

@@ -73,6 +73,7 @@ class Plot {
       const [least_, most] = curve.range();
       low = Math.min(low, least_);
       high = Math.max(high, most);
+      least = Math.max(least, curve.least);
       if (!curve.limit) continue;
       const limit = curve.limit * curve.scale();
       least = Math.max(least, limit * 1e-4);

@@ -36,6 +36,7 @@ function axisCurve(axis, i, column, what) {
   return new Curve(columns[column + i], columns["marks" + i], {
     key: "axis " + axis.letter, label: axis.letter, colour: () => axisColour(axis.letter), bit: what.bit,
     limit: what.limit ? axis[what.limit] : null, scale: what.scale ? what.scale(axis) : () => 1, judged: what.judged !== false,
+    least: axis.max_acceleration * (what.least || 1e-9),
   });
 }
 
@@ -59,7 +60,7 @@ function stepNote(unit) {
 function jerkPlots() {
   const judged = about.jerk_is_judged;
   const note = !judged && about.axes.some((axis) => axis.max_jerk !== null) ? "reported, not judged" : "";
-  return axisPlots("Jerk", "jerk", { bit: 4, limit: "max_jerk", judged, plot: (unit) => ({ unit: () => unit + "/s³", note }) });
+  return axisPlots("Jerk", "jerk", { bit: 4, limit: "max_jerk", least: 1e-2, judged, plot: (unit) => ({ unit: () => unit + "/s³", note }) });
 }
 
 function deviationPlot() {

@@ -76,9 +76,8 @@ pub(crate) fn notes(report: &Report, derived: &Derived) -> String {
     if let Some(slice) = derived.thinning.slice() {
         notes.push(format!(
             "{} samples are too many for a page: every curve shows the smallest and the largest of each {slice} \
-             samples, the path every {} samples. Limits were judged on all of them.",
+             samples, the path two points of them. Limits were judged on all of them.",
             count(report.samples.t_s.len()),
-            slice.div_ceil(2),
         ));
     }
     if !report.jerk_is_judged && report.axes.iter().any(|axis| axis.max_jerk.is_some()) {

@@ -16,13 +16,13 @@ pub(crate) fn escape(text: &str) -> String {
     escaped
 }
 
-/// `value` with four significant digits, without an exponent and without trailing zeros.
+/// `value` with four significant digits, without an exponent and without trailing zeros; nothing smaller than 1e-6.
 pub(crate) fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
     }
     let magnitude = value.abs().max(1e-9).log10().floor() as i32;
-    let decimals = (3 - magnitude).clamp(0, 9) as usize;
+    let decimals = (3 - magnitude).clamp(0, 6) as usize;
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     group(if text == "-0" { "0" } else { text })
