@@ -38,6 +38,7 @@ mod section;
 mod shown;
 mod tools;
 mod units;
+mod values;
 
 pub use error::{MachineError, Place, Problem};
 pub use joints::Joint;
