@@ -1,6 +1,6 @@
 //! Segments from a path and a piece of constant path acceleration.
 
-use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags};
 
 use crate::Path;
 
@@ -42,14 +42,11 @@ pub struct Builder {
 const FIT_MM: f64 = 1e-8;
 
 impl Builder {
-    /// Segments of `block`, whose path starts `path_start_mm` after the start of the run. `feed_mm_per_s` is the
-    /// programmed feed that the governor's ratio refers to.
-    pub fn new(block: &Block, path: &Path, path_start_mm: f64) -> Self {
-        let mut blank = Segment::rest(&block.start, 0.0);
-        blank.block = block.index;
-        blank.line = block.line;
-        blank.flags = if block.kind == BlockKind::Rapid { SegmentFlags::RAPID } else { SegmentFlags::default() };
-        blank.feed_mm_per_s = block.command_feed_mm_per_s();
+    /// Segments of the block whose `path` starts `path_start_mm` after the start of the run. Block, line, feed and flags
+    /// are the planner's to set in [`Builder::blank`].
+    pub fn new(path: &Path, path_start_mm: f64) -> Self {
+        let mut blank = Segment::rest(path.start(), 0.0);
+        blank.flags = SegmentFlags::default();
         // The quintic through position, velocity and acceleration at both ends of an arc of angle θ stands off by at
         // most R·θ⁶/(6!·2⁶): the Hermite remainder of a sine.
         let max_angle_rad = (46_080.0 * FIT_MM / path.radius_mm()).powf(1.0 / 6.0);
@@ -127,7 +124,7 @@ fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use tandem_sdk::ArcGeometry;
+    use tandem_sdk::{ArcGeometry, Block, BlockKind};
 
     fn circle(radius: f64) -> Block {
         let mut block = Block::at(AxisVector::from_slice(&[radius, 0.0]));
@@ -148,7 +145,7 @@ mod tests {
         fn segments_of_an_arc_stay_on_it(radius in 0.05..300.0f64, speed in 0.5..250.0f64, a in -500.0..500.0f64, at in 0.0..1.0f64) {
             let block = circle(radius);
             let path = Path::new(&block).unwrap();
-            let builder = Builder::new(&block, &path, 0.0);
+            let builder = Builder::new(&path, 0.0);
             let mut piece = SpeedPiece { start_mm: 0.01 * radius, speed_mm_per_s: speed, acceleration_mm_per_s2: a, duration_s: 0.001 };
             piece.duration_s = builder.longest_s(&piece).min(0.008).min(0.9 * speed / a.abs());
             let segment = builder.segment(&piece);

@@ -17,6 +17,7 @@ impl AxisVector {
     pub const ZERO: Self = Self([0.0; MAX_AXES]);
 
     /// Builds a vector from the first entries; the rest is zero, what is beyond [`MAX_AXES`] is ignored.
+    #[inline]
     pub fn from_slice(values: &[f64]) -> Self {
         let mut vector = Self::ZERO;
         for (to, from) in vector.0.iter_mut().zip(values) {
@@ -26,12 +27,14 @@ impl AxisVector {
     }
 
     /// Applies `f` to every entry.
+    #[inline]
     #[must_use]
     pub fn map(self, f: impl FnMut(f64) -> f64) -> Self {
         Self(self.0.map(f))
     }
 
     /// Whether every entry is finite.
+    #[inline]
     pub fn is_finite(&self) -> bool {
         self.0.iter().all(|v| v.is_finite())
     }
@@ -39,12 +42,14 @@ impl AxisVector {
 
 impl Index<usize> for AxisVector {
     type Output = f64;
+    #[inline]
     fn index(&self, axis: usize) -> &f64 {
         &self.0[axis]
     }
 }
 
 impl IndexMut<usize> for AxisVector {
+    #[inline]
     fn index_mut(&mut self, axis: usize) -> &mut f64 {
         &mut self.0[axis]
     }
@@ -52,12 +57,14 @@ impl IndexMut<usize> for AxisVector {
 
 impl Add for AxisVector {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
     }
 }
 
 impl AddAssign for AxisVector {
+    #[inline]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
@@ -65,6 +72,7 @@ impl AddAssign for AxisVector {
 
 impl Sub for AxisVector {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] - other.0[i]))
     }
@@ -72,6 +80,7 @@ impl Sub for AxisVector {
 
 impl Mul<f64> for AxisVector {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: f64) -> Self {
         Self(self.0.map(|v| v * factor))
     }
@@ -116,6 +125,7 @@ impl Axes {
     }
 
     /// How many axes there are.
+    #[inline]
     pub fn count(&self) -> usize {
         self.count as usize
     }
@@ -131,6 +141,7 @@ impl Axes {
     }
 
     /// Whether axis `index` turns (rad) rather than slides (mm).
+    #[inline]
     pub fn is_rotary(&self, index: usize) -> bool {
         self.rotary[index]
     }

@@ -22,11 +22,13 @@ impl SegmentFlags {
     pub const TAIL: Self = Self(32);
 
     /// Whether all bits of `other` are set.
+    #[inline]
     pub fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
     /// Both sets of bits.
+    #[inline]
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -104,6 +106,7 @@ pub struct Segment {
 
 impl Segment {
     /// A rest at `position` of `duration_s`, order 2.
+    #[inline]
     pub fn rest(position: &AxisVector, duration_s: f64) -> Self {
         let mut coefficients = [[0.0; 6]; MAX_AXES];
         for (axis, value) in position.0.iter().enumerate() {
@@ -130,16 +133,19 @@ impl Segment {
     }
 
     /// Position at local time `t_s`, mm or rad. Any loop; does not allocate.
+    #[inline]
     pub fn position(&self, t_s: f64) -> AxisVector {
         AxisVector(std::array::from_fn(|axis| polynomial(&self.coefficients[axis], t_s)))
     }
 
     /// Velocity at local time `t_s`, per s of program time. Any loop; does not allocate.
+    #[inline]
     pub fn velocity(&self, t_s: f64) -> AxisVector {
         AxisVector(std::array::from_fn(|axis| polynomial_rate(&self.coefficients[axis], t_s)))
     }
 
     /// Acceleration at local time `t_s`, per s² of program time. Any loop; does not allocate.
+    #[inline]
     pub fn acceleration(&self, t_s: f64) -> AxisVector {
         AxisVector(std::array::from_fn(|axis| {
             let c = &self.coefficients[axis];
@@ -148,20 +154,24 @@ impl Segment {
     }
 
     /// Path coordinate at local time `t_s`, mm.
+    #[inline]
     pub fn path_mm(&self, t_s: f64) -> f64 {
         polynomial(&self.path, t_s)
     }
 
     /// Path speed at local time `t_s`, mm/s of program time.
+    #[inline]
     pub fn path_speed_mm_per_s(&self, t_s: f64) -> f64 {
         polynomial_rate(&self.path, t_s)
     }
 }
 
+#[inline]
 fn polynomial(c: &[f64; 6], t: f64) -> f64 {
     c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
 }
 
+#[inline]
 fn polynomial_rate(c: &[f64; 6], t: f64) -> f64 {
     c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])))
 }

@@ -16,16 +16,21 @@ struct Node {
     transfer: Transfer,
 }
 
-/// Blocks in order; the first one is the next to be driven.
+impl Node {
+    const BLANK: Self = Self { cap: 0.0, reach: 0.0, start: 0.0, transfer: Transfer::BLANK };
+}
+
+/// Blocks in order; the first one is the next to be driven. A ring, so that nothing is moved.
 #[derive(Debug)]
 pub struct Buffer {
     nodes: Vec<Node>,
     entries: Vec<Entry>,
-    /// Blocks before this one are gone; both vectors are shifted down from time to time.
-    first: usize,
-    /// Blocks from this one on have not been looked at.
-    dirty: usize,
+    mask: usize,
     capacity: usize,
+    /// Running number of the first block, of the first that has not been looked at, and of the next to come.
+    first: usize,
+    dirty: usize,
+    end: usize,
     /// Square of what the last block itself allows.
     last_own: f64,
 }
@@ -33,20 +38,23 @@ pub struct Buffer {
 impl Buffer {
     /// An empty buffer for `capacity` blocks. Allocates for good.
     pub fn new(capacity: usize) -> Self {
-        let room = 2 * capacity;
+        // One more than the capacity: the block whose successor is not known comes on top.
+        let room = (capacity + 1).next_power_of_two();
         Self {
-            nodes: Vec::with_capacity(room),
-            entries: Vec::with_capacity(room),
+            nodes: vec![Node::BLANK; room],
+            entries: vec![Entry::blank(); room],
+            mask: room - 1,
+            capacity,
             first: 0,
             dirty: 0,
-            capacity,
+            end: 0,
             last_own: 0.0,
         }
     }
 
     /// Blocks waiting.
     pub fn len(&self) -> usize {
-        self.nodes.len() - self.first
+        self.end - self.first
     }
 
     /// Whether no further block fits.
@@ -56,65 +64,58 @@ impl Buffer {
 
     /// Forgets all blocks.
     pub fn clear(&mut self) {
-        self.nodes.clear();
-        self.entries.clear();
-        (self.first, self.dirty) = (0, 0);
+        (self.first, self.dirty, self.end) = (0, 0, 0);
     }
 
     /// Adds a block. An empty buffer starts at rest: the block driven before it ends there.
-    pub fn push(&mut self, entry: Entry) {
-        if self.nodes.len() == 2 * self.capacity {
-            self.shift();
-        }
+    pub fn push(&mut self, entry: &Entry) {
         let own = entry.feed_mm_per_s.powi(2).min(entry.rows.turning_cap());
         let cap = entry.junction_mm_per_s.powi(2).min(own).min(self.last_own);
         self.last_own = own;
         let transfer = entry.rows.transfer(entry.length_mm());
-        self.nodes.push(Node { cap, reach: 0.0, start: 0.0, transfer });
-        self.entries.push(entry);
-    }
-
-    fn shift(&mut self) {
-        self.nodes.drain(..self.first);
-        self.entries.drain(..self.first);
-        self.dirty -= self.first;
-        self.first = 0;
+        self.nodes[self.end & self.mask] = Node { cap, reach: 0.0, start: 0.0, transfer };
+        self.entries[self.end & self.mask].clone_from(entry);
+        self.end += 1;
     }
 
     /// Takes the first block with the squares of its start and end speed; `None` where there is no block.
     pub fn pop(&mut self) -> Option<(&Entry, f64, f64)> {
         self.update();
-        let index = self.first;
-        let start = self.nodes.get(index)?.start;
-        let end = self.nodes.get(index + 1).map_or(0.0, |next| next.start);
+        if self.len() == 0 {
+            return None;
+        }
+        let index = self.first & self.mask;
+        let end = if self.len() > 1 { self.nodes[(self.first + 1) & self.mask].start } else { 0.0 };
         self.first += 1;
-        Some((&self.entries[index], start, end))
+        Some((&self.entries[index], self.nodes[index].start, end))
     }
 
     /// Raises junction feeds for the blocks that have come: backward as far as anything changes, then forward.
     ///
     /// The start of the first block is frozen: it is the speed at which the block before it ends.
     fn update(&mut self) {
-        let count = self.nodes.len();
         let dirty = self.dirty.max(self.first);
-        if dirty >= count {
+        if dirty >= self.end {
             return;
         }
-        let mut changed = count;
+        let mut changed = self.end;
         let mut next = 0.0;
-        for index in (self.first + 1..count).rev() {
-            let reach = self.nodes[index].cap.min(self.nodes[index].transfer.apply(next));
-            if index < dirty && reach <= self.nodes[index].reach {
+        for number in (self.first + 1..self.end).rev() {
+            let node = &mut self.nodes[number & self.mask];
+            let reach = node.cap.min(node.transfer.apply(next));
+            if number < dirty && reach <= node.reach {
                 break;
             }
-            self.nodes[index].reach = reach;
+            node.reach = reach;
             next = reach;
-            changed = index;
+            changed = number;
         }
-        for index in changed..count {
-            let before = self.nodes[index - 1];
-            self.nodes[index].start = self.nodes[index].reach.min(before.transfer.apply(before.start));
+        for number in changed..self.end {
+            let before = &self.nodes[(number - 1) & self.mask];
+            let reached = before.transfer.apply(before.start);
+            let node = &mut self.nodes[number & self.mask];
+            node.start = node.reach.min(reached);
         }
-        self.dirty = count;
+        self.dirty = self.end;
     }
 }

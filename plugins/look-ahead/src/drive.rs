@@ -1,7 +1,7 @@
 //! Driving one block: its profile, and the segments of it.
 
 use tandem_motion::{Builder, Profile, SpeedPiece};
-use tandem_sdk::{AxisVector, BlockReport, LimitedBy, Segment, SegmentFlags, SegmentSink, size_of_contract};
+use tandem_sdk::{AxisVector, BlockKind, BlockReport, LimitedBy, Segment, SegmentFlags, SegmentSink, size_of_contract};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
@@ -28,8 +28,13 @@ impl Drive {
     pub fn new(entry: &Entry, squares: (f64, f64), rule: Junction, path_start_mm: f64) -> Option<Self> {
         let path = entry.path.as_ref()?;
         let profile = profile(entry, squares);
-        let mut builder = Builder::new(&entry.block, path, path_start_mm);
-        builder.blank().stop_deceleration_mm_per_s2 = profile.acceleration_mm_per_s2;
+        let mut builder = Builder::new(path, path_start_mm);
+        let blank = builder.blank();
+        (blank.block, blank.line, blank.feed_mm_per_s) = (entry.index, entry.line, entry.command_mm_per_s);
+        if entry.kind == BlockKind::Rapid {
+            blank.flags = SegmentFlags::RAPID;
+        }
+        blank.stop_deceleration_mm_per_s2 = profile.acceleration_mm_per_s2;
         let duration_s = profile.duration_s();
         let [lead, end_lead] = steps(entry, &profile, rule);
         Some(Self {
@@ -43,7 +48,7 @@ impl Drive {
             takeback: (lead + end_lead) * (1.0 / duration_s),
             report: report(entry, &profile, squares, duration_s),
             rests: squares.1 == 0.0,
-            end: entry.block.end,
+            end: entry.end,
         })
     }
 
@@ -156,7 +161,7 @@ fn report(entry: &Entry, profile: &Profile, (start, end): (f64, f64), time_s: f6
     BlockReport {
         size: size_of_contract::<BlockReport>(),
         limited_by,
-        block: entry.block.index,
+        block: entry.index,
         start_feed_mm_per_s: profile.start_mm_per_s,
         peak_feed_mm_per_s: profile.peak_mm_per_s,
         end_feed_mm_per_s: profile.end_mm_per_s,

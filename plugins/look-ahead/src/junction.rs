@@ -41,10 +41,11 @@ impl Rule {
         if before.rests_before(after) {
             return;
         }
-        let step = after.directions[0] - before.directions[1];
+        let directions = [before.direction(true), after.direction(false)];
+        let step = directions[1] - directions[0];
         let capped = before.feed_mm_per_s.min(after.feed_mm_per_s);
         let feed = match self.kind {
-            Junction::Tangent => self.tangent(before, after),
+            Junction::Tangent => self.tangent(before, after, &directions),
             Junction::Axis => self.speed_difference(&step),
         };
         after.junction_mm_per_s = feed.min(capped);
@@ -53,8 +54,8 @@ impl Rule {
     }
 
     /// `max(A·T_s/(1 − cos θ), V)`: equation (4) with its floor. The floor belongs to the tangent feed only.
-    fn tangent(&self, before: &Entry, after: &Entry) -> f64 {
-        let drop = tandem_motion::one_minus_cos(&before.directions[1], &after.directions[0]);
+    fn tangent(&self, before: &Entry, after: &Entry, directions: &[AxisVector; 2]) -> f64 {
+        let drop = tandem_motion::one_minus_cos(&directions[0], &directions[1]);
         let acceleration = self.smallest_acceleration(before).min(self.smallest_acceleration(after));
         let floor = self.axes.iter().map(|a| a.speed_difference_mm_per_s).fold(f64::INFINITY, f64::min);
         if drop < STRAIGHT * STRAIGHT { f64::INFINITY } else { (acceleration * self.fine_period_s / drop).max(floor) }

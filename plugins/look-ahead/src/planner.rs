@@ -57,7 +57,7 @@ impl LookAhead {
     /// Moves the pending block, whose end junction is known now, into the buffer.
     fn insert(&mut self, mut entry: Entry, end_mm_per_s: f64) {
         self.rule.limit(&mut entry, end_mm_per_s);
-        self.buffer.push(entry);
+        self.buffer.push(&entry);
     }
 
     /// Takes the next block out of the buffer; `false` where there is none.
@@ -68,8 +68,8 @@ impl LookAhead {
             sink.block(drive.report());
             self.driving = Some(drive);
         } else {
-            sink.block(&dwell_report(&entry.block));
-            self.dwell = Some(dwell(&entry.block, self.path_mm));
+            sink.block(&dwell_report(entry));
+            self.dwell = Some(dwell(entry, self.path_mm));
         }
         true
     }
@@ -181,23 +181,23 @@ fn without_begin(flags: SegmentFlags) -> SegmentFlags {
     SegmentFlags(flags.0 & !SegmentFlags::BLOCK_BEGINS.0)
 }
 
-fn dwell(block: &Block, path_mm: f64) -> Segment {
-    let mut rest = Segment::rest(&block.end, block.dwell_s);
-    (rest.block, rest.line) = (block.index, block.line);
+fn dwell(entry: &Entry, path_mm: f64) -> Segment {
+    let mut rest = Segment::rest(&entry.end, entry.dwell_s);
+    (rest.block, rest.line) = (entry.index, entry.line);
     rest.path[0] = path_mm;
     rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
     rest
 }
 
-fn dwell_report(block: &Block) -> BlockReport {
+fn dwell_report(entry: &Entry) -> BlockReport {
     BlockReport {
         size: size_of_contract::<BlockReport>(),
         limited_by: LimitedBy::Feed,
-        block: block.index,
+        block: entry.index,
         start_feed_mm_per_s: 0.0,
         peak_feed_mm_per_s: 0.0,
         end_feed_mm_per_s: 0.0,
-        time_s: block.dwell_s,
+        time_s: entry.dwell_s,
         time_constant_s: f64::NAN,
     }
 }

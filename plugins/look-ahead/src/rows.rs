@@ -59,7 +59,7 @@ impl Rows {
 
     /// The map from one end of the block to the other.
     pub fn transfer(&self, length_mm: f64) -> Transfer {
-        let mut transfer = Transfer { lines: [(0.0, 0.0); MAX_AXES], count: 0 };
+        let mut transfer = Transfer::BLANK;
         for row in self.iter() {
             let scale = 1.0 / (row.h + 2.0 * length_mm * row.k);
             transfer.push(row.h * scale, 2.0 * length_mm * row.a * scale);
@@ -76,6 +76,9 @@ pub struct Transfer {
 }
 
 impl Transfer {
+    /// Everything comes to rest.
+    pub const BLANK: Self = Self { lines: [(0.0, 0.0); MAX_AXES], count: 0 };
+
     /// Adds a line unless one that is there lies below it for every w ≥ 0; drops those that lie above it.
     fn push(&mut self, p: f64, q: f64) {
         let mut kept = 0;
