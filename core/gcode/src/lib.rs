@@ -13,6 +13,7 @@
 //! - G0 or G1 without axis words sets the mode. G0 or G1 beside G28 or G30 sets the mode too, the axis words are G28's.
 //! - G64 Q is accepted and has no effect.
 //! - EQ and NE forgive a difference of 0.0001, as in LinuxCNC. A blank within a number is an error.
+//! - A comment may hold pairs of parentheses. What a comment says (MSG, PRINT, LOG) is not acted upon.
 //! - Stored positions and offsets (#5161 to #5410) read in mm and degrees, the current position (#5420…) in program
 //!   units. A run writes no parameter file.
 

@@ -154,7 +154,9 @@ impl Lines {
         if self.pass == Pass::First {
             hashes.push(hash);
         } else if hashes.get(self.chunks) != Some(&hash) {
-            return Err(ProgramError::Changed { name: Arc::clone(&program.name), first_line: self.number + 1 });
+            let first_line = self.number + 1;
+            let last_line = self.number + self.buffer[..self.end].split(|b| *b == b'\n').count() as u32;
+            return Err(ProgramError::Changed { name: Arc::clone(&program.name), first_line, last_line });
         }
         Ok(())
     }

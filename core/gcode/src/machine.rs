@@ -69,6 +69,7 @@ impl Interpreter {
         Ok(())
     }
 
+    /// M6. The spindle stops, as in LinuxCNC: nobody changes the tool of a spindle that turns.
     fn change_tool(&mut self, out: &mut Vec<Item>) -> Checked<()> {
         if self.orders.get(Group::ToolChange).is_none() {
             return Ok(());
@@ -78,6 +79,7 @@ impl Interpreter {
         };
         if number != self.state.tool {
             self.rest(out);
+            self.stop_spindle(out);
             self.state.tool = number;
             self.event(EventKind::ToolChange, number, 0.0, out);
         }
@@ -172,11 +174,15 @@ impl Interpreter {
 
     /// Stops spindle and coolant where they run.
     pub(crate) fn switch_off(&mut self, out: &mut Vec<Item>) {
+        self.stop_spindle(out);
+        self.switch_coolant(false, false, out);
+    }
+
+    fn stop_spindle(&mut self, out: &mut Vec<Item>) {
         if self.state.spindle.direction != 0 {
             self.rest(out);
             self.state.spindle.direction = 0;
             self.event(EventKind::Spindle, 0, 0.0, out);
         }
-        self.switch_coolant(false, false, out);
     }
 }

@@ -102,7 +102,7 @@ fn position(state: &State, letters: &Letters, nth: usize) -> f64 {
 }
 
 /// Named values that the interpreter keeps itself.
-fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
+pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
         b"_line" => f64::from(state.line),

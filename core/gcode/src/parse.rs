@@ -2,7 +2,7 @@
 
 use crate::expression::{Context, Parameter};
 use crate::fault::{Checked, Fault, Span};
-use crate::parameters::read_only;
+use crate::parameters::{predefined_name, read_only};
 use crate::scan::Scanner;
 use crate::words::{Assignment, Code, Target, Words};
 
@@ -129,6 +129,15 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Ch
         && let Some(why) = read_only(number)
     {
         return Err(Fault::new(span, "read-only", format!("parameter #{number} cannot be assigned: {why}")));
+    }
+    if let Target::Named(range) = &target
+        && predefined_name(&words.names[range.clone()], context.state, context.letters).is_some()
+    {
+        return Err(Fault::new(
+            span,
+            "read-only",
+            "this parameter cannot be assigned: the interpreter keeps it itself",
+        ));
     }
     if !scanner.take(b'=') {
         return Err(Fault::new(span, "assignment", "a parameter stands here for a word; an assignment needs ="));

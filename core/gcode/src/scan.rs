@@ -72,23 +72,24 @@ impl<'t> Scanner<'t> {
         }
     }
 
+    /// Comments may hold pairs of parentheses: `(z = sin(x))`.
     fn skip_comment(&mut self) -> Checked<()> {
         let start = self.at;
-        let inside = &self.text[start + 1..];
-        match inside.iter().position(|b| matches!(b, b'(' | b')')) {
-            Some(length) if inside[length] == b')' => {
-                self.at = start + length + 2;
-                Ok(())
-            }
-            Some(length) => {
-                let place = Span::new(start + length + 1, start + length + 2);
-                Err(Fault::new(place, "comment", "a comment cannot hold another one"))
-            }
-            None => {
-                let span = Span::new(start, self.text.len());
-                Err(Fault::new(span, "comment", "the comment is not closed: ) is missing"))
+        let mut depth = 0;
+        for byte in &self.text[start..] {
+            self.at += 1;
+            match byte {
+                b'(' => depth += 1,
+                b')' if depth == 1 => return Ok(()),
+                b')' => depth -= 1,
+                _ => {}
             }
         }
+        let message = match depth {
+            1 => "the comment is not closed: ) is missing",
+            _ => "the comment is not closed: it holds more ( than )",
+        };
+        Err(Fault::new(self.since(start), "comment", message))
     }
 
     /// The run of letters that comes next, at most 8, upper case, zero-padded; the cursor stays.

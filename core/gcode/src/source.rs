@@ -22,12 +22,14 @@ pub enum ProgramError {
         error: io::Error,
     },
     /// The file is not what the first pass read.
-    #[error("{name}: the file has changed since it was checked, in line {first_line} or soon after")]
+    #[error("{name}: the file has changed since it was checked, between the lines {first_line} and {last_line}")]
     Changed {
         /// Name of the program.
         name: Arc<str>,
         /// First line of the part that changed; nothing of it has been handed out.
         first_line: u32,
+        /// Last line of that part, as the file is now.
+        last_line: u32,
     },
     /// The stream was opened before the program was checked.
     #[error("{0}: the program has not been checked")]

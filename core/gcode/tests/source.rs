@@ -56,10 +56,8 @@ fn a_line_of_ten_megabytes_is_one_error() {
 
 #[test]
 fn lines_are_whole_across_chunks() {
-    let mut text = String::from("F600 G1\n");
-    for n in 0..20_000 {
-        text += &format!("X{} (some words that move the chunks)\n", f64::from(n % 250) + 0.5);
-    }
+    let line = |n: u32| format!("X{} (some words that move the chunks)\n", f64::from(n % 250) + 0.5);
+    let text = "F600 G1\n".to_owned() + &(0..20_000).map(line).collect::<String>();
     let items = items_of(text.as_bytes());
     let blocks = only_blocks(&items);
     assert_eq!(blocks.len(), 20_000);
@@ -78,7 +76,7 @@ fn binary_files_are_no_programs() {
         (report.diagnostics[0].line, report.diagnostics[0].column, report.diagnostics[0].code),
         (2, 7, "binary")
     );
-    assert!(report_of(b"\xff\xfeG\00\0").diagnostics[0].message.contains("UTF-16"));
+    assert!(report_of(b"\xff\xfeG\x00X\x00").diagnostics[0].message.contains("UTF-16"));
 }
 
 #[test]

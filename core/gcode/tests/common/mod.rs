@@ -75,11 +75,12 @@ fn show(item: &Item) -> String {
 fn show_block(block: &Block) -> String {
     let end: Vec<_> = block.end.0[..4].iter().map(|v| short(*v)).collect();
     let mut text = format!("{}: {:?} {} to {}", block.line, block.kind, block.index, end.join(" "));
-    text += &match block.kind {
+    let how = match block.kind {
         BlockKind::Dwell => format!(" for {}", short(block.dwell_s)),
         BlockKind::Rapid => String::new(),
         _ => format!(" length {} feed {}", short(block.length_mm), short(block.feed_mm_per_s)),
     };
+    text += &how;
     if block.kind == BlockKind::Arc {
         let (arc, [a, b]) = (&block.arc, block.arc.center_mm.map(short));
         let (radius, sweep) = (short(arc.radius_mm), short(arc.sweep_rad.to_degrees()));

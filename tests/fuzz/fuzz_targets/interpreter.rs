@@ -1,0 +1,50 @@
+//! Any bytes as a part program: both passes, on a machine with four axes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tandem_gcode::{Config, Item, Program, Stream, check};
+use tandem_sdk::{Axes, Block, BlockKind};
+
+fn config() -> Config {
+    let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).expect("four axes");
+    let mut config = Config::new(axes);
+    config.travel_mm[0] = (-1000.0, 1000.0);
+    config
+}
+
+/// What a planner relies on.
+fn assert_sound(block: &Block) -> Result<(), String> {
+    assert!(block.start.is_finite() && block.end.is_finite() && block.length_mm.is_finite(), "{block:?}");
+    assert_eq!(block.length_mm > 0.0, block.kind != BlockKind::Dwell, "{block:?}");
+    assert!(block.feed_mm_per_s > 0.0 && block.dwell_s >= 0.0, "{block:?}");
+    if block.kind == BlockKind::Arc {
+        assert!(block.arc.radius_mm > 0.0 && block.arc.sweep_rad.is_finite() && block.arc.sweep_rad != 0.0, "{block:?}");
+    }
+    Ok(())
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut program = Program::spool("fuzz", bytes).expect("a temporary file");
+    let report = check(&mut program, &config(), &mut assert_sound).expect("readable");
+    for diagnostic in &report.diagnostics {
+        assert!(diagnostic.to_string().len() < 2000 && diagnostic.line <= report.lines.max(1) + 65_536);
+    }
+    if !report.is_ok() {
+        return;
+    }
+    let mut stream = Stream::new(program, &config()).expect("checked");
+    let (mut items, mut blocks) = (Vec::new(), 0);
+    loop {
+        items.clear();
+        match stream.next_items(&mut items) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) => panic!("{error}"),
+        }
+        blocks += items.iter().filter(|item| matches!(item, Item::Block(_))).count() as u64;
+        if items.iter().any(|item| matches!(item, Item::Wait(_))) {
+            stream.provide_input(-1.0);
+        }
+    }
+    assert_eq!(blocks, report.blocks);
+});
