@@ -85,9 +85,11 @@ impl<'t> Scanner<'t> {
                 _ => {}
             }
         }
-        let message = match depth {
-            1 => "the comment is not closed: ) is missing",
-            _ => "the comment is not closed: it holds more ( than )",
+        let nested = self.text[start + 1..].contains(&b'(');
+        let message = if nested {
+            "the comment is not closed: it holds more ( than )"
+        } else {
+            "the comment is not closed: ) is missing"
         };
         Err(Fault::new(self.since(start), "comment", message))
     }
