@@ -98,7 +98,7 @@ impl Interpreter {
         Ok(())
     }
 
-    /// G61, G61.1, G64 P Q. Q, LinuxCNC's tolerance for joining collinear lines, has no effect: planners join what is
+    /// G61, G61.1, G64 P Q. P0 is as good as no P: the machine's tolerance. Q, LinuxCNC's tolerance for joining collinear lines, has no effect: planners join what is
     /// collinear themselves.
     fn set_path_control(&mut self) -> Checked<()> {
         let Some(mode) = self.orders.get(Group::PathControl) else { return Ok(()) };
@@ -107,6 +107,7 @@ impl Interpreter {
         self.state.path_mode = if mode == 640 { PathMode::Continuous } else { PathMode::ExactStop };
         if mode == 640
             && let Some(tolerance) = self.words.not_negative(b'P')?
+            && tolerance > 0.0
         {
             self.state.tolerance_mm = tolerance * self.state.unit_mm;
         }

@@ -5,13 +5,29 @@
 //! whole program and lists its errors, [`Stream`] hands out its items on demand. [`Interpreter`] is the part in
 //! between for single lines.
 //!
+//! ```
+//! use tandem_gcode::{Config, Item, Program, Stream, check};
+//! use tandem_sdk::Axes;
+//!
+//! let config = Config::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
+//! let mut program = Program::spool("part.ngc", &b"G21 F600\nG1 X10\nG2 X20 I5\nM2\n"[..]).unwrap();
+//! let report = check(&mut program, &config, &mut |_block| Ok(())).unwrap();
+//! assert!(report.is_ok() && report.blocks == 3);
+//!
+//! let mut stream = Stream::new(program, &config).unwrap();
+//! let mut items = Vec::new();
+//! while stream.next_items(&mut items).unwrap() {}
+//! assert!(matches!(items.last(), Some(Item::End)));
+//! ```
+//!
 //! Where the dialects differ:
 //! - G4 P is in seconds, as in LinuxCNC. `TA` is a time constant in ms.
 //! - The units (G20, G21) and the feed mode (G93, G94) of a line hold for all its words.
 //! - G80 beside a motion word only cancels canned cycles (the usual first line of CAM output); alone it ends the motion
 //!   mode as in LinuxCNC.
 //! - G0 or G1 without axis words sets the mode. G0 or G1 beside G28 or G30 sets the mode too, the axis words are G28's.
-//! - G64 Q is accepted and has no effect.
+//! - G64 without P, or with P0, takes the machine's tolerance. G64 Q is accepted and has no effect.
+//! - M6 stops the spindle.
 //! - EQ and NE forgive a difference of 0.0001, as in LinuxCNC. A blank within a number is an error.
 //! - A comment may hold pairs of parentheses. What a comment says (MSG, PRINT, LOG) is not acted upon.
 //! - Stored positions and offsets (#5161 to #5410) read in mm and degrees, the current position (#5420…) in program

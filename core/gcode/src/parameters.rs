@@ -1,4 +1,4 @@
-//! Numbered (#1 to #5602) and named (#<name>) parameters.
+//! Numbered (`#1` to `#5602`) and named (`#<name>`) parameters.
 
 use std::collections::HashMap;
 

@@ -132,6 +132,7 @@ fn path_control_is_attached() {
     let all = blocks("F600\nG1 X1\nG64 P0.05 Q1\nX2\nG61\nX3\nG64\nX4\nG61.1\nX5\nG20 G64 P0.001\nX0.2");
     let modes: Vec<_> = all.iter().map(|b| (b.path_mode == PathMode::ExactStop, short(b.path_tolerance_mm))).collect();
     let expected = [(false, "NaN"), (false, "0.05"), (true, "NaN"), (false, "NaN"), (true, "NaN"), (false, "0.025")];
+    assert!(last("G64 P0 G0 X1").path_tolerance_mm.is_nan());
     assert_eq!(modes, expected.map(|(exact, tolerance)| (exact, tolerance.to_owned())));
 }
 
