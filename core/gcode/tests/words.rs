@@ -151,6 +151,8 @@ fn offsets_add_up() {
         [["11", "1", "0"], ["1", "1", "0"], ["11", "1", "0"], ["2", "1", "0"]]
     );
     assert_eq!(ends("G10 L2 P1 X10\nG92 X5\nG53 G0 X7\nX0"), [["7", "0", "0"], ["-5", "0", "0"]]);
+    // L20 leaves G92 and the tool out of the origin: the current position is what it says.
+    assert_eq!(ends("G43 H1 G0 Z5\nG92 X3\nG10 L20 P1 X1 Z2\nG0 X2 Z4")[1..], [["1", "0", "27"]]);
     assert_eq!(short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]), "25");
     assert_eq!(ends("G10 L1 P7 Z3 R4\nG43 H7 G0 Z#5410"), [["0", "0", "3"]]);
 }
@@ -198,10 +200,20 @@ fn helices_in_every_plane() {
 }
 
 #[test]
+fn a_nearly_closed_helix_is_one_path_in_two_blocks() {
+    let [first, second] = blocks("F60 G0 X10\nG2 X10.001 Y0.2 Z8 I-10")[1..] else { panic!("two arcs") };
+    let swept = first.arc.sweep_rad + second.arc.sweep_rad;
+    assert!((first.end[2] - 8.0 * first.arc.sweep_rad / swept).abs() < 1e-9);
+    assert_eq!((first.end, second.end[0], second.end[1], second.end[2]), (second.start, 10.001, 0.2, 8.0));
+    assert!((first.length_mm + second.length_mm - (10.0 * swept).hypot(8.0)).abs() < 0.01);
+    assert_eq!((first.line, second.line, first.feed_mm_per_s), (2, 2, second.feed_mm_per_s));
+}
+
+#[test]
 fn no_motion_no_block() {
     assert_items("F60 G1\nG1 X0 Y0\nG0 X0\nG91 X0\nG64 G17", &["End"]);
     // The rounding of offsets is no motion either.
-    assert_eq!(blocks("G10 L2 P1 X0.1\nG92 Y1\nG0 X0.2\nG53 X0.30000000000000004\nX0.2").len(), 1);
+    assert_eq!(blocks("G10 L2 P1 X0.1\nG92 Y1\nG0 X0.2\nG53 X0.3\nX0.2").len(), 1);
 }
 
 #[test]
