@@ -34,15 +34,15 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn open(file: &str, cause: impl ToString) -> Self {
-        Self::Open { file: file.into(), cause: cause.to_string() }
+    pub(crate) fn open(file: &str, cause: impl Into<String>) -> Self {
+        Self::Open { file: file.into(), cause: cause.into() }
     }
 
-    pub(crate) fn line(file: &str, line: u64, cause: impl ToString) -> Self {
-        Self::Line { file: file.into(), line, cause: cause.to_string() }
+    pub(crate) fn line(file: &str, line: u64, cause: impl Into<String>) -> Self {
+        Self::Line { file: file.into(), line, cause: cause.into() }
     }
 
-    pub(crate) fn key(file: &str, key: &str, cause: impl ToString) -> Self {
-        Self::Key { file: file.into(), key: key.into(), cause: cause.to_string() }
+    pub(crate) fn key(file: &str, key: &str, cause: impl Into<String>) -> Self {
+        Self::Key { file: file.into(), key: key.into(), cause: cause.into() }
     }
 }

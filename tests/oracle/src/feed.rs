@@ -53,7 +53,7 @@ pub fn judge_feed(
         let place = |sample: usize| followed.places[followed.links[sample]];
         let from = place((sample - 1).saturating_sub(window));
         let to = place((sample + window).min(last));
-        judge.judge(sample, &moved, &rows[sample].command, judge.touched(from, to), report);
+        judge.judge(sample, &moved, &rows[sample].command, &judge.touched(from, to), report);
     }
 }
 
@@ -83,8 +83,8 @@ impl FeedJudge<'_> {
         first..=last
     }
 
-    fn judge(&self, sample: usize, moved: &Position, at: &Position, touched: Touched, report: &mut Report) {
-        let feed = match touched {
+    fn judge(&self, sample: usize, moved: &Position, at: &Position, touched: &Touched, report: &mut Report) {
+        let feed = match *touched {
             // Where a rapid and a feed meet, the limits of the axes alone hold.
             Touched { rapids: true, linear_mm_per_s: None, rotary_deg_per_s: None } => {
                 return self.judge_rapid(sample, moved, at, report);

@@ -107,10 +107,10 @@ fn reversed(element: &Element) -> Element {
 
 fn nearest_between(elements: &[Element], low: Place, high: Place, sample: &Position) -> (Place, f64) {
     let mut best = (low, f64::INFINITY);
-    for index in low.element..=high.element {
+    for (index, element) in elements.iter().enumerate().take(high.element + 1).skip(low.element) {
         let from = if index == low.element { low.fraction } else { 0.0 };
         let to = if index == high.element { high.fraction } else { 1.0 };
-        let (fraction, off_mm) = elements[index].shape.nearest(sample, from, to);
+        let (fraction, off_mm) = element.shape.nearest(sample, from, to);
         if off_mm < best.1 {
             best = (Place { element: index, fraction }, off_mm);
         }

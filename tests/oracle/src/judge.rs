@@ -46,7 +46,7 @@ pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options)
         }
     }
     let Report { findings, maxima, .. } = report;
-    Verdict { findings, maxima, not_judged, ..Verdict::default() }.settle()
+    Verdict { findings, not_judged, maxima, ..Verdict::default() }.settle()
 }
 
 /// Why a trace cannot be judged on a machine at all.
@@ -62,6 +62,13 @@ fn unfit(trace: &Trace, machine: &Machine, options: &Options) -> Option<String> 
     }
     if let Some(&axis) = trace.axes.iter().find(|&&axis| machine.axis(axis).is_none()) {
         return Some(format!("the machine has no axis {}", LETTERS[axis]));
+    }
+    if let Some(axis) = machine.axes.iter().find(|axis| axis.rotary != trace.degrees.contains(&axis.index)) {
+        let (letter, unit) = (LETTERS[axis.index], if axis.rotary { "mm" } else { "degrees" });
+        return Some(format!("the trace has axis {letter} in {unit}"));
+    }
+    if options.checks.is_empty() {
+        return Some("no judgement is asked for".into());
     }
     let mut jerkless = machine.axes.iter().filter(|axis| axis.max_jerk_mm_per_s3.is_none());
     let jerkless = jerkless.next().filter(|_| options.asks(Check::Jerk))?;

@@ -8,6 +8,9 @@ use keys::Keys;
 
 use crate::{Error, Position, axis::axis_of_name};
 
+/// The planner of a machine that names none.
+const DEFAULT_PLANNER: &str = "look-ahead";
+
 /// A machine as `machine.toml` describes it, in mm and s, rotary axes in degrees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
@@ -86,7 +89,7 @@ impl Machine {
         axes.sort_by_key(|axis| axis.index);
         Ok(Self {
             fine_period_s: keys.need("loops.fine_period_ms")? / 1000.0,
-            planner: keys.text("planner.plugin").unwrap_or_default(),
+            planner: keys.text("planner.plugin").unwrap_or_else(|| DEFAULT_PLANNER.into()),
             speed_difference_mm_per_s: difference / 60.0,
             speed_difference_deg_per_s: rotary_difference / 60.0,
             path_tolerance_mm: keys.need("motion.path_tolerance_mm")?,

@@ -80,6 +80,16 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The default options, with the values of a machine where they depend on nothing else.
+    pub fn for_machine(machine: &Machine) -> Self {
+        let difference = |rotary| Some(Self::default().speed_difference(machine, rotary));
+        Self {
+            speed_difference_mm_per_s: difference(false),
+            speed_difference_deg_per_s: difference(true),
+            ..Self::default()
+        }
+    }
+
     /// The default options with these judgements only.
     pub fn only(checks: &[Check]) -> Self {
         Self { checks: checks.to_vec(), ..Self::default() }

@@ -47,8 +47,7 @@ pub fn read(program: &str, machine: &Machine, options: &Options) -> Result<Path,
             continue;
         }
         let line = Line::parse(text).map_err(unread)?;
-        state.execute(line, index + 1).map_err(unread)?;
-        if state.ended {
+        if state.execute(line, index + 1).map_err(unread)? {
             break;
         }
     }

@@ -11,6 +11,8 @@ use crate::{Axes, Error, LETTERS, Position, axis::axis_of_name};
 pub struct Trace {
     /// The axes that have a command column.
     pub axes: Axes,
+    /// Those of them whose commands are in degrees.
+    pub degrees: Axes,
     /// The samples in order.
     pub rows: Vec<Row>,
     /// Values beside the commands (feedback, feed, sigma, ratio) that are no finite numbers: row, column, value.
@@ -43,7 +45,7 @@ impl Trace {
     /// The file cannot be opened, a column is missing or a value is no number.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|cause| Error::open(&name, cause))?;
+        let file = File::open(path).map_err(|cause| Error::open(&name, cause.to_string()))?;
         Self::from_reader(file, &name)
     }
 
@@ -56,7 +58,7 @@ impl Trace {
         let headers = reader.headers().map_err(|cause| csv_error(name, &cause))?.clone();
         let columns = Columns::find(&headers, name)?;
         let axes = columns.commands.iter().map(|&(axis, _)| axis).collect();
-        let mut trace = Self { axes, ..Self::default() };
+        let mut trace = Self { axes, degrees: degrees(&headers), ..Self::default() };
         let mut record = StringRecord::new();
         while reader.read_record(&mut record).map_err(|cause| csv_error(name, &cause))? {
             columns.append(&mut trace, &record, &headers, name)?;
@@ -64,10 +66,12 @@ impl Trace {
         Ok(trace)
     }
 
-    /// A trace of samples at a constant period, as tests build it; every row carries line 0.
+    /// A trace of samples at a constant period, as tests build it; every row carries line 0, and A, B and C turn.
     pub fn from_samples(axes: &[usize], fine_period_s: f64, samples: &[Position]) -> Self {
         let row = |(tick, &command)| Row { t_s: tick as f64 * fine_period_s, line: 0, command };
-        Self { axes: axes.to_vec(), rows: samples.iter().enumerate().map(row).collect(), not_finite: Vec::new() }
+        let degrees = axes.iter().copied().filter(|&axis| matches!(LETTERS[axis], 'A'..='C')).collect();
+        let rows = samples.iter().enumerate().map(row).collect();
+        Self { axes: axes.to_vec(), degrees, rows, not_finite: Vec::new() }
     }
 }
 
@@ -124,6 +128,10 @@ fn commands(headers: &StringRecord) -> Vec<(usize, usize)> {
     headers.iter().enumerate().filter_map(|(column, header)| Some((axis(header)?, column))).collect()
 }
 
+fn degrees(headers: &StringRecord) -> Axes {
+    headers.iter().filter_map(|header| axis_of_name(header.strip_suffix("_cmd_deg")?)).collect()
+}
+
 fn twice(commands: &[(usize, usize)]) -> Option<usize> {
     let seen = |index: usize| commands[..index].iter().any(|&(axis, _)| axis == commands[index].0);
     (0..commands.len()).find(|&index| seen(index)).map(|index| commands[index].0)
@@ -135,5 +143,5 @@ fn is_other(header: &str) -> bool {
 }
 
 fn csv_error(name: &str, cause: &csv::Error) -> Error {
-    Error::line(name, cause.position().map_or(0, csv::Position::line), cause)
+    Error::line(name, cause.position().map_or(0, csv::Position::line), cause.to_string())
 }

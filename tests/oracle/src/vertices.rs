@@ -27,19 +27,23 @@ struct Laid<'a> {
     elements: &'a [Element],
     lengths_mm: Vec<f64>,
     links_mm: Vec<f64>,
+    /// Links off the path; the place of such a link is that of the last one on it.
+    missed: Vec<bool>,
 }
 
 /// Every vertex up to where the samples end, the corners and the places where an arc is cut into pieces.
 pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) -> Vec<Vertex> {
     let laid = Laid::new(elements, followed);
     let mut link = 0;
+    // Samples far off the path belong to no vertex; they must not widen the search either.
+    let deviation_mm = if followed.misses.is_empty() { followed.deviation_mm } else { 0.0 };
     let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end);
     let vertices = reached.map(|(index, element)| {
         while link + 1 < followed.places.len() && followed.places[link + 1] <= end_of(index) {
             link += 1;
         }
         let limit_mm = limit_mm(elements, index, options);
-        let off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + followed.deviation_mm));
+        let off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + deviation_mm));
         Vertex { line: element.line, sample: followed.samples[link], off_mm, limit_mm, exact_stop: element.exact_stop }
     });
     vertices.collect()
@@ -76,7 +80,11 @@ impl<'a> Laid<'a> {
     fn new(elements: &'a [Element], followed: &'a Followed) -> Self {
         let lengths_mm = lengths_mm(elements);
         let links_mm = followed.places.iter().map(|&place| length_to_mm(&lengths_mm, place)).collect();
-        Self { followed, elements, lengths_mm, links_mm }
+        let mut missed = vec![false; followed.chain.len()];
+        for &(link, _) in &followed.misses {
+            missed[link] = true;
+        }
+        Self { followed, elements, lengths_mm, links_mm, missed }
     }
 
     /// Distance of a vertex from the chords that belong to the path around it; `link` is the last one before it.
@@ -84,14 +92,16 @@ impl<'a> Laid<'a> {
         let element = &self.elements[vertex];
         let point = element.shape.at(1.0);
         let at_mm = self.lengths_mm[vertex + 1];
-        let chord = |from| self.from_link(from, &point, element.exact_stop);
-        let before = (0..=link).rev();
-        let near_before = before.take_while(|&from| from == link || at_mm - self.links_mm[from + 1] <= span_mm);
-        let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - at_mm <= span_mm);
+        let chord = |from| self.chord_mm(from, &point, element.exact_stop);
+        // Samples off the path wait where the walk lost them: all of these belong to the vertices around.
+        let (last_mm, next_mm) = (self.links_mm[link], self.links_mm.get(link + 1).map_or(at_mm, |&mm| mm.max(at_mm)));
+        let near_before =
+            (0..=link).rev().take_while(|&from| from == link || last_mm - self.links_mm[from + 1] <= span_mm);
+        let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - next_mm <= span_mm);
         near_before.chain(near_after).map(chord).fold(f64::INFINITY, f64::min)
     }
 
-    fn from_link(&self, from: usize, point: &Position, samples_only: bool) -> f64 {
+    fn chord_mm(&self, from: usize, point: &Position, samples_only: bool) -> f64 {
         let chain = &self.followed.chain;
         let to = (from + 1).min(chain.len() - 1);
         if samples_only {

@@ -85,7 +85,9 @@ impl<'a> Walker<'a> {
                 Ok(found) => (place, astray_mm, search_at_mm) = (found, 0.0, f64::INFINITY),
                 Err(off_mm) => {
                     walk.misses.push((index, off_mm));
-                    search_at_mm = search_at_mm.min(astray_mm);
+                    if search_at_mm.is_infinite() {
+                        search_at_mm = astray_mm;
+                    }
                 }
             }
             walk.places.push(place);

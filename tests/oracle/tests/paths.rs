@@ -45,7 +45,9 @@ fn a_corner_cut_off_is_found() {
 #[test]
 fn an_axis_shifted_is_off_the_path_and_off_its_ends() {
     let mut samples = corner_run(1.6);
-    samples.iter_mut().for_each(|sample| sample[1] += 0.005);
+    for sample in &mut samples {
+        sample[1] += 0.005;
+    }
     let verdict = judge(&trace(&samples), CORNER, &machine(), &Options::default());
     assert_finds(&verdict, &[Kind::StartPoint, Kind::PathDeviation, Kind::VertexMissed, Kind::EndPoint]);
 }
@@ -97,6 +99,37 @@ fn a_reversal_and_a_crossing_fool_nobody() {
 fn stopping_and_going_back_a_little_is_off_the_order_of_travel() {
     let back = [at(0.0, 0.0, 0.0), at(10.0, 0.0, 0.0), at(9.9, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 15.0, 0.0)];
     assert_finds(&verdict(&stop_at_all(&back, 50.0, 990.0), CORNER), &[Kind::PathDeviation]);
+}
+
+#[test]
+fn samples_and_vertices_have_tolerances_of_their_own() {
+    // A corner rounded by the inscribed arc of 0.5 mm: 0.207 mm from the vertex, at most 0.146 mm off the path.
+    let (radius, sweep) = (0.5, PI / 2.0);
+    let rounded = |length: f64| match length {
+        _ if length < 19.5 => at(length, 0.0, 0.0),
+        _ if length < 19.5 + radius * sweep => {
+            let angle = (length - 19.5) / radius;
+            at(19.5 + radius * angle.sin(), radius - radius * angle.cos(), 0.0)
+        }
+        _ => at(20.0, length - 19.5 - radius * sweep + radius, 0.0),
+    };
+    let length = 19.5 + radius * sweep + 14.5;
+    let samples = ending_at(Profile::rest_to_rest(20.0, length, 500.0).samples(rounded), at(20.0, 15.0, 0.0));
+    let judge = |sample_mm, vertex_mm| {
+        let options = Options {
+            sample_tolerance_mm: Some(sample_mm),
+            vertex_tolerance_mm: Some(vertex_mm),
+            ..Options::default()
+        };
+        judge(&trace(&samples), CORNER, &smooth_machine(), &options)
+    };
+    let wide = judge(0.15, 0.21);
+    assert_passes(&wide);
+    assert!((wide.maxima.vertex_deviation_mm - 0.2071).abs() < 1e-3, "{wide}");
+    assert!((wide.maxima.sample_deviation_mm - 0.1464).abs() < 6e-3, "{wide}");
+    assert_finds(&judge(0.15, 0.2), &[Kind::VertexMissed]);
+    assert_finds(&judge(0.14, 0.21), &[Kind::PathDeviation]);
+    assert_passes(&judge(5.0, 0.21));
 }
 
 /// An arc in XY around (0, 10) from the origin, counter-clockwise, rising along Z.

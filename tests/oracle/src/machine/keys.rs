@@ -63,7 +63,6 @@ impl Keys {
     }
 }
 
-#[allow(clippy::cast_precision_loss)]
 fn as_number(value: &Value) -> Option<f64> {
     let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))?;
     number.is_finite().then_some(number)
@@ -81,7 +80,7 @@ fn load(path: &Path, depth: usize) -> Result<Table, Error> {
     if depth > DEEPEST_INCLUDE {
         return Err(Error::key(&file, "include", "files include each other"));
     }
-    let text = std::fs::read_to_string(path).map_err(|cause| Error::open(&file, cause))?;
+    let text = std::fs::read_to_string(path).map_err(|cause| Error::open(&file, cause.to_string()))?;
     let own = parse(&text, &file)?;
     let mut merged = Table::new();
     for name in own.get("include").and_then(Value::as_array).into_iter().flatten() {

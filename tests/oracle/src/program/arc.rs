@@ -60,7 +60,12 @@ fn center_between(center: Point, start: Point, end: Point) -> Result<Point, Stri
     let chord = [end[0] - start[0], end[1] - start[1]];
     let middle = [f64::midpoint(start[0], end[0]), f64::midpoint(start[1], end[1])];
     let along = (center[0] - middle[0]) * chord[0] + (center[1] - middle[1]) * chord[1];
-    let fraction = along / (chord[0].powi(2) + chord[1].powi(2));
+    let length = chord[0].hypot(chord[1]);
+    // Where the arc is nearly closed, a rounded end says little about the centre.
+    if along.abs() / length > 2.0 * rounding {
+        return Err("the arc is nearly closed, and its end is off its circle".into());
+    }
+    let fraction = along / length.powi(2);
     Ok([center[0] - fraction * chord[0], center[1] - fraction * chord[1]])
 }
 

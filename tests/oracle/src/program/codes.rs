@@ -2,7 +2,7 @@
 
 use super::{
     line::Line,
-    state::{AxisWords, Motion, State},
+    state::{AxisWords, FeedMode, Motion, State},
 };
 
 /// What the codes of one line say about that line alone.
@@ -10,15 +10,19 @@ pub struct LineCodes {
     pub axis_words: AxisWords,
     /// G53
     pub machine_coordinates: bool,
+    /// M2 or M30
+    pub ends: bool,
 }
 
+/// No sample is nearer to the path than rounding lets it be, whatever the program asks for.
+const ROUNDING_MM: f64 = 1e-9;
 /// M codes that move nothing.
 const QUIET_M_CODES: [i32; 13] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 48, 49, 60, 61];
 
 impl State<'_> {
     /// Puts the codes of a line in force.
     pub fn modal_codes(&mut self, line: &mut Line) -> Result<LineCodes, String> {
-        let mut codes = LineCodes { axis_words: AxisWords::Motion, machine_coordinates: false };
+        let mut codes = LineCodes { axis_words: AxisWords::Motion, machine_coordinates: false, ends: false };
         // Units first: they hold for every other word of the line.
         for &code in line.g.iter().filter(|&&code| code == 200 || code == 210) {
             self.unit_mm = if code == 200 { 25.4 } else { 1.0 };
@@ -31,7 +35,7 @@ impl State<'_> {
                 return Err(format!("unknown word G{}", f64::from(code) / 10.0));
             }
         }
-        self.machine_codes(line)?;
+        codes.ends = machine_codes(line)?;
         Ok(codes)
     }
 
@@ -59,37 +63,27 @@ impl State<'_> {
     /// Codes that say how the path is travelled.
     fn path_code(&mut self, code: i32, line: &mut Line) -> Result<bool, String> {
         match code {
-            610 | 611 => self.exact_stop = true,
+            // The tolerance of an earlier G64 is no longer in force.
+            610 | 611 => (self.exact_stop, self.tolerance_mm) = (true, None),
             640 => {
                 self.exact_stop = false;
-                self.tolerance_mm = line.take('P').map(|tolerance| tolerance * self.unit_mm);
+                self.tolerance_mm = line.take('P').map(|tolerance| (tolerance * self.unit_mm).max(ROUNDING_MM));
+                // Q joins collinear lines, which changes nothing of the path.
+                line.take('Q');
             }
-            930 | 940 => {
-                if self.inverse_time != (code == 930) {
-                    self.feed = None;
-                }
-                self.inverse_time = code == 930;
-            }
+            930 => self.set_feed_mode(FeedMode::InverseTime),
+            940 => self.set_feed_mode(FeedMode::PerMinute),
             40 => _ = line.take('P').ok_or("G4 without P")?,
             _ => return Ok(false),
         }
         Ok(true)
     }
 
-    fn machine_codes(&mut self, line: &mut Line) -> Result<(), String> {
-        for code in std::mem::take(&mut line.m) {
-            match code {
-                2 | 30 => self.ended = true,
-                62..=68 => {
-                    for letter in ['P', 'Q', 'E', 'L'] {
-                        line.take(letter);
-                    }
-                }
-                _ if QUIET_M_CODES.contains(&code) => {}
-                _ => return Err(format!("unknown word M{code}")),
-            }
+    fn set_feed_mode(&mut self, mode: FeedMode) {
+        if self.feed_mode != mode {
+            self.feed = None;
         }
-        Ok(())
+        self.feed_mode = mode;
     }
 }
 
@@ -109,4 +103,22 @@ fn line_code(code: i32, codes: &mut LineCodes) -> Result<bool, String> {
     }
     codes.axis_words = axis_words;
     Ok(true)
+}
+
+/// Whether the M codes of a line end the program.
+fn machine_codes(line: &mut Line) -> Result<bool, String> {
+    let mut ends = false;
+    for code in std::mem::take(&mut line.m) {
+        match code {
+            2 | 30 => ends = true,
+            62..=68 => {
+                for letter in ['P', 'Q', 'E', 'L'] {
+                    line.take(letter);
+                }
+            }
+            _ if QUIET_M_CODES.contains(&code) => {}
+            _ => return Err(format!("unknown word M{code}")),
+        }
+    }
+    Ok(ends)
 }

@@ -6,7 +6,7 @@ use super::{
     arc,
     codes::LineCodes,
     line::Line,
-    state::{Motion, State},
+    state::{FeedMode, Motion, State},
 };
 use crate::{
     Position,
@@ -82,10 +82,10 @@ impl State<'_> {
     /// The programmed feed in mm/s, or deg/s where no linear axis moves.
     fn feed_per_s(&self, length_mm: f64, moves_linear: bool) -> Result<f64, String> {
         let (feed, unit_mm) = self.feed.filter(|&(feed, _)| feed > 0.0).ok_or("motion without a feed")?;
-        let per_minute = match (self.inverse_time, moves_linear) {
-            (true, _) => feed * length_mm,
-            (false, true) => feed * unit_mm,
-            (false, false) => feed,
+        let per_minute = match (self.feed_mode, moves_linear) {
+            (FeedMode::InverseTime, _) => feed * length_mm,
+            (FeedMode::PerMinute, true) => feed * unit_mm,
+            (FeedMode::PerMinute, false) => feed,
         };
         Ok(per_minute / 60.0)
     }

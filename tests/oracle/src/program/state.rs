@@ -17,6 +17,15 @@ pub enum Motion {
     },
 }
 
+/// What F means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeedMode {
+    /// G94: units a minute.
+    PerMinute,
+    /// G93: one over the minutes that the block lasts.
+    InverseTime,
+}
+
 /// What axis words of the line at hand are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisWords {
@@ -38,8 +47,8 @@ pub struct State<'a> {
     pub unit_mm: f64,
     pub incremental: bool,
     pub absolute_centers: bool,
-    pub inverse_time: bool,
-    /// In units a minute as programmed, with the unit of then.
+    pub feed_mode: FeedMode,
+    /// F as programmed, with the unit of then in mm.
     pub feed: Option<(f64, f64)>,
     pub work_offsets: [Position; 9],
     pub work_system: usize,
@@ -47,7 +56,6 @@ pub struct State<'a> {
     pub shift: Position,
     pub exact_stop: bool,
     pub tolerance_mm: Option<f64>,
-    pub ended: bool,
     pub elements: Vec<Element>,
 }
 
@@ -61,14 +69,13 @@ impl<'a> State<'a> {
             unit_mm: 1.0,
             incremental: false,
             absolute_centers: false,
-            inverse_time: false,
+            feed_mode: FeedMode::PerMinute,
             feed: None,
             work_offsets: [Position::default(); 9],
             work_system: 0,
             shift: Position::default(),
             exact_stop: false,
             tolerance_mm: None,
-            ended: false,
             elements: Vec::new(),
         }
     }
@@ -77,8 +84,8 @@ impl<'a> State<'a> {
         Path { elements: self.elements, end: self.position }
     }
 
-    /// Executes a line; an error names the word that is not known.
-    pub fn execute(&mut self, mut line: Line, number: usize) -> Result<(), String> {
+    /// Executes a line and says whether the program ends with it; an error names the word that is not known.
+    pub fn execute(&mut self, mut line: Line, number: usize) -> Result<bool, String> {
         let codes = self.modal_codes(&mut line)?;
         self.words(&mut line);
         match codes.axis_words {
@@ -88,7 +95,7 @@ impl<'a> State<'a> {
         }
         match line.left_over() {
             Some(word) => Err(format!("unknown word {word}")),
-            None => Ok(()),
+            None => Ok(codes.ends),
         }
     }
 
@@ -118,7 +125,7 @@ impl<'a> State<'a> {
     fn words(&mut self, line: &mut Line) {
         if let Some(feed) = line.take('F') {
             self.feed = Some((feed, self.unit_mm));
-        } else if self.inverse_time {
+        } else if self.feed_mode == FeedMode::InverseTime {
             // A duration holds for its own line only.
             self.feed = None;
         }
@@ -132,6 +139,9 @@ impl<'a> State<'a> {
         };
         if table != 2.0 || system.fract() != 0.0 || !(0.0..=9.0).contains(&system) {
             return Err(format!("G10 L{table} P{system}"));
+        }
+        if self.incremental {
+            return Err("G10 L2 with G91: controls differ in what it means".into());
         }
         let system = if system == 0.0 { self.work_system } else { system as usize - 1 };
         for (axis, value) in self.take_axes(line)? {
