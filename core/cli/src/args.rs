@@ -46,6 +46,9 @@ pub struct Run {
     /// Wait for Enter at M0, M1 and M6 instead of logging them
     #[arg(long)]
     pub pause: bool,
+    /// Give the operator's commands of a file, a line each: tick,command[,value] (virtual clock)
+    #[arg(long, value_name = "F.csv")]
+    pub commands: Option<PathBuf>,
     /// Write every sample
     #[arg(long, value_name = "F.csv")]
     pub trace: Option<PathBuf>,

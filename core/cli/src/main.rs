@@ -1,15 +1,12 @@
 //! The `tandem` command: the only crate that prints.
 
 mod args;
-mod blocks_csv;
 mod built_in;
 mod check;
-mod output;
 mod program;
 mod progress;
 mod report;
 mod run;
-mod trace_csv;
 
 use std::process::ExitCode;
 

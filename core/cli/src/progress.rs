@@ -29,7 +29,7 @@ impl Progress {
     /// A sample was sent.
     pub fn sample(&mut self, sample: &Sample) {
         self.driven_mm += sample.feed_mm_per_s * self.period_s;
-        if self.active && sample.tick % 64 == 0 && self.shown.elapsed() >= EVERY {
+        if self.active && sample.tick.is_multiple_of(64) && self.shown.elapsed() >= EVERY {
             self.shown = Instant::now();
             self.show(sample);
         }

@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use tandem_host::Summary;
+use tandem_host::{Output, Summary};
 use tandem_machine::{JerkMode, Machine};
 use tandem_report::{Axis, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector};
-
-use crate::output::Output;
 
 /// Keeps every sample in memory: about 150 bytes a sample for three axes.
 pub struct Collector {

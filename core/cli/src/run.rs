@@ -4,16 +4,13 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_host::{Clock, HostError, Outcome, Run, RunObserver, Summary};
+use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Block, BlockReport};
 
-use crate::blocks_csv::BlocksCsv;
-use crate::output::Output;
 use crate::progress::Progress;
 use crate::report::Collector;
-use crate::trace_csv::TraceCsv;
 use crate::{FAULT, REFUSED, args, built_in, program};
 
 /// Runs a program.
@@ -33,10 +30,24 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         args::Clock::Virtual => Clock::Virtual,
         args::Clock::Wall => Clock::Wall,
     };
+    let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock))?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
-    let outcome = run.drive(clock, &[], &mut sinks)?;
+    let outcome = run.drive(clock, &commands, &mut sinks)?;
     sinks.finish(options, &outcome.summary)?;
     Ok(conclude(options, &outcome))
+}
+
+/// Reads a command file; lines that are empty or begin with # are left out.
+fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
+    if clock == Clock::Wall {
+        return Err("--commands goes with --clock virtual: on the wall the operator gives them".to_string());
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let parse = |(index, line)| Timed::parse(line).map_err(|e| format!("{}:{}: {e}", path.display(), index + 1));
+    let mut commands = lines.map(parse).collect::<Result<Vec<_>, _>>()?;
+    commands.sort_by_key(|timed| timed.tick);
+    Ok(commands)
 }
 
 /// Everything that a run is written to.

@@ -19,6 +19,8 @@ pub enum Command {
     EmergencyStop,
     /// Stop on the path and end the run.
     Abort,
+    /// A test's doing: the rough loop does nothing for so many rough periods. Virtual clock only.
+    StallRough(u64),
 }
 
 impl Command {
@@ -31,6 +33,7 @@ impl Command {
             Self::RapidOverride(ratio) => controls.rapid_override.store(ratio.clamp(0.0, 1.0)),
             Self::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
             Self::Abort => controls.soft_fault.store(true, Relaxed),
+            Self::StallRough(_) => {}
         }
     }
 }
@@ -42,4 +45,58 @@ pub struct Timed {
     pub tick: u64,
     /// The command.
     pub command: Command,
+}
+
+impl Timed {
+    /// Reads one line `tick,command[,value]`, as in `120,hold`, `300,feed-override,0.5`.
+    ///
+    /// # Errors
+    /// What is wrong with the line.
+    pub fn parse(line: &str) -> Result<Self, String> {
+        let mut fields = line.split(',').map(str::trim);
+        let tick = fields.next().unwrap_or_default();
+        let tick = tick.parse().map_err(|_| format!("{tick:?} is not the number of a fine period"))?;
+        let name = fields.next().ok_or("a line is tick,command[,value]")?;
+        let command = Command::parse(name, fields.next())?;
+        fields.next().map_or(Ok(Self { tick, command }), |more| Err(format!("{more:?} is one field too many")))
+    }
+}
+
+impl Command {
+    fn parse(name: &str, value: Option<&str>) -> Result<Self, String> {
+        let number = || -> Result<f64, String> {
+            let text = value.ok_or_else(|| format!("{name} needs a value"))?;
+            let ratio = text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0);
+            ratio.ok_or_else(|| format!("{text:?} is not a number of zero or more"))
+        };
+        let command = match name {
+            "hold" => Self::Hold,
+            "resume" => Self::Resume,
+            "emergency-stop" => Self::EmergencyStop,
+            "abort" => Self::Abort,
+            "feed-override" => return number().map(Self::FeedOverride),
+            "rapid-override" => return number().map(Self::RapidOverride),
+            "stall-rough" => return number().map(|periods| Self::StallRough(periods as u64)),
+            _ => {
+                return Err(format!(
+                    "no command is called {name:?}: hold, resume, feed-override, rapid-override, abort, emergency-stop, stall-rough"
+                ));
+            }
+        };
+        value.map_or(Ok(command), |more| Err(format!("{name} takes no value, not {more:?}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_a_command_file() {
+        assert_eq!(Timed::parse("120, hold"), Ok(Timed { tick: 120, command: Command::Hold }));
+        assert_eq!(Timed::parse("3,feed-override,0.5"), Ok(Timed { tick: 3, command: Command::FeedOverride(0.5) }));
+        for bad in ["", "x,hold", "1", "1,hodl", "1,hold,2", "1,feed-override", "1,feed-override,NaN", "1,resume,,"] {
+            assert!(Timed::parse(bad).is_err(), "{bad}");
+        }
+    }
 }

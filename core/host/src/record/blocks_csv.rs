@@ -5,7 +5,7 @@ use std::path::Path;
 use tandem_machine::Machine;
 use tandem_sdk::{Axes, Block, BlockKind, BlockReport, LimitedBy};
 
-use crate::output::Output;
+use super::output::Output;
 
 /// Writes a blocks CSV.
 pub struct BlocksCsv {
@@ -17,6 +17,9 @@ pub struct BlocksCsv {
 
 impl BlocksCsv {
     /// Starts the file with its head line.
+    ///
+    /// # Errors
+    /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine) -> Result<Self, String> {
         let mut writer = csv::Writer::from_writer(Output::create(path)?);
         let columns = "index,line,kind,length_mm,feed_mm_s,start_feed_mm_s,peak_feed_mm_s,end_feed_mm_s,time_s,time_constant_ms,limited_by";
@@ -41,6 +44,9 @@ impl BlocksCsv {
     }
 
     /// Ends the file.
+    ///
+    /// # Errors
+    /// The first row that could not be written, or the file cannot take its name.
     pub fn finish(self) -> Result<(), String> {
         match self.failed {
             Some(error) => Err(format!("blocks: {error}")),

@@ -7,7 +7,7 @@ use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::Axes;
 
-use crate::output::Output;
+use super::output::Output;
 
 /// Writes a trace CSV.
 pub struct TraceCsv {
@@ -19,6 +19,9 @@ pub struct TraceCsv {
 
 impl TraceCsv {
     /// Starts the file with its head line.
+    ///
+    /// # Errors
+    /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine, signals: &[&str]) -> Result<Self, String> {
         let mut out = Output::create(path)?;
         let head = head(&machine.axes, signals);
@@ -36,6 +39,9 @@ impl TraceCsv {
     }
 
     /// Ends the file.
+    ///
+    /// # Errors
+    /// The first row that could not be written, or the file cannot take its name.
     pub fn finish(self) -> Result<(), String> {
         match self.failed {
             Some(error) => Err(format!("trace: {error}")),
@@ -63,18 +69,16 @@ impl TraceCsv {
 }
 
 fn head(axes: &Axes, signals: &[&str]) -> String {
-    let mut head = "t_s,line".to_string();
+    let mut head = vec!["t_s".to_string(), "line".to_string()];
     for kind in ["cmd", "fb"] {
         for axis in 0..axes.count() {
             let unit = if axes.is_rotary(axis) { "deg" } else { "mm" };
-            head += &format!(",{}_{kind}_{unit}", axes.letter(axis).to_ascii_lowercase());
+            head.push(format!("{}_{kind}_{unit}", axes.letter(axis).to_ascii_lowercase()));
         }
     }
-    head += ",feed_mm_s,sigma,state,ratio";
-    for signal in signals {
-        head += &format!(",sig_{signal}");
-    }
-    head
+    head.extend(["feed_mm_s", "sigma", "state", "ratio"].map(str::to_string));
+    head.extend(signals.iter().map(|signal| format!("sig_{signal}")));
+    head.join(",")
 }
 
 /// 17 significant digits: reading it back gives the same number.

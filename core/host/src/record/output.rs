@@ -13,6 +13,9 @@ pub struct Output {
 
 impl Output {
     /// Starts a file at `path`.
+    ///
+    /// # Errors
+    /// The path with the system's words.
     pub fn create(path: &Path) -> Result<Self, String> {
         let mut part = path.as_os_str().to_owned();
         part.push(".part");
@@ -22,6 +25,9 @@ impl Output {
     }
 
     /// Everything is written: the file takes its name.
+    ///
+    /// # Errors
+    /// The path with the system's words.
     pub fn finish(mut self) -> Result<(), String> {
         let named = self.close().and_then(|()| fs::rename(&self.part, &self.path));
         named.map_err(|e| format!("{}: {e}", self.path.display()))

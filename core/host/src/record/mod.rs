@@ -1,0 +1,9 @@
+//! What a run leaves behind: trace, blocks, and files that appear only when they are complete.
+
+mod blocks_csv;
+mod output;
+mod trace_csv;
+
+pub use blocks_csv::BlocksCsv;
+pub use output::Output;
+pub use trace_csv::TraceCsv;
