@@ -33,12 +33,12 @@ pub use driver::SimulatedDrives;
 pub use joint::CURRENT_A_PER_MM_PER_S2;
 pub use options::{Model, Options, Switch};
 
-use tandem_sdk::{Driver, Plugin, PluginError, PluginKind};
+use tandem_sdk::{Driver, Made, Plugin, PluginKind};
 
 /// The plugin as a host registers it.
 pub const PLUGIN: Plugin = Plugin { name: "sim", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Driver(make) };
 
 /// Makes the driver from the TOML text of its options.
-fn make(options: &str) -> Result<Box<dyn Driver>, PluginError> {
+fn make(options: &str) -> Made<dyn Driver> {
     Ok(Box::new(SimulatedDrives::new(Options::parse(options)?)))
 }

@@ -37,6 +37,16 @@ fn stops_rest_exactly_on_the_programmed_position() {
 }
 
 #[test]
+fn an_exponential_filter_is_cut_off_where_nothing_is_left() {
+    let blocks = numbered(vec![line(&AxisVector::ZERO, &[30.0], 50.0)]);
+    let recorder = drive(&mut *open("exponential", 20.0, &context(0.001)), &blocks);
+    let last = recorder.segments.last().unwrap();
+    let lag = 30.0 - last.position(0.0)[0];
+    assert!((0.0..1.2e-9).contains(&lag), "the last piece makes up for {lag} mm");
+    assert!(recorder.duration_s() < 0.6 + 23.0 * 0.02, "and the wait is not longer than it must be");
+}
+
+#[test]
 fn every_block_begins_ends_and_is_reported_once() {
     for filter in FILTERS {
         let blocks = program();

@@ -32,7 +32,11 @@ fn programs() -> impl Strategy<Value = Vec<Block>> {
 }
 
 fn recorded(filter: &str, tau_ms: f64, blocks: &[Block]) -> Recorder {
-    let mut machine = context(0.001);
+    recorded_at(0.001, filter, tau_ms, blocks)
+}
+
+fn recorded_at(fine_period_s: f64, filter: &str, tau_ms: f64, blocks: &[Block]) -> Recorder {
+    let mut machine = context(fine_period_s);
     machine.position = blocks.first().map_or(AxisVector::ZERO, |block| block.start);
     drive(&mut *open(filter, tau_ms, &machine), blocks)
 }
@@ -155,6 +159,24 @@ proptest! {
             let off = norm(&(segment.position(t - start) - *wanted));
             // A kink between two grid points costs the difference equation up to about F·h/2 · h/τ.
             prop_assert!(off < 2e-4, "{off} mm at {t} s");
+        }
+    }
+
+    #[test]
+    fn between_its_ends_a_segment_stays_on_the_filtered_path(
+        blocks in programs(), kind in 0..3_usize, tau_ms in 10.0..120.0_f64,
+    ) {
+        prop_assume!(!blocks.is_empty());
+        let coarse = recorded_at(0.001, FILTERS[kind], tau_ms, &blocks);
+        let fine = recorded_at(0.000_13, FILTERS[kind], tau_ms, &blocks);
+        let mut segments = coarse.timed().peekable();
+        for (t, knot) in fine.timed() {
+            while segments.peek().is_some_and(|(start, segment)| t > start + segment.duration_s) {
+                segments.next();
+            }
+            let Some((start, segment)) = segments.peek() else { break };
+            let off = norm(&(segment.position(t - start) - knot.position(0.0)));
+            prop_assert!(off < 1e-6, "{off} mm at {t} s: {segment:?}");
         }
     }
 }
