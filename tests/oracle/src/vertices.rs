@@ -27,8 +27,6 @@ struct Laid<'a> {
     elements: &'a [Element],
     lengths_mm: Vec<f64>,
     links_mm: Vec<f64>,
-    /// Links off the path; the place of such a link is that of the last one on it.
-    missed: Vec<bool>,
 }
 
 /// Every vertex up to where the samples end, the corners and the places where an arc is cut into pieces.
@@ -80,11 +78,7 @@ impl<'a> Laid<'a> {
     fn new(elements: &'a [Element], followed: &'a Followed) -> Self {
         let lengths_mm = lengths_mm(elements);
         let links_mm = followed.places.iter().map(|&place| length_to_mm(&lengths_mm, place)).collect();
-        let mut missed = vec![false; followed.chain.len()];
-        for &(link, _) in &followed.misses {
-            missed[link] = true;
-        }
-        Self { followed, elements, lengths_mm, links_mm, missed }
+        Self { followed, elements, lengths_mm, links_mm }
     }
 
     /// Distance of a vertex from the chords that belong to the path around it; `link` is the last one before it.

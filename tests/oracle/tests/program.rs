@@ -113,6 +113,7 @@ fn a_tolerance_in_force_is_kept() {
     assert_eq!(judged("G1 X20 F3000"), []);
     assert_eq!(judged("G64 P0.004\nG1 X20 F3000"), []);
     assert_eq!(judged("G64 P0.002\nG1 X20 F3000"), [Kind::PathDeviation]);
+    assert_eq!(judged("G64 P0.002\nG64 P0\nG1 X20 F3000"), []);
     assert_eq!(judged("G20 G64 P0.0001\nG21 G1 X20 F3000"), [Kind::PathDeviation]);
 }
 

@@ -14,8 +14,6 @@ pub struct LineCodes {
     pub ends: bool,
 }
 
-/// No sample is nearer to the path than rounding lets it be, whatever the program asks for.
-const ROUNDING_MM: f64 = 1e-9;
 /// M codes that move nothing.
 const QUIET_M_CODES: [i32; 13] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 48, 49, 60, 61];
 
@@ -67,7 +65,8 @@ impl State<'_> {
             610 | 611 => (self.exact_stop, self.tolerance_mm) = (true, None),
             640 => {
                 self.exact_stop = false;
-                self.tolerance_mm = line.take('P').map(|tolerance| (tolerance * self.unit_mm).max(ROUNDING_MM));
+                // P0 asks for no tolerance of its own.
+                self.tolerance_mm = line.take('P').filter(|&tolerance| tolerance > 0.0).map(|mm| mm * self.unit_mm);
                 // Q joins collinear lines, which changes nothing of the path.
                 line.take('Q');
             }

@@ -83,19 +83,20 @@ fn number(letter: char, rest: &str) -> Result<(f64, &str), String> {
     Ok((value, after))
 }
 
-/// The line in capitals, without comments and blanks.
+/// The line in capitals, without comments and blanks. Comments may hold others: read so, a word is never lost to a
+/// bracket too many, for a comment without an end is an error.
 fn without_comments(text: &str) -> Result<String, String> {
     let mut words = String::with_capacity(text.len());
-    let mut in_comment = false;
+    let mut depth = 0_usize;
     for c in text.chars() {
         match c {
-            ')' if in_comment => in_comment = false,
-            _ if in_comment => {}
-            '(' => in_comment = true,
+            '(' => depth += 1,
+            ')' if depth > 0 => depth -= 1,
+            _ if depth > 0 => {}
             ';' => break,
             _ if c.is_whitespace() => {}
             _ => words.push(c.to_ascii_uppercase()),
         }
     }
-    if in_comment { Err("comment without an end".into()) } else { Ok(words) }
+    if depth > 0 { Err("comment without an end".into()) } else { Ok(words) }
 }
