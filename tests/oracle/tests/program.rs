@@ -27,7 +27,7 @@ fn is_not_judged(program: &str, reason: &str) {
 #[test]
 fn numbers_comments_and_blanks() {
     visits(
-        "%\n(a comment) N10 g1x+1.50y-.5 f3000 ; the rest X9\n/N20 G 1 X 1 0\n\n%\nX99\n",
+        "%\n(a (nested) comment) N10 g1x+1.50y-.5 f3000 ; the rest X9\n/N20 G 1 X 1 0\n\n%\nX99\n",
         &[at(0.0, 0.0, 0.0), at(1.5, -0.5, 0.0), at(10.0, -0.5, 0.0)],
     );
     visits("G1X0.20000Y0.00000Z0.08570F3000\nM30\nX5\n", &[at(0.0, 0.0, 0.0), at(0.2, 0.0, 0.0857)]);
@@ -130,6 +130,7 @@ fn what_is_not_known_is_not_judged() {
     is_not_judged("X1", "program line 1: axis words without a motion word");
     is_not_judged("G0 B1", "program line 1: the machine has no axis B");
     is_not_judged("G0 X1 (open", "program line 1: comment without an end");
+    is_not_judged("G0 X1 (a (b) X5", "program line 1: comment without an end");
     is_not_judged("G0 G1 X1", "program line 1: two motion words");
     is_not_judged("G2 X1 F100", "program line 1: arc without a centre or radius");
     is_not_judged("G2 X10 R4 F100", "program line 1: arc radius 4 mm does not reach its end");
