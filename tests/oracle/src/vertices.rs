@@ -7,6 +7,9 @@ use crate::{
     path::{Element, Place},
 };
 
+/// Chords searched on each side of a vertex; only samples astray or all but at rest come in greater numbers.
+const SEARCHED_CHORDS: usize = 1000;
+
 /// A vertex and how far the samples stay away from it.
 pub struct Vertex {
     /// Program line of the block that ends there.
@@ -92,7 +95,8 @@ impl<'a> Laid<'a> {
         let near_before =
             (0..=link).rev().take_while(|&from| from == link || last_mm - self.links_mm[from + 1] <= span_mm);
         let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - next_mm <= span_mm);
-        near_before.chain(near_after).map(chord).fold(f64::INFINITY, f64::min)
+        let near = near_before.take(SEARCHED_CHORDS).chain(near_after.take(SEARCHED_CHORDS));
+        near.map(chord).fold(f64::INFINITY, f64::min)
     }
 
     fn chord_mm(&self, from: usize, point: &Position, samples_only: bool) -> f64 {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Profile, assert_finds, assert_passes, at, polyline, smooth_machine, stop_at_all, trace, verdict};
-use tandem_oracle::{Check, Kind, Options, Outcome, Position, judge};
+use tandem_oracle::{Check, Kind, Machine, Options, Outcome, Position, judge};
 
 fn xy(points: &[(f64, f64)]) -> Vec<Position> {
     points.iter().map(|&(x, y)| at(x, y, 0.0)).collect()
@@ -84,4 +84,17 @@ fn nothing_asked_is_nothing_judged() {
     assert!(matches!(found.outcome, Outcome::NotJudged { .. }), "{found}");
     let found = judge(&trace(&samples), "", &smooth_machine(), &Options::only(&[Check::Travel]));
     assert_passes(&found);
+}
+
+#[test]
+fn the_options_of_a_machine_are_those_of_its_planner() {
+    let text = common::MACHINE.replace("[planner]\nplugin = \"look-ahead\"\n", "");
+    let unnamed = Machine::from_toml(&text, "machine.toml").expect("the machine reads");
+    for machine in [unnamed, common::machine()] {
+        let options = Options::for_machine(&machine);
+        assert_eq!(options.speed_difference_mm_per_s, Some(100.0 / 60.0));
+        assert_eq!(options.speed_difference_deg_per_s, Some(100.0 / 60.0));
+    }
+    let options = Options::for_machine(&smooth_machine());
+    assert_eq!((options.speed_difference_mm_per_s, options.speed_difference_deg_per_s), (Some(0.0), Some(0.0)));
 }
