@@ -2,6 +2,8 @@
 
 mod arc;
 mod line;
+#[cfg(test)]
+mod tests;
 
 pub use arc::Arc;
 pub use line::Line;

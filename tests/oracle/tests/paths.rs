@@ -177,6 +177,26 @@ fn an_arc_passes_and_its_chords_do_not() {
 }
 
 #[test]
+fn a_negative_radius_takes_the_long_way() {
+    let samples = ending_at(arc_run(10.0, 0.0, 70.0, 1.5 * PI), at(-10.0, 10.0, 0.0));
+    assert_passes(&verdict(&samples, "G3 X-10 Y10 R-10 F4200"));
+    let mirrored: Vec<Position> = samples.iter().map(|&[x, y, ..]| at(-x, y, 0.0)).collect();
+    assert_passes(&verdict(&mirrored, "G2 X10 Y10 R-10 F4200"));
+    assert!(!verdict(&mirrored, "G2 X10 Y10 R10 F4200").passed());
+}
+
+#[test]
+fn absolute_centres_are_program_coordinates() {
+    let line = stop_at_all(&[at(0.0, 0.0, 0.0), at(5.0, 2.0, 0.0)], 50.0, 700.0);
+    let arc = ending_at(arc_run(10.0, 0.0, 70.0, PI / 2.0), at(10.0, 10.0, 0.0));
+    let arc = arc.iter().map(|&[x, y, ..]| at(x + 5.0, y + 2.0, 0.0));
+    let samples: Vec<Position> = line.into_iter().chain(arc).collect();
+    assert_passes(&verdict(&samples, "F4200 G90.1\nG1 X5 Y2\nG3 X15 Y12 I5 J12\n"));
+    assert_passes(&verdict(&samples, "F4200 G10 L2 P1 X1\nG90.1\nG1 X4 Y2\nG3 X14 Y12 I4 J12\n"));
+    assert_passes(&verdict(&samples, "F4200 G90.1\nG1 X5 Y2\nG91.1 G3 X15 Y12 J10\n"));
+}
+
+#[test]
 fn a_full_circle_cannot_be_left_out() {
     let circle = ending_at(arc_run(10.0, 0.0, 70.0, 2.0 * PI), at(0.0, 0.0, 0.0));
     let line = stop_at_all(&[at(0.0, 0.0, 0.0), at(-20.0, 0.0, 0.0)], 50.0, 700.0);
@@ -241,6 +261,20 @@ fn a_rotary_axis_is_judged_in_degrees() {
     assert_finds(&verdict(&turn(60.6, 1990.0), "G1 A90 F3600"), &[Kind::Feed]);
     assert_finds(&verdict(&turn(60.0, 2020.0), "G1 A90 F3600"), &[Kind::Acceleration]);
     assert_finds(&verdict(&turn(60.0, 1990.0), "G1 A90.001 F3600"), &[Kind::EndPoint]);
+}
+
+#[test]
+fn path_speed_counts_linear_axes_where_any_moves() {
+    let both = |length: f64| {
+        let mut position = at(length, 0.0, 0.0);
+        position[3] = 2.0 * length;
+        position
+    };
+    let run = |speed| Profile::rest_to_rest(speed, 40.0, 900.0).samples(both);
+    assert_passes(&verdict(&run(50.0), "G1 X40 A80 F3000"));
+    assert_passes(&verdict(&run(50.0), "G93 G1 X40 A80 F75"));
+    assert_finds(&verdict(&run(50.5), "G1 X40 A80 F3000"), &[Kind::Feed]);
+    assert_finds(&verdict(&run(50.0), "G93 G1 X40 A80 F74"), &[Kind::Feed]);
 }
 
 #[test]
