@@ -1,1 +1,14 @@
-//! Scenarios.
+//! Scenarios end to end: a program goes in, and what comes out is judged by the oracle.
+//!
+//! Random ones print their seed; `TANDEM_SEED=n cargo test -p tandem --test scenarios NAME` replays one.
+
+mod bad_input;
+mod clocks;
+mod defective;
+mod examples;
+mod harness;
+mod hold;
+mod overrides;
+mod random;
+mod report;
+mod starvation;

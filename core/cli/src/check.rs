@@ -1,6 +1,7 @@
 //! `tandem check`.
 
 use std::error::Error;
+use std::io::Write;
 
 use tandem_host::check_program;
 use tandem_machine::Machine;
@@ -15,7 +16,8 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     let name = program.name().to_string();
     let report = check_program(&machine, &built_in::registry()?, &mut program)?;
     if report.is_ok() {
-        println!("{name}: {} lines, {} blocks, {:.3} mm, no errors", report.lines, report.blocks, report.length_mm);
+        let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
+        let _ = writeln!(std::io::stdout(), "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors");
         return Ok(0);
     }
     program::print_errors(&report);

@@ -109,40 +109,40 @@ fn write_summary(path: &Path, summary: &Summary) -> Result<(), String> {
 }
 
 fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
-    let summary = &outcome.summary;
-    println!(
-        "{}: {} blocks, {:.3} mm in {:.3} s (nominal {:.3} s) with {} on {}",
-        summary.program,
-        summary.blocks,
-        summary.length_mm,
-        summary.motion_time_s,
-        summary.nominal_time_s,
-        summary.planner,
-        summary.machine
-    );
-    println!(
-        "limit violations {}, guard stops {}, governed samples {}, starvations {}, path deviation {:.3} µm",
-        summary.limit_violations,
-        summary.guard_stops,
-        summary.governed_samples,
-        summary.starvations,
-        summary.max_path_deviation_mm * 1e3
-    );
-    for (what, path) in [
-        ("trace", &options.trace),
-        ("blocks", &options.blocks),
-        ("summary", &options.summary),
-        ("report", &options.report),
-    ] {
-        if let Some(path) = path {
-            println!("{what}: {}", path.display());
-        }
-    }
-    match &summary.fault {
+    // A reader that has gone away (a closed pipe) is no reason to fail: the run is done.
+    let _ = print_outcome(&mut std::io::stdout().lock(), options, &outcome.summary);
+    match &outcome.summary.fault {
         Some(fault) => {
             eprintln!("fault: {fault}");
             FAULT
         }
         None => 0,
     }
+}
+
+fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {
+    let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
+    writeln!(
+        out,
+        "{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s) with {planner} on {machine}"
+    )?;
+    let Summary { limit_violations, guard_stops, governed_samples, starvations, .. } = summary;
+    let deviation_um = summary.max_path_deviation_mm * 1e3;
+    writeln!(
+        out,
+        "limit violations {limit_violations}, guard stops {guard_stops}, governed samples {governed_samples}, \
+         starvations {starvations}, path deviation {deviation_um:.3} µm"
+    )?;
+    let files = [
+        ("trace", &options.trace),
+        ("blocks", &options.blocks),
+        ("summary", &options.summary),
+        ("report", &options.report),
+    ];
+    for (what, path) in files {
+        if let Some(path) = path {
+            writeln!(out, "{what}: {}", path.display())?;
+        }
+    }
+    Ok(())
 }

@@ -28,6 +28,8 @@ pub struct FineConfig {
     pub guard: GuardMode,
     /// Where the machine stands.
     pub position: AxisVector,
+    /// Highest feed ratio that can be asked: the planner plans at it.
+    pub max_feed_ratio: f64,
     /// M0, M1 and M6 wait for the operator.
     pub pause_at_stops: bool,
 }

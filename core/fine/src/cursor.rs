@@ -110,11 +110,13 @@ impl Cursor {
         }
         let waiting = self.entries.slots().min(Points::SEGMENTS);
         let mut last = Ahead::at(&self.segment, self.segment.duration_s);
+        let mut most = if self.resting { 0.0 } else { self.segment.feed_mm_per_s };
         let Ok(chunk) = self.entries.read_chunk(waiting) else { return last };
         let (first, second) = chunk.as_slices();
         for queued in first.iter().chain(second) {
             let RingEntry::Segment(segment) = &queued.entry else { continue };
-            last = Ahead::at(segment, left_s.min(segment.duration_s));
+            most = segment.feed_mm_per_s.max(most);
+            last = Ahead { most_feed_mm_per_s: most, ..Ahead::at(segment, left_s.min(segment.duration_s)) };
             if left_s < segment.duration_s || ends(segment) {
                 return last;
             }
@@ -126,6 +128,9 @@ impl Cursor {
     /// Moves on by `delta_s` of program time. Events on the way are given to `event`.
     pub fn advance(&mut self, delta_s: f64, mut event: impl FnMut(&Event)) -> Reached {
         let mut left_s = delta_s;
+        if delta_s == 0.0 {
+            return if self.resting { Reached::Rest } else { Reached::Inside };
+        }
         loop {
             let here_s = if self.resting { 0.0 } else { self.segment.duration_s - self.local_s };
             if !self.resting && left_s < here_s {
@@ -174,8 +179,12 @@ fn ends(segment: &Segment) -> bool {
 pub struct Ahead {
     /// Planned path speed, mm/s.
     pub speed_mm_per_s: f64,
+    /// Path coordinate, mm.
+    pub path_mm: f64,
     /// Programmed feed, mm/s.
     pub feed_mm_per_s: f64,
+    /// Highest programmed feed on the way there, mm/s.
+    pub most_feed_mm_per_s: f64,
     /// Rapid motion.
     pub rapid: bool,
 }
@@ -184,7 +193,9 @@ impl Ahead {
     fn at(segment: &Segment, local_s: f64) -> Self {
         Self {
             speed_mm_per_s: segment.path_speed_mm_per_s(local_s),
+            path_mm: segment.path_mm(local_s),
             feed_mm_per_s: segment.feed_mm_per_s,
+            most_feed_mm_per_s: segment.feed_mm_per_s,
             rapid: segment.flags.contains(SegmentFlags::RAPID),
         }
     }

@@ -48,10 +48,15 @@ impl Governor {
 
     /// The rate at the end of this period, as near to `target` as the limits let it come.
     pub fn choose(&self, target: f64, points: &Points) -> f64 {
-        let first = self.admissible(target, self.sigma, points);
-        // The bounds depend on σ, monotonically: what holds at both ends of the period holds in between.
-        let second = self.admissible(target, first, points);
-        if (second - self.sigma).abs() < (first - self.sigma).abs() { second } else { first }
+        let direction = if target > self.sigma { 1.0 } else { -1.0 };
+        let mut most = (target - self.sigma).abs();
+        for point in points.iter() {
+            for axis in 0..self.axes {
+                let limit = self.acceleration[axis];
+                most = most.min(self.reach(point.velocity[axis], point.acceleration[axis], limit, direction));
+            }
+        }
+        (self.sigma + direction * most).clamp(0.0, 1.0)
     }
 
     /// Takes `sigma` as the rate at the end of this period; gives the program time that passes meanwhile, s.
@@ -66,22 +71,53 @@ impl Governor {
         f64::midpoint(self.sigma, sigma) * self.period_s
     }
 
-    /// `target`, cut to what the acceleration limits allow when the bounds are taken at `sigma`.
-    fn admissible(&self, target: f64, sigma: f64, points: &Points) -> f64 {
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for point in points.iter() {
-            for axis in 0..self.axes {
-                let velocity = point.velocity[axis];
-                if velocity == 0.0 {
-                    continue;
-                }
-                let planned = sigma * sigma * point.acceleration[axis];
-                let most = (MARGIN * self.acceleration[axis]).max(planned.abs());
-                let (a, b) = ((-most - planned) / velocity, (most - planned) / velocity);
-                low = low.max(a.min(b));
-                high = high.min(a.max(b));
+    /// How far σ may go in `direction` within a period before an axis with the planned `velocity` and `acceleration`
+    /// meets its `limit`.
+    ///
+    /// With σ going from σ₀ to σ₀ + d·t the axis accelerates by `σ²·q″ + d·t/T·q′`: at the start of the period linear
+    /// in t, at its end quadratic. Where it is within the limit at both ends, it is so in between.
+    fn reach(&self, velocity: f64, acceleration: f64, limit: f64, direction: f64) -> f64 {
+        let planned = self.sigma * self.sigma * acceleration;
+        let most = (MARGIN * limit).max(planned.abs());
+        let turned = direction * velocity / self.period_s;
+        let slope = turned + 2.0 * direction * self.sigma * acceleration;
+        let up = crossing(most - planned, turned, 0.0).min(crossing(most - planned, slope, acceleration));
+        let down = crossing(most + planned, -turned, 0.0).min(crossing(most + planned, -slope, -acceleration));
+        up.min(down)
+    }
+}
+
+/// The first t ≥ 0 at which `slope·t + curve·t²` rises through `gap ≥ 0`; infinite where it never does.
+fn crossing(gap: f64, slope: f64, curve: f64) -> f64 {
+    let discriminant = slope * slope + 4.0 * curve * gap;
+    if discriminant < 0.0 {
+        return f64::INFINITY;
+    }
+    let root = discriminant.sqrt();
+    // The form that does not cancel; it is 0/0 only where the curve starts at the level and falls first.
+    match slope + root {
+        sum if sum > 0.0 => 2.0 * gap / sum,
+        _ if curve > 0.0 => (root - slope) / (2.0 * curve),
+        _ => f64::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_crossing_is_the_first(gap in 0.0..10.0f64, slope in -5.0..5.0f64, curve in -5.0..5.0f64) {
+            let at = |t: f64| slope * t + curve * t * t;
+            let t = crossing(gap, slope, curve);
+            let until = if t.is_finite() { t } else { 1e3 };
+            for step in 0..100 {
+                let earlier = until * f64::from(step) / 100.0;
+                prop_assert!(at(earlier) <= gap + 1e-6 * (1.0 + gap), "{t}: {} at {earlier}", at(earlier));
             }
+            prop_assert!(t.is_infinite() || (at(t) - gap).abs() <= 1e-6 * (1.0 + gap));
         }
-        (self.sigma + ((target - self.sigma) / self.period_s).clamp(low, high.max(low)) * self.period_s).clamp(0.0, 1.0)
     }
 }

@@ -80,6 +80,12 @@ pub struct FineLoop {
     fault: Option<Fault>,
 }
 
+/// The feed ratios that count now.
+struct Ratios {
+    feed: f64,
+    rapid: f64,
+}
+
 impl FineLoop {
     /// A loop at rest. `driver` is open and started; `kinematics` is `None` where joints are axes. Host; allocates.
     pub fn new(
@@ -177,7 +183,7 @@ impl FineLoop {
     }
 
     fn wait(&mut self) -> MachineState {
-        if self.depth.may_start.load(Relaxed) {
+        if self.depth.may_start(self.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
         MachineState::Standstill
@@ -248,7 +254,7 @@ impl FineLoop {
     fn watch_queue(&mut self) {
         let wall_s = self.depth.wall_s.load();
         if self.starved {
-            self.starved = !self.depth.may_start.load(Relaxed);
+            self.starved = !self.depth.may_start(self.cursor.program_time_s());
             return;
         }
         let speed = self.governor.sigma() * self.cursor.path_speed_mm_per_s();
@@ -264,34 +270,44 @@ impl FineLoop {
     /// Chooses the rate for this period; gives the program time that passes, s.
     fn govern(&mut self, ask: Ask) -> f64 {
         self.cursor.scan(self.config.period_s, &mut self.points);
-        let limit = Governor::plan_limit(&self.points);
-        let wanted = if ask == Ask::Run { self.ratio_target() } else { 0.0 };
+        // Under `count` everything is sent: forms that break limits on purpose are not slowed.
+        let counting = self.config.guard == GuardMode::Count;
+        let limit = if counting { 1.0 } else { Governor::plan_limit(&self.points) };
+        let ratios = self.ratios_in_force();
+        let wanted = if ask == Ask::Run { self.ratio_target(&ratios) } else { 0.0 };
         let target = wanted.min(limit);
         let sigma = match target {
             1.0 if self.governor.sigma() == 1.0 => 1.0,
             _ => self.governor.choose(target, &self.points),
         };
-        self.recovering = wanted < 1.0 || (self.recovering && sigma < 1.0);
+        let asked = ask != Ask::Run || ratios.feed < self.config.max_feed_ratio || ratios.rapid < 1.0;
+        self.recovering = asked || (self.recovering && sigma < 1.0);
         self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
         self.governor.take(sigma).min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
     }
 
-    /// The rate at which the path speed is at most ratio × programmed feed at the end of the period.
-    fn ratio_target(&mut self) -> f64 {
-        let permitted = self.outputs.override_permitted;
-        let operator = |value: f64| if permitted { value } else { 1.0 };
+    fn ratios_in_force(&self) -> Ratios {
+        let operator = |value: f64| if self.outputs.override_permitted { value } else { 1.0 };
         let adaptive = if self.outputs.adaptive_permitted { self.ratio } else { 1.0 };
-        let feed_ratio = operator(self.controls.feed_override.load()) * adaptive;
-        let rapid_ratio = operator(self.controls.rapid_override.load());
-        let mut sigma = self.governor.sigma();
-        // The speed at the end of the period depends on the rate sought: two rounds settle it.
-        for _ in 0..2 {
-            let ahead = self.cursor.ahead(self.governor.program_time_s(sigma));
-            let allowed = feed_ratio * ahead.feed_mm_per_s;
+        Ratios {
+            feed: operator(self.controls.feed_override.load()) * adaptive,
+            rapid: operator(self.controls.rapid_override.load()).min(1.0),
+        }
+    }
+
+    /// The rate at which the path speed is at most ratio × programmed feed at the end of the period.
+    fn ratio_target(&mut self, ratios: &Ratios) -> f64 {
+        let (from, from_mm) = (self.governor.sigma(), self.cursor.path_mm());
+        let mut sigma = from;
+        // The plan at the end of the period depends on the rate sought: three rounds settle it.
+        for _ in 0..3 {
+            let delta_s = self.governor.program_time_s(sigma);
+            let ahead = self.cursor.ahead(delta_s);
+            let at_end = within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s);
+            let mean = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
             sigma = match ahead.rapid {
-                true => rapid_ratio.min(1.0),
-                false if ahead.speed_mm_per_s * (1.0 - 1e-12) > allowed => allowed / ahead.speed_mm_per_s,
-                false => 1.0,
+                true => ratios.rapid,
+                false => at_end.min(2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from).clamp(0.0, 1.0),
             };
         }
         sigma
@@ -389,6 +405,14 @@ impl FineLoop {
         status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
     }
 }
+
+/// The rate at which a planned speed is at most `allowed`; 1 where it is anyway, to the rounding of a long path.
+fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
+    if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed { allowed / planned_mm_per_s } else { 1.0 }
+}
+
+/// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
+const FEED_TOLERANCE: f64 = 1e-7;
 
 /// Share of the declared stop deceleration that the starvation stop counts on.
 const STOP_SHARE: f64 = 0.95;

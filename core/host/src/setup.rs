@@ -96,6 +96,7 @@ pub fn fine_config(machine: &Machine, planner: &PlannerDescription, pause_at_sto
             GuardMode::Count => tandem_fine::GuardMode::Count,
         },
         position: machine.start,
+        max_feed_ratio: machine.motion.max_feed_ratio,
         pause_at_stops,
     }
 }

@@ -1,6 +1,6 @@
 //! Floating-point atomics, and how far the queue reaches.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// An `f64` in an atomic.
 #[derive(Debug, Default)]
@@ -33,8 +33,17 @@ pub struct Depth {
     pub stop_deceleration_mm_per_s2: AtomicF64,
     /// Program time at which the queue ends; infinite where it ends at rest.
     pub wall_s: AtomicF64,
-    /// Motion may start (or start again): the worst stop, or the end of the stream, is queued, or the ring is full.
-    pub may_start: AtomicBool,
+    /// Program time that must lie before the wall for motion to start (or start again), s: the worst stop; zero where the
+    /// end of the stream is queued or the ring is full.
+    pub required_s: AtomicF64,
+}
+
+impl Depth {
+    /// Whether motion may start at program time `now_s`.
+    pub fn may_start(&self, now_s: f64) -> bool {
+        let required_s = self.required_s.load();
+        required_s.is_finite() && self.wall_s.load() - now_s >= required_s
+    }
 }
 
 impl Default for Depth {
@@ -43,7 +52,7 @@ impl Default for Depth {
         Self {
             stop_deceleration_mm_per_s2: AtomicF64::new(f64::INFINITY),
             wall_s: AtomicF64::new(0.0),
-            may_start: AtomicBool::new(false),
+            required_s: AtomicF64::new(f64::INFINITY),
         }
     }
 }

@@ -102,10 +102,9 @@ impl Queue {
         let shared = &self.end.depth;
         shared.stop_deceleration_mm_per_s2.store(self.depth.stop_deceleration_mm_per_s2());
         shared.wall_s.store(if self.ends_at_rest { f64::INFINITY } else { self.queued_s });
-        let deep = self.queued_s - now_s >= self.depth.required_s();
-        let full = !self.staged.is_empty();
-        let complete = over && self.staged.is_empty();
-        shared.may_start.store(deep || full || complete, Relaxed);
+        // What is staged waits for room: the ring is full, and deeper it does not get.
+        let enough = over || !self.staged.is_empty();
+        shared.required_s.store(if enough { 0.0 } else { self.depth.required_s() });
     }
 
     fn stage_event(&mut self, mut event: Event) {

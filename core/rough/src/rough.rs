@@ -44,6 +44,7 @@ pub enum RoughError {
 const MARGIN_PERIODS: f64 = 3.0;
 
 /// The soft loop of one program run.
+#[allow(clippy::struct_excessive_bools)] // independent facts about the stream
 pub struct RoughLoop {
     config: RoughConfig,
     source: Box<dyn Source + Send>,

@@ -1,0 +1,57 @@
+//! Bad input: a clear message, exit 1, nothing moved, nothing written.
+
+use std::fmt::Write;
+
+use crate::harness::Scenario;
+
+fn refused(program: &[u8], expected: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.ngc");
+    std::fs::write(&path, program).unwrap();
+    let done = Scenario::of(&path).run();
+    let errors = done.errors();
+    assert_eq!(done.status(), 1, "{errors}");
+    for words in expected {
+        assert!(errors.contains(words), "{words:?} is not in:\n{errors}");
+    }
+    for file in ["trace.csv", "summary.json", "blocks.csv"] {
+        assert!(!done.file(file).exists(), "{file} was written");
+    }
+}
+
+#[test]
+fn programs_that_cannot_run_say_why() {
+    refused(b"G21\nF100\nG1 X1\nG1 X9999\nM2\n", &["bad.ngc:4:", "X", "travel", "^"]);
+    refused(b"G1 X1\n", &["bad.ngc:1:", "feed"]);
+    refused(b"F100\nG2 X10 Y0 I3 J0\n", &["bad.ngc:2:", "radius"]);
+    refused(b"F100\nG1 X1 C4\n", &["bad.ngc:2:7", "C"]);
+    refused(b"F100\nG1 Xnan\n", &["bad.ngc:2:"]);
+    refused(b"F100\nG1 X1e999\n", &["bad.ngc:2:"]);
+    refused(b"F100\nG41 D1\n", &["bad.ngc:2:1", "G41"]);
+    refused(b"o100 sub\n", &["bad.ngc:1:1"]);
+    refused(b"%\nF100\nG1 X1\n", &["%"]);
+    refused(b"\x7fELF\x02\x01\x01\0\0\0\0", &["not a part program"]);
+    refused(&vec![b'X'; 10_000_000], &["bad.ngc:1:", "line"]);
+    refused(b"F100\nG1 X[1+\n", &["bad.ngc:2:"]);
+}
+
+#[test]
+fn all_errors_of_a_file_are_listed() {
+    let mut program = "F100\n".to_string();
+    for line in 0..50 {
+        writeln!(program, "G1 X{}", if line % 2 == 0 { "9999" } else { "1" }).unwrap();
+    }
+    let done = Scenario::text(&program).run();
+    assert_eq!(done.status(), 1);
+    assert_eq!(done.errors().matches("error:").count(), 25);
+}
+
+#[test]
+fn a_wrong_machine_key_names_the_nearest() {
+    let done = Scenario::text("M2\n").with(&["--set", "planner.plugn=look-ahead"]).run();
+    assert_eq!(done.status(), 1);
+    assert!(done.errors().contains("planner.plugin"), "{}", done.errors());
+    let done = Scenario::text("M2\n").with(&["--set", "planner.plugin=look-ahed"]).run();
+    assert_eq!(done.status(), 1);
+    assert!(done.errors().contains("look-ahed") && done.errors().contains("look-ahead"), "{}", done.errors());
+}

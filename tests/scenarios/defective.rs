@@ -1,0 +1,200 @@
+//! Planners with a defect: the guard stops them, and the oracle sees them without the guard.
+
+use std::path::{Path, PathBuf};
+
+use tandem_host::{Clock, Outcome, Registry, Run, RunObserver, TraceCsv};
+use tandem_machine::Machine;
+use tandem_oracle::Kind;
+use tandem_rings::Sample;
+use tandem_sdk::{
+    Accepted, Advanced, AxisVector, Block, BlockReport, Made, Planner, PlannerContext, PlannerDescription, Plugin,
+    PluginError, PluginKind, Segment, SegmentSink,
+};
+
+use crate::harness::{judge_trace, mill};
+
+/// The look-ahead planner with one of the machine's numbers 1 % too high.
+macro_rules! optimist {
+    ($name:ident, $change:expr) => {
+        fn $name(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+            let mut context = *context;
+            let change: fn(&mut PlannerContext) = $change;
+            change(&mut context);
+            let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+            make(options, &context)
+        }
+    };
+}
+
+optimist!(too_fast, |context| context.limits.axes.iter_mut().for_each(|axis| {
+    axis.feed_mm_per_s *= 1.01;
+    axis.rapid_mm_per_s *= 1.01;
+}));
+optimist!(too_hard, |context| context.limits.axes.iter_mut().for_each(|axis| axis.acceleration_mm_per_s2 *= 1.011));
+/// 1 % faster than programmed, and it says that the feed was higher.
+fn too_keen(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let mut keen = *context;
+    keen.max_feed_ratio = 1.01;
+    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+    let bend = |segment: &mut Segment| segment.feed_mm_per_s *= 1.01;
+    let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
+    Ok(Box::new(Bent { inner: make(options, &keen)?, bend, allowed }))
+}
+
+/// Steps where blocks meet twice as large as allowed, not declared.
+fn too_abrupt(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let mut rough = *context;
+    rough.limits.axes.iter_mut().for_each(|axis| axis.speed_difference_mm_per_s *= 4.0);
+    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+    let inner = make(options, &rough)?;
+    Ok(Box::new(Bent { inner, bend: |_| {}, allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s) }))
+}
+
+/// Off the path by a hundredth of a millimetre in Z, everywhere between the ends.
+fn off_the_path(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+    let bend = |segment: &mut Segment| {
+        let at = segment.coefficients[0][0] / 40.0;
+        segment.coefficients[2][0] += 1e-3 * (std::f64::consts::PI * at.clamp(0.0, 1.0)).sin();
+    };
+    let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
+    Ok(Box::new(Bent { inner: make(options, context)?, bend, allowed }))
+}
+
+/// Changes what another planner emits.
+struct Bent {
+    inner: Box<dyn Planner>,
+    bend: fn(&mut Segment),
+    allowed: [f64; 8],
+}
+
+struct BentSink<'a>(&'a mut dyn SegmentSink, fn(&mut Segment));
+
+impl SegmentSink for BentSink<'_> {
+    fn segment(&mut self, segment: &Segment) {
+        let mut segment = *segment;
+        (self.1)(&mut segment);
+        self.0.segment(&segment);
+    }
+    fn block(&mut self, report: &BlockReport) {
+        self.0.block(report);
+    }
+}
+
+impl Planner for Bent {
+    fn describe(&self) -> PlannerDescription {
+        PlannerDescription { speed_difference_mm_per_s: self.allowed, ..self.inner.describe() }
+    }
+    fn check(&self, block: &Block) -> Result<(), PluginError> {
+        self.inner.check(block)
+    }
+    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+        self.inner.accept(block)
+    }
+    fn finish(&mut self) {
+        self.inner.finish();
+    }
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+        self.inner.advance(duration_s, &mut BentSink(sink, self.bend))
+    }
+    fn reset(&mut self, position: &AxisVector) {
+        self.inner.reset(position);
+    }
+}
+
+struct Tracing(TraceCsv);
+
+impl RunObserver for Tracing {
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
+        self.0.sample(sample, signals);
+    }
+}
+
+type Maker = fn(&str, &PlannerContext) -> Made<dyn Planner>;
+
+struct Ran {
+    outcome: Outcome,
+    folder: tempfile::TempDir,
+    machine: PathBuf,
+}
+
+impl Ran {
+    fn at(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}
+
+fn run(maker: Maker, text: &str, guard: &str) -> Ran {
+    let folder = tempfile::tempdir().unwrap();
+    let (program, trace) = (folder.path().join("p.ngc"), folder.path().join("trace.csv"));
+    std::fs::write(&program, text).unwrap();
+    let machine_path = mill();
+    let overrides =
+        [("guard.mode", guard), ("planner.plugin", "defective")].map(|(k, v)| (k.to_string(), v.to_string()));
+    let machine = Machine::read(&machine_path, &overrides).unwrap();
+    let mut registry = Registry::default();
+    registry.register(tandem_sim::PLUGIN).unwrap();
+    registry.register(Plugin { name: "defective", version: "0", kind: PluginKind::Planner(maker) }).unwrap();
+    let run = Run::prepare(machine.clone(), &registry, tandem_gcode::Program::open(&program).unwrap(), false).unwrap();
+    let mut tracing = Tracing(TraceCsv::create(&trace, &machine, &[]).unwrap());
+    let outcome = run.drive(Clock::Virtual, &[], &mut tracing).unwrap();
+    tracing.0.finish().unwrap();
+    Ran { outcome, folder, machine: machine_path }
+}
+
+fn kinds(ran: &Ran, ends_early: bool) -> Vec<Kind> {
+    let verdict = judge_trace(&ran.at("trace.csv"), &ran.at("p.ngc"), Path::new(&ran.machine), |options| {
+        options.ends_early = ends_early;
+        options.sample_tolerance_mm = Some(if ends_early { 1e3 } else { 2e-6 });
+        options.vertex_tolerance_mm = Some(1e3);
+    });
+    assert!(verdict.not_judged.is_none(), "{verdict}");
+    verdict.kinds()
+}
+
+const RAPID: &str = "G21 G90\nG0 X200\nG0 X-200\nM2\n";
+const CORNER: &str = "G21 G90\nF6000\nG1 X20\nG1 Y20\nG1 X0\nM2\n";
+const LINE: &str = "G21 G90\nF3000\nG1 X40\nM2\n";
+
+#[test]
+fn the_guard_stops_what_exceeds_a_limit_and_ramps_out_within_limits() {
+    for (maker, text, word) in [(too_abrupt as Maker, CORNER, "acceleration"), (too_abrupt, RAPID, "")] {
+        let ran = run(maker, text, "stop");
+        if word.is_empty() {
+            assert_eq!(ran.outcome.summary.fault, None, "nothing steps here");
+            continue;
+        }
+        let fault = ran.outcome.summary.fault.clone().unwrap();
+        assert!(fault.contains(word) && fault.contains("defective") && fault.contains("axis"), "{fault}");
+        assert_eq!(ran.outcome.summary.guard_stops, 1);
+        assert_eq!(kinds(&ran, true), [], "what was sent, to standstill, is within limits");
+    }
+}
+
+#[test]
+fn the_governor_slows_what_exceeds_a_limit_and_counts_it() {
+    for maker in [too_fast as Maker, too_hard] {
+        let ran = run(maker, RAPID, "stop");
+        assert!(ran.outcome.summary.governed_samples > 0 || ran.outcome.summary.guard_stops > 0);
+        assert_eq!(kinds(&ran, ran.outcome.fault.is_some()), [], "what was sent is within limits");
+    }
+}
+
+#[test]
+fn the_oracle_sees_a_feed_one_percent_too_high() {
+    let ran = run(too_keen, LINE, "count");
+    assert_eq!(kinds(&ran, false), [Kind::Feed]);
+}
+
+#[test]
+fn the_oracle_sees_a_planner_off_the_path() {
+    let ran = run(off_the_path, LINE, "count");
+    assert!(kinds(&ran, false).contains(&Kind::PathDeviation), "{:?}", kinds(&ran, false));
+}
+
+#[test]
+fn the_oracle_sees_steps_that_are_too_large() {
+    let ran = run(too_abrupt, CORNER, "count");
+    assert!(ran.outcome.summary.limit_violations > 0);
+    assert_eq!(kinds(&ran, false), [Kind::SpeedStep]);
+}

@@ -1,0 +1,180 @@
+//! Running the `tandem` binary and judging its trace.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use tandem_oracle::{Machine, Options, Trace, Verdict, judge};
+use tempfile::TempDir;
+
+/// The folder of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+/// The machine that every example runs on.
+pub fn mill() -> PathBuf {
+    root().join("examples/machines/mill-3axis.toml")
+}
+
+/// A run in the making.
+pub struct Scenario {
+    folder: TempDir,
+    program: PathBuf,
+    machine: PathBuf,
+    arguments: Vec<String>,
+}
+
+/// What a run left.
+pub struct Done {
+    pub output: Output,
+    folder: TempDir,
+    program: PathBuf,
+    machine: PathBuf,
+}
+
+impl Scenario {
+    /// Runs the file `program` on the mill.
+    pub fn of(program: &Path) -> Self {
+        Self { folder: TempDir::new().unwrap(), program: program.to_owned(), machine: mill(), arguments: vec![] }
+    }
+
+    /// Runs the program text on the mill.
+    pub fn text(program: &str) -> Self {
+        let mut this = Self::of(Path::new(""));
+        this.program = this.folder.path().join("program.ngc");
+        std::fs::write(&this.program, program).unwrap();
+        this
+    }
+
+    /// On another machine.
+    pub fn on(mut self, machine: &Path) -> Self {
+        machine.clone_into(&mut self.machine);
+        self
+    }
+
+    /// With further arguments.
+    pub fn with(mut self, arguments: &[&str]) -> Self {
+        self.arguments.extend(arguments.iter().map(|a| (*a).to_string()));
+        self
+    }
+
+    /// With operator commands, a line each.
+    pub fn commands(self, lines: &str) -> Self {
+        let path = self.folder.path().join("commands.csv");
+        std::fs::write(&path, lines).unwrap();
+        let path = path.to_string_lossy().into_owned();
+        self.with(&["--commands", &path])
+    }
+
+    /// Runs it.
+    pub fn run(self) -> Done {
+        let at = |name: &str| self.folder.path().join(name);
+        let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
+            .arg("run")
+            .arg(&self.program)
+            .arg("--machine")
+            .arg(&self.machine)
+            .args(["--trace".as_ref(), at("trace.csv").as_os_str()])
+            .args(["--summary".as_ref(), at("summary.json").as_os_str()])
+            .args(["--blocks".as_ref(), at("blocks.csv").as_os_str()])
+            .args(&self.arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .and_then(wait)
+            .unwrap();
+        Done { output, folder: self.folder, program: self.program, machine: self.machine }
+    }
+}
+
+/// Waits for a run; one that never ends is ended, so that a defect shows as a failure and not as a full disk.
+fn wait(mut child: Child) -> std::io::Result<Output> {
+    for _ in 0..PATIENCE {
+        if child.try_wait()?.is_some() {
+            return child.wait_with_output();
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill()?;
+    child.wait_with_output()
+}
+
+/// How often [`wait`] looks, 2 ms apart at least.
+const PATIENCE: u32 = 30_000;
+
+impl Done {
+    /// Exit status.
+    pub fn status(&self) -> i32 {
+        self.output.status.code().expect("the run was ended: it went on for minutes")
+    }
+
+    /// What was printed to standard error.
+    pub fn errors(&self) -> String {
+        String::from_utf8_lossy(&self.output.stderr).into_owned()
+    }
+
+    /// A file that the run may have written.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The summary.
+    pub fn summary(&self) -> Value {
+        let text = std::fs::read_to_string(self.file("summary.json"));
+        serde_json::from_str(&text.unwrap_or_else(|_| panic!("no summary: {}", self.errors()))).unwrap()
+    }
+
+    /// A number of the summary.
+    pub fn number(&self, key: &str) -> f64 {
+        self.summary()[key].as_f64().unwrap()
+    }
+
+    /// A column of the trace.
+    pub fn column(&self, name: &str) -> Vec<f64> {
+        self.cells(name).iter().map(|cell| cell.parse().unwrap()).collect()
+    }
+
+    /// A column of the trace as text.
+    pub fn cells(&self, name: &str) -> Vec<String> {
+        let mut reader = csv::Reader::from_path(self.file("trace.csv")).unwrap();
+        let index = reader.headers().unwrap().iter().position(|h| h == name).unwrap();
+        reader.records().map(|row| row.unwrap()[index].to_string()).collect()
+    }
+
+    /// The oracle's verdict with the machine's own options, changed by `adjust`.
+    pub fn judge(&self, adjust: impl FnOnce(&mut Options)) -> Verdict {
+        judge_trace(&self.file("trace.csv"), &self.program, &self.machine, adjust)
+    }
+
+    /// *Within limits* as the design defines it: exit 0, all blocks, end reached, nothing stopped or governed, and the
+    /// oracle passes. The path is exact: samples on it, corners cut by no more than a chord between two samples.
+    pub fn assert_within_limits(&self) -> Verdict {
+        assert_eq!(self.status(), 0, "{}", self.errors());
+        for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples", "lost_samples"] {
+            assert_eq!(self.number(count), 0.0, "{count}");
+        }
+        let chord_mm = self.fastest_mm_per_s() * self.number("fine_period_s") / 2.0;
+        let verdict = self.judge(|options| {
+            options.sample_tolerance_mm = Some(2e-6);
+            options.vertex_tolerance_mm = Some(chord_mm.max(1e-6));
+        });
+        assert!(verdict.passed(), "{}\n{verdict}", self.program.display());
+        verdict
+    }
+
+    fn fastest_mm_per_s(&self) -> f64 {
+        self.column("feed_mm_s").into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// The oracle's verdict on a trace file.
+pub fn judge_trace(trace: &Path, program: &Path, machine: &Path, adjust: impl FnOnce(&mut Options)) -> Verdict {
+    let machine = Machine::read(machine).unwrap();
+    let trace = Trace::read(trace).unwrap();
+    let mut options = Options::for_machine(&machine);
+    adjust(&mut options);
+    judge(&trace, &std::fs::read_to_string(program).unwrap(), &machine, &options)
+}

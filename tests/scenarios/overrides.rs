@@ -1,0 +1,48 @@
+//! Feed override: a cap on the path speed, not a scale on the corners.
+
+use crate::harness::{Scenario, root};
+
+#[test]
+fn half_the_override_is_half_the_feed_and_the_same_corners() {
+    let program = root().join("examples/programs/square.ngc");
+    let free = Scenario::of(&program).run();
+    let done = Scenario::of(&program).commands("0,feed-override,0.5\n").run();
+    done.assert_within_limits();
+    let top = |feed: Vec<f64>| feed.into_iter().fold(0.0, f64::max);
+    let top_mm_per_s = top(done.column("feed_mm_s"));
+    assert!((top_mm_per_s / (5000.0 / 120.0) - 1.0).abs() < 1e-6, "{top_mm_per_s}");
+    let (half_s, full_s) = (done.number("motion_time_s"), free.number("motion_time_s"));
+    assert!(half_s < 1.9 * full_s, "corners are not slowed: {half_s} against {full_s}");
+}
+
+#[test]
+fn steps_of_the_override_keep_the_limits() {
+    for program in ["square.ngc", "serpentine.ngc"] {
+        let path = root().join("examples/programs").join(program);
+        for shift in (0..200).step_by(23) {
+            let steps = [0.3, 1.0, 0.0, 0.8, 0.1, 1.0].iter().enumerate();
+            let lines: String = steps.map(|(i, r)| format!("{},feed-override,{r}\n", 50 + shift + 150 * i)).collect();
+            Scenario::of(&path).commands(&lines).run().assert_within_limits();
+        }
+    }
+}
+
+#[test]
+fn the_program_can_forbid_the_override() {
+    let text = "G21 G90\nM49\nF3000\nG1 X20\nM2\n";
+    let free = Scenario::text(text).run();
+    let done = Scenario::text(text).commands("0,feed-override,0.5\n").run();
+    done.assert_within_limits();
+    assert_eq!(done.column("x_cmd_mm"), free.column("x_cmd_mm"));
+}
+
+#[test]
+fn the_rapid_override_slows_rapids_only() {
+    let text = "G21 G90\nF3000\nG1 X20\nG0 X-60\nG1 X-50\nM2\n";
+    let done = Scenario::text(text).commands("0,rapid-override,0.25\n").run();
+    done.assert_within_limits();
+    let (feed, line) = (done.column("feed_mm_s"), done.column("line"));
+    let top = |number: f64| feed.iter().zip(&line).filter(|(_, l)| **l == number).map(|(f, _)| *f).fold(0.0, f64::max);
+    assert!((top(3.0) - 50.0).abs() < 1e-6);
+    assert!(top(4.0) <= 0.25 * 250.0 + 1e-6, "{}", top(4.0));
+}

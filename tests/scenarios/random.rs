@@ -1,0 +1,146 @@
+//! Random programs from a printed seed.
+
+use std::fmt::Write;
+
+use crate::harness::{Scenario, root};
+
+/// A small generator (xorshift64*): the same program for the same seed everywhere.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    fn below(&mut self, count: u64) -> u64 {
+        (self.next() >> 33) % count
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A program of lines, arcs, helices, chords, dwells, exact stops and feed changes, well inside the travel.
+fn program(seed: u64) -> String {
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut text = String::from("G21 G90 G94 G17\nG64\nF2000\n");
+    let mut at = [0.0f64; 3];
+    for _ in 0..random.below(80) + 3 {
+        element(&mut random, &mut at, &mut text);
+    }
+    text.push_str("M2\n");
+    text
+}
+
+fn element(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
+    match random.below(12) {
+        0 => writeln!(text, "F{:.0}", random.between(50.0, 15000.0)).unwrap(),
+        1 => writeln!(text, "{}", ["G61", "G64", "G61.1", "G64 P0.02"][random.below(4) as usize]).unwrap(),
+        2 => writeln!(text, "G4 P{:.3}", random.between(0.0, 0.02)).unwrap(),
+        3 => line(random, at, text, "G0", 30.0),
+        4 => arc(random, at, text),
+        5 => chords(random, at, text),
+        6 => line(random, at, text, "G1", 0.02),
+        7 => line(random, at, text, "G1", 0.5),
+        _ => line(random, at, text, "G1", 15.0),
+    }
+}
+
+fn line(random: &mut Random, at: &mut [f64; 3], text: &mut String, word: &str, reach: f64) {
+    let axes = random.below(7) + 1;
+    write!(text, "{word}").unwrap();
+    for (axis, letter) in "XYZ".chars().enumerate().filter(|(axis, _)| axes >> axis & 1 == 1) {
+        at[axis] = (at[axis] + random.between(-reach, reach)).clamp(-60.0, 60.0);
+        write!(text, " {letter}{:.6}", at[axis]).unwrap();
+        at[axis] = format!("{:.6}", at[axis]).parse().unwrap();
+    }
+    text.push('\n');
+}
+
+/// A full circle or helix in one of the planes; it ends where it began in the plane.
+fn arc(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
+    let word = if random.below(2) == 0 { "G2" } else { "G3" };
+    let (plane, first, second, across) =
+        [("G17", 'I', 'J', 2), ("G18", 'I', 'K', 1), ("G19", 'J', 'K', 0)][random.below(3) as usize];
+    let (a, b) = (random.between(-8.0, 8.0), random.between(0.1, 8.0));
+    write!(text, "{plane} {word} {first}{a:.4} {second}{b:.4}").unwrap();
+    if random.below(2) == 0 {
+        at[across] = (at[across] + random.between(-3.0, 3.0)).clamp(-60.0, 60.0);
+        write!(text, " {}{:.6}", ['X', 'Y', 'Z'][across], at[across]).unwrap();
+        at[across] = format!("{:.6}", at[across]).parse().unwrap();
+    }
+    text.push_str("\nG17\n");
+}
+
+/// A stretch of short chords along a bending path, as CAM writes it.
+fn chords(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
+    let (mut angle, bend, step) = (random.between(0.0, 6.28), random.between(-0.2, 0.2), random.between(0.005, 0.4));
+    for _ in 0..random.below(60) + 5 {
+        angle += bend;
+        at[0] = (at[0] + step * angle.cos()).clamp(-60.0, 60.0);
+        at[1] = (at[1] + step * angle.sin()).clamp(-60.0, 60.0);
+        writeln!(text, "G1 X{:.4} Y{:.4}", at[0], at[1]).unwrap();
+        at[0] = format!("{:.4}", at[0]).parse().unwrap();
+        at[1] = format!("{:.4}", at[1]).parse().unwrap();
+    }
+}
+
+fn seeds(count: u64) -> Vec<u64> {
+    match std::env::var("TANDEM_SEED") {
+        Ok(seed) => vec![seed.parse().unwrap()],
+        Err(_) => (1..=count).collect(),
+    }
+}
+
+#[test]
+fn random_programs_run_within_limits() {
+    for seed in seeds(250) {
+        println!("seed {seed}");
+        let text = program(seed);
+        let done = Scenario::text(&text).run();
+        done.assert_within_limits();
+        assert_eq!(done.number("starvations"), 0.0, "seed {seed}");
+    }
+}
+
+#[test]
+fn random_holds_and_stalls_keep_the_limits() {
+    for seed in seeds(150) {
+        println!("seed {seed}");
+        let mut random = Random(seed | 1 << 40);
+        let mut lines = String::new();
+        let mut tick = 0;
+        for _ in 0..6 {
+            tick += random.below(150) + 1;
+            let command = match random.below(3) {
+                0 => format!("{tick},hold\n{},resume\n", tick + random.below(150)),
+                1 => format!("{tick},feed-override,{:.2}\n", random.between(0.0, 1.0)),
+                _ => format!("{tick},stall-rough,{}\n", random.below(60)),
+            };
+            lines += &command;
+            tick += 150;
+        }
+        lines += &format!("{},feed-override,1\n", tick + 1);
+        Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
+    }
+}
+
+#[test]
+fn random_programs_pass_the_check() {
+    for seed in seeds(20) {
+        let text = program(seed);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.ngc");
+        std::fs::write(&path, text).unwrap();
+        let checked = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
+            .args(["check".as_ref(), path.as_os_str(), "--machine".as_ref()])
+            .arg(root().join("examples/machines/mill-3axis.toml"))
+            .output()
+            .unwrap();
+        assert!(checked.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&checked.stderr));
+    }
+}

@@ -1,0 +1,35 @@
+//! The report of a real run, opened in a real browser.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::harness::{Scenario, root};
+
+const BROWSER: &str = "/usr/bin/chromium";
+
+#[test]
+fn the_report_opens_in_a_browser() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let path = page.to_string_lossy().into_owned();
+    let done = Scenario::of(&root().join("examples/programs/serpentine.ngc")).with(&["--report", &path]).run();
+    done.assert_within_limits();
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(!html.contains("http://") && !html.contains("https://"), "the page fetches something");
+    if !Path::new(BROWSER).exists() {
+        println!("skipped: chromium is not installed (apt-get install chromium)");
+        return;
+    }
+    let shown = Command::new(BROWSER)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"])
+        .args(["--disable-component-update", "--disable-sync", "--window-size=1280,900", "--virtual-time-budget=8000"])
+        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
+        .arg("--dump-dom")
+        .arg(format!("file://{path}"))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    let dom = String::from_utf8_lossy(&shown.stdout);
+    assert!(dom.contains("data-ready=\"1\""), "the page did not come up: {}", String::from_utf8_lossy(&shown.stderr));
+    assert!(!dom.contains("data-errors=\""), "script errors");
+}
