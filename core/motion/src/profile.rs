@@ -29,14 +29,10 @@ impl Profile {
         [(peak - start) / a, ((self.length_mm - ramps_mm) / peak).max(0.0), (peak - end) / a]
     }
 
-    /// Duration of the whole, s.
-    pub fn duration_s(&self) -> f64 {
-        self.durations_s().iter().sum()
-    }
-
-    /// The pieces in order; those too short to matter (below 1e-12 s) have no duration.
-    pub fn pieces(&self) -> [SpeedPiece; 3] {
-        let [up, cruise, down] = self.durations_s();
+    /// The pieces in order, with the [durations](Profile::durations_s) of this profile; those too short to matter (below
+    /// 1e-12 s) have none.
+    pub fn pieces(&self, durations_s: [f64; 3]) -> [SpeedPiece; 3] {
+        let [up, cruise, down] = durations_s;
         let (a, peak) = (self.acceleration_mm_per_s2, self.peak_mm_per_s);
         // The last ramp is laid from the end of the block, so that rounding falls into the cruise.
         let down_mm = (peak - self.end_mm_per_s) * (peak + self.end_mm_per_s) / (2.0 * a);
@@ -72,7 +68,7 @@ mod tests {
             };
             let mut at = 0.0;
             let mut speed = start;
-            for piece in profile.pieces() {
+            for piece in profile.pieces(profile.durations_s()) {
                 if piece.duration_s == 0.0 { continue; }
                 prop_assert!((piece.start_mm - at).abs() < 1e-9 && (piece.speed_mm_per_s - speed).abs() < 1e-9);
                 at += (speed + piece.acceleration_mm_per_s2 * piece.duration_s / 2.0) * piece.duration_s;

@@ -1,11 +1,11 @@
 //! Segments from a path and a piece of constant path acceleration.
 
-use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, MAX_AXES, Segment};
 
 use crate::Path;
 
 /// A stretch of constant acceleration in the middle of which a segment lies.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedPiece {
     /// Path coordinate in the block at the start, mm.
     pub start_mm: f64,
@@ -29,33 +29,25 @@ impl SpeedPiece {
     }
 }
 
-/// Makes the segments of one block.
-#[derive(Clone, Copy, Debug)]
-pub struct Builder {
-    blank: Segment,
-    path: Path,
-    path_start_mm: f64,
-    max_angle_rad: f64,
-}
-
 /// Share of the 1e-6 mm that a segment may stand off its path.
 const FIT_MM: f64 = 1e-8;
 
+/// Draws the segments of one block: how they lie on the path, and how long they may be.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Builder {
+    path_start_mm: f64,
+    /// Most that a segment may turn, rad.
+    max_angle_rad: f64,
+}
+
 impl Builder {
-    /// Segments of the block whose `path` starts `path_start_mm` after the start of the run. Block, line, feed and flags
-    /// are the planner's to set in [`Builder::blank`].
+    /// Segments of the block whose `path` starts `path_start_mm` after the start of the run.
     pub fn new(path: &Path, path_start_mm: f64) -> Self {
-        let mut blank = Segment::rest(path.start(), 0.0);
-        blank.flags = SegmentFlags::default();
         // The quintic through position, velocity and acceleration at both ends of an arc of angle θ stands off by at
         // most R·θ⁶/(6!·2⁶): the Hermite remainder of a sine.
-        let max_angle_rad = (46_080.0 * FIT_MM / path.radius_mm()).powf(1.0 / 6.0);
-        Self { blank, path: *path, path_start_mm, max_angle_rad }
-    }
-
-    /// The blank that every segment of the block starts from: flags and the like may be set on it.
-    pub fn blank(&mut self) -> &mut Segment {
-        &mut self.blank
+        let most = |radius_mm: f64| (46_080.0 * FIT_MM / radius_mm).powf(1.0 / 6.0);
+        let max_angle_rad = if path.is_straight() { f64::INFINITY } else { most(path.radius_mm()) };
+        Self { path_start_mm, max_angle_rad }
     }
 
     /// Where the block starts on the path of the run, mm.
@@ -64,47 +56,52 @@ impl Builder {
     }
 
     /// The longest duration, s, that one segment from `piece` may have and stay within its fit.
-    pub fn longest_s(&self, piece: &SpeedPiece) -> f64 {
-        if self.path.is_straight() {
+    pub fn longest_s(&self, path: &Path, piece: &SpeedPiece) -> f64 {
+        if path.is_straight() {
             return f64::INFINITY;
         }
         let fastest = piece.speed_mm_per_s.max(piece.speed(piece.duration_s));
-        self.max_angle_rad / (self.path.rad_per_mm() * fastest)
+        self.max_angle_rad / (path.rad_per_mm() * fastest)
     }
 
-    /// The segment that drives `piece`. `piece.duration_s` is at most [`Builder::longest_s`].
-    pub fn segment(&self, piece: &SpeedPiece) -> Segment {
-        let mut segment = self.blank;
+    /// Writes duration and polynomials of the segment that drives `piece`; the rest of it is the planner's.
+    /// `piece.duration_s` is at most [`Builder::longest_s`].
+    pub fn draw(&self, path: &Path, piece: &SpeedPiece, segment: &mut Segment) {
+        let (speed, half_acceleration) = (piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0);
         segment.duration_s = piece.duration_s;
-        segment.path[0] = self.path_start_mm + piece.start_mm;
-        segment.path[1] = piece.speed_mm_per_s;
-        segment.path[2] = piece.acceleration_mm_per_s2 / 2.0;
-        segment.coefficients = if self.path.is_straight() { self.parabola(piece) } else { self.quintic(piece) };
-        segment
+        segment.path = [self.path_start_mm + piece.start_mm, speed, half_acceleration, 0.0, 0.0, 0.0];
+        if path.is_straight() {
+            parabola(path, piece, &mut segment.coefficients);
+        } else {
+            quintic(path, piece, &mut segment.coefficients);
+        }
     }
+}
 
-    fn parabola(&self, piece: &SpeedPiece) -> [[f64; 6]; MAX_AXES] {
-        let at = self.path.position(piece.start_mm);
-        let direction = self.path.direction(piece.start_mm);
-        std::array::from_fn(|axis| {
-            let u = direction[axis];
-            [at[axis], piece.speed_mm_per_s * u, piece.acceleration_mm_per_s2 / 2.0 * u, 0.0, 0.0, 0.0]
-        })
+fn parabola(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_AXES]) {
+    let at = path.position(piece.start_mm);
+    let direction = path.direction(piece.start_mm);
+    let velocity = direction * piece.speed_mm_per_s;
+    let half_acceleration = direction * (piece.acceleration_mm_per_s2 / 2.0);
+    for (axis, c) in coefficients.iter_mut().enumerate() {
+        *c = [at[axis], velocity[axis], half_acceleration[axis], 0.0, 0.0, 0.0];
     }
+}
 
-    fn quintic(&self, piece: &SpeedPiece) -> [[f64; 6]; MAX_AXES] {
-        let start = self.state(piece, 0.0);
-        let end = self.state(piece, piece.duration_s);
-        std::array::from_fn(|axis| hermite(start.map(|v| v[axis]), end.map(|v| v[axis]), piece.duration_s))
+fn quintic(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_AXES]) {
+    let start = state(path, piece, 0.0);
+    let end = state(path, piece, piece.duration_s);
+    for (axis, c) in coefficients.iter_mut().enumerate() {
+        *c = hermite(start.map(|v| v[axis]), end.map(|v| v[axis]), piece.duration_s);
     }
+}
 
-    /// Position, velocity and acceleration at local time `t_s`.
-    fn state(&self, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
-        let (s_mm, speed) = (piece.path_mm(t_s), piece.speed(t_s));
-        let direction = self.path.direction(s_mm);
-        let acceleration = direction * piece.acceleration_mm_per_s2 + self.path.curvature(s_mm) * (speed * speed);
-        [self.path.position(s_mm), direction * speed, acceleration]
-    }
+/// Position, velocity and acceleration at local time `t_s`.
+fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
+    let (s_mm, speed) = (piece.path_mm(t_s), piece.speed(t_s));
+    let direction = path.direction(s_mm);
+    let acceleration = direction * piece.acceleration_mm_per_s2 + path.curvature(s_mm) * (speed * speed);
+    [path.position(s_mm), direction * speed, acceleration]
 }
 
 /// The quintic with value, first and second derivative `from` at 0 and `to` at `h`, in the powers of t.
@@ -147,8 +144,9 @@ mod tests {
             let path = Path::new(&block).unwrap();
             let builder = Builder::new(&path, 0.0);
             let mut piece = SpeedPiece { start_mm: 0.01 * radius, speed_mm_per_s: speed, acceleration_mm_per_s2: a, duration_s: 0.001 };
-            piece.duration_s = builder.longest_s(&piece).min(0.008).min(0.9 * speed / a.abs());
-            let segment = builder.segment(&piece);
+            piece.duration_s = builder.longest_s(&path, &piece).min(0.008).min(0.9 * speed / a.abs());
+            let mut segment = Segment::rest(path.start(), 0.0);
+            builder.draw(&path, &piece, &mut segment);
             let t = at * piece.duration_s;
             let off = segment.position(t) - path.position(piece.path_mm(t));
             prop_assert!(off.0.iter().all(|d| d.abs() < 1e-7), "{off:?}");

@@ -1,6 +1,7 @@
 //! The buffered blocks and their junction feeds: the two-array form of the look-ahead.
 
 use crate::geometry::Entry;
+use crate::junction::{End, Rule};
 use crate::rows::Transfer;
 
 /// One block's numbers for the update, all in squares of speeds, mm²/s².
@@ -20,7 +21,17 @@ impl Node {
     const BLANK: Self = Self { cap: 0.0, reach: 0.0, start: 0.0, transfer: Transfer::BLANK };
 }
 
-/// Blocks in order; the first one is the next to be driven. A ring, so that nothing is moved.
+/// A block taken out of the buffer. Its entry stays where it is until the next one is taken.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Taken {
+    /// Squares of its start and end speed.
+    pub squares: [f64; 2],
+    /// Running number.
+    number: usize,
+}
+
+/// Blocks in order; the first one is the next to be driven. A ring, so that nothing is moved: a block is written into
+/// its slot when it comes and stays there until it has been driven.
 #[derive(Debug)]
 pub struct Buffer {
     nodes: Vec<Node>,
@@ -31,6 +42,8 @@ pub struct Buffer {
     first: usize,
     dirty: usize,
     end: usize,
+    /// Whether the slot at `end` holds a block whose end junction is not known yet.
+    open: bool,
     /// Square of what the last block itself allows.
     last_own: f64,
 }
@@ -38,8 +51,8 @@ pub struct Buffer {
 impl Buffer {
     /// An empty buffer for `capacity` blocks. Allocates for good.
     pub fn new(capacity: usize) -> Self {
-        // One more than the capacity: the block whose successor is not known comes on top.
-        let room = (capacity + 1).next_power_of_two();
+        // Two more than the capacity: the block being driven, and the one whose successor is not known.
+        let room = (capacity + 2).next_power_of_two();
         Self {
             nodes: vec![Node::BLANK; room],
             entries: vec![Entry::blank(); room],
@@ -48,11 +61,12 @@ impl Buffer {
             first: 0,
             dirty: 0,
             end: 0,
+            open: false,
             last_own: 0.0,
         }
     }
 
-    /// Blocks waiting.
+    /// Blocks waiting whose end junction is known.
     pub fn len(&self) -> usize {
         self.end - self.first
     }
@@ -64,30 +78,80 @@ impl Buffer {
 
     /// Forgets all blocks.
     pub fn clear(&mut self) {
-        (self.first, self.dirty, self.end) = (0, 0, 0);
+        (self.first, self.dirty, self.end, self.open) = (0, 0, 0, false);
     }
 
-    /// Adds a block. An empty buffer starts at rest: the block driven before it ends there.
-    pub fn push(&mut self, entry: &Entry) {
-        let own = entry.feed_mm_per_s.powi(2).min(entry.rows.turning_cap());
-        let cap = entry.junction_mm_per_s.powi(2).min(own).min(self.last_own);
+    /// Adds the block that `write` puts into its slot; with it the one before becomes ready to be planned.
+    pub fn push(&mut self, rule: &Rule, write: impl FnOnce(&mut Entry)) {
+        if !self.open {
+            write(&mut self.entries[self.end & self.mask]);
+            self.open = true;
+            return;
+        }
+        let slots = [self.end & self.mask, (self.end + 1) & self.mask];
+        let Ok([before, after]) = self.entries.get_disjoint_mut(slots) else { unreachable!("there are two slots") };
+        write(after);
+        rule.join(before, after);
+        let end = End { junction_mm_per_s: after.junction_mm_per_s, half_step: after.half_step };
+        rule.limit(before, &end, &mut self.nodes[self.end & self.mask].transfer);
+        self.close();
+    }
+
+    /// Nothing follows for now: the last block ends at rest.
+    pub fn finish(&mut self, rule: &Rule) {
+        if self.open {
+            let slot = self.end & self.mask;
+            rule.limit(&mut self.entries[slot], &End::default(), &mut self.nodes[slot].transfer);
+            self.close();
+            self.open = false;
+        }
+    }
+
+    /// The end junction of the block at `end` is known. An empty buffer starts at rest: the block driven before ends so.
+    fn close(&mut self) {
+        let entry = &self.entries[self.end & self.mask];
+        let own = entry.own_square;
+        let node = &mut self.nodes[self.end & self.mask];
+        node.cap = entry.junction_mm_per_s.powi(2).min(own).min(self.last_own);
+        (node.reach, node.start) = (0.0, 0.0);
         self.last_own = own;
-        let transfer = entry.rows.transfer(entry.length_mm());
-        self.nodes[self.end & self.mask] = Node { cap, reach: 0.0, start: 0.0, transfer };
-        self.entries[self.end & self.mask].clone_from(entry);
         self.end += 1;
     }
 
-    /// Takes the first block with the squares of its start and end speed; `None` where there is no block.
-    pub fn pop(&mut self) -> Option<(&Entry, f64, f64)> {
-        self.update();
+    /// Takes the first block; `None` where there is none.
+    pub fn pop(&mut self) -> Option<Taken> {
+        if !self.is_settled() {
+            self.update();
+        }
         if self.len() == 0 {
             return None;
         }
-        let index = self.first & self.mask;
-        let end = if self.len() > 1 { self.nodes[(self.first + 1) & self.mask].start } else { 0.0 };
+        let number = self.first;
+        let end = if self.len() > 1 { self.nodes[(number + 1) & self.mask].start } else { 0.0 };
         self.first += 1;
-        Some((&self.entries[index], self.nodes[index].start, end))
+        Some(Taken { squares: [self.nodes[number & self.mask].start, end], number })
+    }
+
+    /// What is known of a block that was taken.
+    pub fn entry(&self, taken: &Taken) -> &Entry {
+        &self.entries[taken.number & self.mask]
+    }
+
+    /// Half the change of direction at the end of a block that was taken.
+    pub fn end_half_step(&self, taken: &Taken) -> &tandem_sdk::AxisVector {
+        &self.entries[(taken.number + 1) & self.mask].half_step
+    }
+
+    /// Whether the end of the first block is as fast as its junction and its start allow: no block that has come since
+    /// the last update can raise it. While the machine cruises, this puts the update off until a bufferful has come,
+    /// and the blocks near the end are not planned again with each that follows.
+    fn is_settled(&self) -> bool {
+        if self.first + 1 >= self.dirty {
+            return false;
+        }
+        let first = &self.nodes[self.first & self.mask];
+        let next = &self.nodes[(self.first + 1) & self.mask];
+        next.start >= next.cap.min(first.transfer.apply(first.start))
     }
 
     /// Raises junction feeds for the blocks that have come: backward as far as anything changes, then forward.

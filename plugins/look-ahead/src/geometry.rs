@@ -3,7 +3,17 @@
 use tandem_motion::Path;
 use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy};
 
-use crate::rows::Rows;
+use crate::rows::{Rows, least_ratio};
+
+/// What a block does.
+#[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant)] // slots of one ring; boxing would allocate for every block
+pub enum Course {
+    /// Moves on a path.
+    Path(Path),
+    /// Rests at a place for a time, s.
+    Dwell(AxisVector, f64),
+}
 
 /// A block with everything that does not change while feeds are raised.
 #[derive(Clone, Debug)]
@@ -18,59 +28,64 @@ pub struct Entry {
     pub ends_at_rest: bool,
     /// What set the highest feed.
     pub feed_reason: LimitedBy,
-    /// Its path; `None` for a dwell.
-    pub path: Option<Path>,
-    /// Where it ends.
-    pub end: AxisVector,
-    /// Half the change of direction at the start and at the end junction; zero where the machine rests there.
-    pub half_steps: [AxisVector; 2],
     /// The programmed feed under the policy's cap, mm/s.
     pub command_mm_per_s: f64,
     /// Highest feed, mm/s, from command and axis speeds.
     pub feed_mm_per_s: f64,
-    /// Duration of a dwell, s.
-    pub dwell_s: f64,
     /// Highest feed the start junction's rule allows, before the blocks' own limits, mm/s.
     pub junction_mm_per_s: f64,
+    /// Square of the highest speed inside, from the feed and what turning may take; known with the end junction.
+    pub own_square: f64,
+    /// Half the change of direction at the start junction; zero where the machine rests there.
+    pub half_step: AxisVector,
     /// Limits inside the block; filled in when its end junction is known.
     pub rows: Rows,
+    /// Its path or dwell.
+    pub course: Course,
 }
 
 impl Entry {
     /// A dwell of no duration.
     pub fn blank() -> Self {
-        Self::new(&Block::at(AxisVector::ZERO), 1.0, &[])
+        Self {
+            index: 0,
+            line: 0,
+            kind: BlockKind::Dwell,
+            ends_at_rest: true,
+            feed_reason: LimitedBy::Feed,
+            command_mm_per_s: 0.0,
+            feed_mm_per_s: 0.0,
+            junction_mm_per_s: 0.0,
+            own_square: 0.0,
+            half_step: AxisVector::ZERO,
+            rows: Rows::default(),
+            course: Course::Dwell(AxisVector::ZERO, 0.0),
+        }
     }
 
-    /// What `block` says by itself, planned at `feed_ratio` times its feed, with the axis speeds `axis_mm_per_s`.
-    pub fn new(block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) -> Self {
-        let mut entry = Self {
-            index: block.index,
-            line: block.line,
-            kind: block.kind,
-            ends_at_rest: block.ends_at_rest(),
-            feed_reason: LimitedBy::Feed,
-            path: Path::new(block),
-            end: block.end,
-            half_steps: [AxisVector::ZERO; 2],
-            command_mm_per_s: block.command_feed_mm_per_s(),
-            feed_mm_per_s: 0.0,
-            dwell_s: block.dwell_s,
-            junction_mm_per_s: 0.0,
-            rows: Rows::default(),
-        };
-        entry.set_feed(block, feed_ratio, axis_mm_per_s);
-        entry
+    /// Takes what `block` says by itself, planned at `feed_ratio` times its feed, with the axis speeds `axis_mm_per_s`.
+    ///
+    /// In place, field by field: entries are large, and moving them costs more than computing them.
+    pub fn set(&mut self, block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) {
+        (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
+        self.ends_at_rest = block.ends_at_rest();
+        self.command_mm_per_s = block.command_feed_mm_per_s();
+        self.junction_mm_per_s = 0.0;
+        self.half_step = AxisVector::ZERO;
+        self.rows.clear();
+        self.course = Path::new(block).map_or(Course::Dwell(block.end, block.dwell_s), Course::Path);
+        self.set_feed(block, feed_ratio, axis_mm_per_s);
+        self.own_square = self.feed_mm_per_s.powi(2);
     }
 
     fn set_feed(&mut self, block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) {
-        let Some(path) = &self.path else { return };
+        (self.feed_mm_per_s, self.feed_reason) = (0.0, LimitedBy::Feed);
+        let Course::Path(path) = &self.course else { return };
         let command = block.feed_mm_per_s * feed_ratio;
         let policy = block.feed_cap_mm_per_s;
         let most = path.max_direction();
-        let moving = axis_mm_per_s.iter().enumerate().filter(|(axis, _)| most[*axis] > 0.0);
-        let axes = moving.map(|(axis, v)| v / most[axis]).fold(f64::INFINITY, f64::min);
-        self.feed_mm_per_s = command.min(policy).min(axes);
+        let axes = axis_mm_per_s.iter().enumerate().map(|(axis, v)| (*v, most[axis]));
+        self.feed_mm_per_s = least_ratio(command.min(policy), axes);
         self.feed_reason = match self.feed_mm_per_s {
             feed if feed >= command || block.kind == BlockKind::Rapid => LimitedBy::Feed,
             feed if feed >= policy => LimitedBy::Policy,
@@ -78,15 +93,23 @@ impl Entry {
         };
     }
 
+    /// Its path; `None` for a dwell.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.course {
+            Course::Path(path) => Some(path),
+            Course::Dwell(..) => None,
+        }
+    }
+
     /// Length of the path, mm; zero for a dwell.
     pub fn length_mm(&self) -> f64 {
-        self.path.as_ref().map_or(0.0, Path::length_mm)
+        self.path().map_or(0.0, Path::length_mm)
     }
 
     /// Direction at the start and at the end, axis units per mm; zero for a dwell.
     pub fn direction(&self, at_end: bool) -> AxisVector {
         let place = |path: &Path| if at_end { path.length_mm() } else { 0.0 };
-        self.path.as_ref().map_or(AxisVector::ZERO, |path| path.direction(place(path)))
+        self.path().map_or(AxisVector::ZERO, |path| path.direction(place(path)))
     }
 
     /// Whether the machine rests between this block and `next`.

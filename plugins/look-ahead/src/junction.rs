@@ -11,7 +11,7 @@ use tandem_sdk::{AxisLimits, AxisVector};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
-use crate::rows::{Row, Rows};
+use crate::rows::{Least, Row, Transfer, least_ratio};
 
 /// Planners stay this far inside the limits.
 const MARGIN: f64 = 0.999;
@@ -36,21 +36,19 @@ impl Rule {
         Self { kind, axes: axes.to_vec(), fine_period_s }
     }
 
-    /// Sets the junction between `before` and `after`: its feed, and the half steps on both sides.
-    pub fn join(&self, before: &mut Entry, after: &mut Entry) {
+    /// Sets the junction between `before` and `after`: its feed, and half the step.
+    pub fn join(&self, before: &Entry, after: &mut Entry) {
         if before.rests_before(after) {
             return;
         }
         let directions = [before.direction(true), after.direction(false)];
         let step = directions[1] - directions[0];
         let capped = before.feed_mm_per_s.min(after.feed_mm_per_s);
-        let feed = match self.kind {
-            Junction::Tangent => self.tangent(before, after, &directions),
-            Junction::Axis => self.speed_difference(&step),
+        after.junction_mm_per_s = match self.kind {
+            Junction::Tangent => self.tangent(before, after, &directions).min(capped),
+            Junction::Axis => self.speed_difference(&step, capped),
         };
-        after.junction_mm_per_s = feed.min(capped);
-        before.half_steps[1] = step * 0.5;
-        after.half_steps[0] = step * 0.5;
+        after.half_step = step * 0.5;
     }
 
     /// `max(A·T_s/(1 − cos θ), V)`: equation (4) with its floor. The floor belongs to the tangent feed only.
@@ -61,52 +59,96 @@ impl Rule {
         if drop < STRAIGHT * STRAIGHT { f64::INFINITY } else { (acceleration * self.fine_period_s / drop).max(floor) }
     }
 
-    fn speed_difference(&self, step: &AxisVector) -> f64 {
+    /// The highest feed up to `most` at which no axis steps by more than its allowable speed difference.
+    fn speed_difference(&self, step: &AxisVector, most: f64) -> f64 {
         let stepping = self.axes.iter().enumerate().filter(|(i, _)| step[*i].abs() > STRAIGHT);
-        stepping.map(|(i, a)| MARGIN * a.speed_difference_mm_per_s / step[i].abs()).fold(f64::INFINITY, f64::min)
+        least_ratio(most, stepping.map(|(i, a)| (MARGIN * a.speed_difference_mm_per_s, step[i].abs())))
     }
 
     /// The smallest acceleration of the axes that move in a block, as published.
     fn smallest_acceleration(&self, entry: &Entry) -> f64 {
-        let most = entry.path.as_ref().map(tandem_motion::Path::max_direction).unwrap_or_default();
+        let most = entry.path().map(tandem_motion::Path::max_direction).unwrap_or_default();
         let moving = self.axes.iter().enumerate().filter(|(i, _)| most[*i] > 0.0);
         moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min)
     }
 
-    /// Fills in what limits the speed inside `entry`, whose end junction would allow `end_mm_per_s`.
-    pub fn limit(&self, entry: &mut Entry, end_mm_per_s: f64) {
-        let Some(path) = entry.path else { return };
-        entry.rows = Rows::default();
+    /// Fills in what limits the speed inside `entry`, whose end junction is `end`, and from one end of it to the other.
+    pub fn limit(&self, entry: &mut Entry, end: &End, transfer: &mut Transfer) {
+        transfer.clear();
+        let Some(path) = entry.path() else { return };
+        let (most, bend, length_mm) = (path.max_direction(), path.max_curvature(), path.length_mm());
         if self.kind == Junction::Tangent {
-            return entry.rows.push(Row { h: 1.0, k: 0.0, a: self.smallest_acceleration(entry) });
+            let row = Row { h: 1.0, k: 0.0, a: self.smallest_acceleration(entry) };
+            entry.rows.push(row);
+            return transfer.push(&row, length_mm);
         }
-        let (most, bend) = (path.max_direction(), path.max_curvature());
+        let costs = Costs::new(entry, length_mm, end.junction_mm_per_s);
+        let mut turning = Least::new(entry.own_square);
         for (axis, limits) in self.axes.iter().enumerate() {
-            let acceleration = MARGIN * limits.acceleration_mm_per_s2;
-            let straight = Row { h: most[axis], k: bend[axis], a: acceleration };
-            entry.rows.push(junction_row(entry, axis, straight, end_mm_per_s));
+            let straight = Row { h: most[axis], k: bend[axis], a: MARGIN * limits.acceleration_mm_per_s2 };
+            let row = costs.row(straight, entry.half_step[axis], end.half_step[axis]);
+            if row.limits() {
+                entry.rows.push(row);
+                turning.and(row.turning_cap());
+                transfer.push(&row, length_mm);
+            }
         }
+        entry.own_square = turning.value();
     }
 }
 
-/// The row of one axis with the cost of the junctions: in the form that allows the higher speed.
-///
-/// The rate that takes the steps back is at most `v_peak·(v_s|Δu_s| + v_e|Δu_e|)/(2L)`. Where the junctions are slow and
-/// the block long, that is a small constant. In a chain of chords, where the junction feeds are the feed itself, it goes
-/// with the square of the speed: `w·|Δu_s + Δu_e|/(2L)`, and what is left where the end speeds differ goes with the
-/// path acceleration.
-fn junction_row(entry: &Entry, axis: usize, row: Row, end_mm_per_s: f64) -> Row {
-    let [before, after] = entry.half_steps.map(|h| h[axis]);
-    if before == 0.0 && after == 0.0 {
-        return row;
+/// The junction at the end of a block.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct End {
+    /// Its feed, mm/s.
+    pub junction_mm_per_s: f64,
+    /// Half the change of direction.
+    pub half_step: AxisVector,
+}
+
+/// What all axes of one block share in the cost of its junctions.
+struct Costs {
+    length_mm: f64,
+    per_mm: f64,
+    feed_mm_per_s: f64,
+    /// Junction feeds at the start and at the end, mm/s.
+    ends_mm_per_s: [f64; 2],
+}
+
+impl Costs {
+    fn new(entry: &Entry, length_mm: f64, end_mm_per_s: f64) -> Self {
+        Self {
+            length_mm,
+            per_mm: 1.0 / length_mm,
+            feed_mm_per_s: entry.feed_mm_per_s,
+            ends_mm_per_s: [entry.junction_mm_per_s, end_mm_per_s],
+        }
     }
-    let length = entry.length_mm();
-    let ends = entry.junction_mm_per_s * before.abs() + end_mm_per_s * after.abs();
-    let constant = Row { a: row.a - entry.feed_mm_per_s * ends / length, ..row };
-    let square = Row { h: row.h + before.abs().max(after.abs()), k: row.k + (before + after).abs() / length, a: row.a };
-    let slow = entry.junction_mm_per_s.min(end_mm_per_s).powi(2);
-    let reach = |r: &Row| (r.h * slow + 2.0 * length * r.a) / (r.h + 2.0 * length * r.k);
-    let affordable = constant.a >= (1.0 - CONSTANT_SHARE) * row.a;
-    let enough = entry.feed_mm_per_s.powi(2);
-    if affordable && reach(&constant).min(enough) >= reach(&square).min(enough) { constant } else { square }
+
+    /// The row of one axis with the cost of the half steps `before` and `after`: in the form that allows more speed.
+    ///
+    /// The rate that takes the steps back is at most `v_peak·(v_s|Δu_s| + v_e|Δu_e|)/(2L)`. Where the junctions are
+    /// slow and the block long, that is a small constant. In a chain of chords, where the junction feeds are the feed
+    /// itself, it goes with the square of the speed: `w·|Δu_s + Δu_e|/(2L)`, and what is left where the end speeds
+    /// differ goes with the path acceleration.
+    fn row(&self, row: Row, before: f64, after: f64) -> Row {
+        if before == 0.0 && after == 0.0 {
+            return row;
+        }
+        let [start, end] = self.ends_mm_per_s;
+        let taken = self.feed_mm_per_s * (start * before.abs() + end * after.abs()) * self.per_mm;
+        let constant = Row { a: row.a - taken, ..row };
+        let square =
+            Row { h: row.h + before.abs().max(after.abs()), k: row.k + (before + after).abs() * self.per_mm, a: row.a };
+        let affordable = constant.a >= (1.0 - CONSTANT_SHARE) * row.a;
+        if affordable && self.reaches_as_far(&constant, &square) { constant } else { square }
+    }
+
+    /// Whether from the slower junction `one` reaches the feed, or at least as much speed as `other`.
+    fn reaches_as_far(&self, one: &Row, other: &Row) -> bool {
+        let slow = self.ends_mm_per_s[0].min(self.ends_mm_per_s[1]).powi(2);
+        let reach = |r: &Row| (r.h * slow + 2.0 * self.length_mm * r.a, r.h + 2.0 * self.length_mm * r.k);
+        let (one, other) = (reach(one), reach(other));
+        one.0 >= self.feed_mm_per_s.powi(2) * one.1 || one.0 * other.1 >= other.0 * one.1
+    }
 }

@@ -10,6 +10,7 @@ mod drive;
 mod geometry;
 mod junction;
 mod options;
+mod plan;
 mod planner;
 mod rows;
 

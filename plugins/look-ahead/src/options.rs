@@ -26,6 +26,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { buffer_blocks: 4096, junction: Junction::default() }
+        // With the two slots that the buffer adds this fits a ring of 4096.
+        Self { buffer_blocks: 4000, junction: Junction::default() }
     }
 }

@@ -1,15 +1,25 @@
 //! The planner itself: blocks in, segments out.
 
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, MAX_AXES, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink, size_of_contract,
+    Accepted, Advanced, AxisVector, Block, BlockKind, MAX_AXES, Planner, PlannerContext, PlannerDescription,
+    PluginError, Segment, SegmentFlags, SegmentSink,
 };
 
 use crate::buffer::Buffer;
-use crate::drive::Drive;
-use crate::geometry::Entry;
+use crate::drive::{Drive, begin, without};
+use crate::geometry::{Course, Entry};
 use crate::junction::Rule;
 use crate::options::{Junction, Options};
+use crate::plan::{Plan, dwell_report};
+
+/// What is being emitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Emitting {
+    Nothing,
+    Block,
+    /// A dwell, of which so much is left, s.
+    Dwell(f64),
+}
 
 /// The look-ahead planner.
 #[derive(Debug)]
@@ -19,12 +29,11 @@ pub struct LookAhead {
     rule: Rule,
     feed_axis_mm_per_s: Vec<f64>,
     rapid_axis_mm_per_s: Vec<f64>,
-    /// The block whose end junction is not known yet.
-    pending: Option<Entry>,
     buffer: Buffer,
-    driving: Option<Drive>,
-    /// Rest still to be emitted for a dwell, s.
-    dwell: Option<Segment>,
+    emitting: Emitting,
+    drive: Drive,
+    /// The segment that goes out: written over and over, because it is large.
+    segment: Segment,
     path_mm: f64,
     finished: bool,
 }
@@ -44,62 +53,67 @@ impl LookAhead {
             rule: Rule::new(options.junction, axes, context.fine_period_s),
             feed_axis_mm_per_s: axes.iter().map(|a| a.feed_mm_per_s).collect(),
             rapid_axis_mm_per_s: axes.iter().map(|a| a.rapid_mm_per_s).collect(),
-            pending: None,
             buffer: Buffer::new(options.buffer_blocks),
-            driving: None,
-            dwell: None,
+            emitting: Emitting::Nothing,
+            drive: Drive::default(),
+            segment: Segment::rest(&AxisVector::ZERO, 0.0),
             path_mm: 0.0,
             finished: false,
             options: options.clone(),
         })
     }
 
-    /// Moves the pending block, whose end junction is known now, into the buffer.
-    fn insert(&mut self, mut entry: Entry, end_mm_per_s: f64) {
-        self.rule.limit(&mut entry, end_mm_per_s);
-        self.buffer.push(&entry);
-    }
-
     /// Takes the next block out of the buffer; `false` where there is none.
     fn start_block(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let rule = self.options.junction;
-        let Some((entry, start, end)) = self.buffer.pop() else { return false };
-        if let Some(drive) = Drive::new(entry, (start, end), rule, self.path_mm) {
-            sink.block(drive.report());
-            self.driving = Some(drive);
-        } else {
-            sink.block(&dwell_report(entry));
-            self.dwell = Some(dwell(entry, self.path_mm));
+        let Some(taken) = self.buffer.pop() else { return false };
+        let entry = self.buffer.entry(&taken);
+        match &entry.course {
+            Course::Path(path) => {
+                let half_step = self.buffer.end_half_step(&taken);
+                let plan = Plan::new(entry, half_step, taken.squares, self.options.junction);
+                sink.block(&plan.report(entry));
+                begin(&mut self.segment, entry, &plan);
+                self.drive.start(taken, path, &plan, self.path_mm);
+                self.emitting = Emitting::Block;
+            }
+            Course::Dwell(at, dwell_s) => {
+                sink.block(&dwell_report(entry, *dwell_s));
+                self.segment = dwell(entry, at, self.path_mm);
+                self.emitting = Emitting::Dwell(*dwell_s);
+            }
         }
         true
     }
 
-    fn emit_dwell(&mut self, mut rest: Segment, duration_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let all_s = rest.duration_s;
-        rest.duration_s = all_s.min(duration_s);
-        let left_s = all_s - rest.duration_s;
-        if left_s > 0.0 {
-            self.dwell = Some(Segment { duration_s: left_s, flags: without_begin(rest.flags), ..rest });
-        } else {
+    /// Emits at most `duration_s` of a dwell of which `left_s` is left.
+    fn emit_dwell(&mut self, left_s: f64, duration_s: f64, sink: &mut dyn SegmentSink) -> f64 {
+        let rest = &mut self.segment;
+        rest.duration_s = left_s.min(duration_s);
+        let after_s = left_s - rest.duration_s;
+        self.emitting = if after_s > 0.0 { Emitting::Dwell(after_s) } else { Emitting::Nothing };
+        if after_s <= 0.0 {
             rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
         }
-        sink.segment(&rest);
+        sink.segment(rest);
+        rest.flags = without(rest.flags, SegmentFlags::BLOCK_BEGINS);
         rest.duration_s
     }
 
     fn emit(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
-        if let Some(rest) = self.dwell.take() {
-            return Some(self.emit_dwell(rest, duration_s, sink));
-        }
-        if let Some(drive) = &mut self.driving {
-            let (emitted_s, over) = drive.advance(duration_s, sink);
-            if over {
-                self.path_mm += drive.length_mm();
-                self.driving = None;
+        match self.emitting {
+            Emitting::Dwell(left_s) => Some(self.emit_dwell(left_s, duration_s, sink)),
+            Emitting::Block => {
+                let entry = self.buffer.entry(self.drive.taken());
+                let Some(path) = entry.path() else { unreachable!("dwells are emitted above") };
+                let (emitted_s, over) = self.drive.advance(path, duration_s, &mut self.segment, sink);
+                if over {
+                    self.path_mm += path.length_mm();
+                    self.emitting = Emitting::Nothing;
+                }
+                Some(emitted_s)
             }
-            return Some(emitted_s);
+            Emitting::Nothing => self.start_block(sink).then_some(0.0),
         }
-        self.start_block(sink).then_some(0.0)
     }
 }
 
@@ -124,7 +138,7 @@ impl Planner for LookAhead {
             let possible = block.dwell_s >= 0.0 && block.dwell_s.is_finite();
             return if possible { Ok(()) } else { Err(PluginError::fixed("a dwell needs a duration of zero or more")) };
         }
-        let sound = block.start.is_finite() && block.end.is_finite() && block.length_mm > 0.0;
+        let sound = is_finite(&block.start) && is_finite(&block.end) && block.length_mm > 0.0;
         let feed = block.command_feed_mm_per_s();
         if sound && feed > 0.0 {
             Ok(())
@@ -141,19 +155,13 @@ impl Planner for LookAhead {
         self.finished = false;
         let rapid = block.kind == BlockKind::Rapid;
         let axes = if rapid { &self.rapid_axis_mm_per_s } else { &self.feed_axis_mm_per_s };
-        let mut entry = Entry::new(block, self.context.max_feed_ratio, axes);
-        if let Some(mut before) = self.pending.take() {
-            self.rule.join(&mut before, &mut entry);
-            self.insert(before, entry.junction_mm_per_s);
-        }
-        self.pending = Some(entry);
+        let ratio = self.context.max_feed_ratio;
+        self.buffer.push(&self.rule, |entry| entry.set(block, ratio, axes));
         Ok(Accepted::Accepted)
     }
 
     fn finish(&mut self) {
-        if let Some(last) = self.pending.take() {
-            self.insert(last, 0.0);
-        }
+        self.buffer.finish(&self.rule);
         self.finished = true;
     }
 
@@ -165,39 +173,27 @@ impl Planner for LookAhead {
                 None => break,
             }
         }
-        let empty = self.buffer.len() == 0 && self.driving.is_none() && self.dwell.is_none();
+        let empty = self.buffer.len() == 0 && self.emitting == Emitting::Nothing;
         Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
     }
 
     fn reset(&mut self, position: &AxisVector) {
         self.context.position = *position;
         self.buffer.clear();
-        (self.pending, self.driving, self.dwell) = (None, None, None);
+        self.emitting = Emitting::Nothing;
         (self.path_mm, self.finished) = (0.0, false);
     }
 }
 
-fn without_begin(flags: SegmentFlags) -> SegmentFlags {
-    SegmentFlags(flags.0 & !SegmentFlags::BLOCK_BEGINS.0)
+/// Whether all entries are finite, without a branch for each.
+fn is_finite(vector: &AxisVector) -> bool {
+    vector.0.iter().fold(true, |all, v| all & v.is_finite())
 }
 
-fn dwell(entry: &Entry, path_mm: f64) -> Segment {
-    let mut rest = Segment::rest(&entry.end, entry.dwell_s);
+fn dwell(entry: &Entry, at: &AxisVector, path_mm: f64) -> Segment {
+    let mut rest = Segment::rest(at, 0.0);
     (rest.block, rest.line) = (entry.index, entry.line);
     rest.path[0] = path_mm;
     rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
     rest
-}
-
-fn dwell_report(entry: &Entry) -> BlockReport {
-    BlockReport {
-        size: size_of_contract::<BlockReport>(),
-        limited_by: LimitedBy::Feed,
-        block: entry.index,
-        start_feed_mm_per_s: 0.0,
-        peak_feed_mm_per_s: 0.0,
-        end_feed_mm_per_s: 0.0,
-        time_s: entry.dwell_s,
-        time_constant_s: f64::NAN,
-    }
 }

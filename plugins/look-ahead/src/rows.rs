@@ -29,46 +29,82 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Adds a row; one that limits nothing is left out.
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds a row.
     pub fn push(&mut self, row: Row) {
-        if row.h > 0.0 || row.k > 0.0 {
-            self.rows[self.count] = row;
-            self.count += 1;
-        }
+        self.rows[self.count] = row;
+        self.count += 1;
     }
 
     fn iter(&self) -> impl Iterator<Item = &Row> {
         self.rows[..self.count].iter()
     }
 
-    /// Square of the highest speed at which turning takes no more than its share.
-    pub fn turning_cap(&self) -> f64 {
-        self.iter().filter(|r| r.k > 0.0).map(|r| TURNING_SHARE * r.a / r.k).fold(f64::INFINITY, f64::min)
-    }
-
     /// Path acceleration that is left when the square of the speed is `w`, mm/s².
     pub fn acceleration(&self, w: f64) -> f64 {
-        self.iter().filter(|r| r.h > 0.0).map(|r| (r.a - w * r.k) / r.h).fold(f64::INFINITY, f64::min)
+        least_ratio(f64::INFINITY, self.iter().map(|r| (r.a - w * r.k, r.h)))
     }
 
-    /// Square of the highest speed inside a block of `length_mm` whose ends have the mean square `mean`.
-    pub fn peak(&self, mean: f64, length_mm: f64) -> f64 {
-        let each = self.iter().map(|r| (r.h * mean + length_mm * r.a) / (r.h + length_mm * r.k));
-        each.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The map from one end of the block to the other.
-    pub fn transfer(&self, length_mm: f64) -> Transfer {
-        let mut transfer = Transfer::BLANK;
-        for row in self.iter() {
-            let scale = 1.0 / (row.h + 2.0 * length_mm * row.k);
-            transfer.push(row.h * scale, 2.0 * length_mm * row.a * scale);
-        }
-        transfer
+    /// Square of the highest speed, up to `most`, inside a block of `length_mm` whose ends have the mean square `mean`.
+    pub fn peak(&self, mean: f64, length_mm: f64, most: f64) -> f64 {
+        least_ratio(most, self.iter().map(|r| (r.h * mean + length_mm * r.a, r.h + length_mm * r.k)))
     }
 }
 
-/// `w ↦ min over lines of (p·w + q)`: the highest square of the speed at the other end of a block.
+impl Row {
+    /// Whether it limits anything.
+    pub fn limits(&self) -> bool {
+        self.h > 0.0 || self.k > 0.0
+    }
+
+    /// Square of the highest speed at which turning takes no more than its share, as a ratio.
+    pub fn turning_cap(&self) -> (f64, f64) {
+        (TURNING_SHARE * self.a, self.k)
+    }
+}
+
+/// The least of some ratios `n/d`, with one division: they are compared crosswise. A `d` of zero limits nothing; none is
+/// negative.
+#[derive(Clone, Copy, Debug)]
+pub struct Least {
+    n: f64,
+    d: f64,
+}
+
+impl Least {
+    /// At most `most`.
+    pub fn new(most: f64) -> Self {
+        Self { n: most, d: 1.0 }
+    }
+
+    /// And at most `n/d`.
+    #[inline]
+    pub fn and(&mut self, (n, d): (f64, f64)) {
+        if n * self.d < self.n * d {
+            (self.n, self.d) = (n, d);
+        }
+    }
+
+    /// The least.
+    #[inline]
+    pub fn value(&self) -> f64 {
+        if self.d == 1.0 { self.n } else { self.n / self.d }
+    }
+}
+
+/// The least of `most` and the ratios `n/d`.
+#[inline]
+pub fn least_ratio(most: f64, ratios: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let mut least = Least::new(most);
+    ratios.for_each(|ratio| least.and(ratio));
+    least.value()
+}
+
+/// `w ↦ min over rows of (p·w + q)`: the highest square of the speed at the other end of a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Transfer {
     lines: [(f64, f64); MAX_AXES],
@@ -79,32 +115,25 @@ impl Transfer {
     /// Everything comes to rest.
     pub const BLANK: Self = Self { lines: [(0.0, 0.0); MAX_AXES], count: 0 };
 
-    /// Adds a line unless one that is there lies below it for every w ≥ 0; drops those that lie above it.
-    fn push(&mut self, p: f64, q: f64) {
-        let mut kept = 0;
-        for index in 0..self.count {
-            let (other_p, other_q) = self.lines[index];
-            if other_p <= p && other_q <= q {
-                return;
-            }
-            if !(p <= other_p && q <= other_q) {
-                self.lines[kept] = (other_p, other_q);
-                kept += 1;
-            }
-        }
-        self.lines[kept] = (p, q);
-        self.count = kept + 1;
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds the row of one axis for a block of `length_mm`.
+    pub fn push(&mut self, row: &Row, length_mm: f64) {
+        let scale = 1.0 / (row.h + 2.0 * length_mm * row.k);
+        self.lines[self.count] = (row.h * scale, 2.0 * length_mm * row.a * scale);
+        self.count += 1;
     }
 
     /// The highest square of the speed at one end when it is `w` at the other.
     #[inline]
     pub fn apply(&self, w: f64) -> f64 {
-        let (p, q) = self.lines[0];
-        let mut least = p * w + q;
-        for (p, q) in &self.lines[1..self.count.max(1)] {
-            least = least.min(p * w + q);
-        }
-        least
+        let Some(((p, q), others)) = self.lines[..self.count].split_first() else { return 0.0 };
+        // `f64::min` has to mind NaN; there is none here, and this is the innermost loop.
+        let lesser = |least: f64, next: f64| if next < least { next } else { least };
+        others.iter().fold(p * w + q, |least, (p, q)| lesser(least, p * w + q))
     }
 }
 
@@ -116,31 +145,43 @@ mod tests {
     fn rows() -> impl Strategy<Value = Rows> {
         proptest::collection::vec((0.01..1.5f64, 0.0..2.0f64, 10.0..2000.0f64), 1..5).prop_map(|rows| {
             let mut all = Rows::default();
-            rows.into_iter().for_each(|(h, k, a)| all.push(Row { h, k, a }));
+            for (h, k, a) in rows {
+                all.push(Row { h, k, a });
+            }
             all
         })
     }
 
+    fn transfer(rows: &Rows, length_mm: f64) -> Transfer {
+        let mut transfer = Transfer::BLANK;
+        rows.iter().for_each(|row| transfer.push(row, length_mm));
+        transfer
+    }
+
+    fn turning_cap(rows: &Rows, most: f64) -> f64 {
+        least_ratio(most, rows.iter().map(Row::turning_cap))
+    }
+
     proptest! {
         #[test]
-        fn dropped_lines_never_matter(rows in rows(), length in 0.001..50.0f64, w in 0.0..1e4f64) {
+        fn the_transfer_is_the_least_of_the_rows(rows in rows(), length in 0.001..50.0f64, w in 0.0..1e4f64) {
             let every = rows.iter().map(|r| (r.h * w + 2.0 * length * r.a) / (r.h + 2.0 * length * r.k));
             let expect = every.fold(f64::INFINITY, f64::min);
-            prop_assert!((rows.transfer(length).apply(w) - expect).abs() <= 1e-12 * expect);
+            prop_assert!((transfer(&rows, length).apply(w) - expect).abs() <= 1e-12 * expect);
         }
 
         #[test]
         fn the_faster_end_keeps_every_row(rows in rows(), length in 0.001..50.0f64, slow in 0.0..1.0f64) {
-            let w = slow * rows.turning_cap().min(1e4);
-            let fast = rows.transfer(length).apply(w).max(w);
+            let w = slow * turning_cap(&rows, 1e4);
+            let fast = transfer(&rows, length).apply(w).max(w);
             let a = (fast - w) / (2.0 * length);
             prop_assert!(a <= rows.acceleration(fast) * (1.0 + 1e-9) + 1e-9);
         }
 
         #[test]
         fn the_peak_is_reached_exactly(rows in rows(), length in 0.001..50.0f64, mean in 0.0..1e3f64) {
-            let mean = mean.min(rows.turning_cap());
-            let peak = rows.peak(mean, length);
+            let mean = turning_cap(&rows, mean);
+            let peak = rows.peak(mean, length, f64::INFINITY);
             prop_assert!((peak - (mean + rows.acceleration(peak) * length)).abs() <= 1e-9 * peak);
         }
     }
