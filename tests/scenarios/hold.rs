@@ -62,13 +62,13 @@ fn a_hold_on_a_line_takes_v_over_a() {
 #[test]
 fn an_emergency_stop_leaves_the_path_at_the_axis_limits() {
     let program = root().join("examples/programs/serpentine.ngc");
-    for tick in (10..3000).step_by(371) {
+    for tick in (10u32..3000).step_by(371) {
         let done = Scenario::of(&program).commands(&format!("{tick},emergency-stop\n")).run();
         assert_eq!(done.status(), 3);
         assert!(done.errors().contains("emergency stop"), "{}", done.errors());
         let verdict = done.judge(|options| {
             options.ends_early = true;
-            options.path_until_s = Some((tick as f64 - 1.0) * 1e-3);
+            options.path_until_s = Some((f64::from(tick) - 1.0) * 1e-3);
         });
         assert!(verdict.passed(), "stop at {tick}\n{verdict}");
         let x = done.column("x_cmd_mm");

@@ -9,6 +9,7 @@ mod examples;
 mod harness;
 mod hold;
 mod overrides;
+mod program_flow;
 mod random;
 mod report;
 mod starvation;

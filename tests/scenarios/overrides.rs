@@ -21,8 +21,9 @@ fn steps_of_the_override_keep_the_limits() {
         let path = root().join("examples/programs").join(program);
         for shift in (0..200).step_by(23) {
             let steps = [0.3, 1.0, 0.0, 0.8, 0.1, 1.0].iter().enumerate();
-            let lines: String = steps.map(|(i, r)| format!("{},feed-override,{r}\n", 50 + shift + 150 * i)).collect();
-            Scenario::of(&path).commands(&lines).run().assert_within_limits();
+            let lines: Vec<String> =
+                steps.map(|(i, r)| format!("{},feed-override,{r}", 50 + shift + 150 * i)).collect();
+            Scenario::of(&path).commands(&lines.join("\n")).run().assert_within_limits();
         }
     }
 }

@@ -78,7 +78,8 @@ fn arc(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
 
 /// A stretch of short chords along a bending path, as CAM writes it.
 fn chords(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
-    let (mut angle, bend, step) = (random.between(0.0, 6.28), random.between(-0.2, 0.2), random.between(0.005, 0.4));
+    let (mut angle, bend, step) =
+        (random.between(0.0, std::f64::consts::TAU), random.between(-0.2, 0.2), random.between(0.005, 0.4));
     for _ in 0..random.below(60) + 5 {
         angle += bend;
         at[0] = (at[0] + step * angle.cos()).clamp(-60.0, 60.0);
@@ -124,7 +125,7 @@ fn random_holds_and_stalls_keep_the_limits() {
             lines += &command;
             tick += 150;
         }
-        lines += &format!("{},feed-override,1\n", tick + 1);
+        writeln!(lines, "{},feed-override,1", tick + 1).unwrap();
         Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Block, BlockReport};
+use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
 use crate::progress::Progress;
 use crate::report::Collector;
@@ -52,6 +52,7 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
 
 /// Everything that a run is written to.
 struct Sinks {
+    pause: bool,
     progress: Progress,
     trace: Option<TraceCsv>,
     blocks: Option<BlocksCsv>,
@@ -65,6 +66,7 @@ impl Sinks {
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         Ok(Self {
+            pause: options.pause,
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
@@ -90,6 +92,19 @@ impl RunObserver for Sinks {
         }
     }
 
+    fn event(&mut self, event: &Event) {
+        let word = stop_word(event.kind);
+        if let (Some(word), false) = (word, self.pause) {
+            eprintln!("line {}: {word}: no operator is asked, the run goes on", event.line);
+        }
+    }
+
+    fn program_stop(&mut self, line: u32) {
+        eprintln!("line {line}: the program waits; Enter goes on");
+        // At the end of the input there is nobody to wait for.
+        let _ = std::io::stdin().read_line(&mut String::new());
+    }
+
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         self.progress.sample(sample);
         if let Some(trace) = &mut self.trace {
@@ -98,6 +113,16 @@ impl RunObserver for Sinks {
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);
         }
+    }
+}
+
+/// The word of an event that waits for the operator.
+fn stop_word(kind: EventKind) -> Option<&'static str> {
+    match kind {
+        EventKind::ProgramStop => Some("M0, program stop"),
+        EventKind::OptionalStop => Some("M1, optional stop"),
+        EventKind::ToolChange => Some("M6, tool change"),
+        _ => None,
     }
 }
 

@@ -238,6 +238,7 @@ impl FineLoop {
         let stop_wanted = self.config.pause_at_stops && self.outputs.stop_requested;
         if stop_wanted {
             self.controls.hold.store(true, Relaxed);
+            self.status.program_stop.store(true, Relaxed);
             self.outputs.stop_requested = false;
         }
         self.watch_queue();
@@ -305,10 +306,8 @@ impl FineLoop {
             let ahead = self.cursor.ahead(delta_s);
             let at_end = within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s);
             let mean = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
-            sigma = match ahead.rapid {
-                true => ratios.rapid,
-                false => at_end.min(2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from).clamp(0.0, 1.0),
-            };
+            let of_period = 2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from;
+            sigma = if ahead.rapid { ratios.rapid } else { at_end.min(of_period).clamp(0.0, 1.0) };
         }
         sigma
     }

@@ -44,6 +44,11 @@ impl Monitor {
         }
     }
 
+    /// Fine period, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
     /// Largest distance of a sample from the path, mm.
     pub fn max_path_deviation_mm(&self) -> f64 {
         self.watch.max_mm

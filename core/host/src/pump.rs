@@ -1,10 +1,11 @@
 //! The soft side of one run: rough loop, strategy, recorder, in the order that both clocks share.
 
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_rings::{HostEnd, Sample};
 use tandem_rough::{Observer, Progress, RoughLoop};
-use tandem_sdk::{Block, BlockReport};
+use tandem_sdk::{Block, BlockReport, Event};
 
 use crate::command::Command;
 use crate::monitor::Monitor;
@@ -14,6 +15,12 @@ use crate::strategy::StrategyRunner;
 pub trait RunObserver {
     /// A block is planned for good.
     fn block(&mut self, _block: &Block, _report: &BlockReport) {}
+
+    /// A non-motion word is planned.
+    fn event(&mut self, _event: &Event) {}
+
+    /// The program waits at rest on `line` for the operator; it goes on when this returns.
+    fn program_stop(&mut self, _line: u32) {}
 
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
@@ -70,6 +77,31 @@ impl<'a> Pump<'a> {
         }
     }
 
+    /// Asks the operator where the program has stopped for one, then goes on.
+    pub fn serve_stop(&mut self) {
+        let status = &self.host.status;
+        if status.program_stop.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
+            self.observer.program_stop(status.line.load(Relaxed));
+            status.program_stop.store(false, Relaxed);
+            Command::Resume.give(&self.host.controls);
+        }
+    }
+
+    /// Nothing will move any more, and nothing is left that could change that.
+    pub fn give_up(&mut self) {
+        self.fail("nothing has moved for a minute of machine time, and no command is left to change that".to_string());
+    }
+
+    /// Fine period, s.
+    pub fn period_s(&self) -> f64 {
+        self.monitor.period_s()
+    }
+
+    /// Whether the program waits for an input.
+    pub fn is_waiting(&self) -> bool {
+        self.rough.is_waiting()
+    }
+
     fn ask_strategy(&mut self, sample: &Sample) {
         if self.done && self.soft_error.is_some() {
             return;
@@ -97,5 +129,9 @@ impl Observer for Both<'_> {
     fn block(&mut self, block: &Block, report: &BlockReport) {
         self.monitor.block(block, report);
         self.observer.block(block, report);
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.observer.event(event);
     }
 }

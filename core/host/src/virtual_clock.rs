@@ -5,8 +5,13 @@ use tandem_fine::FineLoop;
 use crate::command::{Command, Timed};
 use crate::pump::Pump;
 
+/// Machine time, s, without any passing of program time after which a run without further commands is given up.
+const PATIENCE_S: f64 = 60.0;
+
 /// Drives the run to its end. `commands` are in order of their ticks.
 pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, commands: &[Timed]) {
+    let patience = (PATIENCE_S / pump.period_s()).round() as u64;
+    let mut progress = Progress::default();
     let mut commands = commands.iter().peekable();
     let mut tick = 0;
     let mut stalled = 0;
@@ -26,5 +31,27 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
             tick += 1;
         }
         pump.drain();
+        pump.serve_stop();
+        let stuck_ticks = progress.ticks_without(pump.host.status.program_time_s.load(), tick);
+        if commands.peek().is_none() && !pump.is_waiting() && stuck_ticks > patience {
+            pump.give_up();
+        }
+    }
+}
+
+/// When program time last passed.
+#[derive(Default)]
+struct Progress {
+    program_time_s: f64,
+    tick: u64,
+}
+
+impl Progress {
+    /// Fine periods since program time last passed.
+    fn ticks_without(&mut self, program_time_s: f64, tick: u64) -> u64 {
+        if program_time_s != self.program_time_s {
+            (self.program_time_s, self.tick) = (program_time_s, tick);
+        }
+        tick - self.tick
     }
 }

@@ -29,6 +29,7 @@ pub fn drive(pump: &mut Pump<'_>, fine: FineLoop, periods: Periods) -> Result<(F
     while !over.load(Ordering::Acquire) {
         pump.step();
         pump.drain();
+        pump.serve_stop();
         thread::sleep(Duration::from_nanos(periods.rough_ns.unsigned_abs()));
     }
     let joined = thread.join().map_err(|_| HostError::System("the fine loop panicked".to_string()));

@@ -49,6 +49,8 @@ pub struct Status {
     pub state: AtomicU32,
     /// True while nothing moves and nothing is queued.
     pub idle: AtomicBool,
+    /// The program waits for the operator (M0, M1, M6), at rest.
+    pub program_stop: AtomicBool,
     /// Digital inputs as last read.
     pub inputs: AtomicU64,
     /// Samples lost because nobody took them from the ring.

@@ -11,10 +11,13 @@ pub use depth::QueueDepth;
 pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
 pub use source::Source;
 
-use tandem_sdk::{Block, BlockReport};
+use tandem_sdk::{Block, BlockReport, Event};
 
 /// Is told of blocks as they are planned for good; in order, each once.
 pub trait Observer {
     /// `block` is driven as `report` says.
     fn block(&mut self, block: &Block, report: &BlockReport);
+
+    /// A non-motion word is planned.
+    fn event(&mut self, _event: &Event) {}
 }

@@ -91,7 +91,7 @@ impl RoughLoop {
     /// # Errors
     /// The program or the planner cannot go on; what is queued is still driven to its end.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
-        let result = self.fill();
+        let result = self.fill(observer);
         self.queue.flush(self.stretch_over || result.is_err());
         for (block, report) in self.queue.reported.drain(..) {
             observer.block(&block, &report);
@@ -101,10 +101,15 @@ impl RoughLoop {
         Ok(if self.done { Progress::Done } else { Progress::Working })
     }
 
-    fn fill(&mut self) -> Result<(), RoughError> {
+    /// Whether the program waits for an input (M66).
+    pub fn is_waiting(&self) -> bool {
+        self.waiting.is_some()
+    }
+
+    fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         let period_s = self.config.rough_period_s;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
-            self.feed()?;
+            self.feed(observer)?;
             let advanced = self
                 .planner
                 .advance(period_s, &mut self.queue)
@@ -136,7 +141,7 @@ impl RoughLoop {
     }
 
     /// Offers blocks until the planner is full or the program gives no more for now.
-    fn feed(&mut self) -> Result<(), RoughError> {
+    fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         while self.waiting.is_none() && self.load()? {
             match &self.items[self.next] {
                 Item::Block(block) => {
@@ -148,7 +153,10 @@ impl RoughLoop {
                     self.queue.blocks.push_back(*block);
                 }
                 Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
-                Item::Event(event) => self.queue.event(*event),
+                Item::Event(event) => {
+                    observer.event(event);
+                    self.queue.event(*event);
+                }
                 Item::Wait(wait) => self.waiting = Some(*wait),
                 Item::End => self.dry = true,
             }

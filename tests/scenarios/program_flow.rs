@@ -1,0 +1,66 @@
+//! Stops, dwells, outputs and inputs: what a program does beside moving.
+
+use crate::harness::Scenario;
+
+const STOPS: &str = "G21 G90\nT1\nF3000\nG1 X10\nM0\nG1 X20\nM6\nG1 X30\nM1\nG1 X40\nM2\n";
+
+#[test]
+fn stops_without_an_operator_are_logged_and_the_run_goes_on() {
+    let done = Scenario::text(STOPS).run();
+    done.assert_within_limits();
+    for words in ["line 5: M0", "line 7: M6", "line 9: M1"] {
+        assert!(done.errors().contains(words), "{}", done.errors());
+    }
+}
+
+#[test]
+fn with_pause_they_wait_for_enter() {
+    let free = Scenario::text(STOPS).run();
+    let done = Scenario::text(STOPS).with(&["--pause"]).run();
+    done.assert_within_limits();
+    assert_eq!(done.errors().matches("Enter goes on").count(), 3, "{}", done.errors());
+    assert!(done.cells("state").iter().any(|s| s == "holding"));
+    assert!(done.number("samples") > free.number("samples"));
+}
+
+#[test]
+fn a_hold_that_nobody_ends_is_given_up_on_the_path() {
+    let done = Scenario::text("G21 G90\nF3000\nG1 X50\nM2\n").commands("200,hold\n").run();
+    assert_eq!(done.status(), 3);
+    assert!(done.errors().contains("no command is left"), "{}", done.errors());
+    let verdict = done.judge(|options| options.ends_early = true);
+    assert!(verdict.passed(), "{verdict}");
+}
+
+#[test]
+fn a_dwell_lasts_as_long_as_it_says() {
+    let run = |dwell: &str| Scenario::text(&format!("G21 G90\nF3000\nG1 X10\nG4 P{dwell}\nG1 X20\nM2\n")).run();
+    let (short, long) = (run("0.1"), run("0.6"));
+    short.assert_within_limits();
+    long.assert_within_limits();
+    assert_eq!(long.number("samples") - short.number("samples"), 500.0);
+}
+
+#[test]
+fn an_input_is_waited_for_and_changes_the_path() {
+    // Input 0 of the simulated drives is 1 while X stands above 12.5 mm.
+    let switch = "driver.options={switches=[{input=0,joint=0,above_mm=12.5}]}";
+    let text = "G21 G90\nF3000\nG1 X10\nM66 P0 L0\n#1=#5399\nG1 X20\nM66 P0 L3 Q1\nG1 X[30+#5399+#1]\nM2\n";
+    let done = Scenario::text(text).with(&["--set", switch]).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    assert_eq!(done.column("x_cmd_mm").pop(), Some(31.0));
+    let waited =
+        Scenario::text("G21 G90\nF3000\nG1 X10\nM66 P0 L3 Q1\nG1 X[20+#5399]\nM2\n").with(&["--set", switch]).run();
+    assert_eq!(waited.column("x_cmd_mm").pop(), Some(19.0), "{}", waited.errors());
+    assert!(waited.number("samples") > 1200.0, "it waited for its second");
+}
+
+#[test]
+fn exact_stops_are_sampled_at_the_programmed_position() {
+    let done = Scenario::text("G21 G90\nG61\nF3000\nG1 X10.123456 Y3\nG1 X20 Y-7.7\nG64\nG1 X0 Y0\nM2\n").run();
+    done.assert_within_limits();
+    let (x, y) = (done.column("x_cmd_mm"), done.column("y_cmd_mm"));
+    for (px, py) in [(10.123_456, 3.0), (20.0, -7.7), (0.0, 0.0)] {
+        assert!(x.iter().zip(&y).any(|(x, y)| *x == px && *y == py), "({px}, {py}) is in no sample");
+    }
+}
