@@ -23,10 +23,20 @@ impl Profile {
     /// `t_acc = (v_p − F_s)/A`, `t_dec = (v_p − F_e)/A`, `t_cruise = (L − (2v_p² − F_s² − F_e²)/(2A))/v_p`
     /// (Lee & Lee, two-step motion control loop, with linear acceleration).
     pub fn durations_s(&self) -> [f64; 3] {
-        let (a, peak) = (self.acceleration_mm_per_s2, self.peak_mm_per_s);
-        let (start, end) = (self.start_mm_per_s, self.end_mm_per_s);
-        let ramps_mm = ((peak - start) * (peak + start) + (peak - end) * (peak + end)) / (2.0 * a);
-        [(peak - start) / a, ((self.length_mm - ramps_mm) / peak).max(0.0), (peak - end) / a]
+        let [up_mm, down_mm] = self.ramps_mm();
+        let (per_acceleration, peak) = (1.0 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
+        let cruise_s = (self.length_mm - (up_mm + down_mm)) / peak;
+        [
+            (peak - self.start_mm_per_s) * per_acceleration,
+            if cruise_s > 0.0 { cruise_s } else { 0.0 },
+            (peak - self.end_mm_per_s) * per_acceleration,
+        ]
+    }
+
+    /// Lengths of speeding up and of slowing down, mm.
+    fn ramps_mm(&self) -> [f64; 2] {
+        let (per_2a, peak) = (0.5 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
+        [self.start_mm_per_s, self.end_mm_per_s].map(|end| (peak - end) * (peak + end) * per_2a)
     }
 
     /// The pieces in order, with the [durations](Profile::durations_s) of this profile; those too short to matter (below
@@ -35,8 +45,7 @@ impl Profile {
         let [up, cruise, down] = durations_s;
         let (a, peak) = (self.acceleration_mm_per_s2, self.peak_mm_per_s);
         // The last ramp is laid from the end of the block, so that rounding falls into the cruise.
-        let down_mm = (peak - self.end_mm_per_s) * (peak + self.end_mm_per_s) / (2.0 * a);
-        let up_mm = (peak - self.start_mm_per_s) * (peak + self.start_mm_per_s) / (2.0 * a);
+        let [up_mm, down_mm] = self.ramps_mm();
         let piece = |duration_s, start_mm, speed_mm_per_s, acceleration_mm_per_s2| SpeedPiece {
             start_mm,
             speed_mm_per_s,

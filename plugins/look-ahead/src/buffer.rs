@@ -2,7 +2,7 @@
 
 use crate::geometry::Entry;
 use crate::junction::{End, Rule};
-use crate::rows::Transfer;
+use crate::rows::{Transfer, lesser};
 
 /// One block's numbers for the update, all in squares of speeds, mm²/s².
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +92,7 @@ impl Buffer {
         let Ok([before, after]) = self.entries.get_disjoint_mut(slots) else { unreachable!("there are two slots") };
         write(after);
         rule.join(before, after);
-        let end = End { junction_mm_per_s: after.junction_mm_per_s, half_step: after.half_step };
+        let end = End { junction_mm_per_s: after.junction_mm_per_s, half_step: &after.half_step };
         rule.limit(before, &end, &mut self.nodes[self.end & self.mask].transfer);
         self.close();
     }
@@ -101,7 +101,7 @@ impl Buffer {
     pub fn finish(&mut self, rule: &Rule) {
         if self.open {
             let slot = self.end & self.mask;
-            rule.limit(&mut self.entries[slot], &End::default(), &mut self.nodes[slot].transfer);
+            rule.limit(&mut self.entries[slot], &End::REST, &mut self.nodes[slot].transfer);
             self.close();
             self.open = false;
         }
@@ -112,7 +112,7 @@ impl Buffer {
         let entry = &self.entries[self.end & self.mask];
         let own = entry.own_square;
         let node = &mut self.nodes[self.end & self.mask];
-        node.cap = entry.junction_mm_per_s.powi(2).min(own).min(self.last_own);
+        node.cap = lesser(lesser(entry.junction_mm_per_s.powi(2), own), self.last_own);
         (node.reach, node.start) = (0.0, 0.0);
         self.last_own = own;
         self.end += 1;
@@ -151,7 +151,7 @@ impl Buffer {
         }
         let first = &self.nodes[self.first & self.mask];
         let next = &self.nodes[(self.first + 1) & self.mask];
-        next.start >= next.cap.min(first.transfer.apply(first.start))
+        next.start >= lesser(next.cap, first.transfer.apply(first.start))
     }
 
     /// Raises junction feeds for the blocks that have come: backward as far as anything changes, then forward.
@@ -166,7 +166,7 @@ impl Buffer {
         let mut next = 0.0;
         for number in (self.first + 1..self.end).rev() {
             let node = &mut self.nodes[number & self.mask];
-            let reach = node.cap.min(node.transfer.apply(next));
+            let reach = lesser(node.cap, node.transfer.apply(next));
             if number < dirty && reach <= node.reach {
                 break;
             }
@@ -178,7 +178,7 @@ impl Buffer {
             let before = &self.nodes[(number - 1) & self.mask];
             let reached = before.transfer.apply(before.start);
             let node = &mut self.nodes[number & self.mask];
-            node.start = node.reach.min(reached);
+            node.start = lesser(node.reach, reached);
         }
         self.dirty = self.end;
     }

@@ -3,17 +3,7 @@
 use tandem_motion::Path;
 use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy};
 
-use crate::rows::{Rows, least_ratio};
-
-/// What a block does.
-#[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant)] // slots of one ring; boxing would allocate for every block
-pub enum Course {
-    /// Moves on a path.
-    Path(Path),
-    /// Rests at a place for a time, s.
-    Dwell(AxisVector, f64),
-}
+use crate::rows::{Rows, least_ratio, lesser};
 
 /// A block with everything that does not change while feeds are raised.
 #[derive(Clone, Debug)]
@@ -40,8 +30,10 @@ pub struct Entry {
     pub half_step: AxisVector,
     /// Limits inside the block; filled in when its end junction is known.
     pub rows: Rows,
-    /// Its path or dwell.
-    pub course: Course,
+    /// Its path; `None` for a dwell.
+    pub path: Option<Path>,
+    /// Place and duration, s, of a dwell.
+    pub dwell: (AxisVector, f64),
 }
 
 impl Entry {
@@ -59,7 +51,8 @@ impl Entry {
             own_square: 0.0,
             half_step: AxisVector::ZERO,
             rows: Rows::default(),
-            course: Course::Dwell(AxisVector::ZERO, 0.0),
+            path: None,
+            dwell: (AxisVector::ZERO, 0.0),
         }
     }
 
@@ -73,19 +66,22 @@ impl Entry {
         self.junction_mm_per_s = 0.0;
         self.half_step = AxisVector::ZERO;
         self.rows.clear();
-        self.course = Path::new(block).map_or(Course::Dwell(block.end, block.dwell_s), Course::Path);
+        self.path = Path::new(block);
+        if self.path.is_none() {
+            self.dwell = (block.end, block.dwell_s);
+        }
         self.set_feed(block, feed_ratio, axis_mm_per_s);
         self.own_square = self.feed_mm_per_s.powi(2);
     }
 
     fn set_feed(&mut self, block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) {
         (self.feed_mm_per_s, self.feed_reason) = (0.0, LimitedBy::Feed);
-        let Course::Path(path) = &self.course else { return };
+        let Some(path) = &self.path else { return };
         let command = block.feed_mm_per_s * feed_ratio;
         let policy = block.feed_cap_mm_per_s;
         let most = path.max_direction();
-        let axes = axis_mm_per_s.iter().enumerate().map(|(axis, v)| (*v, most[axis]));
-        self.feed_mm_per_s = least_ratio(command.min(policy), axes);
+        let axes = axis_mm_per_s.iter().zip(&most.0).map(|(v, most)| (*v, *most));
+        self.feed_mm_per_s = least_ratio(lesser(command, policy), axes);
         self.feed_reason = match self.feed_mm_per_s {
             feed if feed >= command || block.kind == BlockKind::Rapid => LimitedBy::Feed,
             feed if feed >= policy => LimitedBy::Policy,
@@ -93,23 +89,15 @@ impl Entry {
         };
     }
 
-    /// Its path; `None` for a dwell.
-    pub fn path(&self) -> Option<&Path> {
-        match &self.course {
-            Course::Path(path) => Some(path),
-            Course::Dwell(..) => None,
-        }
-    }
-
     /// Length of the path, mm; zero for a dwell.
     pub fn length_mm(&self) -> f64 {
-        self.path().map_or(0.0, Path::length_mm)
+        self.path.as_ref().map_or(0.0, Path::length_mm)
     }
 
     /// Direction at the start and at the end, axis units per mm; zero for a dwell.
     pub fn direction(&self, at_end: bool) -> AxisVector {
         let place = |path: &Path| if at_end { path.length_mm() } else { 0.0 };
-        self.path().map_or(AxisVector::ZERO, |path| path.direction(place(path)))
+        self.path.as_ref().map_or(AxisVector::ZERO, |path| path.direction(place(path)))
     }
 
     /// Whether the machine rests between this block and `next`.

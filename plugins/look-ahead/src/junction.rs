@@ -11,7 +11,7 @@ use tandem_sdk::{AxisLimits, AxisVector};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
-use crate::rows::{Least, Row, Transfer, least_ratio};
+use crate::rows::{Least, Row, Transfer, least_ratio, lesser};
 
 /// Planners stay this far inside the limits.
 const MARGIN: f64 = 0.999;
@@ -43,7 +43,7 @@ impl Rule {
         }
         let directions = [before.direction(true), after.direction(false)];
         let step = directions[1] - directions[0];
-        let capped = before.feed_mm_per_s.min(after.feed_mm_per_s);
+        let capped = lesser(before.feed_mm_per_s, after.feed_mm_per_s);
         after.junction_mm_per_s = match self.kind {
             Junction::Tangent => self.tangent(before, after, &directions).min(capped),
             Junction::Axis => self.speed_difference(&step, capped),
@@ -61,21 +61,21 @@ impl Rule {
 
     /// The highest feed up to `most` at which no axis steps by more than its allowable speed difference.
     fn speed_difference(&self, step: &AxisVector, most: f64) -> f64 {
-        let stepping = self.axes.iter().enumerate().filter(|(i, _)| step[*i].abs() > STRAIGHT);
-        least_ratio(most, stepping.map(|(i, a)| (MARGIN * a.speed_difference_mm_per_s, step[i].abs())))
+        let stepping = self.axes.iter().zip(step.0.map(f64::abs)).filter(|(_, step)| *step > STRAIGHT);
+        least_ratio(most, stepping.map(|(axis, step)| (MARGIN * axis.speed_difference_mm_per_s, step)))
     }
 
     /// The smallest acceleration of the axes that move in a block, as published.
     fn smallest_acceleration(&self, entry: &Entry) -> f64 {
-        let most = entry.path().map(tandem_motion::Path::max_direction).unwrap_or_default();
+        let most = entry.path.as_ref().map(tandem_motion::Path::max_direction).unwrap_or_default();
         let moving = self.axes.iter().enumerate().filter(|(i, _)| most[*i] > 0.0);
         moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min)
     }
 
     /// Fills in what limits the speed inside `entry`, whose end junction is `end`, and from one end of it to the other.
-    pub fn limit(&self, entry: &mut Entry, end: &End, transfer: &mut Transfer) {
+    pub fn limit(&self, entry: &mut Entry, end: &End<'_>, transfer: &mut Transfer) {
         transfer.clear();
-        let Some(path) = entry.path() else { return };
+        let Some(path) = &entry.path else { return };
         let (most, bend, length_mm) = (path.max_direction(), path.max_curvature(), path.length_mm());
         if self.kind == Junction::Tangent {
             let row = Row { h: 1.0, k: 0.0, a: self.smallest_acceleration(entry) };
@@ -98,12 +98,17 @@ impl Rule {
 }
 
 /// The junction at the end of a block.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct End {
+#[derive(Clone, Copy, Debug)]
+pub struct End<'a> {
     /// Its feed, mm/s.
     pub junction_mm_per_s: f64,
     /// Half the change of direction.
-    pub half_step: AxisVector,
+    pub half_step: &'a AxisVector,
+}
+
+impl End<'_> {
+    /// At rest.
+    pub const REST: Self = Self { junction_mm_per_s: 0.0, half_step: &AxisVector::ZERO };
 }
 
 /// What all axes of one block share in the cost of its junctions.
@@ -146,7 +151,7 @@ impl Costs {
 
     /// Whether from the slower junction `one` reaches the feed, or at least as much speed as `other`.
     fn reaches_as_far(&self, one: &Row, other: &Row) -> bool {
-        let slow = self.ends_mm_per_s[0].min(self.ends_mm_per_s[1]).powi(2);
+        let slow = lesser(self.ends_mm_per_s[0], self.ends_mm_per_s[1]).powi(2);
         let reach = |r: &Row| (r.h * slow + 2.0 * self.length_mm * r.a, r.h + 2.0 * self.length_mm * r.k);
         let (one, other) = (reach(one), reach(other));
         one.0 >= self.feed_mm_per_s.powi(2) * one.1 || one.0 * other.1 >= other.0 * one.1

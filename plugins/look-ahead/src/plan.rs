@@ -5,6 +5,7 @@ use tandem_sdk::{AxisVector, BlockReport, LimitedBy, size_of_contract};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
+use crate::rows::greater;
 
 /// The plan of one block.
 #[derive(Clone, Debug)]
@@ -25,7 +26,7 @@ impl Plan {
         let length_mm = entry.length_mm();
         let [start, end] = squares;
         let most = entry.rows.peak(f64::midpoint(start, end), length_mm, entry.own_square);
-        let peak_square = most.max(start).max(end);
+        let peak_square = greater(greater(most, start), end);
         let profile = Profile {
             length_mm,
             start_mm_per_s: start.sqrt(),
@@ -66,7 +67,7 @@ impl Plan {
             entry.feed_reason
         } else if reached(entry.own_square) {
             LimitedBy::Curvature
-        } else if moving_ends && self.durations_s[0].min(self.durations_s[2]) > 0.0 {
+        } else if moving_ends && self.durations_s[0] > 0.0 && self.durations_s[2] > 0.0 {
             LimitedBy::Junction
         } else {
             LimitedBy::Acceleration
@@ -75,7 +76,7 @@ impl Plan {
 }
 
 /// The report of a dwell.
-pub fn dwell_report(entry: &Entry, dwell_s: f64) -> BlockReport {
+pub fn dwell_report(entry: &Entry) -> BlockReport {
     BlockReport {
         size: size_of_contract::<BlockReport>(),
         limited_by: LimitedBy::Feed,
@@ -83,7 +84,7 @@ pub fn dwell_report(entry: &Entry, dwell_s: f64) -> BlockReport {
         start_feed_mm_per_s: 0.0,
         peak_feed_mm_per_s: 0.0,
         end_feed_mm_per_s: 0.0,
-        time_s: dwell_s,
+        time_s: entry.dwell.1,
         time_constant_s: f64::NAN,
     }
 }

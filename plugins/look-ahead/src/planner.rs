@@ -7,7 +7,7 @@ use tandem_sdk::{
 
 use crate::buffer::Buffer;
 use crate::drive::{Drive, begin, without};
-use crate::geometry::{Course, Entry};
+use crate::geometry::Entry;
 use crate::junction::Rule;
 use crate::options::{Junction, Options};
 use crate::plan::{Plan, dwell_report};
@@ -67,21 +67,18 @@ impl LookAhead {
     fn start_block(&mut self, sink: &mut dyn SegmentSink) -> bool {
         let Some(taken) = self.buffer.pop() else { return false };
         let entry = self.buffer.entry(&taken);
-        match &entry.course {
-            Course::Path(path) => {
-                let half_step = self.buffer.end_half_step(&taken);
-                let plan = Plan::new(entry, half_step, taken.squares, self.options.junction);
-                sink.block(&plan.report(entry));
-                begin(&mut self.segment, entry, &plan);
-                self.drive.start(taken, path, &plan, self.path_mm);
-                self.emitting = Emitting::Block;
-            }
-            Course::Dwell(at, dwell_s) => {
-                sink.block(&dwell_report(entry, *dwell_s));
-                self.segment = dwell(entry, at, self.path_mm);
-                self.emitting = Emitting::Dwell(*dwell_s);
-            }
-        }
+        let Some(path) = &entry.path else {
+            sink.block(&dwell_report(entry));
+            self.segment = dwell(entry, self.path_mm);
+            self.emitting = Emitting::Dwell(entry.dwell.1);
+            return true;
+        };
+        let half_step = self.buffer.end_half_step(&taken);
+        let plan = Plan::new(entry, half_step, taken.squares, self.options.junction);
+        sink.block(&plan.report(entry));
+        begin(&mut self.segment, entry, &plan);
+        self.drive.start(taken, path, &plan, self.path_mm);
+        self.emitting = Emitting::Block;
         true
     }
 
@@ -104,7 +101,7 @@ impl LookAhead {
             Emitting::Dwell(left_s) => Some(self.emit_dwell(left_s, duration_s, sink)),
             Emitting::Block => {
                 let entry = self.buffer.entry(self.drive.taken());
-                let Some(path) = entry.path() else { unreachable!("dwells are emitted above") };
+                let Some(path) = &entry.path else { unreachable!("dwells are emitted above") };
                 let (emitted_s, over) = self.drive.advance(path, duration_s, &mut self.segment, sink);
                 if over {
                     self.path_mm += path.length_mm();
@@ -190,8 +187,8 @@ fn is_finite(vector: &AxisVector) -> bool {
     vector.0.iter().fold(true, |all, v| all & v.is_finite())
 }
 
-fn dwell(entry: &Entry, at: &AxisVector, path_mm: f64) -> Segment {
-    let mut rest = Segment::rest(at, 0.0);
+fn dwell(entry: &Entry, path_mm: f64) -> Segment {
+    let mut rest = Segment::rest(&entry.dwell.0, 0.0);
     (rest.block, rest.line) = (entry.index, entry.line);
     rest.path[0] = path_mm;
     rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);

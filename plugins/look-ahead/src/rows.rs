@@ -67,6 +67,18 @@ impl Row {
     }
 }
 
+/// The lesser of two numbers: `f64::min` also minds NaN, which costs several times as much and does not occur here.
+#[inline]
+pub fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
+}
+
+/// The greater of two numbers; see [`lesser`].
+#[inline]
+pub fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
+
 /// The least of some ratios `n/d`, with one division: they are compared crosswise. A `d` of zero limits nothing; none is
 /// negative.
 #[derive(Clone, Copy, Debug)]
@@ -131,8 +143,6 @@ impl Transfer {
     #[inline]
     pub fn apply(&self, w: f64) -> f64 {
         let Some(((p, q), others)) = self.lines[..self.count].split_first() else { return 0.0 };
-        // `f64::min` has to mind NaN; there is none here, and this is the innermost loop.
-        let lesser = |least: f64, next: f64| if next < least { next } else { least };
         others.iter().fold(p * w + q, |least, (p, q)| lesser(least, p * w + q))
     }
 }
