@@ -61,6 +61,14 @@ fn off_the_path(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
     Ok(Box::new(Bent { inner: make(options, context)?, bend, allowed }))
 }
 
+/// Everything 1 % too far in X.
+fn too_far(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+    let bend = |segment: &mut Segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
+    let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
+    Ok(Box::new(Bent { inner: make(options, context)?, bend, allowed }))
+}
+
 /// Changes what another planner emits.
 struct Bent {
     inner: Box<dyn Planner>,
@@ -184,6 +192,25 @@ fn the_governor_slows_what_exceeds_a_limit_and_counts_it() {
 fn the_oracle_sees_a_feed_one_percent_too_high() {
     let ran = run(too_keen, LINE, "count");
     assert_eq!(kinds(&ran, false), [Kind::Feed]);
+}
+
+#[test]
+fn the_oracle_sees_an_axis_one_percent_too_fast_or_accelerating_too_hard() {
+    assert_eq!(kinds(&run(too_fast, RAPID, "count"), false), [Kind::Velocity, Kind::Feed]);
+    assert_eq!(kinds(&run(too_hard, RAPID, "count"), false), [Kind::SpeedStep]);
+}
+
+#[test]
+fn the_oracle_sees_a_travel_one_percent_too_far() {
+    let text = "G21 G90\nF6000\nG1 X249\nG1 X0\nM2\n";
+    let found = kinds(&run(too_far, text, "count"), false);
+    assert!(found.contains(&Kind::Travel) && found.contains(&Kind::PathDeviation), "{found:?}");
+    let ran = run(too_far, text, "stop");
+    assert!(
+        ran.outcome.summary.fault.as_ref().is_some_and(|f| f.contains("travel")),
+        "{:?}",
+        ran.outcome.summary.fault
+    );
 }
 
 #[test]
