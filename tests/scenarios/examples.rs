@@ -28,6 +28,12 @@ fn long_tests_of_the_path_run_within_limits() {
 }
 
 #[test]
+fn rotary_axes_run_within_limits() {
+    let program = root().join("tests/fixtures/programs/rotary.ngc");
+    Scenario::of(&program).on(&root().join("examples/machines/mill-4axis.toml")).run().assert_within_limits();
+}
+
+#[test]
 fn the_published_path_takes_the_published_time() {
     let loop_machine = root().join("examples/machines/two-step-loop.toml");
     for (name, time_s) in [("two-step-square.ngc", 1.871_080), ("two-step-arcs.ngc", 3.292_509)] {
