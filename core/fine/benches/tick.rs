@@ -1,0 +1,140 @@
+//! The cost of one fine tick: `cargo bench -p tandem-fine`. An item is a tick, with the host's taking of its sample.
+
+use std::sync::atomic::Ordering::Relaxed;
+
+use divan::counter::ItemsCount;
+use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
+use tandem_sdk::{
+    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Limits, PluginError, RingEntry, Segment,
+    SegmentFlags, Setpoint,
+};
+
+const TICKS: usize = 1000;
+const FEED_MM_PER_S: f64 = 50.0;
+
+fn main() {
+    divan::main();
+}
+
+/// Drives that are where they are told to be.
+struct Echo;
+
+impl Driver for Echo {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::simulated()
+    }
+    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
+        Ok(())
+    }
+    fn start(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
+        Ok(())
+    }
+    fn quick_stop(&mut self) {}
+    fn stop(&mut self) {}
+}
+
+/// A fine loop with a queue that lasts for [`TICKS`] ticks and a few more.
+struct Bench {
+    fine: FineLoop,
+    host: HostEnd,
+    /// Keeps the ring alive.
+    _rough: RoughEnd,
+}
+
+impl Bench {
+    /// Segments of `duration_s`, each turned by `turn_rad` against the one before.
+    fn new(duration_s: f64, turn_rad: f64) -> Self {
+        let (mut rough, end, host) = bridge(Sizes { segments: 2048, samples: 64 });
+        let mut at = AxisVector::ZERO;
+        for number in 0..((TICKS + 16) as f64 * 1e-3 / duration_s).ceil() as u32 {
+            let queued = segment(&mut at, f64::from(number), duration_s, turn_rad);
+            rough.segments.push(queued).unwrap();
+        }
+        rough.depth.wall_s.store(f64::INFINITY);
+        rough.depth.required_s.store(0.0);
+        let mut this = Self { fine: FineLoop::new(&config(), end, Box::new(Echo), None), host, _rough: rough };
+        this.run(8);
+        assert!(this.fine.fault().is_none());
+        this
+    }
+
+    fn run(&mut self, ticks: usize) {
+        for tick in 0..ticks {
+            self.fine.tick();
+            if tick % 8 == 7 {
+                while let Ok(sample) = self.host.samples.pop() {
+                    divan::black_box(&sample);
+                }
+            }
+        }
+    }
+}
+
+fn segment(at: &mut AxisVector, number: f64, duration_s: f64, turn_rad: f64) -> Queued {
+    let (sin, cos) = (number * turn_rad).sin_cos();
+    let direction = AxisVector::from_slice(&[0.8 * cos, 0.8 * sin, 0.6]);
+    let mut segment = Segment::rest(at, duration_s);
+    segment.flags = SegmentFlags::default();
+    segment.feed_mm_per_s = FEED_MM_PER_S;
+    segment.stop_deceleration_mm_per_s2 = 1000.0;
+    segment.path[0] = number * duration_s * FEED_MM_PER_S;
+    segment.path[1] = FEED_MM_PER_S;
+    for axis in 0..3 {
+        segment.coefficients[axis][1] = FEED_MM_PER_S * direction[axis];
+    }
+    *at += direction * (FEED_MM_PER_S * duration_s);
+    Queued { entry: RingEntry::Segment(segment), start_s: number * duration_s }
+}
+
+fn config() -> FineConfig {
+    let axis = AxisLimits {
+        min_mm: -1e6,
+        max_mm: 1e6,
+        feed_mm_per_s: 250.0,
+        rapid_mm_per_s: 250.0,
+        acceleration_mm_per_s2: 1000.0,
+        jerk_mm_per_s3: f64::INFINITY,
+        speed_difference_mm_per_s: 0.0,
+    };
+    FineConfig {
+        period_s: 1e-3,
+        limits: Limits::new(&[axis; 3]).unwrap(),
+        // The queue starts at speed: the guard is to look at it, not to stop it.
+        speed_difference_mm_per_s: [1000.0; 8],
+        guard: GuardMode::Stop,
+        position: AxisVector::ZERO,
+        max_feed_ratio: 1.0,
+        pause_at_stops: false,
+    }
+}
+
+fn bench(bencher: divan::Bencher, make: impl Fn() -> Bench) {
+    bencher.counter(ItemsCount::new(TICKS)).with_inputs(make).bench_local_refs(|bench| bench.run(TICKS));
+}
+
+/// Segments of a rough period each, as long lines give them.
+#[divan::bench]
+fn long_lines(bencher: divan::Bencher) {
+    bench(bencher, || Bench::new(8e-3, 0.0));
+}
+
+/// Chords of 0.05 mm at F3000: a segment a tick.
+#[divan::bench]
+fn chords(bencher: divan::Bencher) {
+    bench(bencher, || Bench::new(1e-3, 0.01));
+}
+
+/// Feed hold: stopping on the path, then standing there.
+#[divan::bench]
+fn hold(bencher: divan::Bencher) {
+    bench(bencher, || {
+        let bench = Bench::new(1e-3, 0.01);
+        bench.host.controls.hold.store(true, Relaxed);
+        bench
+    });
+}

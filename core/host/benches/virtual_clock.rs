@@ -1,0 +1,68 @@
+//! Whole runs on the virtual clock: `cargo bench -p tandem-host`. Both passes of the interpreter, planner, both loops,
+//! simulated drives; no trace. An item is a sample, so that at 1 kHz thousands of items a second are × real time.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use divan::counter::ItemsCount;
+use tandem_gcode::Program;
+use tandem_host::{Clock, Registry, Run, Summary};
+use tandem_machine::Machine;
+
+fn main() {
+    divan::main();
+    for name in ["serpentine", "raster", "spiral"] {
+        let example = Example::new(name);
+        let runs = (0..50).map(|_| timed(&example));
+        let (elapsed, summary) = runs.min_by_key(|(elapsed, _)| *elapsed).unwrap();
+        let (motion_s, took_s) = (summary.motion_time_s, elapsed.as_secs_f64());
+        println!(
+            "{name}: {} blocks, {motion_s:.1} s of motion in {:.1} ms, {:.0} × real time",
+            summary.blocks,
+            took_s * 1e3,
+            motion_s / took_s
+        );
+    }
+}
+
+/// A program of the examples on the example machine.
+struct Example {
+    machine: Machine,
+    registry: Registry,
+    text: Vec<u8>,
+}
+
+impl Example {
+    fn new(name: &str) -> Self {
+        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+        let mut registry = Registry::default();
+        registry.register(tandem_look_ahead::PLUGIN).unwrap();
+        registry.register(tandem_sim::PLUGIN).unwrap();
+        Self {
+            machine: Machine::read(&examples.join("machines/mill-3axis.toml"), &[]).unwrap(),
+            registry,
+            text: std::fs::read(examples.join(format!("programs/{name}.ngc"))).unwrap(),
+        }
+    }
+
+    fn run(&self) -> Summary {
+        let program = Program::spool("bench", self.text.as_slice()).unwrap();
+        let run = Run::prepare(self.machine.clone(), &self.registry, program, false).unwrap();
+        let outcome = run.drive(Clock::Virtual, &[], &mut ()).unwrap();
+        assert!(outcome.fault.is_none() && outcome.summary.starvations == 0);
+        outcome.summary
+    }
+}
+
+fn timed(example: &Example) -> (Duration, Summary) {
+    let started = Instant::now();
+    let summary = example.run();
+    (started.elapsed(), summary)
+}
+
+#[divan::bench(args = ["serpentine", "raster", "spiral"])]
+fn run(bencher: divan::Bencher, name: &str) {
+    let example = Example::new(name);
+    let samples = example.run().samples;
+    bencher.counter(ItemsCount::new(samples)).bench_local(|| example.run());
+}
