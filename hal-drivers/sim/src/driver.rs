@@ -9,6 +9,10 @@ use tandem_sdk::{
 use crate::joint::{CURRENT_A_PER_MM_PER_S2, Motion, Servo};
 use crate::options::{Model, Options};
 use crate::spindle::Spindle;
+use crate::watchdog::Watchdog;
+
+/// Fault code of every joint whose drives stopped by themselves because the host fell silent.
+pub const WATCHDOG_FAULT: u32 = 1;
 
 /// Where the driver is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +28,10 @@ enum Life {
 /// the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are
 /// then reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its
 /// command in every state. Latches are not simulated.
+///
+/// Where no new setpoint comes, joints go on at the velocity of the last one; after more than
+/// [`Options::watchdog_periods`] such periods in a row they ramp to rest at the quick-stop deceleration and report
+/// [`WATCHDOG_FAULT`] until an exchange with `reset = 1`. Drives that are not enabled need no heartbeat.
 #[derive(Debug)]
 pub struct SimulatedDrives {
     options: Options,
@@ -35,7 +43,10 @@ pub struct SimulatedDrives {
     joints: [Motion; MAX_AXES],
     /// The setpoint that the joints followed last; none while they follow nothing.
     followed: Option<AxisVector>,
+    /// The velocity commanded last: the joints go on at it while no setpoint comes.
+    velocity: AxisVector,
     quick_stopping: bool,
+    watchdog: Watchdog,
     spindle: Spindle,
 }
 
@@ -46,6 +57,7 @@ impl SimulatedDrives {
         Self {
             servo: servo(&options, period_s),
             spindle: Spindle::new(options.spindle_time_constant_s, period_s),
+            watchdog: Watchdog::new(options.watchdog_periods),
             options,
             life: Life::Closed,
             joint_count: 0,
@@ -53,6 +65,7 @@ impl SimulatedDrives {
             start_position: AxisVector::ZERO,
             joints: [Motion::default(); MAX_AXES],
             followed: None,
+            velocity: AxisVector::ZERO,
             quick_stopping: false,
         }
     }
@@ -78,28 +91,60 @@ impl SimulatedDrives {
         }
     }
 
+    /// Lives through the periods up to and with this exchange. Fine loop.
+    fn live(&mut self, setpoint: &Setpoint) {
+        if setpoint.reset != 0 {
+            self.watchdog.reset();
+        }
+        let heard = self.watchdog.hear(setpoint.tick);
+        (0..heard.missed).for_each(|_| self.miss());
+        if heard.fresh || setpoint.enable == 0 {
+            self.watchdog.fed();
+            self.move_joints(setpoint);
+        } else {
+            self.miss();
+        }
+    }
+
+    /// One period without a new setpoint: on at the last velocity, until the watchdog ends that.
+    fn miss(&mut self) {
+        let Some(last) = self.followed else { return self.brake() };
+        self.watchdog.silence();
+        if self.watchdog.is_tripped() {
+            return self.brake();
+        }
+        let next = last + self.velocity * self.period_s;
+        self.follow(&last, &next);
+    }
+
     /// Moves all joints over one period. Fine loop.
     fn move_joints(&mut self, setpoint: &Setpoint) {
         if setpoint.enable == 0 || setpoint.reset != 0 {
             self.quick_stopping = false;
         }
-        if setpoint.enable == 0 || self.quick_stopping {
-            self.followed = None;
-            let deceleration = self.options.quick_stop_deceleration_mm_per_s2;
-            self.joints[..self.joint_count].iter_mut().for_each(|joint| joint.brake(deceleration, self.period_s));
-            return;
+        if setpoint.enable == 0 || self.quick_stopping || self.watchdog.is_tripped() {
+            return self.brake();
         }
         // Drives that just begin to follow have no setpoint to interpolate from: for them it is a step.
         let from = self.followed.unwrap_or(setpoint.position);
+        self.velocity = setpoint.velocity;
+        self.follow(&from, &setpoint.position);
+    }
+
+    fn brake(&mut self) {
+        self.followed = None;
+        let deceleration = self.options.quick_stop_deceleration_mm_per_s2;
+        self.joints[..self.joint_count].iter_mut().for_each(|joint| joint.brake(deceleration, self.period_s));
+    }
+
+    fn follow(&mut self, from: &AxisVector, to: &AxisVector) {
         for (index, joint) in self.joints[..self.joint_count].iter_mut().enumerate() {
             match self.options.model {
-                Model::Ideal => {
-                    *joint = Motion { position: setpoint.position[index], speed: setpoint.velocity[index] };
-                }
-                Model::SecondOrder => self.servo.follow(joint, from[index], setpoint.position[index]),
+                Model::Ideal => *joint = Motion { position: to[index], speed: self.velocity[index] },
+                Model::SecondOrder => self.servo.follow(joint, from[index], to[index]),
             }
         }
-        self.followed = Some(setpoint.position);
+        self.followed = Some(*to);
     }
 
     fn report(&self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
@@ -109,6 +154,7 @@ impl SimulatedDrives {
             feedback.speed[index] = joint.speed;
             feedback.current_a[index] = self.mean_current_a(&before[index], joint);
             feedback.state[index] = self.state(enable, joint);
+            feedback.fault_code[index] = if self.watchdog.is_tripped() { WATCHDOG_FAULT } else { 0 };
         }
         feedback.inputs = self.inputs();
         feedback.spindle_rad_per_s = self.spindle.speed;
@@ -123,6 +169,9 @@ impl SimulatedDrives {
     }
 
     fn state(&self, enable: bool, joint: &Motion) -> JointState {
+        if self.watchdog.is_tripped() {
+            return JointState::Fault;
+        }
         let at_rest_for_good = self.quick_stopping && joint.speed == 0.0;
         if enable && !at_rest_for_good { JointState::Enabled } else { JointState::Disabled }
     }
@@ -166,7 +215,9 @@ impl Driver for SimulatedDrives {
         self.joints = std::array::from_fn(|i| Motion { position: self.start_position[i], speed: 0.0 });
         self.spindle = Spindle::new(self.options.spindle_time_constant_s, self.period_s);
         self.followed = None;
+        self.velocity = AxisVector::ZERO;
         self.quick_stopping = false;
+        self.watchdog = Watchdog::new(self.options.watchdog_periods);
         self.life = Life::Running;
         Ok(())
     }
@@ -183,7 +234,7 @@ impl Driver for SimulatedDrives {
             return Err(PluginError::fixed("sim: exchange is refused: the setpoint is not a finite number"));
         }
         let before = self.joints;
-        self.move_joints(setpoint);
+        self.live(setpoint);
         self.spindle.follow(setpoint.spindle_rad_per_s);
         self.report(&before, setpoint.enable != 0, feedback);
         Ok(())

@@ -15,6 +15,7 @@
 //! damping_ratio = 0.7
 //! spindle_time_constant_s = 0.3
 //! quick_stop_deceleration_mm_per_s2 = 5000
+//! watchdog_periods = 5             # silent fine periods after which the drives stop by themselves; 0: never
 //!
 //! [[driver.options.switches]]      # input 0 is 1 while joint 0 stands above 12.5 mm: a touch plane to probe
 //! input = 0
@@ -28,8 +29,9 @@ mod driver;
 mod joint;
 mod options;
 mod spindle;
+mod watchdog;
 
-pub use driver::SimulatedDrives;
+pub use driver::{SimulatedDrives, WATCHDOG_FAULT};
 pub use joint::CURRENT_A_PER_MM_PER_S2;
 pub use options::{Model, Options, Switch};
 

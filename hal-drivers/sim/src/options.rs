@@ -42,6 +42,9 @@ pub struct Options {
     pub spindle_time_constant_s: f64,
     /// Deceleration with which every joint stops by itself: in a quick stop, and when the drives are let go, mm/s².
     pub quick_stop_deceleration_mm_per_s2: f64,
+    /// How many fine periods in a row may pass without a new setpoint (an exchange with a new tick) before the drives
+    /// stop by themselves, 0 to 100; 0: they never do.
+    pub watchdog_periods: u32,
     /// Simulated switches on the digital inputs; all other inputs are 0.
     pub switches: Vec<Switch>,
 }
@@ -54,6 +57,7 @@ impl Default for Options {
             damping_ratio: 0.7,
             spindle_time_constant_s: 0.0,
             quick_stop_deceleration_mm_per_s2: 5000.0,
+            watchdog_periods: 5,
             switches: Vec::new(),
         }
     }
@@ -76,6 +80,7 @@ impl Options {
         within("damping_ratio", self.damping_ratio, 1e-3, 1e3)?;
         within("quick_stop_deceleration_mm_per_s2", self.quick_stop_deceleration_mm_per_s2, 1e-3, 1e9)?;
         within("spindle_time_constant_s", self.spindle_time_constant_s, 0.0, 1e4)?;
+        within("watchdog_periods", f64::from(self.watchdog_periods), 0.0, 100.0)?;
         self.switches.iter().try_for_each(Switch::check)
     }
 }
@@ -117,12 +122,13 @@ mod tests {
     #[test]
     fn every_key_is_read() {
         let text = "model = \"second-order\"\nnatural_frequency_hz = 12\ndamping_ratio = 1.5\n\
-                    spindle_time_constant_s = 0.25\nquick_stop_deceleration_mm_per_s2 = 800\n\
+                    spindle_time_constant_s = 0.25\nquick_stop_deceleration_mm_per_s2 = 800\nwatchdog_periods = 9\n\
                     [[switches]]\ninput = 3\njoint = 1\nabove_mm = 12.5\n";
         let options = Options::parse(text).unwrap();
         assert_eq!(options.model, Model::SecondOrder);
         assert_eq!((options.natural_frequency_hz, options.damping_ratio), (12.0, 1.5));
         assert_eq!((options.spindle_time_constant_s, options.quick_stop_deceleration_mm_per_s2), (0.25, 800.0));
+        assert_eq!(options.watchdog_periods, 9);
         assert_eq!(options.switches, [Switch { input: 3, joint: 1, above_mm: 12.5 }]);
     }
 
@@ -135,6 +141,7 @@ mod tests {
             ("damping_ratio = inf", "damping_ratio"),
             ("spindle_time_constant_s = -1", "spindle_time_constant_s"),
             ("quick_stop_deceleration_mm_per_s2 = 0", "quick_stop_deceleration_mm_per_s2"),
+            ("watchdog_periods = 101", "0 to 100"),
             ("frequency_hz = 3", "frequency_hz"),
             ("model = \"third-order\"", "third-order"),
             ("[[switches]]\ninput = 64\njoint = 0\nabove_mm = 1", "0 to 63"),
