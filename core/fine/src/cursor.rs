@@ -151,22 +151,34 @@ impl Cursor {
 
     /// Steps to the start of the next segment; `false` where there is none.
     fn next(&mut self, event: &mut impl FnMut(&Event)) -> bool {
-        while let Ok(queued) = self.entries.pop() {
-            match queued.entry {
-                RingEntry::Event(it) if it.epoch >= self.epoch => event(&it),
+        let mut found = false;
+        while !found {
+            // Looked at in its slot: a segment is large, and is copied once.
+            let Ok(queued) = self.entries.peek() else { break };
+            match &queued.entry {
+                RingEntry::Event(it) if it.epoch >= self.epoch => event(it),
                 RingEntry::Segment(segment) if segment.epoch >= self.epoch => {
                     self.epoch = segment.epoch;
-                    (self.segment, self.start_s, self.local_s) = (segment, queued.start_s, 0.0);
+                    (self.start_s, self.local_s) = (queued.start_s, 0.0);
+                    self.segment.clone_from(segment);
                     self.resting = false;
-                    return true;
+                    found = true;
                 }
                 _ => {}
             }
+            self.drop_front();
         }
-        if !self.resting {
+        if !found && !self.resting {
             self.local_s = self.segment.duration_s;
         }
-        false
+        found
+    }
+
+    /// Gives the slot of the next entry back.
+    fn drop_front(&mut self) {
+        if let Ok(front) = self.entries.read_chunk(1) {
+            front.commit_all();
+        }
     }
 }
 

@@ -16,7 +16,9 @@ pub struct Point {
 pub struct Points {
     list: Box<[Point]>,
     count: usize,
-    limits: [AxisLimits; MAX_AXES],
+    /// Per axis 1/acceleration, and 1/speed in feed and in rapid motion: divisions are made once.
+    per_acceleration: [f64; MAX_AXES],
+    per_speed: [[f64; MAX_AXES]; 2],
     axes: usize,
     /// Largest |velocity| / limit.
     pub speed_ratio: f64,
@@ -34,7 +36,16 @@ impl Points {
     /// No points; the limits are those of the machine's `axes` first axes.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize) -> Self {
         let list = vec![Point::default(); Self::POINTS].into_boxed_slice();
-        Self { list, count: 0, limits: *limits, axes, speed_ratio: 0.0, acceleration_ratio: 0.0, covered_s: 0.0 }
+        Self {
+            list,
+            count: 0,
+            per_acceleration: limits.map(|l| 1.0 / l.acceleration_mm_per_s2),
+            per_speed: [limits.map(|l| 1.0 / l.feed_mm_per_s), limits.map(|l| 1.0 / l.rapid_mm_per_s)],
+            axes,
+            speed_ratio: 0.0,
+            acceleration_ratio: 0.0,
+            covered_s: 0.0,
+        }
     }
 
     /// Forgets all points.
@@ -64,9 +75,9 @@ impl Points {
     }
 
     fn point(&mut self, segment: &Segment, t: f64) {
-        let rapid = segment.flags.contains(SegmentFlags::RAPID);
+        let per_speed = &self.per_speed[usize::from(segment.flags.contains(SegmentFlags::RAPID))];
         let point = &mut self.list[self.count];
-        for axis in 0..self.axes {
+        for (axis, per_speed) in per_speed.iter().enumerate().take(self.axes) {
             let c = &segment.coefficients[axis];
             let velocity = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
             let acceleration = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
@@ -74,10 +85,8 @@ impl Points {
             let smooth = acceleration + takeback;
             point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
             point.acceleration[axis] = smooth;
-            let limits = &self.limits[axis];
-            let fastest = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
-            self.speed_ratio = self.speed_ratio.max(velocity.abs() / fastest);
-            self.acceleration_ratio = self.acceleration_ratio.max(smooth.abs() / limits.acceleration_mm_per_s2);
+            self.speed_ratio = self.speed_ratio.max(velocity.abs() * per_speed);
+            self.acceleration_ratio = self.acceleration_ratio.max(smooth.abs() * self.per_acceleration[axis]);
         }
         self.count += 1;
     }

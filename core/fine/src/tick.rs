@@ -277,10 +277,8 @@ impl FineLoop {
         let ratios = self.ratios_in_force();
         let wanted = if ask == Ask::Run { self.ratio_target(&ratios) } else { 0.0 };
         let target = wanted.min(limit);
-        let sigma = match target {
-            1.0 if self.governor.sigma() == 1.0 => 1.0,
-            _ => self.governor.choose(target, &self.points),
-        };
+        let unchanged = target == self.governor.sigma();
+        let sigma = if unchanged { target } else { self.governor.choose(target, &self.points) };
         let asked = ask != Ask::Run || ratios.feed < self.config.max_feed_ratio || ratios.rapid < 1.0;
         self.recovering = asked || (self.recovering && sigma < 1.0);
         self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
@@ -307,7 +305,11 @@ impl FineLoop {
             let at_end = within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s);
             let mean = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
             let of_period = 2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from;
-            sigma = if ahead.rapid { ratios.rapid } else { at_end.min(of_period).clamp(0.0, 1.0) };
+            let next = if ahead.rapid { ratios.rapid } else { at_end.min(of_period).clamp(0.0, 1.0) };
+            if next == sigma {
+                break;
+            }
+            sigma = next;
         }
         sigma
     }

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_rings::{Queued, RoughEnd};
 use tandem_sdk::{Block, BlockReport, Event, RingEntry, Segment, SegmentFlags, SegmentSink};
 
+use crate::Observer;
 use crate::depth::QueueDepth;
 
 /// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
@@ -18,8 +19,8 @@ pub struct Queue {
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported.
     pub blocks: VecDeque<Block>,
-    /// Blocks planned for good since the last look.
-    pub reported: Vec<(Block, BlockReport)>,
+    /// Reports of blocks planned for good since the last look; their blocks are still in `blocks`.
+    reported: Vec<BlockReport>,
     /// Program time at the end of what was emitted, s.
     emitted_s: f64,
     /// Program time at the end of what is in the ring, s.
@@ -57,6 +58,18 @@ impl Queue {
         }
     }
 
+    /// Tells `observer` of the blocks planned for good since the last look, and forgets them.
+    pub fn tell_of_blocks(&mut self, observer: &mut dyn Observer) {
+        for report in self.reported.drain(..) {
+            while let Some(block) = self.blocks.front().filter(|block| block.index <= report.block) {
+                if block.index == report.block {
+                    observer.block(block, &report);
+                }
+                self.blocks.pop_front();
+            }
+        }
+    }
+
     /// The planner's defect met while emitting, if any.
     pub fn defect(&self) -> Option<&'static str> {
         self.defect
@@ -83,15 +96,15 @@ impl Queue {
 
     /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
     pub fn flush(&mut self, over: bool) {
-        while let Some(next) = self.staged.front() {
-            if self.end.segments.push(*next).is_err() {
-                break;
-            }
-            if let RingEntry::Segment(segment) = &next.entry {
-                self.queued_s = next.start_s + segment.duration_s;
+        let count = self.staged.len().min(self.end.segments.slots());
+        for queued in self.staged.iter().take(count) {
+            if let RingEntry::Segment(segment) = &queued.entry {
+                self.queued_s = queued.start_s + segment.duration_s;
                 self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
             }
-            self.staged.pop_front();
+        }
+        if let Ok(slots) = self.end.segments.write_chunk_uninit(count) {
+            slots.fill_from_iter(self.staged.drain(..count));
         }
         self.tell(over);
     }
@@ -115,8 +128,7 @@ impl Queue {
 
 impl SegmentSink for Queue {
     fn segment(&mut self, segment: &Segment) {
-        let numbers = segment.coefficients.iter().flatten().chain(&segment.path).chain([&segment.duration_s]);
-        if !numbers.into_iter().all(|v| v.is_finite()) || segment.duration_s < 0.0 {
+        if !is_sound(segment) {
             self.defect = Some("a segment with a number that is not finite, or a negative duration");
             return;
         }
@@ -130,12 +142,20 @@ impl SegmentSink for Queue {
     }
 
     fn block(&mut self, report: &BlockReport) {
-        while let Some(block) = self.blocks.pop_front() {
-            if block.index == report.block {
-                self.reported.push((block, *report));
-                return;
-            }
+        let first = self.reported.last().map_or(0, |last| last.block + 1);
+        let given = |block: &Block| block.index == report.block;
+        let place = self.blocks.front().map_or(0, |front| report.block.wrapping_sub(front.index) as usize);
+        if report.block >= first && self.blocks.get(place).is_some_and(given) {
+            self.reported.push(*report);
+        } else {
+            self.defect = Some("a report of a block that it was not given");
         }
-        self.defect = Some("a report of a block that it was not given");
     }
+}
+
+/// Whether all numbers are finite and time goes forward; without a branch for each number.
+fn is_sound(segment: &Segment) -> bool {
+    let finite = |numbers: &[f64; 6]| numbers.iter().fold(true, |all, v| all & v.is_finite());
+    let polynomials = segment.coefficients.iter().fold(finite(&segment.path), |all, c| all & finite(c));
+    polynomials && segment.duration_s.is_finite() && segment.duration_s >= 0.0
 }

@@ -93,9 +93,7 @@ impl RoughLoop {
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
         let result = self.fill(observer);
         self.queue.flush(self.stretch_over || result.is_err());
-        for (block, report) in self.queue.reported.drain(..) {
-            observer.block(&block, &report);
-        }
+        self.queue.tell_of_blocks(observer);
         result?;
         self.answer_wait();
         Ok(if self.done { Progress::Done } else { Progress::Working })
