@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Limits, PluginError, RingEntry, Segment,
-    SegmentFlags, Setpoint,
+    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Limits, PluginError, RingEntry,
+    Segment, SegmentFlags, Setpoint,
 };
 
 const TICKS: usize = 1000;

@@ -11,6 +11,7 @@ mod guard;
 mod outputs;
 mod points;
 mod ramp;
+mod state;
 mod tick;
 
 pub use config::{AxisConfig, FineConfig, GuardMode};

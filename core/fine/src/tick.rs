@@ -15,6 +15,7 @@ use crate::guard::{Checked, Guard};
 use crate::outputs::Outputs;
 use crate::points::Points;
 use crate::ramp::Ramp;
+use crate::state::{self, Input};
 
 /// What the fine loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,6 +59,7 @@ pub struct FineLoop {
     config: FineConfig,
     driver: Box<dyn Driver>,
     kinematics: Option<Box<dyn Kinematics>>,
+    joints: usize,
     controls: Arc<Controls>,
     status: Arc<Status>,
     depth: Arc<Depth>,
@@ -71,6 +73,7 @@ pub struct FineLoop {
     guard: Guard,
     outputs: Outputs,
     phase: Phase,
+    state: MachineState,
     starved: bool,
     recovering: bool,
     tick: u64,
@@ -98,6 +101,7 @@ impl FineLoop {
         Self {
             config: *config,
             driver,
+            joints: kinematics.as_ref().map_or(axes, |k| k.joint_count(axes)),
             kinematics,
             controls: end.controls,
             status: end.status,
@@ -112,6 +116,7 @@ impl FineLoop {
             guard: Guard::new(config),
             outputs: Outputs::default(),
             phase: Phase::Waiting,
+            state: MachineState::Fault,
             starved: false,
             recovering: false,
             tick: 0,
@@ -127,15 +132,16 @@ impl FineLoop {
         let ended = self.outputs.ended;
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();
-        let (position, state) = self.next_position();
+        let (position, input) = self.next_position();
         self.exchange(&position);
+        self.state = state::next(state::next(self.state, self.drives()), input);
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
         if started && !ended && !self.outputs.ended {
             let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
-            self.publish(&position, state, feed);
+            self.publish(&position, feed);
         }
         self.tick += u64::from(started);
-        self.report(state);
+        self.report();
     }
 
     /// Fine periods went by without a sample; more than `most` are a fault. Fine thread.
@@ -144,6 +150,16 @@ impl FineLoop {
         if periods > most {
             self.fail(FaultKind::MissedPeriods);
         }
+    }
+
+    /// Acknowledges a fault: the drives may be enabled. A machine starts faulted. Host, between runs.
+    pub fn reset(&mut self) {
+        self.state = state::next(self.state, Input::Reset);
+    }
+
+    /// Number of the fine period that comes next: 0 until the first motion.
+    pub fn next_tick(&self) -> u64 {
+        self.tick
     }
 
     /// What was counted so far.
@@ -166,7 +182,7 @@ impl FineLoop {
         self.driver
     }
 
-    fn next_position(&mut self) -> (AxisVector, MachineState) {
+    fn next_position(&mut self) -> (AxisVector, Input) {
         if self.controls.emergency_stop.load(Relaxed) {
             self.fail(FaultKind::EmergencyStop);
         }
@@ -176,17 +192,22 @@ impl FineLoop {
             Phase::Ramping(ramp) => {
                 let position = ramp.next();
                 let over = ramp.is_over();
-                (self.ramp_out(position, over), MachineState::Stopping)
+                (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }
-            Phase::Faulted => (*self.guard.position(), MachineState::Fault),
+            Phase::Faulted => (*self.guard.position(), Input::Stopped),
         }
     }
 
-    fn wait(&mut self) -> MachineState {
-        if self.depth.may_start(self.cursor.program_time_s()) {
+    /// Motion starts when the drives hold and enough is queued.
+    fn wait(&mut self) -> Input {
+        if self.controls.soft_fault.load(Relaxed) {
+            self.fail(FaultKind::Soft);
+            return Input::Trip;
+        }
+        if self.state == MachineState::Standstill && self.depth.may_start(self.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
-        MachineState::Standstill
+        Input::Rest
     }
 
     fn ramp_out(&mut self, position: AxisVector, over: bool) -> AxisVector {
@@ -200,7 +221,7 @@ impl FineLoop {
     }
 
     /// Follows the plan for one period.
-    fn follow(&mut self) -> (AxisVector, MachineState) {
+    fn follow(&mut self) -> (AxisVector, Input) {
         self.take_ratio();
         let ask = self.ask();
         if self.cursor.is_resting() {
@@ -208,14 +229,14 @@ impl FineLoop {
         }
         if self.governor.sigma() == 0.0 && ask == Ask::Hold && self.controls.soft_fault.load(Relaxed) {
             self.fail(FaultKind::Soft);
-            return (*self.guard.position(), MachineState::Fault);
+            return (*self.guard.position(), Input::Trip);
         }
         let delta_s = self.govern(ask);
         let reached = self.cursor.advance(delta_s, |event| self.outputs.apply(event));
         let position = self.cursor.position();
         let checked = self.guard.check(&position);
         let position = self.let_pass(position, &checked);
-        (position, self.state(ask, reached))
+        (position, self.input(ask, reached))
     }
 
     fn let_pass(&mut self, position: AxisVector, checked: &Checked) -> AxisVector {
@@ -327,14 +348,14 @@ impl FineLoop {
         }
     }
 
-    fn state(&self, ask: Ask, reached: Reached) -> MachineState {
+    fn input(&self, ask: Ask, reached: Reached) -> Input {
         match (&self.phase, ask) {
-            (Phase::Ramping(_), _) => MachineState::Stopping,
-            (Phase::Faulted, _) => MachineState::Fault,
-            (_, Ask::Hold) => MachineState::Holding,
-            (_, Ask::Starve) => MachineState::Starved,
-            _ if reached == Reached::Rest && self.cursor.is_last() => MachineState::Standstill,
-            _ => MachineState::Running,
+            (Phase::Ramping(_), _) => Input::Trip,
+            (Phase::Faulted, _) => Input::Stopped,
+            (_, Ask::Hold) => Input::Hold,
+            (_, Ask::Starve) => Input::Starve,
+            _ if reached == Reached::Rest && self.cursor.is_last() => Input::Rest,
+            _ => Input::Run,
         }
     }
 
@@ -370,15 +391,26 @@ impl FineLoop {
         if let Some(joint) = self.feedback.state.iter().position(|s| *s == JointState::Fault) {
             self.fail(FaultKind::Drive { joint, code: self.feedback.fault_code[joint] });
         }
+        let moving = matches!(self.state, MachineState::Running | MachineState::Holding | MachineState::Starved);
+        if moving
+            && let Some(joint) = self.feedback.state[..self.joints].iter().position(|s| *s == JointState::Disabled)
+        {
+            self.fail(FaultKind::Drive { joint, code: 0 });
+        }
     }
 
-    fn publish(&mut self, command: &AxisVector, state: MachineState, feed_mm_per_s: f64) {
+    fn drives(&self) -> Input {
+        let on = self.feedback.state[..self.joints].iter().all(|s| *s == JointState::Enabled);
+        if on { Input::DrivesOn } else { Input::DrivesOff }
+    }
+
+    fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
         let to_axes = |v: &AxisVector| self.kinematics.as_ref().map_or(*v, |k| k.to_axes(v));
         let sample = Sample {
             tick: self.tick,
             block: self.cursor.segment().block,
             line: self.cursor.segment().line,
-            state,
+            state: self.state,
             command: *command,
             feedback: to_axes(&self.feedback.position),
             speed: self.feedback.speed,
@@ -395,13 +427,13 @@ impl FineLoop {
         }
     }
 
-    fn report(&self, state: MachineState) {
+    fn report(&self) {
         let status = &self.status;
         status.tick.store(self.tick, Relaxed);
         status.program_time_s.store(self.cursor.program_time_s());
         status.feed_mm_per_s.store(self.governor.sigma() * self.cursor.path_speed_mm_per_s());
         status.line.store(self.cursor.segment().line, Relaxed);
-        status.state.store(state as u32, Relaxed);
+        status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
         status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
     }

@@ -104,9 +104,11 @@ impl Run {
         let description = planner.describe();
         let fine_config = setup::fine_config(&machine, &description, pause_at_stops);
         let rough_config = RoughConfig { rough_period_s: machine.rough_period_s };
+        let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
+        fine.reset();
         Ok(Self {
             rough: RoughLoop::new(rough_config, Box::new(stream), planner, rough_end),
-            fine: FineLoop::new(&fine_config, fine_end, driver, kinematics),
+            fine,
             machine,
             program,
             host,

@@ -17,14 +17,16 @@ pub enum MachineState {
     Starved = 3,
     /// Ramping out after a fault, off the path.
     Stopping = 4,
-    /// Stopped by a fault.
+    /// Stopped by a fault; sticky until reset. A machine starts like this.
     Fault = 5,
+    /// Reset, but the drives do not hold.
+    Disabled = 6,
 }
 
 impl MachineState {
     /// The state of a number, as [`crate::Status::state`] holds it.
     pub fn from_number(number: u32) -> Self {
-        [Self::Standstill, Self::Running, Self::Holding, Self::Starved, Self::Stopping, Self::Fault]
+        [Self::Standstill, Self::Running, Self::Holding, Self::Starved, Self::Stopping, Self::Fault, Self::Disabled]
             .into_iter()
             .find(|s| *s as u32 == number)
             .unwrap_or_default()
@@ -39,6 +41,7 @@ impl MachineState {
             Self::Starved => "starved",
             Self::Stopping => "stopping",
             Self::Fault => "fault",
+            Self::Disabled => "disabled",
         }
     }
 }
