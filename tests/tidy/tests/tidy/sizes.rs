@@ -6,7 +6,9 @@ use crate::tree::{File, files};
 /// Columns of a line.
 const COLUMNS: usize = 130;
 /// Lines of a Rust file.
-const FILE_LINES: usize = 430;
+const FILE_LINES: usize = 400;
+/// Longer files: the fine loop reads as one.
+const LONGER_FILES: &[(&str, usize)] = &[("core/fine/src/tick.rs", 460)];
 /// Lines of a Rust file above which it is listed.
 const LISTED_LINES: usize = 200;
 /// Lines of a function.
@@ -32,7 +34,7 @@ fn lines_are_not_too_long() {
     let mut findings = vec![];
     for file in files(&[".rs", ".toml", ".md"]) {
         let most = LONGER.iter().find(|(name, _)| *name == file.name).map_or(COLUMNS, |(_, columns)| *columns);
-        let markdown = file.name.ends_with(".md");
+        let markdown = std::path::Path::new(&file.name).extension().is_some_and(|e| e == "md");
         for (number, line) in file.lines() {
             let columns = line.chars().count();
             // A row of a Markdown table cannot be broken.
@@ -52,8 +54,9 @@ fn files_are_not_too_long() {
         if lines > LISTED_LINES {
             println!("{}: {lines} lines", file.name);
         }
-        if lines > FILE_LINES {
-            findings.push(format!("{}:{lines}: {FILE_LINES} lines are allowed", file.name));
+        let most = LONGER_FILES.iter().find(|(name, _)| *name == file.name).map_or(FILE_LINES, |(_, lines)| *lines);
+        if lines > most {
+            findings.push(format!("{}:{lines}: {most} lines are allowed", file.name));
         }
     }
     expect_none("long files", &findings);

@@ -100,8 +100,13 @@ fn word(text: &str) -> &str {
 
 #[test]
 fn items_are_found() {
-    let text = "pub fn free(a: u8) {}\nstruct One;\nimpl One {\n    fn own(&self) {}\n}\nimpl<'a> Pump<'a> {\n    \
-                fn given() {}\n}\nimpl<'a> Two for Pump<'a> {\n    fn taken() {}\n}\npub trait Three: Send {\n    fn asked(&mut self);\n}\n";
+    let text = [
+        "pub fn free(a: u8) {}\nstruct One;\nimpl One {\n    fn own(&self) {}\n}\n",
+        "impl<'a> Pump<'a> {\n    fn given() {}\n}\nimpl<'a> Two for Pump<'a> {\n    fn taken() {}\n}\n",
+        "pub trait Three: Send {\n    fn asked(&mut self);\n}\n",
+    ];
+    let text = text.concat();
+    let text = text.as_str();
     assert!(defines(text, "free") && defines(text, "One") && !defines(text, "own") && !defines(text, "fre"));
     assert!(has_method(text, "One", "own") && has_method(text, "Pump", "taken") && has_method(text, "Three", "asked"));
     assert!(has_method(text, "Pump", "given"));
