@@ -16,6 +16,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/machine", &["tandem-sdk"]),
     ("core/rings", &["tandem-sdk"]),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),
+    ("core/trace", &["tandem-rings", "tandem-sdk"]),
     ("core/rough", &["tandem-gcode", "tandem-rings", "tandem-sdk"]),
     (
         "core/host",

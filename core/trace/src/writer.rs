@@ -1,0 +1,84 @@
+//! Writing a trace.
+
+use std::io::{self, Write};
+
+use tandem_rings::Sample;
+
+use crate::code::History;
+use crate::frame::{self, Kind};
+use crate::header::Header;
+use crate::words::Shape;
+
+/// Every so many records one stands on its own: the most that damage in one place can cost, beside itself.
+pub const KEY_INTERVAL: u64 = 256;
+
+/// Writes a trace. Belongs on the soft side.
+pub struct Writer<W> {
+    out: W,
+    shape: Shape,
+    /// Checksum of the header.
+    header: u32,
+    /// Checksum of the last record.
+    previous: u32,
+    history: History,
+    records: u64,
+    bytes: Vec<u8>,
+}
+
+impl<W: Write> Writer<W> {
+    /// Starts a trace with its header.
+    ///
+    /// # Errors
+    /// `out` refuses; the header is none that could be read (period, number of signals, length of names).
+    pub fn new(mut out: W, header: &Header) -> io::Result<Self> {
+        let (bytes, checksum) = header.to_bytes()?;
+        out.write_all(&bytes)?;
+        let (shape, history) = (header.shape(), History::EMPTY);
+        Ok(Self { out, shape, header: checksum, previous: checksum, history, records: 0, bytes })
+    }
+
+    /// Adds a sample and the strategy's signals, as many as the header names.
+    ///
+    /// Tick, block, line, state, command, feedback, feed, sigma and ratio are kept; the other fields are not.
+    ///
+    /// # Errors
+    /// `out` refuses; another number of signals.
+    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) -> io::Result<()> {
+        if signals.len() != self.shape.signals {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not as many signals as the header names"));
+        }
+        let row = self.shape.to_words(sample, signals);
+        let is_key = self.records.is_multiple_of(KEY_INTERVAL);
+        if is_key {
+            // What is written so far outlives the process, should it be killed.
+            self.out.flush()?;
+            self.history = History::EMPTY;
+        }
+        let (kind, seed) = if is_key { (Kind::Key, self.header) } else { (Kind::Sample, self.previous) };
+        self.put(kind, seed, |history, shape, bytes| history.encode(&row, shape.words(), bytes))?;
+        self.records += 1;
+        if is_key {
+            self.history = History::after_key(row);
+        } else {
+            self.history.push(row);
+        }
+        Ok(())
+    }
+
+    /// Closes the trace and returns what it was written to.
+    ///
+    /// # Errors
+    /// `out` refuses.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.put(Kind::End, self.header, |_, _, _| {})?;
+        self.out.flush()?;
+        Ok(self.out)
+    }
+
+    fn put(&mut self, kind: Kind, seed: u32, row: impl FnOnce(&History, Shape, &mut Vec<u8>)) -> io::Result<()> {
+        self.bytes.clear();
+        let fill = |bytes: &mut Vec<u8>| row(&self.history, self.shape, bytes);
+        self.previous = frame::put(kind, self.records, seed, &mut self.bytes, fill);
+        self.out.write_all(&self.bytes)
+    }
+}
