@@ -6,6 +6,7 @@
 mod command;
 mod error;
 mod fault_text;
+mod faults;
 mod monitor;
 mod path_watch;
 mod pump;

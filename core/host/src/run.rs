@@ -18,7 +18,7 @@ use crate::registry::Registry;
 use crate::strategy::StrategyRunner;
 use crate::summary::{FORMAT, Summary};
 use crate::wall_clock::{Periods, Timing};
-use crate::{rules, setup, virtual_clock, wall_clock};
+use crate::{faults, rules, setup, virtual_clock, wall_clock};
 
 /// Which clock drives the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +99,7 @@ impl Run {
         let strategy = setup::strategy(&machine, registry)?;
         let axes = machine.axes.count();
         let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
+        driver = faults::wrap(&machine, driver, joints)?;
         setup::open(&machine, driver.as_mut(), joints)?;
         let (rough_end, fine_end, host) = bridge(Sizes::default());
         let description = planner.describe();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::Place;
-use crate::node::Table;
+use crate::node::{Node, Table};
 use crate::problems::{Origin, Source, place};
 
 /// The origin of every key, by dotted path.
@@ -24,11 +24,19 @@ impl Places {
     fn add(&mut self, path: &str, table: &Table) {
         for (key, node) in table {
             let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-            self.origins.insert(path.clone(), node.origin);
-            if let Some(table) = node.table() {
-                self.add(&path, table);
-            }
+            self.add_node(path, node);
         }
+    }
+
+    /// A value and what is in it; the elements of an array are `key[0]`, `key[1]` and so on.
+    fn add_node(&mut self, path: String, node: &Node) {
+        if let Some(table) = node.table() {
+            self.add(&path, table);
+        }
+        for (index, element) in node.array().unwrap_or_default().iter().enumerate() {
+            self.add_node(format!("{path}[{index}]"), element);
+        }
+        self.origins.insert(path, node.origin);
     }
 
     /// Where `key` was written, else the table around it, else the beginning of the machine's file.
