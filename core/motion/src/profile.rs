@@ -23,6 +23,9 @@ impl Profile {
     /// `t_acc = (v_p − F_s)/A`, `t_dec = (v_p − F_e)/A`, `t_cruise = (L − (2v_p² − F_s² − F_e²)/(2A))/v_p`
     /// (Lee & Lee, two-step motion control loop, with linear acceleration).
     pub fn durations_s(&self) -> [f64; 3] {
+        if self.is_level() {
+            return [0.0, self.length_mm / self.peak_mm_per_s, 0.0];
+        }
         let [up_mm, down_mm] = self.ramps_mm();
         let (per_acceleration, peak) = (1.0 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
         let cruise_s = (self.length_mm - (up_mm + down_mm)) / peak;
@@ -33,8 +36,16 @@ impl Profile {
         ]
     }
 
+    /// Whether the speed is the same everywhere: then nothing waits for the divisions by the acceleration.
+    fn is_level(&self) -> bool {
+        self.start_mm_per_s == self.peak_mm_per_s && self.end_mm_per_s == self.peak_mm_per_s
+    }
+
     /// Lengths of speeding up and of slowing down, mm.
     fn ramps_mm(&self) -> [f64; 2] {
+        if self.is_level() {
+            return [0.0; 2];
+        }
         let (per_2a, peak) = (0.5 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
         [self.start_mm_per_s, self.end_mm_per_s].map(|end| (peak - end) * (peak + end) * per_2a)
     }

@@ -63,6 +63,20 @@ impl Drive {
             self.piece += 1;
             return 0.0;
         }
+        // Short blocks are driven piece by piece, so the whole piece comes first.
+        if self.in_piece_s == 0.0 && piece.duration_s <= duration_s.min(self.builder.longest_s(path, piece)) {
+            let all_s = piece.duration_s;
+            self.emit(path, piece, true, segment, sink);
+            self.in_block_s += all_s;
+            self.piece += 1;
+            return all_s;
+        }
+        self.step_inside(path, duration_s, segment, sink)
+    }
+
+    /// One segment of at most `duration_s` from within the current piece.
+    fn step_inside(&mut self, path: &Path, duration_s: f64, segment: &mut Segment, sink: &mut dyn SegmentSink) -> f64 {
+        let piece = &self.pieces[self.piece];
         let mut part = SpeedPiece {
             start_mm: piece.path_mm(self.in_piece_s),
             speed_mm_per_s: piece.speed(self.in_piece_s),

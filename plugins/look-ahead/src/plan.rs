@@ -22,16 +22,26 @@ pub struct Plan {
 impl Plan {
     /// The plan of `entry` between the squares of its end speeds: up to the feed, what turning may take, or what the
     /// length allows.
-    pub fn new(entry: &Entry, end_half_step: &AxisVector, squares: [f64; 2], rule: Junction) -> Self {
+    ///
+    /// It starts at `start_mm_per_s`, the square root of the first square: the end of the block before.
+    pub fn new(
+        entry: &Entry,
+        end_half_step: &AxisVector,
+        squares: [f64; 2],
+        start_mm_per_s: f64,
+        rule: Junction,
+    ) -> Self {
         let length_mm = entry.length_mm();
         let [start, end] = squares;
         let most = entry.rows.peak(f64::midpoint(start, end), length_mm, entry.own_square);
         let peak_square = greater(greater(most, start), end);
+        // While the machine cruises there is no root to draw.
+        let root = |square: f64| if square == start { start_mm_per_s } else { square.sqrt() };
         let profile = Profile {
             length_mm,
-            start_mm_per_s: start.sqrt(),
-            peak_mm_per_s: peak_square.sqrt(),
-            end_mm_per_s: end.sqrt(),
+            start_mm_per_s,
+            peak_mm_per_s: root(peak_square),
+            end_mm_per_s: root(end),
             acceleration_mm_per_s2: entry.rows.acceleration(peak_square),
         };
         let steps = match rule {

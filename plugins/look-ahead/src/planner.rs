@@ -35,6 +35,8 @@ pub struct LookAhead {
     /// The segment that goes out: written over and over, because it is large.
     segment: Segment,
     path_mm: f64,
+    /// Speed at the end of the last block taken, mm/s.
+    speed_mm_per_s: f64,
     finished: bool,
 }
 
@@ -58,6 +60,7 @@ impl LookAhead {
             drive: Drive::default(),
             segment: Segment::rest(&AxisVector::ZERO, 0.0),
             path_mm: 0.0,
+            speed_mm_per_s: 0.0,
             finished: false,
             options: options.clone(),
         })
@@ -74,7 +77,8 @@ impl LookAhead {
             return true;
         };
         let half_step = self.buffer.end_half_step(&taken);
-        let plan = Plan::new(entry, half_step, taken.squares, self.options.junction);
+        let plan = Plan::new(entry, half_step, taken.squares, self.speed_mm_per_s, self.options.junction);
+        self.speed_mm_per_s = plan.profile.end_mm_per_s;
         sink.block(&plan.report(entry));
         begin(&mut self.segment, entry, &plan);
         self.drive.start(taken, path, &plan, self.path_mm);
@@ -178,7 +182,7 @@ impl Planner for LookAhead {
         self.context.position = *position;
         self.buffer.clear();
         self.emitting = Emitting::Nothing;
-        (self.path_mm, self.finished) = (0.0, false);
+        (self.path_mm, self.speed_mm_per_s, self.finished) = (0.0, 0.0, false);
     }
 }
 
