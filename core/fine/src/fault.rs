@@ -34,6 +34,11 @@ pub enum FaultKind {
         /// The drive's code.
         code: u32,
     },
+    /// A number of the feedback is not finite.
+    Feedback {
+        /// Joint index; none for the spindle.
+        joint: Option<usize>,
+    },
     /// The driver failed to exchange.
     Driver,
     /// The operator's emergency stop.

@@ -3,6 +3,7 @@
 //! A crate of its own so that it stays clean: nothing here allocates, locks, opens a file or makes text after
 //! [`FineLoop::new`].
 
+mod answer;
 mod config;
 mod cursor;
 mod fault;

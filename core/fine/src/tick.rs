@@ -7,6 +7,7 @@ use rtrb::{Consumer, Producer};
 use tandem_rings::{Controls, Depth, FineEnd, MachineState, Ratio, Sample, Status};
 use tandem_sdk::{AxisVector, Driver, Feedback, JointState, Kinematics, Setpoint};
 
+use crate::answer::{self, Numbers};
 use crate::config::{FineConfig, GuardMode};
 use crate::cursor::{Cursor, Reached};
 use crate::fault::{Fault, FaultKind};
@@ -380,22 +381,13 @@ impl FineLoop {
         self.setpoint.enable = u32::from(!matches!(self.phase, Phase::Faulted));
         self.setpoint.outputs = self.outputs.bits;
         self.setpoint.spindle_rad_per_s = self.outputs.spindle_rad_per_s;
+        let last = Numbers::of(&self.feedback);
         let failed = self.driver.exchange(&self.setpoint, &mut self.feedback).is_err();
-        self.watch_drives(failed);
-    }
-
-    fn watch_drives(&mut self, failed: bool) {
-        if failed {
-            self.fail(FaultKind::Driver);
-        }
-        if let Some(joint) = self.feedback.state.iter().position(|s| *s == JointState::Fault) {
-            self.fail(FaultKind::Drive { joint, code: self.feedback.fault_code[joint] });
-        }
         let moving = matches!(self.state, MachineState::Running | MachineState::Holding | MachineState::Starved);
-        if moving
-            && let Some(joint) = self.feedback.state[..self.joints].iter().position(|s| *s == JointState::Disabled)
-        {
-            self.fail(FaultKind::Drive { joint, code: 0 });
+        let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
+        let fault = failed.then_some(FaultKind::Driver).or(unreadable);
+        if let Some(kind) = fault.or_else(|| answer::reported(&self.feedback, self.joints, moving)) {
+            self.fail(kind);
         }
     }
 

@@ -15,6 +15,10 @@ fn cause(machine: &Machine, kind: &FaultKind, soft: Option<&str>) -> String {
         FaultKind::Drive { joint, code } => {
             format!("driver {}: the drive of joint {joint} reports fault {code}", machine.driver.plugin)
         }
+        FaultKind::Feedback { joint } => {
+            let of = joint.map_or("the spindle".to_string(), |joint| format!("joint {joint}"));
+            format!("driver {}: the feedback of {of} is not a finite number", machine.driver.plugin)
+        }
         FaultKind::Driver => format!("driver {}: the exchange failed", machine.driver.plugin),
         FaultKind::EmergencyStop => "emergency stop".to_string(),
         FaultKind::Soft => soft.unwrap_or("stopped by the operator").to_string(),

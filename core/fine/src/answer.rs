@@ -1,0 +1,92 @@
+//! What the drives' answer says of the drives.
+
+use tandem_sdk::{AxisVector, Feedback, JointState};
+
+use crate::fault::FaultKind;
+
+/// The numbers of an answer that go on to strategies and trace.
+pub struct Numbers {
+    joints: [AxisVector; 3],
+    spindle: [f64; 2],
+}
+
+impl Numbers {
+    /// Those of `feedback`. Fine loop; does not allocate.
+    pub fn of(feedback: &Feedback) -> Self {
+        Self {
+            joints: [feedback.position, feedback.speed, feedback.current_a],
+            spindle: [feedback.spindle_rad_per_s, feedback.spindle_angle_rad],
+        }
+    }
+
+    /// Puts these in the place of what is no finite number in `feedback`, so that nothing downstream computes with it;
+    /// gives the fault that it is. Fine loop; does not allocate.
+    pub fn replace_wrong_ones(&self, feedback: &mut Feedback, joints: usize) -> Option<FaultKind> {
+        let mut fault = None;
+        let spindle = [&mut feedback.spindle_rad_per_s, &mut feedback.spindle_angle_rad];
+        for (value, last) in spindle.into_iter().zip(&self.spindle) {
+            if !value.is_finite() {
+                *value = *last;
+                fault = Some(FaultKind::Feedback { joint: None });
+            }
+        }
+        let vectors = [&mut feedback.position, &mut feedback.speed, &mut feedback.current_a];
+        for (vector, last) in vectors.into_iter().zip(&self.joints) {
+            // The lowest joint is named: it comes last.
+            for joint in (0..joints).rev() {
+                if !vector[joint].is_finite() {
+                    vector[joint] = last[joint];
+                    fault = Some(FaultKind::Feedback { joint: Some(joint) });
+                }
+            }
+        }
+        fault
+    }
+}
+
+/// The fault that the drives report; one that has let go while the machine is `moving` is one too. Fine loop.
+pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<FaultKind> {
+    let first = |state: JointState| feedback.state[..joints].iter().position(|s| *s == state);
+    let faulty = first(JointState::Fault).map(|joint| FaultKind::Drive { joint, code: feedback.fault_code[joint] });
+    let off = || first(JointState::Disabled).filter(|_| moving).map(|joint| FaultKind::Drive { joint, code: 0 });
+    faulty.or_else(off)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wrong(change: impl FnOnce(&mut Feedback)) -> (Option<FaultKind>, Feedback) {
+        let good = Feedback { position: AxisVector([7.0; 8]), spindle_angle_rad: 3.0, ..Feedback::default() };
+        let mut feedback = Feedback { position: AxisVector([8.0; 8]), ..good };
+        change(&mut feedback);
+        (Numbers::of(&good).replace_wrong_ones(&mut feedback, 3), feedback)
+    }
+
+    #[test]
+    fn what_is_no_number_is_a_fault_and_goes_no_further() {
+        let (fault, feedback) = wrong(|_| ());
+        assert_eq!((fault, feedback.position), (None, AxisVector([8.0; 8])));
+        let (fault, feedback) = wrong(|f| (f.position[1], f.position[2]) = (f64::NAN, f64::INFINITY));
+        assert_eq!(fault, Some(FaultKind::Feedback { joint: Some(1) }));
+        assert_eq!(feedback.position.0[..4], [8.0, 7.0, 7.0, 8.0]);
+        for change in [|f: &mut Feedback| f.speed[0] = f64::NAN, |f: &mut Feedback| f.current_a[0] = f64::NEG_INFINITY]
+        {
+            assert_eq!(wrong(change).0, Some(FaultKind::Feedback { joint: Some(0) }));
+        }
+        let (fault, feedback) = wrong(|f| f.spindle_angle_rad = f64::NAN);
+        assert_eq!((fault, feedback.spindle_angle_rad), (Some(FaultKind::Feedback { joint: None }), 3.0));
+        assert_eq!(wrong(|f| f.position[3] = f64::NAN).0, None, "there is no such joint");
+    }
+
+    #[test]
+    fn drives_off_are_a_fault_in_motion_only() {
+        let mut feedback = Feedback { state: [JointState::Enabled; 8], ..Feedback::default() };
+        assert_eq!(reported(&feedback, 3, true), None);
+        feedback.state[2] = JointState::Disabled;
+        assert_eq!(reported(&feedback, 3, false), None);
+        assert_eq!(reported(&feedback, 3, true), Some(FaultKind::Drive { joint: 2, code: 0 }));
+        (feedback.state[1], feedback.fault_code[1]) = (JointState::Fault, 9);
+        assert_eq!(reported(&feedback, 3, false), Some(FaultKind::Drive { joint: 1, code: 9 }));
+    }
+}
