@@ -8,6 +8,7 @@ mod defective;
 mod examples;
 mod harness;
 mod hold;
+mod latency;
 mod overrides;
 mod program_flow;
 mod random;

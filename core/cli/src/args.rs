@@ -22,6 +22,8 @@ pub enum Command {
     Run(Run),
     /// List every error of a part program; nothing moves
     Check(Check),
+    /// Measure how late the fine loop wakes on this computer, as a histogram
+    Latency(Latency),
 }
 
 #[derive(Group)]
@@ -71,6 +73,19 @@ pub struct Check {
     pub machine: Machine,
 }
 
+#[derive(Group)]
+pub struct Latency {
+    /// The period, ms
+    #[arg(long = "period", value_name = "MS", default_value = "1", value_parser = positive)]
+    pub period_ms: f64,
+    /// How long to measure, s
+    #[arg(long = "duration", value_name = "S", default_value = "10", value_parser = positive)]
+    pub duration_s: f64,
+    /// Keep every core busy meanwhile
+    #[arg(long)]
+    pub load: bool,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 pub enum Clock {
     /// In lockstep, as fast as the processor allows
@@ -82,4 +97,9 @@ pub enum Clock {
 fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("it has the form key=value")?;
     Ok((key.trim().to_string(), value.to_string()))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v: &f64| (1e-3..=1e6).contains(v));
+    value.ok_or_else(|| "it is a number from 0.001 to 1000000".to_string())
 }

@@ -3,6 +3,7 @@
 mod args;
 mod built_in;
 mod check;
+mod latency;
 mod program;
 mod progress;
 mod report;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
     let status = match Args::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
+        Command::Latency(options) => latency::latency(&options),
     };
     ExitCode::from(status.unwrap_or_else(|error| {
         eprintln!("{error}");

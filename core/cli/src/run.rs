@@ -86,6 +86,10 @@ impl Sinks {
 }
 
 impl RunObserver for Sinks {
+    fn note(&mut self, note: &str) {
+        eprintln!("{note}");
+    }
+
     fn block(&mut self, block: &Block, report: &BlockReport) {
         if let Some(blocks) = &mut self.blocks {
             blocks.block(block, report);

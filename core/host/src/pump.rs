@@ -13,6 +13,9 @@ use crate::strategy::StrategyRunner;
 
 /// Is told of everything that happens in a run, on the soft side.
 pub trait RunObserver {
+    /// The computer did not grant something that the wall clock asks for.
+    fn note(&mut self, _note: &str) {}
+
     /// A block is planned for good.
     fn block(&mut self, _block: &Block, _report: &BlockReport) {}
 
@@ -64,6 +67,11 @@ impl<'a> Pump<'a> {
             Err(error) => self.fail(error.to_string()),
         }
         self.planning_ns += started.elapsed().as_nanos();
+    }
+
+    /// Passes a note on to the observer.
+    pub fn note(&mut self, note: &str) {
+        self.observer.note(note);
     }
 
     /// Takes the samples that have come.

@@ -16,8 +16,8 @@ use crate::monitor::Monitor;
 use crate::pump::{Pump, RunObserver};
 use crate::registry::Registry;
 use crate::strategy::StrategyRunner;
-use crate::summary::{FORMAT, Summary};
-use crate::wall_clock::{Periods, Timing};
+use crate::summary::{FORMAT, LatenessUs, Summary};
+use crate::wall_clock::Periods;
 use crate::{faults, rules, setup, virtual_clock, wall_clock};
 
 /// Which clock drives the loops.
@@ -149,15 +149,23 @@ impl Run {
         let mut fine = self.fine;
         let monitor = Monitor::new(&machine);
         let mut pump = Pump::new(self.rough, self.host, self.strategy, monitor, observer);
-        let mut timing = Timing::default();
+        let mut measured = None;
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
-            Clock::Wall => (fine, timing) = wall_clock::drive(&mut pump, fine, periods(&machine))?,
+            Clock::Wall => {
+                let timed = wall_clock::drive(&mut pump, fine, periods(&machine))?;
+                (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
+            }
         }
         let fault = fine.fault();
         let text = fault.map(|f| describe(&machine, &f, pump.soft_error.as_deref()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
-        (summary.overruns, summary.fault) = (timing.overruns, text);
+        summary.fault = text;
+        if let Some((timing, page_faults)) = measured {
+            summary.overruns = timing.overruns;
+            summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
+            summary.page_faults = Some(page_faults);
+        }
         fine.into_driver().stop();
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault })
@@ -203,6 +211,8 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         jerk_relaxed_samples: 0,
         overruns: 0,
         missed_periods: counters.missed_periods,
+        lateness_us: None,
+        page_faults: None,
         starvations: counters.starvations,
         late_ratios: counters.late_ratios,
         lost_samples: pump.host.status.lost_samples.load(std::sync::atomic::Ordering::Relaxed),

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::lateness::Lateness;
+use crate::realtime::PageFaults;
+
 /// Number of the summary format.
 pub const FORMAT: u32 = 1;
 
@@ -52,10 +55,14 @@ pub struct Summary {
     pub governed_samples: u64,
     /// Samples in which the jerk limit was given up to keep velocity and acceleration.
     pub jerk_relaxed_samples: u64,
-    /// Fine periods whose work took longer than the period.
+    /// Fine periods whose work went past their end.
     pub overruns: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
+    /// How late the fine loop woke; absent on the virtual clock.
+    pub lateness_us: Option<LatenessUs>,
+    /// Page faults of the fine thread; absent on the virtual clock.
+    pub page_faults: Option<PageFaults>,
     /// How often the queue ran low.
     pub starvations: u64,
     /// Ratios that came late.
@@ -70,4 +77,25 @@ pub struct Summary {
     pub planning_ns_per_block: f64,
     /// The fault that ended the run, in words.
     pub fault: Option<String>,
+}
+
+/// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LatenessUs {
+    /// Half of the wake-ups were at most so late.
+    pub p50: f64,
+    /// 99 % were.
+    pub p99: f64,
+    /// 99.9 % were.
+    pub p999: f64,
+    /// All were.
+    pub max: f64,
+}
+
+impl From<&Lateness> for LatenessUs {
+    fn from(lateness: &Lateness) -> Self {
+        let us = |ns: u64| ns as f64 / 1e3;
+        let kept_by = |share| us(lateness.percentile_ns(share));
+        Self { p50: kept_by(0.5), p99: kept_by(0.99), p999: kept_by(0.999), max: us(lateness.max_ns()) }
+    }
 }

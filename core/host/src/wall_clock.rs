@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
@@ -11,31 +12,10 @@ use tandem_fine::FineLoop;
 
 use crate::error::HostError;
 use crate::pump::Pump;
+use crate::realtime::{MemoryLock, PageFaults, prepare_thread};
+use crate::realtime_periods::{Body, PeriodClock, Timing, run};
 
 const NS_PER_S: i64 = 1_000_000_000;
-
-/// What the clock saw.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Timing {
-    /// Periods whose work went past the next deadline.
-    pub overruns: u64,
-}
-
-/// Drives the run to its end in real time; gives the fine loop back.
-pub fn drive(pump: &mut Pump<'_>, fine: FineLoop, periods: Periods) -> Result<(FineLoop, Timing), HostError> {
-    fill_first(pump);
-    let over = Arc::new(AtomicBool::new(false));
-    let thread = spawn(fine, periods, Arc::clone(&over))?;
-    while !over.load(Ordering::Acquire) {
-        pump.step();
-        pump.drain();
-        pump.serve_stop();
-        thread::sleep(Duration::from_nanos(periods.rough_ns.unsigned_abs()));
-    }
-    let joined = thread.join().map_err(|_| HostError::System("the fine loop panicked".to_string()));
-    pump.drain();
-    joined
-}
 
 /// The periods of both loops.
 #[derive(Clone, Copy, Debug)]
@@ -44,8 +24,36 @@ pub struct Periods {
     pub rough_ns: i64,
     /// Fine period, ns.
     pub fine_ns: i64,
-    /// Missed periods above which the machine faults.
+    /// Missed periods in a row above which the machine faults.
     pub max_missed: u64,
+}
+
+/// What a body did in real time.
+pub struct Ended<B> {
+    /// The body.
+    pub body: B,
+    /// What the clock saw.
+    pub timing: Timing,
+    /// Page faults from the first deadline to the last period.
+    pub page_faults: PageFaults,
+}
+
+/// Drives the run to its end in real time; gives the fine loop back.
+pub fn drive(pump: &mut Pump<'_>, fine: FineLoop, periods: Periods) -> Result<Ended<FineLoop>, HostError> {
+    fill_first(pump);
+    let thread = TimedThread::start(Fine { fine, max_missed: periods.max_missed }, periods.fine_ns)?;
+    for note in &thread.notes {
+        pump.note(note);
+    }
+    while !thread.is_over() {
+        pump.step();
+        pump.drain();
+        pump.serve_stop();
+        thread::sleep(Duration::from_nanos(periods.rough_ns.unsigned_abs()));
+    }
+    let timed = thread.join()?;
+    pump.drain();
+    Ok(Ended { body: timed.body.fine, timing: timed.timing, page_faults: timed.page_faults })
 }
 
 /// Fills the queue before the first fine period, so that its first tick is the first tick on either clock.
@@ -53,48 +61,104 @@ fn fill_first(pump: &mut Pump<'_>) {
     pump.step();
 }
 
-fn spawn(
-    mut fine: FineLoop,
-    periods: Periods,
-    over: Arc<AtomicBool>,
-) -> Result<thread::JoinHandle<(FineLoop, Timing)>, HostError> {
-    let work = move || {
-        let timing = run_fine(&mut fine, periods);
-        over.store(true, Ordering::Release);
-        (fine, timing)
-    };
-    let builder = thread::Builder::new().name("tandem-fine".to_string());
-    builder.spawn(work).map_err(|e| HostError::System(format!("the fine thread cannot be started: {e}")))
+/// The fine loop as the body of its thread.
+pub struct Fine {
+    pub fine: FineLoop,
+    /// Missed periods in a row above which the machine faults.
+    pub max_missed: u64,
 }
 
-/// One sample a period. After a stall the deadlines shift by whole periods: no burst, no period with two samples.
-fn run_fine(fine: &mut FineLoop, periods: Periods) -> Timing {
-    let mut timing = Timing::default();
-    let mut deadline_ns = now_ns();
-    while !fine.is_over() {
-        fine.tick();
-        deadline_ns += periods.fine_ns;
-        let late_ns = now_ns() - deadline_ns;
-        if late_ns > 0 {
-            timing.overruns += 1;
-            let missed = late_ns / periods.fine_ns;
-            if missed > 0 {
-                fine.missed(missed.unsigned_abs(), periods.max_missed);
-                deadline_ns += missed * periods.fine_ns;
-            }
-        }
-        sleep_until(deadline_ns);
+impl Body for Fine {
+    fn is_over(&self) -> bool {
+        self.fine.is_over()
     }
-    timing
+
+    fn period(&mut self) {
+        self.fine.tick();
+    }
+
+    fn missed(&mut self, periods: u64, in_a_row: u64) {
+        self.fine.missed(periods, self.max_missed.saturating_sub(in_a_row - periods));
+    }
 }
 
-fn now_ns() -> i64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec * NS_PER_S + now.tv_nsec
+/// A thread that calls its body once a period, with everything that the computer grants.
+pub struct TimedThread<B> {
+    /// What was not granted, in words.
+    pub notes: Vec<String>,
+    over: Arc<AtomicBool>,
+    handle: thread::JoinHandle<Ended<B>>,
+    /// Until the thread has ended.
+    _memory: MemoryLock,
 }
 
-fn sleep_until(deadline_ns: i64) {
-    let deadline = Timespec { tv_sec: deadline_ns / NS_PER_S, tv_nsec: deadline_ns % NS_PER_S };
-    // A signal ends the sleep early: then the rest of it follows.
-    while clock_nanosleep_absolute(ClockId::Monotonic, &deadline).is_err() {}
+impl<B: Body + Send + 'static> TimedThread<B> {
+    /// Starts the thread; it is prepared, and its first deadline one period away, when this returns.
+    pub fn start(body: B, period_ns: i64) -> Result<Self, HostError> {
+        let mut notes = vec![];
+        let memory = MemoryLock::acquire(&mut notes);
+        let over = Arc::new(AtomicBool::new(false));
+        let at_end = Arc::clone(&over);
+        let (sender, receiver) = sync_channel(1);
+        let work = move || {
+            // Also where the body panics: who waits for the end finds out by joining.
+            let _end = AtEnd(at_end);
+            live(body, period_ns, &sender)
+        };
+        let builder = thread::Builder::new().name("tandem-fine".to_string());
+        let handle = builder.spawn(work);
+        let handle = handle.map_err(|e| HostError::System(format!("the fine thread cannot be started: {e}")))?;
+        notes.extend(receiver.recv().unwrap_or_default());
+        Ok(Self { notes, over, handle, _memory: memory })
+    }
+
+    /// Whether the last period is over.
+    pub fn is_over(&self) -> bool {
+        self.over.load(Ordering::Acquire)
+    }
+
+    /// Waits for the last period.
+    pub fn join(self) -> Result<Ended<B>, HostError> {
+        self.handle.join().map_err(|_| HostError::System("the fine loop panicked".to_string()))
+    }
+}
+
+struct AtEnd(Arc<AtomicBool>);
+
+impl Drop for AtEnd {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// The life of the thread. What allocates lies before and after [`run`].
+fn live<B: Body>(mut body: B, period_ns: i64, notes: &SyncSender<Vec<String>>) -> Ended<B> {
+    let mut not_granted = vec![];
+    prepare_thread(&mut not_granted);
+    let mut timing = Timing::default();
+    // Nobody listens only where the host is gone.
+    let _ = notes.send(not_granted);
+    let mut clock = Monotonic;
+    // The first reading maps the kernel's page of clock data: no lock on memory covers it.
+    clock.now_ns();
+    let before = PageFaults::of_this_thread();
+    run(&mut clock, period_ns, &mut body, &mut timing);
+    let page_faults = PageFaults::of_this_thread().since(before);
+    Ended { body, timing, page_faults }
+}
+
+/// The computer's monotonic clock.
+struct Monotonic;
+
+impl PeriodClock for Monotonic {
+    fn now_ns(&mut self) -> i64 {
+        let now = clock_gettime(ClockId::Monotonic);
+        now.tv_sec * NS_PER_S + now.tv_nsec
+    }
+
+    fn sleep_until(&mut self, deadline_ns: i64) {
+        let deadline = Timespec { tv_sec: deadline_ns / NS_PER_S, tv_nsec: deadline_ns % NS_PER_S };
+        // A signal ends the sleep early: then the rest of it follows.
+        while clock_nanosleep_absolute(ClockId::Monotonic, &deadline).is_err() {}
+    }
 }

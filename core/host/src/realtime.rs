@@ -1,0 +1,132 @@
+//! What Linux grants to a thread with deadlines: each best-effort, with a note on what was not granted.
+#![allow(unsafe_code, reason = "priority and page faults of a thread have no safe binding")]
+
+use std::hint::black_box;
+use std::num::NonZeroU64;
+
+use rustix::mm::{MlockAllFlags, mlockall, munlockall};
+use rustix::process::{Resource, getrlimit};
+use rustix::thread::{
+    CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity, set_current_timer_slack,
+};
+use serde::Serialize;
+
+/// Priority of the fine loop among `SCHED_FIFO` threads, 1 to 99: above the usual interrupt threads (50), below the
+/// kernel's own.
+pub const PRIORITY: i32 = 80;
+/// Stack of the fine thread that is touched before the first period, bytes.
+const STACK_BYTES: usize = 64 * 1024;
+
+/// Memory stays locked while this lives.
+#[derive(Debug)]
+pub struct MemoryLock {
+    locked: bool,
+}
+
+impl MemoryLock {
+    /// Locks what is mapped, and what will be. Host, before the fine thread starts.
+    pub fn acquire(notes: &mut Vec<String>) -> Self {
+        if !may_lock_all() {
+            notes.push(
+                "memory is not locked (the limit on locked memory is finite): a page may fault in the fine loop; \
+                 `ulimit -l unlimited` or CAP_IPC_LOCK grants it"
+                    .to_string(),
+            );
+            return Self { locked: false };
+        }
+        let result = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
+        if let Err(error) = result {
+            notes.push(format!("memory is not locked ({error}): a page may fault in the fine loop"));
+        }
+        Self { locked: result.is_ok() }
+    }
+}
+
+impl Drop for MemoryLock {
+    fn drop(&mut self) {
+        if self.locked {
+            // It was granted; should giving it back fail, the process only keeps more memory resident.
+            let _ = munlockall();
+        }
+    }
+}
+
+/// Under a finite limit a lock on future memory turns a later allocation, anywhere in the process, into a failure.
+fn may_lock_all() -> bool {
+    let limit = getrlimit(Resource::Memlock).current;
+    limit.is_none() || capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK))
+}
+
+/// Makes the calling thread one with deadlines. Fine thread, before its first period; may allocate.
+pub fn prepare_thread(notes: &mut Vec<String>) {
+    // Threads without a real-time priority are woken up to 50 µs late on purpose; this asks for 1 ns.
+    let _ = set_current_timer_slack(NonZeroU64::new(1));
+    match set_priority() {
+        Ok(()) => pin_to_last_core(notes),
+        Err(error) => notes.push(format!(
+            "SCHED_FIFO priority {PRIORITY} is not granted ({error}): the fine loop shares the processor with every \
+             other program, and is not pinned to a core either; `ulimit -r {PRIORITY}` or CAP_SYS_NICE grants it"
+        )),
+    }
+    touch_stack();
+}
+
+fn set_priority() -> Result<(), std::io::Error> {
+    let parameters = libc::sched_param { sched_priority: PRIORITY };
+    // SAFETY: the handle is the calling thread's, the parameters outlive the call.
+    let status = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameters) };
+    if status == 0 { Ok(()) } else { Err(std::io::Error::from_raw_os_error(status)) }
+}
+
+/// The last core that the process may use: the first one gets most interrupts. Only with a priority: an ordinary thread
+/// that may not move waits for whatever else runs on its core.
+fn pin_to_last_core(notes: &mut Vec<String>) {
+    let result = sched_getaffinity(None).and_then(|allowed| {
+        let mut cores = (0..CpuSet::MAX_CPU).filter(|core| allowed.is_set(*core));
+        let Some(last) = cores.next_back() else { return Ok(()) };
+        let mut only = CpuSet::new();
+        only.set(last);
+        sched_setaffinity(None, &only)
+    });
+    if let Err(error) = result {
+        notes.push(format!("the fine loop is not pinned to a core ({error}): it may be moved while it runs"));
+    }
+}
+
+/// Touches the stack that the periods will use, so that none of it faults later.
+#[inline(never)]
+#[allow(clippy::large_stack_arrays)] // that it lies on the stack is the point
+fn touch_stack() {
+    let mut stack = [0_u8; STACK_BYTES];
+    for byte in stack.iter_mut().step_by(1024) {
+        *byte = 1;
+    }
+    black_box(&stack);
+}
+
+/// Page faults of a thread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PageFaults {
+    /// Pages read from a disk.
+    pub major: u64,
+    /// Pages that only had to be mapped.
+    pub minor: u64,
+}
+
+impl PageFaults {
+    /// Those of the calling thread until now. Fine thread, before and after the periods; does not allocate.
+    pub fn of_this_thread() -> Self {
+        // SAFETY: the structure holds numbers only, for which all zeros is a value.
+        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+        // SAFETY: the pointer is to a structure of the right type that outlives the call.
+        let status = unsafe { libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage) };
+        debug_assert_eq!(status, 0, "the arguments are constants that Linux knows");
+        Self { major: usage.ru_majflt.unsigned_abs(), minor: usage.ru_minflt.unsigned_abs() }
+    }
+
+    /// Those since `earlier`.
+    #[must_use]
+    pub fn since(self, earlier: Self) -> Self {
+        Self { major: self.major - earlier.major, minor: self.minor - earlier.minor }
+    }
+}
