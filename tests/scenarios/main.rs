@@ -6,6 +6,7 @@ mod bad_input;
 mod clocks;
 mod defective;
 mod examples;
+mod faults;
 mod harness;
 mod hold;
 mod latency;
