@@ -4,10 +4,10 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use divan::counter::ItemsCount;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
-use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
+use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Limits, PluginError, RingEntry,
-    Segment, SegmentFlags, Setpoint,
+    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, PluginError,
+    RingEntry, Segment, SegmentFlags, Setpoint,
 };
 
 const TICKS: usize = 1000;
@@ -32,6 +32,8 @@ impl Driver for Echo {
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
+        let enabled = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+        feedback.state = [enabled; 8];
         Ok(())
     }
     fn quick_stop(&mut self) {}
@@ -58,9 +60,21 @@ impl Bench {
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
         let mut this = Self { fine: FineLoop::new(&config(), end, Box::new(Echo), None), host, _rough: rough };
-        this.run(8);
-        assert!(this.fine.fault().is_none());
+        this.fine.reset();
+        while this.fine.counters().samples == 0 {
+            this.run(1);
+            assert!(this.fine.fault().is_none());
+        }
         this
+    }
+
+    /// [`TICKS`] ticks in `state`. A loop that waits is quick: each tick has to give its sample.
+    fn measure(&mut self, state: MachineState) {
+        let before = self.fine.counters().samples;
+        self.run(TICKS);
+        assert_eq!(self.fine.counters().samples - before, TICKS as u64);
+        assert_eq!(self.host.status.state.load(Relaxed), state as u32);
+        assert!(self.fine.fault().is_none());
     }
 
     fn run(&mut self, ticks: usize) {
@@ -113,26 +127,26 @@ fn config() -> FineConfig {
     }
 }
 
-fn bench(bencher: divan::Bencher, make: impl Fn() -> Bench) {
-    bencher.counter(ItemsCount::new(TICKS)).with_inputs(make).bench_local_refs(|bench| bench.run(TICKS));
+fn bench(bencher: divan::Bencher, state: MachineState, make: impl Fn() -> Bench) {
+    bencher.counter(ItemsCount::new(TICKS)).with_inputs(make).bench_local_refs(|bench| bench.measure(state));
 }
 
 /// Segments of a rough period each, as long lines give them.
 #[divan::bench]
 fn long_lines(bencher: divan::Bencher) {
-    bench(bencher, || Bench::new(8e-3, 0.0));
+    bench(bencher, MachineState::Running, || Bench::new(8e-3, 0.0));
 }
 
 /// Chords of 0.05 mm at F3000: a segment a tick.
 #[divan::bench]
 fn chords(bencher: divan::Bencher) {
-    bench(bencher, || Bench::new(1e-3, 0.01));
+    bench(bencher, MachineState::Running, || Bench::new(1e-3, 0.01));
 }
 
 /// Feed hold: stopping on the path, then standing there.
 #[divan::bench]
 fn hold(bencher: divan::Bencher) {
-    bench(bencher, || {
+    bench(bencher, MachineState::Holding, || {
         let bench = Bench::new(1e-3, 0.01);
         bench.host.controls.hold.store(true, Relaxed);
         bench
