@@ -1,0 +1,157 @@
+//! No fine period touches the heap, whatever happens in it.
+#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::atomic::Ordering::Relaxed;
+
+use common::{Bench, PERIOD_S};
+use tandem_fine::{FaultKind, GuardMode};
+use tandem_rings::{MachineState, Ratio};
+use tandem_sdk::EventKind;
+
+struct Counting;
+
+thread_local! {
+    static ARMED: Cell<bool> = const { Cell::new(false) };
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    CALLS.with(|calls| calls.set(calls.get() + u64::from(ARMED.with(Cell::get))));
+}
+
+// SAFETY: hands every call to the system allocator unchanged; what is counted lies outside the heap.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Runs `periods` fine periods; none may allocate or free.
+fn tick(bench: &mut Bench, periods: u32) {
+    for _ in 0..periods {
+        ARMED.with(|armed| armed.set(true));
+        bench.fine.tick();
+        ARMED.with(|armed| armed.set(false));
+        let calls = CALLS.with(|calls| calls.replace(0));
+        assert_eq!(calls, 0, "the heap was used in state {:?}", bench.state());
+    }
+}
+
+/// Runs until the machine is in `state`.
+fn tick_until(bench: &mut Bench, state: MachineState) {
+    for _ in 0..10_000 {
+        if bench.state() == state {
+            return;
+        }
+        tick(bench, 1);
+    }
+    panic!("{state:?} is not reached: {:?}, {:?}", bench.state(), bench.fine.fault());
+}
+
+#[test]
+fn the_counter_counts() {
+    ARMED.with(|armed| armed.set(true));
+    drop(std::hint::black_box(Box::new(1)));
+    ARMED.with(|armed| armed.set(false));
+    assert_eq!(CALLS.with(|calls| calls.replace(0)), 2);
+}
+
+#[test]
+fn a_program_with_events_hold_and_overrides() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    tick(&mut bench, 5);
+    bench.accelerate();
+    for number in 0..20 {
+        bench.event(EventKind::DigitalOutput, number, 1.0);
+        bench.cruise(0.05);
+    }
+    bench.event(EventKind::Spindle, 0, 100.0);
+    bench.brake();
+    bench.event(EventKind::ProgramEnd, 0, 0.0);
+    tick_until(&mut bench, MachineState::Running);
+    tick(&mut bench, 150);
+    bench.host.controls.hold.store(true, Relaxed);
+    tick(&mut bench, 300);
+    assert_eq!(bench.host.status.feed_mm_per_s.load(), 0.0, "it is held");
+    bench.host.controls.hold.store(false, Relaxed);
+    tick(&mut bench, 200);
+    bench.host.controls.feed_override.store(0.4);
+    tick(&mut bench, 200);
+    bench.host.controls.feed_override.store(1.0);
+    bench.host.ratios.push(Ratio { tick: 0, ratio: 0.7 }).unwrap();
+    for _ in 0..10_000 {
+        tick(&mut bench, 1);
+        if bench.fine.is_over() {
+            break;
+        }
+    }
+    assert!(bench.fine.is_over());
+    assert_eq!((bench.fine.fault(), bench.fine.counters().late_ratios), (None, 1));
+}
+
+#[test]
+fn starvation_and_going_on() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.accelerate();
+    bench.cruise(0.5);
+    tick_until(&mut bench, MachineState::Starved);
+    tick(&mut bench, 300);
+    assert_eq!(bench.host.status.feed_mm_per_s.load(), 0.0, "it waits on the path");
+    bench.cruise(0.3);
+    bench.brake();
+    tick_until(&mut bench, MachineState::Running);
+    tick_until(&mut bench, MachineState::Standstill);
+    assert_eq!((bench.fine.fault(), bench.fine.counters().starvations), (None, 1));
+}
+
+#[test]
+fn every_way_into_a_fault_and_the_ramp_out() {
+    for cause in 0..4 {
+        let mut bench = Bench::new(GuardMode::Stop);
+        bench.accelerate();
+        bench.cruise(1.0);
+        tick_until(&mut bench, MachineState::Running);
+        tick(&mut bench, 200);
+        match cause {
+            0 => bench.host.controls.emergency_stop.store(true, Relaxed),
+            1 => bench.host.controls.soft_fault.store(true, Relaxed),
+            2 => bench.fine.missed(3, 2),
+            _ => bench.fail_drives(),
+        }
+        tick_until(&mut bench, MachineState::Fault);
+        tick(&mut bench, 10);
+        assert!(bench.fine.fault().is_some(), "{cause}");
+    }
+}
+
+#[test]
+fn the_guard_stops_or_counts() {
+    for mode in [GuardMode::Stop, GuardMode::Count] {
+        let mut bench = Bench::new(mode);
+        bench.accelerate();
+        bench.cruise(0.2);
+        // Eleven times the speed from one sample to the next.
+        bench.leap(0.1);
+        bench.brake();
+        tick_until(&mut bench, MachineState::Running);
+        tick(&mut bench, (1.0 / PERIOD_S) as u32);
+        let guard = matches!(bench.fine.fault().map(|f| f.kind), Some(FaultKind::Guard { .. }));
+        assert_eq!(guard, mode == GuardMode::Stop);
+        assert_eq!(bench.fine.counters().limit_violations > 0, mode == GuardMode::Count);
+    }
+}

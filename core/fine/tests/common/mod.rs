@@ -1,0 +1,145 @@
+//! A fine loop with both other ends in the test's hands, and motion along X to feed it.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
+use tandem_sdk::{
+    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState, Limits,
+    MAX_AXES, PluginError, RingEntry, Segment, SegmentFlags, Setpoint,
+};
+
+/// Fine period, s.
+pub const PERIOD_S: f64 = 0.001;
+/// Programmed feed, mm/s.
+const FEED_MM_PER_S: f64 = 20.0;
+/// What the plan accelerates with, mm/s².
+const PLANNED_MM_PER_S2: f64 = 200.0;
+
+/// Drives that follow exactly, until they are told to fail.
+struct Echo {
+    failing: Arc<AtomicBool>,
+}
+
+impl Driver for Echo {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::simulated()
+    }
+
+    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
+
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        feedback.position = setpoint.position;
+        feedback.speed = setpoint.velocity;
+        feedback.state.fill(if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled });
+        if self.failing.load(Relaxed) { Err(PluginError::fixed("the drives are lost")) } else { Ok(()) }
+    }
+
+    fn quick_stop(&mut self) {}
+
+    fn stop(&mut self) {}
+}
+
+/// The fine loop under test.
+pub struct Bench {
+    pub fine: FineLoop,
+    pub host: HostEnd,
+    rough: RoughEnd,
+    failing: Arc<AtomicBool>,
+    queued_s: f64,
+    x_mm: f64,
+}
+
+impl Bench {
+    /// At rest at zero, nothing queued.
+    pub fn new(guard: GuardMode) -> Self {
+        let axis = AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 100.0,
+            rapid_mm_per_s: 100.0,
+            acceleration_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let config = FineConfig {
+            period_s: PERIOD_S,
+            limits: Limits::new(&[axis; 3]).unwrap(),
+            speed_difference_mm_per_s: [0.0; MAX_AXES],
+            guard,
+            position: AxisVector::ZERO,
+            max_feed_ratio: 1.0,
+            pause_at_stops: false,
+        };
+        let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
+        let failing = Arc::new(AtomicBool::new(false));
+        let driver = Echo { failing: Arc::clone(&failing) };
+        let mut fine = FineLoop::new(&config, end, Box::new(driver), None);
+        fine.reset();
+        Self { fine, host, rough, failing, queued_s: 0.0, x_mm: 0.0 }
+    }
+
+    /// What the machine is doing.
+    pub fn state(&self) -> MachineState {
+        MachineState::from_number(self.host.status.state.load(Relaxed))
+    }
+
+    /// The next exchange fails.
+    pub fn fail_drives(&self) {
+        self.failing.store(true, Relaxed);
+    }
+
+    /// Queues the way from rest to the feed.
+    pub fn accelerate(&mut self) {
+        self.piece(0.0, PLANNED_MM_PER_S2, FEED_MM_PER_S / PLANNED_MM_PER_S2, false);
+    }
+
+    /// Queues motion at the feed.
+    pub fn cruise(&mut self, duration_s: f64) {
+        self.piece(FEED_MM_PER_S, 0.0, duration_s, false);
+    }
+
+    /// Queues motion at eleven times the feed: beyond the limits.
+    pub fn leap(&mut self, duration_s: f64) {
+        self.piece(11.0 * FEED_MM_PER_S, 0.0, duration_s, false);
+    }
+
+    /// Queues the way from the feed to rest.
+    pub fn brake(&mut self) {
+        self.piece(FEED_MM_PER_S, -PLANNED_MM_PER_S2, FEED_MM_PER_S / PLANNED_MM_PER_S2, true);
+    }
+
+    /// Queues an event.
+    pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
+        let event = Event { program_time_s: self.queued_s, ..Event::new(kind, 1, 0, index, value) };
+        self.push(&RingEntry::Event(event));
+    }
+
+    fn piece(&mut self, speed_mm_per_s: f64, acceleration_mm_per_s2: f64, duration_s: f64, last: bool) {
+        let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+        let motion = [self.x_mm, speed_mm_per_s, acceleration_mm_per_s2 / 2.0, 0.0, 0.0, 0.0];
+        (segment.coefficients[0], segment.path) = (motion, motion);
+        segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
+        segment.feed_mm_per_s = FEED_MM_PER_S;
+        segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
+        self.push(&RingEntry::Segment(segment));
+        self.x_mm = segment.position(duration_s)[0];
+        self.queued_s += duration_s;
+        let depth = &self.rough.depth;
+        depth.stop_deceleration_mm_per_s2.store(PLANNED_MM_PER_S2);
+        depth.wall_s.store(if last { f64::INFINITY } else { self.queued_s });
+        depth.required_s.store(if last { 0.0 } else { 0.2 });
+    }
+
+    fn push(&mut self, entry: &RingEntry) {
+        self.rough.segments.push(Queued { entry: *entry, start_s: self.queued_s }).unwrap();
+    }
+}
