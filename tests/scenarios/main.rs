@@ -15,3 +15,4 @@ mod program_flow;
 mod random;
 mod report;
 mod starvation;
+mod system_calls;

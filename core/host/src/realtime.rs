@@ -1,7 +1,9 @@
 //! What Linux grants to a thread with deadlines: each best-effort, with a note on what was not granted.
 #![allow(unsafe_code, reason = "priority and page faults of a thread have no safe binding")]
 
+use std::fs::File;
 use std::hint::black_box;
+use std::io::Write;
 use std::num::NonZeroU64;
 
 use rustix::mm::{MlockAllFlags, mlockall, munlockall};
@@ -14,18 +16,42 @@ use serde::Serialize;
 /// Priority of the fine loop among `SCHED_FIFO` threads, 1 to 99: above the usual interrupt threads (50), below the
 /// kernel's own.
 pub const PRIORITY: i32 = 80;
+/// Where Linux takes the longest wake-up time that is bearable.
+const WAKE_UP_TIME: &str = "/dev/cpu_dma_latency";
 /// Stack of the fine thread that is touched before the first period, bytes.
 const STACK_BYTES: usize = 64 * 1024;
 
+/// What holds for the whole process while this lives: memory stays locked, cores stay out of deep sleep.
+#[derive(Debug)]
+pub struct ProcessGrants {
+    _memory: MemoryLock,
+    _awake: Option<File>,
+}
+
+impl ProcessGrants {
+    /// Asks for everything. Host, before the fine thread starts.
+    pub fn acquire(notes: &mut Vec<String>) -> Self {
+        Self { _memory: MemoryLock::acquire(notes), _awake: stay_awake(notes) }
+    }
+}
+
+/// Keeps the cores out of the sleeps that they are slow to wake from, while the file is open.
+fn stay_awake(notes: &mut Vec<String>) -> Option<File> {
+    let file = File::options().write(true).open(WAKE_UP_TIME);
+    // The kernel reads an i32: the wake-up time that is bearable, us.
+    let asked = file.and_then(|mut file| file.write_all(&0_i32.to_ne_bytes()).map(|()| file));
+    asked.map_err(|e| notes.push(format!("{WAKE_UP_TIME} ({e}): an idle core may be slow to wake"))).ok()
+}
+
 /// Memory stays locked while this lives.
 #[derive(Debug)]
-pub struct MemoryLock {
+struct MemoryLock {
     locked: bool,
 }
 
 impl MemoryLock {
-    /// Locks what is mapped, and what will be. Host, before the fine thread starts.
-    pub fn acquire(notes: &mut Vec<String>) -> Self {
+    /// Locks what is mapped, and what will be.
+    fn acquire(notes: &mut Vec<String>) -> Self {
         if !may_lock_all() {
             notes.push(
                 "memory is not locked (the limit on locked memory is finite): a page may fault in the fine loop; \

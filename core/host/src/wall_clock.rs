@@ -12,7 +12,7 @@ use tandem_fine::FineLoop;
 
 use crate::error::HostError;
 use crate::pump::Pump;
-use crate::realtime::{MemoryLock, PageFaults, prepare_thread};
+use crate::realtime::{PageFaults, ProcessGrants, prepare_thread};
 use crate::realtime_periods::{Body, PeriodClock, Timing, run};
 
 const NS_PER_S: i64 = 1_000_000_000;
@@ -89,14 +89,14 @@ pub struct TimedThread<B> {
     over: Arc<AtomicBool>,
     handle: thread::JoinHandle<Ended<B>>,
     /// Until the thread has ended.
-    _memory: MemoryLock,
+    _grants: ProcessGrants,
 }
 
 impl<B: Body + Send + 'static> TimedThread<B> {
     /// Starts the thread; it is prepared, and its first deadline one period away, when this returns.
     pub fn start(body: B, period_ns: i64) -> Result<Self, HostError> {
         let mut notes = vec![];
-        let memory = MemoryLock::acquire(&mut notes);
+        let grants = ProcessGrants::acquire(&mut notes);
         let over = Arc::new(AtomicBool::new(false));
         let at_end = Arc::clone(&over);
         let (sender, receiver) = sync_channel(1);
@@ -109,7 +109,7 @@ impl<B: Body + Send + 'static> TimedThread<B> {
         let handle = builder.spawn(work);
         let handle = handle.map_err(|e| HostError::System(format!("the fine thread cannot be started: {e}")))?;
         notes.extend(receiver.recv().unwrap_or_default());
-        Ok(Self { notes, over, handle, _memory: memory })
+        Ok(Self { notes, over, handle, _grants: grants })
     }
 
     /// Whether the last period is over.
