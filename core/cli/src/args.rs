@@ -22,6 +22,9 @@ pub enum Command {
     Run(Run),
     /// List every error of a part program; nothing moves
     Check(Check),
+    /// Look into traces: export, info, diff
+    #[command(subcommand)]
+    Trace(Trace),
     /// Measure how late the fine loop wakes on this computer, as a histogram
     Latency(Latency),
 }
@@ -51,8 +54,8 @@ pub struct Run {
     /// Give the operator's commands of a file, a line each: tick,command[,value] (virtual clock)
     #[arg(long, value_name = "F.csv")]
     pub commands: Option<PathBuf>,
-    /// Write every sample
-    #[arg(long, value_name = "F.csv")]
+    /// Write every sample; a name that ends in .ttr asks for the binary format
+    #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
     /// Write the summary
     #[arg(long, value_name = "F.json")]
@@ -84,6 +87,30 @@ pub struct Latency {
     /// Keep every core busy meanwhile
     #[arg(long)]
     pub load: bool,
+}
+
+#[derive(Subcommand)]
+pub enum Trace {
+    /// Write a binary trace as CSV
+    Export {
+        /// The binary trace
+        trace: PathBuf,
+        /// The file to write
+        #[arg(long, value_name = "F.csv")]
+        csv: PathBuf,
+    },
+    /// Print what a binary trace holds, and whether it is complete
+    Info {
+        /// The binary trace
+        trace: PathBuf,
+    },
+    /// Compare the command samples of two traces, binary or CSV; exit status 1 where they differ
+    Diff {
+        /// One trace
+        a: PathBuf,
+        /// The other
+        b: PathBuf,
+    },
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -8,6 +8,7 @@ mod program;
 mod progress;
 mod report;
 mod run;
+mod trace;
 
 use std::process::ExitCode;
 
@@ -24,6 +25,7 @@ fn main() -> ExitCode {
     let status = match Args::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Check(options) => check::check(&options),
+        Command::Trace(command) => trace::trace(&command),
         Command::Latency(options) => latency::latency(&options),
     };
     ExitCode::from(status.unwrap_or_else(|error| {

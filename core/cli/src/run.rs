@@ -4,13 +4,14 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Timed, TraceCsv};
+use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Timed};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
 use crate::progress::Progress;
 use crate::report::Collector;
+use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in, program};
 
 /// Runs a program.
@@ -54,7 +55,7 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
 struct Sinks {
     pause: bool,
     progress: Progress,
-    trace: Option<TraceCsv>,
+    trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
     report: Option<Collector>,
 }
@@ -62,7 +63,7 @@ struct Sinks {
 impl Sinks {
     fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run) -> Result<Self, String> {
         let signals = run.signals();
-        let trace = options.trace.as_ref().map(|path| TraceCsv::create(path, machine, signals));
+        let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, signals));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         Ok(Self {
@@ -76,7 +77,7 @@ impl Sinks {
 
     fn finish(self, options: &args::Run, summary: &Summary) -> Result<(), String> {
         self.progress.finish();
-        self.trace.map_or(Ok(()), TraceCsv::finish)?;
+        self.trace.map_or(Ok(()), TraceSink::finish)?;
         self.blocks.map_or(Ok(()), BlocksCsv::finish)?;
         if let (Some(report), Some(path)) = (self.report, &options.report) {
             report.write(path, summary)?;

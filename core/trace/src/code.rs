@@ -1,9 +1,10 @@
-//! Rows of words in few bytes: what a straight line through the last two rows does not foretell.
+//! Rows of words in few bytes: what a straight line through the last two rows does not foretell, and of the feedback
+//! what its last distance from the command does not.
 //!
 //! The bits of a double, read as a whole number, grow evenly where its value does, so at constant speed a position is
 //! foretold to a few units in the last place. Whole-number arithmetic wraps, hence every bit comes back.
 
-use crate::words::{MAX_WORDS, Words};
+use crate::words::{MAX_WORDS, Shape, Words};
 
 /// Most bytes of an encoded row: a length of four bits per word, and eight bytes each.
 pub const MAX_ROW_BYTES: usize = MAX_WORDS.div_ceil(2) + 8 * MAX_WORDS;
@@ -29,33 +30,38 @@ impl History {
         self.before = std::mem::replace(&mut self.last, row);
     }
 
-    /// What the next row's word `index` would be if it went on as before.
-    fn foretold(&self, index: usize) -> u64 {
-        self.last[index].wrapping_add(self.last[index].wrapping_sub(self.before[index]))
+    /// What word `index` of the next row would be if all went on as before; the words before it are known.
+    fn foretold(&self, row: &Words, index: usize, shape: Shape) -> u64 {
+        let (from, before) = match shape.command_of(index) {
+            Some(command) => (row[command], self.last[command]),
+            None => (self.last[index], self.before[index]),
+        };
+        from.wrapping_add(self.last[index].wrapping_sub(before))
     }
 
-    /// Appends the first `count` words of a row to `bytes`.
-    pub fn encode(&self, row: &Words, count: usize, bytes: &mut Vec<u8>) {
-        let lengths = bytes.len();
+    /// Appends the words of a row to `bytes`.
+    pub fn encode(&self, row: &Words, shape: Shape, bytes: &mut Vec<u8>) {
+        let (count, lengths) = (shape.words(), bytes.len());
         bytes.resize(lengths + count.div_ceil(2), 0);
         for (index, word) in row.iter().take(count).enumerate() {
-            let rest = zigzag(word.wrapping_sub(self.foretold(index)));
+            let rest = zigzag(word.wrapping_sub(self.foretold(row, index, shape)));
             let length = 8 - rest.leading_zeros() as usize / 8;
             bytes[lengths + index / 2] |= (length as u8) << (4 * (index % 2));
             bytes.extend_from_slice(&rest.to_le_bytes()[..length]);
         }
     }
 
-    /// The row of `count` words that `bytes` holds, all of them; `None` where they hold none.
-    pub fn decode(&self, bytes: &[u8], count: usize) -> Option<Words> {
+    /// The row that `bytes` holds, all of them; `None` where they hold none.
+    pub fn decode(&self, bytes: &[u8], shape: Shape) -> Option<Words> {
+        let count = shape.words();
         let (lengths, mut rests) = bytes.split_at_checked(count.div_ceil(2))?;
         let mut row = [0; MAX_WORDS];
-        for (index, word) in row.iter_mut().take(count).enumerate() {
+        for index in 0..count {
             let length = usize::from(lengths[index / 2] >> (4 * (index % 2)) & 0xf);
             let (rest, others) = rests.split_at_checked(length)?;
             let mut eight = [0; 8];
             eight.get_mut(..length)?.copy_from_slice(rest);
-            *word = self.foretold(index).wrapping_add(unzigzag(u64::from_le_bytes(eight)));
+            row[index] = self.foretold(&row, index, shape).wrapping_add(unzigzag(u64::from_le_bytes(eight)));
             rests = others;
         }
         rests.is_empty().then_some(row)
@@ -76,6 +82,8 @@ fn unzigzag(number: u64) -> u64 {
 mod tests {
     use super::*;
 
+    const SHAPE: Shape = Shape { axes: 8, signals: 8 };
+
     #[test]
     fn differences_of_either_sign_come_back() {
         for difference in [0, 1, u64::MAX, 1 << 63, i64::MAX.cast_unsigned(), 0x1234_5678_9abc_def0] {
@@ -90,16 +98,19 @@ mod tests {
         let mut history = History::after_key(row(0));
         history.push(row(1));
         let mut bytes = vec![];
-        history.encode(&row(2), MAX_WORDS, &mut bytes);
+        history.encode(&row(2), SHAPE, &mut bytes);
         assert!(bytes.len() <= MAX_WORDS.div_ceil(2) + 2 * MAX_WORDS, "{} bytes", bytes.len());
-        assert_eq!(history.decode(&bytes, MAX_WORDS), Some(row(2)));
+        assert_eq!(history.decode(&bytes, SHAPE), Some(row(2)));
     }
 
     #[test]
-    fn a_length_above_eight_is_no_row() {
-        assert_eq!(History::EMPTY.decode(&[0x09, 0, 0, 0, 0, 0, 0, 0, 0, 0], 1), None);
-        assert_eq!(History::EMPTY.decode(&[0x01], 1), None);
-        assert_eq!(History::EMPTY.decode(&[0x00, 7], 1), None);
-        assert_eq!(History::EMPTY.decode(&[], 1), None);
+    fn what_is_no_row_is_none() {
+        let shape = Shape { axes: 1, signals: 0 };
+        let decoded = |bytes: &[u8]| History::EMPTY.decode(bytes, shape);
+        assert!(decoded(&[0; 5]).is_some() && decoded(&[1, 0, 0, 0, 0, 7]).is_some());
+        assert_eq!(decoded(&[9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None);
+        for bytes in [&[1, 0, 0, 0, 0][..], &[0; 6], &[0; 4], &[]] {
+            assert_eq!(decoded(bytes), None);
+        }
     }
 }

@@ -220,7 +220,7 @@ impl Found {
 }
 
 fn decode(row: &[u8], history: &History, shape: Shape) -> Result<(Words, Sample, [f64; MAX_SIGNALS]), Flaw> {
-    let words = history.decode(row, shape.words()).ok_or(Flaw::Wrong("a record holds no row of numbers"))?;
+    let words = history.decode(row, shape).ok_or(Flaw::Wrong("a record holds no row of numbers"))?;
     let (sample, signals) = shape.to_sample(&words).ok_or(Flaw::Wrong("a record holds no sample"))?;
     Ok((words, sample, signals))
 }

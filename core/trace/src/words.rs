@@ -22,6 +22,12 @@ impl Shape {
         4 + 2 * self.axes + 3 + self.signals
     }
 
+    /// The word of the command to which the feedback in word `index` belongs; `None` for other words.
+    pub fn command_of(self, index: usize) -> Option<usize> {
+        let feedback = 4 + self.axes..4 + 2 * self.axes;
+        feedback.contains(&index).then(|| index - self.axes)
+    }
+
     /// The words of a sample.
     pub fn to_words(self, sample: &Sample, signals: &[f64]) -> Words {
         let numbers = [sample.tick, sample.block, u64::from(sample.line), sample.state as u64];

@@ -55,7 +55,7 @@ impl<W: Write> Writer<W> {
             self.history = History::EMPTY;
         }
         let (kind, seed) = if is_key { (Kind::Key, self.header) } else { (Kind::Sample, self.previous) };
-        self.put(kind, seed, |history, shape, bytes| history.encode(&row, shape.words(), bytes))?;
+        self.put(kind, seed, |history, shape, bytes| history.encode(&row, shape, bytes))?;
         self.records += 1;
         if is_key {
             self.history = History::after_key(row);

@@ -23,10 +23,18 @@ impl TraceCsv {
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine, signals: &[&str]) -> Result<Self, String> {
+        Self::of_axes(path, machine.axes, machine.fine_period_s, signals)
+    }
+
+    /// Starts the file with its head line, for a machine of which only axes and fine period are known.
+    ///
+    /// # Errors
+    /// The path with the system's words.
+    pub fn of_axes(path: &Path, axes: Axes, fine_period_s: f64, signals: &[&str]) -> Result<Self, String> {
         let mut out = Output::create(path)?;
-        let head = head(&machine.axes, signals);
+        let head = head(&axes, signals);
         writeln!(out, "{head}").map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { out, axes: machine.axes, period_s: machine.fine_period_s, failed: None })
+        Ok(Self { out, axes, period_s: fine_period_s, failed: None })
     }
 
     /// Adds a row.
@@ -49,10 +57,14 @@ impl TraceCsv {
         }
     }
 
-    fn row(&mut self, sample: &Sample, signals: &[f64]) -> std::io::Result<()> {
+    /// The time at which a tick stands in the trace, s.
+    pub fn t_s(tick: u64, fine_period_s: f64) -> f64 {
         // A whole number of periods divided by a round number of periods a second keeps t_s free of rounding dust.
-        let t_s = sample.tick as f64 / (1.0 / self.period_s).round_if_close();
-        write!(self.out, "{},{}", number(t_s), sample.line)?;
+        tick as f64 / (1.0 / fine_period_s).round_if_close()
+    }
+
+    fn row(&mut self, sample: &Sample, signals: &[f64]) -> std::io::Result<()> {
+        write!(self.out, "{},{}", number(Self::t_s(sample.tick, self.period_s)), sample.line)?;
         for position in [&sample.command, &sample.feedback] {
             for axis in 0..self.axes.count() {
                 let value = if self.axes.is_rotary(axis) { position[axis].to_degrees() } else { position[axis] };
