@@ -12,6 +12,8 @@ mod random;
 mod schedule;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_allocation;
 mod wrapper;
 
 use tandem_machine::Machine;

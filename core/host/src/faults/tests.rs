@@ -11,7 +11,7 @@ use super::options::{Faults, Joints};
 use super::wrapper::Wrapper;
 
 /// The ticks that the drives got, shared with the test.
-type Ticks = Arc<Mutex<Vec<u64>>>;
+pub type Ticks = Arc<Mutex<Vec<u64>>>;
 
 struct Scribe(Ticks);
 
@@ -49,7 +49,7 @@ fn read(text: &str) -> Result<Faults, Refusal> {
     Faults::read(&text.parse().unwrap(), &joints())
 }
 
-fn wrapped(text: &str) -> (Box<dyn Driver>, Ticks) {
+pub fn wrapped(text: &str) -> (Box<dyn Driver>, Ticks) {
     let ticks = Ticks::default();
     let faults = read(text).unwrap();
     let scribe: Box<dyn Driver> = Box::new(Scribe(Arc::clone(&ticks)));
