@@ -101,7 +101,8 @@ fn zero_turns_it_off() {
 fn drives_with_a_lag_coast_on_as_if_the_line_went_on() {
     let options = "model = \"second-order\"\nnatural_frequency_hz = 30";
     let (mut heard, mut missed) = (running(options), running(options));
-    (up_to(&mut *heard, 300), up_to(&mut *missed, 300));
+    up_to(&mut *heard, 300);
+    up_to(&mut *missed, 300);
     (301..305).for_each(|tick| _ = exchange(&mut *heard, &at(tick)));
     let (heard, missed) = (exchange(&mut *heard, &at(305)), exchange(&mut *missed, &at(305)));
     assert_close(missed.position[0], heard.position[0]);
