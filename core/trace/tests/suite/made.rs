@@ -48,7 +48,7 @@ pub fn bits((s, signals): &Row) -> Vec<u64> {
 pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value = Vec<Row>> {
     let floats = prop::array::uniform32(any_double());
     let row =
-        (any::<u64>(), any::<u64>(), any::<u32>(), 0..6_u32, floats).prop_map(move |(tick, block, line, state, f)| {
+        (any::<u64>(), any::<u64>(), any::<u32>(), 0..7_u32, floats).prop_map(move |(tick, block, line, state, f)| {
             let some = |from: usize, count: usize| std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 });
             let sample = Sample {
                 tick,
