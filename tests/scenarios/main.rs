@@ -15,5 +15,5 @@ mod program_flow;
 mod random;
 mod report;
 mod starvation;
-mod trace;
 mod system_calls;
+mod trace;
