@@ -60,6 +60,7 @@ mod with_a_strategy {
         }
     }
 
+    #[allow(clippy::unnecessary_wraps)] // the form of a factory
     fn make(_options: &str, _context: &StrategyContext) -> Made<dyn FeedStrategy> {
         Ok(Box::new(Fading))
     }
@@ -83,7 +84,10 @@ mod with_a_strategy {
         registry.register(Plugin { name: "fading", version: "0", kind: PluginKind::FeedStrategy(make) }).unwrap();
         let program = tandem_gcode::Program::open(&root().join("examples/programs/square.ngc")).unwrap();
         let mut kept = Kept::default();
-        let outcome = Run::prepare(machine, &registry, program, false).unwrap().drive(clock, &[], &mut kept).unwrap();
+        let outcome = Run::prepare(machine, &registry, program, tandem_host::Switches::default())
+            .unwrap()
+            .drive(clock, &[], &mut kept)
+            .unwrap();
         let summary = outcome.summary;
         let in_time = summary.late_ratios == 0 && summary.starvations == 0 && summary.lost_samples == 0;
         (kept, in_time && summary.fault.is_none())

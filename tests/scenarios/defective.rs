@@ -143,7 +143,13 @@ fn run(maker: Maker, text: &str, guard: &str) -> Ran {
     let mut registry = Registry::default();
     registry.register(tandem_sim::PLUGIN).unwrap();
     registry.register(Plugin { name: "defective", version: "0", kind: PluginKind::Planner(maker) }).unwrap();
-    let run = Run::prepare(machine.clone(), &registry, tandem_gcode::Program::open(&program).unwrap(), false).unwrap();
+    let run = Run::prepare(
+        machine.clone(),
+        &registry,
+        tandem_gcode::Program::open(&program).unwrap(),
+        tandem_host::Switches::default(),
+    )
+    .unwrap();
     let mut tracing = Tracing(TraceCsv::create(&trace, &machine, &[]).unwrap());
     let outcome = run.drive(Clock::Virtual, &[], &mut tracing).unwrap();
     tracing.0.finish().unwrap();

@@ -27,3 +27,11 @@ fn a_short_stall_is_not_noticed() {
     assert_eq!(done.number("starvations"), 0.0);
     assert_eq!(done.column("x_cmd_mm"), free.column("x_cmd_mm"));
 }
+
+#[test]
+fn blocks_of_a_thousandth_do_not_starve() {
+    let lines: Vec<String> = (1..4000).map(|i| format!("G1 X{:.4}", f64::from(i) * 0.001)).collect();
+    let done = Scenario::text(&format!("G21 G90 G64\nF15000\n{}\nM2\n", lines.join("\n"))).run();
+    done.assert_within_limits();
+    assert_eq!(done.number("starvations"), 0.0);
+}

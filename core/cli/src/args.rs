@@ -34,6 +34,9 @@ pub struct Machine {
     /// The machine file
     #[arg(long = "machine", value_name = "M.toml")]
     pub path: PathBuf,
+    /// Leave out the lines that begin with /
+    #[arg(long)]
+    pub block_delete: bool,
     /// Override a key of the machine file, as in planner.plugin=look-ahead
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub overrides: Vec<(String, String)>,

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::io::Write;
 
-use tandem_host::check_program;
+use tandem_host::{Switches, check_program};
 use tandem_machine::Machine;
 
 use crate::args::Check;
@@ -14,7 +14,8 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
     let mut program = program::open(&options.program)?;
     let name = program.name().to_string();
-    let report = check_program(&machine, &built_in::registry()?, &mut program)?;
+    let switches = Switches { block_delete: options.machine.block_delete, ..Switches::default() };
+    let report = check_program(&machine, &built_in::registry()?, &mut program, switches)?;
     if report.is_ok() {
         let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
         let _ = writeln!(std::io::stdout(), "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors");

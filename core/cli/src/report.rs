@@ -92,7 +92,10 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         fact("clock", summary.clock.clone()),
         fact("samples", format!("{} at {} ms", summary.samples, summary.fine_period_s * 1e3)),
         fact("largest distance from the path", format!("{:.3} µm", summary.max_path_deviation_mm * 1e3)),
-        fact("limit violations, guard stops", format!("{}, {}", summary.limit_violations, summary.guard_stops)),
+        fact(
+            "samples beyond a limit sent, guard stops",
+            format!("{}, {}", summary.limit_violations, summary.guard_stops),
+        ),
         fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
     ];
     facts.extend(summary.fault.iter().map(|fault| fact("fault", fault.clone())));

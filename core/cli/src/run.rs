@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Timed};
+use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
@@ -20,7 +20,8 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
-    let run = match Run::prepare(machine.clone(), &registry, program, options.pause) {
+    let switches = Switches { block_delete: options.machine.block_delete, pause_at_stops: options.pause };
+    let run = match Run::prepare(machine.clone(), &registry, program, switches) {
         Err(HostError::Check(report)) => {
             program::print_errors(&report);
             return Ok(REFUSED);
@@ -41,7 +42,10 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
 /// Reads a command file; lines that are empty or begin with # are left out.
 fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
     if clock == Clock::Wall {
-        return Err("--commands goes with --clock virtual: on the wall the operator gives them".to_string());
+        return Err(
+            "--commands goes with --clock virtual: on the wall clock ticks have no place in the operator's time"
+                .to_string(),
+        );
     }
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

@@ -20,7 +20,7 @@ impl Ramp {
         Self { position: *position, velocity: *velocity, step, period_s: config.period_s }
     }
 
-    /// The next sample. Each axis slows by its acceleration limit, and stops within its travel where it can.
+    /// The next sample. Each axis slows by its acceleration limit, whatever lies ahead: the travel too.
     pub fn next(&mut self) -> AxisVector {
         for axis in 0..MAX_AXES {
             let v = self.velocity[axis];

@@ -7,6 +7,9 @@ use crate::interpreter::Interpreter;
 use crate::item::{Input, InputMode, InputWait, Item};
 use crate::table::Group;
 
+/// Highest output of M62 to M65; the two above it are mist and flood coolant.
+const MOST_OUTPUT: u32 = 61;
+
 impl Interpreter {
     /// M62 to M66.
     pub(crate) fn input_output(&mut self, out: &mut Vec<Item>) -> Checked<()> {
@@ -16,7 +19,7 @@ impl Interpreter {
         }
         let missing =
             || self.orders.fault(Group::InputOutput, "word-missing", "P, the number of the output, is missing");
-        let number = self.words.integer(b'P', 0..=63)?.ok_or_else(missing)?;
+        let number = self.words.integer(b'P', 0..=MOST_OUTPUT)?.ok_or_else(missing)?;
         let on = matches!(code, 620 | 640);
         let bit = 1 << number;
         if self.state.outputs_set & bit == 0 || (self.state.outputs & bit != 0) != on {
@@ -30,14 +33,11 @@ impl Interpreter {
     fn wait_for_input(&mut self, out: &mut Vec<Item>) -> Checked<()> {
         let input = match (self.words.integer(b'P', 0..=63)?, self.words.integer(b'E', 0..=63)?) {
             (Some(number), None) => Input::Digital(number),
-            (None, Some(number)) => Input::Analog(number),
-            _ => return Err(self.wait_fault("M66 needs either P (digital input) or E (analogue input)")),
+            (_, Some(_)) => return Err(self.wait_fault("M66 E: there are no analogue inputs, only digital ones (P)")),
+            (None, None) => return Err(self.wait_fault("M66 needs P, the number of a digital input")),
         };
         let mode = self.wait_mode()?;
         let timeout_s = self.words.not_negative(b'Q')?.unwrap_or(0.0);
-        if mode != InputMode::Immediate && matches!(input, Input::Analog(_)) {
-            return Err(self.wait_fault("an analogue input can only be read at once (L0)"));
-        }
         if mode != InputMode::Immediate && timeout_s == 0.0 {
             return Err(self.wait_fault("M66 needs Q, the longest wait in seconds, greater than zero"));
         }

@@ -87,7 +87,7 @@ impl Interpreter {
         self.state.at_rest = true;
     }
 
-    /// The answer to [`Item::Wait`]: 1 or 0, the analogue value, or −1 after the time-out. It becomes #5399.
+    /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out. It becomes #5399.
     pub fn provide_input(&mut self, value: f64) {
         self.state.input = value;
     }

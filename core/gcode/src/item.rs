@@ -21,8 +21,6 @@ pub enum Item {
 pub enum Input {
     /// Digital input P.
     Digital(u32),
-    /// Analogue input E.
-    Analog(u32),
 }
 
 /// What M66 waits for (the L word).

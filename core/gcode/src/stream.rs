@@ -59,7 +59,7 @@ impl Stream {
         Ok(true)
     }
 
-    /// The answer to [`Item::Wait`]: 1 or 0, the analogue value, or −1 after the time-out.
+    /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out.
     pub fn provide_input(&mut self, value: f64) {
         self.interpreter.provide_input(value);
         self.waiting = false;

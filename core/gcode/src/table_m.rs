@@ -34,7 +34,7 @@ pub(crate) static M_ROWS: &[Row] = &[
     works(630, InputOutput, "P", "digital output P off, with the motion"),
     works(640, InputOutput, "P", "digital output P on, between the blocks"),
     works(650, InputOutput, "P", "digital output P off, between the blocks"),
-    works(660, InputOutput, "PELQ", "wait for digital input P or analogue input E"),
+    works(660, InputOutput, "PELQ", "wait for digital input P"),
     refused(670, InputOutput, "analogue output with the motion", ANALOG),
     refused(680, InputOutput, "analogue output", ANALOG),
     refused(700, User, "save the modal state", MODAL),

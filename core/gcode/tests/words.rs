@@ -102,12 +102,12 @@ fn what_needs_rest_gets_it_and_the_rest_does_not() {
 #[test]
 fn inputs_are_waited_for_at_rest() {
     assert_items(
-        "G0 X1\nM66 P3 L1 Q2\nM66 E1 L0\nG0 X#5399",
+        "G0 X1\nM66 P3 L1 Q2\nM66 P1 L0\nG0 X#5399",
         &[
             "1: Rapid 0 to 1 0 0 0",
             "2: Dwell 1 to 1 0 0 0 for 0",
             "2: Wait Digital(3) Rise 2 before 2",
-            "3: Wait Analog(1) Immediate 0 before 2",
+            "3: Wait Digital(1) Immediate 0 before 2",
             "4: Rapid 2 to 0 0 0 0",
             "End",
         ],

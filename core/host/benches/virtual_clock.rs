@@ -47,7 +47,8 @@ impl Example {
 
     fn run(&self) -> Summary {
         let program = Program::spool("bench", self.text.as_slice()).unwrap();
-        let run = Run::prepare(self.machine.clone(), &self.registry, program, false).unwrap();
+        let run =
+            Run::prepare(self.machine.clone(), &self.registry, program, tandem_host::Switches::default()).unwrap();
         let outcome = run.drive(Clock::Virtual, &[], &mut ()).unwrap();
         assert!(outcome.fault.is_none() && outcome.summary.starvations == 0);
         outcome.summary

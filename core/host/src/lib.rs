@@ -34,5 +34,5 @@ pub use realtime_latency::{Latency, measure_latency};
 pub use realtime_periods::Timing;
 pub use record::{BlocksCsv, Output, TraceCsv};
 pub use registry::Registry;
-pub use run::{Clock, Outcome, Run, check_program};
+pub use run::{Clock, Outcome, Run, Switches, check_program};
 pub use summary::{LatenessUs, Summary};

@@ -87,11 +87,10 @@ impl<'a> Pump<'a> {
 
     /// Asks the operator where the program has stopped for one, then goes on.
     pub fn serve_stop(&mut self) {
-        let status = &self.host.status;
-        if status.program_stop.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
+        let (status, controls) = (&self.host.status, &self.host.controls);
+        if controls.program_hold.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
             self.observer.program_stop(status.line.load(Relaxed));
-            status.program_stop.store(false, Relaxed);
-            Command::Resume.give(&self.host.controls);
+            controls.program_hold.store(false, Relaxed);
         }
     }
 

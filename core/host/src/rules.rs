@@ -1,6 +1,6 @@
 //! What does not go together: refusals before a run starts.
 
-use tandem_machine::{GuardMode, JerkMode, Machine};
+use tandem_machine::{GuardMode, JerkMode, Machine, Place};
 use tandem_sdk::{DriverDescription, PlannerDescription};
 
 use crate::error::HostError;
@@ -21,6 +21,18 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
         );
         return refuse("planner.plugin", cause);
     }
+    if machine.policy.is_some() {
+        return refuse(
+            "policy.script",
+            "policy scripts are not supported: this machine would run without its policy".to_string(),
+        );
+    }
+    if !machine.joints.is_empty() {
+        return refuse(
+            "joints",
+            "joints that differ from the axes are not supported: their limits would not be kept".to_string(),
+        );
+    }
     let jerk_stated = machine.limits.axes().iter().any(|a| a.jerk_mm_per_s3.is_finite());
     if jerk_stated && planner.order < 3 && machine.motion.jerk == JerkMode::Limit {
         let cause = format!(
@@ -33,5 +45,9 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
 
 /// A refusal with the place in the machine file.
 pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
-    HostError::Setup { place: format!("{}: {key}", machine.place(key)), cause: cause.into() }
+    let place = match machine.place(key) {
+        place @ Place::Override(_) => place.to_string(),
+        place => format!("{place}: {key}"),
+    };
+    HostError::Setup { place, cause: cause.into() }
 }

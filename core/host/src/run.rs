@@ -29,6 +29,15 @@ pub enum Clock {
     Wall,
 }
 
+/// The switches of the operator's panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Switches {
+    /// Lines that begin with `/` are left out.
+    pub block_delete: bool,
+    /// M0, M1 and M6 wait for the operator.
+    pub pause_at_stops: bool,
+}
+
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
 pub struct Run {
     machine: Machine,
@@ -55,10 +64,21 @@ pub struct Outcome {
 ///
 /// # Errors
 /// The program cannot be read; a plugin refuses. What is wrong with the program is in the report.
-pub fn check_program(machine: &Machine, registry: &Registry, program: &mut Program) -> Result<CheckReport, HostError> {
+pub fn check_program(
+    machine: &Machine,
+    registry: &Registry,
+    program: &mut Program,
+    switches: Switches,
+) -> Result<CheckReport, HostError> {
     let planner = setup::planner(machine, registry)?;
-    let config = setup::interpreter_config(machine);
-    Ok(check(program, &config, &mut |block| planner.check(block).map_err(|e| e.to_string()))?)
+    let config = setup::interpreter_config(machine, switches);
+    let spindle_rad_per_s = machine.spindle.max_rad_per_s;
+    Ok(check(program, &config, &mut |block| {
+        if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
+            return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
+        }
+        planner.check(block).map_err(|e| e.to_string())
+    })?)
 }
 
 impl Run {
@@ -70,18 +90,18 @@ impl Run {
         machine: Machine,
         registry: &Registry,
         mut program: Program,
-        pause_at_stops: bool,
+        switches: Switches,
     ) -> Result<Self, HostError> {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        let checked = check_program(&machine, registry, &mut program)?;
+        let checked = check_program(&machine, registry, &mut program, switches)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
         }
         let name = program.name().to_string();
-        let stream = Stream::new(program, &setup::interpreter_config(&machine))?;
-        Self::assemble(machine, registry, name, stream, planner, driver, checked, pause_at_stops)
+        let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
+        Self::assemble(machine, registry, name, stream, planner, driver, checked, switches)
     }
 
     #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
@@ -93,7 +113,7 @@ impl Run {
         planner: Box<dyn Planner>,
         mut driver: Box<dyn Driver>,
         checked: CheckReport,
-        pause_at_stops: bool,
+        switches: Switches,
     ) -> Result<Self, HostError> {
         let kinematics = setup::kinematics(&machine, registry)?;
         let strategy = setup::strategy(&machine, registry)?;
@@ -103,7 +123,7 @@ impl Run {
         setup::open(&machine, driver.as_mut(), joints)?;
         let (rough_end, fine_end, host) = bridge(Sizes::default());
         let description = planner.describe();
-        let fine_config = setup::fine_config(&machine, &description, pause_at_stops);
+        let fine_config = setup::fine_config(&machine, &description, switches.pause_at_stops);
         let rough_config = RoughConfig { rough_period_s: machine.rough_period_s };
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();
@@ -170,6 +190,11 @@ impl Run {
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault })
     }
+}
+
+fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
+    let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;
+    format!("the spindle is asked for {:.0} rpm; it turns at most at {:.0}", rpm(asked_rad_per_s), rpm(most_rad_per_s))
 }
 
 fn periods(machine: &Machine) -> Periods {

@@ -10,12 +10,14 @@ use tandem_sdk::{
 use crate::error::HostError;
 use crate::registry::Registry;
 use crate::rules::refusal;
+use crate::run::Switches;
 use crate::strategy::StrategyRunner;
 
 /// The interpreter's view of the machine.
-pub fn interpreter_config(machine: &Machine) -> Config {
+pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     let mut config = Config::new(machine.axes);
     config.start = machine.start;
+    config.block_delete = switches.block_delete;
     config.reference = [machine.home; 2];
     for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
         *travel = (axis.min_mm, axis.max_mm);

@@ -24,7 +24,7 @@ static MACHINE: &[Key] = &[
     key("machine.name", "text", "the file's name", "Name of the machine in reports"),
     key("loops.rough_period_ms", "ms", "8", "Period of the rough loop, which plans; a whole multiple of the fine period"),
     key("loops.fine_period_ms", "ms", "1", "Period of the fine loop, which interpolates and talks to the drives"),
-    key("loops.max_missed_periods", "count", "2", "Fine periods missed in a row above which the machine faults"),
+    key("loops.max_missed_periods", "count", "2", "Fine periods missed in one stall above which the machine faults"),
     key("motion.allowable_speed_difference_mm_per_min", "mm/min", "0", "Velocity step that linear axes accept where blocks meet"),
     key("motion.allowable_speed_difference_deg_per_min", "deg/min", "the same number as for linear axes", "Velocity step that rotary axes accept where blocks meet"),
     key("motion.path_tolerance_mm", "mm", "0.01", "Distance allowed from the programmed path where a block states none"),

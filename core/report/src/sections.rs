@@ -54,7 +54,7 @@ fn sigma_chip(report: &Report) -> String {
     if report.samples.sigma.is_empty() {
         return String::new();
     }
-    chip("", "σ below 1", &count(slowed), "samples slowed by the governor")
+    chip("", "σ below 1", &count(slowed), "samples at less than full rate")
 }
 
 fn following_chip(report: &Report, derived: &Derived) -> String {

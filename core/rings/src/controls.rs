@@ -9,6 +9,8 @@ use crate::AtomicF64;
 pub struct Controls {
     /// Feed hold: true holds, false resumes.
     pub hold: AtomicBool,
+    /// The program waits for the operator (M0, M1, M6): set by the fine loop, cleared by the host.
+    pub program_hold: AtomicBool,
     /// Feed override, 1 for the programmed feed.
     pub feed_override: AtomicF64,
     /// Rapid override, 1 for the machine's rapid feed.
@@ -25,6 +27,7 @@ impl Default for Controls {
     fn default() -> Self {
         Self {
             hold: AtomicBool::new(false),
+            program_hold: AtomicBool::new(false),
             feed_override: AtomicF64::new(1.0),
             rapid_override: AtomicF64::new(1.0),
             emergency_stop: AtomicBool::new(false),
@@ -49,8 +52,6 @@ pub struct Status {
     pub state: AtomicU32,
     /// True while nothing moves and nothing is queued.
     pub idle: AtomicBool,
-    /// The program waits for the operator (M0, M1, M6), at rest.
-    pub program_stop: AtomicBool,
     /// Digital inputs as last read.
     pub inputs: AtomicU64,
     /// Samples lost because nobody took them from the ring.

@@ -200,7 +200,7 @@ fn planner_error(line: u32, cause: &str) -> RoughError {
 /// The answer of an input now, if what is waited for is there. Edges are taken as levels: the machine was at rest
 /// before the wait began, and an edge shorter than a rough period is not promised to be seen.
 fn read_input(wait: &InputWait, inputs: u64) -> Option<f64> {
-    let Input::Digital(number) = wait.input else { return Some(0.0) };
+    let Input::Digital(number) = wait.input;
     let high = inputs >> number.min(63) & 1 == 1;
     let met = match wait.mode {
         InputMode::Immediate => true,

@@ -36,6 +36,17 @@ pub struct Entry {
     pub dwell: (AxisVector, f64),
 }
 
+/// What caps the feed of every block.
+#[derive(Clone, Copy, Debug)]
+pub struct FeedCaps<'a> {
+    /// The programmed feed is planned at this multiple.
+    pub feed_ratio: f64,
+    /// Axis speeds, mm/s.
+    pub axis_mm_per_s: &'a [f64],
+    /// Most blocks a second: the fine loop looks at a bounded number of segments a period.
+    pub most_blocks_per_s: f64,
+}
+
 impl Entry {
     /// A dwell of no duration.
     pub fn blank() -> Self {
@@ -56,10 +67,10 @@ impl Entry {
         }
     }
 
-    /// Takes what `block` says by itself, planned at `feed_ratio` times its feed, with the axis speeds `axis_mm_per_s`.
+    /// Takes what `block` says by itself under the `caps` of the planner.
     ///
     /// In place, field by field: entries are large, and moving them costs more than computing them.
-    pub fn set(&mut self, block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) {
+    pub fn set(&mut self, block: &Block, caps: &FeedCaps<'_>) {
         (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
         self.ends_at_rest = block.ends_at_rest();
         self.command_mm_per_s = block.command_feed_mm_per_s();
@@ -70,21 +81,23 @@ impl Entry {
         if self.path.is_none() {
             self.dwell = (block.end, block.dwell_s);
         }
-        self.set_feed(block, feed_ratio, axis_mm_per_s);
+        self.set_feed(block, caps);
         self.own_square = self.feed_mm_per_s.powi(2);
     }
 
-    fn set_feed(&mut self, block: &Block, feed_ratio: f64, axis_mm_per_s: &[f64]) {
+    fn set_feed(&mut self, block: &Block, caps: &FeedCaps<'_>) {
         (self.feed_mm_per_s, self.feed_reason) = (0.0, LimitedBy::Feed);
         let Some(path) = &self.path else { return };
-        let command = block.feed_mm_per_s * feed_ratio;
+        let command = block.feed_mm_per_s * caps.feed_ratio;
         let policy = block.feed_cap_mm_per_s;
         let most = path.max_direction();
-        let axes = axis_mm_per_s.iter().zip(&most.0).map(|(v, most)| (*v, *most));
-        self.feed_mm_per_s = least_ratio(lesser(command, policy), axes);
+        let axes = caps.axis_mm_per_s.iter().zip(&most.0).map(|(v, most)| (*v, *most));
+        let buffer = path.length_mm() * caps.most_blocks_per_s;
+        self.feed_mm_per_s = lesser(least_ratio(lesser(command, policy), axes), buffer);
         self.feed_reason = match self.feed_mm_per_s {
             feed if feed >= command || block.kind == BlockKind::Rapid => LimitedBy::Feed,
             feed if feed >= policy => LimitedBy::Policy,
+            feed if feed >= buffer => LimitedBy::Buffer,
             _ => LimitedBy::Velocity,
         };
     }

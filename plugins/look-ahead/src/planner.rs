@@ -7,7 +7,7 @@ use tandem_sdk::{
 
 use crate::buffer::Buffer;
 use crate::drive::{Drive, begin, without};
-use crate::geometry::Entry;
+use crate::geometry::{Entry, FeedCaps};
 use crate::junction::Rule;
 use crate::options::{Junction, Options};
 use crate::plan::{Plan, dwell_report};
@@ -21,12 +21,16 @@ enum Emitting {
     Dwell(f64),
 }
 
+/// Most blocks that are driven in one fine period; each has up to three segments and the fine loop looks at 64.
+const BLOCKS_PER_FINE_PERIOD: f64 = 16.0;
+
 /// The look-ahead planner.
 #[derive(Debug)]
 pub struct LookAhead {
     context: PlannerContext,
     options: Options,
     rule: Rule,
+    most_blocks_per_s: f64,
     feed_axis_mm_per_s: Vec<f64>,
     rapid_axis_mm_per_s: Vec<f64>,
     buffer: Buffer,
@@ -52,6 +56,7 @@ impl LookAhead {
         let axes = context.limits.axes();
         Ok(Self {
             context: *context,
+            most_blocks_per_s: BLOCKS_PER_FINE_PERIOD / context.fine_period_s,
             rule: Rule::new(options.junction, axes, context.fine_period_s),
             feed_axis_mm_per_s: axes.iter().map(|a| a.feed_mm_per_s).collect(),
             rapid_axis_mm_per_s: axes.iter().map(|a| a.rapid_mm_per_s).collect(),
@@ -156,8 +161,12 @@ impl Planner for LookAhead {
         self.finished = false;
         let rapid = block.kind == BlockKind::Rapid;
         let axes = if rapid { &self.rapid_axis_mm_per_s } else { &self.feed_axis_mm_per_s };
-        let ratio = self.context.max_feed_ratio;
-        self.buffer.push(&self.rule, |entry| entry.set(block, ratio, axes));
+        let caps = FeedCaps {
+            feed_ratio: self.context.max_feed_ratio,
+            axis_mm_per_s: axes,
+            most_blocks_per_s: self.most_blocks_per_s,
+        };
+        self.buffer.push(&self.rule, |entry| entry.set(block, &caps));
         Ok(Accepted::Accepted)
     }
 

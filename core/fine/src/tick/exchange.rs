@@ -1,0 +1,75 @@
+//! The exchange with the drives, and what the soft side is told.
+
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_rings::Sample;
+use tandem_sdk::{AxisVector, JointState};
+
+use super::{FineLoop, Phase};
+use crate::answer::{self, Numbers};
+use crate::fault::FaultKind;
+use crate::state::Input;
+
+impl FineLoop {
+    pub(super) fn exchange(&mut self, axes: &AxisVector) {
+        let joints = self.kinematics.as_ref().map_or(*axes, |k| k.to_joints(axes));
+        let rate = 1.0 / self.config.period_s;
+        let velocity =
+            if self.setpoint.enable == 0 { AxisVector::ZERO } else { (joints - self.setpoint.position) * rate };
+        self.setpoint.acceleration = (velocity - self.setpoint.velocity) * rate;
+        self.setpoint.velocity = velocity;
+        self.setpoint.position = joints;
+        self.setpoint.tick = self.tick;
+        self.setpoint.enable = u32::from(!matches!(self.phase, Phase::Faulted));
+        self.setpoint.outputs = self.outputs.bits;
+        self.setpoint.spindle_rad_per_s = self.outputs.spindle_rad_per_s;
+        let last = Numbers::of(&self.feedback);
+        let failed = self.driver.exchange(&self.setpoint, &mut self.feedback).is_err();
+        // From the first motion on the drives hold, at rest too: what let go has moved.
+        let moving = matches!(self.phase, Phase::Following);
+        let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
+        let fault = failed.then_some(FaultKind::Driver).or(unreadable);
+        if let Some(kind) = fault.or_else(|| answer::reported(&self.feedback, self.joints, moving)) {
+            self.fail(kind);
+        }
+    }
+
+    pub(super) fn drives(&self) -> Input {
+        let on = self.feedback.state[..self.joints].iter().all(|s| *s == JointState::Enabled);
+        if on { Input::DrivesOn } else { Input::DrivesOff }
+    }
+
+    pub(super) fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
+        let to_axes = |v: &AxisVector| self.kinematics.as_ref().map_or(*v, |k| k.to_axes(v));
+        let sample = Sample {
+            tick: self.tick,
+            block: self.cursor.segment().block,
+            line: self.cursor.segment().line,
+            state: self.state,
+            command: *command,
+            feedback: to_axes(&self.feedback.position),
+            speed: self.feedback.speed,
+            current_a: self.feedback.current_a,
+            feed_mm_per_s,
+            programmed_feed_mm_per_s: self.cursor.segment().feed_mm_per_s,
+            sigma: self.governor.sigma(),
+            ratio: self.ratio * self.controls.feed_override.load(),
+            spindle_rad_per_s: self.feedback.spindle_rad_per_s,
+        };
+        self.counters.samples += 1;
+        if self.samples.push(sample).is_err() {
+            self.status.lost_samples.fetch_add(1, Relaxed);
+        }
+    }
+
+    pub(super) fn report(&self) {
+        let status = &self.status;
+        status.tick.store(self.tick, Relaxed);
+        status.program_time_s.store(self.cursor.program_time_s());
+        status.feed_mm_per_s.store(self.governor.sigma() * self.cursor.path_speed_mm_per_s());
+        status.line.store(self.cursor.segment().line, Relaxed);
+        status.state.store(self.state as u32, Relaxed);
+        status.inputs.store(self.feedback.inputs, Relaxed);
+        status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
+    }
+}
