@@ -44,10 +44,10 @@ pub struct Sizes {
 }
 
 impl Default for Sizes {
-    /// 8192 segments (6 MB) hold the worst stop of blocks a tenth of a millimetre long at any sensible feed; 16384
-    /// samples hold 16 s of a recorder that is not looking.
+    /// 4096 segments (3 MB) hold the worst stop of blocks of a hundredth of a millimetre at 160 mm/s; 4096
+    /// samples hold 4 s of a recorder that is not looking.
     fn default() -> Self {
-        Self { segments: 8192, samples: 16_384 }
+        Self { segments: 4096, samples: 4096 }
     }
 }
 

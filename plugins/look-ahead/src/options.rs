@@ -27,6 +27,6 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         // With the two slots that the buffer adds this fits a ring of 4096.
-        Self { buffer_blocks: 4000, junction: Junction::default() }
+        Self { buffer_blocks: 1000, junction: Junction::default() }
     }
 }
