@@ -55,3 +55,31 @@ fn a_wrong_machine_key_names_the_nearest() {
     assert_eq!(done.status(), 1);
     assert!(done.errors().contains("look-ahed") && done.errors().contains("look-ahead"), "{}", done.errors());
 }
+
+#[test]
+fn what_is_read_is_not_written_over_and_nothing_is_written_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("p.ngc");
+    std::fs::write(&program, "F600\nG1 X1\nM2\n").unwrap();
+    let path = program.to_string_lossy().into_owned();
+    let done = Scenario::of(&program).with(&["--report", &path]).run();
+    assert_eq!(done.status(), 1);
+    assert!(done.errors().contains("the run reads this file"), "{}", done.errors());
+    assert_eq!(std::fs::read_to_string(&program).unwrap(), "F600\nG1 X1\nM2\n");
+}
+
+#[test]
+fn a_device_is_written_and_not_replaced() {
+    let device = std::path::Path::new("/dev/null");
+    let done = Scenario::text("F600\nG1 X1\nM2\n").with(&["--report", "/dev/null"]).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    assert!(!device.metadata().unwrap().is_file());
+    assert!(!std::path::Path::new("/dev/null.part").exists());
+}
+
+#[test]
+fn options_beyond_reason_are_refused() {
+    let done = Scenario::text("M2\n").with(&["--set", "planner.options.buffer_blocks=1000000000000"]).run();
+    assert_eq!(done.status(), 1);
+    assert!(done.errors().contains("buffer_blocks = 1000000000000: from 2 to"), "{}", done.errors());
+}

@@ -1,5 +1,6 @@
 //! Running the `tandem` binary and judging its trace.
 
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -24,6 +25,7 @@ pub struct Scenario {
     program: PathBuf,
     machine: PathBuf,
     arguments: Vec<String>,
+    input: &'static str,
 }
 
 /// What a run left.
@@ -37,7 +39,13 @@ pub struct Done {
 impl Scenario {
     /// Runs the file `program` on the mill.
     pub fn of(program: &Path) -> Self {
-        Self { folder: TempDir::new().unwrap(), program: program.to_owned(), machine: mill(), arguments: vec![] }
+        Self {
+            folder: TempDir::new().unwrap(),
+            program: program.to_owned(),
+            machine: mill(),
+            arguments: vec![],
+            input: "",
+        }
     }
 
     /// Runs the program text on the mill.
@@ -57,6 +65,12 @@ impl Scenario {
     /// With further arguments.
     pub fn with(mut self, arguments: &[&str]) -> Self {
         self.arguments.extend(arguments.iter().map(|a| (*a).to_string()));
+        self
+    }
+
+    /// With something typed on standard input.
+    pub fn typing(mut self, input: &'static str) -> Self {
+        self.input = input;
         self
     }
 
@@ -80,7 +94,7 @@ impl Scenario {
             .args(["--summary".as_ref(), at("summary.json").as_os_str()])
             .args(["--blocks".as_ref(), at("blocks.csv").as_os_str()])
             .args(&self.arguments)
-            .stdin(Stdio::null())
+            .stdin(typed(self.input))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -88,6 +102,14 @@ impl Scenario {
             .unwrap();
         Done { output, folder: self.folder, program: self.program, machine: self.machine }
     }
+}
+
+/// Standard input that gives `text` and then ends.
+fn typed(text: &str) -> Stdio {
+    let mut file = tempfile::tempfile().unwrap();
+    file.write_all(text.as_bytes()).unwrap();
+    file.rewind().unwrap();
+    file.into()
 }
 
 /// Waits for a run; one that never ends is ended, so that a defect shows as a failure and not as a full disk.

@@ -16,11 +16,19 @@ fn stops_without_an_operator_are_logged_and_the_run_goes_on() {
 #[test]
 fn with_pause_they_wait_for_enter() {
     let free = Scenario::text(STOPS).run();
-    let done = Scenario::text(STOPS).with(&["--pause"]).run();
+    let done = Scenario::text(STOPS).with(&["--pause"]).typing("\n\n\n").run();
     done.assert_within_limits();
     assert_eq!(done.errors().matches("Enter goes on").count(), 3, "{}", done.errors());
     assert!(done.cells("state").iter().any(|s| s == "holding"));
     assert!(done.number("samples") > free.number("samples"));
+}
+
+#[test]
+fn where_nobody_can_press_enter_the_program_ends_at_its_stop() {
+    let done = Scenario::text(STOPS).with(&["--pause"]).typing("\n").run();
+    assert_eq!(done.status(), 3);
+    assert!(done.errors().contains("line 7: the program waits for an operator"), "{}", done.errors());
+    assert_eq!(done.column("x_cmd_mm").pop(), Some(20.0));
 }
 
 #[test]

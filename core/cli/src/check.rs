@@ -23,6 +23,6 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     }
     program::print_errors(&report);
     let count = report.diagnostics.len() as u64 + report.unlisted;
-    eprintln!("{name}: {count} error{}", if count == 1 { "" } else { "s" });
+    say!("{name}: {count} error{}", if count == 1 { "" } else { "s" });
     Ok(REFUSED)
 }

@@ -26,7 +26,7 @@ pub fn latency(options: &args::Latency) -> Result<u8, Box<dyn Error>> {
     let latency = measure_latency(period, periods)?;
     drop(load);
     for note in &latency.notes {
-        eprintln!("{note}");
+        say!("{note}");
     }
     // A reader that has gone away (a closed pipe) is no reason to fail.
     let _ = std::io::stdout().write_all(text(&latency, options).as_bytes());

@@ -1,5 +1,13 @@
 //! The `tandem` command: the only crate that prints.
 
+/// A line to standard error. A reader that has gone away is no reason to fail.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 mod args;
 mod built_in;
 mod check;
@@ -29,7 +37,7 @@ fn main() -> ExitCode {
         Command::Latency(options) => latency::latency(&options),
     };
     ExitCode::from(status.unwrap_or_else(|error| {
-        eprintln!("{error}");
+        say!("{error}");
         REFUSED
     }))
 }

@@ -13,9 +13,9 @@ pub fn open(path: &Path) -> Result<Program, ProgramError> {
 /// Prints the errors of a program.
 pub fn print_errors(report: &CheckReport) {
     for diagnostic in &report.diagnostics {
-        eprintln!("{diagnostic}");
+        say!("{diagnostic}");
     }
     if report.unlisted > 0 {
-        eprintln!("and {} more errors", report.unlisted);
+        say!("and {} more errors", report.unlisted);
     }
 }

@@ -38,7 +38,7 @@ impl Progress {
     /// Clears the line.
     pub fn finish(&self) {
         if self.active {
-            eprint!("\r\x1b[K");
+            let _ = write!(stderr(), "\r\x1b[K");
         }
     }
 
@@ -46,7 +46,8 @@ impl Progress {
         let share = if self.length_mm > 0.0 { (self.driven_mm / self.length_mm).clamp(0.0, 1.0) } else { 1.0 };
         let left_s = self.started.elapsed().as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
         let feed = sample.feed_mm_per_s * 60.0;
-        eprint!(
+        let _ = write!(
+            stderr(),
             "\r\x1b[Kline {}  F{feed:.0}  {:.0} %  {left_s:.0} s left  {}",
             sample.line,
             share * 100.0,

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Switches, Timed};
 use tandem_machine::Machine;
@@ -33,10 +33,36 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         args::Clock::Wall => Clock::Wall,
     };
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock))?;
+    distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
     let outcome = run.drive(clock, &commands, &mut sinks)?;
     sinks.finish(options, &outcome.summary)?;
     Ok(conclude(options, &outcome))
+}
+
+/// Refuses to write a file twice, or over what the run reads.
+fn distinct_files(options: &args::Run) -> Result<(), String> {
+    let written = [&options.trace, &options.summary, &options.report, &options.blocks];
+    let mut taken = vec![resolved(&options.program), resolved(&options.machine.path)];
+    taken.extend(options.commands.iter().map(|path| resolved(path)));
+    for path in written.into_iter().flatten() {
+        let file = resolved(path);
+        let regular = !file.exists() || file.is_file();
+        if regular && taken.contains(&file) {
+            return Err(format!("{}: the run reads this file, or writes it already", path.display()));
+        }
+        taken.push(file);
+    }
+    Ok(())
+}
+
+/// Where a path leads, also where its last part does not exist yet.
+fn resolved(path: &Path) -> PathBuf {
+    let in_folder = || {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
 }
 
 /// Reads a command file; lines that are empty or begin with # are left out.
@@ -50,9 +76,11 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let parse = |(index, line)| Timed::parse(line).map_err(|e| format!("{}:{}: {e}", path.display(), index + 1));
-    let mut commands = lines.map(parse).collect::<Result<Vec<_>, _>>()?;
-    commands.sort_by_key(|timed| timed.tick);
-    Ok(commands)
+    let commands = lines.map(parse).collect::<Result<Vec<_>, _>>()?;
+    match commands.windows(2).find(|pair| pair[1].tick < pair[0].tick) {
+        Some(pair) => Err(format!("{}: tick {} comes after tick {}", path.display(), pair[1].tick, pair[0].tick)),
+        None => Ok(commands),
+    }
 }
 
 /// Everything that a run is written to.
@@ -92,7 +120,7 @@ impl Sinks {
 
 impl RunObserver for Sinks {
     fn note(&mut self, note: &str) {
-        eprintln!("{note}");
+        say!("{note}");
     }
 
     fn block(&mut self, block: &Block, report: &BlockReport) {
@@ -104,14 +132,13 @@ impl RunObserver for Sinks {
     fn event(&mut self, event: &Event) {
         let word = stop_word(event.kind);
         if let (Some(word), false) = (word, self.pause) {
-            eprintln!("line {}: {word}: no operator is asked, the run goes on", event.line);
+            say!("line {}: {word}: no operator is asked, the run goes on", event.line);
         }
     }
 
-    fn program_stop(&mut self, line: u32) {
-        eprintln!("line {line}: the program waits; Enter goes on");
-        // At the end of the input there is nobody to wait for.
-        let _ = std::io::stdin().read_line(&mut String::new());
+    fn program_stop(&mut self, line: u32) -> bool {
+        say!("line {line}: the program waits; Enter goes on");
+        std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0)
     }
 
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
@@ -147,7 +174,7 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     let _ = print_outcome(&mut std::io::stdout().lock(), options, &outcome.summary);
     match &outcome.summary.fault {
         Some(fault) => {
-            eprintln!("fault: {fault}");
+            say!("fault: {fault}");
             FAULT
         }
         None => 0,

@@ -125,8 +125,9 @@ impl Cursor {
         last
     }
 
-    /// Moves on by `delta_s` of program time. Events on the way are given to `event`.
-    pub fn advance(&mut self, delta_s: f64, mut event: impl FnMut(&Event)) -> Reached {
+    /// Moves on by `delta_s` of program time. Events on the way are given to `event`, which says whether the machine is to
+    /// stay at the rest where it met one.
+    pub fn advance(&mut self, delta_s: f64, mut event: impl FnMut(&Event) -> bool) -> Reached {
         let mut left_s = delta_s;
         if delta_s == 0.0 {
             return if self.resting { Reached::Rest } else { Reached::Inside };
@@ -149,14 +150,14 @@ impl Cursor {
         }
     }
 
-    /// Steps to the start of the next segment; `false` where there is none.
-    fn next(&mut self, event: &mut impl FnMut(&Event)) -> bool {
-        let mut found = false;
-        while !found {
+    /// Steps to the start of the next segment; `false` where there is none, or an event keeps the machine at its rest.
+    fn next(&mut self, event: &mut impl FnMut(&Event) -> bool) -> bool {
+        let (mut found, mut stay) = (false, false);
+        while !found && !stay {
             // Looked at in its slot: a segment is large, and is copied once.
             let Ok(queued) = self.entries.peek() else { break };
             match &queued.entry {
-                RingEntry::Event(it) if it.epoch >= self.epoch => event(it),
+                RingEntry::Event(it) if it.epoch >= self.epoch => stay = event(it) && self.resting,
                 RingEntry::Segment(segment) if segment.epoch >= self.epoch => {
                     self.epoch = segment.epoch;
                     (self.start_s, self.local_s) = (queued.start_s, 0.0);

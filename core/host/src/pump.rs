@@ -22,8 +22,11 @@ pub trait RunObserver {
     /// A non-motion word is planned.
     fn event(&mut self, _event: &Event) {}
 
-    /// The program waits at rest on `line` for the operator; it goes on when this returns.
-    fn program_stop(&mut self, _line: u32) {}
+    /// The program waits at rest on `line` for the operator; when this returns it goes on, or ends where there is nobody
+    /// to go on (`false`).
+    fn program_stop(&mut self, _line: u32) -> bool {
+        true
+    }
 
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
@@ -89,8 +92,11 @@ impl<'a> Pump<'a> {
     pub fn serve_stop(&mut self) {
         let (status, controls) = (&self.host.status, &self.host.controls);
         if controls.program_hold.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
-            self.observer.program_stop(status.line.load(Relaxed));
-            controls.program_hold.store(false, Relaxed);
+            let line = status.line.load(Relaxed);
+            if !self.observer.program_stop(line) {
+                self.fail(format!("line {line}: the program waits for an operator, and there is none"));
+            }
+            self.host.controls.program_hold.store(false, Relaxed);
         }
     }
 

@@ -21,6 +21,9 @@ enum Emitting {
     Dwell(f64),
 }
 
+/// Largest buffer, blocks: about a gigabyte.
+const MOST_BUFFER_BLOCKS: usize = 1_000_000;
+
 /// Most blocks that are driven in one fine period; each has up to three segments and the fine loop looks at 64.
 const BLOCKS_PER_FINE_PERIOD: f64 = 16.0;
 
@@ -48,10 +51,11 @@ impl LookAhead {
     /// A planner at rest. Allocates its buffer for good.
     ///
     /// # Errors
-    /// A buffer of fewer than two blocks.
+    /// A buffer of fewer than two blocks, or beyond reason.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
-        if options.buffer_blocks < 2 {
-            return Err(PluginError::new(format!("buffer_blocks = {}: at least 2", options.buffer_blocks)));
+        if !(2..=MOST_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
+            let (asked, most) = (options.buffer_blocks, MOST_BUFFER_BLOCKS);
+            return Err(PluginError::new(format!("buffer_blocks = {asked}: from 2 to {most}")));
         }
         let axes = context.limits.axes();
         Ok(Self {

@@ -111,13 +111,14 @@ impl Axis {
         let rotary = keys.text(&format!("{table}.kind")).is_some_and(|kind| kind == "rotary");
         let unit = if rotary { "deg" } else { "mm" };
         let key = |quantity: &str, per: &str| format!("{table}.{quantity}_{unit}{per}");
+        let max_feed = keys.need(&key("max_feed", "_per_min"))?;
         Ok(Self {
             index,
             rotary,
             travel_mm: keys.range(&key("travel", ""))?,
             start_mm: keys.number(&key("start", ""))?.unwrap_or(0.0),
-            max_feed_mm_per_s: keys.need(&key("max_feed", "_per_min"))? / 60.0,
-            max_rapid_mm_per_s: keys.need(&key("max_rapid", "_per_min"))? / 60.0,
+            max_feed_mm_per_s: max_feed / 60.0,
+            max_rapid_mm_per_s: keys.number(&key("max_rapid", "_per_min"))?.unwrap_or(max_feed) / 60.0,
             max_acceleration_mm_per_s2: keys.need(&key("max_acceleration", "_per_s2"))?,
             max_jerk_mm_per_s3: keys.number(&key("max_jerk", "_per_s3"))?,
         })

@@ -2,6 +2,7 @@
 //!
 //! Exit status: 0 pass, 1 fail, 2 usage (a file that cannot be opened included), 3 not judged.
 
+use std::io::Write;
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Parser;
@@ -64,7 +65,8 @@ struct Arguments {
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(verdict) => {
-            println!("{verdict}");
+            // The exit status tells the verdict where nobody reads on.
+            let _ = writeln!(std::io::stdout(), "{verdict}");
             ExitCode::from(match verdict.outcome {
                 Outcome::Pass => 0,
                 Outcome::Fail => 1,
@@ -72,7 +74,7 @@ fn main() -> ExitCode {
             })
         }
         Err(error) => {
-            eprintln!("oracle: {error}");
+            let _ = writeln!(std::io::stderr(), "oracle: {error}");
             ExitCode::from(if matches!(error, Error::Open { .. }) { 2 } else { 3 })
         }
     }

@@ -63,7 +63,7 @@ fn a_machine_error_names_its_key() {
     let error = |from, to| machine(from, to).expect_err("refused");
     assert_eq!(error("fine_period_ms = 1", ""), "m.toml: loops.fine_period_ms: missing");
     assert_eq!(error("-250, 250", "250, -250"), "m.toml: axes.x.travel_mm: not two numbers in ascending order");
-    assert_eq!(error("max_rapid_mm_per_min = 12000", ""), "m.toml: axes.x.max_rapid_mm_per_min: missing");
+    assert_eq!(error("max_feed_mm_per_min", "max_fed"), "m.toml: axes.x.max_feed_mm_per_min: missing");
     assert_eq!(
         error("path_tolerance_mm = 0.01", "path_tolerance_mm = \"a\""),
         "m.toml: motion.path_tolerance_mm: no finite number"

@@ -72,7 +72,7 @@ impl Binary {
         if self.is_whole() {
             return 0;
         }
-        eprintln!("{}: {}", self.path.display(), self.verdict());
+        say!("{}: {}", self.path.display(), self.verdict());
         crate::REFUSED
     }
 
@@ -82,7 +82,7 @@ impl Binary {
         self.lost_records += lost_records.unwrap_or(0);
         if self.places <= TOLD {
             let lost = lost_records.map_or("the rest".to_string(), |count| format!("{count} records"));
-            eprintln!("{}: bytes {from} to {to}: {cause}; {lost} lost", self.path.display());
+            say!("{}: bytes {from} to {to}: {cause}; {lost} lost", self.path.display());
         }
     }
 }

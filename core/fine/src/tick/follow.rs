@@ -39,7 +39,11 @@ impl FineLoop {
             return (*self.guard.position(), Input::Trip);
         }
         let delta_s = self.govern(ask);
-        let reached = self.cursor.advance(delta_s, |event| self.outputs.apply(event));
+        let pause = self.config.pause_at_stops;
+        let reached = self.cursor.advance(delta_s, |event| {
+            self.outputs.apply(event);
+            pause && self.outputs.stop_requested
+        });
         let position = self.cursor.position();
         let checked = self.guard.check(&position);
         let position = self.let_pass(position, &checked);

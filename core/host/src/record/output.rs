@@ -1,13 +1,13 @@
 //! Files that a run writes. What exists is replaced only when the new content is complete.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A file in the making, beside the one it will become.
+/// A file in the making, beside the one it will become. What is no regular file (a device, a pipe) is written directly.
 pub struct Output {
     path: PathBuf,
-    part: PathBuf,
+    part: Option<PathBuf>,
     writer: Option<BufWriter<File>>,
 }
 
@@ -17,11 +17,16 @@ impl Output {
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path) -> Result<Self, String> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let file = File::create(&part).map_err(|e| format!("{}: {e}", part.display()))?;
-        Ok(Self { path: path.to_owned(), part, writer: Some(BufWriter::with_capacity(1 << 16, file)) })
+        // A link stays a link: the file that it leads to is the one to replace.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let special = fs::metadata(&path).is_ok_and(|found| !found.is_file());
+        let part = (!special).then(|| beside(&path));
+        let file = match &part {
+            Some(part) => File::create(part),
+            None => OpenOptions::new().write(true).open(&path),
+        };
+        let file = file.map_err(|e| format!("{}: it cannot be written: {e}", path.display()))?;
+        Ok(Self { path, part, writer: Some(BufWriter::with_capacity(1 << 16, file)) })
     }
 
     /// Everything is written: the file takes its name.
@@ -29,13 +34,19 @@ impl Output {
     /// # Errors
     /// The path with the system's words.
     pub fn finish(mut self) -> Result<(), String> {
-        let named = self.close().and_then(|()| fs::rename(&self.part, &self.path));
+        let named = self.close().and_then(|()| self.part.as_ref().map_or(Ok(()), |part| fs::rename(part, &self.path)));
         named.map_err(|e| format!("{}: {e}", self.path.display()))
     }
 
     fn close(&mut self) -> io::Result<()> {
         self.writer.take().map_or(Ok(()), |mut writer| writer.flush())
     }
+}
+
+fn beside(path: &Path) -> PathBuf {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    part.into()
 }
 
 impl Write for Output {
@@ -50,8 +61,8 @@ impl Write for Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        if self.writer.take().is_some() {
-            let _ = fs::remove_file(&self.part);
+        if let (Some(_), Some(part)) = (self.writer.take(), &self.part) {
+            let _ = fs::remove_file(part);
         }
     }
 }
