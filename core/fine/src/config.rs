@@ -1,6 +1,6 @@
 //! What the fine loop knows of the machine.
 
-use tandem_sdk::{AxisLimits, AxisVector, Limits, MAX_AXES};
+use tandem_sdk::{AxisVector, Limits, MAX_AXES};
 
 /// What the guard does with a sample beyond a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,9 +11,6 @@ pub enum GuardMode {
     /// Sends and counts it. Simulated drivers only; the host sees to that.
     Count,
 }
-
-/// Limits of one axis as the fine loop needs them.
-pub type AxisConfig = AxisLimits;
 
 /// Everything the fine loop is told before it runs.
 #[derive(Clone, Copy, Debug)]

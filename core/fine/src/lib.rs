@@ -15,6 +15,6 @@ mod ramp;
 mod state;
 mod tick;
 
-pub use config::{AxisConfig, FineConfig, GuardMode};
+pub use config::{FineConfig, GuardMode};
 pub use fault::{Breach, Fault, FaultKind};
 pub use tick::{Counters, FineLoop};

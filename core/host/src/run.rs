@@ -71,6 +71,16 @@ pub fn check_program(
     switches: Switches,
 ) -> Result<CheckReport, HostError> {
     let planner = setup::planner(machine, registry)?;
+    first_pass(machine, planner.as_ref(), program, switches)
+}
+
+/// The whole program through the interpreter and `planner`, which stays as it was.
+fn first_pass(
+    machine: &Machine,
+    planner: &dyn Planner,
+    program: &mut Program,
+    switches: Switches,
+) -> Result<CheckReport, HostError> {
     let config = setup::interpreter_config(machine, switches);
     let spindle_rad_per_s = machine.spindle.max_rad_per_s;
     Ok(check(program, &config, &mut |block| {
@@ -95,7 +105,7 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        let checked = check_program(&machine, registry, &mut program, switches)?;
+        let checked = first_pass(&machine, planner.as_ref(), &mut program, switches)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
         }

@@ -23,6 +23,10 @@ impl AtomicF64 {
     }
 }
 
+/// Share of the declared stop deceleration that both loops count on: the governor stays inside the limits, and it acts
+/// from the next period on.
+pub const STOP_SHARE: f64 = 0.95;
+
 /// How far the queue reaches, and what it takes to stop within it. Written by the rough loop after each push.
 ///
 /// The fields are stored in the order in which the fine loop may safely see them: first the stop that the new segments

@@ -19,8 +19,6 @@ pub struct Controls {
     pub emergency_stop: AtomicBool,
     /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
     pub soft_fault: AtomicBool,
-    /// Programmed permission for the feed override (M48 to M53); written by the fine loop at the event's tick.
-    pub override_permitted: AtomicBool,
 }
 
 impl Default for Controls {
@@ -32,7 +30,6 @@ impl Default for Controls {
             rapid_override: AtomicF64::new(1.0),
             emergency_stop: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),
-            override_permitted: AtomicBool::new(true),
         }
     }
 }

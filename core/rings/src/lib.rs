@@ -7,7 +7,7 @@ mod atomics;
 mod controls;
 mod sample;
 
-pub use atomics::{AtomicF64, Depth};
+pub use atomics::{AtomicF64, Depth, STOP_SHARE};
 pub use controls::{Controls, Status};
 pub use sample::{MachineState, Sample};
 

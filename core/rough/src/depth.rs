@@ -1,10 +1,8 @@
 //! How much program time must be queued so that the machine can stop within it.
 
 use crate::window::SlidingMax;
+use tandem_rings::STOP_SHARE;
 use tandem_sdk::{Segment, SegmentFlags};
-
-/// Share of the declared stop deceleration that is counted on; the fine loop counts on the same.
-const STOP_SHARE: f64 = 0.95;
 
 /// The worst stop over what is queued.
 #[derive(Debug)]

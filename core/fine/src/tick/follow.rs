@@ -2,6 +2,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
+use tandem_rings::STOP_SHARE;
 use tandem_sdk::AxisVector;
 
 use super::{FineLoop, Phase};
@@ -179,6 +180,3 @@ fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
 
 /// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
 const FEED_TOLERANCE: f64 = 1e-7;
-
-/// Share of the declared stop deceleration that the starvation stop counts on.
-const STOP_SHARE: f64 = 0.95;
