@@ -2,6 +2,7 @@
 
 mod exchange;
 mod follow;
+mod govern;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
