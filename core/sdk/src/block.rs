@@ -1,6 +1,6 @@
 //! A block: one path element of a part program, in machine coordinates, with what the program says about it.
 
-use crate::{AxisVector, RawSlice, size_of_contract};
+use crate::{AxisVector, Edge, RawSlice, StopOn, size_of_contract};
 
 /// What kind of path a block follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,6 +93,9 @@ pub struct Block {
     pub path_tolerance_mm: f64,
     /// Duration of a [`BlockKind::Dwell`], s.
     pub dwell_s: f64,
+    /// What ends the motion early (probing, homing); such a block starts and ends at rest. Planners need not look at it:
+    /// the host marks the segments of the block.
+    pub stop_on: StopOn,
     /// Sum of the offsets in force (work, G92, tool length), mm or rad: program coordinate = machine coordinate − offset.
     pub offset: AxisVector,
     /// Tool in the spindle.
@@ -122,6 +125,7 @@ impl Block {
             time_constant_s: f64::NAN,
             path_tolerance_mm: f64::NAN,
             dwell_s: 0.0,
+            stop_on: StopOn::default(),
             offset: AxisVector::ZERO,
             tool: 0,
             override_enabled: 1,
@@ -139,8 +143,21 @@ impl Block {
         self.path_mode == PathMode::ExactStop || self.starts_at_rest()
     }
 
-    /// Whether the machine must be at rest at the start of this block: dwells and rapids.
+    /// Whether the machine must be at rest at the start of this block: dwells, rapids, and motion that an input ends.
     pub fn starts_at_rest(&self) -> bool {
-        matches!(self.kind, BlockKind::Dwell | BlockKind::Rapid)
+        matches!(self.kind, BlockKind::Dwell | BlockKind::Rapid) || self.stop_on.edge != Edge::None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motion_that_an_input_ends_stands_between_two_rests() {
+        let mut block = Block { kind: BlockKind::Line, ..Block::at(AxisVector::ZERO) };
+        assert!(!block.starts_at_rest() && !block.ends_at_rest());
+        block.stop_on.edge = Edge::Rising;
+        assert!(block.starts_at_rest() && block.ends_at_rest());
     }
 }

@@ -79,7 +79,7 @@ pub struct Segment {
     pub flags: SegmentFlags,
     /// Order of the limits that hold: 2 velocity and acceleration, 3 also jerk.
     pub order: u32,
-    /// What ends the motion early.
+    /// What ends the motion early: the block's [`crate::Block::stop_on`], put in by the host.
     pub stop_on: StopOn,
     /// Duration, s of program time; zero only for a rest (constant position).
     pub duration_s: f64,

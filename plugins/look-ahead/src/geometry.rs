@@ -14,6 +14,8 @@ pub struct Entry {
     pub line: u32,
     /// The kind of path.
     pub kind: BlockKind,
+    /// The machine rests at the start for the program's sake.
+    pub starts_at_rest: bool,
     /// The machine rests at the end for the program's sake.
     pub ends_at_rest: bool,
     /// What set the highest feed.
@@ -54,6 +56,7 @@ impl Entry {
             index: 0,
             line: 0,
             kind: BlockKind::Dwell,
+            starts_at_rest: true,
             ends_at_rest: true,
             feed_reason: LimitedBy::Feed,
             command_mm_per_s: 0.0,
@@ -72,7 +75,7 @@ impl Entry {
     /// In place, field by field: entries are large, and moving them costs more than computing them.
     pub fn set(&mut self, block: &Block, caps: &FeedCaps<'_>) {
         (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
-        self.ends_at_rest = block.ends_at_rest();
+        (self.starts_at_rest, self.ends_at_rest) = (block.starts_at_rest(), block.ends_at_rest());
         self.command_mm_per_s = block.command_feed_mm_per_s();
         self.junction_mm_per_s = 0.0;
         self.half_step = AxisVector::ZERO;
@@ -115,6 +118,6 @@ impl Entry {
 
     /// Whether the machine rests between this block and `next`.
     pub fn rests_before(&self, next: &Self) -> bool {
-        self.ends_at_rest || matches!(next.kind, BlockKind::Dwell | BlockKind::Rapid)
+        self.ends_at_rest || next.starts_at_rest
     }
 }
