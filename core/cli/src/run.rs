@@ -4,7 +4,9 @@ use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use tandem_host::{BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Summary, Switches, Timed};
+use tandem_host::{
+    BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, StopAnswer, Summary, Switches, Timed,
+};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
@@ -136,9 +138,10 @@ impl RunObserver for Sinks {
         }
     }
 
-    fn program_stop(&mut self, line: u32) -> bool {
+    fn program_stop(&mut self, line: u32) -> StopAnswer {
         say!("line {line}: the program waits; Enter goes on");
-        std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0)
+        let pressed = std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
+        if pressed { StopAnswer::GoOn } else { StopAnswer::Nobody }
     }
 
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {

@@ -28,7 +28,7 @@ pub use command::{Command, Timed};
 pub use error::HostError;
 pub use lateness::{Lateness, Row};
 pub use monitor::Monitor;
-pub use pump::RunObserver;
+pub use pump::{RunObserver, StopAnswer};
 pub use realtime::PageFaults;
 pub use realtime_latency::{Latency, measure_latency};
 pub use realtime_periods::Timing;

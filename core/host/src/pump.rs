@@ -11,6 +11,17 @@ use crate::command::Command;
 use crate::monitor::Monitor;
 use crate::strategy::StrategyRunner;
 
+/// What is to happen where the program waits at rest for the operator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopAnswer {
+    /// It goes on.
+    GoOn,
+    /// No answer yet: the loops keep running, and the question comes again after a rough period.
+    Wait,
+    /// There is nobody to answer: the run ends.
+    Nobody,
+}
+
 /// Is told of everything that happens in a run, on the soft side.
 pub trait RunObserver {
     /// The computer did not grant something that the wall clock asks for.
@@ -22,10 +33,10 @@ pub trait RunObserver {
     /// A non-motion word is planned.
     fn event(&mut self, _event: &Event) {}
 
-    /// The program waits at rest on `line` for the operator; when this returns it goes on, or ends where there is nobody
-    /// to go on (`false`).
-    fn program_stop(&mut self, _line: u32) -> bool {
-        true
+    /// The program waits at rest on `line` for the operator. On the virtual clock machine time stands still until this
+    /// returns; on the wall clock nothing is planned or recorded meanwhile, so that a long wait is a [`StopAnswer::Wait`].
+    fn program_stop(&mut self, _line: u32) -> StopAnswer {
+        StopAnswer::GoOn
     }
 
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
@@ -93,8 +104,12 @@ impl<'a> Pump<'a> {
         let (status, controls) = (&self.host.status, &self.host.controls);
         if controls.program_hold.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
             let line = status.line.load(Relaxed);
-            if !self.observer.program_stop(line) {
-                self.fail(format!("line {line}: the program waits for an operator, and there is none"));
+            match self.observer.program_stop(line) {
+                StopAnswer::Wait => return,
+                StopAnswer::GoOn => {}
+                StopAnswer::Nobody => {
+                    self.fail(format!("line {line}: the program waits for an operator, and there is none"));
+                }
             }
             self.host.controls.program_hold.store(false, Relaxed);
         }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 
-use crate::AtomicF64;
+use crate::{AtomicF64, Counts};
 
 /// The operator's commands. Each acts in the next fine period.
 #[derive(Debug)]
@@ -53,4 +53,6 @@ pub struct Status {
     pub inputs: AtomicU64,
     /// Samples lost because nobody took them from the ring.
     pub lost_samples: AtomicU64,
+    /// What was counted so far.
+    pub counts: Counts,
 }

@@ -5,10 +5,12 @@
 
 mod atomics;
 mod controls;
+mod counts;
 mod sample;
 
 pub use atomics::{AtomicF64, Depth, STOP_SHARE};
 pub use controls::{Controls, Status};
+pub use counts::Counts;
 pub use sample::{MachineState, Sample};
 
 use std::sync::Arc;

@@ -71,5 +71,17 @@ impl FineLoop {
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
         status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
+        self.report_counts();
+    }
+
+    fn report_counts(&self) {
+        let (counts, counted) = (&self.status.counts, &self.counters);
+        counts.samples.store(counted.samples, Relaxed);
+        counts.guard_stops.store(counted.guard_stops, Relaxed);
+        counts.limit_violations.store(counted.limit_violations, Relaxed);
+        counts.governed_samples.store(counted.governed_samples, Relaxed);
+        counts.starvations.store(counted.starvations, Relaxed);
+        counts.late_ratios.store(counted.late_ratios, Relaxed);
+        counts.missed_periods.store(counted.missed_periods, Relaxed);
     }
 }
