@@ -19,6 +19,14 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     if report.is_ok() {
         let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
         let _ = writeln!(std::io::stdout(), "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors");
+        if report.open_lines > 0 {
+            let open = report.open_lines;
+            let _ = writeln!(
+                std::io::stdout(),
+                "{open} line{} from what a probe or an input answers: the run judges them when it is known",
+                if open == 1 { " follows" } else { "s follow" }
+            );
+        }
         return Ok(0);
     }
     program::print_errors(&report);

@@ -6,7 +6,6 @@
 mod answer;
 mod config;
 mod cursor;
-mod edge;
 mod fault;
 mod governor;
 mod guard;

@@ -15,6 +15,15 @@ pub struct Tool {
     pub diameter_mm: f64,
 }
 
+/// The input of the probe, for G31 and G38.2 to G38.5.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProbeInput {
+    /// Number of the digital input, 0 to 63.
+    pub input: u32,
+    /// The input is 0 where the probe touches.
+    pub inverted: bool,
+}
+
 /// The machine as a part program sees it. A run starts from this alone and writes nothing back.
 #[derive(Clone, Debug)]
 pub struct Config {
@@ -32,6 +41,8 @@ pub struct Config {
     pub tool_in_spindle: u32,
     /// Whether lines that begin with `/` are skipped.
     pub block_delete: bool,
+    /// The probe, where the machine has one.
+    pub probe: Option<ProbeInput>,
 }
 
 impl Config {
@@ -45,6 +56,7 @@ impl Config {
             tools: Vec::new(),
             tool_in_spindle: 0,
             block_delete: false,
+            probe: None,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Errors as people read them: file, line, column, cause, and the line itself with a caret.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::fault::{Fault, Span};
@@ -23,7 +23,7 @@ pub struct Diagnostic {
     pub code: &'static str,
     /// The cause in words.
     pub message: String,
-    /// The line, shortened around the column where it is long, control bytes escaped.
+    /// The line, shortened around the column where it is long, what is not text and cannot be seen escaped.
     pub excerpt: String,
     /// Characters of [`Diagnostic::excerpt`] before the caret.
     pub caret: u32,
@@ -75,11 +75,18 @@ fn excerpt(text: &[u8], at: usize) -> (String, u32) {
 }
 
 fn escape(bytes: &[u8], to: &mut String) {
-    for character in String::from_utf8_lossy(bytes).chars() {
-        match character {
-            '\t' => to.push(' '),
-            c if c.is_control() => to.extend(c.escape_default()),
-            c => to.push(c),
+    for chunk in bytes.utf8_chunks() {
+        for character in chunk.valid().chars() {
+            match character {
+                '\t' => to.push(' '),
+                '"' | '\'' | '\\' => to.push(character),
+                c if c.is_control() => to.extend(c.escape_unicode()),
+                // What cannot be seen (marks of direction, blanks of no width) would deceive who reads the message.
+                c => to.extend(c.escape_debug()),
+            }
+        }
+        for byte in chunk.invalid() {
+            let _ = write!(to, "\\x{byte:02x}");
         }
     }
 }
@@ -117,7 +124,9 @@ mod tests {
     #[test]
     fn columns_count_characters_and_control_bytes_are_escaped() {
         assert_eq!(shown("(ä)\u{7}".as_bytes(), 4, 5), "part.ngc:7:4: error: no good\n  (ä)\\u{7}\n     ^");
-        assert_eq!(shown(b"(\xff)Q", 3, 4), "part.ngc:7:4: error: no good\n  (\u{fffd})Q\n     ^");
+        assert_eq!(shown(b"(\xff)Q", 3, 4), "part.ngc:7:4: error: no good\n  (\\xff)Q\n        ^");
+        let hidden = shown("(\u{202e}'\u{9b}\\)".as_bytes(), 0, 1);
+        assert_eq!(hidden, "part.ngc:7:1: error: no good\n  (\\u{202e}'\\u{9b}\\)\n  ^");
     }
 
     #[test]

@@ -116,7 +116,10 @@ impl Interpreter {
 
     fn set_motion(&mut self) {
         if let Some(tenths) = self.orders.get(Group::Motion) {
-            self.state.motion = motion_of(tenths);
+            // G31 holds for its line only.
+            if tenths != 310 {
+                self.state.motion = motion_of(tenths);
+            }
         } else if self.orders.get(Group::CannedCycle).is_some() {
             self.state.motion = Motion::None;
         }

@@ -1,5 +1,7 @@
 //! Values: numbers, parameters, `[expressions]` and functions. They are evaluated while they are read.
 
+use std::cell::Cell;
+
 use crate::fault::{Checked, Fault, Span};
 use crate::function::{self, Operator};
 use crate::letters::Letters;
@@ -19,6 +21,8 @@ pub(crate) struct Context<'a> {
     pub parameters: &'a Parameters,
     pub state: &'a State,
     pub letters: &'a Letters,
+    /// Set where a value follows from what the first pass has assumed.
+    pub reads_assumed: &'a Cell<bool>,
 }
 
 /// Which parameter a `#…` names.
@@ -135,7 +139,7 @@ impl Context<'_> {
 
     fn parameter_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         let start = scanner.at();
-        match self.parameter(scanner, depth)? {
+        let value = match self.parameter(scanner, depth)? {
             Parameter::Numbered(number) => Ok(self.parameters.numbered(number, self.state, self.letters)),
             Parameter::Named(name, length) => {
                 let name = &name[..length];
@@ -144,7 +148,11 @@ impl Context<'_> {
                     Fault::new(scanner.since(start), "parameter-unset", message)
                 })
             }
+        }?;
+        if value.assumed {
+            self.reads_assumed.set(true);
         }
+        Ok(value.number)
     }
 
     /// Reads `#number`, `#[expression]` or `#<name>`; the cursor is at the `#`.

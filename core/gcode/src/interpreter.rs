@@ -1,5 +1,6 @@
 //! One line after the other to items.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use tandem_sdk::AxisVector;
@@ -9,12 +10,12 @@ use crate::diagnostic::Diagnostic;
 use crate::expression::Context;
 use crate::fault::{Checked, Fault, Span};
 use crate::item::Item;
-use crate::letters::Letters;
+use crate::letters::{AXIS_MASK, Letters};
 use crate::orders::Orders;
 use crate::parameters::Parameters;
 use crate::parse::parse;
 use crate::scan::Scanner;
-use crate::state::State;
+use crate::state::{Motion, State};
 use crate::words::{Target, Words};
 
 /// Longest line, bytes.
@@ -38,13 +39,17 @@ pub struct Interpreter {
     pub(crate) state: State,
     pub(crate) words: Words,
     pub(crate) orders: Orders,
-    parameters: Parameters,
+    pub(crate) parameters: Parameters,
     file: Arc<str>,
     phase: Phase,
     /// Whether a word of the program has been read; a program number may only come before.
     begun: bool,
     /// The axis words of the current line have been used up.
     pub(crate) moved: bool,
+    /// A value of the current line follows from what the first pass has assumed.
+    pub(crate) reads_assumed: Cell<bool>,
+    /// Axes whose position was assumed before the current line.
+    assumed_start: u32,
 }
 
 impl Interpreter {
@@ -60,6 +65,8 @@ impl Interpreter {
             phase: Phase::Fresh,
             begun: false,
             moved: false,
+            reads_assumed: Cell::new(false),
+            assumed_start: 0,
             config,
         }
     }
@@ -84,12 +91,31 @@ impl Interpreter {
         self.state.position = position;
         self.state.last_end = position;
         self.state.uncertain = 0;
+        self.state.assumed.position = 0;
         self.state.at_rest = true;
     }
 
     /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out. It becomes #5399.
     pub fn provide_input(&mut self, value: f64) {
         self.state.input = value;
+        self.state.assumed.input = false;
+    }
+
+    /// The first pass: M66 is taken to have timed out, and what follows from that to be unknown.
+    pub(crate) fn assume_input(&mut self) {
+        self.state.input = -1.0;
+        self.state.assumed.input = true;
+    }
+
+    /// Whether what the last line does follows from an assumed answer, so that only the run can judge its numbers.
+    pub(crate) fn is_assumed(&self) -> bool {
+        let named = self.letters.axes_of(self.words.present & AXIS_MASK) & self.state.assumed.position;
+        // Where a line ends is its axis words; an arc and a probe also depend on where they begin.
+        let moves = match self.orders.motion {
+            Some(Motion::Rapid | Motion::Line) | None => named != 0,
+            Some(_) => (self.assumed_start | self.state.assumed.position) != 0,
+        };
+        self.reads_assumed.get() || self.moved && moves
     }
 
     /// Interprets line `number` (from 1), given without its line end, and appends what it orders to `out`. Blocks are
@@ -145,7 +171,14 @@ impl Interpreter {
         let Some(from) = self.lead(text, out)? else { return Ok(()) };
         self.words.clear();
         self.moved = false;
-        let context = Context { parameters: &self.parameters, state: &self.state, letters: &self.letters };
+        self.reads_assumed.set(false);
+        self.assumed_start = self.state.assumed.position;
+        let context = Context {
+            parameters: &self.parameters,
+            state: &self.state,
+            letters: &self.letters,
+            reads_assumed: &self.reads_assumed,
+        };
         let parsed = parse(text, from, &context, &mut self.words);
         let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
         let complete = parsed.is_ok();
@@ -204,11 +237,12 @@ impl Interpreter {
     }
 
     fn assign(&mut self) -> Checked<()> {
+        let assumed = self.reads_assumed.get();
         for assignment in &self.words.assignments {
             match &assignment.target {
-                Target::Numbered(number) => self.parameters.set_numbered(*number, assignment.value),
+                Target::Numbered(number) => self.parameters.set_numbered(*number, assignment.value, assumed),
                 Target::Named(range) => {
-                    if !self.parameters.set_named(&self.words.names[range.clone()], assignment.value) {
+                    if !self.parameters.set_named(&self.words.names[range.clone()], assignment.value, assumed) {
                         return Err(Fault::new(
                             assignment.span,
                             "parameter-name",

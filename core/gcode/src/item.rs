@@ -1,12 +1,13 @@
 //! What comes out of the interpreter.
 
-use tandem_sdk::{Block, Event};
+use tandem_sdk::{AxisVector, Block, Edge, Event};
 
 /// One element of the stream, in program order.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "blocks are by far the most frequent item; boxing them would allocate")]
 pub enum Item {
-    /// A path element, or rest.
+    /// A path element, or rest. Behind a probe, whose [`Block::stop_on`] names an edge, nothing is read before
+    /// [`crate::Stream::provide_probe`]; what else stands in its line may follow it.
     Block(Block),
     /// A non-motion word, tied to the block before which it acts.
     Event(Event),
@@ -14,6 +15,13 @@ pub enum Item {
     Wait(InputWait),
     /// The program is over (M2, M30, `%` or the end of the file). Nothing follows.
     End,
+}
+
+impl Item {
+    /// Whether this is a block that an input ends.
+    pub fn is_probe(&self) -> bool {
+        matches!(self, Self::Block(block) if block.stop_on.edge != Edge::None)
+    }
 }
 
 /// Which input M66 reads.
@@ -51,4 +59,13 @@ pub struct InputWait {
     pub mode: InputMode,
     /// Longest wait, s; after it the answer is −1. Zero for [`InputMode::Immediate`].
     pub timeout_s: f64,
+}
+
+/// What became of a probe, in machine coordinates of axis space, mm or rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeResult {
+    /// Where the machine was at the edge; none where the end came without one.
+    pub touched: Option<AxisVector>,
+    /// Where the machine has come to rest: what follows starts here.
+    pub rest: AxisVector,
 }

@@ -28,6 +28,7 @@
 //! - G0 or G1 without axis words sets the mode. G0 or G1 beside G28 or G30 sets the mode too, the axis words are G28's.
 //! - G64 without P, or with P0, takes the machine's tolerance. G64 Q is accepted and has no effect.
 //! - M6 stops the spindle.
+//! - G38.2 to G38.5 are modal as in LinuxCNC, G31 holds for its line as on Fanuc. None of them goes with G93 or G53.
 //! - EQ and NE forgive a difference of 0.0001, as in LinuxCNC. A blank within a number is an error.
 //! - A comment may hold pairs of parentheses. What a comment says (MSG, PRINT, LOG) is not acted upon.
 //! - Stored positions and offsets (#5161 to #5410) read in mm and degrees, the current position (#5420…) in program
@@ -56,6 +57,7 @@ mod offsets;
 mod orders;
 mod parameters;
 mod parse;
+mod probe;
 mod scan;
 mod source;
 mod state;
@@ -67,10 +69,10 @@ mod travel;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
-pub use config::{Config, Tool};
+pub use config::{Config, ProbeInput, Tool};
 pub use diagnostic::Diagnostic;
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
-pub use item::{Input, InputMode, InputWait, Item};
+pub use item::{Input, InputMode, InputWait, Item, ProbeResult};
 pub use source::{Program, ProgramError};
 pub use stream::Stream;
 pub use table::docs;

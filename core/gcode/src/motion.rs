@@ -7,10 +7,10 @@ use crate::interpreter::Interpreter;
 use crate::item::Item;
 use crate::letters::AXIS_MASK;
 use crate::state::Motion;
-use crate::table::Group;
+use crate::table::{Group, written};
 
 /// Moves below this, mm or rad, are the rounding of offsets and no motion.
-const NO_MOVE: f64 = 1e-10;
+pub(crate) const NO_MOVE: f64 = 1e-10;
 
 impl Interpreter {
     /// Moves to where the axis words say.
@@ -23,6 +23,7 @@ impl Interpreter {
             Motion::Line => self.straight(BlockKind::Line, out),
             Motion::ArcClockwise => self.arc(true, uncertain, out),
             Motion::ArcCounterclockwise => self.arc(false, uncertain, out),
+            Motion::Probe(tenths) => self.probe(tenths, out),
             Motion::None | Motion::Refused => Ok(()),
         }
     }
@@ -44,8 +45,25 @@ impl Interpreter {
             if absolute {
                 self.state.uncertain &= !(1 << axis);
             }
+            self.assume_target(axis, machine, absolute);
         }
         self.moved = true;
+    }
+
+    /// Whether the programmed position of `axis` now follows from what the first pass has assumed.
+    #[inline]
+    fn assume_target(&mut self, axis: usize, machine: bool, absolute: bool) {
+        let (bit, assumed) = (1 << axis, &mut self.state.assumed);
+        let base = match (machine, absolute) {
+            (true, _) => 0,
+            (_, true) => assumed.offsets,
+            _ => assumed.position,
+        };
+        assumed.position &= !bit;
+        if self.reads_assumed.get() {
+            assumed.position |= bit;
+        }
+        assumed.position |= base & bit;
     }
 
     /// Where the next block ends: the programmed position, but for moves that are none.
@@ -108,7 +126,11 @@ impl Interpreter {
     #[cold]
     fn no_feed(&self) -> Fault {
         let why = if self.words.has(b'F') { "the feed is zero" } else { "the feed is missing: no F has been set" };
-        self.motion_fault("feed-missing", format!("{why}; G1, G2 and G3 need one"))
+        let who = match self.orders.motion {
+            Some(Motion::Probe(tenths)) => written('G', tenths) + " needs",
+            _ => "G1, G2 and G3 need".into(),
+        };
+        self.motion_fault("feed-missing", format!("{why}; {who} one"))
     }
 
     /// A fault at the motion word, or at the first axis word where the motion is modal.

@@ -58,6 +58,7 @@ impl Interpreter {
         for (axis, value) in self.named_axes() {
             g92[axis] += self.state.position[axis] - self.state.offsets.total[axis] - value;
         }
+        self.assume_offsets(true);
         self.state.offsets.g92 = g92;
         self.state.offsets.g92_stored = g92;
         self.state.offsets.sum_up();
@@ -72,6 +73,13 @@ impl Interpreter {
             offsets.g92_stored = AxisVector::ZERO;
         }
         offsets.sum_up();
+    }
+
+    /// Whether the offsets of the named axes now follow from what the first pass has assumed.
+    fn assume_offsets(&mut self, from_position: bool) {
+        let named = self.letters.axes_of(self.words.present & AXIS_MASK);
+        let of_position = if from_position { self.state.assumed.position | self.state.assumed.offsets } else { 0 };
+        self.state.assumed.offsets |= named & if self.reads_assumed.get() { u32::MAX } else { of_position };
     }
 
     fn set_data(&mut self) -> Checked<()> {
@@ -112,6 +120,7 @@ impl Interpreter {
                 origin[axis] + value
             };
         }
+        self.assume_offsets(from_position);
         self.state.offsets.systems[system] = origin;
         self.state.offsets.sum_up();
         Ok(())
@@ -127,6 +136,7 @@ impl Interpreter {
         for (axis, value) in self.named_axes() {
             tool.offset[axis] = value;
         }
+        self.assume_offsets(false);
         if let Some(radius) = self.words.not_negative(b'R')? {
             tool.diameter_mm = 2.0 * radius * self.state.unit_mm;
         }

@@ -107,8 +107,12 @@ impl Orders {
             return self.check_taken(word, non_modal, words);
         }
         let motion = word.unwrap_or(modal);
-        let is_arc = matches!(motion, Motion::ArcClockwise | Motion::ArcCounterclockwise);
-        if !(axes || is_arc && (arc_words || word.is_some())) {
+        let moves_without_axes = match motion {
+            Motion::ArcClockwise | Motion::ArcCounterclockwise => arc_words || word.is_some(),
+            Motion::Probe(_) => word.is_some(),
+            _ => false,
+        };
+        if !(axes || moves_without_axes) {
             return Ok(());
         }
         self.motion = Some(motion);
@@ -125,9 +129,10 @@ impl Orders {
 
     /// G28 and G30 go well with a motion word, which then only sets the mode; the others do not.
     fn check_taken(&self, word: Option<Motion>, non_modal: Option<u16>, words: &Words) -> Checked<()> {
+        let probes = matches!(word, Some(Motion::Probe(_)));
         if word.is_some_and(|m| m != Motion::Refused)
-            && words.present & AXIS_MASK != 0
-            && let Some(tenths @ (100 | 920)) = non_modal
+            && (words.present & AXIS_MASK != 0 || probes)
+            && let Some(tenths) = non_modal.filter(|tenths| matches!(tenths, 100 | 920) || probes)
         {
             let message = format!("the axis words belong to {}, not to a motion: split the line", written('G', tenths));
             return Err(self.fault(Group::Motion, "conflict", message));
@@ -142,6 +147,7 @@ pub(crate) fn motion_of(tenths: u16) -> Motion {
         0 => Motion::Rapid,
         10 => Motion::Line,
         20 => Motion::ArcClockwise,
+        310 | 382..=385 => Motion::Probe(tenths),
         _ => Motion::ArcCounterclockwise,
     }
 }
@@ -152,6 +158,7 @@ fn implied(motion: Motion) -> &'static Row {
         Motion::Line => 10,
         Motion::ArcClockwise => 20,
         Motion::ArcCounterclockwise => 30,
+        Motion::Probe(tenths) => tenths,
         _ => 0,
     };
     table::g(tenths).unwrap_or(&crate::table_g::G_ROWS[0])

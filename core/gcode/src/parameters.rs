@@ -10,33 +10,52 @@ pub(crate) const LAST: usize = 5602;
 /// Most named parameters, so that memory stays bounded.
 const MAX_NAMED: usize = 10_000;
 
+/// A value, and whether it follows from what the first pass has assumed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Value {
+    pub number: f64,
+    pub assumed: bool,
+}
+
 /// The values that the program has set.
 pub(crate) struct Parameters {
-    numbered: Vec<f64>,
-    named: HashMap<Box<[u8]>, f64>,
+    numbered: Vec<Value>,
+    named: HashMap<Box<[u8]>, Value>,
 }
 
 impl Parameters {
     pub fn new() -> Self {
-        Self { numbered: vec![0.0; LAST + 1], named: HashMap::new() }
+        Self { numbered: vec![Value::default(); LAST + 1], named: HashMap::new() }
     }
 
     /// The value of parameter `number`, which lies within 1 to [`LAST`]; zero where it was never set.
-    pub fn numbered(&self, number: usize, state: &State, letters: &Letters) -> f64 {
-        predefined(number, state, letters).unwrap_or(self.numbered[number])
+    pub fn numbered(&self, number: usize, state: &State, letters: &Letters) -> Value {
+        let kept = predefined(number, state, letters);
+        let kept = kept.map(|value| Value { number: value, assumed: is_assumed(number, state, letters) });
+        kept.unwrap_or(self.numbered[number])
     }
 
     /// The value of the parameter called `name` (lower case, without blanks).
-    pub fn named(&self, name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
-        self.named.get(name).copied().or_else(|| predefined_name(name, state, letters))
+    pub fn named(&self, name: &[u8], state: &State, letters: &Letters) -> Option<Value> {
+        let own = || {
+            Value { number: predefined_name(name, state, letters)?, assumed: is_position_assumed(name, state, letters) }
+                .into()
+        };
+        self.named.get(name).copied().or_else(own)
     }
 
-    pub fn set_numbered(&mut self, number: usize, value: f64) {
-        self.numbered[number] = value;
+    pub fn set_numbered(&mut self, number: usize, value: f64, assumed: bool) {
+        self.numbered[number] = Value { number: value, assumed };
+    }
+
+    /// The value of parameter `number` is only assumed.
+    pub fn assume(&mut self, number: usize) {
+        self.numbered[number].assumed = true;
     }
 
     /// Sets a named parameter; false where there are too many.
-    pub fn set_named(&mut self, name: &[u8], value: f64) -> bool {
+    pub fn set_named(&mut self, name: &[u8], value: f64, assumed: bool) -> bool {
+        let value = Value { number: value, assumed };
         if let Some(slot) = self.named.get_mut(name) {
             *slot = value;
         } else if self.named.len() < MAX_NAMED {
@@ -86,6 +105,27 @@ fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
         5420..=5428 => Some(position(state, letters, number - 5420)),
         _ => None,
     }
+}
+
+/// Whether what the interpreter keeps as parameter `number` follows from an assumed answer.
+fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
+    let axis = |nth: usize| AXIS_LETTERS.as_bytes().get(nth).and_then(|letter| letters.axis(*letter));
+    let of = |mask: u32, nth: usize| axis(nth).is_some_and(|axis| mask >> axis & 1 != 0);
+    let assumed = &state.assumed;
+    match number {
+        5211..=5219 => of(assumed.offsets, number - 5211),
+        5221..=5390 => of(assumed.offsets, (number - 5221) % 20),
+        5399 => assumed.input,
+        5401..=5409 => of(assumed.offsets, number - 5401),
+        5420..=5428 => of(assumed.offsets | assumed.position, number - 5420),
+        _ => false,
+    }
+}
+
+fn is_position_assumed(name: &[u8], state: &State, letters: &Letters) -> bool {
+    let [b'_', letter] = name else { return false };
+    let axis = letters.axis(letter.to_ascii_uppercase());
+    axis.is_some_and(|axis| (state.assumed.offsets | state.assumed.position) >> axis & 1 != 0)
 }
 
 /// A value of the `nth` of the letters XYZABCUVW in mm or degrees; zero where the machine lacks that axis.

@@ -37,6 +37,9 @@ pub enum ProgramError {
     /// The stream was asked for more before the input of M66 was provided.
     #[error("{0}: the program waits for an input (M66)")]
     WaitsForInput(Arc<str>),
+    /// The stream was asked for more before the result of a probe was provided.
+    #[error("{0}: the program waits for the result of a probe")]
+    WaitsForProbe(Arc<str>),
     /// An error in the text.
     #[error(transparent)]
     Text(#[from] Diagnostic),

@@ -23,6 +23,8 @@ pub(crate) enum Motion {
     Line,
     ArcClockwise,
     ArcCounterclockwise,
+    /// G31 and G38.2 to G38.5, by their number in tenths.
+    Probe(u16),
 }
 
 /// The plane of arcs, by the letters of its two axes in the order that makes counter-clockwise positive.
@@ -52,6 +54,17 @@ impl Offsets {
     pub fn sum_up(&mut self) {
         self.total = self.systems[self.active] + self.g92 + self.tool;
     }
+}
+
+/// What the first pass has had to assume: the answers of probes and inputs, and all that follows from them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Assumed {
+    /// Bit per axis whose position follows from an assumed answer.
+    pub position: u32,
+    /// Bit per axis whose offset does.
+    pub offsets: u32,
+    /// The answer of the last M66 is assumed.
+    pub input: bool,
 }
 
 /// The feed: F is kept in both units, because an axis that turns reads it in degrees.
@@ -105,6 +118,7 @@ pub(crate) struct State {
     pub last_end: AxisVector,
     /// Bit per axis whose position an erroneous line has left unknown.
     pub uncertain: u32,
+    pub assumed: Assumed,
     pub spindle: Spindle,
     pub mist: bool,
     pub flood: bool,
@@ -150,6 +164,7 @@ impl State {
             position: config.start,
             last_end: config.start,
             uncertain: 0,
+            assumed: Assumed::default(),
             spindle: Spindle::default(),
             mist: false,
             flood: false,

@@ -6,7 +6,7 @@ use tandem_sdk::AxisVector;
 
 use crate::config::Config;
 use crate::interpreter::Interpreter;
-use crate::item::Item;
+use crate::item::{Item, ProbeResult};
 use crate::lines::{Lines, Next, Pass};
 use crate::source::{Program, ProgramError};
 
@@ -16,7 +16,14 @@ pub struct Stream {
     program: Program,
     lines: Lines,
     interpreter: Interpreter,
-    waiting: bool,
+    waiting: Option<Waiting>,
+}
+
+/// What must be provided before the next item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Waiting {
+    Input,
+    Probe,
 }
 
 impl Stream {
@@ -31,18 +38,22 @@ impl Stream {
         let lines = Lines::new(&mut program, Pass::Second)?;
         let mut interpreter = Interpreter::new(config.clone());
         interpreter.set_file(&program.name);
-        Ok(Self { program, lines, interpreter, waiting: false })
+        Ok(Self { program, lines, interpreter, waiting: None })
     }
 
     /// Appends the items of the next line that has any; false when the program is over. The last item is
-    /// [`Item::End`]. After [`Item::Wait`], [`Stream::provide_input`] must come first.
+    /// [`Item::End`]. After [`Item::Wait`], [`Stream::provide_input`] must come first, after a probe
+    /// [`Stream::provide_probe`].
     ///
     /// # Errors
-    /// The file has changed or cannot be read, a line is wrong (which after a check only the answer of M66 can cause),
-    /// or an input has not been provided.
+    /// The file has changed or cannot be read, a line is wrong (which after a check only the answer of M66 or of a
+    /// probe can cause),
+    /// or an answer has not been provided.
     pub fn next_items(&mut self, out: &mut Vec<Item>) -> Result<bool, ProgramError> {
-        if self.waiting {
-            return Err(ProgramError::WaitsForInput(Arc::clone(&self.program.name)));
+        match self.waiting {
+            Some(Waiting::Input) => return Err(ProgramError::WaitsForInput(Arc::clone(&self.program.name))),
+            Some(Waiting::Probe) => return Err(ProgramError::WaitsForProbe(Arc::clone(&self.program.name))),
+            None => {}
         }
         let before = out.len();
         while out.len() == before {
@@ -55,14 +66,23 @@ impl Stream {
                 Next::End => self.interpreter.finish(out)?,
             }
         }
-        self.waiting = out[before..].iter().any(|item| matches!(item, Item::Wait(_)));
+        self.waiting = out[before..].iter().find_map(|item| match item {
+            Item::Wait(_) => Some(Waiting::Input),
+            item => item.is_probe().then_some(Waiting::Probe),
+        });
         Ok(true)
     }
 
     /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out.
     pub fn provide_input(&mut self, value: f64) {
         self.interpreter.provide_input(value);
-        self.waiting = false;
+        self.waiting = None;
+    }
+
+    /// What became of the probe that was handed out last.
+    pub fn provide_probe(&mut self, result: &ProbeResult) {
+        self.interpreter.provide_probe(result);
+        self.waiting = None;
     }
 
     /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.

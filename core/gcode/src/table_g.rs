@@ -6,7 +6,6 @@ use crate::table::Group::{
 };
 use crate::table::{Row, refused, works};
 
-const PROBING: &str = "probing needs a probe input and the reaction to its edge, which are not supported yet";
 const SPLINES: &str = "NURBS and splines are not supported yet";
 const COMPENSATION: &str = "cutter radius compensation is not supported: let the CAM system write the tool centre path";
 const CYCLES: &str = "canned cycles are not supported: let the CAM system write them out";
@@ -45,13 +44,13 @@ pub(crate) static G_ROWS: &[Row] = &[
     works(281, NonModal, "", "store the first reference position"),
     works(300, NonModal, "XYZABCUVW", "rapid to the second reference position, through a point"),
     works(301, NonModal, "", "store the second reference position"),
-    refused(310, Motion, "skip", PROBING),
+    works(310, Motion, "XYZABCUVW", "skip: straight line that the probe ends; in this line only"),
     refused(330, Motion, "synchronous motion", SYNCHRONOUS),
     refused(331, Motion, "rigid tapping", SYNCHRONOUS),
-    refused(382, Motion, "probe", PROBING),
-    refused(383, Motion, "probe", PROBING),
-    refused(384, Motion, "probe", PROBING),
-    refused(385, Motion, "probe", PROBING),
+    works(382, Motion, "XYZABCUVW", "straight line until the probe touches; an error where it does not"),
+    works(383, Motion, "XYZABCUVW", "straight line until the probe touches"),
+    works(384, Motion, "XYZABCUVW", "straight line until the probe lets go; an error where it does not"),
+    works(385, Motion, "XYZABCUVW", "straight line until the probe lets go"),
     works(400, CutterRadius, "", "cutter radius compensation off"),
     refused(410, CutterRadius, "cutter radius compensation, left", COMPENSATION),
     refused(411, CutterRadius, "cutter radius compensation, left", COMPENSATION),

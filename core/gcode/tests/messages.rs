@@ -133,7 +133,7 @@ refused.ngc:2:1: error: G33 (synchronous motion): motion synchronous with the sp
   ^^^
 ";
     assert!(all.starts_with(first), "{all}");
-    for (line, word) in [(3, "G41"), (4, "G76"), (5, "G95"), (6, "G96"), (7, "G81"), (9, "G5.2"), (10, "G38.2")] {
+    for (line, word) in [(3, "G41"), (4, "G76"), (5, "G95"), (6, "G96"), (7, "G81"), (9, "G5.2"), (10, "G5.3")] {
         assert!(all.contains(&format!("refused.ngc:{line}:1: error: {word} (")), "{word}: {all}");
     }
     for (line, word) in

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use common::{blocks, mill, only_blocks, run_on};
 use proptest::prelude::*;
-use tandem_gcode::{Interpreter, Program, Stream, check};
+use tandem_gcode::{Interpreter, Item, ProbeResult, Program, Stream, check};
 use tandem_sdk::{Block, BlockKind};
 
 /// An expression as a tree, with an evaluator that shares nothing with the interpreter.
@@ -115,8 +115,9 @@ fn pair(name: &str, a: f64, b: f64) -> Option<f64> {
 
 /// Words that make sense often enough to reach deep, and bytes that do not.
 fn line() -> impl Strategy<Value = Vec<u8>> {
-    let codes = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G40 G43 G49 G53 G54 G59.3 G61 G64 G80 G90 G91 G90.1 \
-        G91.1 G92 G92.1 G92.2 G92.3 G93 G94 M0 M1 M3 M4 M5 M6 M7 M8 M9 M48 M49 M50 M62 M63 M66 TA % / ( ) ; G41 G81 M98 O";
+    let codes = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G40 G43 G49 G53 G54 G59.3 G61 G64 G80 \
+        G90 G91 G31 G38.2 G38.3 G38.4 G90.1 G91.1 G92 G92.1 G92.2 G92.3 G93 G94 M0 M1 M3 M4 M5 M6 M7 M8 M9 M48 M49 M50 M62 M63 M66 TA \
+        #7 X#7 X#5061 % / ( ) ; G41 G81 M98 O";
     let codes: Vec<_> = codes.split(' ').collect();
     let letters = prop::sample::select("XYZABIJKRPQLHFSTNE#".chars().collect::<Vec<_>>());
     let word = (letters, -3000..3000i32).prop_map(|(letter, n)| match letter {
@@ -192,6 +193,28 @@ proptest! {
             let mut items = Vec::new();
             while stream.next_items(&mut items).unwrap() {}
             prop_assert_eq!(only_blocks(&items).len() as u64, report.blocks);
+        }
+    }
+
+    #[test]
+    fn a_checked_program_runs_or_is_refused_whatever_its_probes_touch(
+        lines in prop::collection::vec(line(), 0..40), share in prop::option::of(0.0..1.0f64),
+    ) {
+        let text = [&b"F100\nG38.3 X9 Y-7\n#7=#5061\n"[..], &lines.join(&b'\n')].concat();
+        let mut program = Program::spool("lines", &text[..]).unwrap();
+        let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+        if report.is_ok() {
+            let mut stream = Stream::new(program, &mill()).unwrap();
+            let mut items = Vec::new();
+            while let Ok(true) = stream.next_items(&mut items) {
+                let probe = items.iter().rfind(|item| item.is_probe());
+                if let Some(Item::Block(block)) = probe {
+                    let at = block.start + (block.end - block.start) * share.unwrap_or(1.0);
+                    stream.provide_probe(&ProbeResult { touched: share.map(|_| at), rest: at });
+                }
+                stream.provide_input(1.0);
+            }
+            assert_sound(&only_blocks(&items), true);
         }
     }
 

@@ -1,7 +1,7 @@
 //! From a machine to the parts of a run.
 
 use tandem_fine::FineConfig;
-use tandem_gcode::{Config, Tool};
+use tandem_gcode::{Config, ProbeInput, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_sdk::{
     Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext, size_of_contract,
@@ -22,6 +22,7 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
         *travel = (axis.min_mm, axis.max_mm);
     }
+    config.probe = machine.probe.map(|probe| ProbeInput { input: probe.input, inverted: probe.inverted });
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config
 }

@@ -73,6 +73,8 @@ static MACHINE: &[Key] = &[
     key("policy.parameters.<parameter>", "script's", "none", "Parameters of the policy script"),
     key("spindle.max_rpm", "rpm", "no limit", "Highest spindle speed"),
     key("spindle.min_rpm", "rpm", "0", "Lowest spindle speed that turns"),
+    key("probe.input", "number", "required", "Digital input of the probe, 0 to 63; without the table there is no probe"),
+    key("probe.invert", "boolean", "false", "The input is 0 where the probe touches"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
 ];
 

@@ -14,6 +14,7 @@ use crate::node::plain;
 use crate::overrides;
 use crate::parts::{GuardMode, PluginChoice, Policy, Spindle, text};
 use crate::places::Places;
+use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
 use crate::schema::check;
 use crate::section::Section;
@@ -63,6 +64,8 @@ pub struct Machine {
     pub policy: Option<Policy>,
     /// What the spindle may do.
     pub spindle: Spindle,
+    /// The probe, if there is one.
+    pub probe: Option<Probe>,
     /// Tools; empty without a tool table.
     pub tools: ToolTable,
     effective: String,
@@ -134,6 +137,7 @@ struct Tables {
     guard: GuardMode,
     policy: Option<Policy>,
     spindle: Spindle,
+    probe: Option<Probe>,
 }
 
 impl Tables {
@@ -153,6 +157,7 @@ impl Tables {
             guard: GuardMode::read(&root.section("guard")),
             policy: optional("policy").and_then(|s| Policy::read(&s)),
             spindle: Spindle::read(&root.section("spindle")),
+            probe: optional("probe").and_then(|s| Probe::read(&s)),
         }
     }
 
@@ -180,6 +185,7 @@ impl Tables {
             guard: self.guard,
             policy: self.policy,
             spindle: self.spindle,
+            probe: self.probe,
             tools: moving.tools,
             effective,
             places,

@@ -52,6 +52,16 @@ impl<'a> Section<'a> {
         fits
     }
 
+    /// True or false.
+    pub fn truth(&self, key: &str) -> Option<bool> {
+        let node = self.right(key)?;
+        if let Value::Bool(truth) = node.value {
+            return Some(truth);
+        }
+        self.refuse_kind(key, "true or false", node);
+        None
+    }
+
     /// A finite number.
     pub fn number(&self, key: &str) -> Option<f64> {
         self.finite(key, self.right(key)?)

@@ -2,7 +2,7 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, Edge, Event, EventKind, Planner};
+use tandem_sdk::{Accepted, Event, EventKind, Planner};
 
 use crate::Observer;
 use crate::queue::Queue;
@@ -30,14 +30,6 @@ pub enum RoughError {
     /// The program cannot go on.
     #[error("{0}")]
     Program(String),
-    /// The machine stands where the program cannot go on.
-    #[error("line {line}: {cause}")]
-    Stop {
-        /// Program line of the block.
-        line: u32,
-        /// Why.
-        cause: String,
-    },
     /// The planner failed or refused what it had checked.
     #[error("planner: line {line}: {cause}")]
     Planner {
@@ -55,24 +47,22 @@ const MARGIN_PERIODS: f64 = 3.0;
 #[allow(clippy::struct_excessive_bools)] // independent facts about the stream
 pub struct RoughLoop {
     config: RoughConfig,
-    pub(crate) source: Box<dyn Source + Send>,
-    pub(crate) planner: Box<dyn Planner>,
-    pub(crate) queue: Queue,
-    pub(crate) items: Vec<Item>,
-    pub(crate) next: usize,
+    source: Box<dyn Source + Send>,
+    planner: Box<dyn Planner>,
+    queue: Queue,
+    items: Vec<Item>,
+    next: usize,
     /// The program gives nothing more.
-    pub(crate) dry: bool,
+    dry: bool,
     /// The planner has been told that nothing follows for now.
-    pub(crate) finished: bool,
+    finished: bool,
     /// The planner has emitted all of it.
-    pub(crate) stretch_over: bool,
-    pub(crate) waiting: Option<InputWait>,
-    pub(crate) waited_s: f64,
-    /// The last block waits for an edge: where it ends is not known before it has.
-    pub(crate) edge_awaited: bool,
+    stretch_over: bool,
+    waiting: Option<InputWait>,
+    waited_s: f64,
     line: u32,
     last_block: u64,
-    pub(crate) done: bool,
+    done: bool,
 }
 
 impl RoughLoop {
@@ -90,7 +80,6 @@ impl RoughLoop {
             stretch_over: false,
             waiting: None,
             waited_s: 0.0,
-            edge_awaited: false,
             line: 0,
             last_block: 0,
             done: false,
@@ -102,7 +91,7 @@ impl RoughLoop {
     /// # Errors
     /// The program or the planner cannot go on; what is queued is still driven to its end.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
-        let result = self.take_rests(observer).and_then(|()| self.fill(observer));
+        let result = self.fill(observer);
         self.queue.flush(self.stretch_over || result.is_err());
         self.queue.tell_of_blocks(observer);
         result?;
@@ -142,7 +131,7 @@ impl RoughLoop {
     /// The planner has emitted all it was given: the program has ended, or it waits for an input.
     fn stretch_is_over(&mut self) {
         self.queue.release_events();
-        if !self.awaits_answer() && self.dry {
+        if self.waiting.is_none() && self.dry {
             self.queue.event(Event::new(EventKind::ProgramEnd, self.line, self.last_block + 1, 0, 0.0));
             self.queue.release_events();
             self.done = true;
@@ -151,7 +140,7 @@ impl RoughLoop {
 
     /// Offers blocks until the planner is full or the program gives no more for now.
     fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
-        while !self.awaits_answer() && self.load()? {
+        while self.waiting.is_none() && self.load()? {
             match &self.items[self.next] {
                 Item::Block(block) => {
                     (self.line, self.last_block) = (block.line, block.index);
@@ -159,8 +148,7 @@ impl RoughLoop {
                     if accepted == Accepted::Full {
                         return Ok(());
                     }
-                    self.edge_awaited = block.stop_on.edge != Edge::None;
-                    self.queue.accepted(block);
+                    self.queue.blocks.push_back(*block);
                 }
                 Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
                 Item::Event(event) => {
@@ -180,21 +168,12 @@ impl RoughLoop {
         Ok(())
     }
 
-    /// Whether the program can go on only when the machine has answered: an input (M66), or where a probe has touched.
-    fn awaits_answer(&self) -> bool {
-        self.waiting.is_some() || self.edge_awaited
-    }
-
-    /// Sees to it that there is a next item; `false` where the program is over, or gives nothing for now.
+    /// Sees to it that there is a next item; `false` where the program is over.
     fn load(&mut self) -> Result<bool, RoughError> {
         while self.next == self.items.len() && !self.dry {
             self.items.clear();
             self.next = 0;
-            let more = self.source.next_items(&mut self.items).map_err(RoughError::Program)?;
-            if self.items.is_empty() {
-                self.dry = !more;
-                return Ok(false);
-            }
+            self.dry = !self.source.next_items(&mut self.items).map_err(RoughError::Program)? && self.items.is_empty();
         }
         Ok(self.next < self.items.len())
     }

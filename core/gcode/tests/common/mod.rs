@@ -3,16 +3,18 @@
 
 use std::path::PathBuf;
 
-use tandem_gcode::{Config, Diagnostic, Interpreter, Item, Tool};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PathMode};
+use tandem_gcode::{Config, Diagnostic, Interpreter, Item, ProbeInput, ProbeResult, Tool};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, PathMode};
 
-/// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools.
+/// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools, a probe on
+/// input 7.
 pub fn mill() -> Config {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).unwrap();
     let mut config = Config::new(axes);
     config.travel_mm[0] = (-250.0, 250.0);
     config.travel_mm[1] = (-250.0, 250.0);
     config.travel_mm[2] = (-100.0, 100.0);
+    config.probe = Some(ProbeInput { input: 7, inverted: false });
     for (number, length) in [(1, 20.0), (2, 25.0)] {
         let offset = AxisVector::from_slice(&[0.0, 0.0, length]);
         config.tools.push(Tool { number, pocket: Some(number), offset, diameter_mm: 6.0 });
@@ -27,13 +29,17 @@ pub fn run(text: &str) -> Vec<Item> {
     items
 }
 
-/// All items and all errors of a program.
+/// All items and all errors of a program. Every probe touches half way and rests there.
 pub fn run_on(config: Config, text: &str) -> (Vec<Item>, Vec<Diagnostic>) {
     let mut interpreter = Interpreter::new(config);
     interpreter.set_file("t.ngc");
     let (mut items, mut errors) = (Vec::new(), Vec::new());
     for (number, line) in (1..).zip(text.lines()) {
         errors.extend(interpreter.line(number, line.as_bytes(), &mut items).err());
+        if let Some(Item::Block(block)) = items.last().filter(|item| item.is_probe()) {
+            let touched = (block.start + block.end) * 0.5;
+            interpreter.provide_probe(&ProbeResult { touched: Some(touched), rest: touched });
+        }
     }
     errors.extend(interpreter.finish(&mut items).err());
     (items, errors)
@@ -88,6 +94,11 @@ fn show_block(block: &Block) -> String {
     }
     if block.path_mode == PathMode::ExactStop {
         text += " exact";
+    }
+    let stop_on = &block.stop_on;
+    if stop_on.edge != Edge::None {
+        let fault = if stop_on.miss_is_fault == 1 { " or fault" } else { "" };
+        text += &[" until ", &format!("{:?} {}", stop_on.edge, stop_on.input), fault].concat();
     }
     text
 }

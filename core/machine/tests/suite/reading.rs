@@ -113,6 +113,8 @@ fn the_other_tables() {
     let policy = machine.policy.unwrap();
     assert_eq!(policy.script, fixtures().join("good/corner.wasm"));
     assert_eq!(policy.parameters["corner_error_um"].as_integer(), Some(20));
+    let probe = machine.probe.unwrap();
+    assert_eq!((probe.input, probe.inverted), (5, true));
     assert!(close(machine.spindle.min_rad_per_s, 2.0 * PI) && close(machine.spindle.max_rad_per_s, 400.0 * PI));
 }
 
