@@ -77,15 +77,42 @@ fn an_emergency_stop_leaves_the_path_at_the_axis_limits() {
 }
 
 #[test]
-fn an_abort_stops_on_the_path() {
+fn an_abort_rests_on_the_path_and_is_no_fault() {
+    for program in ["square.ngc", "serpentine.ngc", "two-step-arcs.ngc"] {
+        let program = root().join("examples/programs").join(program);
+        for tick in (0..3000).step_by(307) {
+            let done = Scenario::of(&program).commands(&format!("{tick},abort\n")).run();
+            if tick as f64 > done.number("samples") {
+                continue;
+            }
+            assert_aborted(&done, tick);
+        }
+    }
+}
+
+/// Exit status 3 with the line, standstill on the path, limits kept, no fault, nothing moved afterwards.
+fn assert_aborted(done: &Done, tick: usize) {
+    assert_eq!(done.status(), 3, "{}", done.errors());
+    let line = done.column("line").pop().unwrap();
+    let words = format!("stopped by the operator at line {line}");
+    assert!(done.errors().contains(&words), "{words:?} is not in {}", done.errors());
+    assert_eq!(done.summary()["stopped"], words.as_str());
+    assert!(done.summary()["fault"].is_null());
+    let states = done.cells("state");
+    assert_eq!(states.last().unwrap(), "standstill", "abort at {tick}");
+    assert!(states.iter().all(|state| state != "fault" && state != "stopping"), "abort at {tick}");
+    let verdict = done.judge(|options| {
+        options.ends_early = true;
+        options.sample_tolerance_mm = Some(2e-6);
+    });
+    assert!(verdict.passed(), "abort at {tick}\n{verdict}");
+}
+
+#[test]
+fn an_abort_while_held_or_starved_ends_the_run_too() {
     let program = root().join("examples/programs/serpentine.ngc");
-    for tick in (10..3000).step_by(409) {
-        let done = Scenario::of(&program).commands(&format!("{tick},abort\n")).run();
-        assert_eq!(done.status(), 3);
-        let verdict = done.judge(|options| {
-            options.ends_early = true;
-            options.sample_tolerance_mm = Some(2e-6);
-        });
-        assert!(verdict.passed(), "abort at {tick}\n{verdict}");
+    for before in ["300,hold", "300,stall-rough,60"] {
+        let done = Scenario::of(&program).commands(&format!("{before}\n600,abort\n")).run();
+        assert_aborted(&done, 600);
     }
 }

@@ -175,13 +175,14 @@ fn write_summary(path: &Path, summary: &Summary) -> Result<(), String> {
 fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     // A reader that has gone away (a closed pipe) is no reason to fail: the run is done.
     let _ = print_outcome(&mut std::io::stdout().lock(), options, &outcome.summary);
-    match &outcome.summary.fault {
-        Some(fault) => {
-            say!("fault: {fault}");
-            FAULT
-        }
-        None => 0,
+    let Summary { fault, stopped, .. } = &outcome.summary;
+    if let Some(fault) = fault {
+        say!("fault: {fault}");
     }
+    if let Some(stopped) = stopped {
+        say!("{stopped}");
+    }
+    if fault.is_some() || stopped.is_some() { FAULT } else { 0 }
 }
 
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {

@@ -6,6 +6,9 @@ use tandem_sdk::{AxisVector, Event, RingEntry, Segment, SegmentFlags};
 
 use crate::points::Points;
 
+/// Entries of older epochs that are dropped in one fine period: each may be a cache miss.
+const DROPS: usize = 256;
+
 /// A place in the queue: a segment and the time in it.
 #[derive(Debug)]
 pub struct Cursor {
@@ -63,6 +66,39 @@ impl Cursor {
     /// Whether the place is a rest of the plan.
     pub fn is_resting(&self) -> bool {
         self.resting
+    }
+
+    /// The epoch of the entries that count.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// Rests at `position` from here on, in the next epoch: older entries no longer count.
+    pub fn part(&mut self, position: &AxisVector) {
+        let mut rest = Segment::rest(position, 0.0);
+        (rest.block, rest.line, rest.feed_mm_per_s) =
+            (self.segment.block, self.segment.line, self.segment.feed_mm_per_s);
+        rest.path[0] = self.path_mm();
+        (self.start_s, self.local_s) = (self.program_time_s(), 0.0);
+        self.segment = rest;
+        self.resting = true;
+        self.epoch += 1;
+    }
+
+    /// Drops entries of older epochs from the front of the queue, a bounded number; whether one that counts is in front.
+    pub fn drop_older(&mut self) -> bool {
+        for _ in 0..DROPS {
+            let Ok(queued) = self.entries.peek() else { return false };
+            let epoch = match &queued.entry {
+                RingEntry::Event(event) => event.epoch,
+                RingEntry::Segment(segment) => segment.epoch,
+            };
+            if epoch >= self.epoch {
+                return true;
+            }
+            self.drop_front();
+        }
+        false
     }
 
     /// Whether nothing is queued behind the current segment.

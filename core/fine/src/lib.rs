@@ -6,6 +6,7 @@
 mod answer;
 mod config;
 mod cursor;
+mod edge;
 mod fault;
 mod governor;
 mod guard;

@@ -55,7 +55,32 @@ impl Outputs {
         }
     }
 
+    /// After an abort: the spindle stops, the coolant goes off, nothing waits for the operator. User outputs stay.
+    pub fn abort(&mut self) {
+        self.spindle_rad_per_s = 0.0;
+        self.switch(MIST, false);
+        self.switch(FLOOD, false);
+        self.stop_requested = false;
+    }
+
     fn switch(&mut self, output: u32, on: bool) {
         self.bits = if on { self.bits | 1 << output } else { self.bits & !(1 << output) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_abort_leaves_user_outputs_and_nothing_else() {
+        let mut outputs = Outputs::default();
+        for (kind, index) in [(EventKind::Spindle, 0), (EventKind::Mist, 0), (EventKind::Flood, 0)] {
+            outputs.apply(&Event::new(kind, 1, 0, index, 30.0));
+        }
+        outputs.apply(&Event::new(EventKind::DigitalOutput, 1, 0, 7, 1.0));
+        outputs.apply(&Event::new(EventKind::ProgramStop, 1, 0, 0, 0.0));
+        outputs.abort();
+        assert_eq!((outputs.bits, outputs.spindle_rad_per_s, outputs.stop_requested), (1 << 7, 0.0, false));
     }
 }

@@ -3,16 +3,18 @@
 mod exchange;
 mod follow;
 mod govern;
+mod rest;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
-use tandem_rings::{Controls, Depth, FineEnd, MachineState, Ratio, Sample, Status};
+use tandem_rings::{Controls, Depth, FineEnd, MachineState, Ratio, Rest, Sample, Status};
 use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, Setpoint};
 
 use crate::config::FineConfig;
 use crate::cursor::Cursor;
+use crate::edge::EdgeWatch;
 use crate::fault::{Fault, FaultKind};
 use crate::governor::Governor;
 use crate::guard::Guard;
@@ -20,6 +22,7 @@ use crate::outputs::Outputs;
 use crate::points::Points;
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
+use rest::Stop;
 
 /// What the fine loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +49,8 @@ enum Phase {
     /// Nothing has moved yet: the queue fills.
     Waiting,
     Following,
+    /// At the rest that ended an epoch: the next one is waited for.
+    Parted,
     Ramping(Ramp),
     Faulted,
 }
@@ -61,12 +66,15 @@ pub struct FineLoop {
     depth: Arc<Depth>,
     samples: Producer<Sample>,
     ratios: Consumer<Ratio>,
+    rests: Producer<Rest>,
     next_ratio: Option<Ratio>,
     ratio: f64,
     cursor: Cursor,
     points: Points,
     governor: Governor,
     guard: Guard,
+    edge: EdgeWatch,
+    stop: Option<Stop>,
     outputs: Outputs,
     phase: Phase,
     state: MachineState,
@@ -98,12 +106,15 @@ impl FineLoop {
             depth: end.depth,
             samples: end.samples,
             ratios: end.ratios,
+            rests: end.rests,
             next_ratio: None,
             ratio: 1.0,
             cursor: Cursor::new(end.segments, &config.position),
             points: Points::new(limits, axes),
             governor: Governor::new(limits, axes, config.period_s),
             guard: Guard::new(config),
+            edge: EdgeWatch::default(),
+            stop: None,
             outputs: Outputs::default(),
             phase: Phase::Waiting,
             state: MachineState::Fault,
@@ -179,6 +190,7 @@ impl FineLoop {
         match &mut self.phase {
             Phase::Waiting => (*self.guard.position(), self.wait()),
             Phase::Following => self.follow(),
+            Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 let position = ramp.next();
                 let over = ramp.is_over();
@@ -194,7 +206,13 @@ impl FineLoop {
             self.fail(FaultKind::Soft);
             return Input::Trip;
         }
-        if self.state == MachineState::Standstill && self.depth.may_start(self.cursor.program_time_s()) {
+        if self.state != MachineState::Standstill {
+            return Input::Rest;
+        }
+        if self.controls.abort.load(Relaxed) {
+            return self.part(Stop::abort());
+        }
+        if self.depth.may_start(self.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
         Input::Rest

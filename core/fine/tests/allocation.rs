@@ -120,6 +120,29 @@ fn starvation_and_going_on() {
 }
 
 #[test]
+fn an_abort_and_the_next_epoch() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.accelerate();
+    bench.cruise(0.1);
+    bench.event(EventKind::DigitalOutput, 3, 1.0);
+    bench.cruise(1.0);
+    tick_until(&mut bench, MachineState::Running);
+    tick(&mut bench, 120);
+    bench.host.controls.abort.store(true, Relaxed);
+    tick_until(&mut bench, MachineState::Standstill);
+    tick(&mut bench, 300);
+    assert_eq!(bench.host.status.feed_mm_per_s.load(), 0.0, "what is queued is of the old epoch");
+    bench.go_on();
+    bench.accelerate();
+    bench.brake();
+    bench.event(EventKind::ProgramEnd, 0, 0.0);
+    tick_until(&mut bench, MachineState::Running);
+    tick_until(&mut bench, MachineState::Standstill);
+    tick(&mut bench, 5);
+    assert!(bench.fine.is_over() && bench.fine.fault().is_none());
+}
+
+#[test]
 fn every_way_into_a_fault_and_the_ramp_out() {
     for cause in 0..4 {
         let mut bench = Bench::new(GuardMode::Stop);

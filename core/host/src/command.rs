@@ -17,7 +17,7 @@ pub enum Command {
     RapidOverride(f64),
     /// Emergency stop: ramps out off the path.
     EmergencyStop,
-    /// Stop on the path and end the run.
+    /// Stop on the path, drop what is queued, and end the program.
     Abort,
     /// A test's doing: the rough loop does nothing for so many rough periods. Virtual clock only.
     StallRough(u64),
@@ -32,7 +32,7 @@ impl Command {
             Self::FeedOverride(ratio) => controls.feed_override.store(ratio.max(0.0)),
             Self::RapidOverride(ratio) => controls.rapid_override.store(ratio.clamp(0.0, 1.0)),
             Self::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
-            Self::Abort => controls.soft_fault.store(true, Relaxed),
+            Self::Abort => controls.abort.store(true, Relaxed),
             Self::StallRough(_) => {}
         }
     }

@@ -21,7 +21,7 @@ fn cause(machine: &Machine, kind: &FaultKind, soft: Option<&str>) -> String {
         }
         FaultKind::Driver => format!("driver {}: the exchange failed", machine.driver.plugin),
         FaultKind::EmergencyStop => "emergency stop".to_string(),
-        FaultKind::Soft => soft.unwrap_or("stopped by the operator").to_string(),
+        FaultKind::Soft => soft.unwrap_or("stopped by the host").to_string(),
         FaultKind::MissedPeriods => {
             format!("more than {} fine periods were missed: the drives saw a step", machine.max_missed_periods)
         }

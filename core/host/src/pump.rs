@@ -3,11 +3,10 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
-use tandem_rings::{HostEnd, Sample};
-use tandem_rough::{Observer, Progress, RoughLoop};
+use tandem_rings::{HostEnd, Rest, RestCause, Sample};
+use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event};
 
-use crate::command::Command;
 use crate::monitor::Monitor;
 use crate::strategy::StrategyRunner;
 
@@ -39,6 +38,9 @@ pub trait RunObserver {
         StopAnswer::GoOn
     }
 
+    /// The machine came to a rest that ends an epoch: a probe touched, or the operator aborted.
+    fn rest(&mut self, _rest: &Rest) {}
+
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
 }
@@ -54,7 +56,8 @@ pub struct Pump<'a> {
     observer: &'a mut dyn RunObserver,
     /// The defect on the soft side that ends the run, in words.
     pub soft_error: Option<String>,
-    done: bool,
+    /// The rest of the operator's abort.
+    pub aborted: Option<Rest>,
     pub planning_ns: u128,
 }
 
@@ -66,19 +69,18 @@ impl<'a> Pump<'a> {
         monitor: Monitor,
         observer: &'a mut dyn RunObserver,
     ) -> Self {
-        Self { rough, host, strategy, monitor, observer, soft_error: None, done: false, planning_ns: 0 }
+        Self { rough, host, strategy, monitor, observer, soft_error: None, aborted: None, planning_ns: 0 }
     }
 
     /// One rough period.
     pub fn step(&mut self) {
-        if self.done {
+        if self.soft_error.is_some() {
             return;
         }
         let started = Instant::now();
-        let mut both = Both { monitor: &mut self.monitor, observer: self.observer };
-        match self.rough.step(&mut both) {
-            Ok(progress) => self.done = progress == Progress::Done,
-            Err(error) => self.fail(error.to_string()),
+        let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted: &mut self.aborted };
+        if let Err(error) = self.rough.step(&mut both) {
+            self.fail(error.to_string());
         }
         self.planning_ns += started.elapsed().as_nanos();
     }
@@ -131,7 +133,7 @@ impl<'a> Pump<'a> {
     }
 
     fn ask_strategy(&mut self, sample: &Sample) {
-        if self.done && self.soft_error.is_some() {
+        if self.soft_error.is_some() {
             return;
         }
         let Some(strategy) = &mut self.strategy else { return };
@@ -142,15 +144,15 @@ impl<'a> Pump<'a> {
 
     /// A defect on the soft side: the fine loop stops on the path.
     fn fail(&mut self, cause: String) {
-        self.done = true;
         self.soft_error.get_or_insert(cause);
-        Command::Abort.give(&self.host.controls);
+        self.host.controls.soft_fault.store(true, Relaxed);
     }
 }
 
 struct Both<'a> {
     monitor: &'a mut Monitor,
     observer: &'a mut dyn RunObserver,
+    aborted: &'a mut Option<Rest>,
 }
 
 impl Observer for Both<'_> {
@@ -161,5 +163,12 @@ impl Observer for Both<'_> {
 
     fn event(&mut self, event: &Event) {
         self.observer.event(event);
+    }
+
+    fn rest(&mut self, rest: &Rest) {
+        if rest.cause == RestCause::Abort {
+            *self.aborted = Some(*rest);
+        }
+        self.observer.rest(rest);
     }
 }

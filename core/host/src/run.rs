@@ -191,6 +191,7 @@ impl Run {
         let text = fault.map(|f| describe(&machine, &f, pump.soft_error.as_deref()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.fault = text;
+        summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
         if let Some((timing, page_faults)) = measured {
             summary.overruns = timing.overruns;
             summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
@@ -255,5 +256,6 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
         fault: None,
+        stopped: None,
     }
 }

@@ -77,6 +77,8 @@ pub struct Summary {
     pub planning_ns_per_block: f64,
     /// The fault that ended the run, in words.
     pub fault: Option<String>,
+    /// What ended the run before its program was over, without a fault: the operator's abort, in words.
+    pub stopped: Option<String>,
 }
 
 /// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.

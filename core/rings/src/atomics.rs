@@ -1,6 +1,6 @@
 //! Floating-point atomics, and how far the queue reaches.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// An `f64` in an atomic.
 #[derive(Debug, Default)]
@@ -40,9 +40,24 @@ pub struct Depth {
     /// Program time that must lie before the wall for motion to start (or start again), s: the worst stop; zero where the
     /// end of the stream is queued or the ring is full.
     pub required_s: AtomicF64,
+    /// Epoch that the other fields are about; stored behind them when an epoch begins.
+    pub epoch: AtomicU32,
 }
 
 impl Depth {
+    /// Begins `epoch` at program time `now_s`: nothing is queued yet. Rough loop.
+    pub fn begin(&self, epoch: u32, now_s: f64) {
+        self.required_s.store(f64::INFINITY);
+        self.stop_deceleration_mm_per_s2.store(f64::INFINITY);
+        self.wall_s.store(now_s);
+        self.epoch.store(epoch, Ordering::Release);
+    }
+
+    /// Whether the fields are about `epoch`. Fine loop.
+    pub fn is_of(&self, epoch: u32) -> bool {
+        self.epoch.load(Ordering::Acquire) == epoch
+    }
+
     /// Whether motion may start at program time `now_s`.
     pub fn may_start(&self, now_s: f64) -> bool {
         let required_s = self.required_s.load();
@@ -57,6 +72,7 @@ impl Default for Depth {
             stop_deceleration_mm_per_s2: AtomicF64::new(f64::INFINITY),
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),
+            epoch: AtomicU32::new(0),
         }
     }
 }

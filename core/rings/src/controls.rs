@@ -17,6 +17,9 @@ pub struct Controls {
     pub rapid_override: AtomicF64,
     /// Emergency stop: ramp out off the path, then the drives' quick stop. Sticky.
     pub emergency_stop: AtomicBool,
+    /// Abort: stop on the path, drop what is queued, and report the rest. Cleared by the fine loop when it has, and with
+    /// it both holds: nothing is left that they could hold.
+    pub abort: AtomicBool,
     /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
     pub soft_fault: AtomicBool,
 }
@@ -29,6 +32,7 @@ impl Default for Controls {
             feed_override: AtomicF64::new(1.0),
             rapid_override: AtomicF64::new(1.0),
             emergency_stop: AtomicBool::new(false),
+            abort: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),
         }
     }
@@ -39,7 +43,7 @@ impl Default for Controls {
 pub struct Status {
     /// Fine periods done.
     pub tick: AtomicU64,
-    /// Program time in the current epoch, s.
+    /// Program time since the start of the run, s.
     pub program_time_s: AtomicF64,
     /// Path speed commanded, mm/s.
     pub feed_mm_per_s: AtomicF64,

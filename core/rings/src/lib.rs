@@ -1,16 +1,18 @@
-//! What crosses between the rough and the fine loop: three rings and a handful of atomics.
+//! What crosses between the rough and the fine loop: four rings and a handful of atomics.
 //!
-//! Segments and events go one way, samples the other, feed ratios beside them. The operator's commands are atomics: a
+//! Segments and events go one way, samples and rests the other, feed ratios beside them. The operator's commands are atomics: a
 //! stop never shares a queue with work. Nothing here locks; nothing allocates after [`bridge`].
 
 mod atomics;
 mod controls;
 mod counts;
+mod rest;
 mod sample;
 
 pub use atomics::{AtomicF64, Depth, STOP_SHARE};
 pub use controls::{Controls, Status};
 pub use counts::Counts;
+pub use rest::{Rest, RestCause};
 pub use sample::{MachineState, Sample};
 
 use std::sync::Arc;
@@ -23,7 +25,7 @@ use tandem_sdk::RingEntry;
 pub struct Queued {
     /// The segment or event.
     pub entry: RingEntry,
-    /// Program time at which it starts, s, from the start of the epoch.
+    /// Program time at which it starts, s, from the start of the run.
     pub start_s: f64,
 }
 
@@ -58,6 +60,8 @@ impl Default for Sizes {
 pub struct RoughEnd {
     /// Segments and events out.
     pub segments: Producer<Queued>,
+    /// Rests that end an epoch, in.
+    pub rests: Consumer<Rest>,
     /// How far the queue reaches.
     pub depth: Arc<Depth>,
     /// What the fine loop says of itself.
@@ -71,6 +75,8 @@ pub struct FineEnd {
     pub segments: Consumer<Queued>,
     /// Ratios in.
     pub ratios: Consumer<Ratio>,
+    /// Rests that end an epoch, out.
+    pub rests: Producer<Rest>,
     /// How far the queue reaches.
     pub depth: Arc<Depth>,
     /// The operator's commands.
@@ -99,11 +105,14 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
     let (samples_in, samples_out) = RingBuffer::new(sizes.samples);
+    let (rests_in, rests_out) = RingBuffer::new(8);
     let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());
-    let rough = RoughEnd { segments: segments_in, depth: Arc::clone(&depth), status: Arc::clone(&status) };
+    let rough =
+        RoughEnd { segments: segments_in, rests: rests_out, depth: Arc::clone(&depth), status: Arc::clone(&status) };
     let fine = FineEnd {
         segments: segments_out,
         ratios: ratios_out,
+        rests: rests_in,
         depth,
         controls: Arc::clone(&controls),
         status: Arc::clone(&status),

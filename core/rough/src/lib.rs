@@ -3,6 +3,7 @@
 
 mod depth;
 mod queue;
+mod rest;
 mod rough;
 mod source;
 mod window;
@@ -11,6 +12,7 @@ pub use depth::QueueDepth;
 pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
 pub use source::Source;
 
+use tandem_rings::Rest;
 use tandem_sdk::{Block, BlockReport, Event};
 
 /// Is told of blocks as they are planned for good; in order, each once.
@@ -20,4 +22,11 @@ pub trait Observer {
 
     /// A non-motion word is planned.
     fn event(&mut self, _event: &Event) {}
+
+    /// The machine came to a rest that ends an epoch: what was planned behind it is not driven.
+    fn rest(&mut self, _rest: &Rest) {}
+}
+
+impl Observer for () {
+    fn block(&mut self, _block: &Block, _report: &BlockReport) {}
 }

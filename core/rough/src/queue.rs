@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::{Queued, RoughEnd};
-use tandem_sdk::{Block, BlockReport, Event, RingEntry, Segment, SegmentFlags, SegmentSink};
+use tandem_rings::{Queued, Rest, RoughEnd};
+use tandem_sdk::{Block, BlockReport, Edge, Event, RingEntry, Segment, SegmentFlags, SegmentSink, StopOn};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
@@ -13,12 +13,18 @@ use crate::depth::QueueDepth;
 pub struct Queue {
     end: RoughEnd,
     depth: QueueDepth,
+    rough_period_s: f64,
+    epoch: u32,
+    /// Path coordinate at the start of the epoch, mm: planners begin each at zero.
+    path_start_mm: f64,
     /// Emitted, not yet in the ring.
     staged: VecDeque<Queued>,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported.
-    pub blocks: VecDeque<Block>,
+    blocks: VecDeque<Block>,
+    /// Blocks that wait for an edge, until they are emitted.
+    stops: VecDeque<(u64, StopOn)>,
     /// Reports of blocks planned for good since the last look; their blocks are still in `blocks`.
     reported: Vec<BlockReport>,
     /// Program time at the end of what was emitted, s.
@@ -35,15 +41,54 @@ impl Queue {
         Self {
             end,
             depth: QueueDepth::new(rough_period_s),
+            rough_period_s,
+            epoch: 0,
+            path_start_mm: 0.0,
             staged: VecDeque::new(),
             events: VecDeque::new(),
             blocks: VecDeque::new(),
+            stops: VecDeque::new(),
             reported: Vec::new(),
             emitted_s: 0.0,
             queued_s: 0.0,
             ends_at_rest: true,
             defect: None,
         }
+    }
+
+    /// The planner has accepted `block`.
+    pub fn accepted(&mut self, block: &Block) {
+        self.blocks.push_back(*block);
+        if block.stop_on.edge != Edge::None {
+            self.stops.push_back((block.index, block.stop_on));
+        }
+    }
+
+    /// The next rest that the fine loop has reported.
+    pub fn take_rest(&mut self) -> Option<Rest> {
+        self.end.rests.pop().ok()
+    }
+
+    /// Forgets all that was queued behind `rest`, and begins the next epoch there.
+    pub fn restart(&mut self, rest: &Rest) {
+        self.epoch = rest.epoch + 1;
+        self.path_start_mm = rest.path_mm;
+        (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
+        self.staged.clear();
+        self.events.clear();
+        self.blocks.clear();
+        self.stops.clear();
+        self.reported.clear();
+        self.depth = QueueDepth::new(self.rough_period_s);
+        self.end.depth.begin(self.epoch, rest.program_time_s);
+    }
+
+    /// What ends the motion of `block` early.
+    fn stop_on(&mut self, block: u64) -> StopOn {
+        while self.stops.front().is_some_and(|(index, _)| *index < block) {
+            self.stops.pop_front();
+        }
+        self.stops.front().filter(|(index, _)| *index == block).map_or(StopOn::default(), |(_, stop_on)| *stop_on)
     }
 
     /// Takes an event that belongs in front of a block still to come.
@@ -121,7 +166,7 @@ impl Queue {
     }
 
     fn stage_event(&mut self, mut event: Event) {
-        event.program_time_s = self.emitted_s;
+        (event.program_time_s, event.epoch) = (self.emitted_s, self.epoch);
         self.staged.push_back(Queued { entry: RingEntry::Event(event), start_s: self.emitted_s });
     }
 }
@@ -136,7 +181,10 @@ impl SegmentSink for Queue {
             let event = self.events.pop_front().unwrap_or_else(|| unreachable!("looked at above"));
             self.stage_event(event);
         }
-        self.staged.push_back(Queued { entry: RingEntry::Segment(*segment), start_s: self.emitted_s });
+        let mut marked = *segment;
+        (marked.epoch, marked.stop_on) = (self.epoch, self.stop_on(segment.block));
+        marked.path[0] += self.path_start_mm;
+        self.staged.push_back(Queued { entry: RingEntry::Segment(marked), start_s: self.emitted_s });
         self.emitted_s += segment.duration_s;
         self.depth.push(segment, self.emitted_s);
     }

@@ -2,7 +2,7 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, Event, EventKind, Planner};
+use tandem_sdk::{Accepted, Edge, Event, EventKind, Planner};
 
 use crate::Observer;
 use crate::queue::Queue;
@@ -30,6 +30,14 @@ pub enum RoughError {
     /// The program cannot go on.
     #[error("{0}")]
     Program(String),
+    /// The machine stands where the program cannot go on.
+    #[error("line {line}: {cause}")]
+    Stop {
+        /// Program line of the block.
+        line: u32,
+        /// Why.
+        cause: String,
+    },
     /// The planner failed or refused what it had checked.
     #[error("planner: line {line}: {cause}")]
     Planner {
@@ -47,22 +55,24 @@ const MARGIN_PERIODS: f64 = 3.0;
 #[allow(clippy::struct_excessive_bools)] // independent facts about the stream
 pub struct RoughLoop {
     config: RoughConfig,
-    source: Box<dyn Source + Send>,
-    planner: Box<dyn Planner>,
-    queue: Queue,
-    items: Vec<Item>,
-    next: usize,
+    pub(crate) source: Box<dyn Source + Send>,
+    pub(crate) planner: Box<dyn Planner>,
+    pub(crate) queue: Queue,
+    pub(crate) items: Vec<Item>,
+    pub(crate) next: usize,
     /// The program gives nothing more.
-    dry: bool,
+    pub(crate) dry: bool,
     /// The planner has been told that nothing follows for now.
-    finished: bool,
+    pub(crate) finished: bool,
     /// The planner has emitted all of it.
-    stretch_over: bool,
-    waiting: Option<InputWait>,
-    waited_s: f64,
+    pub(crate) stretch_over: bool,
+    pub(crate) waiting: Option<InputWait>,
+    pub(crate) waited_s: f64,
+    /// The last block waits for an edge: where it ends is not known before it has.
+    pub(crate) edge_awaited: bool,
     line: u32,
     last_block: u64,
-    done: bool,
+    pub(crate) done: bool,
 }
 
 impl RoughLoop {
@@ -80,6 +90,7 @@ impl RoughLoop {
             stretch_over: false,
             waiting: None,
             waited_s: 0.0,
+            edge_awaited: false,
             line: 0,
             last_block: 0,
             done: false,
@@ -91,7 +102,7 @@ impl RoughLoop {
     /// # Errors
     /// The program or the planner cannot go on; what is queued is still driven to its end.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
-        let result = self.fill(observer);
+        let result = self.take_rests(observer).and_then(|()| self.fill(observer));
         self.queue.flush(self.stretch_over || result.is_err());
         self.queue.tell_of_blocks(observer);
         result?;
@@ -131,7 +142,7 @@ impl RoughLoop {
     /// The planner has emitted all it was given: the program has ended, or it waits for an input.
     fn stretch_is_over(&mut self) {
         self.queue.release_events();
-        if self.waiting.is_none() && self.dry {
+        if !self.awaits_answer() && self.dry {
             self.queue.event(Event::new(EventKind::ProgramEnd, self.line, self.last_block + 1, 0, 0.0));
             self.queue.release_events();
             self.done = true;
@@ -140,7 +151,7 @@ impl RoughLoop {
 
     /// Offers blocks until the planner is full or the program gives no more for now.
     fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
-        while self.waiting.is_none() && self.load()? {
+        while !self.awaits_answer() && self.load()? {
             match &self.items[self.next] {
                 Item::Block(block) => {
                     (self.line, self.last_block) = (block.line, block.index);
@@ -148,7 +159,8 @@ impl RoughLoop {
                     if accepted == Accepted::Full {
                         return Ok(());
                     }
-                    self.queue.blocks.push_back(*block);
+                    self.edge_awaited = block.stop_on.edge != Edge::None;
+                    self.queue.accepted(block);
                 }
                 Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
                 Item::Event(event) => {
@@ -168,12 +180,21 @@ impl RoughLoop {
         Ok(())
     }
 
-    /// Sees to it that there is a next item; `false` where the program is over.
+    /// Whether the program can go on only when the machine has answered: an input (M66), or where a probe has touched.
+    fn awaits_answer(&self) -> bool {
+        self.waiting.is_some() || self.edge_awaited
+    }
+
+    /// Sees to it that there is a next item; `false` where the program is over, or gives nothing for now.
     fn load(&mut self) -> Result<bool, RoughError> {
         while self.next == self.items.len() && !self.dry {
             self.items.clear();
             self.next = 0;
-            self.dry = !self.source.next_items(&mut self.items).map_err(RoughError::Program)? && self.items.is_empty();
+            let more = self.source.next_items(&mut self.items).map_err(RoughError::Program)?;
+            if self.items.is_empty() {
+                self.dry = !more;
+                return Ok(false);
+            }
         }
         Ok(self.next < self.items.len())
     }

@@ -1,10 +1,12 @@
 //! Where items come from.
 
 use tandem_gcode::{Item, Stream};
+use tandem_rings::{Rest, RestCause};
 
 /// A stream of program items, pulled on demand.
 pub trait Source {
-    /// Appends the next items; `false` where the program is over.
+    /// Appends the next items; `false` where the program is over. Nothing appended and `true`: there is nothing for now,
+    /// and the machine comes to rest.
     ///
     /// # Errors
     /// What is wrong with the program, with its place.
@@ -12,6 +14,11 @@ pub trait Source {
 
     /// Answers an [`Item::Wait`]: 1, 0, or −1 for none in time.
     fn provide_input(&mut self, value: f64);
+
+    /// The machine rests at `rest.position`, before the end of what was planned: behind an edge that a block waited for
+    /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), or after the operator's abort. The
+    /// next block starts there. Whether the stream goes on; where not, the program is over.
+    fn provide_rest(&mut self, rest: &Rest) -> bool;
 }
 
 impl Source for Stream {
@@ -21,5 +28,10 @@ impl Source for Stream {
 
     fn provide_input(&mut self, value: f64) {
         Stream::provide_input(self, value);
+    }
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        self.set_position(rest.position);
+        rest.cause != RestCause::Abort
     }
 }

@@ -166,6 +166,6 @@ pub trait Planner: Send {
     /// A defect of the planner: the machine comes to a controlled stop and names it.
     fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError>;
 
-    /// Forgets everything; the machine rests at `position`.
+    /// Forgets everything; the machine rests at `position`. Path coordinates begin at zero again.
     fn reset(&mut self, position: &AxisVector);
 }

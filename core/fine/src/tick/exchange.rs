@@ -26,12 +26,13 @@ impl FineLoop {
         let last = Numbers::of(&self.feedback);
         let failed = self.driver.exchange(&self.setpoint, &mut self.feedback).is_err();
         // From the first motion on the drives hold, at rest too: what let go has moved.
-        let moving = matches!(self.phase, Phase::Following);
+        let moving = matches!(self.phase, Phase::Following | Phase::Parted);
         let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
         if let Some(kind) = fault.or_else(|| answer::reported(&self.feedback, self.joints, moving)) {
             self.fail(kind);
         }
+        self.watch_edge();
     }
 
     pub(super) fn drives(&self) -> Input {

@@ -17,6 +17,8 @@ use crate::state::Input;
 pub(super) enum Ask {
     Run,
     Hold,
+    /// For good: an edge has come, or the operator aborts.
+    Stop,
     Starve,
 }
 
@@ -24,6 +26,7 @@ impl FineLoop {
     /// Follows the plan for one period.
     pub(super) fn follow(&mut self) -> (AxisVector, Input) {
         self.take_ratio();
+        self.look_for_stop();
         let ask = self.ask();
         if self.cursor.is_resting() {
             self.governor.jump(if ask == Ask::Run { 1.0 } else { 0.0 });
@@ -32,12 +35,16 @@ impl FineLoop {
             self.fail(FaultKind::Soft);
             return (*self.guard.position(), Input::Trip);
         }
+        if let Some(stop) = self.stop.filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting()) {
+            return (*self.guard.position(), self.part(stop));
+        }
         let delta_s = self.govern(ask);
         let pause = self.config.pause_at_stops;
         let reached = self.cursor.advance(delta_s, |event| {
             self.outputs.apply(event);
             pause && self.outputs.stop_requested
         });
+        self.begin_edge();
         let position = self.cursor.position();
         let checked = self.guard.check(&position);
         let position = self.let_pass(position, &checked);
@@ -71,6 +78,8 @@ impl FineLoop {
         let flags = [&controls.hold, &controls.program_hold, &controls.soft_fault];
         if flags.iter().any(|flag| flag.load(Relaxed)) {
             Ask::Hold
+        } else if self.stop.is_some() {
+            Ask::Stop
         } else if self.starved {
             Ask::Starve
         } else {
@@ -99,7 +108,7 @@ impl FineLoop {
         match (&self.phase, ask) {
             (Phase::Ramping(_), _) => Input::Trip,
             (Phase::Faulted, _) => Input::Stopped,
-            (_, Ask::Hold) => Input::Hold,
+            (_, Ask::Hold | Ask::Stop) => Input::Hold,
             (_, Ask::Starve) => Input::Starve,
             _ if reached == Reached::Rest && self.cursor.is_last() => Input::Rest,
             _ => Input::Run,

@@ -56,6 +56,7 @@ pub struct Bench {
     failing: Arc<AtomicBool>,
     queued_s: f64,
     x_mm: f64,
+    epoch: u32,
 }
 
 impl Bench {
@@ -84,7 +85,7 @@ impl Bench {
         let driver = Echo { failing: Arc::clone(&failing) };
         let mut fine = FineLoop::new(&config, end, Box::new(driver), None);
         fine.reset();
-        Self { fine, host, rough, failing, queued_s: 0.0, x_mm: 0.0 }
+        Self { fine, host, rough, failing, queued_s: 0.0, x_mm: 0.0, epoch: 0 }
     }
 
     /// What the machine is doing.
@@ -117,9 +118,16 @@ impl Bench {
         self.piece(FEED_MM_PER_S, -PLANNED_MM_PER_S2, FEED_MM_PER_S / PLANNED_MM_PER_S2, true);
     }
 
+    /// Takes the report of a rest, and queues in the next epoch from there.
+    pub fn go_on(&mut self) {
+        let rest = self.rough.rests.pop().expect("a rest");
+        (self.epoch, self.queued_s, self.x_mm) = (rest.epoch + 1, rest.program_time_s, rest.position[0]);
+        self.rough.depth.begin(self.epoch, self.queued_s);
+    }
+
     /// Queues an event.
     pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
-        let event = Event { program_time_s: self.queued_s, ..Event::new(kind, 1, 0, index, value) };
+        let event = Event { program_time_s: self.queued_s, epoch: self.epoch, ..Event::new(kind, 1, 0, index, value) };
         self.push(&RingEntry::Event(event));
     }
 
@@ -128,6 +136,7 @@ impl Bench {
         let motion = [self.x_mm, speed_mm_per_s, acceleration_mm_per_s2 / 2.0, 0.0, 0.0, 0.0];
         (segment.coefficients[0], segment.path) = (motion, motion);
         segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
+        segment.epoch = self.epoch;
         segment.feed_mm_per_s = FEED_MM_PER_S;
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
         self.push(&RingEntry::Segment(segment));

@@ -1,0 +1,91 @@
+//! The input edge that ends a motion: probing, homing.
+
+use tandem_sdk::{AxisVector, Edge, Feedback, Latch, MAX_LATCHES, Segment, StopOn};
+
+/// Watches for the edge while a block that waits for one moves.
+#[derive(Debug, Default)]
+pub struct EdgeWatch {
+    block: Option<u64>,
+    /// The drives' latches before the block: what has not changed since is of an older edge.
+    latches: [Latch; MAX_LATCHES],
+}
+
+impl EdgeWatch {
+    /// Begins to watch where `segment` is the first of its block; `before` is the feedback before it moved. Whether the
+    /// input already has the level waited for. Fine loop.
+    pub fn begin(&mut self, segment: &Segment, before: &Feedback) -> bool {
+        if segment.stop_on.edge == Edge::None || self.block == Some(segment.block) {
+            return false;
+        }
+        self.block = Some(segment.block);
+        self.latches = before.latches;
+        has_level(&segment.stop_on, before.inputs)
+    }
+
+    /// Joint positions at the edge that `stop_on` waits for, mm or rad, where it has come. A latch of the drives is
+    /// nearer to the edge than the feedback, and shows an edge that is over before the period is. Fine loop.
+    pub fn find(&self, stop_on: &StopOn, feedback: &Feedback) -> Option<AxisVector> {
+        let fits = |latch: &Latch| latch.input == stop_on.input && latch.edge == stop_on.edge as u32;
+        let latch = feedback.latches.iter().find(|latch| fits(latch) && !self.latches.contains(latch));
+        latch.map(|latch| latch.position).or_else(|| has_level(stop_on, feedback.inputs).then_some(feedback.position))
+    }
+
+    /// Forgets the block. Fine loop.
+    pub fn end(&mut self) {
+        self.block = None;
+    }
+}
+
+fn has_level(stop_on: &StopOn, inputs: u64) -> bool {
+    let high = inputs >> stop_on.input.min(63) & 1 == 1;
+    match stop_on.edge {
+        Edge::None => false,
+        Edge::Rising => high,
+        Edge::Falling => !high,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn probing(edge: Edge) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        (segment.block, segment.stop_on) = (7, StopOn { input: 3, edge, miss_is_fault: 0 });
+        segment
+    }
+
+    fn feedback(inputs: u64) -> Feedback {
+        Feedback { inputs, position: AxisVector([5.0; 8]), ..Feedback::default() }
+    }
+
+    #[test]
+    fn a_level_that_is_there_before_the_motion_is_told_once() {
+        for (edge, there, away) in [(Edge::Rising, 8, 0), (Edge::Falling, 0, 8)] {
+            let mut watch = EdgeWatch::default();
+            assert!(watch.begin(&probing(edge), &feedback(there)));
+            assert!(!watch.begin(&probing(edge), &feedback(there)), "it moves already");
+            watch.end();
+            assert!(!watch.begin(&probing(edge), &feedback(away)));
+            assert_eq!(watch.find(&probing(edge).stop_on, &feedback(away)), None);
+            assert_eq!(watch.find(&probing(edge).stop_on, &feedback(there)), Some(AxisVector([5.0; 8])));
+        }
+        assert!(!EdgeWatch::default().begin(&probing(Edge::None), &feedback(u64::MAX)));
+    }
+
+    #[test]
+    fn a_new_latch_counts_an_old_one_does_not() {
+        let segment = probing(Edge::Rising);
+        let with = |input, edge, at: f64| {
+            let mut feedback = feedback(0);
+            feedback.latches[2] = Latch { input, edge, position: AxisVector([at; 8]) };
+            feedback
+        };
+        let mut watch = EdgeWatch::default();
+        watch.begin(&segment, &with(3, 1, 1.0));
+        assert_eq!(watch.find(&segment.stop_on, &with(3, 1, 1.0)), None, "of an older edge");
+        assert_eq!(watch.find(&segment.stop_on, &with(3, 2, 4.0)), None, "of the other edge");
+        assert_eq!(watch.find(&segment.stop_on, &with(2, 1, 4.0)), None, "of another input");
+        assert_eq!(watch.find(&segment.stop_on, &with(3, 1, 4.0)), Some(AxisVector([4.0; 8])));
+    }
+}

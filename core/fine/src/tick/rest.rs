@@ -1,0 +1,101 @@
+//! Rests that end an epoch: an input edge or an abort stops the machine on the path, and what was queued behind counts no
+//! more.
+
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_rings::{MachineState, Rest, RestCause};
+use tandem_sdk::{AxisVector, Edge};
+
+use super::{FineLoop, Phase};
+use crate::fault::FaultKind;
+use crate::state::Input;
+
+/// A stop for good, until its rest is reported.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stop {
+    cause: RestCause,
+    /// Joint positions at the edge.
+    latch: Option<AxisVector>,
+}
+
+impl Stop {
+    pub(super) fn abort() -> Self {
+        Self { cause: RestCause::Abort, latch: None }
+    }
+}
+
+impl FineLoop {
+    /// Before a period: an abort, or a motion that ended without its edge.
+    pub(super) fn look_for_stop(&mut self) {
+        if self.controls.abort.load(Relaxed) {
+            self.stop = Some(Stop::abort());
+        } else if self.cursor.is_resting() && self.cursor.segment().stop_on.edge != Edge::None {
+            self.stop.get_or_insert(Stop { cause: RestCause::Missed, latch: None });
+        }
+    }
+
+    /// Behind a move: a motion that waits for an edge may have begun.
+    pub(super) fn begin_edge(&mut self) {
+        if self.edge.begin(self.cursor.segment(), &self.feedback) {
+            self.stop.get_or_insert(Stop { cause: RestCause::Already, latch: None });
+        }
+    }
+
+    /// Behind an exchange: the edge may have come.
+    pub(super) fn watch_edge(&mut self) {
+        let stop_on = &self.cursor.segment().stop_on;
+        if stop_on.edge == Edge::None || self.stop.is_some() || !matches!(self.phase, Phase::Following) {
+            return;
+        }
+        if let Some(latch) = self.edge.find(stop_on, &self.feedback) {
+            self.stop = Some(Stop { cause: RestCause::Edge, latch: Some(latch) });
+        }
+    }
+
+    /// At rest: reports it and ends the epoch. Where nobody has taken the reports before, it waits.
+    pub(super) fn part(&mut self, stop: Stop) -> Input {
+        let to_axes = |v: AxisVector| self.kinematics.as_ref().map_or(v, |k| k.to_axes(&v));
+        let rest = Rest {
+            epoch: self.cursor.epoch(),
+            cause: stop.cause,
+            tick: self.tick,
+            block: self.cursor.segment().block,
+            line: self.cursor.segment().line,
+            stop_on: self.cursor.segment().stop_on,
+            position: *self.guard.position(),
+            latch: stop.latch.map(to_axes),
+            program_time_s: self.cursor.program_time_s(),
+            path_mm: self.cursor.path_mm(),
+        };
+        if self.rests.push(rest).is_err() {
+            return Input::Hold;
+        }
+        self.cursor.part(&rest.position);
+        self.edge.end();
+        (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);
+        if stop.cause == RestCause::Abort {
+            self.outputs.abort();
+            let controls = &self.controls;
+            for flag in [&controls.hold, &controls.program_hold, &controls.abort] {
+                flag.store(false, Relaxed);
+            }
+        }
+        Input::Rest
+    }
+
+    /// Motion starts again when the rough loop has taken the report and enough of the new epoch is queued.
+    pub(super) fn wait_parted(&mut self) -> Input {
+        if self.controls.soft_fault.load(Relaxed) {
+            self.fail(FaultKind::Soft);
+            return Input::Trip;
+        }
+        if self.controls.abort.load(Relaxed) {
+            return self.part(Stop::abort());
+        }
+        let enough = self.depth.is_of(self.cursor.epoch()) && self.depth.may_start(self.cursor.program_time_s());
+        if self.cursor.drop_older() && enough && self.state == MachineState::Standstill {
+            self.phase = Phase::Following;
+        }
+        Input::Rest
+    }
+}
