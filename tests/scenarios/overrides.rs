@@ -47,3 +47,32 @@ fn the_rapid_override_slows_rapids_only() {
     assert!((top(3.0) - 50.0).abs() < 1e-6);
     assert!(top(4.0) <= 0.25 * 250.0 + 1e-6, "{}", top(4.0));
 }
+
+#[test]
+fn a_feed_override_above_one_acts_as_far_as_the_machine_plans_for_it() {
+    let text = "G21 G90\nF3000\nG1 X60\nM2\n";
+    let top = |most: &str| {
+        let ratio = format!("motion.max_feed_ratio={most}");
+        let done = Scenario::text(text).with(&["--set", &ratio]).commands("300,feed-override,1.5\n").run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        let verdict = done.judge(|options| options.max_ratio = 1.5);
+        assert!(verdict.passed(), "{verdict}");
+        let feed = done.column("feed_mm_s");
+        assert!((feed[299] - 50.0).abs() < 1e-6, "before the command {}", feed[299]);
+        assert!(most == "1" || feed[301] > 50.0, "it acts at once: {}", feed[301]);
+        feed.into_iter().fold(0.0, f64::max)
+    };
+    assert!((top("1") - 50.0).abs() < 1e-6);
+    assert!((top("1.2") - 60.0).abs() < 1e-6);
+    assert!((top("2") - 75.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_rapid_override_is_at_most_one() {
+    let text = "G21 G90\nG0 X60\nM2\n";
+    let free = Scenario::text(text).run();
+    let done =
+        Scenario::text(text).with(&["--set", "motion.max_feed_ratio=2"]).commands("0,rapid-override,1.5\n").run();
+    done.assert_within_limits();
+    assert_eq!(done.column("x_cmd_mm"), free.column("x_cmd_mm"));
+}

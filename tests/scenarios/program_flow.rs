@@ -72,3 +72,39 @@ fn exact_stops_are_sampled_at_the_programmed_position() {
         assert!(x.iter().zip(&y).any(|(x, y)| *x == px && *y == py), "({px}, {py}) is in no sample");
     }
 }
+
+#[test]
+fn m1_waits_while_the_optional_stop_is_on() {
+    let waits = |arguments: &[&str], commands: &str| {
+        let done = Scenario::text(STOPS).with(arguments).commands(commands).typing("\n\n\n").run();
+        done.assert_within_limits();
+        let errors = done.errors();
+        (3..=9).filter(|line| errors.contains(&format!("line {line}: the program waits"))).collect::<Vec<i32>>()
+    };
+    assert!(waits(&[], "").is_empty());
+    assert_eq!(waits(&["--optional-stop"], ""), [9]);
+    assert_eq!(waits(&[], "100,optional-stop,1"), [9]);
+    assert_eq!(waits(&["--pause"], ""), [5, 7, 9]);
+    assert_eq!(waits(&["--pause"], "100,optional-stop,0"), [5, 7]);
+}
+
+const CUT: &str = "G21 G90\nS1000 M3\nM8\nF600\nG1 X20\nM64 P3\nG0 X0\nM0\nG93\nG1 X20 F30\nG94 F600\nM1\nM2\n";
+
+#[test]
+fn a_dry_run_drives_the_path_at_its_own_feed_and_switches_nothing() {
+    let feed = "operator.dry_run_feed_mm_per_min=3000";
+    let done = Scenario::text(CUT).with(&["--dry-run", "--set", feed]).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    for words in ["line 8: M0, program stop: a dry run", "line 12: M1, optional stop: a dry run"] {
+        assert!(done.errors().contains(words), "{}", done.errors());
+    }
+    assert_eq!(done.summary()["dry_run"], true);
+    assert!(String::from_utf8_lossy(&done.output.stdout).starts_with("dry run of "));
+    let (feed, line) = (done.column("feed_mm_s"), done.column("line"));
+    let top = |number: f64| feed.iter().zip(&line).filter(|(_, l)| **l == number).map(|(f, _)| *f).fold(0.0, f64::max);
+    assert!((top(5.0) - 50.0).abs() < 1e-6 && (top(10.0) - 50.0).abs() < 1e-6, "{} {}", top(5.0), top(10.0));
+    assert!(top(7.0) > 100.0, "rapids stay rapids");
+    let programmed = Scenario::text(CUT).with(&["--dry-run"]).run();
+    programmed.assert_within_limits();
+    assert!(programmed.column("feed_mm_s").iter().zip(programmed.column("line")).all(|(f, l)| l != 5.0 || *f < 10.001));
+}

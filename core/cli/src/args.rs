@@ -54,6 +54,12 @@ pub struct Run {
     /// Wait for Enter at M0, M1 and M6 instead of logging them
     #[arg(long)]
     pub pause: bool,
+    /// Turn the optional stop on: wait for Enter at M1
+    #[arg(long)]
+    pub optional_stop: bool,
+    /// Move as the program says, at the dry-run feed of the machine; switch no spindle, coolant or output, wait for nobody
+    #[arg(long = "dry-run", conflicts_with_all = ["pause", "optional_stop"])]
+    pub dry: bool,
     /// Give the operator's commands of a file, a line each: tick,command[,value] (virtual clock)
     #[arg(long, value_name = "F.csv")]
     pub commands: Option<PathBuf>,

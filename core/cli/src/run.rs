@@ -22,7 +22,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
-    let switches = Switches { block_delete: options.machine.block_delete, pause_at_stops: options.pause };
+    let switches = switches(options);
     let run = match Run::prepare(machine.clone(), &registry, program, switches) {
         Err(HostError::Check(report)) => {
             program::print_errors(&report);
@@ -40,6 +40,16 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let outcome = run.drive(clock, &commands, &mut sinks)?;
     sinks.finish(options, &outcome.summary)?;
     Ok(conclude(options, &outcome))
+}
+
+/// The operator's switches as the command line sets them.
+fn switches(options: &args::Run) -> Switches {
+    Switches {
+        block_delete: options.machine.block_delete,
+        pause_at_stops: options.pause,
+        optional_stop: options.pause || options.optional_stop,
+        dry_run: options.dry,
+    }
 }
 
 /// Refuses to write a file twice, or over what the run reads.
@@ -87,7 +97,7 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
 
 /// Everything that a run is written to.
 struct Sinks {
-    pause: bool,
+    switches: Switches,
     progress: Progress,
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
@@ -101,7 +111,7 @@ impl Sinks {
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         Ok(Self {
-            pause: options.pause,
+            switches: switches(options),
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
@@ -132,9 +142,14 @@ impl RunObserver for Sinks {
     }
 
     fn event(&mut self, event: &Event) {
-        let word = stop_word(event.kind);
-        if let (Some(word), false) = (word, self.pause) {
-            say!("line {}: {word}: no operator is asked, the run goes on", event.line);
+        let Some(word) = stop_word(event.kind) else { return };
+        let (line, switches) = (event.line, &self.switches);
+        let waits =
+            if event.kind == EventKind::OptionalStop { switches.optional_stop } else { switches.pause_at_stops };
+        if switches.dry_run {
+            say!("line {line}: {word}: a dry run, it goes on");
+        } else if !waits {
+            say!("line {line}: {word}: no operator is asked, the run goes on");
         }
     }
 
@@ -187,9 +202,11 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
 
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {
     let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
+    let dry = if summary.dry_run { "dry run of " } else { "" };
     writeln!(
         out,
-        "{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s) with {planner} on {machine}"
+        "{dry}{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s) \
+         with {planner} on {machine}"
     )?;
     let Summary { limit_violations, guard_stops, governed_samples, starvations, .. } = summary;
     let deviation_um = summary.max_path_deviation_mm * 1e3;

@@ -124,6 +124,7 @@ fn config() -> FineConfig {
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
         pause_at_stops: false,
+        dry_run: false,
     }
 }
 

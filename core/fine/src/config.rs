@@ -27,8 +27,10 @@ pub struct FineConfig {
     pub position: AxisVector,
     /// Highest feed ratio that can be asked: the planner plans at it.
     pub max_feed_ratio: f64,
-    /// M0, M1 and M6 wait for the operator.
+    /// M0 and M6 wait for the operator; M1 does where the operator's switch is on.
     pub pause_at_stops: bool,
+    /// Spindle, coolant and user outputs are not switched, and nothing waits for the operator.
+    pub dry_run: bool,
 }
 
 impl FineConfig {

@@ -7,6 +7,15 @@ pub const MIST: u32 = 62;
 /// Number of the output that stands for flood coolant.
 pub const FLOOD: u32 = 63;
 
+/// Which words wait for the operator.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Waits {
+    /// M0 and M6.
+    pub program: bool,
+    /// M1.
+    pub optional: bool,
+}
+
 /// The switched state.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::struct_excessive_bools)] // independent modal states of the program, as the program has them
@@ -23,10 +32,13 @@ pub struct Outputs {
     pub ended: bool,
     /// The program asks to wait for the operator.
     pub stop_requested: bool,
+    /// Spindle, coolant and user outputs stay as they are.
+    dry_run: bool,
 }
 
-impl Default for Outputs {
-    fn default() -> Self {
+impl Outputs {
+    /// All off, all permitted.
+    pub fn new(dry_run: bool) -> Self {
         Self {
             bits: 0,
             spindle_rad_per_s: 0.0,
@@ -34,22 +46,23 @@ impl Default for Outputs {
             adaptive_permitted: true,
             ended: false,
             stop_requested: false,
+            dry_run,
         }
     }
-}
 
-impl Outputs {
     /// Takes an event that the path has reached.
-    pub fn apply(&mut self, event: &Event) {
+    pub fn apply(&mut self, event: &Event, waits: Waits) {
         let on = event.value != 0.0;
         match event.kind {
+            EventKind::Spindle | EventKind::Mist | EventKind::Flood | EventKind::DigitalOutput if self.dry_run => {}
             EventKind::Spindle => self.spindle_rad_per_s = event.value,
             EventKind::Mist => self.switch(MIST, on),
             EventKind::Flood => self.switch(FLOOD, on),
             EventKind::DigitalOutput => self.switch(event.index.clamp(0, 63).unsigned_abs(), on),
             EventKind::FeedOverride => self.override_permitted = on,
             EventKind::AdaptiveFeed => self.adaptive_permitted = on,
-            EventKind::ProgramStop | EventKind::OptionalStop | EventKind::ToolChange => self.stop_requested = true,
+            EventKind::ProgramStop | EventKind::ToolChange => self.stop_requested |= waits.program,
+            EventKind::OptionalStop => self.stop_requested |= waits.optional,
             EventKind::ProgramEnd => self.ended = true,
             EventKind::ToolSelect | EventKind::SpindleOverride | EventKind::FeedHold => {}
         }
@@ -74,13 +87,40 @@ mod tests {
 
     #[test]
     fn an_abort_leaves_user_outputs_and_nothing_else() {
-        let mut outputs = Outputs::default();
+        let waits = Waits { program: true, optional: true };
+        let mut outputs = Outputs::new(false);
         for (kind, index) in [(EventKind::Spindle, 0), (EventKind::Mist, 0), (EventKind::Flood, 0)] {
-            outputs.apply(&Event::new(kind, 1, 0, index, 30.0));
+            outputs.apply(&Event::new(kind, 1, 0, index, 30.0), waits);
         }
-        outputs.apply(&Event::new(EventKind::DigitalOutput, 1, 0, 7, 1.0));
-        outputs.apply(&Event::new(EventKind::ProgramStop, 1, 0, 0, 0.0));
+        outputs.apply(&Event::new(EventKind::DigitalOutput, 1, 0, 7, 1.0), waits);
+        outputs.apply(&Event::new(EventKind::ProgramStop, 1, 0, 0, 0.0), waits);
         outputs.abort();
         assert_eq!((outputs.bits, outputs.spindle_rad_per_s, outputs.stop_requested), (1 << 7, 0.0, false));
+    }
+
+    #[test]
+    fn a_dry_run_switches_nothing() {
+        let mut outputs = Outputs::new(true);
+        for kind in [EventKind::Spindle, EventKind::Mist, EventKind::Flood, EventKind::DigitalOutput] {
+            outputs.apply(&Event::new(kind, 1, 0, 7, 30.0), Waits::default());
+        }
+        outputs.apply(&Event::new(EventKind::FeedOverride, 1, 0, 0, 0.0), Waits::default());
+        assert_eq!((outputs.bits, outputs.spindle_rad_per_s, outputs.override_permitted), (0, 0.0, false));
+    }
+
+    #[test]
+    fn each_stop_waits_where_it_is_to() {
+        for (kind, waits) in [
+            (EventKind::ProgramStop, Waits { program: true, optional: false }),
+            (EventKind::ToolChange, Waits { program: true, optional: false }),
+            (EventKind::OptionalStop, Waits { program: false, optional: true }),
+        ] {
+            let stops = |waits| {
+                let mut outputs = Outputs::new(false);
+                outputs.apply(&Event::new(kind, 1, 0, 0, 0.0), waits);
+                outputs.stop_requested
+            };
+            assert!(stops(waits) && !stops(Waits { program: !waits.program, optional: !waits.optional }));
+        }
     }
 }

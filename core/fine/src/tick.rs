@@ -115,7 +115,7 @@ impl FineLoop {
             guard: Guard::new(config),
             edge: EdgeWatch::default(),
             stop: None,
-            outputs: Outputs::default(),
+            outputs: Outputs::new(config.dry_run),
             phase: Phase::Waiting,
             state: MachineState::Fault,
             starved: false,

@@ -15,6 +15,10 @@ pub enum Command {
     FeedOverride(f64),
     /// Rapid override, 1 for the rapid feed.
     RapidOverride(f64),
+    /// Optional stop: whether M1 waits for the operator.
+    OptionalStop(bool),
+    /// Single block: whether the machine rests at the end of each block.
+    SingleBlock(bool),
     /// Emergency stop: ramps out off the path.
     EmergencyStop,
     /// Stop on the path, drop what is queued, and end the program.
@@ -31,6 +35,8 @@ impl Command {
             Self::Resume => controls.hold.store(false, Relaxed),
             Self::FeedOverride(ratio) => controls.feed_override.store(ratio.max(0.0)),
             Self::RapidOverride(ratio) => controls.rapid_override.store(ratio.clamp(0.0, 1.0)),
+            Self::OptionalStop(on) => controls.optional_stop.store(on, Relaxed),
+            Self::SingleBlock(on) => controls.single_block.store(on, Relaxed),
             Self::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
             Self::Abort => controls.abort.store(true, Relaxed),
             Self::StallRough(_) => {}
@@ -69,6 +75,11 @@ impl Command {
             let ratio = text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0);
             ratio.ok_or_else(|| format!("{text:?} is not a number of zero or more"))
         };
+        let switch = || match value {
+            Some("0") => Ok(false),
+            Some("1") => Ok(true),
+            other => Err(format!("{name} is switched with 1 or 0, not {:?}", other.unwrap_or_default())),
+        };
         let command = match name {
             "hold" => Self::Hold,
             "resume" => Self::Resume,
@@ -76,10 +87,13 @@ impl Command {
             "abort" => Self::Abort,
             "feed-override" => return number().map(Self::FeedOverride),
             "rapid-override" => return number().map(Self::RapidOverride),
+            "optional-stop" => return switch().map(Self::OptionalStop),
+            "single-block" => return switch().map(Self::SingleBlock),
             "stall-rough" => return number().map(|periods| Self::StallRough(periods as u64)),
             _ => {
                 return Err(format!(
-                    "no command is called {name:?}: hold, resume, feed-override, rapid-override, abort, emergency-stop, stall-rough"
+                    "no command is called {name:?}: hold, resume, feed-override, rapid-override, optional-stop, \
+                     single-block, abort, emergency-stop, stall-rough"
                 ));
             }
         };
@@ -95,7 +109,20 @@ mod tests {
     fn lines_of_a_command_file() {
         assert_eq!(Timed::parse("120, hold"), Ok(Timed { tick: 120, command: Command::Hold }));
         assert_eq!(Timed::parse("3,feed-override,0.5"), Ok(Timed { tick: 3, command: Command::FeedOverride(0.5) }));
-        for bad in ["", "x,hold", "1", "1,hodl", "1,hold,2", "1,feed-override", "1,feed-override,NaN", "1,resume,,"] {
+        assert_eq!(Timed::parse("7,single-block,1"), Ok(Timed { tick: 7, command: Command::SingleBlock(true) }));
+        assert_eq!(Timed::parse("8,optional-stop,0"), Ok(Timed { tick: 8, command: Command::OptionalStop(false) }));
+        for bad in [
+            "",
+            "x,hold",
+            "1",
+            "1,hodl",
+            "1,hold,2",
+            "1,feed-override",
+            "1,feed-override,NaN",
+            "1,single-block",
+            "1,single-block,on",
+            "1,resume,,",
+        ] {
             assert!(Timed::parse(bad).is_err(), "{bad}");
         }
     }

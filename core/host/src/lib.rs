@@ -4,6 +4,7 @@
 //! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
 
 mod command;
+mod dry_run;
 mod error;
 mod fault_text;
 mod faults;

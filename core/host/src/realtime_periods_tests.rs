@@ -160,6 +160,7 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
         pause_at_stops: false,
+        dry_run: false,
     };
     let (rough, end, host) = bridge(Sizes { segments: 16, samples: 256 });
     let mut driver = tandem_sim::SimulatedDrives::new(tandem_sim::Options::default());

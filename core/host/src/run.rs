@@ -1,5 +1,6 @@
 //! One run of one program on one machine.
 
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_fine::{Fault, FineLoop};
@@ -31,11 +32,17 @@ pub enum Clock {
 
 /// The switches of the operator's panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools)] // independent switches of a panel
 pub struct Switches {
     /// Lines that begin with `/` are left out.
     pub block_delete: bool,
-    /// M0, M1 and M6 wait for the operator.
+    /// M0 and M6 wait for the operator.
     pub pause_at_stops: bool,
+    /// M1 waits for the operator, until the switch is turned off.
+    pub optional_stop: bool,
+    /// No spindle, coolant or user output is switched, nothing waits for the operator, and feed motion runs at the
+    /// machine's dry-run feed.
+    pub dry_run: bool,
 }
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
@@ -47,6 +54,7 @@ pub struct Run {
     host: HostEnd,
     strategy: Option<StrategyRunner>,
     steps: bool,
+    switches: Switches,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -133,17 +141,19 @@ impl Run {
         setup::open(&machine, driver.as_mut(), joints)?;
         let (rough_end, fine_end, host) = bridge(Sizes::default());
         let description = planner.describe();
-        let fine_config = setup::fine_config(&machine, &description, switches.pause_at_stops);
+        let fine_config = setup::fine_config(&machine, &description, switches);
+        host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let rough_config = RoughConfig { rough_period_s: machine.rough_period_s };
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();
         Ok(Self {
-            rough: RoughLoop::new(rough_config, Box::new(stream), planner, rough_end),
+            rough: RoughLoop::new(rough_config, setup::source(&machine, stream, switches), planner, rough_end),
             fine,
             machine,
             program,
             host,
             strategy,
+            switches,
             steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
             checked,
         })
@@ -190,6 +200,7 @@ impl Run {
         let fault = fine.fault();
         let text = fault.map(|f| describe(&machine, &f, pump.soft_error.as_deref()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
+        summary.dry_run = self.switches.dry_run;
         summary.fault = text;
         summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
         if let Some((timing, page_faults)) = measured {
@@ -229,6 +240,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         machine: machine.name.clone(),
         planner: machine.planner.plugin.clone(),
         clock: if clock == Clock::Virtual { "virtual" } else { "wall" }.to_string(),
+        dry_run: false,
         blocks: monitor.blocks,
         length_mm: monitor.length_mm,
         nominal_time_s: monitor.nominal_s,
@@ -251,7 +263,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         page_faults: None,
         starvations: counters.starvations,
         late_ratios: counters.late_ratios,
-        lost_samples: pump.host.status.lost_samples.load(std::sync::atomic::Ordering::Relaxed),
+        lost_samples: pump.host.status.lost_samples.load(Relaxed),
         end_position_mm: each(&monitor.position),
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,

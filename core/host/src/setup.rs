@@ -1,12 +1,14 @@
 //! From a machine to the parts of a run.
 
 use tandem_fine::FineConfig;
-use tandem_gcode::{Config, ProbeInput, Tool};
+use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
+use tandem_rough::Source;
 use tandem_sdk::{
     Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext, size_of_contract,
 };
 
+use crate::dry_run::DryRun;
 use crate::error::HostError;
 use crate::registry::Registry;
 use crate::rules::refusal;
@@ -25,6 +27,14 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     config.probe = machine.probe.map(|probe| ProbeInput { input: probe.input, inverted: probe.inverted });
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config
+}
+
+/// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
+pub fn source(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
+    match machine.operator.dry_run_feed_mm_per_s.filter(|_| switches.dry_run) {
+        Some(feed_mm_per_s) => Box::new(DryRun::new(stream, machine.axes, feed_mm_per_s)),
+        None => Box::new(stream),
+    }
 }
 
 fn tool(tool: &tandem_machine::Tool) -> Tool {
@@ -89,7 +99,7 @@ pub fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Strateg
 }
 
 /// The fine loop's view of the machine.
-pub fn fine_config(machine: &Machine, planner: &PlannerDescription, pause_at_stops: bool) -> FineConfig {
+pub fn fine_config(machine: &Machine, planner: &PlannerDescription, switches: Switches) -> FineConfig {
     FineConfig {
         period_s: machine.fine_period_s,
         limits: machine.limits,
@@ -100,6 +110,7 @@ pub fn fine_config(machine: &Machine, planner: &PlannerDescription, pause_at_sto
         },
         position: machine.start,
         max_feed_ratio: machine.motion.max_feed_ratio,
-        pause_at_stops,
+        pause_at_stops: switches.pause_at_stops,
+        dry_run: switches.dry_run,
     }
 }

@@ -23,9 +23,11 @@ pub struct Summary {
     pub planner: String,
     /// `virtual` or `wall`.
     pub clock: String,
-    /// Blocks driven.
+    /// No spindle, coolant or user output was switched, and feed motion ran at the dry-run feed.
+    pub dry_run: bool,
+    /// Blocks planned for good.
     pub blocks: u64,
-    /// Path length of the blocks driven, mm.
+    /// Path length of these blocks, mm.
     pub length_mm: f64,
     /// Length / feed (rapids at the machine's rapid feed) and dwells, s.
     pub nominal_time_s: f64,

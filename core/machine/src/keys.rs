@@ -75,6 +75,7 @@ static MACHINE: &[Key] = &[
     key("spindle.min_rpm", "rpm", "0", "Lowest spindle speed that turns"),
     key("probe.input", "number", "required", "Digital input of the probe, 0 to 63; without the table there is no probe"),
     key("probe.invert", "boolean", "false", "The input is 0 where the probe touches"),
+    key("operator.dry_run_feed_mm_per_min", "mm/min", "the programmed feed", "Feed of all feed motion in a dry run"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
 ];
 

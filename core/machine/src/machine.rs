@@ -12,7 +12,7 @@ use crate::load::Loader;
 use crate::motion::{Loops, Motion};
 use crate::node::plain;
 use crate::overrides;
-use crate::parts::{GuardMode, PluginChoice, Policy, Spindle, text};
+use crate::parts::{GuardMode, Operator, PluginChoice, Policy, Spindle, text};
 use crate::places::Places;
 use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
@@ -66,6 +66,8 @@ pub struct Machine {
     pub spindle: Spindle,
     /// The probe, if there is one.
     pub probe: Option<Probe>,
+    /// What the operator's switches mean.
+    pub operator: Operator,
     /// Tools; empty without a tool table.
     pub tools: ToolTable,
     effective: String,
@@ -138,6 +140,7 @@ struct Tables {
     policy: Option<Policy>,
     spindle: Spindle,
     probe: Option<Probe>,
+    operator: Operator,
 }
 
 impl Tables {
@@ -158,6 +161,7 @@ impl Tables {
             policy: optional("policy").and_then(|s| Policy::read(&s)),
             spindle: Spindle::read(&root.section("spindle")),
             probe: optional("probe").and_then(|s| Probe::read(&s)),
+            operator: Operator::read(&root.section("operator")),
         }
     }
 
@@ -186,6 +190,7 @@ impl Tables {
             policy: self.policy,
             spindle: self.spindle,
             probe: self.probe,
+            operator: self.operator,
             tools: moving.tools,
             effective,
             places,

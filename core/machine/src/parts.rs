@@ -76,6 +76,20 @@ impl Policy {
     }
 }
 
+/// What the operator's switches mean on this machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Operator {
+    /// Feed of all feed motion in a dry run, mm/s; none: the programmed feed.
+    pub dry_run_feed_mm_per_s: Option<f64>,
+}
+
+impl Operator {
+    /// Reads `[operator]`.
+    pub(crate) fn read(operator: &Section<'_>) -> Self {
+        Self { dry_run_feed_mm_per_s: operator.positive("dry_run_feed_mm_per_min").map(|feed| feed / 60.0) }
+    }
+}
+
 /// What the spindle may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spindle {

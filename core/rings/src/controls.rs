@@ -15,6 +15,10 @@ pub struct Controls {
     pub feed_override: AtomicF64,
     /// Rapid override, 1 for the machine's rapid feed.
     pub rapid_override: AtomicF64,
+    /// Optional stop: M1 waits for the operator.
+    pub optional_stop: AtomicBool,
+    /// Single block: the machine rests at the end of each block.
+    pub single_block: AtomicBool,
     /// Emergency stop: ramp out off the path, then the drives' quick stop. Sticky.
     pub emergency_stop: AtomicBool,
     /// Abort: stop on the path, drop what is queued, and report the rest. Cleared by the fine loop when it has, and with
@@ -31,6 +35,8 @@ impl Default for Controls {
             program_hold: AtomicBool::new(false),
             feed_override: AtomicF64::new(1.0),
             rapid_override: AtomicF64::new(1.0),
+            optional_stop: AtomicBool::new(false),
+            single_block: AtomicBool::new(false),
             emergency_stop: AtomicBool::new(false),
             abort: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),

@@ -10,6 +10,7 @@ use crate::config::GuardMode;
 use crate::cursor::Reached;
 use crate::fault::FaultKind;
 use crate::guard::Checked;
+use crate::outputs::Waits;
 use crate::state::Input;
 
 /// Why the rate of program time is to go down.
@@ -39,10 +40,10 @@ impl FineLoop {
             return (*self.guard.position(), self.part(stop));
         }
         let delta_s = self.govern(ask);
-        let pause = self.config.pause_at_stops;
+        let waits = self.waits();
         let reached = self.cursor.advance(delta_s, |event| {
-            self.outputs.apply(event);
-            pause && self.outputs.stop_requested
+            self.outputs.apply(event, waits);
+            self.outputs.stop_requested
         });
         self.begin_edge();
         let position = self.cursor.position();
@@ -66,10 +67,15 @@ impl FineLoop {
         }
     }
 
+    /// Which words wait for the operator now.
+    fn waits(&self) -> Waits {
+        let optional = self.controls.optional_stop.load(Relaxed) && !self.config.dry_run;
+        Waits { program: self.config.pause_at_stops && !self.config.dry_run, optional }
+    }
+
     /// What is asked of the rate of program time, before ratios.
     fn ask(&mut self) -> Ask {
-        let stop_wanted = self.config.pause_at_stops && self.outputs.stop_requested;
-        if stop_wanted {
+        if self.outputs.stop_requested {
             self.controls.program_hold.store(true, Relaxed);
             self.outputs.stop_requested = false;
         }

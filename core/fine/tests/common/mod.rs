@@ -79,6 +79,7 @@ impl Bench {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             pause_at_stops: false,
+            dry_run: false,
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));

@@ -75,6 +75,7 @@ impl Rig {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             pause_at_stops: false,
+            dry_run: false,
         };
         let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { unreachable!("it is a driver") };
         let mut driver = make("switches = [{ input = 0, joint = 0, above_mm = 12.5 }]").unwrap();
