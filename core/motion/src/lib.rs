@@ -4,6 +4,7 @@
 
 mod arc;
 mod geometry;
+pub mod nurbs;
 mod path;
 mod profile;
 mod segment;

@@ -1,5 +1,7 @@
 //! A block: one path element of a part program, in machine coordinates, with what the program says about it.
 
+use std::sync::Arc;
+
 use crate::{AxisVector, Edge, RawSlice, StopOn, size_of_contract};
 
 /// What kind of path a block follows.
@@ -56,6 +58,86 @@ pub struct NurbsGeometry {
     pub weights: RawSlice<f64>,
     /// Knots, non-decreasing, `control points + degree + 1` of them.
     pub knots: RawSlice<f64>,
+}
+
+/// The data of a NURBS curve, owned: what outlives the call that hands over a [`NurbsGeometry`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NurbsData {
+    /// Degree, 1 to 5.
+    pub degree: usize,
+    /// Control points, mm or rad.
+    pub control_points: Vec<AxisVector>,
+    /// Weights, one a control point.
+    pub weights: Vec<f64>,
+    /// Knots, `control points + degree + 1` of them.
+    pub knots: Vec<f64>,
+}
+
+impl NurbsData {
+    /// A description of this data, for a call during which it lives. Does not allocate.
+    pub fn geometry(&self) -> NurbsGeometry {
+        NurbsGeometry {
+            degree: self.degree as u32,
+            control_points: RawSlice::new(&self.control_points),
+            weights: RawSlice::new(&self.weights),
+            knots: RawSlice::new(&self.knots),
+        }
+    }
+}
+
+impl NurbsGeometry {
+    /// A copy of the data. Allocates.
+    ///
+    /// # Safety
+    /// Only during the call in which the geometry was handed over: its owner may free the data afterwards.
+    pub unsafe fn to_data(&self) -> NurbsData {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            NurbsData {
+                degree: self.degree as usize,
+                control_points: self.control_points.as_slice().to_vec(),
+                weights: self.weights.as_slice().to_vec(),
+                knots: self.knots.as_slice().to_vec(),
+            }
+        }
+    }
+}
+
+/// A block that owns its curve: what a queue of blocks holds.
+#[derive(Clone, Debug)]
+pub struct OwnedBlock {
+    block: Block,
+    curve: Option<Arc<NurbsData>>,
+}
+
+impl OwnedBlock {
+    /// `block` with the data of its curve, where it has one.
+    pub fn new(block: Block, curve: Option<Arc<NurbsData>>) -> Self {
+        Self { block: Block { nurbs: NurbsGeometry::default(), ..block }, curve }
+    }
+
+    /// Hands the block to `call`; the slices of its curve are valid there and no longer.
+    pub fn with<T>(&self, call: impl FnOnce(&Block) -> T) -> T {
+        match &self.curve {
+            None => call(&self.block),
+            Some(curve) => call(&Block { nurbs: curve.geometry(), ..self.block }),
+        }
+    }
+
+    /// The block's plain facts, without its curve.
+    pub fn facts(&self) -> &Block {
+        &self.block
+    }
+
+    /// The same, to be changed.
+    pub fn facts_mut(&mut self) -> &mut Block {
+        &mut self.block
+    }
+
+    /// The data of its curve.
+    pub fn curve(&self) -> Option<&Arc<NurbsData>> {
+        self.curve.as_ref()
+    }
 }
 
 /// One path element. Coordinates are machine coordinates in axis space with all offsets applied.

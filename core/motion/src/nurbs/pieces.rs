@@ -1,0 +1,80 @@
+//! Where a curve has corners.
+
+use tandem_sdk::AxisVector;
+
+use super::{Derivatives, Nurbs};
+use crate::half_angle_turn_rad;
+
+/// Turns below this are rounding of the control points, rad; above it the curve has a corner.
+pub const CORNER_RAD: f64 = 1e-6;
+/// Share of the mean parameter speed below which the curve stands still in its parameter: a cusp.
+const STANDS_STILL: f64 = 1e-7;
+
+/// A smooth part of a curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// First and last parameter.
+    pub range: (f64, f64),
+    /// Direction just behind the start, of unit length over the counted axes.
+    pub start_direction: AxisVector,
+    /// Direction just before the end.
+    pub end_direction: AxisVector,
+}
+
+impl Nurbs {
+    /// The smooth parts of the curve, in order: it is cut at knots where the direction turns by more than
+    /// [`CORNER_RAD`] (only a knot that stands as often as the degree, or coinciding control points, can do that) and where
+    /// the curve stands still in its parameter at a knot. Allocates.
+    pub fn pieces(&self) -> Vec<Piece> {
+        let (from, to) = self.range();
+        let mut pieces = Vec::new();
+        let mut start = (from, self.direction_behind(from));
+        for knot in self.inner_knots() {
+            let (before, behind) = (self.direction_before(knot), self.direction_behind(knot));
+            if half_angle_turn_rad(&before, &behind) > CORNER_RAD || self.stands_still(knot) {
+                pieces.push(Piece { range: (start.0, knot), start_direction: start.1, end_direction: before });
+                start = (knot, behind);
+            }
+        }
+        let end_direction = self.direction_before(to);
+        pieces.push(Piece { range: (start.0, to), start_direction: start.1, end_direction });
+        pieces
+    }
+
+    /// The distinct knots inside the curve.
+    pub fn inner_knots(&self) -> impl Iterator<Item = f64> {
+        let (from, to) = self.range();
+        let knots = self.knots.windows(2).filter(move |pair| pair[1] > pair[0] && pair[1] > from && pair[1] < to);
+        knots.map(|pair| pair[1])
+    }
+
+    fn stands_still(&self, knot: f64) -> bool {
+        let span = self.span(knot);
+        let speed = self.counted_length(&self.derivatives_in(span, knot).first);
+        let width = self.knots[span + 1] - self.knots[span];
+        speed * width <= STANDS_STILL * self.gauss(span, knot, self.knots[span + 1])
+    }
+
+    /// Direction just behind `knot`.
+    fn direction_behind(&self, knot: f64) -> AxisVector {
+        let span = self.span(knot);
+        self.direction(&self.derivatives_in(span, knot), self.knots[span + 1] - knot)
+    }
+
+    /// Direction just before `knot`.
+    fn direction_before(&self, knot: f64) -> AxisVector {
+        let mut span = self.span(knot);
+        while self.knots[span] >= knot {
+            span -= 1;
+        }
+        self.direction(&self.derivatives_in(span, knot), self.knots[span] - knot)
+    }
+
+    /// The direction in which the curve leaves a point, by the first derivative that is not zero: `step` is signed.
+    fn direction(&self, at: &Derivatives, step: f64) -> AxisVector {
+        let moves = [at.first * step, at.second * (step * step / 2.0), at.third * (step * step * step / 6.0)];
+        let largest = moves.iter().map(|m| self.counted_length(m)).fold(0.0, f64::max);
+        let first = moves.iter().find(|m| self.counted_length(m) > STANDS_STILL * largest);
+        first.map_or(AxisVector::ZERO, |m| *m * (step.signum() / self.counted_length(m)))
+    }
+}

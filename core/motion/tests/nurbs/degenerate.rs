@@ -1,0 +1,128 @@
+//! Curves at the edge of what is one.
+
+use tandem_motion::nurbs::{ArcLength, Nurbs, NurbsError, Place};
+use tandem_sdk::{Axes, AxisVector, NurbsData};
+
+use crate::common::{axes, clamped, curve, distance};
+
+/// Every place of the table lies on the curve and steps by what was asked for.
+fn assert_even(data: &NurbsData) {
+    let curve = curve(data);
+    let table = ArcLength::new(&curve);
+    let (mut place, steps) = (Place::default(), 2000);
+    let step_mm = table.length().mm / f64::from(steps);
+    let mut before = table.position(&curve, 0.0, &mut place);
+    for step in 1..=steps {
+        let at = table.position(&curve, step_mm * f64::from(step), &mut place);
+        let moved = distance(&at, &before);
+        assert!(moved <= step_mm + 1e-8, "{step}: {moved} instead of {step_mm}");
+        before = at;
+    }
+    assert!(distance(&before, &data.control_points[data.control_points.len() - 1]) < 1e-9);
+}
+
+const ZIGZAG: [[f64; 3]; 6] =
+    [[0.0, 0.0, 0.0], [5.0, 9.0, 0.0], [10.0, -3.0, 1.0], [15.0, 4.0, 2.0], [22.0, 0.0, 2.0], [30.0, 5.0, 0.0]];
+
+#[test]
+fn coinciding_control_points() {
+    for (at, count) in [(0, 2), (0, 3), (2, 2), (2, 3), (5, 2), (5, 3)] {
+        let mut points = ZIGZAG.to_vec();
+        for _ in 1..count {
+            points.insert(at, ZIGZAG[at]);
+        }
+        assert_even(&clamped(3, &points, &vec![1.0; points.len()]));
+    }
+}
+
+#[test]
+fn a_cusp_inside_a_span() {
+    // The control polygon of a cubic that crosses itself so that C′(1/2) = 0.
+    assert_even(&clamped(3, &[[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], &[1.0; 4]));
+}
+
+#[test]
+fn weights_far_apart() {
+    assert_even(&clamped(3, &ZIGZAG, &[1.0, 1e4, 1.0, 1e4, 1.0, 1.0]));
+    assert_even(&clamped(5, &ZIGZAG, &[1e-4, 1.0, 1e-4, 1.0, 1.0, 1.0]));
+    let refused = Nurbs::new(&clamped(3, &ZIGZAG, &[1.0, 1e7, 1.0, 1.0, 1.0, 1.0]), &axes()).unwrap_err();
+    assert!(refused.to_string().contains("1.0e7"), "{refused}");
+}
+
+#[test]
+fn a_corner_inside_cuts_the_curve() {
+    let mut data = clamped(3, &ZIGZAG, &[1.0; 6]);
+    data.knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0];
+    assert_eq!(curve(&data).pieces().len(), 1);
+    let mut points = ZIGZAG.to_vec();
+    points.push([35.0, 5.0, 0.0]);
+    let mut data = clamped(3, &points, &[1.0; 7]);
+    data.knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0];
+    let pieces = curve(&data).pieces();
+    assert_eq!(pieces.iter().map(|p| p.range).collect::<Vec<_>>(), [(0.0, 1.0), (1.0, 2.0)]);
+    let chord = AxisVector::from_slice(&ZIGZAG[3]) - AxisVector::from_slice(&ZIGZAG[2]);
+    let unit = chord * (1.0 / distance(&chord, &AxisVector::ZERO));
+    assert!(distance(&pieces[0].end_direction, &unit) < 1e-12);
+    let chord = AxisVector::from_slice(&ZIGZAG[4]) - AxisVector::from_slice(&ZIGZAG[3]);
+    let unit = chord * (1.0 / distance(&chord, &AxisVector::ZERO));
+    assert!(distance(&pieces[1].start_direction, &unit) < 1e-12);
+}
+
+#[test]
+fn control_points_on_a_corner_cut_the_curve() {
+    let points = [
+        [0.0, 0.0, 0.0],
+        [5.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0],
+        [10.0, 0.0, 0.0],
+        [10.0, 5.0, 0.0],
+        [10.0, 9.0, 0.0],
+    ];
+    let pieces = curve(&clamped(3, &points, &[1.0; 7])).pieces();
+    assert_eq!(pieces.len(), 2);
+    assert!((pieces[0].end_direction[0] - 1.0).abs() < 1e-12 && (pieces[1].start_direction[1] - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn ten_thousand_control_points() {
+    let points: Vec<[f64; 3]> = (0..10_000u32)
+        .map(|i| [f64::from(i) * 0.1, (f64::from(i) * 0.37).sin() * 3.0, (f64::from(i) * 0.11).cos()])
+        .collect();
+    let curve = curve(&clamped(3, &points, &vec![1.0; points.len()]));
+    let table = ArcLength::new(&curve);
+    assert!(table.length().mm > 1000.0 && table.parts() < 200_000, "{} parts", table.parts());
+    assert!((curve.length().mm - table.length().mm).abs() < 1e-7);
+}
+
+#[test]
+fn refusals_say_why() {
+    let good = clamped(3, &ZIGZAG, &[1.0; 6]);
+    let refusal = |change: &dyn Fn(&mut NurbsData)| {
+        let mut data = good.clone();
+        change(&mut data);
+        Nurbs::new(&data, &axes()).unwrap_err()
+    };
+    assert_eq!(refusal(&|d| d.degree = 6), NurbsError::Degree(6));
+    assert_eq!(refusal(&|d| d.control_points.truncate(3)), NurbsError::Points { degree: 3, points: 3 });
+    assert_eq!(refusal(&|d| d.weights[2] = 0.0), NurbsError::Weight { index: 2, value: 0.0 });
+    assert_eq!(refusal(&|d| d.weights.truncate(5)), NurbsError::Weights { points: 6, weights: 5 });
+    assert_eq!(refusal(&|d| d.knots[5] = 0.5), NurbsError::Knot { index: 5, value: 0.5, before: 1.0 });
+    assert!(refusal(&|d| d.knots.truncate(9)).to_string().contains("need 10 knots"));
+    assert_eq!(refusal(&|d| d.knots.fill(1.0)), NurbsError::Empty(1.0));
+    assert_eq!(refusal(&|d| d.control_points[4][1] = f64::NAN), NurbsError::Point(4));
+    assert_eq!(refusal(&|d| d.control_points.fill(AxisVector::ZERO)), NurbsError::NoLength);
+    assert!(refusal(&|d| d.knots[5] = 1.0 + 1e-12).to_string().contains("differ by"));
+    let mut broken = clamped(1, &ZIGZAG, &[1.0; 6]);
+    broken.knots[3] = broken.knots[2];
+    assert!(matches!(Nurbs::new(&broken, &axes()), Err(NurbsError::Multiplicity { count: 2, .. })));
+}
+
+#[test]
+fn rotary_axes_count_where_nothing_else_moves() {
+    let axes = Axes::new(&[('X', false), ('A', true)]).unwrap();
+    let mut data = clamped(2, &[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]], &[1.0; 3]);
+    assert!((Nurbs::new(&data, &axes).unwrap().length().mm - 2.0).abs() < 1e-12);
+    data.control_points[2][0] = 3.0;
+    assert!((Nurbs::new(&data, &axes).unwrap().length().mm - 3.0).abs() < 1e-9);
+}
