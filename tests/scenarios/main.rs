@@ -1,19 +1,26 @@
 //! Scenarios end to end: a program goes in, and what comes out is judged by the oracle.
 //!
-//! Random ones print their seed; `TANDEM_SEED=n cargo test -p tandem --test scenarios NAME` replays one.
+//! What fails prints the command that replays it. `TANDEM_SEEDS=n` asks for more random programs than usual.
 
 mod bad_input;
+mod bench;
 mod clocks;
 mod defective;
+mod disturbances;
+mod every_tick;
 mod examples;
 mod faults;
 mod harness;
 mod hold;
 mod latency;
+mod optimal_stop;
 mod overrides;
+mod plan;
 mod program_flow;
 mod random;
+mod replay;
 mod report;
 mod starvation;
+mod stopping_time;
 mod system_calls;
 mod trace;

@@ -3,11 +3,17 @@
 use std::fmt::Write;
 
 use crate::harness::{Scenario, root};
+use crate::replay::for_each_seed;
 
 /// A small generator (xorshift64*): the same program for the same seed everywhere.
-struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
+    /// Seeds that follow each other give unlike numbers.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
     fn next(&mut self) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -15,18 +21,18 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
     }
 
-    fn below(&mut self, count: u64) -> u64 {
+    pub fn below(&mut self, count: u64) -> u64 {
         (self.next() >> 33) % count
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
 /// A program of lines, arcs, helices, chords, dwells, exact stops and feed changes, well inside the travel.
-fn program(seed: u64) -> String {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+pub fn program(seed: u64) -> String {
+    let mut random = Random::new(seed);
     let mut text = String::from("G21 G90 G94 G17\nG64\nF2000\n");
     let mut at = [0.0f64; 3];
     for _ in 0..random.below(80) + 3 {
@@ -90,58 +96,60 @@ fn chords(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
     }
 }
 
-fn seeds(count: u64) -> Vec<u64> {
-    match std::env::var("TANDEM_SEED") {
-        Ok(seed) => vec![seed.parse().unwrap()],
-        Err(_) => (1..=count).collect(),
-    }
+/// What panics in `attempt` is told with the seed.
+fn attempted(attempt: impl FnOnce() + std::panic::UnwindSafe) -> Result<(), String> {
+    std::panic::catch_unwind(attempt).map_err(|_| "see above".to_string())
 }
 
 #[test]
 fn random_programs_run_within_limits() {
-    for seed in seeds(250) {
-        println!("seed {seed}");
-        let text = program(seed);
-        let done = Scenario::text(&text).run();
-        done.assert_within_limits();
-        assert_eq!(done.number("starvations"), 0.0, "seed {seed}");
-    }
+    for_each_seed("random_programs_run_within_limits", 250, |seed| {
+        attempted(|| {
+            let done = Scenario::text(&program(seed)).run();
+            done.assert_within_limits();
+            assert_eq!(done.number("starvations"), 0.0);
+        })
+    });
 }
 
 #[test]
 fn random_holds_and_stalls_keep_the_limits() {
-    for seed in seeds(150) {
-        println!("seed {seed}");
-        let mut random = Random(seed | 1 << 40);
-        let mut lines = String::new();
-        let mut tick = 0;
-        for _ in 0..6 {
-            tick += random.below(150) + 1;
-            let command = match random.below(3) {
-                0 => format!("{tick},hold\n{},resume\n", tick + random.below(150)),
-                1 => format!("{tick},feed-override,{:.2}\n", random.between(0.0, 1.0)),
-                _ => format!("{tick},stall-rough,{}\n", random.below(60)),
-            };
-            lines += &command;
-            tick += 150;
-        }
-        writeln!(lines, "{},feed-override,1", tick + 1).unwrap();
-        Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
+    for_each_seed("random_holds_and_stalls_keep_the_limits", 150, |seed| {
+        let lines = holds_and_stalls(&mut Random(seed | 1 << 40));
+        attempted(|| {
+            Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
+        })
+    });
+}
+
+fn holds_and_stalls(random: &mut Random) -> String {
+    let mut lines = String::new();
+    let mut tick = 0;
+    for _ in 0..6 {
+        tick += random.below(150) + 1;
+        let command = match random.below(3) {
+            0 => format!("{tick},hold\n{},resume\n", tick + random.below(150)),
+            1 => format!("{tick},feed-override,{:.2}\n", random.between(0.0, 1.0)),
+            _ => format!("{tick},stall-rough,{}\n", random.below(60)),
+        };
+        lines += &command;
+        tick += 150;
     }
+    lines + &format!("{},feed-override,1\n", tick + 1)
 }
 
 #[test]
 fn random_programs_pass_the_check() {
-    for seed in seeds(20) {
-        let text = program(seed);
+    for_each_seed("random_programs_pass_the_check", 20, |seed| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.ngc");
-        std::fs::write(&path, text).unwrap();
+        std::fs::write(&path, program(seed)).unwrap();
         let checked = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
             .args(["check".as_ref(), path.as_os_str(), "--machine".as_ref()])
             .arg(root().join("examples/machines/mill-3axis.toml"))
             .output()
             .unwrap();
-        assert!(checked.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&checked.stderr));
-    }
+        let errors = String::from_utf8_lossy(&checked.stderr).into_owned();
+        checked.status.success().then_some(()).ok_or(errors)
+    });
 }

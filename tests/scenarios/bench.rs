@@ -1,0 +1,220 @@
+//! Runs in this process, through the same host and plugins as the command: thousands of disturbed runs in seconds.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+use tandem_host::{Clock, Outcome, Registry, Run, RunObserver, Switches, Timed, TraceCsv};
+use tandem_machine::Machine;
+use tandem_oracle::{Options, Row, Trace, Verdict, judge};
+use tandem_rings::{MachineState, Sample};
+use tandem_sdk::{
+    Accepted, Advanced, AxisVector, Block, BlockReport, Made, Planner, PlannerContext, PlannerDescription, Plugin,
+    PluginError, PluginKind, Segment, SegmentSink,
+};
+
+use crate::harness::mill;
+
+/// A program on the mill.
+pub struct Bench {
+    program: PathBuf,
+    text: String,
+    pub judging: tandem_oracle::Machine,
+    _folder: Option<tempfile::TempDir>,
+}
+
+/// What a run did.
+pub struct Ran {
+    pub samples: Vec<Sample>,
+    pub outcome: Outcome,
+    /// What the planner emitted.
+    pub segments: Vec<Segment>,
+}
+
+impl Bench {
+    /// The program of a file.
+    pub fn of(program: &Path) -> Self {
+        let text = std::fs::read_to_string(program).unwrap();
+        let judging = tandem_oracle::Machine::read(&mill()).unwrap();
+        Self { program: program.to_owned(), text, judging, _folder: None }
+    }
+
+    /// A program text.
+    pub fn text(text: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("program.ngc");
+        std::fs::write(&path, text).unwrap();
+        Self { _folder: Some(folder), ..Self::of(&path) }
+    }
+
+    /// Runs it with commands, a line each as in `--commands`, undisturbed otherwise.
+    pub fn run(&self, commands: &str) -> Ran {
+        self.run_with(commands, &[])
+    }
+
+    /// Runs it with further settings of the machine.
+    pub fn run_with(&self, commands: &str, settings: &[(&str, &str)]) -> Ran {
+        let mut settings: Vec<_> = settings.iter().map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect();
+        if settings.iter().all(|(key, _)| key != "planner.plugin") {
+            settings.push(("planner.plugin".to_string(), "watched".to_string()));
+        }
+        let machine = Machine::read(&mill(), &settings).unwrap();
+        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
+        let program = tandem_gcode::Program::open(&self.program).unwrap();
+        let run = Run::prepare(machine, &registry(), program, Switches::default()).unwrap();
+        let mut kept = Kept::default();
+        EMITTED.take();
+        let outcome = run.drive(Clock::Virtual, &commands, &mut kept).unwrap();
+        Ran { samples: kept.0, outcome, segments: EMITTED.take() }
+    }
+
+    /// The oracle's verdict: samples on the path to 2 nm, corners cut by no more than a chord between two samples.
+    pub fn judge(&self, ran: &Ran, adjust: impl FnOnce(&mut Options)) -> Verdict {
+        let fastest = ran.samples.iter().fold(0.0, |most: f64, sample| most.max(sample.feed_mm_per_s));
+        let mut options = Options::for_machine(&self.judging);
+        options.sample_tolerance_mm = Some(2e-6);
+        options.vertex_tolerance_mm = Some((fastest * self.judging.fine_period_s / 2.0).max(1e-6));
+        adjust(&mut options);
+        judge(&self.trace(ran), &self.text, &self.judging, &options)
+    }
+
+    /// The samples as the oracle reads them.
+    fn trace(&self, ran: &Ran) -> Trace {
+        let axes = self.judging.axes.iter().map(|axis| axis.index).collect();
+        let rows = ran.samples.iter().map(|sample| row(sample, self.judging.fine_period_s)).collect();
+        Trace { axes, rows, ..Trace::default() }
+    }
+}
+
+/// The verdict as a result.
+pub fn passed(verdict: &Verdict) -> Result<(), String> {
+    verdict.passed().then_some(()).ok_or_else(|| verdict.to_string())
+}
+
+fn row(sample: &Sample, fine_period_s: f64) -> Row {
+    let mut row = Row { t_s: TraceCsv::t_s(sample.tick, fine_period_s), line: sample.line, ..Row::default() };
+    row.command[..3].copy_from_slice(&sample.command.0[..3]);
+    row
+}
+
+impl Ran {
+    /// Nothing went wrong, no count says that something nearly did, and the program is driven to its end.
+    pub fn expect_clean(&self) -> Result<(), String> {
+        let summary = &self.outcome.summary;
+        let counts = [summary.limit_violations, summary.guard_stops, summary.governed_samples, summary.lost_samples];
+        match &summary.fault {
+            Some(fault) => Err(fault.clone()),
+            None if counts != [0; 4] => Err(format!("violations, guard stops, governed, lost: {counts:?}")),
+            None => self.expect_ended(),
+        }
+    }
+
+    /// In a state in which a program ends.
+    fn expect_ended(&self) -> Result<(), String> {
+        let state = self.samples.last().map(|sample| sample.state);
+        let ended = state.is_some_and(|state| [MachineState::Running, MachineState::Standstill].contains(&state));
+        ended.then_some(()).ok_or(format!("ends {state:?}"))
+    }
+
+    /// At rest in `state` at the end.
+    pub fn expect_rest_in(&self, state: MachineState) -> Result<(), String> {
+        let [.., before, last] = &self.samples[..] else { return Err("fewer than two samples".to_string()) };
+        let at_rest = before.command == last.command;
+        (at_rest && last.state == state).then_some(()).ok_or(format!("ends {:?}, at rest: {at_rest}", last.state))
+    }
+
+    /// Every change of state is one that the table of states knows.
+    pub fn expect_known_changes(&self) -> Result<(), String> {
+        let change = |pair: &[Sample]| (pair[0].state, pair[1].state);
+        let unknown = self.samples.windows(2).map(change).find(|(from, to)| from != to && !may_follow(*from, *to));
+        unknown.map_or(Ok(()), |(from, to)| Err(format!("{from:?} became {to:?}")))
+    }
+}
+
+/// Whether `to` can follow `from` while the drives hold and nobody resets.
+fn may_follow(from: MachineState, to: MachineState) -> bool {
+    use MachineState::{Fault, Holding, Running, Standstill, Starved, Stopping};
+    match from {
+        Standstill | Running | Holding | Starved => {
+            [Standstill, Running, Holding, Starved, Stopping, Fault].contains(&to)
+        }
+        Stopping => to == Fault,
+        _ => false,
+    }
+}
+
+#[derive(Default)]
+struct Kept(Vec<Sample>);
+
+impl RunObserver for Kept {
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
+        self.0.push(*sample);
+    }
+}
+
+fn registry() -> Registry {
+    let planner = |name, make| Plugin { name, version: "0", kind: PluginKind::Planner(make) };
+    let mut registry = Registry::default();
+    for plugin in [tandem_sim::PLUGIN, planner("watched", watched), planner("boastful", boastful)] {
+        registry.register(plugin).unwrap();
+    }
+    registry
+}
+
+thread_local! {
+    static EMITTED: RefCell<Vec<Segment>> = const { RefCell::new(vec![]) };
+}
+
+fn look_ahead(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+    make(options, context)
+}
+
+/// The look-ahead planner; what it emits is kept.
+fn watched(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    Ok(Box::new(Watched { inner: look_ahead(options, context)?, boast: 1.0 }))
+}
+
+/// The same, and it declares to leave twice the deceleration to stop with: half the depth of the ring.
+fn boastful(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    Ok(Box::new(Watched { inner: look_ahead(options, context)?, boast: 2.0 }))
+}
+
+struct Watched {
+    inner: Box<dyn Planner>,
+    boast: f64,
+}
+
+struct WatchedSink<'a>(&'a mut dyn SegmentSink, f64);
+
+impl SegmentSink for WatchedSink<'_> {
+    fn segment(&mut self, segment: &Segment) {
+        let mut segment = *segment;
+        segment.stop_deceleration_mm_per_s2 *= self.1;
+        EMITTED.with_borrow_mut(|emitted| emitted.push(segment));
+        self.0.segment(&segment);
+    }
+    fn block(&mut self, report: &BlockReport) {
+        self.0.block(report);
+    }
+}
+
+impl Planner for Watched {
+    fn describe(&self) -> PlannerDescription {
+        self.inner.describe()
+    }
+    fn check(&self, block: &Block) -> Result<(), PluginError> {
+        self.inner.check(block)
+    }
+    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+        self.inner.accept(block)
+    }
+    fn finish(&mut self) {
+        self.inner.finish();
+    }
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+        self.inner.advance(duration_s, &mut WatchedSink(sink, self.boast))
+    }
+    fn reset(&mut self, position: &AxisVector) {
+        self.inner.reset(position);
+    }
+}
