@@ -101,8 +101,8 @@ impl Ran {
     pub fn expect_clean(&self) -> Result<(), String> {
         let summary = &self.outcome.summary;
         let counts = [summary.limit_violations, summary.guard_stops, summary.governed_samples, summary.lost_samples];
-        match &summary.fault {
-            Some(fault) => Err(fault.clone()),
+        match summary.fault.as_ref().or(summary.stopped.as_ref()) {
+            Some(ended_early) => Err(ended_early.clone()),
             None if counts != [0; 4] => Err(format!("violations, guard stops, governed, lost: {counts:?}")),
             None => self.expect_ended(),
         }
@@ -113,6 +113,16 @@ impl Ran {
         let state = self.samples.last().map(|sample| sample.state);
         let ended = state.is_some_and(|state| [MachineState::Running, MachineState::Standstill].contains(&state));
         ended.then_some(()).ok_or(format!("ends {state:?}"))
+    }
+
+    /// Ended by the operator's abort: no fault, at rest, and nothing was ramped out.
+    pub fn expect_aborted(&self) -> Result<(), String> {
+        let ramped = self.samples.iter().any(|sample| sample.state == MachineState::Stopping);
+        match &self.outcome.summary {
+            summary if summary.stopped.is_none() => Err("it was not stopped".to_string()),
+            summary if summary.fault.is_some() || ramped => Err(format!("{:?}, ramped: {ramped}", summary.fault)),
+            _ => self.expect_rest_in(MachineState::Standstill),
+        }
     }
 
     /// At rest in `state` at the end.

@@ -49,13 +49,12 @@ fn stops_at_random_ticks() {
         let free = bench.run("").samples.len() as u64;
         let mut random = Random::new(seed ^ 1 << 42);
         let tick = 1 + random.below(free);
-        let before = steps(&mut random, tick);
-        let before: String = before.lines().filter(|line| at(line) < tick).map(|line| format!("{line}\n")).collect();
-        let abort = random.below(2) == 0;
-        let stop = format!("{before}{tick},{}", if abort { "abort" } else { "emergency-stop" });
-        let ran = bench.run(&stop);
+        let (before, abort) = (steps(&mut random, tick), random.below(2) == 0);
+        let stop = format!("{tick},{}", if abort { "abort" } else { "emergency-stop" });
+        let lines: Vec<&str> = before.lines().filter(|line| at(line) < tick).chain([stop.as_str()]).collect();
+        let ran = bench.run(&lines.join("\n"));
         ran.expect_known_changes()?;
-        ran.expect_rest_in(MachineState::Fault)?;
+        if abort { ran.expect_aborted() } else { ran.expect_rest_in(MachineState::Fault) }?;
         on_the_path_until(&bench, &ran, if abort { u64::MAX } else { tick - 1 })
     });
 }

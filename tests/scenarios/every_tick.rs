@@ -34,7 +34,7 @@ impl<'a> HoldCheck<'a> {
         let axes = &bench.judging.axes;
         Self {
             free: &free.samples,
-            plan: Plan::new(&free.segments, axes.len()),
+            plan: Plan::new(&free.segments),
             acceleration: axes.iter().map(|axis| axis.max_acceleration_mm_per_s2).collect(),
             period_s: bench.judging.fine_period_s,
         }
@@ -144,7 +144,7 @@ fn abort_at_every_tick() {
     for_each_tick("abort_at_every_tick", 1..free.samples.len() - 1, |tick| {
         let ran = bench.run(&format!("{tick},abort"));
         ran.expect_known_changes()?;
-        ran.expect_rest_in(MachineState::Fault)?;
+        ran.expect_aborted()?;
         passed(&bench.judge(&ran, |options| options.ends_early = true))
     });
 }

@@ -51,19 +51,18 @@ struct Step {
     from_s: f64,
     length_s: f64,
     ends: [Place; 2],
-    axes: usize,
 }
 
 fn steps(plan: &Plan, step_s: f64) -> Vec<Step> {
     let mut steps = vec![];
     for stretch in plan.stretches(0.0, plan.end_s()) {
-        let long_s = stretch.until_s() - stretch.from_s();
+        let long_s = stretch.until_s - stretch.from_s;
         let count = (long_s / step_s).ceil().max(1.0);
-        let at = |number: f64| stretch.from_s() + long_s * number / count;
+        let at = |number: f64| stretch.from_s + long_s * number / count;
         for number in 0..count as u32 {
             let (from_s, until_s) = (at(f64::from(number)), at(f64::from(number + 1)));
             let ends = [stretch.at(from_s), stretch.at(until_s)];
-            steps.push(Step { from_s, length_s: until_s - from_s, ends, axes: plan.axes() });
+            steps.push(Step { from_s, length_s: until_s - from_s, ends });
         }
     }
     steps
@@ -96,11 +95,11 @@ impl Step {
         let mut range = (f64::NEG_INFINITY, f64::INFINITY);
         for (number, end) in self.ends.iter().take(ends).enumerate() {
             let after_s = number as f64 * self.length_s;
-            for axis in 0..self.axes {
-                // |constant + slope · u| ≤ limit
+            for (axis, most) in limit.iter().enumerate() {
+                // |constant + slope · u| ≤ most
                 let constant = end.acceleration[axis] * y;
                 let slope = end.acceleration[axis] * after_s + end.velocity[axis] / 2.0;
-                let (a, b) = ((-limit[axis] - constant) / slope, (limit[axis] - constant) / slope);
+                let (a, b) = ((-most - constant) / slope, (most - constant) / slope);
                 if slope != 0.0 {
                     range = (range.0.max(a.min(b)), range.1.min(a.max(b)));
                 }

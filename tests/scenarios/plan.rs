@@ -5,7 +5,6 @@ use tandem_sdk::{Segment, SegmentFlags};
 /// Segments one after the other, each with its start in program time, s.
 pub struct Plan {
     pieces: Vec<(f64, Segment)>,
-    axes: usize,
 }
 
 /// A place of the plan as the governor must see it: the velocity that is continuous over junctions, and its rate.
@@ -20,12 +19,12 @@ pub struct Place {
 pub struct Stretch<'a> {
     segment: &'a Segment,
     start_s: f64,
-    from_s: f64,
-    until_s: f64,
+    pub from_s: f64,
+    pub until_s: f64,
 }
 
 impl Plan {
-    pub fn new(segments: &[Segment], axes: usize) -> Self {
+    pub fn new(segments: &[Segment]) -> Self {
         let mut start_s = 0.0;
         let mut pieces: Vec<(f64, Segment)> = vec![];
         for segment in segments {
@@ -37,11 +36,7 @@ impl Plan {
             }
             start_s += segment.duration_s;
         }
-        Self { pieces, axes }
-    }
-
-    pub fn axes(&self) -> usize {
-        self.axes
+        Self { pieces }
     }
 
     /// Program time at the end, s.
@@ -80,7 +75,7 @@ impl Plan {
         };
         self.stretches(from_s, until_s).any(|stretch| {
             let ends = [stretch.at(stretch.from_s), stretch.at(stretch.until_s)];
-            ends.iter().any(|place| (0..self.axes).any(|axis| brakes(place, axis)))
+            ends.iter().any(|place| (0..limit.len()).any(|axis| brakes(place, axis)))
         })
     }
 
@@ -94,14 +89,6 @@ impl Plan {
 }
 
 impl Stretch<'_> {
-    pub fn from_s(&self) -> f64 {
-        self.from_s
-    }
-
-    pub fn until_s(&self) -> f64 {
-        self.until_s
-    }
-
     /// The place at a program time within the stretch.
     pub fn at(&self, time_s: f64) -> Place {
         let local_s = (time_s - self.start_s).clamp(0.0, self.segment.duration_s);

@@ -31,7 +31,7 @@ fn worst(name: &str, text: &str, step: usize, most: f64) -> f64 {
     let bench = Bench::text(text);
     let free = bench.run("");
     free.expect_clean().unwrap();
-    let plan = Plan::new(&free.segments, 3);
+    let plan = Plan::new(&free.segments);
     let optimal = OptimalStop::of(&plan, &ACCELERATION, PERIOD_S);
     let times_s = times_s(&plan, &free);
     let (mut worst, mut runs): ((f64, usize), u32) = ((0.0, 0), 0);
@@ -108,7 +108,7 @@ fn on_a_line_a_hold_takes_v_over_a_within_a_period() {
         let (taken, ideal) = (stopping_periods(&ran, tick) as f64, speed_mm_per_s / 1000.0 / PERIOD_S);
         assert!((taken - ideal).abs() <= 1.0, "{feed_mm_per_min} mm/min: {taken} periods instead of {ideal}");
         // The search finds the same without a governor.
-        let plan = Plan::new(&ran.segments, 3);
+        let plan = Plan::new(&ran.segments);
         let optimal = OptimalStop::of(&plan, &ACCELERATION, PERIOD_S);
         let found = optimal.time_s(plan.end_s() / 2.0) / PERIOD_S;
         assert!((found - ideal).abs() <= 0.01 * ideal, "{feed_mm_per_min} mm/min: found {found} for {ideal}");
@@ -133,7 +133,7 @@ fn in_short_chords_a_hold_takes_longer() {
 #[test]
 fn the_search_does_not_depend_on_its_grid() {
     let bench = Bench::text(&circle());
-    let plan = Plan::new(&bench.run("").segments, 3);
+    let plan = Plan::new(&bench.run("").segments);
     let [coarse, fine] = [PERIOD_S, PERIOD_S / 3.0].map(|step_s| OptimalStop::of(&plan, &ACCELERATION, step_s));
     for tenth in 1..10 {
         let at_s = plan.end_s() * f64::from(tenth) / 10.0;
