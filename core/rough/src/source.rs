@@ -1,6 +1,6 @@
 //! Where items come from.
 
-use tandem_gcode::{Item, Stream};
+use tandem_gcode::{Item, ProbeResult, Stream};
 use tandem_rings::{Rest, RestCause};
 
 /// A stream of program items, pulled on demand.
@@ -31,7 +31,11 @@ impl Source for Stream {
     }
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
-        self.set_position(rest.position);
-        rest.cause != RestCause::Abort
+        if rest.cause == RestCause::Abort {
+            self.set_position(rest.position);
+            return false;
+        }
+        self.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+        true
     }
 }

@@ -3,12 +3,14 @@
 use std::f64::consts::TAU;
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, PluginError, Setpoint,
+    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES, MAX_LATCHES,
+    PluginError, Setpoint,
 };
 
 use crate::joint::{CURRENT_A_PER_MM_PER_S2, Motion, Servo};
-use crate::options::{Model, Options};
+use crate::options::{Model, Options, Switch};
 use crate::spindle::Spindle;
+use crate::switches::Switches;
 use crate::watchdog::Watchdog;
 
 /// Fault code of every joint whose drives stopped by themselves because the host fell silent.
@@ -27,7 +29,7 @@ enum Life {
 /// Joints stand at [`DriverContext::start_position`] when started. While `enable` is 0 they do not follow: they run out at
 /// the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are
 /// then reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its
-/// command in every state. Latches are not simulated.
+/// command in every state.
 ///
 /// Where no new setpoint comes, joints go on at the velocity of the last one; after more than
 /// [`Options::watchdog_periods`] such periods in a row they ramp to rest at the quick-stop deceleration and report
@@ -48,6 +50,9 @@ pub struct SimulatedDrives {
     quick_stopping: bool,
     watchdog: Watchdog,
     spindle: Spindle,
+    switches: Switches,
+    /// Where the joints really stand when the drives say zero.
+    shift: AxisVector,
 }
 
 impl SimulatedDrives {
@@ -58,6 +63,8 @@ impl SimulatedDrives {
             servo: servo(&options, period_s),
             spindle: Spindle::new(options.spindle_time_constant_s, period_s),
             watchdog: Watchdog::new(options.watchdog_periods),
+            switches: Switches::new(&options.switches, options.latches, options.seed),
+            shift: unknown_start(&options),
             options,
             life: Life::Closed,
             joint_count: 0,
@@ -81,10 +88,10 @@ impl SimulatedDrives {
         if !context.start_position.is_finite() {
             return Err(PluginError::fixed("sim: the start position is not a finite number"));
         }
-        match self.options.switches.iter().find(|switch| switch.joint >= count) {
-            Some(switch) => Err(PluginError::new(format!(
-                "sim: options: switches: joint = {}: the machine has joints 0 to {}",
-                switch.joint,
+        let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
+        match self.options.switches.iter().map(last_joint).find(|joint| *joint >= count) {
+            Some(joint) => Err(PluginError::new(format!(
+                "sim: options: switches: joint = {joint}: the machine has joints 0 to {}",
                 count - 1
             ))),
             None => Ok(()),
@@ -147,7 +154,7 @@ impl SimulatedDrives {
         self.followed = Some(*to);
     }
 
-    fn report(&self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
+    fn report(&mut self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
         *feedback = Feedback::default();
         for (index, joint) in self.joints[..self.joint_count].iter().enumerate() {
             feedback.position[index] = joint.position;
@@ -156,7 +163,7 @@ impl SimulatedDrives {
             feedback.state[index] = self.state(enable, joint);
             feedback.fault_code[index] = if self.watchdog.is_tripped() { WATCHDOG_FAULT } else { 0 };
         }
-        feedback.inputs = self.inputs();
+        (feedback.inputs, feedback.latches) = self.switch(before);
         feedback.spindle_rad_per_s = self.spindle.speed;
         feedback.spindle_angle_rad = self.spindle.angle;
     }
@@ -176,14 +183,33 @@ impl SimulatedDrives {
         if enable && !at_rest_for_good { JointState::Enabled } else { JointState::Disabled }
     }
 
-    fn inputs(&self) -> u64 {
-        let on = self.options.switches.iter().filter(|switch| self.joints[switch.joint].position > switch.above_mm);
-        on.fold(0, |inputs, switch| inputs | 1 << switch.input)
+    /// The inputs after a period, and the positions caught in it, as the drives see them.
+    fn switch(&mut self, before: &[Motion; MAX_AXES]) -> (u64, [Latch; MAX_LATCHES]) {
+        let (inputs, mut latches) = self.switches.step(&self.real(before), &self.real(&self.joints));
+        for latch in latches.iter_mut().filter(|latch| latch.edge != 0) {
+            latch.position = latch.position - self.shift;
+        }
+        (inputs, latches)
+    }
+
+    /// Where the joints really stand.
+    fn real(&self, joints: &[Motion; MAX_AXES]) -> AxisVector {
+        AxisVector(std::array::from_fn(|i| joints[i].position + self.shift[i]))
     }
 
     fn refuse_unless(&self, wanted: Life, refusals: [&'static str; 3]) -> Result<(), PluginError> {
         if self.life == wanted { Ok(()) } else { Err(PluginError::fixed(refusals[self.life as usize])) }
     }
+}
+
+/// How far each joint stands from where its drive says: a seeded part of the option.
+fn unknown_start(options: &Options) -> AxisVector {
+    let mut state = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    AxisVector(std::array::from_fn(|_| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let share = (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
+        share * options.unknown_start_mm
+    }))
 }
 
 fn servo(options: &Options, period_s: f64) -> Servo {
@@ -214,6 +240,8 @@ impl Driver for SimulatedDrives {
         self.refuse_unless(Life::Opened, REFUSED)?;
         self.joints = std::array::from_fn(|i| Motion { position: self.start_position[i], speed: 0.0 });
         self.spindle = Spindle::new(self.options.spindle_time_constant_s, self.period_s);
+        let at = self.real(&self.joints);
+        self.switches.start(&at);
         self.followed = None;
         self.velocity = AxisVector::ZERO;
         self.quick_stopping = false;

@@ -23,17 +23,21 @@
 //! above_mm = 12.5
 //! ```
 //!
-//! Everything is computed from the setpoints and the fine period: no clock, no randomness, so a run repeats bit for bit.
+//! Everything is computed from the setpoints and the fine period: no clock, and what is
+//! random comes from a seed, so a run repeats bit for bit.
 
 mod driver;
 mod joint;
 mod options;
+mod shape;
 mod spindle;
+mod switches;
 mod watchdog;
 
 pub use driver::{SimulatedDrives, WATCHDOG_FAULT};
 pub use joint::CURRENT_A_PER_MM_PER_S2;
 pub use options::{Model, Options, Switch};
+pub use shape::Bore;
 
 use tandem_sdk::{Driver, Made, Plugin, PluginKind};
 

@@ -3,6 +3,8 @@
 use serde::Deserialize;
 use tandem_sdk::{PluginError, parse_options};
 
+use crate::shape::{Bore, Shape};
+
 /// How a joint follows its setpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -14,7 +16,8 @@ pub enum Model {
     SecondOrder,
 }
 
-/// A simulated switch: its input is 1 while the joint stands above a position. A touch plane for probing and homing.
+/// A simulated switch or surface: its input is 1 while the joints stand in a part of space. It has one shape: a joint
+/// above or below a position, a box of joints 0 to 2, or the wall of a bore.
 ///
 /// Several switches may share an input; it is 1 while any of them is on.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -22,10 +25,21 @@ pub enum Model {
 pub struct Switch {
     /// Number of the digital input, 0 to 63.
     pub input: u32,
-    /// Number of the (linear) joint, from 0.
-    pub joint: usize,
+    /// Number of the (linear) joint, from 0, of `above_mm` and `below_mm`.
+    pub joint: Option<usize>,
     /// The input is 1 while the joint's position is greater than this, mm.
-    pub above_mm: f64,
+    pub above_mm: Option<f64>,
+    /// The input is 1 while the joint's position is less than this, mm.
+    pub below_mm: Option<f64>,
+    /// The input is 1 within the box from this corner, mm, …
+    pub low_mm: Option<[f64; 3]>,
+    /// … to this one.
+    pub high_mm: Option<[f64; 3]>,
+    /// The input is 1 at the wall of the bore and beyond.
+    pub bore: Option<Bore>,
+    /// Fine periods after a change in which the input is random.
+    #[serde(default)]
+    pub bounce_periods: u32,
 }
 
 /// Options of the simulated drives; the keys of `[driver.options]`.
@@ -47,6 +61,13 @@ pub struct Options {
     pub watchdog_periods: u32,
     /// Simulated switches on the digital inputs; all other inputs are 0.
     pub switches: Vec<Switch>,
+    /// Whether the drives catch the position at each edge of a switch, between two exchanges.
+    pub latches: bool,
+    /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
+    /// random part of it. Switches are where they are; only homing finds out.
+    pub unknown_start_mm: f64,
+    /// Seed of what is random: bounce and the unknown start.
+    pub seed: u64,
 }
 
 impl Default for Options {
@@ -59,6 +80,9 @@ impl Default for Options {
             quick_stop_deceleration_mm_per_s2: 5000.0,
             watchdog_periods: 5,
             switches: Vec::new(),
+            latches: true,
+            unknown_start_mm: 0.0,
+            seed: 1,
         }
     }
 }
@@ -80,6 +104,7 @@ impl Options {
         within("damping_ratio", self.damping_ratio, 1e-3, 1e3)?;
         within("quick_stop_deceleration_mm_per_s2", self.quick_stop_deceleration_mm_per_s2, 1e-3, 1e9)?;
         within("spindle_time_constant_s", self.spindle_time_constant_s, 0.0, 1e4)?;
+        within("unknown_start_mm", self.unknown_start_mm, 0.0, 1e6)?;
         within("watchdog_periods", f64::from(self.watchdog_periods), 0.0, 100.0)?;
         self.switches.iter().try_for_each(Switch::check)
     }
@@ -90,12 +115,30 @@ impl Switch {
         if self.input > 63 {
             return Err(refusal(&format!("switches: input = {}: the inputs are 0 to 63", self.input)));
         }
-        if !self.above_mm.is_finite() {
-            return Err(refusal(&format!("switches: above_mm = {}: not a position", self.above_mm)));
+        let positions = [self.above_mm, self.below_mm].into_iter().flatten();
+        let corners = [self.low_mm, self.high_mm].into_iter().flatten().flatten();
+        let circle = self.bore.iter().flat_map(|bore| [bore.centre_mm[0], bore.centre_mm[1], bore.radius_mm]);
+        if let Some(wrong) = positions.chain(corners).chain(circle).find(|v| !v.is_finite()) {
+            return Err(refusal(&format!("switches: {wrong}: not a position")));
         }
-        Ok(())
+        within("switches: bounce_periods", f64::from(self.bounce_periods), 0.0, 1e4)?;
+        self.shape().map(|_| ()).ok_or_else(|| refusal(SHAPES))
+    }
+
+    /// Where it is on; none where the keys do not say one shape.
+    pub(crate) fn shape(&self) -> Option<Shape> {
+        match (self.joint, self.above_mm, self.below_mm, self.low_mm, self.high_mm, self.bore) {
+            (Some(joint), Some(mm), None, None, None, None) => Some(Shape::Above { joint, mm }),
+            (Some(joint), None, Some(mm), None, None, None) => Some(Shape::Below { joint, mm }),
+            (None, None, None, Some(low_mm), Some(high_mm), None) => Some(Shape::Box { low_mm, high_mm }),
+            (None, None, None, None, None, Some(bore)) => Some(Shape::Bore(bore)),
+            _ => None,
+        }
     }
 }
+
+/// What a switch is made of.
+const SHAPES: &str = "switches: a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
 
 fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError> {
     // A comparison with NaN is false, so NaN is refused as well.
@@ -123,13 +166,18 @@ mod tests {
     fn every_key_is_read() {
         let text = "model = \"second-order\"\nnatural_frequency_hz = 12\ndamping_ratio = 1.5\n\
                     spindle_time_constant_s = 0.25\nquick_stop_deceleration_mm_per_s2 = 800\nwatchdog_periods = 9\n\
-                    [[switches]]\ninput = 3\njoint = 1\nabove_mm = 12.5\n";
+                    latches = false\nunknown_start_mm = 2.5\nseed = 7\n\
+                    [[switches]]\ninput = 3\njoint = 1\nabove_mm = 12.5\n\
+                    [[switches]]\ninput = 4\nbore = { centre_mm = [1, 2], radius_mm = 3 }\nbounce_periods = 4\n";
         let options = Options::parse(text).unwrap();
         assert_eq!(options.model, Model::SecondOrder);
         assert_eq!((options.natural_frequency_hz, options.damping_ratio), (12.0, 1.5));
         assert_eq!((options.spindle_time_constant_s, options.quick_stop_deceleration_mm_per_s2), (0.25, 800.0));
         assert_eq!(options.watchdog_periods, 9);
-        assert_eq!(options.switches, [Switch { input: 3, joint: 1, above_mm: 12.5 }]);
+        assert_eq!(options.switches[0].shape(), Some(Shape::Above { joint: 1, mm: 12.5 }));
+        assert_eq!(options.switches[1].shape(), Some(Shape::Bore(Bore { centre_mm: [1.0, 2.0], radius_mm: 3.0 })));
+        assert_eq!((options.switches[1].bounce_periods, options.latches), (4, false));
+        assert_eq!((options.unknown_start_mm, options.seed), (2.5, 7));
     }
 
     #[test]
@@ -145,7 +193,9 @@ mod tests {
             ("frequency_hz = 3", "frequency_hz"),
             ("model = \"third-order\"", "third-order"),
             ("[[switches]]\ninput = 64\njoint = 0\nabove_mm = 1", "0 to 63"),
-            ("[[switches]]\ninput = 1\njoint = 0\nabove_mm = nan", "above_mm"),
+            ("[[switches]]\ninput = 1\njoint = 0\nabove_mm = nan", "not a position"),
+            ("[[switches]]\ninput = 1\njoint = 0\nabove_mm = 1\nbelow_mm = 2", "joint and below_mm"),
+            ("unknown_start_mm = -1", "unknown_start_mm"),
             ("[[switches]]\ninput = 1\njoint = 0", "above_mm"),
             ("[[switches]]\ninput = 1\njoint = -1\nabove_mm = 1", "-1"),
         ];

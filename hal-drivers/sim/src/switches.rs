@@ -1,0 +1,81 @@
+//! The simulated switches on the digital inputs: their edges, caught where they are, and their bounce.
+
+use tandem_sdk::{AxisVector, Latch, MAX_LATCHES};
+
+use crate::options::Switch;
+use crate::shape::{Shape, edge, is_on};
+
+/// One digital input with the switches on it.
+#[derive(Clone, Debug, PartialEq)]
+struct Line {
+    input: u32,
+    shapes: Vec<Shape>,
+    bounce_periods: u32,
+    on: bool,
+    /// Periods for which the contact still bounces.
+    bouncing: u32,
+}
+
+/// All inputs. What is caught in a period is reported in that period only.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Switches {
+    lines: Vec<Line>,
+    latching: bool,
+    random: u64,
+}
+
+impl Switches {
+    /// The inputs of checked options; `latching`: edges within a period are caught. Host; allocates.
+    pub fn new(switches: &[Switch], latching: bool, seed: u64) -> Self {
+        let mut lines: Vec<Line> = Vec::new();
+        for switch in switches {
+            let Some(shape) = switch.shape() else { continue };
+            let found = lines.iter().position(|line| line.input == switch.input);
+            let index = found.unwrap_or_else(|| {
+                let (input, shapes) = (switch.input, Vec::new());
+                lines.push(Line { input, shapes, bounce_periods: 0, on: false, bouncing: 0 });
+                lines.len() - 1
+            });
+            lines[index].shapes.push(shape);
+            lines[index].bounce_periods = lines[index].bounce_periods.max(switch.bounce_periods);
+        }
+        // A generator of this kind must not start at zero.
+        Self { lines, latching, random: seed.wrapping_mul(2).wrapping_add(1) }
+    }
+
+    /// The machine stands at `at` and has not moved: nothing bounces.
+    pub fn start(&mut self, at: &AxisVector) {
+        for line in &mut self.lines {
+            (line.on, line.bouncing) = (is_on(line.shapes.iter(), at), 0);
+        }
+    }
+
+    /// The joints went from one position to the other in a period: the inputs, and the positions caught. Fine loop.
+    pub fn step(&mut self, from: &AxisVector, to: &AxisVector) -> (u64, [Latch; MAX_LATCHES]) {
+        let (mut inputs, mut latches) = (0, [Latch::default(); MAX_LATCHES]);
+        let mut free = latches.iter_mut();
+        for line in &mut self.lines {
+            let shapes = &line.shapes;
+            let on = is_on(shapes.iter(), to);
+            if on != line.on {
+                (line.on, line.bouncing) = (on, line.bounce_periods);
+                if let Some(latch) = free.next().filter(|_| self.latching) {
+                    let position = edge(from, to, |at| is_on(shapes.iter(), at));
+                    *latch = Latch { input: line.input, edge: if on { 1 } else { 2 }, position };
+                }
+            }
+            let shown = if line.bouncing > 0 { random_bit(&mut self.random) } else { line.on };
+            line.bouncing = line.bouncing.saturating_sub(1);
+            inputs |= u64::from(shown) << line.input;
+        }
+        (inputs, latches)
+    }
+}
+
+/// The next bit of an xorshift generator.
+fn random_bit(state: &mut u64) -> bool {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state >> 63 == 1
+}
