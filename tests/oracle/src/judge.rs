@@ -39,7 +39,7 @@ pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options)
     if report.findings.is_empty() {
         judge_limits(&trace.rows, machine, options, &mut report);
         if options.asks_program() {
-            match program::read(program, machine, options) {
+            match program::read(program, machine, options, &trace.rows) {
                 Ok(path) => judge_program(&path, trace, machine, options, &mut report),
                 Err(unread) => not_judged = Some(unread.to_string()),
             }

@@ -11,7 +11,7 @@ use std::fmt;
 use line::Line;
 use state::State;
 
-use crate::{Machine, Options, path::Path};
+use crate::{Machine, Options, Row, path::Path};
 
 /// Why a program could not be read.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,9 +28,11 @@ impl fmt::Display for Unread {
     }
 }
 
-/// Reads a program into the path of the machine's axes, from where the machine stands.
-pub fn read(program: &str, machine: &Machine, options: &Options) -> Result<Path, Unread> {
-    let mut state = State::new(machine);
+/// Reads a program into the path of the machine's axes, from where the machine stands. Where a probe came to rest is
+/// read off the trace.
+pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -> Result<Path, Unread> {
+    let mut state = State::new(machine, rows);
+    let program = program.strip_prefix('\u{feff}').unwrap_or(program);
     let mut percent_signs = 0;
     for (index, text) in program.lines().enumerate() {
         let unread = |cause| Unread { line: index + 1, cause };

@@ -155,3 +155,32 @@ fn a_program_that_moves_nothing_wants_samples_that_stand() {
     let moved = stop_at_all(&[at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0)], 50.0, 990.0);
     assert_eq!(verdict(&moved, "G4 P1\nM2\n").kinds(), [Kind::PathDeviation, Kind::EndPoint]);
 }
+
+#[test]
+fn a_probe_ends_where_the_trace_says_if_that_lies_on_its_line() {
+    // The lines of the trace: 1 to the touch, 2 and 3 behind it.
+    let drive = |points: &[Position]| {
+        let mut samples = trace(&stop_at_all(points, 50.0, 990.0));
+        let touch = points[1];
+        let seen = samples.rows.iter().position(|row| row.command == touch).unwrap();
+        for (index, row) in samples.rows.iter_mut().enumerate() {
+            row.line = if index <= seen { 1 } else { 2 };
+        }
+        samples
+    };
+    let program = "G38.2 X10 F3000\nG91 G1 Y2\nG10 L20 P1 X1\nG90 G31 X3.5\n";
+    let fair = [at(0.0, 0.0, 0.0), at(4.0, 0.0, 0.0), at(4.0, 2.0, 0.0), at(6.5, 2.0, 0.0)];
+    assert_passes(&judge(&drive(&fair), program, &smooth_machine(), &Options::default()));
+    for (point, axis, value) in [(1, 1, 0.5), (2, 0, 4.5), (3, 0, 7.0)] {
+        let mut wrong = fair;
+        wrong[point][axis] = value;
+        let verdict = judge(&drive(&wrong), program, &smooth_machine(), &Options::default());
+        assert_eq!(verdict.outcome, Outcome::Fail, "point {point}");
+    }
+    is_not_judged("G38.2 X1 F100\nG1 X#5061\n", "program line 2: unknown word X#5061");
+}
+
+#[test]
+fn the_mark_of_utf_8_is_no_word() {
+    visits("\u{feff}G1 X5 F3000\n", &[at(0.0, 0.0, 0.0), at(5.0, 0.0, 0.0)]);
+}

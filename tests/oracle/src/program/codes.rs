@@ -8,6 +8,8 @@ use super::{
 /// What the codes of one line say about that line alone.
 pub struct LineCodes {
     pub axis_words: AxisWords,
+    /// The motion of this line only: G31.
+    pub once: Option<Motion>,
     /// G53
     pub machine_coordinates: bool,
     /// M2 or M30
@@ -20,12 +22,13 @@ const QUIET_M_CODES: [i32; 13] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 48, 49, 60, 61];
 impl State<'_> {
     /// Puts the codes of a line in force.
     pub fn modal_codes(&mut self, line: &mut Line) -> Result<LineCodes, String> {
-        let mut codes = LineCodes { axis_words: AxisWords::Motion, machine_coordinates: false, ends: false };
+        let mut codes =
+            LineCodes { axis_words: AxisWords::Motion, once: None, machine_coordinates: false, ends: false };
         // Units first: they hold for every other word of the line.
         for &code in line.g.iter().filter(|&&code| code == 200 || code == 210) {
             self.unit_mm = if code == 200 { 25.4 } else { 1.0 };
         }
-        if line.g.iter().filter(|&&code| code <= 30).count() > 1 {
+        if line.g.iter().filter(|&&code| matches!(code, 0..=30 | 310 | 382..=385)).count() > 1 {
             return Err("two motion words".into());
         }
         for code in std::mem::take(&mut line.g) {
@@ -43,6 +46,7 @@ impl State<'_> {
             0 => self.motion = Some(Motion::Rapid),
             10 => self.motion = Some(Motion::Feed),
             20 | 30 => self.motion = Some(Motion::Arc { clockwise: code == 20 }),
+            382..=385 => self.motion = Some(Motion::Probe),
             800 => self.motion = None,
             170 => self.plane = [0, 1, 2],
             180 => self.plane = [2, 0, 1],
@@ -93,6 +97,10 @@ fn line_code(code: i32, codes: &mut LineCodes) -> Result<bool, String> {
         920 => AxisWords::Shift,
         530 => {
             codes.machine_coordinates = true;
+            return Ok(true);
+        }
+        310 => {
+            codes.once = Some(Motion::Probe);
             return Ok(true);
         }
         _ => return Ok(false),

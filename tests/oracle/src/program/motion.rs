@@ -21,15 +21,18 @@ impl State<'_> {
     /// Moves to where the axis words of a line say.
     pub fn move_axes(&mut self, line: &mut Line, codes: &LineCodes, number: usize) -> Result<(), String> {
         let axes = self.take_axes(line)?;
-        let is_arc = matches!(self.motion, Some(Motion::Arc { .. }));
+        let is_arc = codes.once.is_none() && matches!(self.motion, Some(Motion::Arc { .. }));
         if axes.is_empty() && !(is_arc && ['I', 'J', 'K', 'R'].into_iter().any(|letter| line.has(letter))) {
             return Ok(());
         }
-        let motion = self.motion.ok_or("axis words without a motion word")?;
+        let motion = codes.once.or(self.motion).ok_or("axis words without a motion word")?;
         if is_arc && codes.machine_coordinates {
             return Err("G53 with an arc".into());
         }
-        let target = self.target(&axes, codes.machine_coordinates);
+        let mut target = self.target(&axes, codes.machine_coordinates);
+        if motion == Motion::Probe {
+            target = self.probed(target, number);
+        }
         let shapes = match motion {
             Motion::Arc { clockwise } => pieces(&arc::build(self, line, &target, clockwise)?),
             _ if target == self.position => Vec::new(),
@@ -50,6 +53,15 @@ impl State<'_> {
             };
         }
         target
+    }
+
+    /// Where a probe ends: the point of its line next to where the trace leaves the program line. So a machine that
+    /// comes to rest beside the line is off its path.
+    fn probed(&self, target: Position, number: usize) -> Position {
+        let rest = self.rows.iter().rfind(|row| row.line as usize == number);
+        let Some(rest) = rest.filter(|_| target != self.position) else { return target };
+        let line = path::Line::new(self.position, target);
+        line.at(line.foot(&rest.command).clamp(0.0, 1.0))
     }
 
     fn append(&mut self, shapes: Vec<Shape>, motion: Motion, target: &Position, number: usize) -> Result<(), String> {
@@ -74,7 +86,7 @@ impl State<'_> {
             feed,
             moves_linear,
             tolerance_mm: self.tolerance_mm.unwrap_or(self.machine.path_tolerance_mm),
-            exact_stop: self.exact_stop && index == last,
+            exact_stop: (self.exact_stop || motion == Motion::Probe) && index == last,
         }));
         Ok(())
     }

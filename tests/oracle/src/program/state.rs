@@ -2,7 +2,7 @@
 
 use super::line::Line;
 use crate::{
-    LETTERS, Machine, Position,
+    LETTERS, Machine, Position, Row,
     path::{Element, Path},
 };
 
@@ -11,6 +11,8 @@ use crate::{
 pub enum Motion {
     Rapid,
     Feed,
+    /// G31 and G38.2 to G38.5: a straight line that may end early.
+    Probe,
     /// G2 or G3: clockwise or not.
     Arc {
         clockwise: bool,
@@ -30,7 +32,7 @@ pub enum FeedMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisWords {
     Motion,
-    /// G10 L2
+    /// G10 L2 and L20
     WorkOffset,
     /// G92
     Shift,
@@ -38,6 +40,8 @@ pub enum AxisWords {
 
 pub struct State<'a> {
     pub machine: &'a Machine,
+    /// The trace, for what no program says: where probes came to rest.
+    pub rows: &'a [Row],
     /// Machine coordinates, mm and deg.
     pub position: Position,
     pub motion: Option<Motion>,
@@ -60,9 +64,10 @@ pub struct State<'a> {
 }
 
 impl<'a> State<'a> {
-    pub fn new(machine: &'a Machine) -> Self {
+    pub fn new(machine: &'a Machine, rows: &'a [Row]) -> Self {
         Self {
             machine,
+            rows,
             position: machine.start(),
             motion: None,
             plane: [0, 1, 2],
@@ -135,17 +140,19 @@ impl<'a> State<'a> {
 
     fn set_work_offset(&mut self, line: &mut Line) -> Result<(), String> {
         let (Some(table), Some(system)) = (line.take('L'), line.take('P')) else {
-            return Err("G10 without L2 and P".into());
+            return Err("G10 without L2 or L20 and P".into());
         };
-        if table != 2.0 || system.fract() != 0.0 || !(0.0..=9.0).contains(&system) {
+        let here = table == 20.0;
+        if !(here || table == 2.0) || system.fract() != 0.0 || !(0.0..=9.0).contains(&system) {
             return Err(format!("G10 L{table} P{system}"));
         }
-        if self.incremental {
+        if self.incremental && !here {
             return Err("G10 L2 with G91: controls differ in what it means".into());
         }
         let system = if system == 0.0 { self.work_system } else { system as usize - 1 };
         for (axis, value) in self.take_axes(line)? {
-            self.work_offsets[system][axis] = value;
+            let origin = if here { self.position[axis] - self.shift[axis] - value } else { value };
+            self.work_offsets[system][axis] = origin;
         }
         Ok(())
     }
