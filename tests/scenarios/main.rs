@@ -16,6 +16,7 @@ mod latency;
 mod optimal_stop;
 mod overrides;
 mod plan;
+mod probing;
 mod program_flow;
 mod random;
 mod replay;

@@ -117,7 +117,10 @@ impl Switch {
         }
         let positions = [self.above_mm, self.below_mm].into_iter().flatten();
         let corners = [self.low_mm, self.high_mm].into_iter().flatten().flatten();
-        let circle = self.bore.iter().flat_map(|bore| [bore.centre_mm[0], bore.centre_mm[1], bore.radius_mm]);
+        let circle = self
+            .bore
+            .iter()
+            .flat_map(|bore| [bore.centre_mm[0], bore.centre_mm[1], bore.radius_mm, bore.top_mm.unwrap_or(0.0)]);
         if let Some(wrong) = positions.chain(corners).chain(circle).find(|v| !v.is_finite()) {
             return Err(refusal(&format!("switches: {wrong}: not a position")));
         }
@@ -175,7 +178,10 @@ mod tests {
         assert_eq!((options.spindle_time_constant_s, options.quick_stop_deceleration_mm_per_s2), (0.25, 800.0));
         assert_eq!(options.watchdog_periods, 9);
         assert_eq!(options.switches[0].shape(), Some(Shape::Above { joint: 1, mm: 12.5 }));
-        assert_eq!(options.switches[1].shape(), Some(Shape::Bore(Bore { centre_mm: [1.0, 2.0], radius_mm: 3.0 })));
+        assert_eq!(
+            options.switches[1].shape(),
+            Some(Shape::Bore(Bore { centre_mm: [1.0, 2.0], radius_mm: 3.0, top_mm: None }))
+        );
         assert_eq!((options.switches[1].bounce_periods, options.latches), (4, false));
         assert_eq!((options.unknown_start_mm, options.seed), (2.5, 7));
     }
