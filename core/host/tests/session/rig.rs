@@ -78,7 +78,7 @@ impl Rig {
             dry_run: false,
         };
         let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { unreachable!("it is a driver") };
-        let mut driver = make("switches = [{ input = 0, joint = 0, above_mm = 12.5 }]").unwrap();
+        let mut driver = make("latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]").unwrap();
         driver.open(&DriverContext::new(3, PERIOD_S)).unwrap();
         driver.start().unwrap();
         let mut fine = FineLoop::new(&config, fine_end, driver, None);
