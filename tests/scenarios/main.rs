@@ -23,5 +23,6 @@ mod replay;
 mod report;
 mod starvation;
 mod stopping_time;
+mod stops;
 mod system_calls;
 mod trace;

@@ -155,3 +155,41 @@ fn what_is_no_trace_is_refused() {
     assert_eq!(trace(&["info".as_ref(), &folder.path().join("none.ttr")]).0, 1);
     assert_eq!(trace(&["export".as_ref(), &program]).0, 2);
 }
+
+const COMMANDS: &str = "0,feed-override,0.7\n150,hold\n400,resume\n500,feed-override,1\n501,rapid-override,0.25\n\
+    700,single-block,1\n720,single-block,0\n800,stall-rough,60\n1500,abort\n";
+
+#[test]
+fn the_commands_of_a_run_are_in_its_trace_and_give_the_same_run_again() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("given.csv"), COMMANDS).unwrap();
+    let (program, machine) = (root().join("examples/programs/serpentine.ngc"), mill());
+    let driven = |commands: &str, name: &str| {
+        let (commands, path) = (at(commands), at(name));
+        let [run, on, by, to] = ["run", "--machine", "--commands", "--trace"].map(Path::new);
+        let output = tandem(&[run, &program, on, &machine, by, &commands, to, &path]);
+        assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+        path
+    };
+    let first = driven("given.csv", "first.ttr");
+    let [ttr, csv, commands] = ["first.ttr", "first.csv", "commands.csv"].map(at);
+    let [export, to, with] = ["export", "--csv", "--commands"].map(Path::new);
+    assert_eq!(trace(&[export, &ttr, to, &csv, with, &commands]).0, 0);
+    let written = std::fs::read_to_string(&commands).unwrap();
+    assert_eq!(written, format!("# tick,command[,value]\n{COMMANDS}"));
+    let second = driven("commands.csv", "second.ttr");
+    assert!(std::fs::read(&first).unwrap() == std::fs::read(&second).unwrap());
+    let (_, said, _) = trace(&["info".as_ref(), &first]);
+    assert!(said.contains("commands     9") && said.contains("  501,rapid-override,0.25"), "{said}");
+}
+
+#[test]
+fn a_trace_of_format_1_is_read() {
+    let old = root().join("tests/fixtures/traces/format-1.ttr");
+    let (status, said, _) = trace(&["info".as_ref(), &old]);
+    assert_eq!(status, 0, "{said}");
+    for words in ["format 1", "program      old.ngc\n", "commands     0", "complete"] {
+        assert!(said.contains(words), "{words:?} is not in {said}");
+    }
+}

@@ -107,6 +107,9 @@ pub enum Trace {
         /// The file to write
         #[arg(long, value_name = "F.csv")]
         csv: PathBuf,
+        /// Write the operator's commands, for `tandem run --commands`
+        #[arg(long, value_name = "F.csv")]
+        commands: Option<PathBuf>,
     },
     /// Print what a binary trace holds, and whether it is complete
     Info {

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use tandem_host::{
-    BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, StopAnswer, Summary, Switches, Timed,
+    BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Stop, StopAnswer, Summary, Switches, Timed,
 };
 use tandem_machine::Machine;
 use tandem_rings::Sample;
@@ -107,7 +107,7 @@ struct Sinks {
 impl Sinks {
     fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run) -> Result<Self, String> {
         let signals = run.signals();
-        let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, signals));
+        let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         Ok(Self {
@@ -159,6 +159,12 @@ impl RunObserver for Sinks {
         if pressed { StopAnswer::GoOn } else { StopAnswer::Nobody }
     }
 
+    fn command(&mut self, command: &Timed) {
+        if let Some(trace) = &mut self.trace {
+            trace.command(command);
+        }
+    }
+
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         self.progress.sample(sample);
         if let Some(trace) = &mut self.trace {
@@ -200,6 +206,25 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     if fault.is_some() || stopped.is_some() { FAULT } else { 0 }
 }
 
+/// The stop that took longest to come to rest.
+fn longest(stops: &[Stop]) -> Option<&Stop> {
+    stops.iter().max_by(|a, b| a.time_s.total_cmp(&b.time_s).then(b.tick.cmp(&a.tick)))
+}
+
+fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> std::io::Result<()> {
+    let Stop { tick, line, cause, time_s, distance_mm, .. } = stop;
+    let reaction = match stop.reaction_periods {
+        Some(1) => "slower from the first sample".to_string(),
+        Some(periods) => format!("slower from sample {periods}"),
+        None => "nothing to slow down".to_string(),
+    };
+    let count = summary.stop_count;
+    writeln!(
+        out,
+        "stops {count}, the longest: {cause} at tick {tick}, line {line}: {reaction}, {time_s:.3} s, {distance_mm:.3} mm"
+    )
+}
+
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {
     let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
     let dry = if summary.dry_run { "dry run of " } else { "" };
@@ -215,6 +240,9 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
         "limit violations {limit_violations}, guard stops {guard_stops}, governed samples {governed_samples}, \
          starvations {starvations}, path deviation {deviation_um:.3} µm"
     )?;
+    if let Some(stop) = longest(&summary.stops) {
+        print_stop(out, summary, stop)?;
+    }
     let files = [
         ("trace", &options.trace),
         ("blocks", &options.blocks),

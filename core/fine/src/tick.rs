@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
-use tandem_rings::{Controls, Depth, FineEnd, MachineState, Ratio, Rest, Sample, Status};
+use tandem_rings::{Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause};
 use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, Setpoint};
 
 use crate::config::FineConfig;
@@ -62,6 +62,8 @@ pub struct FineLoop {
     kinematics: Option<Box<dyn Kinematics>>,
     joints: usize,
     controls: Arc<Controls>,
+    given: Given,
+    cause: StopCause,
     status: Arc<Status>,
     depth: Arc<Depth>,
     samples: Producer<Sample>,
@@ -102,6 +104,8 @@ impl FineLoop {
             joints: kinematics.as_ref().map_or(axes, |k| k.joint_count(axes)),
             kinematics,
             controls: end.controls,
+            given: Given::default(),
+            cause: StopCause::None,
             status: end.status,
             depth: end.depth,
             samples: end.samples,
@@ -130,6 +134,8 @@ impl FineLoop {
 
     /// One fine period: fine thread, no allocation, bounded work.
     pub fn tick(&mut self) {
+        self.given = Given::of(&self.controls);
+        self.cause = StopCause::None;
         let ended = self.outputs.ended;
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();
@@ -184,7 +190,7 @@ impl FineLoop {
     }
 
     fn next_position(&mut self) -> (AxisVector, Input) {
-        if self.controls.emergency_stop.load(Relaxed) {
+        if self.given.emergency_stop {
             self.fail(FaultKind::EmergencyStop);
         }
         match &mut self.phase {
@@ -192,11 +198,15 @@ impl FineLoop {
             Phase::Following => self.follow(),
             Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
+                self.cause = StopCause::Fault;
                 let position = ramp.next();
                 let over = ramp.is_over();
                 (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }
-            Phase::Faulted => (*self.guard.position(), Input::Stopped),
+            Phase::Faulted => {
+                self.cause = StopCause::Fault;
+                (*self.guard.position(), Input::Stopped)
+            }
         }
     }
 
@@ -209,7 +219,7 @@ impl FineLoop {
         if self.state != MachineState::Standstill {
             return Input::Rest;
         }
-        if self.controls.abort.load(Relaxed) {
+        if self.given.abort {
             return self.part(Stop::abort());
         }
         if self.depth.may_start(self.cursor.program_time_s()) {

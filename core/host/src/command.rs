@@ -1,5 +1,6 @@
 //! The operator's commands.
 
+use std::fmt;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::Controls;
@@ -68,6 +69,24 @@ impl Timed {
     }
 }
 
+impl fmt::Display for Timed {
+    /// The line that [`Timed::parse`] reads.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},", self.tick)?;
+        match self.command {
+            Command::Hold => write!(f, "hold"),
+            Command::Resume => write!(f, "resume"),
+            Command::FeedOverride(ratio) => write!(f, "feed-override,{ratio}"),
+            Command::RapidOverride(ratio) => write!(f, "rapid-override,{ratio}"),
+            Command::OptionalStop(on) => write!(f, "optional-stop,{}", u8::from(on)),
+            Command::SingleBlock(on) => write!(f, "single-block,{}", u8::from(on)),
+            Command::EmergencyStop => write!(f, "emergency-stop"),
+            Command::Abort => write!(f, "abort"),
+            Command::StallRough(periods) => write!(f, "stall-rough,{periods}"),
+        }
+    }
+}
+
 impl Command {
     fn parse(name: &str, value: Option<&str>) -> Result<Self, String> {
         let number = || -> Result<f64, String> {
@@ -104,6 +123,14 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let lines = ["1,hold", "2,resume", "3,feed-override,0.1", "4,rapid-override,1", "5,optional-stop,1"];
+        for line in lines.into_iter().chain(["6,single-block,0", "7,emergency-stop", "8,abort", "9,stall-rough,7"]) {
+            assert_eq!(Timed::parse(line).unwrap().to_string(), line);
+        }
+    }
 
     #[test]
     fn lines_of_a_command_file() {

@@ -4,6 +4,7 @@
 //! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
 
 mod command;
+mod command_log;
 mod dry_run;
 mod error;
 mod fault_text;
@@ -20,6 +21,7 @@ mod registry;
 mod rules;
 mod run;
 mod setup;
+mod stops;
 mod strategy;
 mod summary;
 mod virtual_clock;
@@ -36,4 +38,5 @@ pub use realtime_periods::Timing;
 pub use record::{BlocksCsv, Output, TraceCsv};
 pub use registry::Registry;
 pub use run::{Clock, Outcome, Run, Switches, check_program};
+pub use stops::Stop;
 pub use summary::{LatenessUs, Summary};

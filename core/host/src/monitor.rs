@@ -5,6 +5,7 @@ use tandem_rings::Sample;
 use tandem_sdk::{AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
 
 use crate::path_watch::PathWatch;
+use crate::stops::StopWatch;
 
 /// Watches a run. Finite differences at the fine period, with rest before the first sample.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ pub struct Monitor {
     pub nominal_s: f64,
     /// The last position sent.
     pub position: AxisVector,
+    /// What each stop took.
+    pub stops: StopWatch,
     watch: PathWatch,
 }
 
@@ -40,6 +43,7 @@ impl Monitor {
             length_mm: 0.0,
             nominal_s: 0.0,
             position: machine.start,
+            stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::default(),
         }
     }
@@ -76,6 +80,7 @@ impl Monitor {
         if self.samples == 0 {
             self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
         }
+        self.stops.sample(sample);
         self.samples += 1;
         let velocity = (sample.command - self.last[0]) * (1.0 / self.period_s);
         let acceleration = (velocity - self.last[1]) * (1.0 / self.period_s);

@@ -3,10 +3,12 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
-use tandem_rings::{HostEnd, Rest, RestCause, Sample};
+use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event};
 
+use crate::command::{Command, Timed};
+use crate::command_log::CommandLog;
 use crate::monitor::Monitor;
 use crate::strategy::StrategyRunner;
 
@@ -41,6 +43,9 @@ pub trait RunObserver {
     /// The machine came to a rest that ends an epoch: a probe touched, or the operator aborted.
     fn rest(&mut self, _rest: &Rest) {}
 
+    /// A command of the operator, or of the command file, acts in its tick; told before the sample of that tick.
+    fn command(&mut self, _command: &Timed) {}
+
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
 }
@@ -58,6 +63,7 @@ pub struct Pump<'a> {
     pub soft_error: Option<String>,
     /// The rest of the operator's abort.
     pub aborted: Option<Rest>,
+    commands: CommandLog,
     pub planning_ns: u128,
 }
 
@@ -69,7 +75,8 @@ impl<'a> Pump<'a> {
         monitor: Monitor,
         observer: &'a mut dyn RunObserver,
     ) -> Self {
-        Self { rough, host, strategy, monitor, observer, soft_error: None, aborted: None, planning_ns: 0 }
+        let commands = CommandLog::new(Given::of(&host.controls));
+        Self { rough, host, strategy, monitor, observer, soft_error: None, aborted: None, commands, planning_ns: 0 }
     }
 
     /// One rough period.
@@ -90,9 +97,20 @@ impl<'a> Pump<'a> {
         self.observer.note(note);
     }
 
+    /// Gives a command of the command file to the fine loop, or does what it says of the rough loop.
+    pub fn give(&mut self, timed: &Timed) {
+        timed.command.give(&self.host.controls);
+        if matches!(timed.command, Command::StallRough(_)) {
+            self.observer.command(timed);
+        }
+    }
+
     /// Takes the samples that have come.
     pub fn drain(&mut self) {
         while let Ok(sample) = self.host.samples.pop() {
+            for command in self.commands.sample(&sample) {
+                self.observer.command(&command);
+            }
             let deviation_mm = self.monitor.sample(&sample);
             let signals = self.strategy.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
             let count = self.strategy.as_ref().map_or(0, |s| s.signals().len());

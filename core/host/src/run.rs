@@ -267,6 +267,8 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         end_position_mm: each(&monitor.position),
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
+        stops: monitor.stops.stops.clone(),
+        stop_count: monitor.stops.count,
         fault: None,
         stopped: None,
     }

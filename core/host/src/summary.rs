@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::lateness::Lateness;
 use crate::realtime::PageFaults;
+use crate::stops::Stop;
 
 /// Number of the summary format.
 pub const FORMAT: u32 = 1;
@@ -77,6 +78,10 @@ pub struct Summary {
     pub wall_time_s: f64,
     /// Time spent in the rough loop a block, ns.
     pub planning_ns_per_block: f64,
+    /// The stops, the first thousand: holds, program stops, starvation, aborts and faults.
+    pub stops: Vec<Stop>,
+    /// How many stops there were.
+    pub stop_count: u64,
     /// The fault that ended the run, in words.
     pub fault: Option<String>,
     /// What ended the run before its program was over, without a fault: the operator's abort, in words.

@@ -22,7 +22,7 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         stalled = u64::saturating_sub(stalled, 1);
         for _ in 0..fine_per_rough {
             while let Some(timed) = commands.next_if(|timed| timed.tick <= fine.next_tick()) {
-                timed.command.give(&pump.host.controls);
+                pump.give(timed);
                 if let Command::StallRough(periods) = timed.command {
                     stalled += periods;
                 }

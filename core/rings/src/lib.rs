@@ -6,14 +6,16 @@
 mod atomics;
 mod controls;
 mod counts;
+mod given;
 mod rest;
 mod sample;
 
 pub use atomics::{AtomicF64, Depth, STOP_SHARE};
 pub use controls::{Controls, Status};
 pub use counts::Counts;
+pub use given::Given;
 pub use rest::{Rest, RestCause};
-pub use sample::{MachineState, Sample};
+pub use sample::{MachineState, Sample, StopCause};
 
 use std::sync::Arc;
 

@@ -2,6 +2,8 @@
 
 use tandem_sdk::AxisVector;
 
+use crate::Given;
+
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
@@ -46,6 +48,44 @@ impl MachineState {
     }
 }
 
+/// Why the machine is being stopped, or kept at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StopCause {
+    /// It is not.
+    #[default]
+    None,
+    /// Feed hold.
+    Hold,
+    /// The program waits for the operator.
+    ProgramStop,
+    /// The queue ran low.
+    Starvation,
+    /// An input edge ends the motion, or it had the level waited for before.
+    Edge,
+    /// The operator's abort.
+    Abort,
+    /// A fault on the soft side: the machine stops on the path.
+    SoftFault,
+    /// Any other fault: the axes ramp out.
+    Fault,
+}
+
+impl StopCause {
+    /// The cause as people and programs read it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Hold => "hold",
+            Self::ProgramStop => "program stop",
+            Self::Starvation => "starvation",
+            Self::Edge => "input edge",
+            Self::Abort => "abort",
+            Self::SoftFault => "soft fault",
+            Self::Fault => "fault",
+        }
+    }
+}
+
 /// One fine period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
@@ -75,4 +115,8 @@ pub struct Sample {
     pub ratio: f64,
     /// Spindle speed read back, rad/s.
     pub spindle_rad_per_s: f64,
+    /// Why the machine is being stopped, as this position was chosen.
+    pub cause: StopCause,
+    /// What the operator asked for in this period.
+    pub given: Given,
 }

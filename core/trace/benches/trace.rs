@@ -18,6 +18,7 @@ fn header() -> Header {
         machine: "mill".to_string(),
         program: "circle".to_string(),
         planner: "look-ahead".to_string(),
+        dry_run: false,
         signals: vec![],
     }
 }

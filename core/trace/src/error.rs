@@ -20,7 +20,7 @@ pub enum Cause {
     #[error("not a Tandem trace (its first bytes are others)")]
     Magic,
     /// Another format number.
-    #[error("the trace has format {0}, this program reads format {expected}", expected = crate::FORMAT)]
+    #[error("the trace has format {0}, this program reads formats 1 to {expected}", expected = crate::FORMAT)]
     Format(u32),
     /// The file ends within the header; nothing can be read without it.
     #[error("the file ends within its header")]

@@ -17,6 +17,8 @@ const LENGTH_BITS: u32 = 14;
 /// What a record is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// A command of the operator, as text.
+    Command = 0,
     /// A sample, as what differs from the ones before.
     Sample = 1,
     /// A sample on its own, with its number.
@@ -27,7 +29,7 @@ pub enum Kind {
 
 impl Kind {
     fn from_number(number: u16) -> Option<Self> {
-        [Self::Sample, Self::Key, Self::End].into_iter().find(|kind| *kind as u16 == number)
+        [Self::Command, Self::Sample, Self::Key, Self::End].into_iter().find(|kind| *kind as u16 == number)
     }
 
     /// Whether reading can begin here.

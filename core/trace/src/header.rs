@@ -10,8 +10,8 @@ use crate::words::Shape;
 
 /// The first bytes of a trace: not text, and spoilt by whatever rewrites line ends.
 pub const MAGIC: [u8; 8] = *b"\x89TTR\r\n\x1a\n";
-/// The format that is written and read.
-pub const FORMAT: u32 = 1;
+/// The format that is written. Format 1, without commands and dry runs, is read too.
+pub const FORMAT: u32 = 2;
 /// Bytes before the body: magic, format, length of the body.
 const FIXED_BYTES: usize = MAGIC.len() + 4 + 4;
 /// Most bytes of the body, so that a damaged length asks for no memory.
@@ -30,6 +30,8 @@ pub struct Header {
     pub program: String,
     /// Name of the planner.
     pub planner: String,
+    /// Nothing was switched, and feed motion ran at the dry-run feed.
+    pub dry_run: bool,
     /// Names of the feed strategy's signals, at most [`MAX_SIGNALS`].
     pub signals: Vec<String>,
 }
@@ -66,14 +68,15 @@ impl Header {
         for name in &self.signals {
             put_text(&mut body, name);
         }
+        body.push(u8::from(self.dry_run));
         body
     }
 
-    /// Takes the header and its checksum from the start of a trace.
-    pub(crate) fn take(source: &mut Source<impl Read>) -> Result<(Self, u32), TraceError> {
+    /// Takes the header, its format and its checksum from the start of a trace.
+    pub(crate) fn take(source: &mut Source<impl Read>) -> Result<(Self, u32, u32), TraceError> {
         let bytes = source.peek(FIXED_BYTES).map_err(|e| TraceError::at(0, e))?;
         let (format, length) = fixed(bytes).map_err(|(offset, cause)| TraceError::at(offset, cause))?;
-        if format != FORMAT {
+        if !(1..=FORMAT).contains(&format) {
             return Err(TraceError::at(MAGIC.len() as u64, Cause::Format(format)));
         }
         if length > MAX_BODY_BYTES {
@@ -90,25 +93,27 @@ impl Header {
         if checksum != u32::from_le_bytes(*stored) {
             return Err(TraceError::at(0, Cause::Header("its checksum differs")));
         }
-        let header = Self::parse(body).map_err(|cause| TraceError::at(FIXED_BYTES as u64, Cause::Header(cause)))?;
+        let header =
+            Self::parse(body, format).map_err(|cause| TraceError::at(FIXED_BYTES as u64, Cause::Header(cause)))?;
         source.skip(whole);
-        Ok((header, checksum))
+        Ok((header, format, checksum))
     }
 
-    fn parse(body: &[u8]) -> Result<Self, &'static str> {
+    fn parse(body: &[u8], format: u32) -> Result<Self, &'static str> {
         let mut body = Body(body);
         let fine_period_s = f64::from_le_bytes(*body.chunk::<8>()?);
         let axes = body.axes()?;
         let [machine, program, planner] = [body.text()?, body.text()?, body.text()?];
         let [count] = *body.chunk::<1>()?;
         let signals = (0..count).map(|_| body.text()).collect::<Result<Vec<_>, _>>()?;
+        let dry_run = format > 1 && *body.chunk::<1>()? == [1];
         if !body.0.is_empty() || signals.len() > MAX_SIGNALS {
             return Err("it holds more than it should");
         }
         if !fine_period_s.is_finite() || fine_period_s <= 0.0 {
             return Err("its period is none");
         }
-        Ok(Self { fine_period_s, axes, machine, program, planner, signals })
+        Ok(Self { fine_period_s, axes, machine, program, planner, dry_run, signals })
     }
 }
 

@@ -39,11 +39,13 @@ pub struct Damage {
 }
 
 /// What a trace holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // nearly every item is the large one, and none is kept
 pub enum Item {
     /// A sample.
     Record(Record),
+    /// A command of the operator, as a line of a command file; it stands before the sample of its tick.
+    Command(String),
     /// Something that is none.
     Damage(Damage),
 }
@@ -64,6 +66,7 @@ pub enum Ending {
 pub struct Reader<R> {
     source: Source<R>,
     header: Header,
+    format: u32,
     seeds: Seeds,
     history: History,
     /// Number of the next record.
@@ -79,14 +82,19 @@ impl<R: Read> Reader<R> {
     /// It is no trace, of another format, or its header is damaged: nothing can be read then.
     pub fn new(inner: R) -> Result<Self, TraceError> {
         let mut source = Source::new(inner);
-        let (header, checksum) = Header::take(&mut source)?;
+        let (header, format, checksum) = Header::take(&mut source)?;
         let seeds = Seeds { header: checksum, previous: None };
-        Ok(Self { source, header, seeds, history: History::EMPTY, next: 0, ending: None, failed: false })
+        Ok(Self { source, header, format, seeds, history: History::EMPTY, next: 0, ending: None, failed: false })
     }
 
     /// What the trace is of.
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// Number of the format that it is written in.
+    pub fn format(&self) -> u32 {
+        self.format
     }
 
     /// How the trace ends; known once everything is read.
@@ -97,7 +105,7 @@ impl<R: Read> Reader<R> {
     fn read(&mut self) -> Result<Option<Item>, TraceError> {
         let from = self.source.offset();
         match self.look()? {
-            Ok(found) if found.number == self.next => self.take(&found),
+            Ok(found) if found.number == self.next => self.take(found),
             Ok(found) => Ok(Some(self.damage(from, &found, "records are missing here"))),
             Err(flaw) => self.search(from, flaw),
         }
@@ -111,12 +119,20 @@ impl<R: Read> Reader<R> {
         Ok(frame.and_then(|frame| Found::decode(&frame, self.next, &self.history, self.header.shape())))
     }
 
-    fn take(&mut self, found: &Found) -> Result<Option<Item>, TraceError> {
+    fn take(&mut self, found: Found) -> Result<Option<Item>, TraceError> {
         let offset = self.source.offset();
         self.source.skip(found.length);
-        let Some((row, sample, signals)) = found.row else {
-            self.ending = Some(Ending::Complete);
-            return self.rest();
+        let (row, sample, signals) = match found.content {
+            Content::Row(row, sample, signals) => (row, sample, signals),
+            Content::Command(text) => {
+                // Behind damage the next sample still needs a key: a command has no row to go on from.
+                self.seeds.previous = self.seeds.previous.map(|_| found.checksum);
+                return Ok(Some(Item::Command(text)));
+            }
+            Content::End => {
+                self.ending = Some(Ending::Complete);
+                return self.rest();
+            }
         };
         self.seeds.previous = Some(found.checksum);
         if found.kind == Kind::Key {
@@ -191,12 +207,19 @@ impl<R: Read> Iterator for Reader<R> {
     }
 }
 
+/// What a sound record holds.
+#[allow(clippy::large_enum_variant)] // nearly every record is the large one, and none is kept
+enum Content {
+    Row(Words, Sample, [f64; MAX_SIGNALS]),
+    Command(String),
+    End,
+}
+
 /// A sound record.
 struct Found {
     kind: Kind,
     number: u64,
-    /// `None` for the closing record.
-    row: Option<(Words, Sample, [f64; MAX_SIGNALS])>,
+    content: Content,
     checksum: u32,
     /// Bytes.
     length: usize,
@@ -210,17 +233,22 @@ impl Found {
         if number < next {
             return Err(Flaw::Wrong("a record's number goes back"));
         }
-        let row = match kind {
-            Kind::End => None,
-            Kind::Key => Some(decode(frame.row, &History::EMPTY, shape)?),
-            Kind::Sample => Some(decode(frame.row, history, shape)?),
+        let content = match kind {
+            Kind::End => Content::End,
+            Kind::Command => Content::Command(text(frame.row)?),
+            Kind::Key => decode(frame.row, &History::EMPTY, shape)?,
+            Kind::Sample => decode(frame.row, history, shape)?,
         };
-        Ok(Self { kind, number, row, checksum, length })
+        Ok(Self { kind, number, content, checksum, length })
     }
 }
 
-fn decode(row: &[u8], history: &History, shape: Shape) -> Result<(Words, Sample, [f64; MAX_SIGNALS]), Flaw> {
+fn text(row: &[u8]) -> Result<String, Flaw> {
+    String::from_utf8(row.to_vec()).map_err(|_| Flaw::Wrong("a command is not UTF-8"))
+}
+
+fn decode(row: &[u8], history: &History, shape: Shape) -> Result<Content, Flaw> {
     let words = history.decode(row, shape).ok_or(Flaw::Wrong("a record holds no row of numbers"))?;
     let (sample, signals) = shape.to_sample(&words).ok_or(Flaw::Wrong("a record holds no sample"))?;
-    Ok((words, sample, signals))
+    Ok(Content::Row(words, sample, signals))
 }

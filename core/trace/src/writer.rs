@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use tandem_rings::Sample;
 
-use crate::code::History;
+use crate::code::{History, MAX_ROW_BYTES};
 use crate::frame::{self, Kind};
 use crate::header::Header;
 use crate::words::Shape;
@@ -63,6 +63,17 @@ impl<W: Write> Writer<W> {
             self.history.push(row);
         }
         Ok(())
+    }
+
+    /// Adds a command of the operator, in the words of a command file. It belongs before the sample of its tick.
+    ///
+    /// # Errors
+    /// `out` refuses; a text longer than a record.
+    pub fn command(&mut self, text: &str) -> io::Result<()> {
+        if text.len() > MAX_ROW_BYTES {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "no command is so long"));
+        }
+        self.put(Kind::Command, self.header, |_, _, bytes| bytes.extend(text.as_bytes()))
     }
 
     /// Closes the trace and returns what it was written to.

@@ -16,6 +16,8 @@ pub struct Binary {
     places: u64,
     /// Records that they are known to have cost.
     lost_records: u64,
+    /// The operator's commands so far, as lines of a command file.
+    pub commands: Vec<String>,
 }
 
 impl Binary {
@@ -26,12 +28,17 @@ impl Binary {
     pub fn open(path: &Path) -> Result<Self, String> {
         let file = File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let reader = Reader::new(file).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { path: path.to_owned(), reader, places: 0, lost_records: 0 })
+        Ok(Self { path: path.to_owned(), reader, places: 0, lost_records: 0, commands: vec![] })
     }
 
     /// What the trace is of.
     pub fn header(&self) -> &Header {
         self.reader.header()
+    }
+
+    /// Number of the format that it is written in.
+    pub fn format(&self) -> u32 {
+        self.reader.format()
     }
 
     /// The next sound record.
@@ -42,6 +49,7 @@ impl Binary {
         loop {
             match self.reader.next().transpose().map_err(|e| format!("{}: {e}", self.path.display()))? {
                 Some(Item::Damage(damage)) => self.tell(&damage),
+                Some(Item::Command(line)) => self.commands.push(line),
                 Some(Item::Record(record)) => return Ok(Some(record)),
                 None => return Ok(None),
             }

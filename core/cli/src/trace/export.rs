@@ -1,17 +1,21 @@
 //! `tandem trace export`.
 
 use std::error::Error;
+use std::io::Write;
 use std::path::Path;
 
-use tandem_host::TraceCsv;
+use tandem_host::{Output, TraceCsv};
 
 use super::binary::Binary;
 
-/// Writes a binary trace as the CSV that the run would have written. Status 1 where not every record could be read; what
-/// could is written all the same.
-pub fn export(trace: &Path, csv: &Path) -> Result<u8, Box<dyn Error>> {
-    if trace == csv {
-        return Err(format!("{}: the CSV would replace the trace", csv.display()).into());
+/// Writes a binary trace as the CSV that the run would have written, and the operator's commands as a command file.
+/// Status 1 where not every record could be read; what could is written all the same.
+pub fn export(trace: &Path, csv: &Path, commands: Option<&Path>) -> Result<u8, Box<dyn Error>> {
+    if trace == csv || commands == Some(trace) {
+        return Err(format!("{}: it would be replaced", trace.display()).into());
+    }
+    if commands == Some(csv) {
+        return Err(format!("{}: samples and commands need a file each", csv.display()).into());
     }
     let mut trace = Binary::open(trace)?;
     let header = trace.header();
@@ -22,5 +26,18 @@ pub fn export(trace: &Path, csv: &Path) -> Result<u8, Box<dyn Error>> {
         csv.sample(&record.sample, &record.signals[..count]);
     }
     csv.finish()?;
+    if let Some(path) = commands {
+        write_commands(path, &trace.commands)?;
+    }
     Ok(trace.conclude())
+}
+
+fn write_commands(path: &Path, lines: &[String]) -> Result<(), String> {
+    let mut out = Output::create(path)?;
+    let mut write = || {
+        writeln!(out, "# tick,command[,value]")?;
+        lines.iter().try_for_each(|line| writeln!(out, "{line}"))
+    };
+    write().map_err(|e: std::io::Error| format!("{}: {e}", path.display()))?;
+    out.finish()
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use tandem_host::TraceCsv;
 use tandem_rings::Sample;
 use tandem_sdk::{AxisVector, MAX_AXES};
-use tandem_trace::{FORMAT, Header};
+use tandem_trace::Header;
 
 use super::binary::Binary;
 
@@ -21,19 +21,26 @@ pub fn info(path: &Path) -> Result<u8, Box<dyn Error>> {
     let bytes = std::fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?.len();
     let mut out = io::stdout().lock();
     // A reader that has gone away (a closed pipe) is no reason to fail.
-    let _ = print_header(&mut out, path, trace.header())
+    let _ = print_header(&mut out, path, &trace)
         .and_then(|()| totals.print(&mut out, trace.header(), bytes))
+        .and_then(|()| print_commands(&mut out, &trace.commands))
         .and_then(|()| writeln!(out, "{}", trace.verdict()));
     Ok(u8::from(!trace.is_whole()) * crate::REFUSED)
 }
 
-fn print_header(out: &mut impl Write, path: &Path, header: &Header) -> io::Result<()> {
-    let Header { fine_period_s, axes, machine, program, planner, signals } = header;
+fn print_commands(out: &mut impl Write, commands: &[String]) -> io::Result<()> {
+    writeln!(out, "commands     {}", commands.len())?;
+    commands.iter().try_for_each(|line| writeln!(out, "  {line}"))
+}
+
+fn print_header(out: &mut impl Write, path: &Path, trace: &Binary) -> io::Result<()> {
+    let Header { fine_period_s, axes, machine, program, planner, dry_run, signals } = trace.header();
     let kind = |axis| if axes.is_rotary(axis) { "rotary" } else { "linear" };
     let axes: Vec<_> = (0..axes.count()).map(|axis| format!("{} {}", axes.letter(axis), kind(axis))).collect();
     let signals = if signals.is_empty() { "none".to_string() } else { signals.join(", ") };
-    writeln!(out, "{}: trace, format {FORMAT}", path.display())?;
-    writeln!(out, "program      {program}\nmachine      {machine}\nplanner      {planner}")?;
+    writeln!(out, "{}: trace, format {}", path.display(), trace.format())?;
+    let dry = if *dry_run { " (dry run)" } else { "" };
+    writeln!(out, "program      {program}{dry}\nmachine      {machine}\nplanner      {planner}")?;
     writeln!(out, "axes         {}\nfine period  {} ms\nsignals      {signals}", axes.join(", "), fine_period_s * 1e3)
 }
 

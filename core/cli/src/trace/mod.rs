@@ -16,7 +16,7 @@ use crate::args;
 /// Looks into traces.
 pub fn trace(command: &args::Trace) -> Result<u8, Box<dyn Error>> {
     match command {
-        args::Trace::Export { trace, csv } => export::export(trace, csv),
+        args::Trace::Export { trace, csv, commands } => export::export(trace, csv, commands.as_deref()),
         args::Trace::Info { trace } => info::info(trace),
         args::Trace::Diff { a, b } => diff::diff(a, b),
     }

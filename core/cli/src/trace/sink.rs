@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, TraceCsv};
+use tandem_host::{Output, Run, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_trace::{Header, Writer};
@@ -25,7 +25,8 @@ impl TraceSink {
     ///
     /// # Errors
     /// The path with the system's words.
-    pub fn create(path: &Path, machine: &Machine, program: &str, signals: &[&str]) -> Result<Self, String> {
+    pub fn create(path: &Path, machine: &Machine, program: &str, run: &Run, dry_run: bool) -> Result<Self, String> {
+        let signals = run.signals();
         if !is_binary_name(path) {
             return TraceCsv::create(path, machine, signals).map(Self::Csv);
         }
@@ -35,6 +36,7 @@ impl TraceSink {
             machine: machine.name.clone(),
             program: program.to_string(),
             planner: machine.planner.plugin.clone(),
+            dry_run,
             signals: signals.iter().map(ToString::to_string).collect(),
         };
         let writer = Writer::new(Output::create(path)?, &header).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -47,6 +49,13 @@ impl TraceSink {
             Self::Csv(csv) => csv.sample(sample, signals),
             Self::Binary { failed: Some(_), .. } => {}
             Self::Binary { writer, failed } => *failed = writer.sample(sample, signals).err().map(|e| e.to_string()),
+        }
+    }
+
+    /// Adds a command of the operator; a CSV has no place for it.
+    pub fn command(&mut self, command: &Timed) {
+        if let Self::Binary { writer, failed: failed @ None } = self {
+            *failed = writer.command(&command.to_string()).err().map(|e| e.to_string());
         }
     }
 

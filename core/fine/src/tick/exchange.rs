@@ -54,8 +54,10 @@ impl FineLoop {
             feed_mm_per_s,
             programmed_feed_mm_per_s: self.cursor.segment().feed_mm_per_s,
             sigma: self.governor.sigma(),
-            ratio: self.ratio * self.controls.feed_override.load(),
+            ratio: self.ratio * self.given.feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
+            cause: self.cause,
+            given: self.given,
         };
         self.counters.samples += 1;
         if self.samples.push(sample).is_err() {

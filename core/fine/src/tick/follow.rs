@@ -29,6 +29,7 @@ impl FineLoop {
         self.take_ratio();
         self.look_for_stop();
         let ask = self.ask();
+        self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
             self.governor.jump(if ask == Ask::Run { 1.0 } else { 0.0 });
         }
@@ -69,7 +70,7 @@ impl FineLoop {
 
     /// Which words wait for the operator now.
     fn waits(&self) -> Waits {
-        let optional = self.controls.optional_stop.load(Relaxed) && !self.config.dry_run;
+        let optional = self.given.optional_stop && !self.config.dry_run;
         Waits { program: self.config.pause_at_stops && !self.config.dry_run, optional }
     }
 
@@ -77,12 +78,11 @@ impl FineLoop {
     fn ask(&mut self) -> Ask {
         if self.outputs.stop_requested {
             self.controls.program_hold.store(true, Relaxed);
+            self.given.program_hold = true;
             self.outputs.stop_requested = false;
         }
         self.watch_queue();
-        let controls = &self.controls;
-        let flags = [&controls.hold, &controls.program_hold, &controls.soft_fault];
-        if flags.iter().any(|flag| flag.load(Relaxed)) {
+        if self.given.hold || self.given.program_hold || self.controls.soft_fault.load(Relaxed) {
             Ask::Hold
         } else if self.stop.is_some() {
             Ask::Stop

@@ -3,9 +3,10 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::{MachineState, Rest, RestCause};
+use tandem_rings::{MachineState, Rest, RestCause, StopCause};
 use tandem_sdk::{AxisVector, Edge};
 
+use super::follow::Ask;
 use super::{FineLoop, Phase};
 use crate::fault::FaultKind;
 use crate::state::Input;
@@ -27,10 +28,24 @@ impl Stop {
 impl FineLoop {
     /// Before a period: an abort, or a motion that ended without its edge.
     pub(super) fn look_for_stop(&mut self) {
-        if self.controls.abort.load(Relaxed) {
+        if self.given.abort {
             self.stop = Some(Stop::abort());
         } else if self.cursor.is_resting() && self.cursor.segment().stop_on.edge != Edge::None {
             self.stop.get_or_insert(Stop { cause: RestCause::Missed, latch: None });
+        }
+    }
+
+    /// Why the rate of program time is to go down: what lasts longest comes first.
+    pub(super) fn cause_of(&self, ask: Ask) -> StopCause {
+        match (ask, self.stop.map(|stop| stop.cause)) {
+            (Ask::Run, _) => StopCause::None,
+            _ if self.controls.soft_fault.load(Relaxed) => StopCause::SoftFault,
+            (_, Some(RestCause::Abort)) => StopCause::Abort,
+            (_, Some(RestCause::Edge | RestCause::Already)) => StopCause::Edge,
+            (Ask::Hold, _) if self.given.hold => StopCause::Hold,
+            (Ask::Hold, _) => StopCause::ProgramStop,
+            (Ask::Stop, _) => StopCause::None,
+            (Ask::Starve, _) => StopCause::Starvation,
         }
     }
 
@@ -89,7 +104,7 @@ impl FineLoop {
             self.fail(FaultKind::Soft);
             return Input::Trip;
         }
-        if self.controls.abort.load(Relaxed) {
+        if self.given.abort {
             return self.part(Stop::abort());
         }
         let enough = self.depth.is_of(self.cursor.epoch()) && self.depth.may_start(self.cursor.program_time_s());

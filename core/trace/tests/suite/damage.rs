@@ -121,7 +121,7 @@ fn other_files_are_refused_with_the_cause() {
     let mut bytes = written(&header(3, 0), &[]);
     assert_eq!(refused(&bytes[..30]), "byte 30: the file ends within its header");
     bytes[MAGIC.len()] = 9;
-    assert_eq!(refused(&bytes), "byte 8: the trace has format 9, this program reads format 1");
+    assert_eq!(refused(&bytes), "byte 8: the trace has format 9, this program reads formats 1 to 2");
     bytes[MAGIC.len()] = 1;
     bytes[20] ^= 1;
     assert_eq!(refused(&bytes), "byte 0: the header is damaged: its checksum differs");
@@ -178,4 +178,27 @@ proptest! {
         let start = written(&header(2, 1), &[]);
         let _ = read(&[&start[..keep.min(start.len())], &bytes].concat());
     }
+}
+
+#[test]
+fn a_command_behind_damage_is_read_and_samples_wait_for_the_next_key() {
+    let rows = motion(2 * KEY_INTERVAL);
+    let mut writer = tandem_trace::Writer::new(vec![], &header(3, 0)).unwrap();
+    for (index, (sample, _)) in rows.iter().enumerate() {
+        if index == 100 {
+            writer.command("100,hold").unwrap();
+        }
+        writer.sample(sample, &[]).unwrap();
+    }
+    let mut bytes = writer.finish().unwrap();
+    let sound = records(&read(&bytes).unwrap().0);
+    bytes[sound[50].offset as usize + 8] ^= 1;
+    let (items, ending) = read(&bytes).unwrap();
+    assert_eq!(ending, Ending::Complete);
+    assert!(items.contains(&Item::Command("100,hold".to_string())));
+    assert!(are_sound(&items, &rows));
+    let numbers: Vec<_> = records(&items).iter().map(|r| r.number).collect();
+    assert!(numbers.iter().copied().eq((0..50).chain(KEY_INTERVAL..2 * KEY_INTERVAL)));
+    let lost: u64 = damages(&items).iter().filter_map(|damage| damage.lost_records).sum();
+    assert_eq!(lost, KEY_INTERVAL - 50);
 }

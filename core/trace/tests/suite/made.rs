@@ -17,6 +17,7 @@ pub fn header(axes: usize, signals: usize) -> Header {
         machine: "mühle".to_string(),
         program: "part.ngc".to_string(),
         planner: "look-ahead".to_string(),
+        dry_run: false,
         signals: (0..signals).map(|index| format!("force_{index}_n")).collect(),
     }
 }

@@ -39,6 +39,35 @@ fn motion_takes_a_fraction_of_its_raw_size() {
 }
 
 #[test]
+fn commands_stand_before_the_sample_of_their_tick() {
+    let mut writer = Writer::new(vec![], &header(3, 0)).unwrap();
+    let rows = motion(KEY_INTERVAL + 20);
+    for (index, (sample, _)) in rows.iter().enumerate() {
+        // Before a key, behind one, and in the midst.
+        if [0, 1, 7, 256, 257].contains(&index) {
+            writer.command(&format!("{index},hold")).unwrap();
+        }
+        writer.sample(sample, &[]).unwrap();
+    }
+    writer.command("300,feed-override,0.5").unwrap();
+    let (items, ending) = read(&writer.finish().unwrap()).unwrap();
+    assert_eq!(ending, Ending::Complete);
+    let mut expected = vec![];
+    for number in 0..rows.len() {
+        expected.extend([0, 1, 7, 256, 257].contains(&number).then(|| format!("{number},hold")));
+        expected.push(number.to_string());
+    }
+    expected.push("300,feed-override,0.5".to_string());
+    let said = items.iter().map(|item| match item {
+        Item::Record(record) => record.number.to_string(),
+        Item::Command(line) => line.clone(),
+        Item::Damage(damage) => panic!("{damage:?}"),
+    });
+    assert!(said.eq(expected));
+    assert!(Writer::new(vec![], &header(3, 0)).unwrap().command(&"x".repeat(1 << 13)).is_err());
+}
+
+#[test]
 fn what_cannot_be_read_is_not_written() {
     let mut other = header(3, 1);
     assert!(Writer::new(vec![], &other).unwrap().sample(&motion(1)[0].0, &[]).is_err());
