@@ -1,5 +1,7 @@
 //! The first pass: the whole program, before anything moves.
 
+use std::sync::Arc;
+
 use tandem_sdk::Block;
 
 use crate::config::Config;
@@ -128,17 +130,28 @@ impl<'a> FirstPass<'a> {
     fn take_items(&mut self, program: &Program, text: &[u8]) {
         for item in &self.items {
             match item {
-                Item::Block(block) => {
-                    self.report.blocks += 1;
-                    self.report.length_mm += block.length_mm;
-                    if let Err(why) = (self.per_block)(block) {
-                        let refused = Diagnostic::whole_line(&program.name, block.line, text, "block-refused", why);
-                        self.report.add(refused);
-                    }
+                Item::Block(block) => judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)),
+                Item::Curve(owned) => {
+                    owned
+                        .with(|block| judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)));
                 }
                 Item::Wait(_) => self.interpreter.assume_input(),
                 Item::Event(_) | Item::End => {}
             }
         }
+    }
+}
+
+/// Counts a block and asks whether the planner can drive it. `place` is the program and the text of the block's line.
+fn judge_block(
+    report: &mut CheckReport,
+    per_block: &mut dyn FnMut(&Block) -> Result<(), String>,
+    block: &Block,
+    place: (&Arc<str>, &[u8]),
+) {
+    report.blocks += 1;
+    report.length_mm += block.length_mm;
+    if let Err(why) = per_block(block) {
+        report.add(Diagnostic::whole_line(place.0, block.line, place.1, "block-refused", why));
     }
 }

@@ -116,8 +116,8 @@ impl Interpreter {
 
     fn set_motion(&mut self) {
         if let Some(tenths) = self.orders.get(Group::Motion) {
-            // G31 holds for its line only.
-            if tenths != 310 {
+            // G31 holds for its line only; so does what opens a curve.
+            if !matches!(tenths, 310 | 52 | 62) {
                 self.state.motion = motion_of(tenths);
             }
         } else if self.orders.get(Group::CannedCycle).is_some() {

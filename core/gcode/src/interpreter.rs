@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use tandem_sdk::AxisVector;
 
+use crate::bezier::Tail;
 use crate::config::Config;
+use crate::curve::Curve;
 use crate::diagnostic::Diagnostic;
 use crate::expression::Context;
 use crate::fault::{Checked, Fault, Span};
@@ -44,6 +46,10 @@ pub struct Interpreter {
     phase: Phase,
     /// Whether a word of the program has been read; a program number may only come before.
     begun: bool,
+    /// The curve whose lines are being read.
+    pub(crate) curve: Option<Curve>,
+    /// How the last G5 ended.
+    pub(crate) bezier_tail: Option<Tail>,
     /// The axis words of the current line have been used up.
     pub(crate) moved: bool,
     /// A value of the current line follows from what the first pass has assumed.
@@ -64,6 +70,8 @@ impl Interpreter {
             file: "program".into(),
             phase: Phase::Fresh,
             begun: false,
+            curve: None,
+            bezier_tail: None,
             moved: false,
             reads_assumed: Cell::new(false),
             assumed_start: 0,
@@ -151,8 +159,9 @@ impl Interpreter {
                 Err(Diagnostic::whole_line(&self.file, self.state.line.max(1), b"", "truncated", why.into()))
             }
             Phase::Fresh | Phase::Running => {
+                let open = self.no_curve_open();
                 self.end(out);
-                Ok(())
+                open.map_err(|fault| Diagnostic::new(&self.file, self.state.line.max(1), b"", fault))
             }
         }
     }
@@ -180,9 +189,17 @@ impl Interpreter {
             reads_assumed: &self.reads_assumed,
         };
         let parsed = parse(text, from, &context, &mut self.words);
+        let goes_on = self.goes_on();
+        if let Ok(true) = goes_on {
+            let done = parsed.and_then(|()| self.assign()).and_then(|()| self.curve_line(out));
+            if let (Err(_), Some(curve)) = (&done, &mut self.curve) {
+                curve.broken = true;
+            }
+            return done;
+        }
         let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
         let complete = parsed.is_ok();
-        let done = parsed.and(sorted).and_then(|()| self.obey(out));
+        let done = parsed.and(goes_on).and(sorted).and_then(|()| self.obey(out));
         if done.is_err() {
             self.recover(complete);
         }
@@ -226,7 +243,9 @@ impl Interpreter {
         if self.phase == Phase::Fresh {
             self.phase = Phase::Opened;
         } else {
+            let open = self.no_curve_open();
             self.end(out);
+            open?;
         }
         Ok(None)
     }

@@ -1,6 +1,6 @@
 //! What comes out of the interpreter.
 
-use tandem_sdk::{AxisVector, Block, Edge, Event};
+use tandem_sdk::{AxisVector, Block, Edge, Event, OwnedBlock};
 
 /// One element of the stream, in program order.
 #[derive(Clone, Debug)]
@@ -9,6 +9,8 @@ pub enum Item {
     /// A path element, or rest. Behind a probe, whose [`Block::stop_on`] names an edge, nothing is read before
     /// [`crate::Stream::provide_probe`]; what else stands in its line may follow it.
     Block(Block),
+    /// A path element that is a NURBS curve, with the data of the curve.
+    Curve(OwnedBlock),
     /// A non-motion word, tied to the block before which it acts.
     Event(Event),
     /// M66: the program goes on when the input has answered.

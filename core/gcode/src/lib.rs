@@ -38,8 +38,11 @@
 
 mod arc;
 mod arc_motion;
+mod bezier;
 mod check;
 mod config;
+mod curve;
+mod curve_lines;
 mod diagnostic;
 mod execute;
 mod expression;

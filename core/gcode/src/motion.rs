@@ -16,7 +16,7 @@ impl Interpreter {
     /// Moves to where the axis words say.
     #[inline]
     pub(crate) fn motion(&mut self, motion: Motion, out: &mut Vec<Item>) -> Checked<()> {
-        let uncertain = self.state.uncertain;
+        let (uncertain, start) = (self.state.uncertain, self.state.position);
         self.advance();
         match motion {
             Motion::Rapid => self.straight(BlockKind::Rapid, out),
@@ -24,7 +24,19 @@ impl Interpreter {
             Motion::ArcClockwise => self.arc(true, uncertain, out),
             Motion::ArcCounterclockwise => self.arc(false, uncertain, out),
             Motion::Probe(tenths) => self.probe(tenths, out),
+            Motion::Curve(tenths) => self.curve_motion(tenths, (uncertain, start), out),
             Motion::None | Motion::Refused => Ok(()),
+        }
+    }
+
+    /// G5, G5.1, G5.2 and G06.2.
+    #[cold]
+    fn curve_motion(&mut self, tenths: u16, before: (u32, AxisVector), out: &mut Vec<Item>) -> Checked<()> {
+        match tenths {
+            50 => self.cubic(before.0, out),
+            51 => self.quadratic(before.0, out),
+            52 => self.open_linuxcnc(before.0, before.1),
+            _ => self.open_fanuc(before.0, before.1),
         }
     }
 

@@ -25,6 +25,13 @@ impl Orders {
         Self { present: 0, codes: [Code::default(); GROUPS], motion: None, axes_taken: false }
     }
 
+    /// Forgets the words of the line before.
+    pub fn clear(&mut self) {
+        self.present = 0;
+        self.motion = None;
+        self.axes_taken = false;
+    }
+
     /// The word of `group`, in tenths.
     #[inline]
     pub fn get(&self, group: Group) -> Option<u16> {
@@ -40,9 +47,7 @@ impl Orders {
     /// all the same, so that reading can go on.
     #[inline]
     pub fn sort(&mut self, words: &Words, modal: Motion, letters: &Letters) -> Checked<()> {
-        self.present = 0;
-        self.motion = None;
-        self.axes_taken = false;
+        self.clear();
         let mut claims = Claims::default();
         let g = self.sort_kind('G', words.g.as_slice(), words, &mut claims);
         let m = self.sort_kind('M', words.m.as_slice(), words, &mut claims);
@@ -109,7 +114,7 @@ impl Orders {
         let motion = word.unwrap_or(modal);
         let moves_without_axes = match motion {
             Motion::ArcClockwise | Motion::ArcCounterclockwise => arc_words || word.is_some(),
-            Motion::Probe(_) => word.is_some(),
+            Motion::Probe(_) | Motion::Curve(_) => word.is_some(),
             _ => false,
         };
         if !(axes || moves_without_axes) {
@@ -147,6 +152,8 @@ pub(crate) fn motion_of(tenths: u16) -> Motion {
         0 => Motion::Rapid,
         10 => Motion::Line,
         20 => Motion::ArcClockwise,
+        50..=52 | 62 => Motion::Curve(tenths),
+        53 => Motion::None,
         310 | 382..=385 => Motion::Probe(tenths),
         _ => Motion::ArcCounterclockwise,
     }
@@ -158,7 +165,7 @@ fn implied(motion: Motion) -> &'static Row {
         Motion::Line => 10,
         Motion::ArcClockwise => 20,
         Motion::ArcCounterclockwise => 30,
-        Motion::Probe(tenths) => tenths,
+        Motion::Probe(tenths) | Motion::Curve(tenths) => tenths,
         _ => 0,
     };
     table::g(tenths).unwrap_or(&crate::table_g::G_ROWS[0])

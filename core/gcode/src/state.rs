@@ -23,6 +23,8 @@ pub(crate) enum Motion {
     Line,
     ArcClockwise,
     ArcCounterclockwise,
+    /// G5, G5.1, G5.2 and G6.2, by their number in tenths.
+    Curve(u16),
     /// G31 and G38.2 to G38.5, by their number in tenths.
     Probe(u16),
 }

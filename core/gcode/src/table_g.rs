@@ -6,7 +6,6 @@ use crate::table::Group::{
 };
 use crate::table::{Row, refused, works};
 
-const SPLINES: &str = "NURBS and splines are not supported yet";
 const COMPENSATION: &str = "cutter radius compensation is not supported: let the CAM system write the tool centre path";
 const CYCLES: &str = "canned cycles are not supported: let the CAM system write them out";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
@@ -20,12 +19,22 @@ pub(crate) static G_ROWS: &[Row] = &[
     works(20, Motion, "XYZABCUVWIJKRP", "arc or helix, clockwise; P turns"),
     works(30, Motion, "XYZABCUVWIJKRP", "arc or helix, counter-clockwise; P turns"),
     works(40, NonModal, "P", "dwell of P seconds"),
-    refused(50, Motion, "cubic spline, high-precision mode", SPLINES),
-    refused(51, Motion, "quadratic spline, look-ahead control", SPLINES),
-    refused(52, Motion, "NURBS", SPLINES),
-    refused(53, Motion, "end of NURBS", SPLINES),
-    refused(61, Motion, "NURBS", "not supported yet"),
-    refused(62, Motion, "NURBS", "not supported yet"),
+    works(
+        50,
+        Motion,
+        "XYIJPQ",
+        "cubic Bezier curve in XY; I J second control point from the start, P Q third from the end",
+    ),
+    works(51, Motion, "XYIJ", "quadratic Bezier curve in XY; I J middle control point from the start"),
+    works(52, Motion, "XYZABCUVWPL", "NURBS curve until G5.3: a control point a line; P weight, L order"),
+    works(53, Motion, "", "end of the NURBS curve of G5.2"),
+    refused(61, Motion, "NURBS", "write G6.2 (a control point and a knot a line) or G5.2"),
+    works(
+        62,
+        Motion,
+        "XYZABCUVWPKR",
+        "NURBS curve: a control point, knot K and weight R a line, then knots alone; P order",
+    ),
     refused(70, LatheDiameter, "diameter mode", LATHE),
     refused(80, LatheDiameter, "radius mode", LATHE),
     refused(90, NonModal, "exact stop in this line only", "not supported: use G61.1 and G64"),

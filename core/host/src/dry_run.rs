@@ -39,8 +39,10 @@ impl<S: Source> Source for DryRun<S> {
         let before = items.len();
         let more = self.source.next_items(items)?;
         for item in &mut items[before..] {
-            if let Item::Block(block) = item {
-                self.set_feed(block);
+            match item {
+                Item::Block(block) => self.set_feed(block),
+                Item::Curve(curve) => self.set_feed(curve.facts_mut()),
+                _ => {}
             }
         }
         Ok(more)

@@ -2,7 +2,7 @@
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
 
 use crate::path_watch::PathWatch;
 use crate::stops::StopWatch;
@@ -28,6 +28,7 @@ pub struct Monitor {
     /// What each stop took.
     pub stops: StopWatch,
     watch: PathWatch,
+    axes: Axes,
 }
 
 impl Monitor {
@@ -45,6 +46,7 @@ impl Monitor {
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::default(),
+            axes: machine.axes,
         }
     }
 
@@ -60,7 +62,7 @@ impl Monitor {
 
     /// A block is planned for good.
     pub fn block(&mut self, block: &Block, _report: &BlockReport) {
-        self.watch.block(block);
+        self.watch.block(&self.axes, block);
         self.blocks += 1;
         self.length_mm += block.length_mm;
         self.nominal_s += match block.kind {

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use tandem_motion::Path;
-use tandem_sdk::{AxisVector, Block};
+use tandem_motion::nurbs::Nurbs;
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
 /// Blocks looked back over where a planner leaves the path: what its filters can still hold.
 const LOOK_BACK: usize = 256;
@@ -11,21 +12,59 @@ const LOOK_BACK: usize = 256;
 /// Distances that are rounding of the segments, mm: not worth looking at the neighbours.
 const ON_PATH_MM: f64 = 1e-6;
 
+/// Spans of a curve searched around the last foot.
+const SPANS_AROUND: usize = 4;
+
+/// The path of a block.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant)] // lines and arcs are by far the most frequent; boxing them would allocate
+enum Watched {
+    Path(Path),
+    /// A curve, and the span of the last foot.
+    Curve(Box<Nurbs>, usize),
+}
+
+impl Watched {
+    fn curve(axes: &Axes, block: &Block) -> Option<Self> {
+        // SAFETY: the block is handed over in this call, and its slices with it.
+        let data = unsafe { block.nurbs.to_data() };
+        let curve = Nurbs::new(&data, axes).ok()?;
+        let span = curve.degree();
+        Some(Self::Curve(Box::new(curve), span))
+    }
+
+    fn distance_mm(&mut self, position: &AxisVector) -> f64 {
+        match self {
+            Self::Path(path) => path.distance_mm(position),
+            Self::Curve(curve, span) => {
+                let mut nearest = curve.nearest(position, span.saturating_sub(SPANS_AROUND), *span + SPANS_AROUND);
+                if nearest.distance_mm > ON_PATH_MM {
+                    nearest = curve.nearest(position, 0, curve.points());
+                }
+                *span = curve.span(nearest.u);
+                nearest.distance_mm
+            }
+        }
+    }
+}
+
 /// Keeps the paths of the blocks that move now and measures samples against them.
 #[derive(Debug, Default)]
 pub struct PathWatch {
     /// Paths with the index of their block.
-    paths: VecDeque<(u64, Path)>,
+    paths: VecDeque<(u64, Watched)>,
     /// Largest distance so far, mm.
     pub max_mm: f64,
 }
 
 impl PathWatch {
     /// A block that will be driven.
-    pub fn block(&mut self, block: &Block) {
-        if let Some(path) = Path::new(block) {
-            self.paths.push_back((block.index, path));
-        }
+    pub fn block(&mut self, axes: &Axes, block: &Block) {
+        let watched = match block.kind {
+            BlockKind::Nurbs => Watched::curve(axes, block),
+            _ => Path::new(block).map(Watched::Path),
+        };
+        self.paths.extend(watched.map(|watched| (block.index, watched)));
     }
 
     /// Distance of `position`, sampled while block `block` moved, from the path, mm. Blocks far behind are forgotten.
@@ -35,9 +74,9 @@ impl PathWatch {
         }
         let here = self.paths.partition_point(|(index, _)| *index < block);
         let mut nearest = f64::INFINITY;
-        let from_here = self.paths.range(here..).take(2).chain(self.paths.range(..here).rev());
-        for (_, path) in from_here {
-            nearest = nearest.min(path.distance_mm(position));
+        let last = self.paths.len().min(here + 2);
+        for place in (here..last).chain((0..here).rev()) {
+            nearest = nearest.min(self.paths[place].1.distance_mm(position));
             if nearest < ON_PATH_MM {
                 break;
             }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{Queued, Rest, RoughEnd};
-use tandem_sdk::{Block, BlockReport, Edge, Event, RingEntry, Segment, SegmentFlags, SegmentSink, StopOn};
+use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, RingEntry, Segment, SegmentFlags, SegmentSink, StopOn};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
@@ -22,7 +22,7 @@ pub struct Queue {
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported.
-    blocks: VecDeque<Block>,
+    blocks: VecDeque<OwnedBlock>,
     /// Blocks that wait for an edge, until they are emitted.
     stops: VecDeque<(u64, StopOn)>,
     /// Reports of blocks planned for good since the last look; their blocks are still in `blocks`.
@@ -57,11 +57,12 @@ impl Queue {
     }
 
     /// The planner has accepted `block`.
-    pub fn accepted(&mut self, block: &Block) {
-        self.blocks.push_back(*block);
-        if block.stop_on.edge != Edge::None {
-            self.stops.push_back((block.index, block.stop_on));
+    pub fn accepted(&mut self, block: OwnedBlock) {
+        let facts = block.facts();
+        if facts.stop_on.edge != Edge::None {
+            self.stops.push_back((facts.index, facts.stop_on));
         }
+        self.blocks.push_back(block);
     }
 
     /// The next rest that the fine loop has reported.
@@ -106,9 +107,9 @@ impl Queue {
     /// Tells `observer` of the blocks planned for good since the last look, and forgets them.
     pub fn tell_of_blocks(&mut self, observer: &mut dyn Observer) {
         for report in self.reported.drain(..) {
-            while let Some(block) = self.blocks.front().filter(|block| block.index <= report.block) {
-                if block.index == report.block {
-                    observer.block(block, &report);
+            while let Some(block) = self.blocks.front().filter(|block| block.facts().index <= report.block) {
+                if block.facts().index == report.block {
+                    block.with(|block| observer.block(block, &report));
                 }
                 self.blocks.pop_front();
             }
@@ -191,8 +192,8 @@ impl SegmentSink for Queue {
 
     fn block(&mut self, report: &BlockReport) {
         let first = self.reported.last().map_or(0, |last| last.block + 1);
-        let given = |block: &Block| block.index == report.block;
-        let place = self.blocks.front().map_or(0, |front| report.block.wrapping_sub(front.index) as usize);
+        let given = |block: &OwnedBlock| block.facts().index == report.block;
+        let place = self.blocks.front().map_or(0, |front| report.block.wrapping_sub(front.facts().index) as usize);
         if report.block >= first && self.blocks.get(place).is_some_and(given) {
             self.reported.push(*report);
         } else {

@@ -2,7 +2,7 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, Edge, Event, EventKind, Planner};
+use tandem_sdk::{Accepted, Edge, Event, EventKind, OwnedBlock, Planner};
 
 use crate::Observer;
 use crate::queue::Queue;
@@ -160,7 +160,16 @@ impl RoughLoop {
                         return Ok(());
                     }
                     self.edge_awaited = block.stop_on.edge != Edge::None;
-                    self.queue.accepted(block);
+                    self.queue.accepted(OwnedBlock::new(*block, None));
+                }
+                Item::Curve(curve) => {
+                    let line = curve.facts().line;
+                    (self.line, self.last_block) = (line, curve.facts().index);
+                    let accepted = curve.with(|block| self.planner.accept(block));
+                    if accepted.map_err(|e| planner_error(line, &e.to_string()))? == Accepted::Full {
+                        return Ok(());
+                    }
+                    self.queue.accepted(curve.clone());
                 }
                 Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
                 Item::Event(event) => {

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use tandem_gcode::{Config, Diagnostic, Interpreter, Item, ProbeInput, ProbeResult, Tool};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, PathMode};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, OwnedBlock, PathMode};
 
 /// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools, a probe on
 /// input 7.
@@ -69,6 +69,7 @@ pub fn shown(items: &[Item]) -> Vec<String> {
 fn show(item: &Item) -> String {
     match item {
         Item::Block(block) => show_block(block),
+        Item::Curve(curve) => show_curve(curve),
         Item::Event(e) => format!("{}: {:?} {} {} before {}", e.line, e.kind, e.index, short(e.value), e.before_block),
         Item::Wait(w) => {
             let (input, mode) = (w.input, w.mode);
@@ -76,6 +77,15 @@ fn show(item: &Item) -> String {
         }
         Item::End => "End".into(),
     }
+}
+
+fn show_curve(curve: &OwnedBlock) -> String {
+    let data = curve.curve().expect("a curve has its data");
+    let numbers = |values: &[f64]| values.iter().map(|v| short(*v)).collect::<Vec<_>>().join(" ");
+    let points: Vec<_> = data.control_points.iter().map(|p| numbers(&p.0[..3])).collect();
+    let block = show_block(curve.facts());
+    let (degree, weights, knots) = (data.degree, numbers(&data.weights), numbers(&data.knots));
+    format!("{block} degree {degree} points {} weights {weights} knots {knots}", points.join(", "))
 }
 
 fn show_block(block: &Block) -> String {

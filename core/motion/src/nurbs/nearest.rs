@@ -70,6 +70,41 @@ impl Nurbs {
     }
 }
 
+impl Nurbs {
+    /// Lowest and highest position of `axis` on the curve, mm or rad: at the ends of spans and where the axis turns.
+    /// Does not allocate.
+    pub fn extent(&self, axis: usize) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for span in self.degree..self.points() {
+            let (from, to) = (self.knots[span], self.knots[span + 1]);
+            let mut before = from;
+            for step in 0..=if to > from { TRIED } else { 0 } {
+                let u = (from + (to - from) * step as f64 / TRIED as f64).min(to);
+                for at in [u, self.turn(span, axis, before, u)] {
+                    let value = self.derivatives_in(span, at).position[axis];
+                    (low, high) = (low.min(value), high.max(value));
+                }
+                before = u;
+            }
+        }
+        (low, high)
+    }
+
+    /// Where `axis` turns between two parameters, by halving; the first of them where it does not.
+    fn turn(&self, span: usize, axis: usize, mut from: f64, mut to: f64) -> f64 {
+        let rate = |u: f64| self.derivatives_in(span, u).first[axis];
+        let first = rate(from);
+        if first * rate(to) >= 0.0 {
+            return from;
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (from + to);
+            if rate(middle) * first > 0.0 { from = middle } else { to = middle }
+        }
+        from
+    }
+}
+
 fn distance(a: &AxisVector, b: &AxisVector) -> f64 {
     (*a - *b).0.iter().map(|d| d * d).sum::<f64>().sqrt()
 }

@@ -12,7 +12,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/sdk", &[]),
     ("core/report", &[]),
     ("core/motion", &["tandem-sdk"]),
-    ("core/gcode", &["tandem-sdk"]),
+    ("core/gcode", &["tandem-motion", "tandem-sdk"]),
     ("core/machine", &["tandem-sdk"]),
     ("core/rings", &["tandem-sdk"]),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),

@@ -1,0 +1,150 @@
+//! NURBS and Bezier curves of part programs.
+
+mod common;
+
+use common::{messages, mill, only_blocks, run, run_on, shown};
+use tandem_gcode::Item;
+use tandem_sdk::OwnedBlock;
+
+fn curves(program: &str) -> Vec<OwnedBlock> {
+    let all = run(program).into_iter();
+    all.filter_map(|item| if let Item::Curve(curve) = item { Some(curve) } else { None }).collect()
+}
+
+fn assert_messages(program: &str, expected: &[&str]) {
+    assert_eq!(messages(program), expected, "{program}");
+}
+
+#[test]
+fn linuxcnc_curve() {
+    let items = shown(&run("F60\nG0 X1\nG5.2 P2 L3\nX0 Y1 P1\n(in between)\nX2 Y2\nN7 X2 Y0 P3\nG5.3\nG1 X3"));
+    assert_eq!(
+        items[1],
+        "3: Nurbs 1 to 2 0 0 0 length 3.867 feed 1 degree 2 points 1 0 0, 0 1 0, 2 2 0, 2 0 0 weights 2 1 1 3 \
+         knots 0 0 0 1 2 2 2"
+    );
+    assert_eq!(items[2], "9: Line 2 to 3 0 0 0 length 1 feed 1");
+}
+
+#[test]
+fn linuxcnc_curve_with_a_point_in_its_first_line() {
+    let made = curves("F60\nG91 G5.2 X1 Y1 P3 L4\nX1\nX1 Y-1\nG5.3");
+    let data = made[0].curve().unwrap();
+    assert_eq!((data.degree, data.weights.as_slice()), (3, &[1.0, 3.0, 1.0, 1.0][..]));
+    assert_eq!(data.control_points[3].0[..2], [3.0, 0.0]);
+    // Nothing is left of the curve's mode.
+    assert!(messages("F60\nG5.2 X1 Y1\nX2\nG5.3\nX5")[0].contains("no motion mode"));
+}
+
+#[test]
+fn fanuc_curve() {
+    let items = shown(&run("F60\nG06.2 P3 K0 X0 Y0 R1\nK0 X0 Y5\nK0. X5 Y5 R2\nK1 X9 Y5\nK3\nN9 K3\nK3\nG01 X10"));
+    assert_eq!(
+        items[0],
+        "2: Nurbs 0 to 9 5 0 0 length 12.65 feed 1 degree 2 points 0 0 0, 0 5 0, 5 5 0, 9 5 0 weights 1 1 2 1 \
+         knots 0 0 0 1 3 3 3"
+    );
+    assert!(items[1].starts_with("9: Line 1 to 10 5"), "{}", items[1]);
+    // Without a point in its first line the curve begins where the machine stands; without P it is cubic.
+    assert_eq!(curves("F60\nG1 X1\nG6.2 K0\nK0 X2\nK0 X2 Y1\nK0 Y2\nK1\nK1\nK1\nK1")[0].curve().unwrap().degree, 3);
+}
+
+#[test]
+fn bezier_curves() {
+    let made = curves("F60\nG5 X3 Y0 I1 J1 P-1 Q1\nX6 P-1 Q-1\nG5.1 X8 I1");
+    let points = |n: usize| made[n].curve().unwrap().control_points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>();
+    assert_eq!(points(0), [[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 0.0]]);
+    assert_eq!(points(1), [[3.0, 0.0], [4.0, -1.0], [5.0, -1.0], [6.0, 0.0]]);
+    assert_eq!(points(2), [[6.0, 0.0], [7.0, 0.0], [8.0, 0.0]]);
+    let inches = curves("G20 F60\nG5.1 X2 I1");
+    assert!((inches[0].facts().length_mm - 50.8).abs() < 1e-9 && inches[0].facts().feed_mm_per_s == 25.4);
+}
+
+#[test]
+fn inverse_time() {
+    let made = curves("G93\nG5.2 F30 L2\nX3\nG5.3\nG5.1 X3 Y8 J4 F60");
+    assert!((made[0].facts().feed_mm_per_s - 1.5).abs() < 1e-9);
+    assert!((made[1].facts().feed_mm_per_s - 8.0).abs() < 1e-9);
+}
+
+#[test]
+fn blocks_go_on_behind_a_curve() {
+    let (items, errors) = run_on(mill(), "F60\nG1 X1\nG5.2 L2\nX2\nG5.3\nG1 X5\nX7");
+    assert!(errors.is_empty());
+    assert_eq!(only_blocks(&items).iter().map(|b| b.index).collect::<Vec<_>>(), [0, 2, 3]);
+}
+
+#[test]
+fn faulty_knots_and_weights_are_named() {
+    assert_messages(
+        "F60\nG6.2 P3 K0 X0\nK0 X1\nK0 X2\nK2 X3\nK1 X4\nK3\nK3\nK3\nG1 X9",
+        &["6:1 [nurbs] knot 1 is below the one before it, 2: knots never fall"],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK1 X1\nK1 X2\nK2\nK2\nK2\nG1 X9",
+        &["3:1 [nurbs] the first 3 knots are equal: the curve begins at its first control point"],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK2\nK3\nK3\nG1 X9",
+        &["6:1 [nurbs] the last 3 knots are equal: the curve ends at its last control point"],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1 R0\nK0 X2\nK2\nK2\nK2",
+        &["3:7 [nurbs] the weight R must be greater than zero"],
+    );
+    assert_messages("F60\nG5.2 P-1\nX2\nG5.3", &["2:6 [nurbs] the weight P must be greater than zero"]);
+    assert_messages("F60\nG6.2 P7 K0", &["2:6 [word-range] P must be a whole number from 2 to 6"]);
+    assert_messages(
+        "F60\nG6.2 P2 X1 K0\nX2 K0\nK1\nK1",
+        &["2:9 [nurbs] the first control point is not where the machine stands (1 off): the curve begins there"],
+    );
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK2\nK2\nG1 X9",
+        &[
+            "7:1 [nurbs] the curve that line 2 opens is not complete: of the 3 knots (K) that stand alone behind the last \
+           control point 1 are missing",
+        ],
+    );
+    assert_messages("F60\nG6.2 P3 K0\nX1\nK0 X2\nK2\nK2\nK2", &["3:1 [nurbs] K, the knot of this line, is missing"]);
+    assert_messages(
+        "F60\nG5.2 L4\nX1\nX2\nG5.3\nG1 X9",
+        &[
+            "5:1 [nurbs] the curve that line 2 opens has 3 control points (the position before it is one), order 4 needs 4",
+        ],
+    );
+    assert_messages(
+        "F60\nG5.2\nX1\nX2\nG1 X9",
+        &["5:1 [nurbs] the curve that line 2 opens is not complete: G5.3, which ends it, is missing before this line"],
+    );
+    assert_messages("F60\nG5.2\nX1", &["3:1 [nurbs] the program ends within the curve that line 2 opens"]);
+    assert_messages("F60\nG5.2\nX1 S300\nX2\nG5.3", &["3:4 [unused-word] S has no place in this line of a curve"]);
+    assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [unused-word] B has no place in this line of a curve"]);
+    assert_messages(
+        "G5.2\nX1\nX2\nG5.3",
+        &["4:1 [feed-missing] the feed is missing: no F has been set; G1, G2 and G3 need one"],
+    );
+    assert_messages("F60 G5 X1 I1 J1", &["1:5 [nurbs] G5 needs P and Q, the third control point from the end"]);
+    assert_messages(
+        "F60 G5 X1 P1 Q1",
+        &[
+            "1:5 [nurbs] G5 needs I and J, the second control point from the start: only a G5 behind another may lack them",
+        ],
+    );
+    assert_messages("F60 G18 G5.1 X1 I1", &["1:9 [nurbs] G5 and G5.1 need the plane XY (G17)"]);
+    assert_messages(
+        "F60\nG5.2\nX0\nX0\nG5.3",
+        &["5:1 [nurbs] the curve that line 2 opens: all control points coincide: the curve has no length"],
+    );
+}
+
+/// Only the curve itself has to stay within the travel, not its control points.
+#[test]
+fn travel() {
+    assert!(messages("F60\nG5.2\nX240 Y100\nX0 Y251\nX-240 Y100\nG5.3").is_empty());
+    let refused = messages("F60\nG5.2\nX240 Y100\nX0 Y600\nX-240 Y100\nG5.3");
+    assert!(refused[0].starts_with("6:1 [travel] Y would reach 433.3333 mm"), "{refused:?}");
+}
