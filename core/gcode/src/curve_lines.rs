@@ -81,7 +81,8 @@ impl Interpreter {
         }
         let (points, line) = (curve.points.len(), curve.line);
         let message = format!(
-            "the curve that line {line} opens has {points} control points (the position before it is one), order {order} needs {order}"
+            "the curve that line {line} opens has {points} control points (the position before it is one), \
+             order {order} needs {order}"
         );
         Err(self.first_fault(&message))
     }
