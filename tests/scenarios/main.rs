@@ -21,6 +21,7 @@ mod program_flow;
 mod random;
 mod replay;
 mod report;
+mod single_block;
 mod starvation;
 mod stopping_time;
 mod stops;

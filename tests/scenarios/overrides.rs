@@ -76,3 +76,21 @@ fn the_rapid_override_is_at_most_one() {
     done.assert_within_limits();
     assert_eq!(done.column("x_cmd_mm"), free.column("x_cmd_mm"));
 }
+
+#[test]
+fn a_lower_feed_is_met_where_it_begins_also_below_full_override() {
+    let text = "G21 G90 G64\nF6000\nG1 X30\nF900\nX60\nF3000\nX75\nF600\nX90 Y5\nM2\n";
+    let feeds = [(3.0, 100.0), (5.0, 15.0), (7.0, 50.0), (9.0, 10.0)];
+    for ratio in [0.2, 0.5, 0.9] {
+        let done = Scenario::text(text).commands(&format!("0,feed-override,{ratio}\n")).run();
+        done.assert_within_limits();
+        let (feed, line) = (done.column("feed_mm_s"), done.column("line"));
+        for (at, most) in feeds {
+            // The first sample of a line covers the end of the line before.
+            let inside = feed.iter().zip(&line).filter(|(_, l)| **l == at).skip(1);
+            let top = inside.fold(0.0f64, |top, (f, _)| top.max(*f));
+            assert!(top <= ratio * most * (1.0 + 1e-6), "line {at} at {ratio}: {top} above {}", ratio * most);
+            assert!(top >= ratio * most * 0.999, "line {at} at {ratio}: {top} never reaches {}", ratio * most);
+        }
+    }
+}

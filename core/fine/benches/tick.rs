@@ -51,6 +51,10 @@ struct Bench {
 impl Bench {
     /// Segments of `duration_s`, each turned by `turn_rad` against the one before.
     fn new(duration_s: f64, turn_rad: f64) -> Self {
+        Self::of_order(2, duration_s, turn_rad)
+    }
+
+    fn of_order(order: u32, duration_s: f64, turn_rad: f64) -> Self {
         let (mut rough, end, host) = bridge(Sizes { segments: 2048, samples: 64 });
         let mut at = AxisVector::ZERO;
         for number in 0..((TICKS + 16) as f64 * 1e-3 / duration_s).ceil() as u32 {
@@ -59,7 +63,7 @@ impl Bench {
         }
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
-        let mut this = Self { fine: FineLoop::new(&config(), end, Box::new(Echo), None), host, _rough: rough };
+        let mut this = Self { fine: FineLoop::new(&config(order), end, Box::new(Echo), None), host, _rough: rough };
         this.fine.reset();
         while this.fine.counters().samples == 0 {
             this.run(1);
@@ -105,14 +109,14 @@ fn segment(at: &mut AxisVector, number: f64, duration_s: f64, turn_rad: f64) -> 
     Queued { entry: RingEntry::Segment(segment), start_s: number * duration_s }
 }
 
-fn config() -> FineConfig {
+fn config(order: u32) -> FineConfig {
     let axis = AxisLimits {
         min_mm: -1e6,
         max_mm: 1e6,
         feed_mm_per_s: 250.0,
         rapid_mm_per_s: 250.0,
         acceleration_mm_per_s2: 1000.0,
-        jerk_mm_per_s3: f64::INFINITY,
+        jerk_mm_per_s3: if order == 3 { 20_000.0 } else { f64::INFINITY },
         speed_difference_mm_per_s: 0.0,
     };
     FineConfig {
@@ -120,7 +124,8 @@ fn config() -> FineConfig {
         limits: Limits::new(&[axis; 3]).unwrap(),
         // The queue starts at speed: the guard is to look at it, not to stop it.
         speed_difference_mm_per_s: [1000.0; 8],
-        guard: GuardMode::Stop,
+        order,
+        guard: if order == 3 { GuardMode::Count } else { GuardMode::Stop },
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
         pause_at_stops: false,
@@ -150,6 +155,22 @@ fn hold(bencher: divan::Bencher) {
     bench(bencher, MachineState::Holding, || {
         let bench = Bench::new(1e-3, 0.01);
         bench.host.controls.hold.store(true, Relaxed);
+        bench
+    });
+}
+
+/// Segments of a fine period each on a straight line with a jerk limit.
+#[divan::bench]
+fn jerk_limited(bencher: divan::Bencher) {
+    bench(bencher, MachineState::Running, || Bench::of_order(3, 1e-3, 0.0));
+}
+
+/// The same, at half the feed.
+#[divan::bench]
+fn jerk_limited_override(bencher: divan::Bencher) {
+    bench(bencher, MachineState::Running, || {
+        let bench = Bench::of_order(3, 1e-3, 0.0);
+        bench.host.controls.feed_override.store(0.5);
         bench
     });
 }

@@ -21,6 +21,8 @@ pub struct FineConfig {
     pub limits: Limits,
     /// Allowable speed difference that the planner makes use of, per axis, mm/s.
     pub speed_difference_mm_per_s: [f64; MAX_AXES],
+    /// Order of the limits that the planner keeps: 2 velocity and acceleration, 3 also jerk.
+    pub order: u32,
     /// What the guard does.
     pub guard: GuardMode,
     /// Where the machine stands.

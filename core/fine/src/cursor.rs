@@ -1,5 +1,7 @@
 //! Where the fine loop is in the queue of segments.
 
+mod look;
+
 use rtrb::Consumer;
 use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, Event, RingEntry, Segment, SegmentFlags};
@@ -17,6 +19,8 @@ pub struct Cursor {
     start_s: f64,
     local_s: f64,
     epoch: u32,
+    /// Entries taken out of the queue since the start.
+    taken: u64,
     /// At the end of a segment that ends at rest: the next move starts with the next segment.
     resting: bool,
 }
@@ -35,7 +39,15 @@ pub enum Reached {
 impl Cursor {
     /// At rest at `position`, in front of an empty queue.
     pub fn new(entries: Consumer<Queued>, position: &AxisVector) -> Self {
-        Self { entries, segment: Segment::rest(position, 0.0), start_s: 0.0, local_s: 0.0, epoch: 0, resting: true }
+        Self {
+            entries,
+            segment: Segment::rest(position, 0.0),
+            start_s: 0.0,
+            local_s: 0.0,
+            epoch: 0,
+            taken: 0,
+            resting: true,
+        }
     }
 
     /// The segment that the place lies in.
@@ -215,6 +227,7 @@ impl Cursor {
     fn drop_front(&mut self) {
         if let Ok(front) = self.entries.read_chunk(1) {
             front.commit_all();
+            self.taken += 1;
         }
     }
 }

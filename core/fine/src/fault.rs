@@ -11,6 +11,8 @@ pub enum Breach {
     Velocity,
     /// More change of velocity than `A·Δt + V` over some window.
     Acceleration,
+    /// More change of acceleration than the jerk limit gives, where the planner keeps one.
+    Jerk,
 }
 
 /// The cause of a fault.

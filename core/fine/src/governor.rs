@@ -5,6 +5,10 @@
 //! for the continuous velocity that the segment declares; the steps themselves shrink with σ. A constant σ is always
 //! admissible where the plan is, so the interval for σ̇ is never empty.
 
+mod smooth;
+
+pub use smooth::Aim;
+
 use tandem_sdk::{AxisLimits, MAX_AXES};
 
 use crate::points::Points;
@@ -19,6 +23,8 @@ const TOLERANCE: f64 = 1e-6;
 #[derive(Debug)]
 pub struct Governor {
     sigma: f64,
+    /// Its rate of change at the end of the last period, 1/s.
+    rate_per_s: f64,
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
@@ -27,7 +33,7 @@ pub struct Governor {
 impl Governor {
     /// A governor at σ = 1: where nothing moves, program time passes at its own rate.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
-        Self { sigma: 1.0, period_s, acceleration: limits.map(|l| l.acceleration_mm_per_s2), axes }
+        Self { sigma: 1.0, rate_per_s: 0.0, period_s, acceleration: limits.map(|l| l.acceleration_mm_per_s2), axes }
     }
 
     /// The rate at the end of the last period.
@@ -35,9 +41,14 @@ impl Governor {
         self.sigma
     }
 
+    /// Its rate of change at the end of the last period, 1/s.
+    pub fn rate_per_s(&self) -> f64 {
+        self.rate_per_s
+    }
+
     /// Sets the rate where nothing moves and any rate is as good.
     pub fn jump(&mut self, sigma: f64) {
-        self.sigma = sigma;
+        (self.sigma, self.rate_per_s) = (sigma, 0.0);
     }
 
     /// The highest rate at which the plan itself keeps the limits: 1 unless the planner is defective.
@@ -62,6 +73,7 @@ impl Governor {
     /// Takes `sigma` as the rate at the end of this period; gives the program time that passes meanwhile, s.
     pub fn take(&mut self, sigma: f64) -> f64 {
         let mean = f64::midpoint(self.sigma, sigma);
+        self.rate_per_s = (sigma - self.sigma) / self.period_s;
         self.sigma = sigma;
         mean * self.period_s
     }

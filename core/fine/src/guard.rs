@@ -7,6 +7,10 @@ use crate::fault::{Breach, FaultKind};
 
 /// The one tolerance on velocity and acceleration, relative.
 const TOLERANCE: f64 = 1e-6;
+/// The one on jerk.
+const JERK_TOLERANCE: f64 = 1e-2;
+/// Samples whose third difference contains a sample that was sent with a relaxed jerk.
+const RELAXED_SAMPLES: u32 = 4;
 
 /// Checks samples against the ones already sent.
 #[derive(Debug)]
@@ -14,6 +18,9 @@ pub struct Guard {
     config: FineConfig,
     position: AxisVector,
     velocity: AxisVector,
+    acceleration: AxisVector,
+    /// Samples for which jerk is not judged.
+    relaxed: u32,
     /// Per sign and axis: by how much the velocity has changed more than the acceleration limit explains, mm/s.
     buckets: [[f64; MAX_AXES]; 2],
 }
@@ -22,6 +29,7 @@ pub struct Guard {
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
     velocity: AxisVector,
+    acceleration: AxisVector,
     buckets: [[f64; MAX_AXES]; 2],
     /// The first limit broken, if any.
     pub breach: Option<FaultKind>,
@@ -31,7 +39,8 @@ impl Guard {
     /// At rest at the configured position.
     pub fn new(config: &FineConfig) -> Self {
         let position = config.position;
-        Self { config: *config, position, velocity: AxisVector::ZERO, buckets: [[0.0; MAX_AXES]; 2] }
+        let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
+        Self { config: *config, position, velocity, acceleration, relaxed: 0, buckets: [[0.0; MAX_AXES]; 2] }
     }
 
     /// The last position sent.
@@ -44,9 +53,20 @@ impl Guard {
         &self.velocity
     }
 
+    /// The acceleration of the last period, mm/s².
+    pub fn acceleration(&self) -> &AxisVector {
+        &self.acceleration
+    }
+
+    /// No rate keeps the jerk limit with the next sample: it is counted, and not held against it.
+    pub fn relax_jerk(&mut self) {
+        self.relaxed = RELAXED_SAMPLES;
+    }
+
     /// Judges `next` as the sample after the last one sent.
     pub fn check(&self, next: &AxisVector) -> Checked {
-        let mut checked = Checked { velocity: AxisVector::ZERO, buckets: self.buckets, breach: None };
+        let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
+        let mut checked = Checked { velocity, acceleration, buckets: self.buckets, breach: None };
         for axis in 0..self.config.axis_count() {
             let breach = self.check_axis(axis, next[axis], &mut checked);
             checked.breach = checked.breach.or(breach);
@@ -57,7 +77,8 @@ impl Guard {
     /// Remembers that `next` was sent.
     pub fn sent(&mut self, next: &AxisVector, checked: &Checked) {
         self.position = *next;
-        self.velocity = checked.velocity;
+        (self.velocity, self.acceleration) = (checked.velocity, checked.acceleration);
+        self.relaxed = self.relaxed.saturating_sub(1);
         self.buckets = checked.buckets;
     }
 
@@ -69,6 +90,7 @@ impl Guard {
         let velocity = (next - self.position[axis]) / period_s;
         let change = velocity - self.velocity[axis];
         checked.velocity[axis] = velocity;
+        checked.acceleration[axis] = change / period_s;
         let leak = limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * period_s + rounding;
         let mut fullest = 0.0f64;
         for (sign, bucket) in [change, -change].into_iter().zip(&mut checked.buckets) {
@@ -90,6 +112,12 @@ impl Guard {
         let allowed = self.config.speed_difference_mm_per_s[axis];
         if fullest > allowed * (1.0 + TOLERANCE) + rounding {
             return breach(Breach::Acceleration, change / period_s, limits.acceleration_mm_per_s2);
+        }
+        let jerk = (change / period_s - self.acceleration[axis]) / period_s;
+        let jerk_rounding = 4.0 * rounding / (period_s * period_s);
+        let judged = self.config.order >= 3 && self.relaxed == 0;
+        if judged && jerk.abs() > limits.jerk_mm_per_s3 * (1.0 + JERK_TOLERANCE) + jerk_rounding {
+            return breach(Breach::Jerk, jerk, limits.jerk_mm_per_s3);
         }
         None
     }

@@ -4,6 +4,7 @@ mod exchange;
 mod follow;
 mod govern;
 mod rest;
+mod single_block;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -18,8 +19,10 @@ use crate::edge::EdgeWatch;
 use crate::fault::{Fault, FaultKind};
 use crate::governor::Governor;
 use crate::guard::Guard;
+use crate::outlook::Outlook;
 use crate::outputs::Outputs;
 use crate::points::Points;
+use crate::preview::{LineEnd, Preview};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
 use rest::Stop;
@@ -41,6 +44,8 @@ pub struct Counters {
     pub late_ratios: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
+    /// Samples that kept velocity and acceleration, but for which no rate kept the jerk limit.
+    pub jerk_relaxed_samples: u64,
 }
 
 #[derive(Debug)]
@@ -73,6 +78,11 @@ pub struct FineLoop {
     ratio: f64,
     cursor: Cursor,
     points: Points,
+    outlook: Outlook,
+    preview: Preview,
+    line_end: LineEnd,
+    /// Something has moved since the last hold between two lines.
+    line_moves: bool,
     governor: Governor,
     guard: Guard,
     edge: EdgeWatch,
@@ -115,6 +125,10 @@ impl FineLoop {
             ratio: 1.0,
             cursor: Cursor::new(end.segments, &config.position),
             points: Points::new(limits, axes),
+            outlook: Outlook::new(limits, axes, config.period_s),
+            preview: Preview::new(),
+            line_end: LineEnd::default(),
+            line_moves: false,
             governor: Governor::new(limits, axes, config.period_s),
             guard: Guard::new(config),
             edge: EdgeWatch::default(),
@@ -244,6 +258,6 @@ impl FineLoop {
             return;
         }
         self.fault = Some(Fault { kind, tick: self.tick, line: self.cursor.segment().line });
-        self.phase = Phase::Ramping(Ramp::new(&self.config, self.guard.position(), self.guard.velocity()));
+        self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
     }
 }

@@ -42,6 +42,7 @@ fn guard(machine: &Machine, breach: Breach, axis: usize, value: f64, limit: f64)
         Breach::Acceleration => {
             format!("acceleration {value:.3} {unit}/s² in a window already full, limit {limit:.3} {unit}/s²")
         }
+        Breach::Jerk => format!("jerk {value:.1} {unit}/s³, limit {limit:.1} {unit}/s³"),
     };
     format!("guard: planner {} asks for axis {letter} {what}; the sample was not sent", machine.planner.plugin)
 }

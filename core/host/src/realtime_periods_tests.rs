@@ -156,6 +156,7 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         period_s: 0.001,
         limits: Limits::new(&[axis; 3]).unwrap(),
         speed_difference_mm_per_s: [0.0; MAX_AXES],
+        order: 2,
         guard: GuardMode::Stop,
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,

@@ -256,7 +256,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         limit_violations: counters.limit_violations,
         guard_stops: counters.guard_stops,
         governed_samples: counters.governed_samples,
-        jerk_relaxed_samples: 0,
+        jerk_relaxed_samples: counters.jerk_relaxed_samples,
         overruns: 0,
         missed_periods: counters.missed_periods,
         lateness_us: None,

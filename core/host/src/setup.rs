@@ -104,6 +104,7 @@ pub fn fine_config(machine: &Machine, planner: &PlannerDescription, switches: Sw
         period_s: machine.fine_period_s,
         limits: machine.limits,
         speed_difference_mm_per_s: planner.speed_difference_mm_per_s,
+        order: planner.order,
         guard: match machine.guard {
             GuardMode::Stop => tandem_fine::GuardMode::Stop,
             GuardMode::Count => tandem_fine::GuardMode::Count,

@@ -27,6 +27,9 @@ impl AtomicF64 {
 /// from the next period on.
 pub const STOP_SHARE: f64 = 0.95;
 
+/// Share of the jerk that both loops count on for a stop: turning, and the plan's own jerk, take what they need.
+pub const STOP_JERK_SHARE: f64 = 0.8;
+
 /// How far the queue reaches, and what it takes to stop within it. Written by the rough loop after each push.
 ///
 /// The fields are stored in the order in which the fine loop may safely see them: first the stop that the new segments
@@ -35,6 +38,8 @@ pub const STOP_SHARE: f64 = 0.95;
 pub struct Depth {
     /// Smallest path deceleration that the queued segments leave, mm/s².
     pub stop_deceleration_mm_per_s2: AtomicF64,
+    /// Longest time in which that deceleration can be built up, s; zero where no jerk limit is kept.
+    pub stop_ramp_s: AtomicF64,
     /// Program time at which the queue ends; infinite where it ends at rest.
     pub wall_s: AtomicF64,
     /// Program time that must lie before the wall for motion to start (or start again), s: the worst stop; zero where the
@@ -49,6 +54,7 @@ impl Depth {
     pub fn begin(&self, epoch: u32, now_s: f64) {
         self.required_s.store(f64::INFINITY);
         self.stop_deceleration_mm_per_s2.store(f64::INFINITY);
+        self.stop_ramp_s.store(0.0);
         self.wall_s.store(now_s);
         self.epoch.store(epoch, Ordering::Release);
     }
@@ -70,6 +76,7 @@ impl Default for Depth {
     fn default() -> Self {
         Self {
             stop_deceleration_mm_per_s2: AtomicF64::new(f64::INFINITY),
+            stop_ramp_s: AtomicF64::new(0.0),
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),
             epoch: AtomicU32::new(0),

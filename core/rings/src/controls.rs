@@ -33,10 +33,10 @@ impl Default for Controls {
         Self {
             hold: AtomicBool::new(false),
             program_hold: AtomicBool::new(false),
+            single_block: AtomicBool::new(false),
             feed_override: AtomicF64::new(1.0),
             rapid_override: AtomicF64::new(1.0),
             optional_stop: AtomicBool::new(false),
-            single_block: AtomicBool::new(false),
             emergency_stop: AtomicBool::new(false),
             abort: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),

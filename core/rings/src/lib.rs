@@ -10,7 +10,7 @@ mod given;
 mod rest;
 mod sample;
 
-pub use atomics::{AtomicF64, Depth, STOP_SHARE};
+pub use atomics::{AtomicF64, Depth, STOP_JERK_SHARE, STOP_SHARE};
 pub use controls::{Controls, Status};
 pub use counts::Counts;
 pub use given::Given;

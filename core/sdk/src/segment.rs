@@ -98,9 +98,12 @@ pub struct Segment {
     /// `velocity(t) − step_velocity + step_acceleration · t`, and it is what the governor limits. See `ARCHITECTURE.md`,
     /// "Velocity steps and the governor".
     pub step_acceleration: AxisVector,
-    /// Bound on |dσ/dt| that keeps the jerk limit, 1/s; infinite for order 2.
+    /// Order 3: the plan leaves room for |dσ/dt| up to this, together with the next, at every σ from 0 to 1, 1/s; infinite
+    /// for order 2. On a straight path it is `a_s/v`, with `a_s` the deceleration declared above.
     pub max_sigma_rate_per_s: f64,
-    /// Bound on |d²σ/dt²| that keeps the jerk limit, 1/s²; infinite for order 2.
+    /// Order 3: the plan leaves room for |d²σ/dt²| up to this, 1/s²; infinite for order 2. On a straight path J/v. What both
+    /// say is counted on for the depth of the queue: building up the stop takes `rate / acceleration`. While driving, the
+    /// fine loop goes by the limits themselves.
     pub max_sigma_acceleration_per_s2: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::STOP_SHARE;
+use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_sdk::AxisVector;
 
 use super::{FineLoop, Phase};
@@ -28,6 +28,7 @@ impl FineLoop {
     pub(super) fn follow(&mut self) -> (AxisVector, Input) {
         self.take_ratio();
         self.look_for_stop();
+        self.stop_between_lines();
         let ask = self.ask();
         self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
@@ -103,7 +104,8 @@ impl FineLoop {
         let speed = self.governor.sigma() * self.cursor.path_speed_mm_per_s();
         let deceleration = self.depth.stop_deceleration_mm_per_s2.load();
         // The declared deceleration is kept within the governor's margin and from the next period on.
-        let stop_s = speed / (STOP_SHARE * deceleration) + 3.0 * self.config.period_s;
+        let ramp_s = self.depth.stop_ramp_s.load() / STOP_JERK_SHARE;
+        let stop_s = speed / (STOP_SHARE * deceleration) + ramp_s + 3.0 * self.config.period_s;
         if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s {
             self.starved = true;
             self.counters.starvations += 1;

@@ -1,9 +1,12 @@
-//! Choosing the rate of program time: what the ratios ask for, and what the limits allow.
+//! Choosing the rate of program time: what is asked for, and what the limits allow.
+
+use tandem_rings::STOP_SHARE;
 
 use super::FineLoop;
 use super::follow::Ask;
 use crate::config::GuardMode;
-use crate::governor::Governor;
+use crate::governor::{Aim, Governor};
+use crate::law::Along;
 
 /// The feed ratios that count now.
 struct Ratios {
@@ -11,22 +14,76 @@ struct Ratios {
     rapid: f64,
 }
 
+/// Share of the jerk that braking for a place ahead counts on.
+const JERK_SHARE: f64 = 0.9;
+
 impl FineLoop {
     /// Chooses the rate for this period; gives the program time that passes, s.
     pub(super) fn govern(&mut self, ask: Ask) -> f64 {
         self.cursor.scan(self.config.period_s, &mut self.points);
-        // Under `count` everything is sent: forms that break limits on purpose are not slowed.
-        let counting = self.config.guard == GuardMode::Count;
-        let limit = if counting { 1.0 } else { Governor::plan_limit(&self.points) };
+        if self.config.order >= 3 {
+            self.cursor.look_out(self.config.period_s, &mut self.outlook);
+        }
         let ratios = self.ratios_in_force();
-        let wanted = if ask == Ask::Run { self.ratio_target(&ratios) } else { 0.0 };
+        let below = ratios.feed < self.config.max_feed_ratio;
+        let end_mm = if ask == Ask::Run { self.line_end() } else { None };
+        let way_speed = if ask == Ask::Run { self.speed_for_places(&ratios, end_mm) } else { 0.0 };
+        let delta_s = if self.config.order >= 3 {
+            self.govern_smooth(ask, &ratios, way_speed)
+        } else {
+            self.govern_steep(ask, &ratios, way_speed)
+        };
+        let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some();
+        let sigma = self.governor.sigma();
+        self.recovering = asked || (self.recovering && sigma < 1.0);
+        self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
+        self.stop_at_line_end(end_mm);
+        delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
+    }
+
+    /// The highest rate at which the plan keeps its limits.
+    fn plan_limit(&self) -> f64 {
+        // Under `count` everything is sent: forms that break limits on purpose are not slowed.
+        if self.config.guard == GuardMode::Count {
+            return 1.0;
+        }
+        let limit = Governor::plan_limit(&self.points);
+        let jerk = if self.config.order >= 3 { self.outlook.jerk_ratio } else { 0.0 };
+        if jerk > 1.0 + JERK_TOLERANCE { limit.min(jerk.cbrt().recip()) } else { limit }
+    }
+
+    /// Limits of velocity and acceleration: σ is linear in the period.
+    fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        let limit = self.plan_limit();
+        let wanted = if ask == Ask::Run { self.ratio_target(ratios, way_speed_mm_per_s) } else { 0.0 };
         let target = wanted.min(limit);
         let unchanged = target == self.governor.sigma();
         let sigma = if unchanged { target } else { self.governor.choose(target, &self.points) };
-        let asked = ask != Ask::Run || ratios.feed < self.config.max_feed_ratio || ratios.rapid < 1.0;
-        self.recovering = asked || (self.recovering && sigma < 1.0);
-        self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
-        self.governor.take(sigma).min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
+        self.governor.take(sigma)
+    }
+
+    /// Limits of jerk too: σ̈ is constant in the period.
+    fn govern_smooth(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        let path = self.cursor.path_derivatives();
+        let ahead = self.cursor.ahead(self.governor.sigma() * self.config.period_s);
+        let limit = self.plan_limit();
+        let run = if ahead.rapid { ratios.rapid.min(limit) } else { limit };
+        let feed = if ahead.rapid || ratios.feed >= self.config.max_feed_ratio {
+            f64::INFINITY
+        } else {
+            ratios.feed * ahead.feed_mm_per_s.min(self.cursor.segment().feed_mm_per_s)
+        };
+        let aim = match ask {
+            Ask::Run => Aim { sigma: run, speed_mm_per_s: feed.min(way_speed_mm_per_s), path },
+            // Where the plan stands still, its path says nothing.
+            _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, path },
+        };
+        let chosen = self.governor.smooth(&aim, &self.outlook);
+        if chosen.relaxed {
+            self.counters.jerk_relaxed_samples += 1;
+            self.guard.relax_jerk();
+        }
+        chosen.delta_s
     }
 
     fn ratios_in_force(&self) -> Ratios {
@@ -38,8 +95,9 @@ impl FineLoop {
         }
     }
 
-    /// The rate at which the path speed is at most ratio × programmed feed at the end of the period.
-    fn ratio_target(&mut self, ratios: &Ratios) -> f64 {
+    /// The rate at which the path speed is at most ratio × programmed feed at the end of the period, and no more than
+    /// `way_speed_mm_per_s`.
+    fn ratio_target(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
         let (from, from_mm) = (self.governor.sigma(), self.cursor.path_mm());
         let mut sigma = from;
         // The plan at the end of the period depends on the rate sought: three rounds settle it.
@@ -50,12 +108,57 @@ impl FineLoop {
             let mean = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
             let of_period = 2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from;
             let next = if ahead.rapid { ratios.rapid } else { at_end.min(of_period).clamp(0.0, 1.0) };
+            let next = next.min(within(way_speed_mm_per_s, ahead.speed_mm_per_s));
             if next == sigma {
                 break;
             }
             sigma = next;
         }
         sigma
+    }
+
+    /// The speed at the end of this period from which every lower feed ahead, and the end of the line, can be met, mm/s.
+    fn speed_for_places(&mut self, ratios: &Ratios, end_mm: Option<f64>) -> f64 {
+        let at_end = end_mm.map_or(f64::INFINITY, |end_mm| self.speed_towards(end_mm, 0.0));
+        if ratios.feed >= self.config.max_feed_ratio {
+            return at_end;
+        }
+        let along = self.along();
+        let stop_s = along.speed_mm_per_s / along.most_mm_per_s2 + self.outlook.horizon_s + 4.0 * self.config.period_s;
+        let until_s = self.cursor.program_time_s() + stop_s;
+        self.preview.extend(&mut self.cursor, until_s);
+        let marks = self.preview.marks();
+        marks.fold(at_end, |least, mark| least.min(self.speed_towards(mark.path_mm, ratios.feed * mark.feed_mm_per_s)))
+    }
+
+    /// The speed at the end of this period from which `end_mm_per_s` can be met at `place_mm`, mm/s.
+    ///
+    /// With limits of order 2: with `d` the way left and `v₀` the speed now, `v² ≤ v_e² + 2a(d − (v₀ + v)T/2)`. With a jerk
+    /// limit it is decided period by period whether braking may still wait.
+    fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
+        let (along, period_s) = (self.along(), self.config.period_s);
+        let left_mm = place_mm - self.cursor.path_mm();
+        if self.config.order >= 3 {
+            let soon_mm = 2.0 * period_s * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
+            let later = Along { speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s), ..along };
+            return if later.way_to_mm(end_mm_per_s) + soon_mm < left_mm { f64::INFINITY } else { end_mm_per_s };
+        }
+        let step = along.most_mm_per_s2 * period_s;
+        let way = 2.0 * along.most_mm_per_s2 * left_mm - step * (along.speed_mm_per_s + step);
+        let square = end_mm_per_s * end_mm_per_s + way + step * step / 4.0;
+        (square.max(0.0).sqrt() - step / 2.0).max(0.0)
+    }
+
+    /// The state along the path, with what every queued segment leaves to brake with.
+    pub(super) fn along(&self) -> Along {
+        let [speed, acceleration, _] = self.cursor.path_derivatives();
+        let sigma = self.governor.sigma();
+        Along {
+            speed_mm_per_s: sigma * speed,
+            acceleration_mm_per_s2: sigma * sigma * acceleration + speed * self.governor.rate_per_s(),
+            most_mm_per_s2: STOP_SHARE * self.depth.stop_deceleration_mm_per_s2.load(),
+            jerk_mm_per_s3: JERK_SHARE * self.outlook.path_jerk_mm_per_s3,
+        }
     }
 
     /// Takes the ratios that are due.
@@ -79,3 +182,5 @@ fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
 
 /// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
 const FEED_TOLERANCE: f64 = 1e-7;
+/// Relative tolerance on jerk within which a plan is at its limit.
+const JERK_TOLERANCE: f64 = 1e-2;

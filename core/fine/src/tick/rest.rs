@@ -87,6 +87,8 @@ impl FineLoop {
         }
         self.cursor.part(&rest.position);
         self.edge.end();
+        self.preview.clear();
+        self.line_end.forget();
         (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);
         if stop.cause == RestCause::Abort {
             self.outputs.abort();

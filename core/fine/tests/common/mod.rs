@@ -75,6 +75,7 @@ impl Bench {
             period_s: PERIOD_S,
             limits: Limits::new(&[axis; 3]).unwrap(),
             speed_difference_mm_per_s: [0.0; MAX_AXES],
+            order: 2,
             guard,
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,

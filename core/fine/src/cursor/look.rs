@@ -1,0 +1,85 @@
+//! Looking ahead in the queue without moving.
+
+use tandem_rings::Queued;
+use tandem_sdk::RingEntry;
+
+use super::{Cursor, ends};
+use crate::outlook::{Outlook, derivatives};
+use crate::points::Points;
+
+impl Cursor {
+    /// Number, counted from the start, of the entry that comes next.
+    pub fn next_number(&self) -> u64 {
+        self.taken
+    }
+
+    /// Line of the next segment queued.
+    pub fn next_line(&mut self) -> Option<u32> {
+        let mut line = None;
+        self.walk(self.taken, Points::SEGMENTS, |queued| {
+            if let RingEntry::Segment(segment) = &queued.entry {
+                line = Some(segment.line);
+            }
+            line.is_none()
+        });
+        line
+    }
+
+    /// Shows the queued entries from `number` on, at most `most` of them, until `look` says stop (`false`); gives the
+    /// number of the first entry not shown, or shown last where it said stop.
+    pub fn walk(&mut self, number: u64, most: usize, mut look: impl FnMut(&Queued) -> bool) -> u64 {
+        let skip = number.saturating_sub(self.taken) as usize;
+        let wanted = self.entries.slots().min(skip + most);
+        let mut at = self.taken + skip.min(wanted) as u64;
+        let Ok(chunk) = self.entries.read_chunk(wanted) else { return at };
+        let (first, second) = chunk.as_slices();
+        for queued in first.iter().chain(second).skip(skip) {
+            if !look(queued) {
+                return at;
+            }
+            at += 1;
+        }
+        at
+    }
+
+    /// First to third derivative of the path coordinate here by program time, mm/s and so on.
+    pub fn path_derivatives(&self) -> [f64; 3] {
+        if self.resting { [0.0; 3] } else { derivatives(&self.segment.path, self.local_s) }
+    }
+
+    /// Collects the points of the coming period, and a grid beyond it.
+    pub fn look_out(&mut self, period_s: f64, outlook: &mut Outlook) {
+        outlook.clear();
+        let step_s = outlook.horizon_s / Outlook::GRID as f64;
+        let mut grid_s = period_s + step_s;
+        let mut start_s = 0.0;
+        if !self.resting {
+            let here_s = self.segment.duration_s - self.local_s;
+            outlook.stretch(&self.segment, self.local_s, here_s.min(period_s), 0.0);
+            while grid_s <= here_s && grid_s <= outlook.horizon_s {
+                outlook.point(&self.segment, self.local_s + grid_s, grid_s);
+                grid_s += step_s;
+            }
+            if ends(&self.segment) {
+                return;
+            }
+            start_s = here_s;
+        }
+        let next = self.taken;
+        self.walk(next, Points::SEGMENTS, |queued| {
+            let RingEntry::Segment(segment) = &queued.entry else { return true };
+            if start_s < period_s {
+                if outlook.is_full() {
+                    return false;
+                }
+                outlook.stretch(segment, 0.0, segment.duration_s.min(period_s - start_s), start_s);
+            }
+            while grid_s <= start_s + segment.duration_s && grid_s <= outlook.horizon_s {
+                outlook.point(segment, grid_s - start_s, grid_s);
+                grid_s += step_s;
+            }
+            start_s += segment.duration_s;
+            grid_s <= outlook.horizon_s && !ends(segment)
+        });
+    }
+}

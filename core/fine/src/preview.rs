@@ -1,0 +1,134 @@
+//! What lies ahead on the path that the plan does not slow down for by itself: a lower feed at a ratio below 1, and the
+//! end of a line in single-block operation.
+//!
+//! The queue is looked at once, a bounded number of entries in a period, ahead of the place that moves.
+
+use tandem_sdk::{RingEntry, Segment, SegmentFlags};
+
+use crate::cursor::Cursor;
+
+/// A place on the path from which on the programmed feed is lower.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mark {
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Programmed feed from there, mm/s.
+    pub feed_mm_per_s: f64,
+}
+
+/// Entries looked at in a period: four times what may be driven in one.
+const ENTRIES: usize = 64;
+/// Most marks; where there are more, neighbours are merged to the earlier place and the lower feed.
+const MARKS: usize = 64;
+
+/// The marks ahead.
+#[derive(Debug)]
+pub struct Preview {
+    /// Number of the entry to look at next.
+    next: u64,
+    /// Programmed feed up to there, mm/s.
+    feed_mm_per_s: f64,
+    marks: [Mark; MARKS],
+    first: usize,
+    count: usize,
+}
+
+impl Preview {
+    /// Nothing seen.
+    pub fn new() -> Self {
+        Self { next: 0, feed_mm_per_s: 0.0, marks: [Mark::default(); MARKS], first: 0, count: 0 }
+    }
+
+    /// Looks further ahead, up to program time `until_s`; forgets what has been passed.
+    pub fn extend(&mut self, cursor: &mut Cursor, until_s: f64) {
+        let here_mm = cursor.path_mm();
+        if self.next < cursor.next_number() {
+            (self.next, self.feed_mm_per_s) = (cursor.next_number(), cursor.segment().feed_mm_per_s);
+        }
+        while self.count > 0 && self.marks[self.first].path_mm <= here_mm {
+            self.first = (self.first + 1) % MARKS;
+            self.count -= 1;
+        }
+        self.next = cursor.walk(self.next, ENTRIES, |queued| {
+            if let RingEntry::Segment(segment) = &queued.entry {
+                if queued.start_s > until_s {
+                    return false;
+                }
+                self.see(segment);
+            }
+            true
+        });
+    }
+
+    /// Forgets the marks: what is queued counts no more.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// The marks ahead, nearest first.
+    pub fn marks(&self) -> impl Iterator<Item = &Mark> {
+        (0..self.count).map(|n| &self.marks[(self.first + n) % MARKS])
+    }
+
+    fn see(&mut self, segment: &Segment) {
+        if segment.flags.contains(SegmentFlags::DWELL) || segment.duration_s == 0.0 {
+            return;
+        }
+        if segment.feed_mm_per_s < self.feed_mm_per_s {
+            self.mark(Mark { path_mm: segment.path[0], feed_mm_per_s: segment.feed_mm_per_s });
+        }
+        self.feed_mm_per_s = segment.feed_mm_per_s;
+    }
+
+    fn mark(&mut self, mark: Mark) {
+        if self.count < MARKS {
+            self.marks[(self.first + self.count) % MARKS] = mark;
+            self.count += 1;
+        } else {
+            let last = &mut self.marks[(self.first + self.count - 1) % MARKS];
+            last.feed_mm_per_s = last.feed_mm_per_s.min(mark.feed_mm_per_s);
+        }
+    }
+}
+
+/// Where single-block operation stops next.
+#[derive(Debug, Default)]
+pub struct LineEnd {
+    /// Number of the entry to look at next.
+    next: u64,
+    /// Line of the entries up to there.
+    line: u32,
+    /// Whether the plan rests there by itself.
+    rests: bool,
+    /// Path coordinate of the end chosen, mm.
+    chosen_mm: Option<f64>,
+}
+
+impl LineEnd {
+    /// Forgets the end chosen: the next one is looked for.
+    pub fn forget(&mut self) {
+        self.chosen_mm = None;
+    }
+
+    /// The nearest end of a line at which the plan goes on and the machine can stop when it needs `way_mm` for it.
+    pub fn look(&mut self, cursor: &mut Cursor, way_mm: f64) -> Option<f64> {
+        let here_mm = cursor.path_mm();
+        if self.chosen_mm.is_none_or(|end_mm| end_mm < here_mm) {
+            self.chosen_mm = None;
+            let overtaken = self.next < cursor.next_number();
+            if overtaken {
+                (self.next, self.line) = (cursor.next_number(), cursor.segment().line);
+            }
+            let nearest_mm = here_mm + way_mm;
+            let (line, rests, chosen) = (&mut self.line, &mut self.rests, &mut self.chosen_mm);
+            self.next = cursor.walk(self.next, ENTRIES, |queued| {
+                let RingEntry::Segment(segment) = &queued.entry else { return true };
+                let ended = segment.line != *line && !*rests && segment.path[0] >= nearest_mm;
+                (*line, *rests) = (segment.line, segment.flags.contains(SegmentFlags::ENDS_AT_REST));
+                *chosen = ended.then_some(segment.path[0]);
+                !ended
+            });
+        }
+        self.chosen_mm
+    }
+}
