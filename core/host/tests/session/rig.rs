@@ -71,6 +71,7 @@ impl Rig {
             period_s: PERIOD_S,
             limits,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
+            order: 2,
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
