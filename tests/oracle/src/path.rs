@@ -1,12 +1,14 @@
-//! The programmed path as a chain of lines and arcs.
+//! The programmed path as a chain of lines, arcs and pieces of curves.
 
 mod arc;
 mod line;
+mod nurbs;
 #[cfg(test)]
 mod tests;
 
 pub use arc::Arc;
 pub use line::Line;
+pub use nurbs::{Curve, Nurbs};
 
 use crate::{Position, geometry::distance};
 
@@ -19,7 +21,7 @@ pub struct Path {
     pub end: Position,
 }
 
-/// A block, or a part of an arc short enough to be curved one way only.
+/// A block, or a part of an arc or curve short enough to be curved one way only.
 #[derive(Clone, Debug)]
 pub struct Element {
     /// Line of the part program, from 1.
@@ -38,6 +40,7 @@ pub struct Element {
 pub enum Shape {
     Line(Line),
     Arc(Arc),
+    Curve(Curve),
 }
 
 /// How fast a block may be travelled.
@@ -62,6 +65,7 @@ impl Shape {
         match self {
             Self::Line(line) => line.at(fraction),
             Self::Arc(arc) => arc.at(fraction),
+            Self::Curve(curve) => curve.at(fraction),
         }
     }
 
@@ -69,6 +73,7 @@ impl Shape {
         match self {
             Self::Line(line) => line.length_mm(),
             Self::Arc(arc) => arc.length_mm(),
+            Self::Curve(curve) => curve.length_mm(),
         }
     }
 
@@ -77,6 +82,7 @@ impl Shape {
         match self {
             Self::Line(line) => Self::Line(line.reversed()),
             Self::Arc(arc) => Self::Arc(arc.reversed()),
+            Self::Curve(curve) => Self::Curve(curve.reversed()),
         }
     }
 
@@ -85,6 +91,7 @@ impl Shape {
         let free = match self {
             Self::Line(line) => line.foot(point),
             Self::Arc(arc) => arc.foot(point),
+            Self::Curve(curve) => curve.foot(point),
         };
         let fraction = free.clamp(low, high.max(low));
         (fraction, distance(&self.at(fraction), point))
@@ -102,6 +109,7 @@ impl Shape {
         let first = match self {
             Self::Line(line) => line.entry(point, reach_mm),
             Self::Arc(arc) => arc.entry(point, reach_mm, low, nearest),
+            Self::Curve(curve) => curve.entry(point, reach_mm, low, nearest),
         };
         Some(first.clamp(low, nearest))
     }

@@ -2,6 +2,7 @@
 
 mod arc;
 mod codes;
+mod curve;
 mod line;
 mod motion;
 mod state;
@@ -53,5 +54,5 @@ pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -
             break;
         }
     }
-    Ok(state.into_path())
+    state.into_path().map_err(|cause| Unread { line: program.lines().count(), cause })
 }

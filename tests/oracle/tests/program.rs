@@ -119,7 +119,7 @@ fn a_tolerance_in_force_is_kept() {
 
 #[test]
 fn what_is_not_known_is_not_judged() {
-    is_not_judged("G21\nG5 X1 Y1\n", "program line 2: unknown word G5");
+    is_not_judged("G21\nG33 X1 Y1\n", "program line 2: unknown word G33");
     is_not_judged("#1=5\n", "program line 1: unknown word #1=5");
     is_not_judged("G1 X[1+2] F100", "program line 1: unknown word X[1+2]F100");
     is_not_judged("O100 SUB", "program line 1: unknown word SUB");
@@ -144,7 +144,7 @@ fn what_is_not_known_is_not_judged() {
 
 #[test]
 fn a_broken_limit_is_a_failure_even_where_the_program_is_not_known() {
-    let verdict = verdict(&[at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0)], "G5 X1\n");
+    let verdict = verdict(&[at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0)], "G33 X1\n");
     assert_eq!(verdict.outcome, Outcome::Fail);
     assert!(verdict.not_judged.is_some());
 }

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{Arc, Line, Shape};
+use super::{Arc, Line, Nurbs, Shape};
 use crate::{Position, geometry::distance};
 
 const STEPS: usize = 4000;
@@ -25,7 +25,20 @@ fn shapes() -> impl Strategy<Value = Shape> {
     let curved = curved.prop_map(|(radius_mm, start_rad, sweep_rad, clockwise, rise_mm)| {
         arc(radius_mm, start_rad, if clockwise { -sweep_rad } else { sweep_rad }, rise_mm)
     });
-    prop_oneof![line, curved]
+    prop_oneof![line, curved, curves()]
+}
+
+/// A piece of a rational curve of any degree.
+fn curves() -> impl Strategy<Value = Shape> {
+    let point = [-10.0..10.0_f64, -10.0..10.0_f64, -10.0..10.0_f64].prop_map(|[x, y, z]| at(x, y, z));
+    let points = prop::collection::vec((point, 0.3..3.0_f64), 2..=6);
+    (points, any::<prop::sample::Index>()).prop_map(|(points, which)| {
+        let order = points.len();
+        let knots = (0..2 * order).map(|index| if index < order { 0.0 } else { 1.0 }).collect();
+        let (points, weights) = points.into_iter().unzip();
+        let pieces = Nurbs { degree: order - 1, points, weights, knots }.pieces();
+        Shape::Curve(which.get(&pieces).clone())
+    })
 }
 
 fn fractions() -> impl Iterator<Item = f64> {

@@ -14,6 +14,8 @@ use crate::{
     path::{self, Element, Feed, Shape},
 };
 
+/// Chords whose sum is the length of a piece of a curve.
+const CHORDS: u32 = 64;
 /// Arcs are cut into pieces so that none is mistaken for its chord.
 const GREATEST_SWEEP_RAD: f64 = PI / 8.0;
 
@@ -38,7 +40,7 @@ impl State<'_> {
             _ if target == self.position => Vec::new(),
             _ => vec![Shape::Line(path::Line::new(self.position, target))],
         };
-        self.append(shapes, motion, &target, number)?;
+        self.append(shapes, motion, number)?;
         self.position = target;
         Ok(())
     }
@@ -64,14 +66,18 @@ impl State<'_> {
         line.at(line.foot(&rest.command).clamp(0.0, 1.0))
     }
 
-    fn append(&mut self, shapes: Vec<Shape>, motion: Motion, target: &Position, number: usize) -> Result<(), String> {
+    /// Appends pieces of one block to the path.
+    pub fn append(&mut self, shapes: Vec<Shape>, motion: Motion, number: usize) -> Result<(), String> {
         if shapes.is_empty() {
             return Ok(());
         }
-        let moved = minus(target, &self.position);
         let arc = matches!(motion, Motion::Arc { .. });
         let linear = |index: usize| !self.machine.axis(index).is_some_and(|axis| axis.rotary);
-        let moves_linear = arc || (0..moved.len()).any(|axis| linear(axis) && moved[axis] != 0.0);
+        let moves_linear = arc
+            || shapes.iter().any(|shape| {
+                let moved = minus(&shape.at(1.0), &shape.at(0.0));
+                (0..moved.len()).any(|axis| linear(axis) && moved[axis] != 0.0)
+            });
         let counted = |axis: usize| linear(axis) == moves_linear;
         let feed = if motion == Motion::Rapid {
             Feed::Rapid
@@ -111,6 +117,14 @@ fn counted_length_mm(shape: &Shape, counted: &impl Fn(usize) -> bool) -> f64 {
         Shape::Line(_) => {
             let squared: f64 = squares(&minus(&shape.at(1.0), &shape.at(0.0)));
             squared.sqrt()
+        }
+        Shape::Curve(_) => {
+            let chord = |step: u32| {
+                let ends = [step, step + 1].map(|step| shape.at(f64::from(step) / f64::from(CHORDS)));
+                let squared: f64 = squares(&minus(&ends[1], &ends[0]));
+                squared.sqrt()
+            };
+            (0..CHORDS).map(chord).sum()
         }
         Shape::Arc(arc) => {
             let squared: f64 = squares(&arc.along);

@@ -1,6 +1,9 @@
 //! What a program line leaves in force for the next ones.
 
-use super::line::Line;
+use super::{
+    curve::{self, Open},
+    line::Line,
+};
 use crate::{
     LETTERS, Machine, Position, Row,
     path::{Element, Path},
@@ -60,6 +63,8 @@ pub struct State<'a> {
     pub shift: Position,
     pub exact_stop: bool,
     pub tolerance_mm: Option<f64>,
+    /// The curve whose lines are being read.
+    pub curve: Option<Open>,
     pub elements: Vec<Element>,
 }
 
@@ -81,18 +86,30 @@ impl<'a> State<'a> {
             shift: Position::default(),
             exact_stop: false,
             tolerance_mm: None,
+            curve: None,
             elements: Vec::new(),
         }
     }
 
-    pub fn into_path(self) -> Path {
-        Path { elements: self.elements, end: self.position }
+    pub fn into_path(self) -> Result<Path, String> {
+        match self.curve {
+            Some(_) => Err("a curve that is not complete".into()),
+            None => Ok(Path { elements: self.elements, end: self.position }),
+        }
     }
 
     /// Executes a line and says whether the program ends with it; an error names the word that is not known.
     pub fn execute(&mut self, mut line: Line, number: usize) -> Result<bool, String> {
+        if let Some(open) = self.curve.take() {
+            return self.curve_line(open, line).map(|()| false);
+        }
+        let curve = curve::code(&line);
+        line.g.retain(|code| Some(*code) != curve);
         let codes = self.modal_codes(&mut line)?;
         self.words(&mut line);
+        if let Some(code) = curve {
+            self.curve_code(code, &mut line, number)?;
+        }
         match codes.axis_words {
             AxisWords::WorkOffset => self.set_work_offset(&mut line)?,
             AxisWords::Shift => self.set_shift(&mut line)?,
