@@ -96,6 +96,12 @@ pub struct Latency {
     /// Keep every core busy meanwhile
     #[arg(long)]
     pub load: bool,
+    /// Draw the histogram
+    #[arg(long, value_name = "F.html")]
+    pub report: Option<PathBuf>,
+    /// Show beside it what `cyclictest -h` has printed by the end of the measurement
+    #[arg(long, value_name = "F")]
+    pub cyclictest: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]

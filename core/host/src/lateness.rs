@@ -36,10 +36,16 @@ impl Lateness {
 
     /// Counts one wake-up; one before its time counts as in time. Fine thread; does not allocate.
     pub fn record(&mut self, late_ns: i64) {
-        let late_ns = late_ns.max(0).unsigned_abs();
-        self.counts[bucket(late_ns)] += 1;
-        self.count += 1;
-        self.max_ns = self.max_ns.max(late_ns);
+        self.record_many(late_ns.max(0).unsigned_abs(), 1);
+    }
+
+    /// Counts so many wake-ups of the same lateness. Any thread; does not allocate.
+    pub fn record_many(&mut self, late_ns: u64, count: u64) {
+        if count > 0 {
+            self.counts[bucket(late_ns)] += count;
+            self.count += count;
+            self.max_ns = self.max_ns.max(late_ns);
+        }
     }
 
     /// Wake-ups counted.

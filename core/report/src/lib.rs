@@ -3,6 +3,7 @@
 //! The page needs no network, no server and no other file: style, script and samples are inside it. It shows the tool
 //! path coloured by feed, and over one shared time axis the path feed, each axis' velocity, acceleration and jerk with
 //! their limits, the path deviation, σ and the following error. What exceeds a limit is red and listed.
+//! [`LatencyReport`] draws how late a thread woke.
 //!
 //! ```
 //! use tandem_report::{Axis, Report, Samples, Unit};
@@ -31,6 +32,7 @@ mod differences;
 mod encode;
 mod findings;
 mod judge;
+mod latency;
 mod model;
 mod page;
 mod sections;
@@ -38,4 +40,5 @@ mod tables;
 mod text;
 mod thin;
 
+pub use latency::{LatencyBin, LatencyReport, LatencySeries};
 pub use model::{Axis, Report, Samples, Signal, Unit};

@@ -1,22 +1,22 @@
 //! `tandem latency`.
 
+mod cyclictest;
+mod drawing;
+mod load;
+
 use std::error::Error;
 use std::fmt::Write as _;
-use std::hint::black_box;
 use std::io::Write;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::Duration;
 
-use tandem_host::{Latency, LatenessUs, measure_latency};
+use tandem_host::{Latency, Lateness, LatenessUs, measure_latency};
 
 use crate::args;
+use cyclictest::Cyclictest;
+use load::Load;
 
 /// Longest bar, characters.
 const BAR: u64 = 50;
-/// Memory that each busy thread walks through, to keep the caches busy as well, bytes.
-const WALK_BYTES: usize = 4 * 1024 * 1024;
 
 /// Measures how late the fine loop's thread wakes on this computer.
 pub fn latency(options: &args::Latency) -> Result<u8, Box<dyn Error>> {
@@ -30,46 +30,15 @@ pub fn latency(options: &args::Latency) -> Result<u8, Box<dyn Error>> {
     }
     // A reader that has gone away (a closed pipe) is no reason to fail.
     let _ = std::io::stdout().write_all(text(&latency, options).as_bytes());
+    // Read only now: so it may have measured in the same minutes.
+    let beside = options.cyclictest.as_ref().map(|path| Cyclictest::read(path)).transpose()?;
+    if let Some(Cyclictest { lateness, .. }) = &beside {
+        let _ = writeln!(std::io::stdout(), "cyclictest: {} wake-ups, {}", lateness.count(), figures(lateness));
+    }
+    if let Some(path) = &options.report {
+        drawing::write(path, options, &latency, beside.as_ref())?;
+    }
     Ok(0)
-}
-
-/// Busy threads of ordinary priority, one a core, until this is dropped.
-struct Load {
-    over: Arc<AtomicBool>,
-    threads: Vec<thread::JoinHandle<()>>,
-}
-
-impl Load {
-    fn start() -> Self {
-        let over = Arc::new(AtomicBool::new(false));
-        let cores = thread::available_parallelism().map_or(1, usize::from);
-        let busy = |_| {
-            let over = Arc::clone(&over);
-            thread::spawn(move || be_busy(&over))
-        };
-        let threads = (0..cores).map(busy).collect();
-        Self { over, threads }
-    }
-}
-
-impl Drop for Load {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            // What a busy thread computed does not matter, nor how it ended.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn be_busy(over: &AtomicBool) {
-    let mut memory = vec![1_u64; WALK_BYTES / size_of::<u64>()];
-    while !over.load(Ordering::Relaxed) {
-        for word in &mut memory {
-            *word = word.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        }
-        black_box(&mut memory);
-    }
 }
 
 /// The histogram with its figures.
@@ -82,8 +51,7 @@ fn text(latency: &Latency, options: &args::Latency) -> String {
         let (from, below) = (row.from_ns as f64 / 1e3, row.below_ns as f64 / 1e3);
         let _ = writeln!(text, "{from:9.1} to {below:9.1} {:10} {}", row.count, bar(row.count, most));
     }
-    let LatenessUs { p50, p99, p999, max } = LatenessUs::from(&timing.lateness);
-    let _ = writeln!(text, "p50 {p50:.1}, p99 {p99:.1}, p99.9 {p999:.1}, max {max:.1} us");
+    let _ = writeln!(text, "{}", figures(&timing.lateness));
     let (wake_ups, missed) = (timing.lateness.count(), timing.missed_periods);
     let _ = writeln!(
         text,
@@ -95,6 +63,11 @@ fn text(latency: &Latency, options: &args::Latency) -> String {
         latency.page_faults.minor
     );
     text
+}
+
+fn figures(lateness: &Lateness) -> String {
+    let LatenessUs { p50, p99, p999, max } = LatenessUs::from(lateness);
+    format!("p50 {p50:.1}, p99 {p99:.1}, p99.9 {p999:.1}, max {max:.1} us")
 }
 
 /// A bar on a logarithmic scale: one late wake-up among a million is what is looked for.
