@@ -143,7 +143,7 @@ impl Run {
         let description = planner.describe();
         let fine_config = setup::fine_config(&machine, &description, switches);
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
-        let rough_config = RoughConfig { rough_period_s: machine.rough_period_s };
+        let rough_config = RoughConfig::new(machine.rough_period_s);
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();
         Ok(Self {

@@ -14,17 +14,24 @@ pub struct QueueDepth {
     /// Times in which the deceleration is built up, s.
     ramps: SlidingMax,
     rough_period_s: f64,
+    factor: f64,
 }
 
 impl QueueDepth {
-    /// Nothing queued.
-    pub fn new(rough_period_s: f64) -> Self {
+    /// Nothing queued. `factor` is the share of the worst stop that is asked for, 1 but in tests.
+    pub fn new(rough_period_s: f64, factor: f64) -> Self {
         Self {
             speeds: SlidingMax::default(),
             decelerations: SlidingMax::default(),
             ramps: SlidingMax::default(),
             rough_period_s,
+            factor,
         }
+    }
+
+    /// Nothing is queued any more.
+    pub fn clear(&mut self) {
+        *self = Self::new(self.rough_period_s, self.factor);
     }
 
     /// A segment has been queued that ends at `until_s`.
@@ -62,6 +69,6 @@ impl QueueDepth {
     /// Program time that must be queued, s: the worst stop `v/a_s + a_s/J` and two rough periods.
     pub fn required_s(&self) -> f64 {
         let worst_s = self.speeds.max().map_or(0.0, |v| v / (STOP_SHARE * self.stop_deceleration_mm_per_s2()));
-        worst_s + self.stop_ramp_s() / STOP_JERK_SHARE + 2.0 * self.rough_period_s
+        self.factor * (worst_s + self.stop_ramp_s() / STOP_JERK_SHARE) + 2.0 * self.rough_period_s
     }
 }

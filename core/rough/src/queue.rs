@@ -13,7 +13,6 @@ use crate::depth::QueueDepth;
 pub struct Queue {
     end: RoughEnd,
     depth: QueueDepth,
-    rough_period_s: f64,
     epoch: u32,
     /// Path coordinate at the start of the epoch, mm: planners begin each at zero.
     path_start_mm: f64,
@@ -37,11 +36,10 @@ pub struct Queue {
 
 impl Queue {
     /// An empty queue.
-    pub fn new(end: RoughEnd, rough_period_s: f64) -> Self {
+    pub fn new(end: RoughEnd, depth: QueueDepth) -> Self {
         Self {
             end,
-            depth: QueueDepth::new(rough_period_s),
-            rough_period_s,
+            depth,
             epoch: 0,
             path_start_mm: 0.0,
             staged: VecDeque::new(),
@@ -80,7 +78,7 @@ impl Queue {
         self.blocks.clear();
         self.stops.clear();
         self.reported.clear();
-        self.depth = QueueDepth::new(self.rough_period_s);
+        self.depth.clear();
         self.end.depth.begin(self.epoch, rest.program_time_s);
     }
 

@@ -5,6 +5,7 @@ use tandem_rings::RoughEnd;
 use tandem_sdk::{Accepted, Edge, Event, EventKind, OwnedBlock, Planner};
 
 use crate::Observer;
+use crate::depth::QueueDepth;
 use crate::queue::Queue;
 use crate::source::Source;
 
@@ -13,6 +14,16 @@ use crate::source::Source;
 pub struct RoughConfig {
     /// Rough period, s.
     pub rough_period_s: f64,
+    /// Share of the worst stop that the queue holds: 1, or the machine cannot use the speed that is planned. Tests show
+    /// with less what the depth is for.
+    pub depth_factor: f64,
+}
+
+impl RoughConfig {
+    /// The configuration of a machine with this rough period, s.
+    pub fn new(rough_period_s: f64) -> Self {
+        Self { rough_period_s, depth_factor: 1.0 }
+    }
 }
 
 /// How far the rough loop is.
@@ -82,7 +93,7 @@ impl RoughLoop {
             config,
             source,
             planner,
-            queue: Queue::new(end, config.rough_period_s),
+            queue: Queue::new(end, QueueDepth::new(config.rough_period_s, config.depth_factor)),
             items: Vec::new(),
             next: 0,
             dry: false,

@@ -1,5 +1,6 @@
 //! Rests that end an epoch: where the machine stands, what is forgotten, and that it goes on from there.
 
+mod depth;
 mod rig;
 
 use std::sync::atomic::Ordering::Relaxed;

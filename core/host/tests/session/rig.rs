@@ -56,6 +56,11 @@ pub struct Rig {
 
 impl Rig {
     pub fn new() -> Self {
+        Self::with_depth(1.0)
+    }
+
+    /// With a queue that holds this share of the worst stop.
+    pub fn with_depth(depth_factor: f64) -> Self {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,
@@ -85,7 +90,7 @@ impl Rig {
         let mut fine = FineLoop::new(&config, fine_end, driver, None);
         fine.reset();
         let feed = Feed::default();
-        let rough_config = RoughConfig { rough_period_s: f64::from(FINE_PER_ROUGH) * PERIOD_S };
+        let rough_config = RoughConfig { depth_factor, ..RoughConfig::new(f64::from(FINE_PER_ROUGH) * PERIOD_S) };
         let rough = RoughLoop::new(rough_config, Box::new(feed.clone()), planner(&limits), rough_end);
         let (position, samples) = (AxisVector::ZERO, vec![]);
         Self { rough, fine, host, feed, position, blocks: 0, samples, error: None }
@@ -129,10 +134,19 @@ impl Rig {
             if self.error.is_none() {
                 self.error = self.rough.step(&mut ()).err();
             }
-            (0..FINE_PER_ROUGH).for_each(|_| self.fine.tick());
-            while let Ok(sample) = self.host.samples.pop() {
-                self.samples.push(sample);
-            }
+            self.fine_periods();
+        }
+    }
+
+    /// Lets so many rough periods pass in which the rough loop does nothing.
+    pub fn stall(&mut self, count: usize) {
+        (0..count).for_each(|_| self.fine_periods());
+    }
+
+    fn fine_periods(&mut self) {
+        (0..FINE_PER_ROUGH).for_each(|_| self.fine.tick());
+        while let Ok(sample) = self.host.samples.pop() {
+            self.samples.push(sample);
         }
     }
 
