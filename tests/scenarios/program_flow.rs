@@ -108,3 +108,20 @@ fn a_dry_run_drives_the_path_at_its_own_feed_and_switches_nothing() {
     programmed.assert_within_limits();
     assert!(programmed.column("feed_mm_s").iter().zip(programmed.column("line")).all(|(f, l)| l != 5.0 || *f < 10.001));
 }
+
+#[test]
+fn m64_comes_to_rest_and_m62_does_not() {
+    for (word, rests) in [("M62", false), ("M64", true)] {
+        let text = format!("G21 G90 G64\nF3000\nG1 X10\n{word} P3\nX20\n{word} P3\nX30\nM2\n");
+        let done = Scenario::text(&text).run();
+        done.assert_within_limits();
+        let (feed, x) = (done.column("feed_mm_s"), done.column("x_cmd_mm"));
+        let slowest = |at: f64| {
+            let near = feed.iter().zip(&x).filter(|(_, x)| (**x - at).abs() < 2.0).map(|(feed, _)| *feed);
+            near.fold(f64::INFINITY, f64::min)
+        };
+        assert_eq!(slowest(10.0) < 1.0, rests, "{word}: {}", slowest(10.0));
+        assert_eq!(x.contains(&10.0), rests, "{word}");
+        assert!(slowest(20.0) > 49.0, "{word}: it is on already");
+    }
+}

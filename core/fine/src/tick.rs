@@ -3,6 +3,7 @@
 mod exchange;
 mod follow;
 mod govern;
+mod request;
 mod rest;
 mod single_block;
 
@@ -10,7 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
-use tandem_rings::{Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause};
+use tandem_rings::{
+    Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
+};
 use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, Setpoint};
 
 use crate::config::FineConfig;
@@ -73,6 +76,7 @@ pub struct FineLoop {
     depth: Arc<Depth>,
     samples: Producer<Sample>,
     ratios: Consumer<Ratio>,
+    requests: Consumer<StrategyRequest>,
     rests: Producer<Rest>,
     next_ratio: Option<Ratio>,
     ratio: f64,
@@ -120,6 +124,7 @@ impl FineLoop {
             depth: end.depth,
             samples: end.samples,
             ratios: end.ratios,
+            requests: end.requests,
             rests: end.rests,
             next_ratio: None,
             ratio: 1.0,
@@ -150,6 +155,7 @@ impl FineLoop {
     pub fn tick(&mut self) {
         self.given = Given::of(&self.controls);
         self.cause = StopCause::None;
+        self.take_requests();
         let ended = self.outputs.ended;
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();

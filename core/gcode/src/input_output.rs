@@ -11,7 +11,8 @@ use crate::table::Group;
 const MOST_OUTPUT: u32 = 61;
 
 impl Interpreter {
-    /// M62 to M66.
+    /// M62 to M66. M64 and M65 do not wait for motion: the machine is at rest when they switch, as in LinuxCNC, whose
+    /// queue has run empty by then.
     pub(crate) fn input_output(&mut self, out: &mut Vec<Item>) -> Checked<()> {
         let Some(code) = self.orders.get(Group::InputOutput) else { return Ok(()) };
         if code == 660 {
@@ -25,6 +26,9 @@ impl Interpreter {
         if self.state.outputs_set & bit == 0 || (self.state.outputs & bit != 0) != on {
             self.state.outputs_set |= bit;
             self.state.outputs = if on { self.state.outputs | bit } else { self.state.outputs & !bit };
+            if code >= 640 {
+                self.rest(out);
+            }
             self.event(EventKind::DigitalOutput, number, f64::from(u8::from(on)), out);
         }
         Ok(())

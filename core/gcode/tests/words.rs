@@ -100,6 +100,28 @@ fn what_needs_rest_gets_it_and_the_rest_does_not() {
 }
 
 #[test]
+fn outputs_that_do_not_go_with_the_motion_switch_at_rest() {
+    assert_items(
+        "F60\nG1 X1\nM62 P1\nX2\nM64 P2\nX3\nM64 P2\nX4\nM63 P1\nX5\nM65 P2\nX6",
+        &[
+            "2: Line 0 to 1 0 0 0 length 1 feed 1",
+            "3: DigitalOutput 1 1 before 1",
+            "4: Line 1 to 2 0 0 0 length 1 feed 1",
+            "5: Dwell 2 to 2 0 0 0 for 0",
+            "5: DigitalOutput 2 1 before 3",
+            "6: Line 3 to 3 0 0 0 length 1 feed 1",
+            "8: Line 4 to 4 0 0 0 length 1 feed 1",
+            "9: DigitalOutput 1 0 before 5",
+            "10: Line 5 to 5 0 0 0 length 1 feed 1",
+            "11: Dwell 6 to 5 0 0 0 for 0",
+            "11: DigitalOutput 2 0 before 7",
+            "12: Line 7 to 6 0 0 0 length 1 feed 1",
+            "End",
+        ],
+    );
+}
+
+#[test]
 fn inputs_are_waited_for_at_rest() {
     assert_items(
         "G0 X1\nM66 P3 L1 Q2\nM66 P1 L0\nG0 X#5399",

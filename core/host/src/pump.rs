@@ -60,7 +60,7 @@ pub struct Pump<'a> {
     pub monitor: Monitor,
     observer: &'a mut dyn RunObserver,
     /// The defect on the soft side that ends the run, in words.
-    pub soft_error: Option<String>,
+    soft_error: Option<String>,
     /// The rest of the operator's abort.
     pub aborted: Option<Rest>,
     commands: CommandLog,
@@ -115,7 +115,9 @@ impl<'a> Pump<'a> {
             let signals = self.strategy.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
             let count = self.strategy.as_ref().map_or(0, |s| s.signals().len());
             self.observer.sample(&sample, deviation_mm, &signals[..count]);
-            self.ask_strategy(&sample);
+            if let (Some(strategy), None) = (&mut self.strategy, &self.soft_error) {
+                strategy.sample(&sample, &mut self.host);
+            }
         }
     }
 
@@ -150,14 +152,10 @@ impl<'a> Pump<'a> {
         self.rough.is_waiting()
     }
 
-    fn ask_strategy(&mut self, sample: &Sample) {
-        if self.soft_error.is_some() {
-            return;
-        }
-        let Some(strategy) = &mut self.strategy else { return };
-        if let Err(cause) = strategy.sample(sample, &mut self.host.ratios, &self.host.controls) {
-            self.fail(format!("feed strategy: {cause}"));
-        }
+    /// Why the soft side stops the machine, in words.
+    pub fn soft_cause(&self) -> Option<&str> {
+        let of_strategy = || self.strategy.as_ref()?.fault.as_deref();
+        self.soft_error.as_deref().or_else(of_strategy)
     }
 
     /// A defect on the soft side: the fine loop stops on the path.

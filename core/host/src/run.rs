@@ -198,7 +198,7 @@ impl Run {
             }
         }
         let fault = fine.fault();
-        let text = fault.map(|f| describe(&machine, &f, pump.soft_error.as_deref()));
+        let text = fault.map(|f| describe(&machine, &f, pump.soft_cause()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.fault = text;

@@ -1,10 +1,7 @@
 //! The feed strategy between the sample ring and the ratio ring.
 
-use rtrb::Producer;
-use tandem_rings::{Controls, Ratio, Sample};
+use tandem_rings::{HostEnd, Ratio, RequestKind, Sample, StrategyRequest};
 use tandem_sdk::{Answer, FeedStrategy, FineSample, RawSlice, Request, Window, size_of_contract};
-
-use crate::command::Command;
 
 /// Collects the samples of a rough period and asks the strategy.
 pub struct StrategyRunner {
@@ -14,12 +11,14 @@ pub struct StrategyRunner {
     max_ratio: f64,
     /// The last answer.
     pub answer: Option<Answer>,
+    /// Why the strategy stops the machine, in words: it is not asked again.
+    pub fault: Option<String>,
 }
 
 impl StrategyRunner {
     /// A runner for windows of `per_window` fine samples. Ratios are kept within 0 and `max_ratio`.
     pub fn new(strategy: Box<dyn FeedStrategy>, per_window: usize, max_ratio: f64) -> Self {
-        Self { strategy, window: Vec::with_capacity(per_window), per_window, max_ratio, answer: None }
+        Self { strategy, window: Vec::with_capacity(per_window), per_window, max_ratio, answer: None, fault: None }
     }
 
     /// Names of the strategy's signals.
@@ -27,34 +26,45 @@ impl StrategyRunner {
         self.strategy.signals()
     }
 
-    /// Takes a sample; where it completes a rough period k, the ratio for the first tick of period k + 2 goes out.
-    ///
-    /// # Errors
-    /// The strategy's own words, or a ratio that is not a number.
-    pub fn sample(&mut self, sample: &Sample, ratios: &mut Producer<Ratio>, controls: &Controls) -> Result<(), String> {
+    /// Takes a sample; where it completes a rough period k, what the strategy answers goes out for the first tick of
+    /// period k + 2.
+    pub fn sample(&mut self, sample: &Sample, host: &mut HostEnd) {
+        if self.fault.is_some() {
+            return;
+        }
         self.window.push(fine_sample(sample));
         if self.window.len() < self.per_window {
-            return Ok(());
+            return;
         }
         let period = sample.tick / self.per_window as u64;
+        let tick = (period + 2) * self.per_window as u64;
+        let kind = match self.ask(period) {
+            Ok(answer) => {
+                // A full ring means that 64 ratios wait for their tick: the fine loop has stopped, and the last one stands.
+                let _ = host.ratios.push(Ratio { tick, ratio: answer.ratio.clamp(0.0, self.max_ratio) });
+                self.answer = Some(answer);
+                match answer.request {
+                    Request::None => return,
+                    Request::Hold => RequestKind::Hold,
+                    Request::Fault(code) => self.fail(&format!("fault {code}")),
+                }
+            }
+            Err(cause) => self.fail(&cause),
+        };
+        // Where the ring is full the same was asked for eight times, and has not acted yet.
+        let _ = host.requests.push(StrategyRequest { tick, kind });
+    }
+
+    fn ask(&mut self, period: u64) -> Result<Answer, String> {
         let window = Window { size: size_of_contract::<Window>(), period, samples: RawSlice::new(&self.window) };
         let answer = self.strategy.update(&window).map_err(|e| e.to_string())?;
         self.window.clear();
-        if !answer.ratio.is_finite() {
-            return Err(format!("ratio {}", answer.ratio));
-        }
-        let tick = (period + 2) * self.per_window as u64;
-        // A full ring means that 64 ratios wait for their tick: the fine loop has stopped, and the last ratio stands.
-        let _ = ratios.push(Ratio { tick, ratio: answer.ratio.clamp(0.0, self.max_ratio) });
-        self.answer = Some(answer);
-        match answer.request {
-            Request::None => Ok(()),
-            Request::Hold => {
-                Command::Hold.give(controls);
-                Ok(())
-            }
-            Request::Fault(code) => Err(format!("fault {code}")),
-        }
+        if answer.ratio.is_finite() { Ok(answer) } else { Err(format!("ratio {}", answer.ratio)) }
+    }
+
+    fn fail(&mut self, cause: &str) -> RequestKind {
+        self.fault = Some(format!("feed strategy: {cause}"));
+        RequestKind::Fault
     }
 }
 

@@ -21,6 +21,10 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         }
         stalled = u64::saturating_sub(stalled, 1);
         for _ in 0..fine_per_rough {
+            // As on the wall clock, no sample follows the last.
+            if fine.is_over() {
+                break;
+            }
             while let Some(timed) = commands.next_if(|timed| timed.tick <= fine.next_tick()) {
                 pump.give(timed);
                 if let Command::StallRough(periods) = timed.command {

@@ -1,12 +1,14 @@
-//! What crosses between the rough and the fine loop: four rings and a handful of atomics.
+//! What crosses between the rough and the fine loop: five rings and a handful of atomics.
 //!
-//! Segments and events go one way, samples and rests the other, feed ratios beside them. The operator's commands are atomics: a
-//! stop never shares a queue with work. Nothing here locks; nothing allocates after [`bridge`].
+//! Segments and events go one way, samples and rests the other, the feed strategy's ratios and requests beside them.
+//! The operator's commands are atomics: a stop never shares a queue with work. Nothing here locks; nothing allocates
+//! after [`bridge`].
 
 mod atomics;
 mod controls;
 mod counts;
 mod given;
+mod request;
 mod rest;
 mod sample;
 
@@ -14,6 +16,7 @@ pub use atomics::{AtomicF64, Depth, STOP_JERK_SHARE, STOP_SHARE};
 pub use controls::{Controls, Status};
 pub use counts::Counts;
 pub use given::Given;
+pub use request::{RequestKind, StrategyRequest};
 pub use rest::{Rest, RestCause};
 pub use sample::{MachineState, Sample, StopCause};
 
@@ -77,6 +80,8 @@ pub struct FineEnd {
     pub segments: Consumer<Queued>,
     /// Ratios in.
     pub ratios: Consumer<Ratio>,
+    /// The feed strategy's requests, in.
+    pub requests: Consumer<StrategyRequest>,
     /// Rests that end an epoch, out.
     pub rests: Producer<Rest>,
     /// How far the queue reaches.
@@ -100,6 +105,8 @@ pub struct HostEnd {
     pub samples: Consumer<Sample>,
     /// Ratios out.
     pub ratios: Producer<Ratio>,
+    /// The feed strategy's requests, out.
+    pub requests: Producer<StrategyRequest>,
 }
 
 /// Makes the bridge between the loops. Allocates for good.
@@ -107,6 +114,7 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
     let (samples_in, samples_out) = RingBuffer::new(sizes.samples);
+    let (requests_in, requests_out) = RingBuffer::new(8);
     let (rests_in, rests_out) = RingBuffer::new(8);
     let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());
     let rough =
@@ -114,11 +122,12 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let fine = FineEnd {
         segments: segments_out,
         ratios: ratios_out,
+        requests: requests_out,
         rests: rests_in,
         depth,
         controls: Arc::clone(&controls),
         status: Arc::clone(&status),
         samples: samples_in,
     };
-    (rough, fine, HostEnd { controls, status, samples: samples_out, ratios: ratios_in })
+    (rough, fine, HostEnd { controls, status, samples: samples_out, ratios: ratios_in, requests: requests_in })
 }

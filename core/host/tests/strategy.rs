@@ -1,0 +1,106 @@
+//! What a feed strategy asks for acts in its tick: the first of the rough period after the next.
+
+use std::path::Path;
+
+use tandem_gcode::Program;
+use tandem_host::{Clock, Registry, Run, RunObserver, Summary, Switches, Timed};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::{Answer, FeedStrategy, MAX_SIGNALS, Plugin, PluginError, PluginKind, Request, Window};
+
+/// Rough period in whose samples the strategy finds what it acts on, and the tick in which that acts.
+const PERIOD: u64 = 20;
+const TICK: u64 = (PERIOD + 2) * 8;
+
+/// Asks once for what its options say.
+struct Once(String);
+
+impl FeedStrategy for Once {
+    fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
+        let request = match (window.period == PERIOD, self.0.as_str()) {
+            (true, "hold") => Request::Hold,
+            (true, "fault") => Request::Fault(7),
+            (true, "defect") => return Err(PluginError::fixed("it has lost its way")),
+            _ => Request::None,
+        };
+        Ok(Answer { ratio: 1.0, request, signals: [0.0; MAX_SIGNALS] })
+    }
+}
+
+const ONCE: Plugin = Plugin {
+    name: "once",
+    version: "1",
+    kind: PluginKind::FeedStrategy(|options, _| {
+        Ok(Box::new(Once(options.split('"').nth(1).unwrap_or("").to_string())))
+    }),
+};
+
+#[derive(Default)]
+struct Samples(Vec<Sample>, Vec<String>);
+
+impl RunObserver for Samples {
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
+        self.0.push(*sample);
+    }
+
+    fn command(&mut self, command: &Timed) {
+        self.1.push(command.to_string());
+    }
+}
+
+fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
+    let mut registry = Registry::default();
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN, ONCE] {
+        registry.register(plugin).unwrap();
+    }
+    let settings = [
+        ("feed_strategy.plugin", "once".to_string()),
+        ("feed_strategy.options.asks", format!("\"{asks}\"")),
+        ("loops.max_missed_periods", "100000".to_string()),
+    ];
+    let settings = settings.map(|(key, value)| (key.to_string(), value));
+    let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let machine = Machine::read(&mill, &settings).unwrap();
+    let program = Program::spool("line", &b"G21 G90\nF5000\nG1 X60\nM2\n"[..]).unwrap();
+    let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
+    let mut samples = Samples::default();
+    let commands: &[Timed] = if asks == "hold" { &[Timed::parse("400,resume").unwrap()] } else { &[] };
+    let commands = if clock == Clock::Virtual { commands } else { &[] };
+    let outcome = run.drive(clock, commands, &mut samples).unwrap();
+    (outcome.summary, samples)
+}
+
+#[test]
+fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
+    let (summary, samples) = driven("hold", Clock::Virtual);
+    assert_eq!((summary.fault, summary.late_ratios, summary.stop_count), (None, 0, 1));
+    let stop = &summary.stops[0];
+    assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "hold", Some(1)));
+    assert_eq!(samples.1, [format!("{TICK},hold"), "400,resume".to_string()]);
+    assert_eq!(summary.end_position_mm["x"], 60.0);
+}
+
+#[test]
+fn a_fault_and_a_defect_stop_on_the_path_in_their_tick() {
+    for (asks, words) in [("fault", "feed strategy: fault 7"), ("defect", "feed strategy: it has lost its way")] {
+        let (summary, samples) = driven(asks, Clock::Virtual);
+        assert!(summary.fault.as_ref().is_some_and(|fault| fault.starts_with(words)), "{:?}", summary.fault);
+        let stop = &summary.stops[0];
+        assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "soft fault", Some(1)));
+        let last = samples.0.last().unwrap().command;
+        assert!(last[1] == 0.0 && last[0] > 0.0 && last[0] < 60.0);
+    }
+}
+
+#[test]
+fn both_clocks_send_the_same_samples_up_to_the_fault() {
+    let (_, expected) = driven("fault", Clock::Virtual);
+    let (summary, samples) = driven("fault", Clock::Wall);
+    let disturbed = summary.missed_periods + summary.starvations + summary.late_ratios;
+    if disturbed > 0 {
+        println!("not compared: this computer was late {disturbed} times");
+        return;
+    }
+    let commands = |samples: &Samples| samples.0.iter().map(|s| (s.tick, s.command)).collect::<Vec<_>>();
+    assert!(commands(&samples) == commands(&expected));
+}
