@@ -90,8 +90,8 @@ impl FineLoop {
         let operator = |value: f64| if self.outputs.override_permitted { value } else { 1.0 };
         let adaptive = if self.outputs.adaptive_permitted { self.ratio } else { 1.0 };
         Ratios {
-            feed: operator(self.controls.feed_override.load()) * adaptive,
-            rapid: operator(self.controls.rapid_override.load()).min(1.0),
+            feed: operator(self.given.feed_override) * adaptive,
+            rapid: operator(self.given.rapid_override).min(1.0),
         }
     }
 

@@ -10,7 +10,7 @@ const LINE_END_MM: f64 = 0.01;
 impl FineLoop {
     /// In single-block operation: where to come to rest, as a path coordinate, mm.
     pub(super) fn line_end(&mut self) -> Option<f64> {
-        if !self.controls.single_block.load(Relaxed) || self.cursor.is_resting() {
+        if !self.given.single_block || self.cursor.is_resting() {
             return None;
         }
         let along = self.along();
@@ -34,13 +34,15 @@ impl FineLoop {
 
     /// At a rest of the plan between two lines: a feed hold stands until the operator resumes.
     pub(super) fn stop_between_lines(&mut self) {
-        if !self.controls.single_block.load(Relaxed) || !self.cursor.is_resting() {
+        if !self.given.single_block || !self.cursor.is_resting() {
             self.line_moves |= !self.cursor.is_resting();
             return;
         }
         let line = self.cursor.segment().line;
         if self.line_moves && self.cursor.next_line().is_some_and(|next| next != line) {
             self.controls.hold.store(true, Relaxed);
+            // It acts in this period already.
+            self.given.hold = true;
             self.line_moves = false;
         }
     }
