@@ -88,7 +88,24 @@ impl fmt::Display for Timed {
 }
 
 impl Command {
-    fn parse(name: &str, value: Option<&str>) -> Result<Self, String> {
+    /// The command's name, as [`Command::parse`] reads it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Resume => "resume",
+            Self::FeedOverride(_) => "feed-override",
+            Self::RapidOverride(_) => "rapid-override",
+            Self::EmergencyStop => "emergency-stop",
+            Self::Abort => "abort",
+            Self::StallRough(_) => "stall-rough",
+        }
+    }
+
+    /// The command called `name`, with its value as text.
+    ///
+    /// # Errors
+    /// There is no such command, or its value is missing, wrong or too much.
+    pub fn parse(name: &str, value: Option<&str>) -> Result<Self, String> {
         let number = || -> Result<f64, String> {
             let text = value.ok_or_else(|| format!("{name} needs a value"))?;
             let ratio = text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0);

@@ -11,6 +11,7 @@ mod fault_text;
 mod faults;
 mod lateness;
 mod monitor;
+pub mod operator;
 mod path_watch;
 mod pump;
 mod realtime;

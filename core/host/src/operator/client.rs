@@ -1,0 +1,166 @@
+//! One client: its socket, what it has sent, what waits to be sent.
+
+use std::io::{ErrorKind, Read};
+use std::time::{Duration, Instant};
+
+use rustix::event::PollFlags;
+
+use super::desk::Desk;
+use super::lease::Lease;
+use super::listen::Stream;
+use super::outbox::Outbox;
+use super::reply;
+use super::session::{Answer, Session};
+
+/// Longest line of a client, bytes.
+pub const MAX_LINE: usize = 4096;
+/// How long a client may take to say who it is, and to read its last line.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// One client.
+pub struct Client {
+    stream: Box<dyn Stream>,
+    incoming: Vec<u8>,
+    outbox: Outbox,
+    session: Session,
+    phase: Phase,
+    /// Since when it is in its phase.
+    since: Instant,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Talking,
+    /// Its last line is on the way.
+    Leaving,
+    /// Everything is sent: what it still says is read and dropped, so that its last line is not lost with the connection.
+    Left,
+    Gone,
+}
+
+impl Client {
+    /// A client that has just come.
+    pub fn new(stream: Box<dyn Stream>, session: Session, now: Instant) -> Self {
+        Self { stream, incoming: vec![], outbox: Outbox::default(), session, phase: Phase::Talking, since: now }
+    }
+
+    /// The client's number.
+    pub fn number(&self) -> u64 {
+        self.session.client
+    }
+
+    /// Whether it may give commands, as far as its connection goes.
+    pub fn is_talking(&self) -> bool {
+        self.phase == Phase::Talking && self.session.is_known()
+    }
+
+    /// Whether there is nothing left to do for it.
+    pub fn is_gone(&self) -> bool {
+        self.phase == Phase::Gone
+    }
+
+    /// The socket, and what it is waited for.
+    pub fn interest(&self) -> (&dyn Stream, PollFlags) {
+        let mut flags = PollFlags::empty();
+        // One that has said its last word would be ready for reading all the time.
+        flags.set(PollFlags::IN, self.phase != Phase::Leaving);
+        flags.set(PollFlags::OUT, !self.outbox.is_empty());
+        (self.stream.as_ref(), flags)
+    }
+
+    /// When its next status line is due.
+    pub fn due(&self) -> Option<Instant> {
+        self.session.due().filter(|_| self.phase == Phase::Talking)
+    }
+
+    /// Reads, answers, sends: whatever can be done without waiting.
+    pub fn serve(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+        self.read(desk, lease, now);
+        if self.phase == Phase::Talking && self.session.is_due(now) {
+            self.outbox.telemetry(|lost| reply::telemetry(&desk.status(), lost));
+        }
+        self.send(now);
+        let late = now.duration_since(self.since) > PATIENCE;
+        if late && (self.phase != Phase::Talking || !self.session.is_known()) {
+            self.phase = Phase::Gone;
+        }
+        if self.phase != Phase::Talking {
+            lease.release(self.number());
+        }
+    }
+
+    /// The run is over: its last line.
+    pub fn dismiss(&mut self, desk: &Desk, now: Instant) {
+        if self.is_talking() {
+            self.outbox.last(|lost| reply::ended(&desk.status(), lost));
+        }
+        self.leave(now);
+    }
+
+    /// Sends `answer` and closes.
+    pub fn turn_away(&mut self, answer: &Answer, now: Instant) {
+        self.take(answer, now);
+    }
+
+    fn read(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+        let mut chunk = [0; MAX_LINE];
+        // One chunk a round: a client that never stops sending does not keep the others waiting.
+        match self.stream.read(&mut chunk) {
+            Ok(0) => self.hang_up(now),
+            Ok(count) if self.phase == Phase::Talking => {
+                self.incoming.extend_from_slice(&chunk[..count]);
+                self.lines(desk, lease, now);
+            }
+            Err(error) if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                self.phase = Phase::Gone;
+            }
+            _ => {}
+        }
+    }
+
+    /// It says no more; what it has asked for is still sent.
+    fn hang_up(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Talking => self.leave(now),
+            Phase::Leaving => {}
+            _ => self.phase = Phase::Gone,
+        }
+    }
+
+    fn lines(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+        while self.phase == Phase::Talking {
+            let end = self.incoming.iter().position(|byte| *byte == b'\n');
+            let answer = match end {
+                Some(end) if end <= MAX_LINE => {
+                    let line: Vec<u8> = self.incoming.drain(..=end).collect();
+                    self.session.line(&String::from_utf8_lossy(&line[..end]), desk, lease, now)
+                }
+                None if self.incoming.len() <= MAX_LINE => return,
+                _ => self.session.too_long(MAX_LINE),
+            };
+            self.take(&answer, now);
+        }
+    }
+
+    fn take(&mut self, answer: &Answer, now: Instant) {
+        let fits = self.outbox.answer(&answer.line);
+        if answer.last || !fits {
+            self.leave(now);
+        }
+    }
+
+    fn leave(&mut self, now: Instant) {
+        if self.phase == Phase::Talking {
+            (self.phase, self.since) = (Phase::Leaving, now);
+        }
+    }
+
+    fn send(&mut self, now: Instant) {
+        if self.outbox.send(&mut self.stream).is_err() {
+            self.phase = Phase::Gone;
+        } else if self.phase == Phase::Leaving && self.outbox.is_empty() {
+            self.stream.end_writing();
+            (self.phase, self.since) = (Phase::Left, now);
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Where all commands come together, and what the operator is told.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tandem_machine::Machine;
+use tandem_rings::{Controls, MachineState, Sample, Status};
+use tandem_sdk::{Axes, AxisVector};
+
+use crate::command::Command;
+
+use super::status::{Counters, Position, StatusLine};
+
+/// The operator's desk: keys, sockets and whatever else gives commands share one. Soft side; never waits for the fine
+/// loop.
+#[derive(Debug)]
+pub struct Desk {
+    controls: Arc<Controls>,
+    status: Arc<Status>,
+    axes: Axes,
+    max_feed_ratio: f64,
+    latest: Mutex<Latest>,
+    /// An answer to a program stop: set by a resume, taken by the run.
+    go_on: AtomicBool,
+    clients: AtomicUsize,
+}
+
+/// What the recorder last saw.
+#[derive(Debug)]
+struct Latest {
+    position: AxisVector,
+    sigma: f64,
+    progress: f64,
+    /// Line on which the program waits for the operator.
+    waits_on_line: Option<u32>,
+    fault: Option<String>,
+    ended: bool,
+}
+
+impl Desk {
+    /// The desk of a run on `machine`. Host; allocates.
+    pub fn new(machine: &Machine, controls: Arc<Controls>, status: Arc<Status>) -> Self {
+        let latest = Latest {
+            position: machine.start,
+            sigma: 1.0,
+            progress: 0.0,
+            waits_on_line: None,
+            fault: None,
+            ended: false,
+        };
+        Self {
+            controls,
+            status,
+            axes: machine.axes,
+            max_feed_ratio: machine.motion.max_feed_ratio,
+            latest: Mutex::new(latest),
+            go_on: AtomicBool::new(false),
+            clients: AtomicUsize::new(0),
+        }
+    }
+
+    /// Gives a command: the one way to the fine loop for keys and sockets. It acts in the next fine period. The answer is
+    /// the number of that period, at the latest the one after it.
+    ///
+    /// # Errors
+    /// What the machine does not allow; nothing has changed.
+    pub fn give(&self, command: Command) -> Result<u64, String> {
+        self.check(command)?;
+        if command == Command::Resume {
+            self.go_on.store(true, Release);
+        }
+        command.give(&self.controls);
+        Ok(self.status.tick.load(Relaxed))
+    }
+
+    fn check(&self, command: Command) -> Result<(), String> {
+        match command {
+            Command::FeedOverride(ratio) if ratio > self.max_feed_ratio => Err(format!(
+                "a feed override of {ratio} is above motion.max_feed_ratio, which is {}",
+                self.max_feed_ratio
+            )),
+            Command::RapidOverride(ratio) if ratio > 1.0 => {
+                Err(format!("a rapid override of {ratio} is above 1: rapids run at the axes' rapid feeds"))
+            }
+            Command::StallRough(_) => Err("stall-rough is for tests, from a command file".to_string()),
+            _ => Ok(()),
+        }
+    }
+
+    /// The highest feed override that the machine allows.
+    pub fn max_feed_ratio(&self) -> f64 {
+        self.max_feed_ratio
+    }
+
+    /// The operator's atomics as they stand.
+    pub fn controls(&self) -> &Controls {
+        &self.controls
+    }
+
+    /// A sample was sent; `progress` is the share of the program's path that is driven. Host.
+    pub fn sample(&self, sample: &Sample, progress: f64) {
+        let mut latest = self.latest();
+        (latest.position, latest.sigma, latest.progress) = (sample.command, sample.sigma, progress);
+    }
+
+    /// The program waits on `line`: from now on a resume answers. Host.
+    pub fn begin_wait(&self, line: u32) {
+        self.go_on.store(false, Release);
+        self.latest().waits_on_line = Some(line);
+    }
+
+    /// Whether the operator has said to go on since the program began to wait; then the wait is over. Host.
+    pub fn answered(&self) -> bool {
+        let answered = self.go_on.swap(false, Acquire);
+        if answered {
+            self.end_wait();
+        }
+        answered
+    }
+
+    /// The program goes on, whoever said so. Host.
+    pub fn end_wait(&self) {
+        self.latest().waits_on_line = None;
+    }
+
+    /// The line on which the program waits, if it does.
+    pub fn waits_on_line(&self) -> Option<u32> {
+        self.latest().waits_on_line
+    }
+
+    /// The run is over, by a `fault` or not. Host.
+    pub fn end(&self, fault: Option<&str>) {
+        let mut latest = self.latest();
+        latest.fault = fault.map(str::to_string);
+        latest.ended = true;
+    }
+
+    /// Clients that could give commands over a socket now.
+    pub fn clients(&self) -> usize {
+        self.clients.load(Relaxed)
+    }
+
+    pub(super) fn set_clients(&self, count: usize) {
+        self.clients.store(count, Relaxed);
+    }
+
+    /// The machine as it is now, for looking at. Allocates.
+    pub fn status(&self) -> StatusLine {
+        let (status, controls) = (&self.status, &self.controls);
+        let latest = self.latest();
+        let state = MachineState::from_number(status.state.load(Relaxed));
+        StatusLine {
+            state: if latest.fault.is_some() { MachineState::Fault } else { state }.name(),
+            tick: status.tick.load(Relaxed),
+            line: status.line.load(Relaxed),
+            position: Position::new(&self.axes, &latest.position),
+            feed_mm_per_min: if latest.ended { 0.0 } else { status.feed_mm_per_s.load() * 60.0 },
+            sigma: latest.sigma,
+            feed_override: controls.feed_override.load(),
+            rapid_override: controls.rapid_override.load(),
+            hold: controls.hold.load(Relaxed),
+            waits_on_line: latest.waits_on_line,
+            progress: latest.progress,
+            counters: Counters::of(status),
+            fault: latest.fault.clone(),
+        }
+    }
+
+    fn latest(&self) -> MutexGuard<'_, Latest> {
+        // What lies in it is whole after every statement: a panic elsewhere does not spoil it.
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,158 @@
+//! Where clients can reach a run.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::PathBuf;
+
+use super::socket_file::{self, SocketFile};
+use super::token;
+
+/// Bytes that the system keeps for a client: telemetry that waits longer is old.
+const SEND_BUFFER_BYTES: usize = 16 * 1024;
+
+/// Where clients may come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Listen {
+    /// Path of a unix socket.
+    pub unix: Option<PathBuf>,
+    /// Loopback address and port for TCP.
+    pub tcp: Option<SocketAddr>,
+    /// File of the token that clients over TCP name.
+    pub token_file: Option<PathBuf>,
+}
+
+impl Listen {
+    /// Whether nobody can come.
+    pub fn is_nowhere(&self) -> bool {
+        self.unix.is_none() && self.tcp.is_none()
+    }
+}
+
+/// A client's end, whichever way it came. Reading and writing never wait.
+pub trait Stream: Read + Write + Send {
+    /// For waiting until it is ready.
+    fn fd(&self) -> BorrowedFd<'_>;
+
+    /// Nothing more will be written. What fails here is broken anyway.
+    fn end_writing(&self);
+}
+
+macro_rules! stream {
+    ($kind:ty) => {
+        impl Stream for $kind {
+            fn fd(&self) -> BorrowedFd<'_> {
+                self.as_fd()
+            }
+
+            fn end_writing(&self) {
+                let _ = self.shutdown(std::net::Shutdown::Write);
+            }
+        }
+    };
+}
+
+stream!(UnixStream);
+stream!(TcpStream);
+
+/// An open door.
+#[derive(Debug)]
+pub enum Door {
+    /// The file's mode lets the owner in alone.
+    Unix(UnixListener, #[allow(dead_code, reason = "the file goes with it")] SocketFile),
+    /// Whoever knows the token.
+    Tcp(TcpListener, String),
+}
+
+impl Door {
+    /// Opens every door asked for.
+    ///
+    /// # Errors
+    /// The place with the cause.
+    pub fn open(listen: &Listen) -> Result<Vec<Self>, String> {
+        let mut doors = vec![];
+        if let Some(path) = &listen.unix {
+            let (listener, file) = socket_file::listen(path)?;
+            doors.push(Self::Unix(listener, file));
+        }
+        if let Some(address) = listen.tcp {
+            doors.push(tcp(address, listen)?);
+        }
+        Ok(doors)
+    }
+
+    /// The next client that waits, with the token that it must name.
+    pub fn accept(&self) -> Option<(Box<dyn Stream>, Option<String>)> {
+        match self {
+            Self::Unix(listener, _) => {
+                let stream = listener.accept().ok()?.0;
+                stream.set_nonblocking(true).ok()?;
+                bound_buffer(&stream);
+                Some((Box::new(stream), None))
+            }
+            Self::Tcp(listener, token) => {
+                let stream = listener.accept().ok()?.0;
+                stream.set_nonblocking(true).ok()?;
+                // Answers are short and wait for nothing.
+                let _ = stream.set_nodelay(true);
+                bound_buffer(&stream);
+                Some((Box::new(stream), Some(token.clone())))
+            }
+        }
+    }
+
+    /// For waiting until a client comes.
+    pub fn fd(&self) -> BorrowedFd<'_> {
+        match self {
+            Self::Unix(listener, _) => listener.as_fd(),
+            Self::Tcp(listener, _) => listener.as_fd(),
+        }
+    }
+
+    /// The TCP address, with the port that the system chose for port 0.
+    pub fn address(&self) -> Option<SocketAddr> {
+        match self {
+            Self::Unix(..) => None,
+            Self::Tcp(listener, _) => listener.local_addr().ok(),
+        }
+    }
+}
+
+/// Where the system keeps its own size, telemetry only gets older.
+fn bound_buffer(stream: &impl AsFd) {
+    let _ = rustix::net::sockopt::set_socket_send_buffer_size(stream, SEND_BUFFER_BYTES);
+}
+
+fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
+    if !address.ip().is_loopback() {
+        return Err(format!("{address}: operators are let in from this computer alone: 127.0.0.1 or [::1]"));
+    }
+    let file =
+        listen.token_file.as_ref().ok_or("a TCP address needs a token file: anybody on this computer reaches it")?;
+    let token = token::of_file(file)?;
+    let listener = TcpListener::bind(address).map_err(|e| format!("{address}: {e}"))?;
+    listener.set_nonblocking(true).map_err(|e| format!("{address}: {e}"))?;
+    Ok(Door::Tcp(listener, token))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tcp_is_for_this_computer_and_needs_a_token() {
+        let folder = tempfile::tempdir().unwrap();
+        let listen = |address: &str, token: bool| Listen {
+            unix: None,
+            tcp: Some(address.parse().unwrap()),
+            token_file: token.then(|| folder.path().join("token")),
+        };
+        for elsewhere in ["0.0.0.0:0", "192.168.0.1:5000", "[::]:0"] {
+            assert!(Door::open(&listen(elsewhere, true)).unwrap_err().contains("this computer alone"), "{elsewhere}");
+        }
+        assert!(Door::open(&listen("127.0.0.1:0", false)).unwrap_err().contains("token file"));
+        let doors = Door::open(&listen("127.0.0.1:0", true)).unwrap();
+        assert_ne!(doors[0].address().unwrap().port(), 0);
+    }
+}

@@ -1,0 +1,94 @@
+//! What clients are told, a JSON line each.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::status::StatusLine;
+
+/// What is wrong with a request.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Problem {
+    /// What happened.
+    pub what: &'static str,
+    /// Where in the line.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// The cause.
+    pub why: String,
+}
+
+impl Problem {
+    /// A line that cannot be understood: the connection closes.
+    pub fn malformed(place: &str, why: &str) -> Self {
+        Self { what: "malformed line", place: place.to_string(), why: why.to_string() }
+    }
+
+    /// A line that is no JSON, or JSON of the wrong form.
+    pub fn of_json(error: &serde_json::Error) -> Self {
+        let text = error.to_string();
+        // The line within the text is always the first.
+        let why = text.split(" at line ").next().unwrap_or(&text);
+        Self::malformed(&format!("column {}", error.column()), why)
+    }
+
+    /// A request that is understood and not granted: the connection stays.
+    pub fn refused(place: &str, why: String) -> Self {
+        Self { what: "refused", place: place.to_string(), why }
+    }
+}
+
+/// The answer to a request that was not granted, on line `number` of the connection.
+pub fn error(number: u64, problem: &Problem) -> String {
+    let Problem { what, place, why } = problem;
+    line(&json!({ "error": { "what": what, "where": format!("line {number}: {place}"), "why": why } }))
+}
+
+/// The answer to a request that was granted.
+pub fn ok(value: &Value) -> String {
+    line(&json!({ "ok": value }))
+}
+
+/// The answer to a status request.
+pub fn status(status: &StatusLine) -> String {
+    #[derive(Serialize)]
+    struct Answer<'a> {
+        ok: Inner<'a>,
+    }
+    #[derive(Serialize)]
+    struct Inner<'a> {
+        status: &'a StatusLine,
+    }
+    line(&Answer { ok: Inner { status } })
+}
+
+/// A status line that was subscribed to; `lost` of them did not fit since the last one.
+pub fn telemetry(status: &StatusLine, lost: u64) -> String {
+    #[derive(Serialize)]
+    struct Telemetry<'a> {
+        status: &'a StatusLine,
+        lost: u64,
+    }
+    line(&Telemetry { status, lost })
+}
+
+/// The last line of a run.
+pub fn ended(status: &StatusLine, lost: u64) -> String {
+    #[derive(Serialize)]
+    struct Last<'a> {
+        ended: End<'a>,
+        status: &'a StatusLine,
+        lost: u64,
+    }
+    #[derive(Serialize)]
+    struct End<'a> {
+        fault: Option<&'a str>,
+    }
+    line(&Last { ended: End { fault: status.fault.as_deref() }, status, lost })
+}
+
+fn line(value: &impl Serialize) -> String {
+    // Numbers and text only: there is nothing in it that JSON cannot say.
+    let mut text = serde_json::to_string(value).unwrap_or_default();
+    text.push('\n');
+    text
+}

@@ -1,0 +1,95 @@
+//! The token that a client over TCP names in its first line.
+
+use std::fmt::Write as _;
+use std::fs::{self, OpenOptions};
+use std::io::{ErrorKind, Write as _};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::Path;
+
+use rustix::rand::{GetRandomFlags, getrandom};
+
+/// Random bytes of a new token.
+const BYTES: usize = 32;
+/// Shortest token that is taken from a file.
+const LEAST_CHARACTERS: usize = 16;
+
+/// The token of `path`; a random one in a new file of mode 0600 where there is none.
+///
+/// # Errors
+/// The file with the cause: it cannot be read or made, others may read it, or what is in it is too short.
+pub fn of_file(path: &Path) -> Result<String, String> {
+    let made = make(path);
+    let read = || -> Result<String, String> {
+        let metadata = fs::metadata(path).map_err(|e| e.to_string())?;
+        if metadata.mode() & 0o077 != 0 {
+            return Err(format!("others may read it (mode {:o}); `chmod 600` it", metadata.mode() & 0o777));
+        }
+        let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
+        let token = text.trim();
+        if token.chars().count() < LEAST_CHARACTERS {
+            return Err(format!("the token in it has fewer than {LEAST_CHARACTERS} characters"));
+        }
+        Ok(token.to_string())
+    };
+    made.and_then(|()| read()).map_err(|why| format!("{}: {why}", path.display()))
+}
+
+/// Makes the file where it does not exist.
+fn make(path: &Path) -> Result<(), String> {
+    let mut file = match OpenOptions::new().write(true).create_new(true).mode(0o600).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(()),
+        Err(error) => return Err(error.to_string()),
+    };
+    let mut random = [0_u8; BYTES];
+    let filled = getrandom(&mut random, GetRandomFlags::empty()).map_err(|e| e.to_string())?;
+    let mut text = String::new();
+    for byte in &random[..filled] {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    writeln!(file, "{text}").map_err(|e| e.to_string())
+}
+
+/// Whether two tokens are the same, in a time that does not tell how far they agree.
+pub fn is_same(a: &str, b: &str) -> bool {
+    let differences = a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    a.len() == b.len() && std::hint::black_box(differences) == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn a_new_file_holds_a_random_token_for_its_owner_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        let token = of_file(&a).unwrap();
+        assert_eq!(fs::metadata(&a).unwrap().mode() & 0o777, 0o600);
+        assert_eq!(token.len(), 2 * BYTES);
+        assert_eq!(of_file(&a).unwrap(), token);
+        assert_ne!(of_file(&b).unwrap(), token);
+    }
+
+    #[test]
+    fn a_file_that_others_may_read_is_refused_and_so_is_a_short_token() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("token");
+        of_file(&path).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        assert!(of_file(&path).unwrap_err().contains("mode 640"));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        fs::write(&path, "secret\n").unwrap();
+        assert!(of_file(&path).unwrap_err().contains("fewer than 16"));
+    }
+
+    #[test]
+    fn tokens_are_compared_in_full() {
+        assert!(is_same("abc", "abc") && is_same("", ""));
+        for other in ["abd", "ab", "abcd", ""] {
+            assert!(!is_same("abc", other), "{other}");
+        }
+    }
+}
