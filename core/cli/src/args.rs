@@ -1,5 +1,6 @@
 //! The command line.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
@@ -19,7 +20,7 @@ pub struct Args {
 #[derive(Subcommand)]
 pub enum Command {
     /// Run a part program
-    Run(Run),
+    Run(Box<Run>),
     /// List every error of a part program; nothing moves
     Check(Check),
     /// Look into traces: export, info, diff
@@ -63,6 +64,8 @@ pub struct Run {
     /// Give the operator's commands of a file, a line each: tick,command[,value] (virtual clock)
     #[arg(long, value_name = "F.csv")]
     pub commands: Option<PathBuf>,
+    #[command(flatten)]
+    pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format
     #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
@@ -75,6 +78,19 @@ pub struct Run {
     /// Write every block as it was driven
     #[arg(long, value_name = "F.csv")]
     pub blocks: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Operator {
+    /// Take operator commands, and tell the status, as JSON lines at a unix socket that only you can reach
+    #[arg(long, value_name = "PATH")]
+    pub listen: Option<PathBuf>,
+    /// The same over TCP, on this computer alone
+    #[arg(long, value_name = "127.0.0.1:PORT", requires = "token_file")]
+    pub listen_tcp: Option<SocketAddr>,
+    /// The token that clients over TCP name first; a random one is made where the file does not exist
+    #[arg(long, value_name = "F", requires = "listen_tcp")]
+    pub token_file: Option<PathBuf>,
 }
 
 #[derive(Group)]
@@ -131,12 +147,19 @@ pub enum Trace {
     },
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Clock {
     /// In lockstep, as fast as the processor allows
     Virtual,
     /// In real time
     Wall,
+}
+
+impl Operator {
+    /// Whether no client can come.
+    pub fn is_nowhere(&self) -> bool {
+        self.listen.is_none() && self.listen_tcp.is_none()
+    }
 }
 
 fn key_value(text: &str) -> Result<(String, String), String> {

@@ -12,6 +12,7 @@ mod args;
 mod built_in;
 mod check;
 mod latency;
+mod operator;
 mod program;
 mod progress;
 mod report;

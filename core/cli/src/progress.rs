@@ -1,4 +1,4 @@
-//! Live progress on a terminal: line, feed, time left. Quiet in a pipe.
+//! Live progress on a terminal: state, line, feed, override, time left. Quiet in a pipe.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
@@ -42,16 +42,22 @@ impl Progress {
         }
     }
 
+    /// Share of the program's path that is driven, 0 to 1.
+    pub fn share(&self) -> f64 {
+        if self.length_mm > 0.0 { (self.driven_mm / self.length_mm).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
     fn show(&self, sample: &Sample) {
-        let share = if self.length_mm > 0.0 { (self.driven_mm / self.length_mm).clamp(0.0, 1.0) } else { 1.0 };
+        let share = self.share();
         let left_s = self.started.elapsed().as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
         let feed = sample.feed_mm_per_s * 60.0;
         let _ = write!(
             stderr(),
-            "\r\x1b[Kline {}  F{feed:.0}  {:.0} %  {left_s:.0} s left  {}",
+            "\r\x1b[K{}  line {}  F{feed:.0}  override {:.0} %  done {:.0} %, {left_s:.0} s left",
+            sample.state.name(),
             sample.line,
-            share * 100.0,
-            sample.state.name()
+            sample.ratio * 100.0,
+            share * 100.0
         );
         let _ = stderr().flush();
     }

@@ -8,13 +8,14 @@ use tandem_host::{
     BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Stop, StopAnswer, Summary, Switches, Timed,
 };
 use tandem_machine::Machine;
-use tandem_rings::Sample;
+use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
+use crate::operator::Operator;
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
-use crate::{FAULT, REFUSED, args, built_in, program};
+use crate::{FAULT, REFUSED, args, built_in, operator, program};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
@@ -22,7 +23,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
-    let switches = switches(options);
+    let switches = switches(options, keys_at_hand(options));
     let run = match Run::prepare(machine.clone(), &registry, program, switches) {
         Err(HostError::Check(report)) => {
             program::print_errors(&report);
@@ -38,15 +39,22 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
     let outcome = run.drive(clock, &commands, &mut sinks)?;
+    sinks.operator.end(&outcome.summary);
     sinks.finish(options, &outcome.summary)?;
     Ok(conclude(options, &outcome))
 }
 
-/// The operator's switches as the command line sets them.
-fn switches(options: &args::Run) -> Switches {
+/// Whether keys are to be taken: in real time, on a terminal.
+fn keys_at_hand(options: &args::Run) -> bool {
+    options.clock == args::Clock::Wall && operator::is_on_terminal()
+}
+
+/// The operator's switches as the command line sets them. Where somebody can answer in real time, stops wait.
+fn switches(options: &args::Run, keys: bool) -> Switches {
+    let attended = keys || (options.clock == args::Clock::Wall && !options.operator.is_nowhere());
     Switches {
         block_delete: options.machine.block_delete,
-        pause_at_stops: options.pause,
+        pause_at_stops: options.pause || (attended && !options.dry),
         optional_stop: options.pause || options.optional_stop,
         dry_run: options.dry,
     }
@@ -98,6 +106,7 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
 /// Everything that a run is written to.
 struct Sinks {
     switches: Switches,
+    operator: Operator,
     progress: Progress,
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
@@ -110,8 +119,10 @@ impl Sinks {
         let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
+        let keys = keys_at_hand(options);
         Ok(Self {
-            switches: switches(options),
+            switches: switches(options, keys),
+            operator: Operator::begin(options, machine, run, keys)?,
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
@@ -154,9 +165,15 @@ impl RunObserver for Sinks {
     }
 
     fn program_stop(&mut self, line: u32) -> StopAnswer {
-        say!("line {line}: the program waits; Enter goes on");
-        let pressed = std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
-        if pressed { StopAnswer::GoOn } else { StopAnswer::Nobody }
+        self.operator.program_stop(line)
+    }
+
+    fn is_attended(&self) -> bool {
+        self.operator.is_attended()
+    }
+
+    fn rest(&mut self, _rest: &Rest) {
+        self.operator.rest();
     }
 
     fn command(&mut self, command: &Timed) {
@@ -167,6 +184,7 @@ impl RunObserver for Sinks {
 
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         self.progress.sample(sample);
+        self.operator.sample(sample, self.progress.share());
         if let Some(trace) = &mut self.trace {
             trace.sample(sample, signals);
         }

@@ -95,6 +95,8 @@ impl Command {
             Self::Resume => "resume",
             Self::FeedOverride(_) => "feed-override",
             Self::RapidOverride(_) => "rapid-override",
+            Self::OptionalStop(_) => "optional-stop",
+            Self::SingleBlock(_) => "single-block",
             Self::EmergencyStop => "emergency-stop",
             Self::Abort => "abort",
             Self::StallRough(_) => "stall-rough",

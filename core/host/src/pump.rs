@@ -40,6 +40,11 @@ pub trait RunObserver {
         StopAnswer::GoOn
     }
 
+    /// Whether somebody may still give commands: on the virtual clock a machine that stands then waits in real time.
+    fn is_attended(&self) -> bool {
+        false
+    }
+
     /// The machine came to a rest that ends an epoch: a probe touched, or the operator aborted.
     fn rest(&mut self, _rest: &Rest) {}
 
@@ -140,6 +145,11 @@ impl<'a> Pump<'a> {
     /// Nothing will move any more, and nothing is left that could change that.
     pub fn give_up(&mut self) {
         self.fail("nothing has moved for a minute of machine time, and no command is left to change that".to_string());
+    }
+
+    /// Whether an operator may still change something.
+    pub fn is_attended(&self) -> bool {
+        self.observer.is_attended()
     }
 
     /// Fine period, s.

@@ -1,5 +1,8 @@
 //! Both loops in lockstep on one thread, as fast as the processor allows.
 
+use std::thread;
+use std::time::Duration;
+
 use tandem_fine::FineLoop;
 
 use crate::command::{Command, Timed};
@@ -37,7 +40,10 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         pump.drain();
         pump.serve_stop();
         let stuck_ticks = progress.ticks_without(pump.host.status.program_time_s.load(), tick);
-        if commands.peek().is_none() && !pump.is_waiting() && stuck_ticks > patience {
+        if stuck_ticks > 0 && pump.is_attended() {
+            // Somebody at a keyboard lives in real time.
+            thread::sleep(Duration::from_secs_f64(pump.period_s() * f64::from(fine_per_rough)));
+        } else if commands.peek().is_none() && !pump.is_waiting() && stuck_ticks > patience {
             pump.give_up();
         }
     }

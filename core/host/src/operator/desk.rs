@@ -1,8 +1,7 @@
 //! Where all commands come together, and what the operator is told.
 
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_machine::Machine;
@@ -36,6 +35,7 @@ struct Latest {
     /// Line on which the program waits for the operator.
     waits_on_line: Option<u32>,
     fault: Option<String>,
+    stopped: Option<String>,
     ended: bool,
 }
 
@@ -48,6 +48,7 @@ impl Desk {
             progress: 0.0,
             waits_on_line: None,
             fault: None,
+            stopped: None,
             ended: false,
         };
         Self {
@@ -125,15 +126,20 @@ impl Desk {
         self.latest().waits_on_line = None;
     }
 
+    /// Whether a stop for good is on its way: an abort or an emergency stop.
+    pub fn is_stopping(&self) -> bool {
+        [&self.controls.abort, &self.controls.emergency_stop, &self.controls.soft_fault].iter().any(|s| s.load(Relaxed))
+    }
+
     /// The line on which the program waits, if it does.
     pub fn waits_on_line(&self) -> Option<u32> {
         self.latest().waits_on_line
     }
 
-    /// The run is over, by a `fault` or not. Host.
-    pub fn end(&self, fault: Option<&str>) {
+    /// The run is over: by a `fault`, `stopped` by the operator, or because all is done. Host.
+    pub fn end(&self, fault: Option<&str>, stopped: Option<&str>) {
         let mut latest = self.latest();
-        latest.fault = fault.map(str::to_string);
+        (latest.fault, latest.stopped) = (fault.map(str::to_string), stopped.map(str::to_string));
         latest.ended = true;
     }
 
@@ -161,10 +167,13 @@ impl Desk {
             feed_override: controls.feed_override.load(),
             rapid_override: controls.rapid_override.load(),
             hold: controls.hold.load(Relaxed),
+            single_block: controls.single_block.load(Relaxed),
+            optional_stop: controls.optional_stop.load(Relaxed),
             waits_on_line: latest.waits_on_line,
             progress: latest.progress,
             counters: Counters::of(status),
             fault: latest.fault.clone(),
+            stopped: latest.stopped.clone(),
         }
     }
 

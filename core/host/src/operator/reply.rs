@@ -82,8 +82,10 @@ pub fn ended(status: &StatusLine, lost: u64) -> String {
     #[derive(Serialize)]
     struct End<'a> {
         fault: Option<&'a str>,
+        stopped: Option<&'a str>,
     }
-    line(&Last { ended: End { fault: status.fault.as_deref() }, status, lost })
+    let end = End { fault: status.fault.as_deref(), stopped: status.stopped.as_deref() };
+    line(&Last { ended: end, status, lost })
 }
 
 fn line(value: &impl Serialize) -> String {

@@ -84,7 +84,7 @@ pub fn parse(text: &str) -> Result<Request, Problem> {
 fn to_command(name: &str, value: Option<&Value>) -> Result<Request, Problem> {
     let text = value.map(|value| match value {
         Value::String(text) => text.clone(),
-        Value::Bool(on) => if *on { "on" } else { "off" }.to_string(),
+        Value::Bool(on) => u8::from(*on).to_string(),
         other => other.to_string(),
     });
     let place = if value.is_some() { "keys \"command\" and \"value\"" } else { "key \"command\"" };
@@ -107,6 +107,8 @@ mod tests {
         for (text, request) in [
             (r#"{"command":"hold"}"#, Request::Command(Command::Hold)),
             (r#"{"command":"feed-override","value":0.5}"#, Request::Command(Command::FeedOverride(0.5))),
+            (r#"{"command":"single-block","value":true}"#, Request::Command(Command::SingleBlock(true))),
+            (r#"{"command":"optional-stop","value":0}"#, Request::Command(Command::OptionalStop(false))),
             (r#"{"command":"emergency-stop"}"#, Request::Command(Command::EmergencyStop)),
             (r#"{"subscribe":{"rate_hz":20}}"#, Request::Subscribe(20.0)),
             (r#"{"status":{}}"#, Request::Status),

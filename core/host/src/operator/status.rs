@@ -27,14 +27,20 @@ pub struct StatusLine {
     pub rapid_override: f64,
     /// Whether a feed hold is asked for.
     pub hold: bool,
+    /// Whether the machine rests at the end of each block.
+    pub single_block: bool,
+    /// Whether M1 waits for the operator.
+    pub optional_stop: bool,
     /// Line on which the program waits for the operator (M0, M1, M6).
     pub waits_on_line: Option<u32>,
     /// Share of the program's path that is driven, 0 to 1.
     pub progress: f64,
     /// What was counted so far.
     pub counters: Counters,
-    /// What stopped the machine, in words.
+    /// The fault that stopped the machine, in words.
     pub fault: Option<String>,
+    /// What else ended the run before its program was over: the operator's abort, in words.
+    pub stopped: Option<String>,
 }
 
 /// A position by axis, in the units of traces: `x_mm`, `a_deg`.

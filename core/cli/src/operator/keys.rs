@@ -1,0 +1,175 @@
+//! Keys while a program runs.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::stdio;
+use tandem_host::Command;
+use tandem_host::operator::Desk;
+
+use super::signals::Stops;
+use super::tell;
+use super::terminal::RawTerminal;
+
+/// How often the thread looks whether the run is over, ns.
+const LOOK_NS: i64 = 50_000_000;
+/// A step of the feed override.
+const STEP: f64 = 0.1;
+const CTRL_C: u8 = 3;
+const ESCAPE: u8 = 27;
+
+/// Takes keys while it lives; dropping it gives the terminal back.
+pub struct Keyboard {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    _terminal: RawTerminal,
+}
+
+impl Keyboard {
+    /// Takes the terminal.
+    ///
+    /// # Errors
+    /// The system's words.
+    pub fn begin(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
+        let terminal = RawTerminal::take()?;
+        say!(
+            "keys: space hold/resume, + - feed override, s single block, o optional stop, Enter goes on, q abort, e emergency stop"
+        );
+        let over = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&over);
+        let thread = thread::spawn(move || listen(&desk, &stops, &seen));
+        Ok(Self { over, thread: Some(thread), _terminal: terminal })
+    }
+}
+
+impl Drop for Keyboard {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // It has nothing left to do; how it ended does not matter.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn listen(desk: &Desk, stops: &Stops, over: &AtomicBool) {
+    let mut keys = [0; 16];
+    let timeout = Timespec { tv_sec: 0, tv_nsec: LOOK_NS };
+    while !over.load(Ordering::Acquire) {
+        let input = stdio::stdin();
+        let ready = poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&timeout));
+        if !ready.is_ok_and(|count| count > 0) {
+            continue;
+        }
+        // No bytes: the terminal is gone, and its signal stops the machine.
+        let Ok(count @ 1..) = rustix::io::read(input, &mut keys) else { return };
+        // An arrow or function key is no letter.
+        if keys[0] == ESCAPE && count > 1 {
+            continue;
+        }
+        for words in keys[..count].iter().filter_map(|key| press(*key, desk, stops)) {
+            tell(&words);
+        }
+    }
+}
+
+/// What a key does, and what is said of it.
+fn press(key: u8, desk: &Desk, stops: &Stops) -> Option<String> {
+    let controls = desk.controls();
+    let on = |switch: &AtomicBool| switch.load(Ordering::Relaxed);
+    let (command, words) = match key {
+        b' ' if on(&controls.hold) => (Command::Resume, "resume".to_string()),
+        b' ' => (Command::Hold, "feed hold; space resumes".to_string()),
+        b'\r' | b'\n' => (Command::Resume, "on".to_string()),
+        b'+' | b'=' => step(desk, STEP),
+        b'-' => step(desk, -STEP),
+        b's' => (Command::SingleBlock(!on(&controls.single_block)), switched("single block", &controls.single_block)),
+        b'o' => {
+            (Command::OptionalStop(!on(&controls.optional_stop)), switched("optional stop", &controls.optional_stop))
+        }
+        b'q' => (Command::Abort, "abort: stopping on the path".to_string()),
+        b'e' => (Command::EmergencyStop, "emergency stop".to_string()),
+        CTRL_C => return Some(stops.ask(desk)),
+        _ => return None,
+    };
+    Some(desk.give(command).map_or_else(|refusal| refusal, |_| words))
+}
+
+fn switched(what: &str, switch: &AtomicBool) -> String {
+    format!("{what} {}", if switch.load(Ordering::Relaxed) { "off" } else { "on" })
+}
+
+/// The feed override a step on, within what the machine allows.
+fn step(desk: &Desk, by: f64) -> (Command, String) {
+    let (now, most) = (desk.controls().feed_override.load(), desk.max_feed_ratio());
+    // Whole per cents: steps up and down end where they began.
+    let asked = ((now + by) * 100.0).round() / 100.0;
+    let next = asked.clamp(0.0, most);
+    let bound = match next {
+        _ if next == asked => "",
+        0.0 => ": the least there is",
+        _ => ": the most that motion.max_feed_ratio allows",
+    };
+    (Command::FeedOverride(next), format!("feed override {:.0} %{bound}", next * 100.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use std::sync::atomic::Ordering::Relaxed;
+    use tandem_machine::Machine;
+
+    fn desk() -> Desk {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let machine = Machine::read(&path, &[("motion.max_feed_ratio".to_string(), "1.15".to_string())]).unwrap();
+        Desk::new(&machine, Arc::default(), Arc::default())
+    }
+
+    #[test]
+    fn every_key() {
+        let (desk, stops) = (desk(), Stops::default());
+        let type_in = |keys: &str| keys.bytes().filter_map(|key| press(key, &desk, &stops)).collect::<Vec<_>>();
+        let controls = desk.controls();
+        assert_eq!(type_in(" "), ["feed hold; space resumes"]);
+        assert!(controls.hold.load(Relaxed));
+        assert_eq!(type_in(" "), ["resume"]);
+        assert!(!controls.hold.load(Relaxed));
+        assert_eq!(type_in("s"), ["single block on"]);
+        assert!(controls.single_block.load(Relaxed));
+        assert_eq!(type_in("so"), ["single block off", "optional stop on"]);
+        desk.begin_wait(7);
+        assert!(!desk.answered());
+        type_in("\n");
+        assert!(desk.answered());
+        assert!(type_in("xyz\x1b").is_empty());
+        type_in("q");
+        assert!(controls.abort.load(Relaxed) && !controls.emergency_stop.load(Relaxed));
+        type_in("e");
+        assert!(controls.emergency_stop.load(Relaxed));
+    }
+
+    #[test]
+    fn the_override_stays_within_the_machine_and_says_so() {
+        let (desk, stops) = (desk(), Stops::default());
+        let said = |key: u8| press(key, &desk, &stops).unwrap();
+        assert_eq!(said(b'+'), "feed override 110 %");
+        assert_eq!(said(b'+'), "feed override 115 %: the most that motion.max_feed_ratio allows");
+        assert_eq!(desk.controls().feed_override.load(), 1.15);
+        assert_eq!(said(b'-'), "feed override 105 %");
+        let down: Vec<String> = (0..12).map(|_| said(b'-')).collect();
+        assert_eq!(down[11], "feed override 0 %: the least there is");
+        assert_eq!(said(b'+'), "feed override 10 %");
+    }
+
+    #[test]
+    fn ctrl_c_aborts_and_then_stops_at_once() {
+        let (desk, stops) = (desk(), Stops::default());
+        press(CTRL_C, &desk, &stops);
+        assert!(desk.controls().abort.load(Relaxed) && !desk.controls().emergency_stop.load(Relaxed));
+        press(CTRL_C, &desk, &stops);
+        assert!(desk.controls().emergency_stop.load(Relaxed));
+    }
+}

@@ -1,0 +1,141 @@
+//! The operator of a run: keys on the terminal, clients at sockets, signals.
+
+mod enter;
+mod keys;
+mod signals;
+mod terminal;
+
+use std::io::{IsTerminal, stderr};
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use tandem_host::operator::{Desk, Listen, Server};
+use tandem_host::{Run, StopAnswer, Summary};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+
+use crate::args;
+
+use enter::Enter;
+use keys::Keyboard;
+use signals::Signals;
+pub use terminal::is_on_terminal;
+
+/// How often a program stop is looked after while machine time stands still.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// Everything through which a run is told what to do. Dropping it gives the terminal back and tells clients that the run
+/// is over.
+pub struct Operator {
+    desk: Arc<Desk>,
+    // The order matters: keys and signals go before the clients are told.
+    keyboard: Option<Keyboard>,
+    signals: Option<Signals>,
+    server: Option<Server>,
+    enter: Enter,
+    /// Machine time passes while the program waits.
+    real_time: bool,
+    /// `--pause`: stops wait also where nobody is seen to be there.
+    pause: bool,
+}
+
+impl Operator {
+    /// Opens what the command line asks for; `keys` takes the terminal.
+    ///
+    /// # Errors
+    /// The socket, the token file or the terminal with the cause.
+    pub fn begin(options: &args::Run, machine: &Machine, run: &Run, keys: bool) -> Result<Self, String> {
+        let desk = Arc::new(Desk::new(machine, run.controls(), run.status()));
+        let server = serve(&options.operator, &desk)?;
+        let real_time = options.clock == args::Clock::Wall;
+        let signals = real_time.then(|| Signals::catch(Arc::clone(&desk))).transpose()?;
+        let stops = signals.as_ref().map(Signals::stops);
+        let keyboard = stops.filter(|_| keys).map(|stops| Keyboard::begin(Arc::clone(&desk), stops)).transpose()?;
+        Ok(Self { desk, keyboard, signals, server, enter: Enter::default(), real_time, pause: options.pause })
+    }
+
+    /// A sample was sent; `progress` is the share of the path that is driven.
+    pub fn sample(&self, sample: &Sample, progress: f64) {
+        if self.server.is_some() {
+            self.desk.sample(sample, progress);
+        }
+    }
+
+    /// Whether somebody can give commands now.
+    pub fn is_attended(&self) -> bool {
+        self.keyboard.is_some() || self.desk.clients() > 0
+    }
+
+    /// The program waits on `line`: whether it goes on.
+    pub fn program_stop(&mut self, line: u32) -> StopAnswer {
+        if self.desk.waits_on_line() != Some(line) {
+            if !self.pause && !self.is_attended() {
+                say!("line {line}: no operator is there, the run goes on");
+                return StopAnswer::GoOn;
+            }
+            self.desk.begin_wait(line);
+            say!("line {line}: the program waits; Enter goes on");
+        }
+        let mut answer = self.look();
+        while answer == StopAnswer::Wait && !self.real_time {
+            thread::sleep(LOOK);
+            answer = self.look();
+        }
+        if answer != StopAnswer::Wait {
+            self.desk.end_wait();
+        }
+        answer
+    }
+
+    /// The machine came to a rest that ended what the program waited for.
+    pub fn rest(&self) {
+        self.desk.end_wait();
+    }
+
+    /// The run is over: the terminal is as it was, and the clients are told why.
+    pub fn end(&mut self, summary: &Summary) {
+        self.keyboard = None;
+        self.signals = None;
+        self.desk.end(summary.fault.as_deref(), summary.stopped.as_deref());
+        self.server = None;
+    }
+
+    fn look(&mut self) -> StopAnswer {
+        if self.desk.answered() || self.desk.is_stopping() {
+            return StopAnswer::GoOn;
+        }
+        if self.keyboard.is_some() || !self.pause {
+            return StopAnswer::Wait;
+        }
+        match self.enter.look() {
+            None => StopAnswer::Wait,
+            Some(true) => StopAnswer::GoOn,
+            Some(false) if self.server.is_some() => StopAnswer::Wait,
+            Some(false) => StopAnswer::Nobody,
+        }
+    }
+}
+
+/// A line to standard error, over the progress where that is shown.
+fn tell(words: &str) {
+    let clear = if stderr().is_terminal() { "\r\x1b[K" } else { "" };
+    say!("{clear}{words}");
+}
+
+/// Opens the sockets, and says where clients find them.
+fn serve(options: &args::Operator, desk: &Arc<Desk>) -> Result<Option<Server>, String> {
+    if options.is_nowhere() {
+        return Ok(None);
+    }
+    let listen =
+        Listen { unix: options.listen.clone(), tcp: options.listen_tcp, token_file: options.token_file.clone() };
+    let server = Server::start(Arc::clone(desk), &listen)?;
+    if let Some(path) = &options.listen {
+        say!("operators: {}", path.display());
+    }
+    if let Some(address) = server.address {
+        say!("operators: {address}");
+    }
+    Ok(Some(server))
+}
