@@ -67,6 +67,7 @@ fn every_key_does_what_it_says() {
     client.wait("block by block", |s| s["single_block"] == true);
     press(&mut keys, "s");
     client.wait("through", |s| s["single_block"] == false);
+    client.wait("long enough to see its progress", |s| s["tick"].as_u64().unwrap() > 500);
     press(&mut keys, "q");
     assert!(client.hear()["ended"]["stopped"].is_string());
     let said = assert_left_well(run, keys, "3");

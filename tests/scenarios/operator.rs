@@ -82,7 +82,8 @@ impl Drop for Running {
     }
 }
 
-/// `tandem run` of `p.ngc` in `folder`, on the wall clock where no other is asked for, lenient with a computer that is busy with other tests.
+/// `tandem run` of `p.ngc` in `folder`, on the wall clock where no other is asked for; lenient with a
+/// computer that is busy with other tests.
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
     command.current_dir(folder).args(["run", "p.ngc", "--listen", "s", "--machine"]).arg(mill());

@@ -17,6 +17,9 @@ use super::terminal::RawTerminal;
 const LOOK_NS: i64 = 50_000_000;
 /// A step of the feed override.
 const STEP: f64 = 0.1;
+/// What is said when the keys are taken.
+const HELP: &str = "keys: space hold/resume, + - feed override, s single block, o optional stop, Enter goes on, \
+                    q abort, e emergency stop";
 const CTRL_C: u8 = 3;
 const ESCAPE: u8 = 27;
 
@@ -34,9 +37,7 @@ impl Keyboard {
     /// The system's words.
     pub fn begin(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
         let terminal = RawTerminal::take()?;
-        say!(
-            "keys: space hold/resume, + - feed override, s single block, o optional stop, Enter goes on, q abort, e emergency stop"
-        );
+        say!("{HELP}");
         let over = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&over);
         let thread = thread::spawn(move || listen(&desk, &stops, &seen));

@@ -7,6 +7,7 @@ mod terminal;
 
 use std::io::{IsTerminal, stderr};
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
 use std::time::Duration;
 
@@ -36,7 +37,7 @@ pub struct Operator {
     enter: Enter,
     /// Machine time passes while the program waits.
     real_time: bool,
-    /// `--pause`: stops wait also where nobody is seen to be there.
+    /// `--pause`.
     pause: bool,
 }
 
@@ -70,7 +71,7 @@ impl Operator {
     /// The program waits on `line`: whether it goes on.
     pub fn program_stop(&mut self, line: u32) -> StopAnswer {
         if self.desk.waits_on_line() != Some(line) {
-            if !self.pause && !self.is_attended() {
+            if !self.is_asked_to_wait() && !self.is_attended() {
                 say!("line {line}: no operator is there, the run goes on");
                 return StopAnswer::GoOn;
             }
@@ -101,11 +102,16 @@ impl Operator {
         self.server = None;
     }
 
+    /// Whether stops wait also where nobody is seen to be there: somebody has asked for that.
+    fn is_asked_to_wait(&self) -> bool {
+        self.pause || self.desk.controls().optional_stop.load(Relaxed)
+    }
+
     fn look(&mut self) -> StopAnswer {
         if self.desk.answered() || self.desk.is_stopping() {
             return StopAnswer::GoOn;
         }
-        if self.keyboard.is_some() || !self.pause {
+        if self.keyboard.is_some() || !self.is_asked_to_wait() {
             return StopAnswer::Wait;
         }
         match self.enter.look() {
