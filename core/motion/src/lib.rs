@@ -7,6 +7,7 @@ mod geometry;
 pub mod nurbs;
 mod path;
 mod profile;
+pub mod retime;
 mod segment;
 mod vector;
 

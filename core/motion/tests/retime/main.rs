@@ -1,0 +1,69 @@
+//! Retiming against closed forms, and against the limits as differences of samples.
+
+mod along;
+
+use along::{Along, retimed};
+use proptest::prelude::*;
+use tandem_motion::retime::LaneLimits;
+
+const FEED: f64 = 250.0;
+
+fn limits(lanes: usize) -> LaneLimits {
+    LaneLimits { lanes, acceleration: [5000.0; 8], jerk: [4e5; 8] }
+}
+
+/// A straight line of `length` in the first axis.
+fn line(length: f64) -> Along {
+    Along { length, lanes: 1, feed: FEED, derivatives: Box::new(|_| [[1.0, 0.0], [0.0; 2], [0.0; 2]]) }
+}
+
+/// Three quarters of a circle.
+fn circle(radius: f64, feed: f64) -> Along {
+    let derivatives = move |s: f64| {
+        let (sin, cos) = (s / radius).sin_cos();
+        [[-sin, cos], [-cos / radius, -sin / radius], [sin / (radius * radius), -cos / (radius * radius)]]
+    };
+    Along { length: 1.5 * std::f64::consts::PI * radius, lanes: 2, feed, derivatives: Box::new(derivatives) }
+}
+
+#[test]
+fn a_line_takes_the_time_of_the_s_curve() {
+    // Rest to rest with 250 mm/s, 5000 mm/s², 4e5 mm/s³: with a cruise, and with a peak below the feed.
+    for (length, closed_form_s) in [(50.0, 0.2625), (5.0, 0.076_968_984_8)] {
+        let done = retimed(&line(length), &limits(1), 1e-3, 4);
+        println!("{length} mm: {} s, {closed_form_s} s, {:?}", done.time_s, done.status);
+        assert!(done.status.is_feasible());
+        let ratio = done.time_s / closed_form_s;
+        assert!((0.999..1.03).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn the_bound_on_the_rate_is_the_feed() {
+    let done = retimed(&line(50.0), &limits(1), 1e-3, 3);
+    let top = done.speeds().into_iter().fold(0.0, f64::max);
+    assert!(top <= FEED * (1.0 + 1e-3) && top > 0.999 * FEED, "{top}");
+}
+
+#[test]
+fn a_tight_turn_uses_the_jerk_that_there_is() {
+    // On a circle at constant speed an axis accelerates with v²/r and jerks with v³/r²; where both axes share the turn, more.
+    let done = retimed(&circle(1.0, FEED), &limits(2), 1e-3, 3);
+    let steady = (4e5f64).cbrt().min(5000.0f64.sqrt());
+    let speeds = done.speeds();
+    let middle = speeds[speeds.len() / 2];
+    assert!(middle <= 2f64.sqrt() * steady && middle > 0.9 * steady, "{middle} {steady}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn samples_keep_the_limits(radius in 0.2..40.0f64, feed in 20.0..250.0f64, grid in 0.8e-3..3e-3f64) {
+        let along = circle(radius, feed);
+        let done = retimed(&along, &limits(2), grid, 2);
+        prop_assert!(done.status.is_feasible(), "{:?}", done.status);
+        let [acceleration, jerk] = done.peaks(&along);
+        prop_assert!(acceleration < 5000.0 * 1.001, "{acceleration}");
+        prop_assert!(jerk < 4e5 * 1.01, "{jerk}");
+    }
+}
