@@ -96,16 +96,17 @@ fn quintic(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_AX
     }
 }
 
-/// Position, velocity and acceleration at local time `t_s`.
-fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
+/// Position, velocity and acceleration per axis at local time `t_s` of `piece`. Rough loop; does not allocate.
+pub fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
     let (s_mm, speed) = (piece.path_mm(t_s), piece.speed(t_s));
     let direction = path.direction(s_mm);
     let acceleration = direction * piece.acceleration_mm_per_s2 + path.curvature(s_mm) * (speed * speed);
     [path.position(s_mm), direction * speed, acceleration]
 }
 
-/// The quintic with value, first and second derivative `from` at 0 and `to` at `h`, in the powers of t.
-fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
+/// The quintic with value, first and second derivative `from` at 0 and `to` at `h`, in the powers of t. Any loop; does not
+/// allocate.
+pub fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
     let (c1, c2) = (from[1], from[2] / 2.0);
     let position = to[0] - from[0] - h * (c1 + h * c2);
     let velocity = (to[1] - c1 - 2.0 * c2 * h) * h;

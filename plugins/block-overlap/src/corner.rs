@@ -1,0 +1,139 @@
+//! The junction of two blocks: what tolerance and turning allow there, in closed form.
+
+use crate::entry::Entry;
+use crate::options::LimitMode;
+use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, largest, lesser};
+
+/// A junction, whatever feeds meet there.
+///
+/// With the overlap τ, feeds F and the step `Δu` of the direction, the corner error is `F·τ·|Δu|/8` (for a turn θ
+/// `|Δu| = 2·sin(θ/2)`) and the acceleration of an axis `F·Δu/τ`. Both depend on `F·τ` alone or on `F/τ` alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Corner {
+    /// The program needs rest here.
+    pub rest: bool,
+    /// Acceleration that 1 mm/s over 1 s takes of the axis that turns most, as a share of its limit, s²/mm.
+    pub turn_s2_per_mm: f64,
+    /// The greatest F·τ that the tolerance allows, mm.
+    pub span_mm: f64,
+    /// The greatest F·τ that tolerance and short blocks allow, mm.
+    pub room_mm: f64,
+    /// Time constant, s: the longest overlap, or the overlap where it is not shortened.
+    pub tau_s: f64,
+    /// The longest overlap, s; infinite where constants may be stretched.
+    pub longest_s: f64,
+    /// The highest feed at which both blocks may pass in full overlap, mm/s.
+    pub cap_mm_per_s: f64,
+    /// Share of the acceleration that arcs leave at that feed for a change of feed.
+    pub spare: f64,
+}
+
+impl Corner {
+    /// The junction between `before` and `after`.
+    pub fn new(rules: &Rules, before: &Entry, after: &Entry) -> Self {
+        let tau_s = before.tau_s;
+        let rest = before.rests_before(after);
+        let blank = Self { rest, tau_s, longest_s: tau_s, spare: 1.0, ..Self::default() };
+        if rest {
+            return blank;
+        }
+        let step = after.directions[0] - before.directions[1];
+        let turn = largest(&step, &rules.per_acceleration);
+        let span_mm = if rules.controlled { span_mm(rules, before, after, &step) } else { f64::INFINITY };
+        if rules.limits == LimitMode::Off {
+            let fastest = greater(before.feed_mm_per_s, after.feed_mm_per_s);
+            let most = (span_mm / fastest / rules.tick_s + 1e-9).floor().max(1.0) * rules.tick_s;
+            let tau_s = lesser(tau_s, most);
+            return Self { tau_s, cap_mm_per_s: f64::INFINITY, room_mm: f64::INFINITY, span_mm, ..blank };
+        }
+        let shorter = lesser(before.length_mm, after.length_mm);
+        let room_mm = if rules.shorten { lesser(span_mm, shorter) } else { span_mm };
+        let longest_s = if rules.limits == LimitMode::Stretch { f64::INFINITY } else { tau_s };
+        let bend = ARC_OVERLAP * greater(before.bend, after.bend);
+        let cap = cap_mm_per_s(turn, room_mm, longest_s, bend);
+        let bent = bend * lesser(cap, greater(before.feed_mm_per_s, after.feed_mm_per_s)).powi(2);
+        let spare = 1.0 - lesser(bent, TURN_SHARE);
+        Self { turn_s2_per_mm: turn, span_mm, room_mm, longest_s, cap_mm_per_s: cap, spare, ..blank }
+    }
+
+    /// The highest feed of the faster of two blocks in full overlap where the slower has `slow_mm_per_s`; `slope` is
+    /// 1/path acceleration of the faster one.
+    ///
+    /// Acceleration: `slow·g + (fast − slow)·slope ≤ spare·τ` with `τ = min(longest, room/fast)`.
+    pub fn lift_mm_per_s(&self, slow_mm_per_s: f64, slope: f64) -> f64 {
+        if slope == 0.0 {
+            return self.cap_mm_per_s;
+        }
+        let level = slow_mm_per_s * (slope - self.turn_s2_per_mm);
+        let by_room = (level + (level * level + 4.0 * slope * self.spare * self.room_mm).sqrt()) / (2.0 * slope);
+        let by_time = (self.spare * self.longest_s + level) / slope;
+        greater(lesser(lesser(by_room, by_time), self.cap_mm_per_s), slow_mm_per_s)
+    }
+}
+
+/// The largest F with `F·g/τ + bend·F² ≤ TURN_SHARE` and `τ = min(longest, room/F)`.
+fn cap_mm_per_s(turn: f64, room_mm: f64, longest_s: f64, bend: f64) -> f64 {
+    if room_mm <= 0.0 {
+        return 0.0;
+    }
+    let square = turn / room_mm + bend;
+    let by_room = if square > 0.0 { (TURN_SHARE / square).sqrt() } else { f64::INFINITY };
+    let linear = turn / longest_s;
+    let by_time = match bend {
+        0.0 if linear > 0.0 => TURN_SHARE / linear,
+        0.0 => f64::INFINITY,
+        _ => 2.0 * TURN_SHARE / (linear + (linear * linear + 4.0 * bend * TURN_SHARE).sqrt()),
+    };
+    lesser(by_room, by_time)
+}
+
+/// The largest X = F·τ with `X·|Δu|/8 + X²·κ/64 ≤ tolerance`: the corner error, and what two blocks of the curvatures
+/// κ₁ + κ₂ = κ lose while one starts and the other ends. The second term is an upper bound: with d₁ and d₂ the distances
+/// still to go and already gone, arcs lose at most κ·d₁·d₂, and d₁·d₂ ≤ (X/8)².
+fn span_mm(rules: &Rules, before: &Entry, after: &Entry, step: &tandem_sdk::AxisVector) -> f64 {
+    let allowed_mm = lesser(before.tolerance_mm, after.tolerance_mm) - rules.sag_mm;
+    let squares: f64 = step.0.iter().zip(&rules.metric.0).map(|(d, m)| (d * m) * (d * m)).sum();
+    let sharp = squares.sqrt() / 8.0;
+    let curved = CURVED * (before.curvature_per_mm + after.curvature_per_mm) / 64.0;
+    if allowed_mm <= 0.0 {
+        return if sharp < STRAIGHT && curved == 0.0 { f64::INFINITY } else { 0.0 };
+    }
+    if curved == 0.0 {
+        return allowed_mm / sharp;
+    }
+    2.0 * allowed_mm / (sharp + (sharp * sharp + 4.0 * curved * allowed_mm).sqrt())
+}
+
+/// Directions that differ by less are the same, to the rounding of coordinates.
+const STRAIGHT: f64 = 1e-9;
+
+/// Margin on the curved term for what is left out of it: the arc's own change of direction while it starts.
+const CURVED: f64 = 1.1;
+
+/// The corner error, mm: the distance of the vertex from the parabola on which two straight blocks overlap for `tau_s`,
+/// one slowing down from `before_mm_per_s`, the other speeding up to `after_mm_per_s`, with the turn angle `turn_rad`.
+///
+/// For equal feeds `F·τ/4·sin(θ/2)`. Else the point is at `s/(1−s) = r`, r the positive root of
+/// `b²·r³ + a·b·c·r² − a·b·c·r − a² = 0` with a and b half of feed times τ and c = cos θ. Does not allocate.
+pub fn corner_error_mm(before_mm_per_s: f64, after_mm_per_s: f64, tau_s: f64, turn_rad: f64) -> f64 {
+    let (a, b, c) = (before_mm_per_s * tau_s / 2.0, after_mm_per_s * tau_s / 2.0, turn_rad.cos());
+    if a <= 0.0 || b <= 0.0 {
+        return 0.0;
+    }
+    let value = |r: f64| ((b * b * r + a * b * c) * r - a * b * c) * r - a * a;
+    let (mut low, mut high) = (0.0, 2.0 * (1.0 + (a / b).max(1.0)));
+    for _ in 0..80 {
+        let middle = f64::midpoint(low, high);
+        *(if value(middle) > 0.0 { &mut high } else { &mut low }) = middle;
+    }
+    let s = low / (1.0 + low);
+    let (p, q) = (a * (1.0 - s) * (1.0 - s), b * s * s);
+    // |p·u₁ − q·u₂|² = (p − q)² + 2·p·q·(1 − cos θ), in the form that does not cancel.
+    ((p - q).powi(2) + 4.0 * p * q * (turn_rad / 2.0).sin().powi(2)).sqrt()
+}
+
+/// The time constant, s, at which two blocks of the feed `feed_mm_per_s` lose `error_mm` at a corner:
+/// `τ = 4·ε/(F·sin(θ/2))`. Does not allocate.
+pub fn tau_for_tolerance_s(error_mm: f64, feed_mm_per_s: f64, turn_rad: f64) -> f64 {
+    4.0 * error_mm / (feed_mm_per_s * (turn_rad / 2.0).sin())
+}

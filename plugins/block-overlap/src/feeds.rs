@@ -1,0 +1,249 @@
+//! The feeds of a window of blocks: the choice at every junction, then feeds that differ no more than the axes allow.
+
+use crate::buffer::Ring;
+use crate::choose::{Item, ROUNDING, Way};
+use crate::corner::Corner;
+use crate::entry::Entry;
+use crate::join::{Mode, late_overlap_s};
+use crate::rules::{Rules, TURN_SHARE, greater, lesser};
+
+/// What is fixed before the window.
+#[derive(Clone, Copy, Debug)]
+pub struct Before {
+    /// Feed of the first block, mm/s, where it has been joined to the one before.
+    pub feed_mm_per_s: Option<f64>,
+    /// Time constant of its acceleration, s.
+    pub tau_s: f64,
+}
+
+/// A plan for a window of blocks. Its memory is kept from plan to plan.
+#[derive(Debug, Default)]
+pub struct Plan {
+    /// Feeds, mm/s.
+    pub feeds: Vec<f64>,
+    /// How each block is joined to the next.
+    pub modes: Vec<Mode>,
+    own: Vec<[f64; 2]>,
+    better: Vec<[Mode; 2]>,
+    fixed: bool,
+}
+
+impl Plan {
+    /// Memory for `capacity` blocks.
+    pub fn new(capacity: usize) -> Self {
+        let (feeds, modes) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        Self { feeds, modes, own: Vec::with_capacity(capacity), better: Vec::with_capacity(capacity), fixed: false }
+    }
+
+    /// Plans the blocks of `ring`, to rest after the last one. `false` where what is fixed before does not allow it.
+    pub fn make(&mut self, rules: &Rules, ring: &Ring, before: &Before) -> bool {
+        self.fixed = before.feed_mm_per_s.is_some();
+        self.own_feeds(rules, ring, before);
+        if !self.choose(rules, ring) {
+            return false;
+        }
+        self.start_feeds(ring);
+        if !self.backward(rules, ring) || !self.forward(rules, ring) {
+            return false;
+        }
+        if rules.grid {
+            self.round_to_ticks(rules, ring, before.tau_s);
+        }
+        true
+    }
+
+    /// The highest feed of each block by itself, in full overlap on both sides and otherwise.
+    fn own_feeds(&mut self, rules: &Rules, ring: &Ring, before: &Before) {
+        self.own.clear();
+        let mut tau_s = before.tau_s;
+        for k in 0..ring.len() {
+            let (block, corner) = (ring.entry(k), ring.corner(k));
+            let taus_s = [tau_s, corner.tau_s];
+            if block.path.is_some() {
+                tau_s = corner.tau_s;
+            }
+            let own = if rules.shorten { block.feed_mm_per_s } else { slowed_mm_per_s(block, taus_s) };
+            let ramped = if rules.shorten { block.triangle_mm_per_s } else { ramped_mm_per_s(block, taus_s) };
+            self.own.push([own, lesser(own, ramped)]);
+        }
+        if let (Some(feed), Some(own)) = (before.feed_mm_per_s, self.own.first_mut()) {
+            *own = [feed, lesser(feed, own[1])];
+        }
+    }
+
+    fn item<'a>(&self, ring: &'a Ring, k: usize) -> Item<'a> {
+        let [own_mm_per_s, ramped_mm_per_s] = self.own[k];
+        Item { block: ring.entry(k), own_mm_per_s, ramped_mm_per_s, fixed: self.fixed && k == 0 }
+    }
+
+    fn choose(&mut self, rules: &Rules, ring: &Ring) -> bool {
+        let count = ring.len();
+        let mut way = Way::START;
+        self.better.clear();
+        for k in 0..count {
+            let next = (k + 1 < count).then(|| self.item(ring, k + 1));
+            let corner = if next.is_some() { *ring.corner(k) } else { Corner { rest: true, ..*ring.corner(k) } };
+            let (further, better) = way.over(rules, &self.item(ring, k), &corner, next.as_ref());
+            if further.is_closed() {
+                return false;
+            }
+            way = further;
+            self.better.push(better);
+        }
+        self.trace_back(ring, way.best());
+        true
+    }
+
+    /// The modes of the best way, from its end to its start.
+    fn trace_back(&mut self, ring: &Ring, last: Mode) {
+        let count = ring.len();
+        self.modes.clear();
+        self.modes.resize(count, Mode::Rest);
+        let mut mode = last;
+        for k in (0..count).rev() {
+            let rest = k + 1 == count || ring.corner(k).rest;
+            self.modes[k] = if rest { Mode::Rest } else { mode };
+            mode = self.better[k][usize::from(mode != Mode::Flow)];
+        }
+    }
+
+    fn start_feeds(&mut self, ring: &Ring) {
+        self.feeds.clear();
+        let mut cap = 0.0;
+        let mut before = if self.fixed { Mode::Flow } else { Mode::Rest };
+        if self.fixed {
+            cap = f64::INFINITY;
+        }
+        for k in 0..ring.len() {
+            let after = self.modes[k];
+            let [own, ramped] = self.own[k];
+            let mut feed = if before == Mode::Flow && after == Mode::Flow { own } else { ramped };
+            if before == Mode::Flow {
+                feed = lesser(feed, cap);
+            }
+            cap = ring.corner(k).cap_mm_per_s;
+            if after == Mode::Flow {
+                feed = lesser(feed, cap);
+            }
+            self.feeds.push(feed);
+            before = after;
+        }
+    }
+
+    /// Lowers feeds that the next block cannot take over; `false` where the fixed one is too high.
+    fn backward(&mut self, rules: &Rules, ring: &Ring) -> bool {
+        for k in (0..ring.len().saturating_sub(1)).rev() {
+            if self.modes[k] != Mode::Flow || self.feeds[k] <= self.feeds[k + 1] {
+                continue;
+            }
+            let lift = ring.corner(k).lift_mm_per_s(self.feeds[k + 1], ring.entry(k).slope_s2_per_mm);
+            if self.feeds[k] <= lift * (1.0 + ROUNDING) || self.start_late(rules, ring, k, (k, lift)) {
+                continue;
+            }
+            if self.fixed && k == 0 {
+                return false;
+            }
+            self.feeds[k] = lift;
+        }
+        true
+    }
+
+    /// Lowers feeds that the block before cannot hand over.
+    fn forward(&mut self, rules: &Rules, ring: &Ring) -> bool {
+        for k in 0..ring.len().saturating_sub(1) {
+            if self.modes[k] != Mode::Flow || self.feeds[k + 1] <= self.feeds[k] {
+                continue;
+            }
+            let lift = ring.corner(k).lift_mm_per_s(self.feeds[k], ring.entry(k + 1).slope_s2_per_mm);
+            if self.feeds[k + 1] > lift && !self.start_late(rules, ring, k, (k + 1, lift)) {
+                self.feeds[k + 1] = lift;
+            }
+        }
+        true
+    }
+
+    /// Lets the block after junction `k` start late where that costs less than lowering the feed of one block to `lift`.
+    fn start_late(&mut self, rules: &Rules, ring: &Ring, k: usize, (lowered, lift): (usize, f64)) -> bool {
+        let blocks = [ring.entry(k), ring.entry(k + 1)];
+        let feeds = [self.feeds[k], self.feeds[k + 1]];
+        if feeds[0] > self.own[k][1] || feeds[1] > self.own[k + 1][1] {
+            return false;
+        }
+        let ramps_s = [0, 1].map(|i| feeds[i] * blocks[i].slope_s2_per_mm);
+        let overlap_s = late_overlap_s(rules, ring.corner(k), blocks, lesser(ramps_s[0], ramps_s[1]));
+        let late_s = f64::midpoint(ramps_s[0], ramps_s[1]) - overlap_s;
+        let lower_s = ring.entry(lowered).length_mm * (1.0 / lift - 1.0 / self.feeds[lowered]);
+        let fixed = self.fixed && lowered == 0;
+        if late_s < lower_s || fixed {
+            self.modes[k] = Mode::Late;
+        }
+        late_s < lower_s || fixed
+    }
+
+    /// The published rounding: whole ticks where both ends have the time constant, and the axes still take the feed.
+    fn round_to_ticks(&mut self, rules: &Rules, ring: &Ring, mut tau_s: f64) {
+        for k in 0..ring.len() {
+            let (block, corner) = (ring.entry(k), ring.corner(k));
+            let taus_s = [tau_s, corner.tau_s];
+            if block.path.is_none() {
+                continue;
+            }
+            tau_s = corner.tau_s;
+            if self.fixed && k == 0 || !self.is_plain(block, k, taus_s) {
+                continue;
+            }
+            let feed = whole_ticks_mm_per_s(block, taus_s.map(|tau| tau / rules.tick_s), self.feeds[k], rules.tick_s);
+            let fits = |at: usize, feeds: [f64; 2]| {
+                self.modes[at] != Mode::Flow || is_flow(ring.corner(at), [ring.entry(at), ring.entry(at + 1)], feeds)
+            };
+            if (k == 0 || fits(k - 1, [self.feeds[k - 1], feed]))
+                && (k + 1 == ring.len() || fits(k, [feed, self.feeds[k + 1]]))
+            {
+                self.feeds[k] = feed;
+            }
+        }
+    }
+
+    /// Whether both ramps of block `k` take the time constants.
+    fn is_plain(&self, block: &Entry, k: usize, taus_s: [f64; 2]) -> bool {
+        let ramp_s = self.feeds[k] * block.slope_s2_per_mm;
+        let before = if k > 0 { self.modes[k - 1] } else { Mode::Rest };
+        let plain = |mode: Mode, tau_s: f64| match mode {
+            Mode::Flow => true,
+            Mode::Late => false,
+            Mode::Rest => ramp_s <= tau_s,
+        };
+        plain(before, taus_s[0]) && plain(self.modes[k], taus_s[1])
+    }
+}
+
+/// The feed of a block that is driven in whole ticks: `N = max(na, ceil(x + (na − nd)/2))`, `F = l/(Ts·(N + (nd − na)/2))`.
+fn whole_ticks_mm_per_s(block: &Entry, ticks: [f64; 2], feed: f64, tick_s: f64) -> f64 {
+    let [na, nd] = ticks.map(f64::round);
+    let x = block.length_mm / (feed * tick_s);
+    let n = greater(na, (x + (na - nd) / 2.0 - 1e-9).ceil());
+    lesser(block.length_mm / (tick_s * (n + (nd - na) / 2.0)), feed * (1.0 + 1e-11))
+}
+
+/// Whether two feeds may meet in full overlap.
+fn is_flow(corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2]) -> bool {
+    let fast = usize::from(feeds[1] > feeds[0]);
+    let change = (feeds[fast] - feeds[1 - fast]) * blocks[fast].slope_s2_per_mm;
+    let turn = corner.turn_s2_per_mm;
+    feeds[1 - fast] * turn + change <= corner.spare * corner.tau_s && feeds[fast] * turn <= TURN_SHARE * corner.tau_s
+}
+
+/// A block shorter than its time constants is slowed: `F ≤ l/((τa + τd)/2)`.
+fn slowed_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
+    lesser(block.feed_mm_per_s, 2.0 * block.length_mm / (taus_s[0] + taus_s[1]))
+}
+
+/// The same where a ramp may be longer than its time constant, because the axes ask for it: every combination holds.
+fn ramped_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
+    let (l, h) = (block.length_mm, block.slope_s2_per_mm);
+    if h == 0.0 {
+        return f64::INFINITY;
+    }
+    let one = |tau: f64| ((tau * tau + 8.0 * h * l).sqrt() - tau) / (2.0 * h);
+    lesser(block.triangle_mm_per_s, lesser(one(taus_s[0]), one(taus_s[1])))
+}

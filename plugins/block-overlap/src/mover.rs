@@ -1,0 +1,129 @@
+//! One block in motion: its trapezoid of speed, in ticks.
+
+use tandem_motion::{Builder, Path, SpeedPiece};
+use tandem_sdk::BlockKind;
+
+use crate::buffer::Taken;
+use crate::entry::Entry;
+use crate::rules::{Rules, greater, lesser};
+
+/// Times that differ by less, in ticks, are the same.
+pub const SAME_TICKS: f64 = 1e-9;
+
+/// A block that moves.
+#[derive(Clone, Debug)]
+pub struct Mover {
+    /// Index of the block, its line and its command feed.
+    pub index: u64,
+    /// Program line.
+    pub line: u32,
+    /// The programmed feed under the policy's cap, mm/s.
+    pub command_mm_per_s: f64,
+    /// Rapid motion.
+    pub rapid: bool,
+    /// Its path.
+    pub path: Path,
+    /// Time since its start, ticks.
+    pub at: f64,
+    /// Path deceleration that is left while nothing else moves, mm/s².
+    pub stop_mm_per_s2: f64,
+    fit: Builder,
+    length_mm: f64,
+    feed_mm_per_s: f64,
+    /// End of speeding up, start of slowing down, and end, ticks.
+    knots: [f64; 3],
+    accelerations: [f64; 2],
+    tick_s: f64,
+}
+
+impl Mover {
+    /// The block `entry`, driven as `taken` says; `None` for a dwell.
+    pub fn new(rules: &Rules, entry: &Entry, taken: &Taken) -> Option<Self> {
+        let path = entry.path?;
+        let (feed, tick_s) = (taken.feed_mm_per_s, rules.tick_s);
+        let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s / tick_s, rules.grid));
+        let cruise = round(entry.length_mm / (feed * tick_s) + (up - down) / 2.0, rules.grid);
+        let slow_from = greater(up, cruise);
+        let slope = entry.slope_s2_per_mm;
+        Some(Self {
+            index: entry.index,
+            line: entry.line,
+            command_mm_per_s: entry.command_mm_per_s,
+            rapid: entry.kind == BlockKind::Rapid,
+            at: 0.0,
+            stop_mm_per_s2: if slope > 0.0 { 1.0 / slope } else { rules.weakest_mm_per_s2 },
+            fit: Builder::new(&path, 0.0),
+            path,
+            length_mm: entry.length_mm,
+            feed_mm_per_s: feed,
+            knots: [up, slow_from, slow_from + down],
+            accelerations: [feed / (up * tick_s), -feed / (down * tick_s)],
+            tick_s,
+        })
+    }
+
+    /// When it has come to rest, ticks after its start.
+    pub fn end(&self) -> f64 {
+        self.knots[2]
+    }
+
+    /// Length, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.length_mm
+    }
+
+    /// Whether it has come to its end.
+    pub fn is_over(&self) -> bool {
+        self.at >= self.knots[2]
+    }
+
+    /// Ticks to where its acceleration next changes.
+    pub fn left(&self) -> f64 {
+        let next = self.knots.iter().find(|knot| **knot > self.at);
+        next.map_or(0.0, |knot| knot - self.at)
+    }
+
+    /// The longest piece from here, at most `most`, that one polynomial fits, ticks.
+    pub fn fitted(&self, most: f64) -> f64 {
+        if self.path.is_straight() {
+            return most;
+        }
+        lesser(most, self.fit.longest_s(&self.path, &self.piece(most)) / self.tick_s)
+    }
+
+    /// Moves on; a knot is met exactly.
+    pub fn advance(&mut self, ticks: f64) {
+        self.at += ticks;
+        for knot in self.knots {
+            if (self.at - knot).abs() < SAME_TICKS {
+                self.at = knot;
+            }
+        }
+    }
+
+    /// The motion from here on for `ticks`, up to the next knot.
+    pub fn piece(&self, ticks: f64) -> SpeedPiece {
+        let (at, tick_s, feed) = (self.at, self.tick_s, self.feed_mm_per_s);
+        let [up, slow_from, end] = self.knots;
+        let duration_s = ticks * tick_s;
+        if at < up {
+            let speed = self.accelerations[0] * at * tick_s;
+            let start_mm = speed * at * tick_s / 2.0;
+            SpeedPiece { start_mm, speed_mm_per_s: speed, acceleration_mm_per_s2: self.accelerations[0], duration_s }
+        } else if at < slow_from {
+            let start_mm = feed * tick_s * (at - up / 2.0);
+            SpeedPiece { start_mm, speed_mm_per_s: feed, acceleration_mm_per_s2: 0.0, duration_s }
+        } else {
+            let left = end - at;
+            let speed = -self.accelerations[1] * left * tick_s;
+            let start_mm = self.length_mm - speed * left * tick_s / 2.0;
+            SpeedPiece { start_mm, speed_mm_per_s: speed, acceleration_mm_per_s2: self.accelerations[1], duration_s }
+        }
+    }
+}
+
+/// A number of ticks, without the rounding of seconds where it is whole.
+fn round(ticks: f64, grid: bool) -> f64 {
+    let whole = ticks.round();
+    if grid && (ticks - whole).abs() < 1e-7 { whole } else { ticks }
+}

@@ -1,0 +1,104 @@
+//! What options and machine make of the rules, once for a run.
+
+use tandem_sdk::{AxisVector, MAX_AXES, PlannerContext};
+
+use crate::options::{CornerControl, LimitMode, Options};
+
+/// Planners aim at this share of a limit.
+const AIM: f64 = 0.999;
+
+/// Turning may take this share of the acceleration; the rest is left to come to a stop with.
+pub const TURN_SHARE: f64 = 0.8;
+
+/// On an arc the path acceleration that goes with [`TURN_SHARE`] of centripetal acceleration: 0.6² + 0.8² = 1.
+pub const ARC_SHARE: f64 = 0.6;
+
+/// While two blocks overlap, an arc among them asks for this much more than its centripetal acceleration: half of it
+/// comes from the change of direction under its own ramp.
+pub const ARC_OVERLAP: f64 = 1.5;
+
+/// The rules of a run.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// Corner errors are bounded.
+    pub controlled: bool,
+    /// What keeps the axis limits.
+    pub limits: LimitMode,
+    /// Short blocks shorten the time constant instead of being slowed by it.
+    pub shorten: bool,
+    /// Knots lie on ticks: the published rounding.
+    pub grid: bool,
+    /// Per axis 1/acceleration, s²/mm; zero where limits are off.
+    pub per_acceleration: AxisVector,
+    /// Highest axis speeds in feed and in rapid motion, mm/s.
+    pub axis_mm_per_s: [AxisVector; 2],
+    /// Per axis what a unit counts in path deviation: mm as they are, rotary axes in degrees.
+    pub metric: AxisVector,
+    /// Fine period, s.
+    pub tick_s: f64,
+    /// By how much the chord between two samples may lie inside a rounded corner, mm.
+    pub sag_mm: f64,
+    /// Acceleration of the weakest axis, mm/s².
+    pub weakest_mm_per_s2: f64,
+    /// Tolerance where a block states none, mm.
+    pub tolerance_mm: f64,
+    /// The programmed feed is planned at this multiple.
+    pub feed_ratio: f64,
+}
+
+impl Rules {
+    /// The rules of a machine.
+    pub fn new(options: &Options, context: &PlannerContext) -> Self {
+        let axes = context.limits.axes();
+        let each = |of: &dyn Fn(usize) -> f64, other: f64| {
+            AxisVector(std::array::from_fn(|i| if i < axes.len() { of(i) } else { other }))
+        };
+        let acceleration = |i: usize| AIM * axes[i].acceleration_mm_per_s2;
+        let unlimited = options.limits == LimitMode::Off;
+        let controlled = options.corner_control == CornerControl::On;
+        let metric = each(&|i| if context.axes.is_rotary(i) { 1f64.to_degrees() } else { 1.0 }, 0.0);
+        let squares = (0..axes.len().min(MAX_AXES)).map(|i| (acceleration(i) * metric[i]).powi(2));
+        let tick_s = context.fine_period_s;
+        Self {
+            controlled,
+            limits: options.limits,
+            shorten: controlled && !unlimited,
+            grid: !controlled || unlimited,
+            per_acceleration: if unlimited { AxisVector::ZERO } else { each(&|i| 1.0 / acceleration(i), 0.0) },
+            axis_mm_per_s: [each(&|i| axes[i].feed_mm_per_s, 0.0), each(&|i| axes[i].rapid_mm_per_s, 0.0)],
+            metric,
+            tick_s,
+            sag_mm: squares.sum::<f64>().sqrt() * tick_s * tick_s / 8.0,
+            weakest_mm_per_s2: (0..axes.len()).map(acceleration).fold(f64::INFINITY, f64::min),
+            tolerance_mm: context.path_tolerance_mm,
+            feed_ratio: context.max_feed_ratio,
+        }
+    }
+
+    /// The nearest whole number of ticks, at least one, s.
+    pub fn on_tick_s(&self, tau_s: f64) -> f64 {
+        (tau_s / self.tick_s + 0.5).floor().max(1.0) * self.tick_s
+    }
+}
+
+/// The smaller of two numbers that are not NaN; unlike `f64::min` a single instruction.
+#[inline]
+pub fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers that are not NaN.
+#[inline]
+pub fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The largest |v·w| over the axes.
+#[inline]
+pub fn largest(vector: &AxisVector, weight: &AxisVector) -> f64 {
+    let mut most = 0.0;
+    for (v, w) in vector.0.iter().zip(&weight.0) {
+        most = greater(most, (v * w).abs());
+    }
+    most
+}
