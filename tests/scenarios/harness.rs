@@ -187,9 +187,26 @@ impl Done {
         verdict
     }
 
+    /// The same of a planner that rounds corners within the tolerance in force and lets two blocks overlap.
+    pub fn assert_within_tolerance(&self) -> Verdict {
+        assert_eq!(self.status(), 0, "{}", self.errors());
+        for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples", "lost_samples"] {
+            assert_eq!(self.number(count), 0.0, "{count}");
+        }
+        let verdict = self.judge(overlapping);
+        assert!(verdict.passed(), "{}\n{verdict}", self.program.display());
+        verdict
+    }
+
     fn fastest_mm_per_s(&self) -> f64 {
         self.column("feed_mm_s").into_iter().fold(0.0, f64::max)
     }
+}
+
+/// For a planner of continuous velocity with overlaps of at most 0.2 s, whatever planner the machine file names.
+pub fn overlapping(options: &mut Options) {
+    (options.speed_difference_mm_per_s, options.speed_difference_deg_per_s) = (Some(0.0), Some(0.0));
+    options.feed_window_s = Some(0.2);
 }
 
 /// The oracle's verdict on a trace file.

@@ -16,6 +16,7 @@ mod keys;
 mod latency;
 mod operator;
 mod optimal_stop;
+mod overlap;
 mod overrides;
 mod plan;
 mod probing;

@@ -5,6 +5,9 @@ use std::fmt::Write;
 use crate::harness::{Scenario, root};
 use crate::replay::for_each_seed;
 
+/// Runs with the planner that lets blocks overlap.
+pub const OVERLAP: &[&str] = &["--set", "planner.plugin=block-overlap"];
+
 /// A small generator (xorshift64*): the same program for the same seed everywhere.
 pub struct Random(u64);
 
@@ -151,5 +154,41 @@ fn random_programs_pass_the_check() {
             .unwrap();
         let errors = String::from_utf8_lossy(&checked.stderr).into_owned();
         checked.status.success().then_some(()).ok_or(errors)
+    });
+}
+
+/// The program of a seed with a time constant in every fifth line of motion.
+fn program_with_constants(seed: u64) -> String {
+    let mut random = Random(seed.wrapping_mul(0xbf58_476d_1ce4_e5b9) | 1);
+    let mut text = String::new();
+    for line in program(seed).lines() {
+        text.push_str(line);
+        if line.starts_with("G1") && random.below(5) == 0 {
+            write!(text, " TA{}", [1, 2, 5, 10, 20, 50, 80, 150][random.below(8) as usize]).unwrap();
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn random_programs_overlap_within_limits_and_tolerance() {
+    for_each_seed("random_programs_overlap_within_limits_and_tolerance", 120, |seed| {
+        attempted(|| {
+            let done = Scenario::text(&program_with_constants(seed)).with(OVERLAP).run();
+            done.assert_within_tolerance();
+            assert_eq!(done.number("starvations"), 0.0);
+        })
+    });
+}
+
+#[test]
+fn random_holds_and_stalls_of_overlapping_blocks_keep_the_limits() {
+    for_each_seed("random_holds_and_stalls_of_overlapping_blocks_keep_the_limits", 80, |seed| {
+        let lines = holds_and_stalls(&mut Random(seed | 1 << 40));
+        attempted(|| {
+            let text = program_with_constants(seed);
+            Scenario::text(&text).with(OVERLAP).commands(&lines).run().assert_within_tolerance();
+        })
     });
 }

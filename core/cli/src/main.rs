@@ -11,6 +11,7 @@ macro_rules! say {
 mod args;
 mod built_in;
 mod check;
+mod corners;
 mod latency;
 mod operator;
 mod program;

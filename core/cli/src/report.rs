@@ -6,13 +6,16 @@ use tandem_host::{Output, Summary};
 use tandem_machine::{JerkMode, Machine};
 use tandem_report::{Axis, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector};
+use tandem_sdk::{Axes, AxisVector, Block, BlockReport};
+
+use crate::corners::Corners;
 
 /// Keeps every sample in memory: about 150 bytes a sample for three axes.
 pub struct Collector {
     report: Report,
     axes: Axes,
     deviation_mm: Vec<f64>,
+    corners: Corners,
 }
 
 impl Collector {
@@ -33,7 +36,12 @@ impl Collector {
             jerk_is_judged: machine.motion.jerk == JerkMode::Limit,
             ..Report::default()
         };
-        Self { report, axes: machine.axes, deviation_mm: vec![] }
+        Self { report, axes: machine.axes, deviation_mm: vec![], corners: Corners::default() }
+    }
+
+    /// A block is planned for good.
+    pub fn block(&mut self, block: &Block, report: &BlockReport) {
+        self.corners.block(block, report);
     }
 
     /// Adds a sample.
@@ -46,6 +54,7 @@ impl Collector {
         let programmed = sample.programmed_feed_mm_per_s;
         samples.programmed_feed_mm_s.push(if programmed.is_finite() { programmed } else { f64::NAN });
         self.deviation_mm.push(deviation_mm);
+        self.corners.sample(sample);
         push(&mut samples.command, &sample.command, &self.axes);
         push(&mut samples.feedback, &sample.feedback, &self.axes);
         for (signal, value) in self.report.signals.iter_mut().zip(signals) {
@@ -57,6 +66,7 @@ impl Collector {
     pub fn write(mut self, path: &Path, summary: &Summary) -> Result<(), String> {
         self.report.samples.deviation_mm = Some(self.deviation_mm);
         self.report.facts = facts(summary);
+        self.report.signals.extend(self.corners.signals());
         let mut out = Output::create(path)?;
         self.report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
         out.finish()

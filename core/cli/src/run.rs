@@ -105,6 +105,8 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
 
 /// Everything that a run is written to.
 struct Sinks {
+    /// It has been said that the planner knows no time constant.
+    told_of_time_constant: bool,
     switches: Switches,
     operator: Operator,
     progress: Progress,
@@ -121,6 +123,7 @@ impl Sinks {
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         let keys = keys_at_hand(options);
         Ok(Self {
+            told_of_time_constant: false,
             switches: switches(options, keys),
             operator: Operator::begin(options, machine, run, keys)?,
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
@@ -147,8 +150,12 @@ impl RunObserver for Sinks {
     }
 
     fn block(&mut self, block: &Block, report: &BlockReport) {
+        self.tell_of_time_constant(block, report);
         if let Some(blocks) = &mut self.blocks {
             blocks.block(block, report);
+        }
+        if let Some(collector) = &mut self.report {
+            collector.block(block, report);
         }
     }
 
@@ -190,6 +197,17 @@ impl RunObserver for Sinks {
         }
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);
+        }
+    }
+}
+
+impl Sinks {
+    /// A time constant that the planner does not use is worth a line, once.
+    fn tell_of_time_constant(&mut self, block: &Block, report: &BlockReport) {
+        let unused = !block.time_constant_s.is_nan() && report.time_constant_s.is_nan() && block.length_mm > 0.0;
+        if unused && !self.told_of_time_constant {
+            say!("line {}: TA has no effect: the planner of this machine knows no time constant", block.line);
+            self.told_of_time_constant = true;
         }
     }
 }

@@ -39,6 +39,8 @@ pub struct Config {
     pub tools: Vec<Tool>,
     /// Tool in the spindle at the start, 0 for none.
     pub tool_in_spindle: u32,
+    /// Least and greatest time constant that TA may ask for, s.
+    pub time_constant_s: (f64, f64),
     /// Whether lines that begin with `/` are skipped.
     pub block_delete: bool,
     /// The probe, where the machine has one.
@@ -55,6 +57,7 @@ impl Config {
             reference: [AxisVector::ZERO; 2],
             tools: Vec::new(),
             tool_in_spindle: 0,
+            time_constant_s: (0.0, f64::INFINITY),
             block_delete: false,
             probe: None,
         }

@@ -70,6 +70,13 @@ impl Interpreter {
                 let message = "TA (time constant, ms) must be greater than zero";
                 return Err(crate::fault::Fault::new(span, "time-constant", message));
             }
+            let (least_s, most_s) = self.config.time_constant_s;
+            // The limits are in ms in the machine file too; a nanosecond is the rounding on the way.
+            if value_ms < least_s * 1e3 - 1e-6 || value_ms > most_s * 1e3 + 1e-6 {
+                let [least, most, asked] = [least_s * 1e3, most_s * 1e3, value_ms].map(crate::fault::show);
+                let message = format!("TA {asked} is beyond the time constants of this machine, {least} to {most} ms");
+                return Err(crate::fault::Fault::new(span, "time-constant", message));
+            }
             self.state.time_constant_s = value_ms / 1000.0;
         }
         Ok(())

@@ -187,6 +187,7 @@ fn the_reader_says_where_and_what() {
         ("G4", "1:1 [word-missing] G4 needs P, the dwell in seconds"),
         ("G4 P-1", "1:4 [word-range] P must not be negative"),
         ("TA0", "1:1 [time-constant] TA (time constant, ms) must be greater than zero"),
+        ("G1 TA-5", "1:4 [time-constant] TA (time constant, ms) must be greater than zero"),
         ("TA", "1:1 [value-missing] TA has no value: a number, [expression], #parameter or function must follow"),
         ("T9", "1:1 [tool] the tool table has no tool 9"),
         ("G43 H9", "1:1 [tool] the tool table has no tool 9"),

@@ -15,12 +15,17 @@ use crate::rules::refusal;
 use crate::run::Switches;
 use crate::strategy::StrategyRunner;
 
+/// Greatest time constant that a program may ask for where the machine states no range, s.
+const MOST_TIME_CONSTANT_S: f64 = 1.0;
+
 /// The interpreter's view of the machine.
 pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     let mut config = Config::new(machine.axes);
     config.start = machine.start;
     config.block_delete = switches.block_delete;
     config.reference = [machine.home; 2];
+    config.time_constant_s =
+        machine.motion.time_constant_range_s.unwrap_or((machine.fine_period_s, MOST_TIME_CONSTANT_S));
     for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
         *travel = (axis.min_mm, axis.max_mm);
     }

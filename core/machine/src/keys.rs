@@ -29,6 +29,7 @@ static MACHINE: &[Key] = &[
     key("motion.allowable_speed_difference_deg_per_min", "deg/min", "the same number as for linear axes", "Velocity step that rotary axes accept where blocks meet"),
     key("motion.path_tolerance_mm", "mm", "0.01", "Distance allowed from the programmed path where a block states none"),
     key("motion.time_constant_ms", "ms", "50", "Time constant of acceleration where a block states none"),
+    key("motion.time_constant_range_ms", "ms", "the fine period, 1000", "Least and greatest time constant that a program may ask for with TA"),
     key("motion.jerk", "limit or report", "limit", "What max_jerk means to a planner that does not know jerk: refuse to start, or only report"),
     key("motion.max_feed_ratio", "ratio", "1", "Highest feed ratio that may be asked while running; at least 1"),
     key("axes.<axis>.kind", "linear or rotary", "linear", "Whether the axis slides (keys in mm) or turns (keys in deg)"),

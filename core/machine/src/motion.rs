@@ -26,6 +26,8 @@ pub struct Motion {
     pub path_tolerance_mm: f64,
     /// Time constant of acceleration, s.
     pub time_constant_s: f64,
+    /// Least and greatest time constant that a program may ask for, s; `None` where the machine states none.
+    pub time_constant_range_s: Option<(f64, f64)>,
     /// What a stated jerk limit means to a planner of order 2.
     pub jerk: JerkMode,
     /// Highest feed ratio that may be asked while running; at least 1.
@@ -43,10 +45,21 @@ impl Motion {
             speed_difference_rad_per_s: rotary.to_radians() / 60.0,
             path_tolerance_mm: motion.at_least("path_tolerance_mm", 0.0).unwrap_or(0.01),
             time_constant_s: motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0,
+            time_constant_range_s: time_constant_range(motion),
             jerk: motion.choice("jerk", &modes).unwrap_or_default(),
             max_feed_ratio: motion.at_least("max_feed_ratio", 1.0).unwrap_or(1.0),
         }
     }
+}
+
+fn time_constant_range(motion: &Section<'_>) -> Option<(f64, f64)> {
+    let key = "time_constant_range_ms";
+    let (least, most) = motion.has(key).then(|| motion.range(key)).flatten()?;
+    if least <= 0.0 {
+        motion.refuse(key, "a time constant is above zero");
+        return None;
+    }
+    Some((least / 1000.0, most / 1000.0))
 }
 
 /// The periods of the two loops.

@@ -33,12 +33,13 @@ impl Item<'_> {
 /// Feeds that differ by less are the same.
 pub const ROUNDING: f64 = 1e-12;
 
+#[allow(clippy::struct_field_names, reason = "all of them are named after their unit")]
 /// The state of the way at one junction: what both modes have cost so far, s; infinite where a mode is impossible.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     cost_s: [f64; 2],
-    cap_mm_per_s: f64,
-    overlap_s: f64,
+    highest_mm_per_s: f64,
+    lent_s: f64,
 }
 
 /// Index of the two modes in a [`Way`].
@@ -47,7 +48,7 @@ const LATE: usize = 1;
 
 impl Way {
     /// At rest, or where the feed of the next block is fixed already.
-    pub const START: Self = Self { cost_s: [f64::INFINITY, 0.0], cap_mm_per_s: 0.0, overlap_s: 0.0 };
+    pub const START: Self = Self { cost_s: [f64::INFINITY, 0.0], highest_mm_per_s: 0.0, lent_s: 0.0 };
 
     /// The way over `item` to `corner`, which leads to `next`; gives it and, for each mode there, the better mode at the
     /// junction before.
@@ -56,23 +57,23 @@ impl Way {
             return (Self::START, [Mode::Late; 2]);
         }
         let possible = item.possible(corner);
-        let Some(next) = next.filter(|_| !corner.rest) else { return self.to(item, possible, corner, 0.0) };
+        let Some(next) = next.filter(|_| !corner.rest) else { return self.further(item, possible, corner, 0.0) };
         if is_free(item, corner, next) {
-            return self.to_free();
+            return self.freely();
         }
         let ramp = |item: &Item<'_>| item.ramped_mm_per_s * item.block.slope_s2_per_mm;
         let overlap_s = late_overlap_s(rules, corner, [item.block, next.block], lesser(ramp(item), ramp(next)));
-        self.to(item, possible, corner, overlap_s)
+        self.further(item, possible, corner, overlap_s)
     }
 
     /// Full overlap holds neither block down: it is taken, and how long the block takes no longer matters.
-    fn to_free(&self) -> (Self, [Mode; 2]) {
+    fn freely(&self) -> (Self, [Mode; 2]) {
         let before = if self.cost_s[FLOW] <= self.cost_s[LATE] { Mode::Flow } else { Mode::Late };
-        (Self { cost_s: [0.0, f64::INFINITY], cap_mm_per_s: f64::INFINITY, overlap_s: 0.0 }, [before; 2])
+        (Self { cost_s: [0.0, f64::INFINITY], highest_mm_per_s: f64::INFINITY, lent_s: 0.0 }, [before; 2])
     }
 
-    fn to(&self, item: &Item<'_>, possible: [bool; 2], corner: &Corner, overlap_s: f64) -> (Self, [Mode; 2]) {
-        let mut way = Self { cost_s: [f64::INFINITY; 2], cap_mm_per_s: corner.cap_mm_per_s, overlap_s };
+    fn further(&self, item: &Item<'_>, possible: [bool; 2], corner: &Corner, overlap_s: f64) -> (Self, [Mode; 2]) {
+        let mut way = Self { cost_s: [f64::INFINITY; 2], highest_mm_per_s: corner.cap_mm_per_s, lent_s: overlap_s };
         let mut before = [Mode::Flow; 2];
         for to in [FLOW, LATE] {
             for from in [FLOW, LATE] {
@@ -94,14 +95,14 @@ impl Way {
         let late = (from == LATE) || (to == LATE);
         let mut feed = if late { item.ramped_mm_per_s } else { item.own_mm_per_s };
         if from == FLOW {
-            feed = lesser(feed, self.cap_mm_per_s);
+            feed = lesser(feed, self.highest_mm_per_s);
         }
         if to == FLOW {
             feed = lesser(feed, corner.cap_mm_per_s);
         }
         let ramp_s = feed * item.block.slope_s2_per_mm;
         let side = |late: bool, overlap_s: f64| if late { (ramp_s - lesser(overlap_s, ramp_s)) / 2.0 } else { 0.0 };
-        item.block.length_mm / feed + side(from == LATE, self.overlap_s) + side(to == LATE, overlap_s)
+        item.block.length_mm / feed + side(from == LATE, self.lent_s) + side(to == LATE, overlap_s)
     }
 
     /// Whether there is no way at all: a feed that is fixed allows neither.

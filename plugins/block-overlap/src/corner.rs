@@ -47,8 +47,11 @@ impl Corner {
             return Self { tau_s, cap_mm_per_s: f64::INFINITY, room_mm: f64::INFINITY, span_mm, ..blank };
         }
         let shorter = lesser(before.length_mm, after.length_mm);
-        let room_mm = if rules.shorten { lesser(span_mm, shorter) } else { span_mm };
-        let longest_s = if rules.limits == LimitMode::Stretch { f64::INFINITY } else { tau_s };
+        // Without corner control a short block is slowed by its constants; longer ones would not fit into it.
+        let fits = rules.shorten || before.reach_mm <= before.length_mm && after.reach_mm <= after.length_mm;
+        let stretch = rules.limits == LimitMode::Stretch && fits;
+        let room_mm = if rules.shorten || stretch { lesser(span_mm, shorter) } else { span_mm };
+        let longest_s = if stretch { f64::INFINITY } else { tau_s };
         let bend = ARC_OVERLAP * greater(before.bend, after.bend);
         let cap = cap_mm_per_s(turn, room_mm, longest_s, bend);
         let bent = bend * lesser(cap, greater(before.feed_mm_per_s, after.feed_mm_per_s)).powi(2);

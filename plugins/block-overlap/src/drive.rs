@@ -5,7 +5,7 @@ use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
 use crate::buffer::Taken;
 use crate::mover::{Mover, SAME_TICKS};
-use crate::rules::{Rules, greater, lesser};
+use crate::rules::{greater, lesser};
 
 /// What moves now.
 #[derive(Debug)]
@@ -19,7 +19,6 @@ pub struct Drive {
     overlap_stop: [f64; 2],
     /// Path coordinate of the start of the newer block, mm.
     path_mm: f64,
-    tick_s: f64,
     /// The segment that goes out: written over and over, because it is large.
     segment: Segment,
     /// Whether the segment holds powers above two.
@@ -29,14 +28,13 @@ pub struct Drive {
 
 impl Drive {
     /// Nothing moves.
-    pub fn new(rules: &Rules) -> Self {
+    pub fn new() -> Self {
         Self {
             older: None,
             newer: None,
             next_at: None,
             overlap_stop: [f64::INFINITY; 2],
             path_mm: 0.0,
-            tick_s: rules.tick_s,
             segment: Segment::rest(&AxisVector::ZERO, 0.0),
             curved: false,
             begins: false,
@@ -68,11 +66,7 @@ impl Drive {
         self.path_mm = self.path_mm();
         self.older = self.newer.take();
         self.overlap_stop = [self.overlap_stop[1], taken.join.stop_mm_per_s2];
-        self.next_at = (taken.join.overlap_s > 0.0).then(|| {
-            let at = mover.end() - taken.join.overlap_s / self.tick_s;
-            // Ticks that are whole stay so.
-            if (at - at.round()).abs() < 1e-7 && taken.join.overlap_s == taken.join.down_s { at.round() } else { at }
-        });
+        self.next_at = (taken.join.overlap_s > 0.0).then(|| mover.next_at(taken.join.overlap_s));
         self.begins = true;
         self.newer = Some(mover);
     }

@@ -30,6 +30,8 @@ pub struct Entry {
     pub reason: LimitedBy,
     /// Time constant that acts from the deceleration of this block on, s.
     pub tau_s: f64,
+    /// Length that the longer of its two time constants takes at its highest feed, mm.
+    pub reach_mm: f64,
     /// Path tolerance, mm.
     pub tolerance_mm: f64,
     /// 1/path acceleration of its ramps, s²/mm; zero where limits are off.
@@ -59,6 +61,7 @@ impl Entry {
             feed_mm_per_s: 0.0,
             reason: LimitedBy::Feed,
             tau_s: 0.0,
+            reach_mm: 0.0,
             tolerance_mm: 0.0,
             slope_s2_per_mm: 0.0,
             bend: 0.0,
@@ -68,11 +71,12 @@ impl Entry {
         }
     }
 
-    /// Takes what `block` says by itself; `tau_s` is the time constant in force, on a tick. In place: entries are large.
-    pub fn set(&mut self, block: &Block, rules: &Rules, tau_s: f64) {
+    /// Takes what `block` says by itself; `taus_s` are the time constants of its ramps, on a tick. In place: entries are
+    /// large.
+    pub fn set(&mut self, block: &Block, rules: &Rules, taus_s: [f64; 2]) {
         (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
         self.rests = [block.starts_at_rest(), block.ends_at_rest()];
-        self.tau_s = tau_s;
+        self.tau_s = taus_s[1];
         self.command_mm_per_s = block.command_feed_mm_per_s();
         let stated = block.path_tolerance_mm;
         self.tolerance_mm = if stated.is_nan() { rules.tolerance_mm } else { stated };
@@ -90,6 +94,7 @@ impl Entry {
             self.set_arc(block, rules);
         }
         self.set_feed(block, rules);
+        self.reach_mm = self.feed_mm_per_s * greater(taus_s[0], taus_s[1]);
         self.triangle_mm_per_s = (self.length_mm / self.slope_s2_per_mm).sqrt();
     }
 

@@ -1,5 +1,6 @@
 //! How two blocks meet once their feeds are known: ramps and overlap.
 
+use crate::choose::ROUNDING;
 use crate::corner::Corner;
 use crate::entry::Entry;
 use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, largest, lesser};
@@ -32,8 +33,8 @@ pub struct Join {
 /// Overlaps shorter than this share of a fine period are none.
 const NO_OVERLAP_TICKS: f64 = 1e-3;
 
-/// Share of the turn's acceleration above which a late start leaves nothing to brake with while the blocks overlap: then
-/// they may overlap for half a ramp at most, so that the other half can stop the machine.
+/// Where turning takes more than its share there is nothing to brake with while the blocks overlap: then they overlap for
+/// this share of a ramp at most, and the rest of it can stop the machine.
 const HALF: f64 = 0.5;
 
 impl Join {
@@ -84,7 +85,10 @@ impl Join {
         }
         let turn = corner.turn_s2_per_mm / lesser(slopes[0], slopes[1]);
         let bent = bent_share(blocks, overlap_s);
-        let left = if turn + bent <= TURN_SHARE { 1.0 - turn - bent } else { HALF };
+        // A short overlap leaves half, a long one what turning leaves.
+        let turning = if turn + bent <= TURN_SHARE { 1.0 - turn - bent } else { 0.0 };
+        let halved = if overlap_s <= HALF * ramp_s { HALF } else { LEAST_STOP };
+        let left = greater(turning, halved);
         Self { down_s, up_s, overlap_s, stop_mm_per_s2: left / slope }
     }
 }
@@ -116,12 +120,19 @@ pub fn late_overlap_s(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], ramp_
     let tolerated_s = (corner.span_mm * slope).sqrt();
     let longest_s = lesser(tolerated_s, corner.longest_s);
     let turn = corner.turn_s2_per_mm / slope;
-    let all_s = lesser(longest_s, ramp_s);
-    if turn + bent_share(blocks, all_s) <= TURN_SHARE {
-        return all_s;
+    // Arcs ask for more the longer the overlap: bent · o².
+    let bent = bent_share(blocks, 1.0);
+    let bounded_s = |ramp_s: f64, spare: f64| {
+        let most_s = lesser(longest_s, ramp_s);
+        if bent * most_s * most_s > spare { (spare / bent).sqrt() } else { most_s }
+    };
+    // A right angle between two axes takes all of both, to rounding.
+    let spare = 1.0 + ROUNDING - turn_share(rules, blocks);
+    if spare <= 0.0 {
+        return 0.0;
     }
-    let half_s = lesser(longest_s, HALF * ramp_s);
-    if turn_share(rules, blocks) + bent_share(blocks, half_s) <= 1.0 { half_s } else { 0.0 }
+    let half_s = bounded_s(HALF * ramp_s, spare);
+    if turn < TURN_SHARE { greater(half_s, bounded_s(ramp_s, lesser(spare, TURN_SHARE - turn))) } else { half_s }
 }
 
 /// What the axis that turns most needs of its acceleration while one ramp falls and the other rises, at most.

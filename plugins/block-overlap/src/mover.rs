@@ -67,6 +67,14 @@ impl Mover {
         self.knots[2]
     }
 
+    /// When the next block starts that overlaps this one for `overlap_s`, ticks after this one's start.
+    pub fn next_at(&self, overlap_s: f64) -> f64 {
+        let [_, slow_from, end] = self.knots;
+        // A full overlap starts with the deceleration, to the last bit: else one block would speed up alone.
+        let before_end = overlap_s / self.tick_s;
+        if (end - before_end - slow_from).abs() < SAME_TICKS { slow_from } else { end - before_end }
+    }
+
     /// Length, mm.
     pub fn length_mm(&self) -> f64 {
         self.length_mm

@@ -31,6 +31,8 @@ pub struct BlockOverlap {
     dwell: Option<Segment>,
     /// Speed along the path at the start of the next block, mm/s.
     start_mm_per_s: f64,
+    /// Time constant of the last block with motion, s: the next one speeds up with it.
+    last_tau_s: f64,
     finished: bool,
 }
 
@@ -53,10 +55,11 @@ impl BlockOverlap {
             context: *context,
             options: options.clone(),
             buffer: Buffer::new(options.buffer_blocks, tau_s),
-            drive: Drive::new(&rules),
+            drive: Drive::new(),
             rules,
             dwell: None,
             start_mm_per_s: 0.0,
+            last_tau_s: tau_s,
             finished: false,
         })
     }
@@ -158,8 +161,11 @@ impl Planner for BlockOverlap {
         }
         self.check(block)?;
         self.finished = false;
-        let (tau_s, rules) = (self.tau_s(block), &self.rules);
-        self.buffer.push(rules, |entry| entry.set(block, rules, tau_s));
+        let (taus_s, rules) = ([self.last_tau_s, self.tau_s(block)], &self.rules);
+        self.buffer.push(rules, |entry| entry.set(block, rules, taus_s));
+        if block.kind != BlockKind::Dwell {
+            self.last_tau_s = taus_s[1];
+        }
         Ok(Accepted::Accepted)
     }
 
@@ -182,7 +188,8 @@ impl Planner for BlockOverlap {
 
     fn reset(&mut self, position: &AxisVector) {
         self.context.position = *position;
-        self.buffer.clear(self.rules.on_tick_s(self.context.time_constant_s));
+        self.last_tau_s = self.rules.on_tick_s(self.context.time_constant_s);
+        self.buffer.clear(self.last_tau_s);
         self.drive.reset();
         (self.dwell, self.start_mm_per_s, self.finished) = (None, 0.0, false);
     }

@@ -36,6 +36,21 @@ impl Collected {
         self.reports.iter().scan(0.0, sum).collect()
     }
 
+    /// Positions every `period_s`, from the start to two periods of rest.
+    pub fn samples(&self, period_s: f64) -> Vec<AxisVector> {
+        let (mut index, mut start_s) = (0, 0.0);
+        let mut at = |tick: usize| {
+            let t_s = tick as f64 * period_s;
+            while index + 1 < self.segments.len() && t_s > start_s + self.segments[index].duration_s {
+                start_s += self.segments[index].duration_s;
+                index += 1;
+            }
+            self.segments[index].position((t_s - start_s).min(self.segments[index].duration_s))
+        };
+        let count = (self.duration_s() / period_s).ceil() as usize + 3;
+        (0..count).map(&mut at).collect()
+    }
+
     /// Position and velocity at program time `t_s`.
     pub fn at(&self, t_s: f64) -> (AxisVector, AxisVector) {
         let mut left = t_s;
