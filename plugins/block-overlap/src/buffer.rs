@@ -1,5 +1,7 @@
 //! The buffered blocks and the plan for them.
 
+use tandem_motion::Path;
+
 use crate::corner::Corner;
 use crate::entry::Entry;
 use crate::feeds::{Before, Plan};
@@ -32,6 +34,11 @@ impl Ring {
         &self.corners[(self.first + k) & self.mask]
     }
 
+    /// The path of a block that moves; `None` for a dwell.
+    pub fn path(&self, number: usize) -> Option<&Path> {
+        self.numbered(number).path.as_ref()
+    }
+
     /// The block with the running number `number`; it stays until two more have been taken.
     pub fn numbered(&self, number: usize) -> &Entry {
         &self.entries[number & self.mask]
@@ -56,6 +63,9 @@ pub struct Taken {
     /// The feed of the next block, mm/s, where the two overlap.
     pub next_feed_mm_per_s: f64,
 }
+
+/// A new plan is made when this part of the last one is left: each block is planned once and a third.
+const KEPT: usize = 4;
 
 /// The buffer.
 #[derive(Debug)]
@@ -138,7 +148,7 @@ impl Buffer {
             return None;
         }
         let left = self.planned.saturating_sub(self.ring.first);
-        if self.ring.end > self.planned && left <= self.capacity / 2 {
+        if self.ring.end > self.planned && left <= self.capacity / KEPT {
             self.update(rules);
         }
         (self.ring.first < self.planned).then(|| self.take(rules))

@@ -1,9 +1,9 @@
 //! The motion of at most two blocks, and the segments of it.
 
-use tandem_motion::{SpeedPiece, hermite, state};
+use tandem_motion::{Path, SpeedPiece, hermite, state};
 use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
-use crate::buffer::Taken;
+use crate::buffer::{Ring, Taken};
 use crate::mover::{Mover, SAME_TICKS};
 use crate::rules::{greater, lesser};
 
@@ -72,22 +72,24 @@ impl Drive {
     }
 
     /// Emits at most `left` ticks, up to the next change of acceleration; gives how many.
-    pub fn step(&mut self, left: f64, sink: &mut dyn SegmentSink) -> f64 {
+    pub fn step(&mut self, ring: &Ring, left: f64, sink: &mut dyn SegmentSink) -> f64 {
         let Some(newer) = &self.newer else { return 0.0 };
         let to_next = self.next_at.map_or(f64::INFINITY, |at| at - newer.at);
         let mut ticks = lesser(lesser(left, to_next), newer.left());
-        if let Some(older) = &self.older {
-            ticks = older.fitted(lesser(ticks, older.left()));
+        let Some(path) = ring.path(newer.number) else { return 0.0 };
+        let older = self.older.as_ref().and_then(|older| Some((older, ring.path(older.number)?)));
+        if let Some((older, older_path)) = older {
+            ticks = older.fitted(older_path, lesser(ticks, older.left()));
         }
-        ticks = newer.fitted(ticks);
+        ticks = newer.fitted(path, ticks);
         if ticks > SAME_TICKS {
-            self.emit(ticks, sink);
+            self.emit(ring, ticks, sink);
         }
-        self.advance(ticks, sink);
+        self.advance(ring, ticks, sink);
         ticks
     }
 
-    fn advance(&mut self, ticks: f64, sink: &mut dyn SegmentSink) {
+    fn advance(&mut self, ring: &Ring, ticks: f64, sink: &mut dyn SegmentSink) {
         if let Some(older) = &mut self.older {
             older.advance(ticks);
             if older.is_over() {
@@ -98,26 +100,29 @@ impl Drive {
         newer.advance(ticks);
         match self.next_at {
             Some(at) if (newer.at - at).abs() < SAME_TICKS => newer.at = at,
-            None if newer.is_over() => self.rest(sink),
+            None if newer.is_over() => self.rest(ring, sink),
             _ => {}
         }
     }
 
     /// The programmed position itself, for the sample at rest.
-    fn rest(&mut self, sink: &mut dyn SegmentSink) {
+    fn rest(&mut self, ring: &Ring, sink: &mut dyn SegmentSink) {
         self.path_mm = self.path_mm();
         let Some(newer) = self.newer.take() else { return };
-        let mut rest = Segment::rest(newer.path.end(), 0.0);
+        let Some(path) = ring.path(newer.number) else { return };
+        let mut rest = Segment::rest(path.end(), 0.0);
         (rest.block, rest.line, rest.feed_mm_per_s) = (newer.index, newer.line, feed(&newer));
         rest.flags = rest.flags.with(flags(&newer));
         rest.path[0] = self.path_mm;
         sink.segment(&rest);
     }
 
-    fn emit(&mut self, ticks: f64, sink: &mut dyn SegmentSink) {
+    fn emit(&mut self, ring: &Ring, ticks: f64, sink: &mut dyn SegmentSink) {
         let Some(newer) = &self.newer else { return };
+        let Some(path) = ring.path(newer.number) else { return };
         let piece = newer.piece(ticks);
         let older = self.older.as_ref().map(|older| (older, older.piece(ticks)));
+        let older_path = self.older.as_ref().and_then(|older| ring.path(older.number));
         let segment = &mut self.segment;
         segment.duration_s = piece.duration_s;
         (segment.block, segment.line, segment.feed_mm_per_s) = (newer.index, newer.line, feed(newer));
@@ -139,8 +144,8 @@ impl Drive {
             segment.path[1] += second.speed_mm_per_s;
             segment.path[2] += second.acceleration_mm_per_s2 / 2.0;
         }
-        let curved = !newer.path.is_straight() || older.as_ref().is_some_and(|(o, _)| !o.path.is_straight());
-        let moving = [older.as_ref().map(|(o, piece)| (*o, piece)), Some((newer, &piece))];
+        let curved = !newer.straight || older.as_ref().is_some_and(|(o, _)| !o.straight);
+        let moving = [older_path.zip(older.as_ref().map(|(_, piece)| piece)), Some((path, &piece))];
         if curved {
             quintic(&moving, piece.duration_s, &mut segment.coefficients);
         } else {
@@ -152,7 +157,7 @@ impl Drive {
     }
 }
 
-type Moving<'a> = [Option<(&'a Mover, &'a SpeedPiece)>; 2];
+type Moving<'a> = [Option<(&'a Path, &'a SpeedPiece)>; 2];
 
 fn feed(mover: &Mover) -> f64 {
     if mover.rapid { f64::INFINITY } else { mover.command_mm_per_s }
@@ -165,10 +170,10 @@ fn flags(mover: &Mover) -> SegmentFlags {
 /// Straight blocks: what moves adds up. What is left of the older block is negative and ends in exactly nothing.
 fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_AXES]) {
     let mut terms = [AxisVector::ZERO; 3];
-    for (index, (mover, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
-        let direction = mover.path.direction(0.0);
-        let at = mover.path.position(piece.start_mm);
-        terms[0] += if index == 0 { at - *mover.path.end() } else { at };
+    for (index, (path, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
+        let direction = path.direction(0.0);
+        let at = path.position(piece.start_mm);
+        terms[0] += if index == 0 { at - *path.end() } else { at };
         terms[1] += direction * piece.speed_mm_per_s;
         terms[2] += direction * (piece.acceleration_mm_per_s2 / 2.0);
     }
@@ -183,10 +188,10 @@ fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_
 /// With an arc among them: through position, velocity and acceleration at both ends.
 fn quintic(moving: &Moving<'_>, duration_s: f64, coefficients: &mut [[f64; 6]; MAX_AXES]) {
     let mut ends = [[AxisVector::ZERO; 3]; 2];
-    for (index, (mover, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
+    for (index, (path, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
         for (end, t_s) in ends.iter_mut().zip([0.0, duration_s]) {
-            let [at, velocity, acceleration] = state(&mover.path, piece, t_s);
-            end[0] += if index == 0 { at - *mover.path.end() } else { at };
+            let [at, velocity, acceleration] = state(path, piece, t_s);
+            end[0] += if index == 0 { at - *path.end() } else { at };
             end[1] += velocity;
             end[2] += acceleration;
         }

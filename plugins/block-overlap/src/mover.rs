@@ -21,8 +21,10 @@ pub struct Mover {
     pub command_mm_per_s: f64,
     /// Rapid motion.
     pub rapid: bool,
-    /// Its path.
-    pub path: Path,
+    /// Running number, by which the buffer has its path.
+    pub number: usize,
+    /// Whether the path is straight.
+    pub straight: bool,
     /// Time since its start, ticks.
     pub at: f64,
     /// Path deceleration that is left while nothing else moves, mm/s².
@@ -39,7 +41,7 @@ pub struct Mover {
 impl Mover {
     /// The block `entry`, driven as `taken` says; `None` for a dwell.
     pub fn new(rules: &Rules, entry: &Entry, taken: &Taken) -> Option<Self> {
-        let path = entry.path?;
+        let path = entry.path.as_ref()?;
         let (feed, tick_s) = (taken.feed_mm_per_s, rules.tick_s);
         let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s / tick_s, rules.grid));
         let cruise = round(entry.length_mm / (feed * tick_s) + (up - down) / 2.0, rules.grid);
@@ -52,8 +54,9 @@ impl Mover {
             rapid: entry.kind == BlockKind::Rapid,
             at: 0.0,
             stop_mm_per_s2: if slope > 0.0 { 1.0 / slope } else { rules.weakest_mm_per_s2 },
-            fit: Builder::new(&path, 0.0),
-            path,
+            number: taken.number,
+            straight: path.is_straight(),
+            fit: Builder::new(path, 0.0),
             length_mm: entry.length_mm,
             feed_mm_per_s: feed,
             knots: [up, slow_from, slow_from + down],
@@ -92,11 +95,11 @@ impl Mover {
     }
 
     /// The longest piece from here, at most `most`, that one polynomial fits, ticks.
-    pub fn fitted(&self, most: f64) -> f64 {
-        if self.path.is_straight() {
+    pub fn fitted(&self, path: &Path, most: f64) -> f64 {
+        if self.straight {
             return most;
         }
-        lesser(most, self.fit.longest_s(&self.path, &self.piece(most)) / self.tick_s)
+        lesser(most, self.fit.longest_s(path, &self.piece(most)) / self.tick_s)
     }
 
     /// Moves on; a knot is met exactly.

@@ -104,7 +104,7 @@ impl BlockOverlap {
         if self.drive.wants_next() {
             return self.begin(sink).then_some(0.0);
         }
-        Some(self.drive.step(left_s / self.rules.tick_s, sink) * self.rules.tick_s)
+        Some(self.drive.step(self.buffer.ring(), left_s / self.rules.tick_s, sink) * self.rules.tick_s)
     }
 
     fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
@@ -133,7 +133,7 @@ impl Planner for BlockOverlap {
     fn check(&self, block: &Block) -> Result<(), PluginError> {
         let refuse = |why| Err(PluginError::fixed(why));
         let axes = self.context.axes.count() as u32;
-        let sound = block.start.is_finite() && block.end.is_finite();
+        let sound = is_finite(&block.start) & is_finite(&block.end);
         match block.kind {
             BlockKind::Nurbs => refuse("block-overlap drives lines and arcs; for NURBS use planner nurbs"),
             BlockKind::Dwell if !(sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite()) => {
@@ -193,6 +193,11 @@ impl Planner for BlockOverlap {
         self.drive.reset();
         (self.dwell, self.start_mm_per_s, self.finished) = (None, 0.0, false);
     }
+}
+
+/// Whether all entries are finite, without a branch for each.
+fn is_finite(vector: &AxisVector) -> bool {
+    vector.0.iter().fold(true, |all, v| all & v.is_finite())
 }
 
 /// Speed of a block at the edge of an overlap inside its ramp, mm/s.
