@@ -14,6 +14,7 @@ mod harness;
 mod hold;
 mod keys;
 mod latency;
+mod mdi;
 mod operator;
 mod optimal_stop;
 mod overlap;

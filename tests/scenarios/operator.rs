@@ -106,7 +106,7 @@ impl<S: Read + Write> Client<S> {
         Self { lines: BufReader::new(reader), stream }
     }
 
-    fn say(&mut self, line: &str) {
+    pub fn say(&mut self, line: &str) {
         writeln!(self.stream, "{line}").unwrap();
     }
 
@@ -122,7 +122,7 @@ impl<S: Read + Write> Client<S> {
         self.hear()
     }
 
-    fn command(&mut self, name: &str) -> Value {
+    pub fn command(&mut self, name: &str) -> Value {
         self.ask(&format!("{{\"command\":\"{name}\"}}"))
     }
 

@@ -23,6 +23,8 @@ pub enum Command {
     Run(Box<Run>),
     /// List every error of a part program; nothing moves
     Check(Check),
+    /// Take lines of G-code from the keyboard or a pipe, each from where the machine stands
+    Mdi(Box<Mdi>),
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
@@ -91,6 +93,20 @@ pub struct Operator {
     /// The token that clients over TCP name first; a random one is made where the file does not exist
     #[arg(long, value_name = "F", requires = "listen_tcp")]
     pub token_file: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Mdi {
+    #[command(flatten)]
+    pub machine: Machine,
+    /// The clock that drives the loops
+    #[arg(long, default_value = "wall")]
+    pub clock: Clock,
+    #[command(flatten)]
+    pub operator: Operator,
+    /// Write every sample; a name that ends in .ttr asks for the binary format
+    #[arg(long, value_name = "F.csv|F.ttr")]
+    pub trace: Option<PathBuf>,
 }
 
 #[derive(Group)]

@@ -13,6 +13,7 @@ mod built_in;
 mod check;
 mod corners;
 mod latency;
+mod mdi;
 mod operator;
 mod program;
 mod progress;
@@ -34,6 +35,7 @@ const FAULT: u8 = 3;
 fn main() -> ExitCode {
     let status = match Args::parse().command {
         Command::Run(options) => run::run(&options),
+        Command::Mdi(options) => mdi::mdi(&options),
         Command::Check(options) => check::check(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Latency(options) => latency::latency(&options),

@@ -11,7 +11,7 @@ use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
-use crate::operator::Operator;
+use crate::operator::{Keyboard, Operator, Presence};
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
@@ -122,10 +122,14 @@ impl Sinks {
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
         let keys = keys_at_hand(options);
+        let presence = Presence { real_time: options.clock == args::Clock::Wall, pause: options.pause, keys };
+        if keys {
+            Keyboard::explain();
+        }
         Ok(Self {
             told_of_time_constant: false,
             switches: switches(options, keys),
-            operator: Operator::begin(options, machine, run, keys)?,
+            operator: Operator::begin(&options.operator, machine, run, presence)?,
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,

@@ -35,6 +35,7 @@ enum Phase {
 }
 
 /// The state of one part program and of the machine as the program knows it.
+#[derive(Clone)]
 pub struct Interpreter {
     pub(crate) config: Config,
     pub(crate) letters: Letters,
@@ -87,6 +88,13 @@ impl Interpreter {
     /// Whether the program has ended: further lines are passed over.
     pub fn ended(&self) -> bool {
         self.phase == Phase::Ended
+    }
+
+    /// Manual input: lines are taken again after M2 or M30.
+    pub fn go_on(&mut self) {
+        if self.ended() {
+            self.phase = Phase::Running;
+        }
     }
 
     /// The programmed position, machine coordinates, mm or rad.

@@ -11,6 +11,7 @@ const ALWAYS: u32 = mask("NOFST");
 const ARC_LETTERS: u32 = mask("IJKR");
 
 /// What a line orders.
+#[derive(Clone)]
 pub(crate) struct Orders {
     present: u32,
     codes: [Code; GROUPS],

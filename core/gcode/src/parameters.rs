@@ -18,6 +18,7 @@ pub(crate) struct Value {
 }
 
 /// The values that the program has set.
+#[derive(Clone)]
 pub(crate) struct Parameters {
     numbered: Vec<Value>,
     named: HashMap<Box<[u8]>, Value>,

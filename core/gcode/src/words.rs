@@ -14,7 +14,7 @@ pub(crate) struct Code {
 }
 
 /// The G or the M words of a line in their order.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Codes {
     codes: [Code; MAX_CODES],
     count: usize,
@@ -55,7 +55,7 @@ pub(crate) struct Assignment {
 }
 
 /// The words of one line. Kept from line to line so that nothing is allocated.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Words {
     /// Bit per letter that the line has, G and M apart.
     pub present: u32,

@@ -7,8 +7,8 @@ use tandem_fine::{Fault, FineLoop};
 use tandem_gcode::{CheckReport, Program, Stream, check};
 use tandem_machine::{JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
-use tandem_rough::{RoughConfig, RoughLoop};
-use tandem_sdk::{Driver, Planner};
+use tandem_rough::{RoughConfig, RoughLoop, Source};
+use tandem_sdk::{AxisVector, Block, Driver, Planner};
 
 use crate::command::Timed;
 use crate::error::HostError;
@@ -66,6 +66,8 @@ pub struct Outcome {
     pub summary: Summary,
     /// The fault that ended it.
     pub fault: Option<Fault>,
+    /// Where the machine came to rest, mm or rad.
+    pub position: AxisVector,
 }
 
 /// Runs the whole program through interpreter and planner; nothing moves.
@@ -90,13 +92,16 @@ fn first_pass(
     switches: Switches,
 ) -> Result<CheckReport, HostError> {
     let config = setup::interpreter_config(machine, switches);
+    Ok(check(program, &config, &mut |block| check_block(machine, planner, block))?)
+}
+
+/// Whether the machine and its planner can drive `block`.
+pub(crate) fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
     let spindle_rad_per_s = machine.spindle.max_rad_per_s;
-    Ok(check(program, &config, &mut |block| {
-        if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
-            return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
-        }
-        planner.check(block).map_err(|e| e.to_string())
-    })?)
+    if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
+        return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
+    }
+    planner.check(block).map_err(|e| e.to_string())
 }
 
 impl Run {
@@ -119,7 +124,22 @@ impl Run {
         }
         let name = program.name().to_string();
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
-        Self::assemble(machine, registry, name, stream, planner, driver, checked, switches)
+        let source = setup::source(&machine, stream, switches);
+        Self::assemble(machine, registry, name, source, planner, driver, checked, switches)
+    }
+
+    /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
+    pub(crate) fn of_source(
+        machine: Machine,
+        registry: &Registry,
+        name: String,
+        source: Box<dyn Source + Send>,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let planner = setup::planner(&machine, registry)?;
+        let driver = setup::driver(&machine, registry)?;
+        rules::check(&machine, &planner.describe(), driver.describe())?;
+        Self::assemble(machine, registry, name, source, planner, driver, CheckReport::default(), switches)
     }
 
     #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
@@ -127,7 +147,7 @@ impl Run {
         machine: Machine,
         registry: &Registry,
         program: String,
-        stream: Stream,
+        source: Box<dyn Source + Send>,
         planner: Box<dyn Planner>,
         mut driver: Box<dyn Driver>,
         checked: CheckReport,
@@ -147,7 +167,7 @@ impl Run {
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();
         Ok(Self {
-            rough: RoughLoop::new(rough_config, setup::source(&machine, stream, switches), planner, rough_end),
+            rough: RoughLoop::new(rough_config, source, planner, rough_end),
             fine,
             machine,
             program,
@@ -208,9 +228,10 @@ impl Run {
             summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
             summary.page_faults = Some(page_faults);
         }
+        let position = pump.monitor.position;
         fine.into_driver().stop();
         summary.wall_time_s = started.elapsed().as_secs_f64();
-        Ok(Outcome { summary, fault })
+        Ok(Outcome { summary, fault, position })
     }
 }
 
@@ -230,7 +251,7 @@ fn periods(machine: &Machine) -> Periods {
 
 fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {
     let (monitor, counters) = (&pump.monitor, fine.counters());
-    let each = |values: &tandem_sdk::AxisVector| {
+    let each = |values: &AxisVector| {
         let shown = |i: usize| if machine.axes.is_rotary(i) { values[i].to_degrees() } else { values[i] };
         (0..machine.axes.count()).map(|i| (machine.axes.letter(i).to_lowercase().to_string(), shown(i))).collect()
     };

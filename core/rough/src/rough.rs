@@ -208,6 +208,10 @@ impl RoughLoop {
     /// Sees to it that there is a next item; `false` where the program is over, or gives nothing for now.
     fn load(&mut self) -> Result<bool, RoughError> {
         while self.next == self.items.len() && !self.dry {
+            let driven = self.finished && self.queue.is_driven();
+            if !self.source.may_go_on(driven) {
+                return Ok(false);
+            }
             self.items.clear();
             self.next = 0;
             let more = self.source.next_items(&mut self.items).map_err(RoughError::Program)?;

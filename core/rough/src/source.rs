@@ -12,6 +12,12 @@ pub trait Source {
     /// What is wrong with the program, with its place.
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String>;
 
+    /// Whether the next items may be asked for; `driven` says that everything before is driven and the machine stands.
+    /// A program goes on at once; lines given by hand wait for the one before.
+    fn may_go_on(&mut self, _driven: bool) -> bool {
+        true
+    }
+
     /// Answers an [`Item::Wait`]: 1, 0, or −1 for none in time.
     fn provide_input(&mut self, value: f64);
 

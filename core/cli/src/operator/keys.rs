@@ -31,13 +31,17 @@ pub struct Keyboard {
 }
 
 impl Keyboard {
+    /// Says what the keys do.
+    pub fn explain() {
+        say!("{HELP}");
+    }
+
     /// Takes the terminal.
     ///
     /// # Errors
     /// The system's words.
     pub fn begin(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
         let terminal = RawTerminal::take()?;
-        say!("{HELP}");
         let over = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&over);
         let thread = thread::spawn(move || listen(&desk, &stops, &seen));

@@ -19,12 +19,24 @@ use tandem_rings::Sample;
 use crate::args;
 
 use enter::Enter;
-use keys::Keyboard;
+pub use keys::Keyboard;
 use signals::Signals;
+pub use signals::Stops;
 pub use terminal::is_on_terminal;
 
 /// How often a program stop is looked after while machine time stands still.
 const LOOK: Duration = Duration::from_millis(5);
+
+/// Who is there, and in which time.
+#[derive(Clone, Copy, Debug)]
+pub struct Presence {
+    /// Machine time is the wall's.
+    pub real_time: bool,
+    /// `--pause`: stops wait also where nobody is seen to be there.
+    pub pause: bool,
+    /// Keys are taken from the terminal.
+    pub keys: bool,
+}
 
 /// Everything through which a run is told what to do. Dropping it gives the terminal back and tells clients that the run
 /// is over.
@@ -42,18 +54,28 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Opens what the command line asks for; `keys` takes the terminal.
+    /// Opens what the command line asks for.
     ///
     /// # Errors
     /// The socket, the token file or the terminal with the cause.
-    pub fn begin(options: &args::Run, machine: &Machine, run: &Run, keys: bool) -> Result<Self, String> {
+    pub fn begin(options: &args::Operator, machine: &Machine, run: &Run, presence: Presence) -> Result<Self, String> {
+        let Presence { real_time, pause, keys } = presence;
         let desk = Arc::new(Desk::new(machine, run.controls(), run.status()));
-        let server = serve(&options.operator, &desk)?;
-        let real_time = options.clock == args::Clock::Wall;
+        let server = serve(options, &desk)?;
         let signals = real_time.then(|| Signals::catch(Arc::clone(&desk))).transpose()?;
         let stops = signals.as_ref().map(Signals::stops);
         let keyboard = stops.filter(|_| keys).map(|stops| Keyboard::begin(Arc::clone(&desk), stops)).transpose()?;
-        Ok(Self { desk, keyboard, signals, server, enter: Enter::default(), real_time, pause: options.pause })
+        Ok(Self { desk, keyboard, signals, server, enter: Enter::default(), real_time, pause })
+    }
+
+    /// The desk, for keys that come and go.
+    pub fn desk(&self) -> &Arc<Desk> {
+        &self.desk
+    }
+
+    /// How often a stop was asked for by Ctrl-C or a signal; `None` on the virtual clock.
+    pub fn stops(&self) -> Option<Stops> {
+        self.signals.as_ref().map(Signals::stops)
     }
 
     /// A sample was sent; `progress` is the share of the path that is driven.

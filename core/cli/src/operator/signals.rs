@@ -16,6 +16,11 @@ use super::tell;
 pub struct Stops(Arc<AtomicU32>);
 
 impl Stops {
+    /// Whether a stop was asked for.
+    pub fn are_asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed) > 0
+    }
+
     /// Asks once more.
     pub fn ask(&self, desk: &Desk) -> String {
         let (command, words) = match self.0.fetch_add(1, Ordering::Relaxed) {

@@ -1,0 +1,128 @@
+//! `tandem mdi`: manual input.
+
+mod conversation;
+mod input;
+
+use std::error::Error;
+use std::sync::Arc;
+
+use tandem_host::{Clock, Run, RunObserver, Session, StopAnswer, Switches, Timed};
+use tandem_machine::Machine;
+use tandem_rings::{Rest, Sample};
+
+use crate::operator::{Operator, Presence, is_on_terminal};
+use crate::trace::TraceSink;
+use crate::{FAULT, REFUSED, args, built_in};
+
+use conversation::{Conversation, Shared};
+
+/// The word that takes back a fault.
+const RESET: &str = "!reset";
+
+/// Takes lines until there are no more.
+pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
+    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let registry = built_in::registry()?;
+    let real_time = options.clock == args::Clock::Wall;
+    let keys = real_time && is_on_terminal();
+    let attended = keys || (real_time && !options.operator.is_nowhere());
+    let switches =
+        Switches { block_delete: options.machine.block_delete, pause_at_stops: attended, ..Switches::default() };
+    let shared = Arc::new(Shared::new(real_time, keys));
+    let conversation = Conversation::new(Arc::clone(&shared), machine.axes);
+    let mut session = Session::new(machine.clone(), &registry, switches, Box::new(conversation))?;
+    let clock = if real_time { Clock::Wall } else { Clock::Virtual };
+    let mut sinks = Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: false };
+    let mut faulted = false;
+    while !faulted || shared.is_reset() {
+        let run = session.enable()?;
+        sinks.begin(options, &machine, &run, Presence { real_time, pause: false, keys: false }, &shared)?;
+        let outcome = run.drive(clock, &[], &mut sinks)?;
+        shared.take_keys();
+        sinks.end(&outcome.summary);
+        session.stands_at(outcome.position);
+        let Some(fault) = &outcome.summary.fault else { break };
+        faulted = true;
+        say!("fault: {fault}; {RESET} goes on from here");
+    }
+    sinks.trace.map_or(Ok(()), TraceSink::finish)?;
+    let status = if shared.ended_in_fault() { FAULT } else { u8::from(shared.has_refused()) * REFUSED };
+    Ok(status)
+}
+
+/// What is kept of all runs of a session.
+struct Sinks {
+    trace: Option<TraceSink>,
+    operator: Option<Operator>,
+    /// Tick of the session at which the run began: a trace goes on after a reset.
+    first_tick: u64,
+    next_tick: u64,
+    /// What the computer did not grant has been said.
+    noted: bool,
+}
+
+impl Sinks {
+    fn begin(
+        &mut self,
+        options: &args::Mdi,
+        machine: &Machine,
+        run: &Run,
+        presence: Presence,
+        shared: &Shared,
+    ) -> Result<(), String> {
+        if let (None, Some(path)) = (&self.trace, &options.trace) {
+            self.trace = Some(TraceSink::create(path, machine, "manual input", run, false)?);
+        }
+        let operator = Operator::begin(&options.operator, machine, run, presence)?;
+        shared.follow(&operator);
+        self.operator = Some(operator);
+        self.first_tick = self.next_tick;
+        Ok(())
+    }
+
+    fn end(&mut self, summary: &tandem_host::Summary) {
+        if let Some(mut operator) = self.operator.take() {
+            operator.end(summary);
+        }
+        self.noted = true;
+    }
+}
+
+impl RunObserver for Sinks {
+    fn note(&mut self, note: &str) {
+        if !self.noted {
+            say!("{note}");
+        }
+    }
+
+    fn program_stop(&mut self, line: u32) -> StopAnswer {
+        self.operator.as_mut().map_or(StopAnswer::GoOn, |operator| operator.program_stop(line))
+    }
+
+    fn is_attended(&self) -> bool {
+        self.operator.as_ref().is_some_and(Operator::is_attended)
+    }
+
+    fn rest(&mut self, _rest: &Rest) {
+        if let Some(operator) = &self.operator {
+            operator.rest();
+        }
+    }
+
+    fn command(&mut self, command: &Timed) {
+        if let Some(trace) = &mut self.trace {
+            trace.command(&Timed { tick: self.first_tick + command.tick, ..*command });
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
+        let sample = Sample { tick: self.first_tick + sample.tick, ..*sample };
+        self.next_tick = sample.tick + 1;
+        if let Some(operator) = &self.operator {
+            operator.sample(&sample, 1.0);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.sample(&sample, signals);
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Manual input: lines of G-code from an operator, one after the other, each from where the machine stands.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tandem_gcode::{Interpreter, Item, ProbeResult};
+use tandem_machine::Machine;
+use tandem_rings::{Rest, RestCause};
+use tandem_rough::Source;
+use tandem_sdk::{AxisVector, Block, Planner};
+
+use crate::error::HostError;
+use crate::registry::Registry;
+use crate::run::{Run, Switches, check_block};
+use crate::setup;
+
+/// What the operator says next.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NextLine {
+    /// A line, without its end.
+    Line(String),
+    /// Nothing yet.
+    Later,
+    /// Nothing more.
+    Over,
+}
+
+/// The operator's side of manual input. Called on the soft side, at rest; on the virtual clock it may wait, and machine
+/// time stands still meanwhile.
+pub trait Dialogue: Send {
+    /// What the operator says next.
+    fn next_line(&mut self) -> NextLine;
+
+    /// A line is refused, in words with its place: nothing has changed.
+    fn refused(&mut self, why: &str);
+
+    /// A line is taken: motion may begin.
+    fn begins(&mut self) {}
+
+    /// The last line is done and the machine stands at `position`, mm or rad.
+    fn done(&mut self, position: &AxisVector);
+}
+
+/// Manual input on one machine. Modal state, offsets and parameters stay between lines, and through faults.
+pub struct Session<'a> {
+    machine: Machine,
+    registry: &'a Registry,
+    switches: Switches,
+    manual: Arc<Mutex<Manual>>,
+}
+
+impl<'a> Session<'a> {
+    /// A session that nothing has been said in. Host.
+    ///
+    /// # Errors
+    /// The planner refuses.
+    pub fn new(
+        machine: Machine,
+        registry: &'a Registry,
+        switches: Switches,
+        dialogue: Box<dyn Dialogue>,
+    ) -> Result<Self, HostError> {
+        let mut interpreter = Interpreter::new(setup::interpreter_config(&machine, switches));
+        interpreter.set_file("input");
+        let judge = setup::planner(&machine, registry)?;
+        let manual =
+            Manual { machine: machine.clone(), judge, interpreter, dialogue, lines: 0, standing: 0, busy: false };
+        Ok(Self { machine, registry, switches, manual: Arc::new(Mutex::new(manual)) })
+    }
+
+    /// Enables the machine where it stands: a run that takes lines until there are no more, or a fault ends it.
+    ///
+    /// # Errors
+    /// The plugins refuse, or do not go together.
+    pub fn enable(&self) -> Result<Run, HostError> {
+        let source = Box::new(Lines(Arc::clone(&self.manual)));
+        Run::of_source(self.machine.clone(), self.registry, "manual input".to_string(), source, self.switches)
+    }
+
+    /// The machine has come to rest at `position` after a fault: the next line starts there.
+    pub fn stands_at(&mut self, position: AxisVector) {
+        self.machine.start = position;
+        let mut manual = lock(&self.manual);
+        manual.interpreter.set_position(position);
+        (manual.busy, manual.standing) = (false, 0);
+    }
+}
+
+/// Times in a row that the rough loop finds everything driven before it is believed: the fine loop says so once a period,
+/// and may have taken a segment since.
+const STANDING: u32 = 2;
+
+struct Manual {
+    machine: Machine,
+    /// A planner that only judges blocks.
+    judge: Box<dyn Planner>,
+    interpreter: Interpreter,
+    dialogue: Box<dyn Dialogue>,
+    lines: u32,
+    /// How often in a row everything was driven.
+    standing: u32,
+    /// A line is being driven.
+    busy: bool,
+}
+
+impl Manual {
+    /// Interprets a line and has every block of it judged; where it is refused nothing has changed.
+    fn interpret(&mut self, text: &str, items: &mut Vec<Item>) -> Result<(), String> {
+        let mut tried = self.interpreter.clone();
+        let before = items.len();
+        let judged = tried.line(self.lines, text.as_bytes(), items).map_err(|e| e.to_string()).and_then(|()| {
+            let mut blocks = items[before..].iter();
+            let place = |why: String| format!("input:{}: {why}", self.lines);
+            blocks.try_for_each(|item| self.judge(item)).map_err(place)
+        });
+        if judged.is_err() {
+            items.truncate(before);
+            return judged;
+        }
+        // M2 ends a program, not the session.
+        items.retain(|item| !matches!(item, Item::End));
+        tried.go_on();
+        self.interpreter = tried;
+        Ok(())
+    }
+
+    fn judge(&self, item: &Item) -> Result<(), String> {
+        let judge = |block: &Block| check_block(&self.machine, self.judge.as_ref(), block);
+        match item {
+            Item::Block(block) => judge(block),
+            Item::Curve(curve) => curve.with(judge),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The session as the rough loop pulls it.
+struct Lines(Arc<Mutex<Manual>>);
+
+impl Source for Lines {
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        let mut manual = lock(&self.0);
+        manual.standing = if driven { manual.standing + 1 } else { 0 };
+        if manual.standing < STANDING {
+            return false;
+        }
+        if manual.busy {
+            manual.busy = false;
+            let position = manual.interpreter.position();
+            manual.dialogue.done(&position);
+        }
+        true
+    }
+
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        let mut manual = lock(&self.0);
+        loop {
+            let text = match manual.dialogue.next_line() {
+                NextLine::Line(text) => text,
+                NextLine::Later => return Ok(true),
+                // What still runs is switched off, as at the end of a program.
+                NextLine::Over => {
+                    return manual.interpreter.clone().finish(items).map(|()| false).map_err(|e| e.to_string());
+                }
+            };
+            manual.lines += 1;
+            if let Err(why) = manual.interpret(&text, items) {
+                manual.dialogue.refused(&why);
+                continue;
+            }
+            (manual.busy, manual.standing) = (true, 0);
+            manual.dialogue.begins();
+            return Ok(true);
+        }
+    }
+
+    fn provide_input(&mut self, value: f64) {
+        lock(&self.0).interpreter.provide_input(value);
+    }
+
+    /// Also after an abort the session goes on, from where the machine stands.
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        let mut manual = lock(&self.0);
+        if rest.cause == RestCause::Abort {
+            manual.interpreter.set_position(rest.position);
+        } else {
+            manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+        }
+        manual.standing = 0;
+        true
+    }
+}
+
+fn lock(manual: &Mutex<Manual>) -> MutexGuard<'_, Manual> {
+    // A panic in the dialogue leaves the interpreter as it was before the line.
+    manual.lock().unwrap_or_else(PoisonError::into_inner)
+}

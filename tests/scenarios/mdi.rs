@@ -1,0 +1,137 @@
+//! Manual input: lines from where the machine stands.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+
+use tempfile::TempDir;
+
+use crate::harness::{judge_trace, mill};
+use crate::operator::{Running, is_held, is_moving};
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
+    command.current_dir(folder).arg("mdi").arg("--machine").arg(mill()).args(["--trace", "trace.csv"]).args(arguments);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+struct Said {
+    folder: TempDir,
+    output: Output,
+}
+
+impl Said {
+    /// Positions, a line each.
+    fn positions(&self) -> Vec<String> {
+        String::from_utf8_lossy(&self.output.stdout).lines().map(str::to_string).collect()
+    }
+
+    fn errors(&self) -> String {
+        String::from_utf8_lossy(&self.output.stderr).into_owned()
+    }
+
+    /// The trace, judged as that of `program`.
+    fn assert_drives(&self, program: &str) {
+        let path = self.folder.path().join("p.ngc");
+        std::fs::write(&path, program).unwrap();
+        let verdict = judge_trace(&self.folder.path().join("trace.csv"), &path, &mill(), |_| ());
+        assert!(verdict.passed(), "{verdict}");
+    }
+}
+
+fn say(lines: &str, arguments: &[&str]) -> Said {
+    let folder = TempDir::new().unwrap();
+    let mut child = command(folder.path(), arguments).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    Said { output: child.wait_with_output().unwrap(), folder }
+}
+
+const VIRTUAL: [&str; 2] = ["--clock", "virtual"];
+
+#[test]
+fn each_line_starts_where_the_machine_stands_and_ends_at_rest() {
+    let lines = "G0 X10\nG1 Y5 F600\nG91 X-2 Y1\n#1=4\nG90 G1 X#1\nG92 X0\nG1 X1\n";
+    let said = say(lines, &VIRTUAL);
+    assert_eq!(said.output.status.code(), Some(0), "{}", said.errors());
+    let ends = ["x_mm 10.0000  y_mm 0.0000", "x_mm 10.0000  y_mm 5.0000", "x_mm 8.0000  y_mm 6.0000"];
+    let more = ["x_mm 8.0000", "x_mm 4.0000  y_mm 6.0000", "x_mm 4.0000", "x_mm 5.0000  y_mm 6.0000"];
+    let positions = said.positions();
+    assert_eq!(positions.len(), 7);
+    for (position, end) in positions.iter().zip(ends.iter().chain(&more)) {
+        assert!(position.starts_with(end), "{position}: {end}");
+    }
+    // The machine rests after each line, as a program in exact stop does.
+    said.assert_drives("G0 X10\nG1 Y5 F600\nG1 X8 Y6\n\nG1 X4\n\nG1 X5\nM2\n");
+}
+
+#[test]
+fn a_refused_line_moves_nothing_and_changes_nothing() {
+    let said = say("G0 X10\nG91 G1 Y5\nG91 X9999\nG0 X20\n", &VIRTUAL);
+    assert_eq!(said.output.status.code(), Some(1));
+    let errors = said.errors();
+    assert!(errors.contains("input:2:") && errors.contains("input:3:5") && errors.contains("travel"), "{errors}");
+    // Had G91 of a refused line stayed, X would be 30.
+    assert_eq!(said.positions().len(), 2);
+    assert!(said.positions()[1].starts_with("x_mm 20.0000  y_mm 0.0000"));
+    said.assert_drives("G0 X10\n\n\nG0 X20\nM2\n");
+}
+
+#[test]
+fn the_end_of_a_program_is_not_the_end_of_the_session() {
+    let said = say("G0 X1\nM2\nG0 X2\nM30\nG0 X3\n", &VIRTUAL);
+    assert!(said.positions().last().unwrap().starts_with("x_mm 3.0000"), "{}", said.errors());
+}
+
+#[test]
+fn a_fault_is_left_with_reset_from_where_the_machine_stands() {
+    let fails = ["--clock", "virtual", "--set", "faults.wrap=[{kind=\"fail\",at_call=500}]"];
+    let said = say("G91\nG1 X50 F600\nG0 X1\n!reset\nG0 Y2\n", &fails);
+    assert_eq!(said.output.status.code(), Some(1), "{}", said.errors());
+    assert!(said.errors().contains("!reset goes on"), "{}", said.errors());
+    assert!(said.errors().contains("the machine is in fault"));
+    let last = said.positions().pop().unwrap();
+    // Stopped on the way to X50, then 2 mm in Y: G91 has outlived the fault.
+    let x: f64 = last.split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!((1.0..10.0).contains(&x) && last.contains("y_mm 2.0000"), "{last}");
+    let unreset = say("G1 X50 F600\nG0 X1\n", &fails);
+    assert_eq!(unreset.output.status.code(), Some(3));
+}
+
+/// In real time with a socket, typed to bit by bit.
+fn live() -> (Running, std::process::ChildStdin) {
+    let start = |folder: &Path| -> Child {
+        let lenient = ["--set", "loops.max_missed_periods=1000000", "--listen", "s"];
+        command(folder, &lenient).spawn().unwrap()
+    };
+    let mut run = Running::start_with("", start);
+    let keys = run.child().stdin.take().unwrap();
+    (run, keys)
+}
+
+#[test]
+fn a_line_can_be_held_and_aborted_and_the_next_one_goes_on() {
+    let (run, mut keys) = live();
+    let mut client = run.connect();
+    client.say(r#"{"lease":"take"}"#);
+    client.hear();
+    writeln!(keys, "G1 X50 F600").unwrap();
+    client.wait("moving", is_moving);
+    client.command("hold");
+    client.wait("held", is_held);
+    client.command("resume");
+    client.wait("moving", is_moving);
+    client.command("abort");
+    let rest = client.wait("at rest", |s| s["state"] == "standstill" && s["feed_mm_per_min"] == 0.0);
+    // The position that is told follows a rough period behind.
+    let settled = |s: &serde_json::Value| s["tick"].as_u64() > rest["tick"].as_u64().map(|tick| tick + 200);
+    let rest = client.wait("settled", settled);
+    let x = rest["position"]["x_mm"].as_f64().unwrap();
+    assert!(x > 0.0 && x < 50.0, "{x}");
+    writeln!(keys, "G91 G0 X-0.5").unwrap();
+    client.wait("half a millimetre back", |s| (s["position"]["x_mm"].as_f64().unwrap() - x + 0.5).abs() < 1e-6);
+    drop(keys);
+    let (output, _) = run.finish();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stdout).lines().count(), 2);
+}
