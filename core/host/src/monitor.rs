@@ -32,8 +32,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Nothing seen yet.
-    pub fn new(machine: &Machine) -> Self {
+    /// Nothing seen yet; `leaves_path` as the planner describes itself.
+    pub fn new(machine: &Machine, leaves_path: bool) -> Self {
         Self {
             rapid_mm_per_s: machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect(),
             period_s: machine.fine_period_s,
@@ -45,7 +45,7 @@ impl Monitor {
             nominal_s: 0.0,
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
-            watch: PathWatch::default(),
+            watch: PathWatch::new(leaves_path),
             axes: machine.axes,
         }
     }

@@ -9,6 +9,9 @@ use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 /// Blocks looked back over where a planner leaves the path: what its filters can still hold.
 const LOOK_BACK: usize = 256;
 
+/// The same where it stays on the path, within its tolerance: the blocks that may move beside the one named.
+const LOOK_BACK_ON_PATH: usize = 4;
+
 /// Distances that are rounding of the segments, mm: not worth looking at the neighbours.
 const ON_PATH_MM: f64 = 1e-6;
 
@@ -49,15 +52,23 @@ impl Watched {
 }
 
 /// Keeps the paths of the blocks that move now and measures samples against them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct PathWatch {
     /// Paths with the index of their block.
     paths: VecDeque<(u64, Watched)>,
+    /// Blocks looked back over.
+    look_back: usize,
     /// Largest distance so far, mm.
     pub max_mm: f64,
 }
 
 impl PathWatch {
+    /// Nothing seen yet; `leaves_path` as the planner describes itself.
+    pub fn new(leaves_path: bool) -> Self {
+        let look_back = if leaves_path { LOOK_BACK } else { LOOK_BACK_ON_PATH };
+        Self { paths: VecDeque::new(), look_back, max_mm: 0.0 }
+    }
+
     /// A block that will be driven.
     pub fn block(&mut self, axes: &Axes, block: &Block) {
         let watched = match block.kind {
@@ -69,7 +80,7 @@ impl PathWatch {
 
     /// Distance of `position`, sampled while block `block` moved, from the path, mm. Blocks far behind are forgotten.
     pub fn sample(&mut self, block: u64, position: &AxisVector) -> f64 {
-        while self.paths.len() > LOOK_BACK && self.paths[LOOK_BACK].0 < block {
+        while self.paths.len() > self.look_back && self.paths[self.look_back].0 < block {
             self.paths.pop_front();
         }
         let here = self.paths.partition_point(|(index, _)| *index < block);

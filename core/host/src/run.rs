@@ -54,6 +54,7 @@ pub struct Run {
     host: HostEnd,
     strategy: Option<StrategyRunner>,
     steps: bool,
+    leaves_path: bool,
     switches: Switches,
     /// What the first pass found: totals.
     pub checked: CheckReport,
@@ -175,6 +176,7 @@ impl Run {
             strategy,
             switches,
             steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
+            leaves_path: description.leaves_path != 0,
             checked,
         })
     }
@@ -207,7 +209,7 @@ impl Run {
         let started = Instant::now();
         let machine = self.machine;
         let mut fine = self.fine;
-        let monitor = Monitor::new(&machine);
+        let monitor = Monitor::new(&machine, self.leaves_path);
         let mut pump = Pump::new(self.rough, self.host, self.strategy, monitor, observer);
         let mut measured = None;
         match clock {
