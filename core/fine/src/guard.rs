@@ -90,7 +90,6 @@ impl Guard {
         let velocity = (next - self.position[axis]) / period_s;
         let change = velocity - self.velocity[axis];
         checked.velocity[axis] = velocity;
-        checked.acceleration[axis] = change / period_s;
         let leak = limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * period_s + rounding;
         let mut fullest = 0.0f64;
         for (sign, bucket) in [change, -change].into_iter().zip(&mut checked.buckets) {
@@ -113,12 +112,15 @@ impl Guard {
         if fullest > allowed * (1.0 + TOLERANCE) + rounding {
             return breach(Breach::Acceleration, change / period_s, limits.acceleration_mm_per_s2);
         }
-        let jerk = (change / period_s - self.acceleration[axis]) / period_s;
-        let jerk_rounding = 4.0 * rounding / (period_s * period_s);
-        let judged = self.config.order >= 3 && self.relaxed == 0;
-        if judged && jerk.abs() > limits.jerk_mm_per_s3 * (1.0 + JERK_TOLERANCE) + jerk_rounding {
-            return breach(Breach::Jerk, jerk, limits.jerk_mm_per_s3);
-        }
-        None
+        if self.config.order >= 3 { self.check_jerk(axis, change / period_s, rounding, checked) } else { None }
+    }
+
+    /// Jerk, where the planner keeps it.
+    fn check_jerk(&self, axis: usize, acceleration: f64, rounding: f64, checked: &mut Checked) -> Option<FaultKind> {
+        let (limit, period_s) = (self.config.limits.axes[axis].jerk_mm_per_s3, self.config.period_s);
+        checked.acceleration[axis] = acceleration;
+        let value = (acceleration - self.acceleration[axis]) / period_s;
+        let beyond = value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
+        (beyond && self.relaxed == 0).then_some(FaultKind::Guard { breach: Breach::Jerk, axis, value, limit })
     }
 }

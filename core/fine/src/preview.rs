@@ -28,15 +28,15 @@ pub struct Preview {
     next: u64,
     /// Programmed feed up to there, mm/s.
     feed_mm_per_s: f64,
-    marks: [Mark; MARKS],
+    marks: Box<[Mark]>,
     first: usize,
     count: usize,
 }
 
 impl Preview {
-    /// Nothing seen.
+    /// Nothing seen. Allocates.
     pub fn new() -> Self {
-        Self { next: 0, feed_mm_per_s: 0.0, marks: [Mark::default(); MARKS], first: 0, count: 0 }
+        Self { next: 0, feed_mm_per_s: 0.0, marks: vec![Mark::default(); MARKS].into_boxed_slice(), first: 0, count: 0 }
     }
 
     /// Looks further ahead, up to program time `until_s`; forgets what has been passed.
