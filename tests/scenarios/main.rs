@@ -10,6 +10,7 @@ mod disturbances;
 mod every_tick;
 mod examples;
 mod faults;
+mod following;
 mod harness;
 mod hold;
 mod keys;

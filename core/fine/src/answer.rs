@@ -52,6 +52,14 @@ pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<Faul
     faulty.or_else(off)
 }
 
+/// The fault that a joint which follows is further from its `command` than its limit in `most_mm` allows. Fine loop.
+pub fn following(feedback: &Feedback, command: &AxisVector, joints: usize, most_mm: &AxisVector) -> Option<FaultKind> {
+    let error = |joint: usize| (command[joint] - feedback.position[joint]).abs();
+    let holds = |joint: &usize| feedback.state[*joint] == JointState::Enabled;
+    let lost = (0..joints).filter(holds).find(|joint| error(*joint) > most_mm[*joint]);
+    lost.map(|joint| FaultKind::Following { joint, error_mm: error(joint), limit_mm: most_mm[joint] })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +85,17 @@ mod tests {
         let (fault, feedback) = wrong(|f| f.spindle_angle_rad = f64::NAN);
         assert_eq!((fault, feedback.spindle_angle_rad), (Some(FaultKind::Feedback { joint: None }), 3.0));
         assert_eq!(wrong(|f| f.position[3] = f64::NAN).0, None, "there is no such joint");
+    }
+
+    #[test]
+    fn a_joint_that_follows_must_be_near_its_command() {
+        let mut feedback = Feedback { state: [JointState::Enabled; 8], ..Feedback::default() };
+        let (command, most_mm) =
+            (AxisVector([0.5; 8]), AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]));
+        let fault = Some(FaultKind::Following { joint: 2, error_mm: 0.5, limit_mm: 0.25 });
+        assert_eq!(following(&feedback, &command, 3, &most_mm), fault, "at the limit it is not beyond it");
+        feedback.state[2] = JointState::Disabled;
+        assert_eq!(following(&feedback, &command, 3, &most_mm), None, "what is off follows nothing");
     }
 
     #[test]

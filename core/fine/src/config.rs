@@ -29,6 +29,8 @@ pub struct FineConfig {
     pub position: AxisVector,
     /// Highest feed ratio that can be asked: the planner plans at it.
     pub max_feed_ratio: f64,
+    /// Largest distance between the command and the feedback of a period, per joint, mm or rad; infinite for none.
+    pub max_following_error_mm: AxisVector,
     /// M0 and M6 wait for the operator; M1 does where the operator's switch is on.
     pub pause_at_stops: bool,
     /// Spindle, coolant and user outputs are not switched, and nothing waits for the operator.

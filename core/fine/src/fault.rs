@@ -41,6 +41,15 @@ pub enum FaultKind {
         /// Joint index; none for the spindle.
         joint: Option<usize>,
     },
+    /// A joint is too far from where it is told to be.
+    Following {
+        /// Joint index.
+        joint: usize,
+        /// Distance between command and feedback, mm or rad.
+        error_mm: f64,
+        /// The limit.
+        limit_mm: f64,
+    },
     /// The driver failed to exchange.
     Driver,
     /// The operator's emergency stop.

@@ -14,7 +14,7 @@ use rtrb::{Consumer, Producer};
 use tandem_rings::{
     Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
 };
-use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, Setpoint};
+use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
 
 use crate::config::FineConfig;
 use crate::cursor::Cursor;
@@ -101,6 +101,7 @@ pub struct FineLoop {
     feedback: Feedback,
     counters: Counters,
     fault: Option<Fault>,
+    driver_error: Option<PluginError>,
 }
 
 impl FineLoop {
@@ -148,6 +149,7 @@ impl FineLoop {
             feedback: Feedback::default(),
             counters: Counters::default(),
             fault: None,
+            driver_error: None,
         }
     }
 
@@ -197,6 +199,11 @@ impl FineLoop {
     /// The fault, if there is one.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
+    }
+
+    /// What the driver said when an exchange failed first. Host.
+    pub fn driver_error(&self) -> Option<&PluginError> {
+        self.driver_error.as_ref()
     }
 
     /// Whether the program has ended, or a fault has brought the machine to rest.

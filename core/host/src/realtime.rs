@@ -12,10 +12,8 @@ use rustix::thread::{
     CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity, set_current_timer_slack,
 };
 use serde::Serialize;
+use tandem_machine::FineThread;
 
-/// Priority of the fine loop among `SCHED_FIFO` threads, 1 to 99: above the usual interrupt threads (50), below the
-/// kernel's own.
-pub const PRIORITY: i32 = 80;
 /// Where Linux takes the longest wake-up time that is bearable.
 const WAKE_UP_TIME: &str = "/dev/cpu_dma_latency";
 /// Stack of the fine thread that is touched before the first period, bytes.
@@ -84,38 +82,40 @@ fn may_lock_all() -> bool {
 }
 
 /// Makes the calling thread one with deadlines. Fine thread, before its first period; may allocate.
-pub fn prepare_thread(notes: &mut Vec<String>) {
+pub fn prepare_thread(thread: FineThread, notes: &mut Vec<String>) {
+    let priority = thread.priority;
     // Threads without a real-time priority are woken up to 50 µs late on purpose; this asks for 1 ns.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
-    match set_priority() {
-        Ok(()) => pin_to_last_core(notes),
+    match set_priority(priority) {
+        Ok(()) => pin(thread.core, notes),
         Err(error) => notes.push(format!(
-            "SCHED_FIFO priority {PRIORITY} is not granted ({error}): the fine loop shares the processor with every \
-             other program, and is not pinned to a core either; `ulimit -r {PRIORITY}` or CAP_SYS_NICE grants it"
+            "SCHED_FIFO priority {priority} is not granted ({error}): the fine loop shares the processor with every \
+             other program, and is not pinned to a core either; `ulimit -r {priority}` or CAP_SYS_NICE grants it"
         )),
     }
     touch_stack();
 }
 
-fn set_priority() -> Result<(), std::io::Error> {
-    let parameters = libc::sched_param { sched_priority: PRIORITY };
+fn set_priority(priority: u32) -> Result<(), std::io::Error> {
+    let parameters = libc::sched_param { sched_priority: priority.cast_signed() };
     // SAFETY: the handle is the calling thread's, the parameters outlive the call.
     let status = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameters) };
     if status == 0 { Ok(()) } else { Err(std::io::Error::from_raw_os_error(status)) }
 }
 
-/// The last core that the process may use: the first one gets most interrupts. Only with a priority: an ordinary thread
-/// that may not move waits for whatever else runs on its core.
-fn pin_to_last_core(notes: &mut Vec<String>) {
+/// To `core`, or else to the last core that the process may use: the first one gets most interrupts. Only with a
+/// priority: an ordinary thread that may not move waits for whatever else runs on its core.
+fn pin(core: Option<u32>, notes: &mut Vec<String>) {
     let result = sched_getaffinity(None).and_then(|allowed| {
-        let mut cores = (0..CpuSet::MAX_CPU).filter(|core| allowed.is_set(*core));
-        let Some(last) = cores.next_back() else { return Ok(()) };
+        let last = || (0..CpuSet::MAX_CPU).rfind(|core| allowed.is_set(*core));
+        let Some(chosen) = core.map(|core| core as usize).or_else(last) else { return Ok(()) };
         let mut only = CpuSet::new();
-        only.set(last);
+        only.set(chosen);
         sched_setaffinity(None, &only)
     });
     if let Err(error) = result {
-        notes.push(format!("the fine loop is not pinned to a core ({error}): it may be moved while it runs"));
+        let which = core.map_or("a core".to_string(), |core| format!("core {core}"));
+        notes.push(format!("the fine loop is not pinned to {which} ({error}): it may be moved while it runs"));
     }
 }
 

@@ -3,6 +3,8 @@
 use std::thread;
 use std::time::Duration;
 
+use tandem_machine::FineThread;
+
 use crate::error::HostError;
 use crate::realtime::PageFaults;
 use crate::realtime_periods::{Body, Timing};
@@ -25,7 +27,7 @@ pub struct Latency {
 /// The thread cannot be started.
 pub fn measure_latency(period: Duration, periods: u64) -> Result<Latency, HostError> {
     let period_ns = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX).max(1);
-    let thread = TimedThread::start(Empty { left: periods }, period_ns)?;
+    let thread = TimedThread::start(Empty { left: periods }, period_ns, FineThread::default())?;
     let notes = thread.notes.clone();
     while !thread.is_over() {
         thread::sleep(Duration::from_millis(20));

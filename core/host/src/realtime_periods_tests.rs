@@ -160,6 +160,7 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         guard: GuardMode::Stop,
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
+        max_following_error_mm: AxisVector([f64::INFINITY; 8]),
         pause_at_stops: false,
         dry_run: false,
     };

@@ -21,6 +21,14 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
         );
         return refuse("planner.plugin", cause);
     }
+    let followed = (0..machine.axes.count()).find(|axis| machine.max_following_error_mm[*axis].is_finite());
+    if let Some(axis) = followed.filter(|_| machine.kinematics.plugin != "identity") {
+        let (letter, unit) = (machine.axes.letter(axis), if machine.axes.is_rotary(axis) { "deg" } else { "mm" });
+        let key = format!("axes.{}.max_following_error_{unit}", letter.to_ascii_lowercase());
+        let cause =
+            format!("following errors are those of joints, and {} has joints of its own", machine.kinematics.plugin);
+        return refuse(&key, cause);
+    }
     if machine.policy.is_some() {
         return refuse(
             "policy.script",

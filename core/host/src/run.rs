@@ -220,7 +220,7 @@ impl Run {
             }
         }
         let fault = fine.fault();
-        let text = fault.map(|f| describe(&machine, &f, pump.soft_cause()));
+        let text = fault.map(|f| describe(&machine, &f, pump.soft_cause(), fine.driver_error()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.fault = text;
@@ -248,6 +248,7 @@ fn periods(machine: &Machine) -> Periods {
         rough_ns: ns(machine.rough_period_s),
         fine_ns: ns(machine.fine_period_s),
         max_missed: u64::from(machine.max_missed_periods),
+        fine_thread: machine.fine_thread,
     }
 }
 

@@ -116,6 +116,7 @@ pub fn fine_config(machine: &Machine, planner: &PlannerDescription, switches: Sw
         },
         position: machine.start,
         max_feed_ratio: machine.motion.max_feed_ratio,
+        max_following_error_mm: machine.max_following_error_mm,
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
     }

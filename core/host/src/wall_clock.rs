@@ -9,6 +9,7 @@ use std::time::Duration;
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 use rustix::time::{Timespec, clock_gettime};
 use tandem_fine::FineLoop;
+use tandem_machine::FineThread;
 
 use crate::error::HostError;
 use crate::pump::Pump;
@@ -26,6 +27,8 @@ pub struct Periods {
     pub fine_ns: i64,
     /// Missed periods in a row above which the machine faults.
     pub max_missed: u64,
+    /// What the fine thread asks of the computer.
+    pub fine_thread: FineThread,
 }
 
 /// What a body did in real time.
@@ -41,7 +44,8 @@ pub struct Ended<B> {
 /// Drives the run to its end in real time; gives the fine loop back.
 pub fn drive(pump: &mut Pump<'_>, fine: FineLoop, periods: Periods) -> Result<Ended<FineLoop>, HostError> {
     fill_first(pump);
-    let thread = TimedThread::start(Fine { fine, max_missed: periods.max_missed }, periods.fine_ns)?;
+    let thread =
+        TimedThread::start(Fine { fine, max_missed: periods.max_missed }, periods.fine_ns, periods.fine_thread)?;
     for note in &thread.notes {
         pump.note(note);
     }
@@ -94,7 +98,7 @@ pub struct TimedThread<B> {
 
 impl<B: Body + Send + 'static> TimedThread<B> {
     /// Starts the thread; it is prepared, and its first deadline one period away, when this returns.
-    pub fn start(body: B, period_ns: i64) -> Result<Self, HostError> {
+    pub fn start(body: B, period_ns: i64, asks: FineThread) -> Result<Self, HostError> {
         let mut notes = vec![];
         let grants = ProcessGrants::acquire(&mut notes);
         let over = Arc::new(AtomicBool::new(false));
@@ -103,7 +107,7 @@ impl<B: Body + Send + 'static> TimedThread<B> {
         let work = move || {
             // Also where the body panics: who waits for the end finds out by joining.
             let _end = AtEnd(at_end);
-            live(body, period_ns, &sender)
+            live(body, period_ns, asks, &sender)
         };
         let builder = thread::Builder::new().name("tandem-fine".to_string());
         let handle = builder.spawn(work);
@@ -132,9 +136,9 @@ impl Drop for AtEnd {
 }
 
 /// The life of the thread. What allocates lies before and after [`run`].
-fn live<B: Body>(mut body: B, period_ns: i64, notes: &SyncSender<Vec<String>>) -> Ended<B> {
+fn live<B: Body>(mut body: B, period_ns: i64, asks: FineThread, notes: &SyncSender<Vec<String>>) -> Ended<B> {
     let mut not_granted = vec![];
-    prepare_thread(&mut not_granted);
+    prepare_thread(asks, &mut not_granted);
     let mut timing = Timing::default();
     // Nobody listens only where the host is gone.
     let _ = notes.send(not_granted);

@@ -15,6 +15,7 @@ const LETTERS: &str = "xyzabcuvw";
 pub(crate) struct AxisSet {
     pub axes: Axes,
     pub limits: Limits,
+    pub max_following_error: AxisVector,
     pub start: AxisVector,
     pub home: AxisVector,
 }
@@ -23,6 +24,7 @@ struct Axis {
     letter: char,
     rotary: bool,
     limits: AxisLimits,
+    following: f64,
     start: f64,
     home: f64,
 }
@@ -50,6 +52,7 @@ impl AxisSet {
         Some(Self {
             axes: Axes::new(&letters).ok()?,
             limits: Limits::new(&limits).ok()?,
+            max_following_error: vector(|a| a.following),
             start: vector(|a| a.start),
             home: vector(|a| a.home),
         })
@@ -65,9 +68,11 @@ fn axis(axes: &Section<'_>, name: &str, motion: &Motion) -> Option<Axis> {
     refuse_other_kind(&section, rotary);
     let units = Units::of(rotary);
     let limits = limits(&section, units, None, difference(rotary, motion))?;
+    let stated = if section.has(units.following) { section.positive(units.following) } else { Some(f64::INFINITY) };
+    let following = stated.map(|most| most * units.scale);
     let start = position(&section, units.start, units, &limits, 0.0);
     let home = position(&section, units.home, units, &limits, start.unwrap_or(limits.min_mm));
-    Some(Axis { letter: letter?, rotary, limits, start: start?, home: home? })
+    Some(Axis { letter: letter?, rotary, limits, following: following?, start: start?, home: home? })
 }
 
 /// The letter of an axis, upper case.

@@ -45,7 +45,7 @@ pub use error::{MachineError, Place, Problem};
 pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;
-pub use motion::{JerkMode, Motion};
+pub use motion::{FineThread, JerkMode, Motion};
 pub use parts::{GuardMode, Operator, PluginChoice, Policy, Spindle};
 pub use probe::Probe;
 pub use tools::{Tool, ToolTable};

@@ -9,7 +9,7 @@ use crate::error::{MachineError, Place};
 use crate::joints::{self, Joint};
 use crate::keys::keys;
 use crate::load::Loader;
-use crate::motion::{Loops, Motion};
+use crate::motion::{FineThread, Loops, Motion};
 use crate::node::plain;
 use crate::overrides;
 use crate::parts::{GuardMode, Operator, PluginChoice, Policy, Spindle, text};
@@ -36,12 +36,17 @@ pub struct Machine {
     pub fine_periods_per_rough: u32,
     /// Fine periods missed in a row above which the machine faults.
     pub max_missed_periods: u32,
+    /// What the fine loop's thread asks of the computer.
+    pub fine_thread: FineThread,
     /// How the machine moves where a block says nothing.
     pub motion: Motion,
     /// Axes, in the order of the file.
     pub axes: Axes,
     /// What each axis may do.
     pub limits: Limits,
+    /// Largest distance between command and feedback of each joint, mm or rad; infinite where none is stated. It is
+    /// stated for the axes, and is that of the joints where joints are axes.
+    pub max_following_error_mm: AxisVector,
     /// Where a simulated machine stands at power-on, within the travel.
     pub start: AxisVector,
     /// Reference position, within the travel.
@@ -167,7 +172,7 @@ impl Tables {
 
     fn into_machine(self, path: &Path, moving: Moving, effective: String, places: Places) -> Machine {
         let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let AxisSet { axes, limits, start, home } = moving.axes;
+        let AxisSet { axes, limits, max_following_error, start, home } = moving.axes;
         Machine {
             name: self.name.unwrap_or_else(stem),
             path: path.to_owned(),
@@ -175,9 +180,11 @@ impl Tables {
             fine_period_s: self.loops.fine_period_s,
             fine_periods_per_rough: self.loops.fine_periods_per_rough,
             max_missed_periods: self.loops.max_missed_periods,
+            fine_thread: self.loops.fine_thread,
             motion: self.motion,
             axes,
             limits,
+            max_following_error_mm: max_following_error,
             start,
             home,
             joints: moving.joints,

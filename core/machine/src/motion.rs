@@ -62,6 +62,25 @@ fn time_constant_range(motion: &Section<'_>) -> Option<(f64, f64)> {
     Some((least / 1000.0, most / 1000.0))
 }
 
+/// What the fine loop's thread asks of the computer on the wall clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FineThread {
+    /// The core it is pinned to; `None` for the last one that the process may use.
+    pub core: Option<u32>,
+    /// Its priority among `SCHED_FIFO` threads, 1 to 99.
+    pub priority: u32,
+}
+
+impl Default for FineThread {
+    /// The last core; above the usual interrupt threads (50), below the kernel's own.
+    fn default() -> Self {
+        Self { core: None, priority: 80 }
+    }
+}
+
+/// Highest number of a core: what the system's set of cores has room for.
+const LAST_CORE: u32 = 1023;
+
 /// The periods of the two loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Loops {
@@ -69,6 +88,7 @@ pub(crate) struct Loops {
     pub fine_period_s: f64,
     pub fine_periods_per_rough: u32,
     pub max_missed_periods: u32,
+    pub fine_thread: FineThread,
 }
 
 impl Loops {
@@ -77,11 +97,16 @@ impl Loops {
         let period = |key, default| if loops.has(key) { loops.positive(key) } else { Some(default) };
         let (rough, fine) = (period("rough_period_ms", 8.0), period("fine_period_ms", 1.0));
         let count = rough.zip(fine).and_then(|(rough, fine)| fine_periods(loops, rough, fine));
+        let fine_thread = FineThread {
+            core: loops.whole("fine_core", 0, LAST_CORE),
+            priority: loops.whole("fine_priority", 1, 99).unwrap_or(FineThread::default().priority),
+        };
         Self {
             rough_period_s: rough.unwrap_or(8.0) / 1000.0,
             fine_period_s: fine.unwrap_or(1.0) / 1000.0,
             fine_periods_per_rough: count.unwrap_or(1),
             max_missed_periods: loops.whole("max_missed_periods", 0, u32::MAX).unwrap_or(2),
+            fine_thread,
         }
     }
 }

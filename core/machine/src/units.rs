@@ -12,6 +12,7 @@ pub struct Units {
     pub rapid: &'static str,
     pub acceleration: &'static str,
     pub jerk: &'static str,
+    pub following: &'static str,
     /// From mm or degrees to mm or rad.
     pub scale: f64,
 }
@@ -24,6 +25,7 @@ static LINEAR: Units = Units {
     rapid: "max_rapid_mm_per_min",
     acceleration: "max_acceleration_mm_per_s2",
     jerk: "max_jerk_mm_per_s3",
+    following: "max_following_error_mm",
     scale: 1.0,
 };
 
@@ -35,6 +37,7 @@ static ROTARY: Units = Units {
     rapid: "max_rapid_deg_per_min",
     acceleration: "max_acceleration_deg_per_s2",
     jerk: "max_jerk_deg_per_s3",
+    following: "max_following_error_deg",
     scale: std::f64::consts::PI / 180.0,
 };
 
@@ -44,8 +47,8 @@ impl Units {
         if rotary { &ROTARY } else { &LINEAR }
     }
 
-    fn names(&self) -> [&'static str; 7] {
-        [self.travel, self.start, self.home, self.feed, self.rapid, self.acceleration, self.jerk]
+    fn names(&self) -> [&'static str; 8] {
+        [self.travel, self.start, self.home, self.feed, self.rapid, self.acceleration, self.jerk, self.following]
     }
 }
 

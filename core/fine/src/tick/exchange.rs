@@ -24,15 +24,28 @@ impl FineLoop {
         self.setpoint.outputs = self.outputs.bits;
         self.setpoint.spindle_rad_per_s = self.outputs.spindle_rad_per_s;
         let last = Numbers::of(&self.feedback);
-        let failed = self.driver.exchange(&self.setpoint, &mut self.feedback).is_err();
+        let failed = self.ask_driver();
         // From the first motion on the drives hold, at rest too: what let go has moved.
         let moving = matches!(self.phase, Phase::Following | Phase::Parted);
         let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
-        if let Some(kind) = fault.or_else(|| answer::reported(&self.feedback, self.joints, moving)) {
+        let reported = || answer::reported(&self.feedback, self.joints, moving);
+        let lost = || answer::following(&self.feedback, &joints, self.joints, &self.config.max_following_error_mm);
+        if let Some(kind) = fault.or_else(reported).or_else(lost) {
             self.fail(kind);
         }
         self.watch_edge();
+    }
+
+    /// Whether the exchange failed; the driver's first words about it are kept for the host.
+    fn ask_driver(&mut self) -> bool {
+        match self.driver.exchange(&self.setpoint, &mut self.feedback) {
+            Ok(()) => false,
+            Err(error) => {
+                self.driver_error.get_or_insert(error);
+                true
+            }
+        }
     }
 
     pub(super) fn drives(&self) -> Input {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use crate::common::{fixtures, read};
-use tandem_machine::{GuardMode, JerkMode, Machine, Place};
+use tandem_machine::{FineThread, GuardMode, JerkMode, Machine, Place};
 
 fn full() -> Machine {
     read(&fixtures().join("good/full.toml"), &[]).unwrap()
@@ -69,6 +69,9 @@ fn rotary_axes_are_in_radians() {
     assert!(close(c.feed_mm_per_s, PI / 3.0) && close(c.rapid_mm_per_s, 2.0 * PI / 3.0));
     assert!(close(c.acceleration_mm_per_s2, 5.0 * PI) && close(c.jerk_mm_per_s3, 100.0 * PI));
     assert!(close(c.speed_difference_mm_per_s, PI / 120.0));
+    let following = machine.max_following_error_mm;
+    assert_eq!((following[0], following[1]), (0.5, f64::INFINITY), "there is no limit where none is stated");
+    assert!(close(following[2], PI / 200.0));
 }
 
 #[test]
@@ -77,6 +80,13 @@ fn a_speed_difference_in_mm_counts_for_rotary_axes_in_degrees() {
     let motion = machine.unwrap().motion;
     assert_eq!(motion.speed_difference_mm_per_s, 3.0);
     assert!(close(motion.speed_difference_rad_per_s, PI / 60.0));
+}
+
+#[test]
+fn the_fine_thread() {
+    let machine = full();
+    assert_eq!(machine.fine_thread, FineThread { core: Some(3), priority: 70 });
+    assert_eq!(example("mill-3axis.toml").fine_thread, FineThread { core: None, priority: 80 });
 }
 
 #[test]
@@ -136,9 +146,9 @@ fn tools() {
 fn places() {
     let machine = read(&fixtures().join("good/full.toml"), &["planner.options.zeta=2"]).unwrap();
     let place = |key: &str| machine.place(key).to_string().replace(&format!("{}/", fixtures().display()), "");
-    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:23:1");
+    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:25:1");
     assert_eq!(place("axes.x.max_jerk_mm_per_s3"), "good/shared/axes.toml:9:1");
-    assert_eq!(place("planner.options.gamma"), "good/full.toml:63:10", "the table, where the key is absent");
+    assert_eq!(place("planner.options.gamma"), "good/full.toml:67:10", "the table, where the key is absent");
     assert_eq!(place("guard.severity"), "good/shared/drives.toml:10:2");
     assert_eq!(place("coolant"), "good/full.toml:1:1");
     assert_eq!(machine.place("planner.options.zeta"), Place::Override("planner.options.zeta".to_owned()));

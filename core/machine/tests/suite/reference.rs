@@ -58,7 +58,7 @@ fn every_key_of_the_examples_is_in_the_table() {
         let text = std::fs::read_to_string(file.unwrap().path()).unwrap();
         let mut paths = Vec::new();
         leaves("", &text.parse().unwrap(), &mut paths);
-        assert!(paths.len() > 5);
+        assert!(!paths.is_empty());
         for path in paths {
             assert!(keys().iter().any(|key| stands_for(key.path, &path)), "{path}");
         }
