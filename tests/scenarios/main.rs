@@ -16,6 +16,7 @@ mod hold;
 mod keys;
 mod latency;
 mod mdi;
+mod nurbs;
 mod operator;
 mod optimal_stop;
 mod overlap;

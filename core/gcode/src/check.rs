@@ -132,8 +132,7 @@ impl<'a> FirstPass<'a> {
             match item {
                 Item::Block(block) => judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)),
                 Item::Curve(owned) => {
-                    owned
-                        .with(|block| judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)));
+                    owned.with(|block| judge_block(&mut self.report, &mut self.per_block, block, (&program.name, b"")));
                 }
                 Item::Wait(_) => self.interpreter.assume_input(),
                 Item::Event(_) | Item::End => {}

@@ -4,7 +4,7 @@ use tandem_sdk::AxisVector;
 
 use super::fit::Fit;
 use super::length::Length;
-use super::{AlongPath, Nurbs};
+use super::{AlongPath, Nurbs, Piece};
 
 /// A place in an [`ArcLength`] table, kept between look-ups so that marching costs nothing to search.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,6 +36,15 @@ impl ArcLength {
     pub fn new(curve: &Nurbs) -> Self {
         let mut table = Self::empty(curve);
         while table.add_span(curve) {}
+        table
+    }
+
+    /// The table of `piece` of `curve`, with s from its start: at its ends the derivatives are those inside. Allocates.
+    pub fn of_piece(curve: &Nurbs, piece: &Piece) -> Self {
+        let mut table = Self { next_span: curve.span(piece.range.0), ..Self::empty(curve) };
+        while table.next_span < curve.points() && curve.knots()[table.next_span] < piece.range.1 {
+            table.add_span(curve);
+        }
         table
     }
 

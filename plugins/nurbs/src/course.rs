@@ -1,0 +1,96 @@
+//! The path of a block by arc length, in smooth stretches.
+
+use tandem_motion::Path;
+use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Place};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+
+/// What a block moves along: a curve, or a line or arc.
+#[derive(Clone, Debug)]
+enum Shape {
+    Path(Box<Path>),
+    Curve(Box<Nurbs>),
+}
+
+/// The path of one block, cut where it has corners.
+#[derive(Clone, Debug)]
+pub struct Course {
+    shape: Shape,
+    stretches: Vec<Stretch>,
+    end: AxisVector,
+}
+
+/// A smooth part of a course.
+#[derive(Clone, Debug)]
+pub struct Stretch {
+    /// Length, mm.
+    pub length_mm: f64,
+    table: Option<ArcLength>,
+}
+
+impl Course {
+    /// The course of `block`; `None` for rest. Called while the block is handed over: it copies the curve. Allocates.
+    ///
+    /// # Errors
+    /// A curve that is none.
+    pub fn new(axes: &Axes, block: &Block) -> Result<Option<Self>, NurbsError> {
+        let end = block.end;
+        if block.kind != BlockKind::Nurbs {
+            return Ok(Path::new(block).map(|path| {
+                let stretches = vec![Stretch { length_mm: path.length_mm(), table: None }];
+                Self { shape: Shape::Path(Box::new(path)), stretches, end }
+            }));
+        }
+        let curve = curve_of(axes, block)?;
+        let stretch = |piece: &_| {
+            let table = ArcLength::of_piece(&curve, piece);
+            Stretch { length_mm: table.length().mm, table: Some(table) }
+        };
+        let stretches = curve.pieces().iter().map(stretch).collect();
+        Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end }))
+    }
+
+    /// Its smooth stretches.
+    pub fn stretches(&self) -> &[Stretch] {
+        &self.stretches
+    }
+
+    /// Where it ends: the programmed point.
+    pub fn end(&self) -> &AxisVector {
+        &self.end
+    }
+
+    /// Position and derivatives by arc length at `s_mm` of stretch `index`. Where a curve stands still in its parameter
+    /// (a cusp) direction and curvature are zero. Does not allocate.
+    pub fn at(&self, index: usize, s_mm: f64, place: &mut Place) -> AlongPath {
+        match (&self.shape, &self.stretches[index].table) {
+            (Shape::Curve(curve), Some(table)) => table.along_path(curve, s_mm, place).unwrap_or_else(|| {
+                let position = table.position(curve, s_mm, place);
+                AlongPath { position, ..AlongPath::default() }
+            }),
+            (Shape::Path(path), _) => AlongPath {
+                position: path.position(s_mm),
+                direction: path.direction(s_mm),
+                curvature: path.curvature(s_mm),
+                ..AlongPath::default()
+            },
+            (Shape::Curve(_), None) => AlongPath::default(),
+        }
+    }
+
+    /// Length of a vector over the axes that path speed counts.
+    pub fn counted_length(&self, vector: &AxisVector) -> f64 {
+        match &self.shape {
+            Shape::Curve(curve) => curve.counted_length(vector),
+            // The derivatives of lines and arcs are by path length already.
+            Shape::Path(path) if path.is_straight() => 0.0,
+            Shape::Path(_) => vector.0.iter().map(|v| v * v).sum::<f64>().sqrt(),
+        }
+    }
+}
+
+/// The curve of `block`, checked.
+pub(crate) fn curve_of(axes: &Axes, block: &Block) -> Result<Nurbs, NurbsError> {
+    // SAFETY: the block is handed over in the call that asks, and its slices with it.
+    let data = unsafe { block.nurbs.to_data() };
+    Nurbs::new(&data, axes)
+}

@@ -1,0 +1,44 @@
+//! The planner `nurbs`: NURBS curves driven directly, slowed where a chord of the fine period would leave them.
+//!
+//! | `form` | what it keeps |
+//! |---|---|
+//! | `adaptive` | feed and chord error only, as published: acceleration and jerk break the limits |
+//!
+//! `adaptive` is the baseline that the literature compares with, after Yeh and Hsu, "Adaptive-feedrate interpolation for
+//! parametric curves with a confined chord error": in every fine period the feed is the least of the programmed one and
+//! that whose chord stays within `chord_error_um` at the curvature where the period begins. It jumps from feed to feed
+//! and starts at full feed, so it runs on simulated drives with `guard.mode = "count"` only.
+//!
+//! ```toml
+//! [planner]
+//! plugin = "nurbs"
+//! [planner.options]
+//! form = "adaptive"
+//! chord_error_um = 1
+//! ```
+//!
+//! What a form decides is a feed profile over the arc length ([`Piece`] by [`Piece`] in time); following the path at that
+//! feed is common to all of them. Lines and arcs go the same way as curves.
+
+mod adaptive;
+mod course;
+mod limit;
+mod options;
+mod piece;
+mod planner;
+
+pub use course::{Course, Stretch};
+pub use limit::chord_feed_mm_per_s;
+pub use options::{Form, Options};
+pub use piece::Piece;
+pub use planner::{BUFFER_BLOCKS, NurbsPlanner};
+
+use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind};
+
+/// The plugin as the host registers it.
+pub const PLUGIN: Plugin =
+    Plugin { name: "nurbs", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
+
+fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    Ok(Box::new(NurbsPlanner::new(&Options::parse(options)?, context)?))
+}

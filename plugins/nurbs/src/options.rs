@@ -1,0 +1,63 @@
+//! `[planner.options]` of the planner.
+
+use serde::Deserialize;
+use tandem_sdk::{PluginError, parse_options};
+
+/// What decides the feed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// As published: the chord error at the place where a fine period begins. Breaks acceleration and jerk limits.
+    Adaptive,
+}
+
+/// The options.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// What decides the feed; to be said, because the one form there is breaks limits.
+    pub form: Form,
+    /// Most that the chord of a fine period may stand off the curve, µm: 0.001 to 1000.
+    #[serde(default = "one")]
+    pub chord_error_um: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Options {
+    /// Reads and checks the TOML text of the options.
+    ///
+    /// # Errors
+    /// An unknown key or form, none, or a chord error out of range.
+    pub fn parse(text: &str) -> Result<Self, PluginError> {
+        let options: Self = parse_options(text)?;
+        // The range is asked in this form because a comparison with NaN is false.
+        if (0.001..=1000.0).contains(&options.chord_error_um) {
+            return Ok(options);
+        }
+        Err(PluginError::new(format!("options: chord_error_um = {}: must be 0.001 to 1000", options.chord_error_um)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_read_and_checked() {
+        let plain = Options::parse("form = \"adaptive\"").unwrap();
+        assert_eq!(plain, Options { form: Form::Adaptive, chord_error_um: 1.0 });
+        for (text, word) in [
+            ("", "form"),
+            ("form = \"fast\"", "fast"),
+            ("form = \"adaptive\"\nchord_error_um = 0", "chord_error_um"),
+            ("form = \"adaptive\"\nchord_error_um = nan", "chord_error_um"),
+            ("form = \"adaptive\"\nchord_error_mm = 1", "chord_error_mm"),
+        ] {
+            let message = Options::parse(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Curves end to end: read, driven by the planner that drives them, judged against a reading of the oracle's own.
+
+use tandem_oracle::Check;
+
+use crate::harness::{Scenario, root};
+
+const ADAPTIVE: [&str; 6] =
+    ["--set", "planner.plugin=nurbs", "--set", "planner.options.form=adaptive", "--set", "guard.mode=count"];
+
+/// Several curves in both dialects, a corner inside one, lines and arcs between.
+const MIXTURE: &str = "\
+F3000 G1 X10
+G5.2 P1 L4
+X12 Y0 P2
+X14 Y5
+X18 Y6
+X20 Y0 Z-1
+G5.3
+G1 X22
+G3 X24 Y2 J2
+G6.2 P3 K0
+K0 X24 Y6
+K0 X28 Y6
+K1 X28 Y3
+K1 X30 Y3 R2
+K2
+K2
+K2
+G5 X40 Y3 I3 J4 P-3 Q4
+G5 X50 Y3 I3 J-4 P-3 Q4
+G4 P0.05
+G5.1 X50 Y10 J3 I3
+G0 X0 Y0
+";
+
+#[test]
+fn curves_are_followed() {
+    let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
+    for scenario in [Scenario::of(&butterfly), Scenario::text(MIXTURE)] {
+        let done = scenario.with(&ADAPTIVE).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        let verdict = done.judge(|options| {
+            options.checks = vec![Check::EndPoint, Check::Path, Check::Vertices];
+            options.sample_tolerance_mm = Some(1e-6);
+            // Corners are passed at full feed: the chord of a period, 0.05 mm, cuts them.
+            options.vertex_tolerance_mm = Some(0.025);
+        });
+        assert!(verdict.passed(), "{verdict}");
+        assert!(done.number("max_path_deviation_mm") < 1e-6, "{}", done.number("max_path_deviation_mm"));
+    }
+}
+
+#[test]
+fn the_judge_sees_another_curve() {
+    let butterfly = std::fs::read_to_string(root().join("tests/fixtures/programs/butterfly.ngc")).unwrap();
+    let done = Scenario::text(&butterfly).with(&ADAPTIVE).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    // One weight of fifty-one a hundredth off.
+    let other = done.file("other.ngc");
+    std::fs::write(&other, butterfly.replacen("R5", "R5.05", 1)).unwrap();
+    let judged = crate::harness::judge_trace(&done.file("trace.csv"), &other, &crate::harness::mill(), |options| {
+        options.checks = vec![Check::Path];
+        options.sample_tolerance_mm = Some(1e-6);
+    });
+    assert!(!judged.passed());
+}
+
+#[test]
+fn planners_that_drive_no_curves_say_so() {
+    for set in [&[][..], &["--set", "planner.plugin=after-interpolation", "--set", "guard.mode=count"]] {
+        let refused = Scenario::text("F600 G1 X1\nG5.2\nX2\nX2 Y2\nG5.3\n").with(set).run();
+        assert_eq!(refused.status(), 1);
+        let errors = refused.errors();
+        assert!(errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"), "{errors}");
+    }
+}
+
+#[test]
+fn the_baseline_does_not_start_under_the_guard() {
+    let set = ["--set", "planner.plugin=nurbs", "--set", "planner.options.form=adaptive"];
+    let refused = Scenario::text(MIXTURE).with(&set).run();
+    assert_eq!(refused.status(), 1);
+    assert!(refused.errors().contains("guard.mode = \"count\""), "{}", refused.errors());
+}
