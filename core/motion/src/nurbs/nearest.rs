@@ -40,7 +40,7 @@ impl Nurbs {
         for step in 0..=TRIED {
             let lower = |other: Option<&f64>| other.is_none_or(|other| tried[step] <= *other);
             if lower(step.checked_sub(1).map(|before| &tried[before])) && lower(tried.get(step + 1)) {
-                let found = self.improve(point, Nearest { u: at(step), distance_mm: tried[step] });
+                let found = self.improve(span, point, Nearest { u: at(step), distance_mm: tried[step] });
                 if found.distance_mm < best.distance_mm {
                     *best = found;
                 }
@@ -48,18 +48,19 @@ impl Nurbs {
         }
     }
 
-    fn improve(&self, point: &AxisVector, mut best: Nearest) -> Nearest {
-        let (from, to) = self.range();
+    /// Improves a foot within `span`, with the derivatives inside: at a corner those behind it say nothing of it.
+    fn improve(&self, span: usize, point: &AxisVector, mut best: Nearest) -> Nearest {
+        let (from, to) = (self.knots[span], self.knots[span + 1]);
         let mut share = 1.0;
         for _ in 0..ROUNDS {
-            let at = self.derivatives(best.u);
+            let at = self.derivatives_in(span, best.u);
             let squared: f64 = at.first.0.iter().map(|v| v * v).sum();
             let along: f64 = (*point - at.position).0.iter().zip(at.first.0).map(|(a, b)| a * b).sum();
             let u = (best.u + share * along / squared).clamp(from, to);
             if !u.is_finite() || u == best.u {
                 break;
             }
-            let distance_mm = distance(point, &self.position(u));
+            let distance_mm = distance(point, &self.derivatives_in(span, u).position);
             if distance_mm < best.distance_mm {
                 best = Nearest { u, distance_mm };
             } else {

@@ -68,6 +68,20 @@ fn a_corner_inside_cuts_the_curve() {
     assert!(distance(&pieces[1].start_direction, &unit) < 1e-12);
 }
 
+/// Just before a square corner the foot lies before it, though the direction behind it says there is nothing to gain.
+#[test]
+fn the_foot_of_a_point_before_a_corner() {
+    let mut data =
+        clamped(2, &[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [4.0, 2.0, 0.0], [4.0, 0.0, 0.0], [6.0, 0.0, 0.0]], &[1.0; 5]);
+    data.knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+    let curve = curve(&data);
+    for step in 1..200 {
+        let u = f64::from(step) / 100.0;
+        let nearest = curve.nearest(&curve.position(u), 0, curve.points());
+        assert!(nearest.distance_mm < 1e-9, "{u}: {nearest:?}");
+    }
+}
+
 #[test]
 fn control_points_on_a_corner_cut_the_curve() {
     let points = [
