@@ -2,7 +2,7 @@
 
 use crate::entry::Entry;
 use crate::options::LimitMode;
-use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, largest, lesser};
+use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, lesser};
 
 /// A junction, whatever feeds meet there.
 ///
@@ -37,9 +37,8 @@ impl Corner {
         if rest {
             return blank;
         }
-        let step = after.directions[0] - before.directions[1];
-        let turn = largest(&step, &rules.per_acceleration);
-        let span_mm = if rules.controlled { span_mm(rules, before, after, &step) } else { f64::INFINITY };
+        let (turn, squares) = rules.turn(&before.directions[1], &after.directions[0]);
+        let span_mm = if rules.controlled { span_mm(rules, before, after, squares) } else { f64::INFINITY };
         if rules.limits == LimitMode::Off {
             let fastest = greater(before.feed_mm_per_s, after.feed_mm_per_s);
             let most = (span_mm / fastest / rules.tick_s + 1e-9).floor().max(1.0) * rules.tick_s;
@@ -93,9 +92,8 @@ fn cap_mm_per_s(turn: f64, room_mm: f64, longest_s: f64, bend: f64) -> f64 {
 /// The largest X = F·τ with `X·|Δu|/8 + X²·κ/64 ≤ tolerance`: the corner error, and what two blocks of the curvatures
 /// κ₁ + κ₂ = κ lose while one starts and the other ends. The second term is an upper bound: with d₁ and d₂ the distances
 /// still to go and already gone, arcs lose at most κ·d₁·d₂, and d₁·d₂ ≤ (X/8)².
-fn span_mm(rules: &Rules, before: &Entry, after: &Entry, step: &tandem_sdk::AxisVector) -> f64 {
+fn span_mm(rules: &Rules, before: &Entry, after: &Entry, squares: f64) -> f64 {
     let allowed_mm = lesser(before.tolerance_mm, after.tolerance_mm) - rules.sag_mm;
-    let squares: f64 = step.0.iter().zip(&rules.metric.0).map(|(d, m)| (d * m) * (d * m)).sum();
     let sharp = squares.sqrt() / 8.0;
     let curved = CURVED * (before.curvature_per_mm + after.curvature_per_mm) / 64.0;
     if allowed_mm <= 0.0 {

@@ -77,13 +77,13 @@ impl Drive {
         let to_next = self.next_at.map_or(f64::INFINITY, |at| at - newer.at);
         let mut ticks = lesser(lesser(left, to_next), newer.left());
         let Some(path) = ring.path(newer.number) else { return 0.0 };
-        let older = self.older.as_ref().and_then(|older| Some((older, ring.path(older.number)?)));
-        if let Some((older, older_path)) = older {
+        let older_path = self.older.as_ref().and_then(|older| ring.path(older.number));
+        if let Some((older, older_path)) = self.older.as_ref().zip(older_path) {
             ticks = older.fitted(older_path, lesser(ticks, older.left()));
         }
         ticks = newer.fitted(path, ticks);
         if ticks > SAME_TICKS {
-            self.emit(ring, ticks, sink);
+            self.emit([older_path, Some(path)], ticks, sink);
         }
         self.advance(ring, ticks, sink);
         ticks
@@ -117,12 +117,10 @@ impl Drive {
         sink.segment(&rest);
     }
 
-    fn emit(&mut self, ring: &Ring, ticks: f64, sink: &mut dyn SegmentSink) {
-        let Some(newer) = &self.newer else { return };
-        let Some(path) = ring.path(newer.number) else { return };
+    fn emit(&mut self, [older_path, path]: [Option<&Path>; 2], ticks: f64, sink: &mut dyn SegmentSink) {
+        let Some((newer, path)) = self.newer.as_ref().zip(path) else { return };
         let piece = newer.piece(ticks);
         let older = self.older.as_ref().map(|older| (older, older.piece(ticks)));
-        let older_path = self.older.as_ref().and_then(|older| ring.path(older.number));
         let segment = &mut self.segment;
         segment.duration_s = piece.duration_s;
         (segment.block, segment.line, segment.feed_mm_per_s) = (newer.index, newer.line, feed(newer));
@@ -168,20 +166,26 @@ fn flags(mover: &Mover) -> SegmentFlags {
 }
 
 /// Straight blocks: what moves adds up. What is left of the older block is negative and ends in exactly nothing.
+#[inline]
 fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_AXES]) {
-    let mut terms = [AxisVector::ZERO; 3];
-    for (index, (path, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
-        let direction = path.direction(0.0);
-        let at = path.position(piece.start_mm);
-        terms[0] += if index == 0 { at - *path.end() } else { at };
-        terms[1] += direction * piece.speed_mm_per_s;
-        terms[2] += direction * (piece.acceleration_mm_per_s2 / 2.0);
-    }
+    let [older, Some((path, piece))] = moving else { return };
+    let (start, direction) = (path.start(), path.direction(0.0));
+    let [mm, speed, half] = [piece.start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
     for (axis, c) in coefficients.iter_mut().enumerate() {
-        (c[0], c[1], c[2]) = (terms[0][axis], terms[1][axis], terms[2][axis]);
-        if clear {
-            (c[3], c[4], c[5]) = (0.0, 0.0, 0.0);
+        (c[0], c[1], c[2]) = (start[axis] + direction[axis] * mm, direction[axis] * speed, direction[axis] * half);
+    }
+    if let Some((path, piece)) = older {
+        let direction = path.direction(0.0);
+        let left_mm = path.length_mm() - piece.start_mm;
+        let [speed, half] = [piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
+        for (axis, c) in coefficients.iter_mut().enumerate() {
+            c[0] -= direction[axis] * left_mm;
+            c[1] += direction[axis] * speed;
+            c[2] += direction[axis] * half;
         }
+    }
+    if clear {
+        coefficients.iter_mut().for_each(|c| c[3..].fill(0.0));
     }
 }
 

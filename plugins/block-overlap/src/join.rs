@@ -58,8 +58,9 @@ impl Join {
         let tau_s = if rules.shorten || corner.longest_s.is_infinite() {
             let short = |i: usize| blocks[i].length_mm / feeds[i];
             let most = lesser(corner.span_mm / fastest, lesser(short(0), short(1)));
-            let wanted = greater(corner.tau_s, needed_s(corner, blocks, feeds));
-            lesser(most, if corner.longest_s.is_infinite() { wanted } else { corner.tau_s })
+            let stretched = corner.longest_s.is_infinite();
+            let needed_s = if stretched { needed_s(corner, blocks, feeds) } else { 0.0 };
+            lesser(most, greater(corner.tau_s, needed_s))
         } else {
             corner.tau_s
         };

@@ -27,6 +27,8 @@ pub struct Mover {
     pub straight: bool,
     /// Time since its start, ticks.
     pub at: f64,
+    /// The knot that comes next; 3 at the end.
+    phase: usize,
     /// Path deceleration that is left while nothing else moves, mm/s².
     pub stop_mm_per_s2: f64,
     fit: Builder,
@@ -43,8 +45,9 @@ impl Mover {
     pub fn new(rules: &Rules, entry: &Entry, taken: &Taken) -> Option<Self> {
         let path = entry.path.as_ref()?;
         let (feed, tick_s) = (taken.feed_mm_per_s, rules.tick_s);
-        let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s / tick_s, rules.grid));
-        let cruise = round(entry.length_mm / (feed * tick_s) + (up - down) / 2.0, rules.grid);
+        let per_tick = 1.0 / tick_s;
+        let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s * per_tick, rules.grid));
+        let cruise = round(entry.length_mm / feed * per_tick + (up - down) / 2.0, rules.grid);
         let slow_from = greater(up, cruise);
         let slope = entry.slope_s2_per_mm;
         Some(Self {
@@ -53,6 +56,8 @@ impl Mover {
             command_mm_per_s: entry.command_mm_per_s,
             rapid: entry.kind == BlockKind::Rapid,
             at: 0.0,
+            // A block without a ramp begins behind its first knot.
+            phase: usize::from(up <= 0.0) + usize::from(slow_from <= 0.0),
             stop_mm_per_s2: if slope > 0.0 { 1.0 / slope } else { rules.weakest_mm_per_s2 },
             number: taken.number,
             straight: path.is_straight(),
@@ -85,13 +90,13 @@ impl Mover {
 
     /// Whether it has come to its end.
     pub fn is_over(&self) -> bool {
-        self.at >= self.knots[2]
+        self.phase == 3
     }
 
     /// Ticks to where its acceleration next changes.
+    #[inline]
     pub fn left(&self) -> f64 {
-        let next = self.knots.iter().find(|knot| **knot > self.at);
-        next.map_or(0.0, |knot| knot - self.at)
+        self.knots.get(self.phase).map_or(0.0, |knot| knot - self.at)
     }
 
     /// The longest piece from here, at most `most`, that one polynomial fits, ticks.
@@ -103,25 +108,25 @@ impl Mover {
     }
 
     /// Moves on; a knot is met exactly.
+    #[inline]
     pub fn advance(&mut self, ticks: f64) {
         self.at += ticks;
-        for knot in self.knots {
-            if (self.at - knot).abs() < SAME_TICKS {
-                self.at = knot;
-            }
+        while self.phase < 3 && self.knots[self.phase] - self.at < SAME_TICKS {
+            self.at = self.knots[self.phase];
+            self.phase += 1;
         }
     }
 
     /// The motion from here on for `ticks`, up to the next knot.
     pub fn piece(&self, ticks: f64) -> SpeedPiece {
         let (at, tick_s, feed) = (self.at, self.tick_s, self.feed_mm_per_s);
-        let [up, slow_from, end] = self.knots;
+        let [up, _, end] = self.knots;
         let duration_s = ticks * tick_s;
-        if at < up {
+        if self.phase == 0 {
             let speed = self.accelerations[0] * at * tick_s;
             let start_mm = speed * at * tick_s / 2.0;
             SpeedPiece { start_mm, speed_mm_per_s: speed, acceleration_mm_per_s2: self.accelerations[0], duration_s }
-        } else if at < slow_from {
+        } else if self.phase == 1 {
             let start_mm = feed * tick_s * (at - up / 2.0);
             SpeedPiece { start_mm, speed_mm_per_s: feed, acceleration_mm_per_s2: 0.0, duration_s }
         } else {
@@ -134,7 +139,12 @@ impl Mover {
 }
 
 /// A number of ticks, without the rounding of seconds where it is whole.
+#[inline]
 fn round(ticks: f64, grid: bool) -> f64 {
+    // Rounding is a call of its own on plain x86-64.
+    if !grid {
+        return ticks;
+    }
     let whole = ticks.round();
-    if grid && (ticks - whole).abs() < 1e-7 { whole } else { ticks }
+    if (ticks - whole).abs() < 1e-7 { whole } else { ticks }
 }

@@ -33,6 +33,9 @@ pub struct BlockOverlap {
     start_mm_per_s: f64,
     /// Time constant of the last block with motion, s: the next one speeds up with it.
     last_tau_s: f64,
+    /// The time constant last stated, and the same on a tick, s.
+    stated_s: f64,
+    on_tick_s: f64,
     finished: bool,
 }
 
@@ -60,14 +63,20 @@ impl BlockOverlap {
             dwell: None,
             start_mm_per_s: 0.0,
             last_tau_s: tau_s,
+            stated_s: context.time_constant_s,
+            on_tick_s: tau_s,
             finished: false,
         })
     }
 
-    /// The time constant of a block, on a tick, s.
-    fn tau_s(&self, block: &Block) -> f64 {
+    /// The time constant of a block, on a tick, s. Most blocks state the one of the block before.
+    fn tau_s(&mut self, block: &Block) -> f64 {
         let stated = block.time_constant_s;
-        self.rules.on_tick_s(if stated.is_nan() { self.context.time_constant_s } else { stated })
+        let stated_s = if stated.is_nan() { self.context.time_constant_s } else { stated };
+        if stated_s != self.stated_s {
+            (self.stated_s, self.on_tick_s) = (stated_s, self.rules.on_tick_s(stated_s));
+        }
+        self.on_tick_s
     }
 
     /// Takes the next block out of the buffer; `false` where there is none.
@@ -161,7 +170,8 @@ impl Planner for BlockOverlap {
         }
         self.check(block)?;
         self.finished = false;
-        let (taus_s, rules) = ([self.last_tau_s, self.tau_s(block)], &self.rules);
+        let taus_s = [self.last_tau_s, self.tau_s(block)];
+        let rules = &self.rules;
         self.buffer.push(rules, |entry| entry.set(block, rules, taus_s));
         if block.kind != BlockKind::Dwell {
             self.last_tau_s = taus_s[1];

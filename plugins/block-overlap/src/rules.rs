@@ -28,6 +28,8 @@ pub struct Rules {
     pub shorten: bool,
     /// Knots lie on ticks: the published rounding.
     pub grid: bool,
+    /// Number of axes.
+    pub axes: usize,
     /// Per axis 1/acceleration, s²/mm; zero where limits are off.
     pub per_acceleration: AxisVector,
     /// Highest axis speeds in feed and in rapid motion, mm/s.
@@ -61,6 +63,7 @@ impl Rules {
         let tick_s = context.fine_period_s;
         Self {
             controlled,
+            axes: axes.len().min(MAX_AXES),
             limits: options.limits,
             shorten: controlled && !unlimited,
             grid: !controlled || unlimited,
@@ -73,6 +76,20 @@ impl Rules {
             tolerance_mm: context.path_tolerance_mm,
             feed_ratio: context.max_feed_ratio,
         }
+    }
+
+    /// Between two directions: the largest |Δu|/acceleration of an axis, s²/mm, and |Δu|² in the metric of deviations. Over
+    /// the axes that there are: one after the other they are added up, and each costs its time.
+    #[inline]
+    pub fn turn(&self, from: &AxisVector, to: &AxisVector) -> (f64, f64) {
+        let (mut most, mut squares) = (0.0, 0.0);
+        for axis in 0..self.axes {
+            let step = to[axis] - from[axis];
+            most = greater(most, (step * self.per_acceleration[axis]).abs());
+            let off = step * self.metric[axis];
+            squares += off * off;
+        }
+        (most, squares)
     }
 
     /// The nearest whole number of ticks, at least one, s.
