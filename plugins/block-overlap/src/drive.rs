@@ -185,7 +185,9 @@ fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_
         }
     }
     if clear {
-        coefficients.iter_mut().for_each(|c| c[3..].fill(0.0));
+        for c in coefficients.iter_mut() {
+            c[3..].fill(0.0);
+        }
     }
 }
 
