@@ -23,6 +23,17 @@ pub struct Length {
     pub error_mm: f64,
 }
 
+/// How far a span has been halved.
+#[derive(Clone, Copy)]
+struct Halving {
+    /// Length of the whole part, mm: what the accuracy is relative to.
+    scale_mm: f64,
+    /// Halvings left.
+    left: u32,
+    /// The rule agreed with its halves one step before.
+    agreed: bool,
+}
+
 impl Nurbs {
     /// Length of the whole curve. Does not allocate.
     pub fn length(&self) -> Length {
@@ -34,25 +45,28 @@ impl Nurbs {
         sum
     }
 
-    /// Length of the piece on `span` between two parameters, halved until rule and halves agree to 1e-13. Does not
-    /// allocate.
+    /// Length of the piece on `span` between two parameters, halved until rule and halves agree to 1e-13, and
+    /// the halves with theirs: once alone the errors of two halves can cancel. Does not allocate.
     pub fn length_in(&self, span: usize, from: f64, to: f64) -> Length {
         if to <= from {
             return Length::default();
         }
         let whole = self.gauss(span, from, to);
-        self.refine(span, (from, to), whole, whole.max(1e-3), MAX_HALVINGS)
+        let halving = Halving { scale_mm: whole.max(1e-3), left: MAX_HALVINGS, agreed: false };
+        self.refine(span, (from, to), whole, halving)
     }
 
-    fn refine(&self, span: usize, (from, to): (f64, f64), whole: f64, scale_mm: f64, halvings: u32) -> Length {
+    fn refine(&self, span: usize, (from, to): (f64, f64), whole: f64, halving: Halving) -> Length {
         let middle = 0.5 * (from + to);
         let (left, right) = (self.gauss(span, from, middle), self.gauss(span, middle, to));
         let error_mm = (left + right - whole).abs();
-        if error_mm <= RELATIVE * scale_mm || halvings == 0 || middle <= from || middle >= to {
+        let agrees = error_mm <= RELATIVE * halving.scale_mm;
+        if agrees && halving.agreed || halving.left == 0 || middle <= from || middle >= to {
             return Length { mm: left + right, error_mm };
         }
-        let first = self.refine(span, (from, middle), left, scale_mm, halvings - 1);
-        let second = self.refine(span, (middle, to), right, scale_mm, halvings - 1);
+        let next = Halving { left: halving.left - 1, agreed: agrees, ..halving };
+        let first = self.refine(span, (from, middle), left, next);
+        let second = self.refine(span, (middle, to), right, next);
         Length { mm: first.mm + second.mm, error_mm: first.error_mm + second.error_mm }
     }
 
