@@ -13,6 +13,7 @@ mod faults;
 mod following;
 mod harness;
 mod hold;
+mod homing;
 mod keys;
 mod latency;
 mod mdi;

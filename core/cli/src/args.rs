@@ -25,6 +25,8 @@ pub enum Command {
     Check(Check),
     /// Take lines of G-code from the keyboard or a pipe, each from where the machine stands
     Mdi(Box<Mdi>),
+    /// Home the axes, as the machine file says
+    Home(Home),
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
@@ -54,6 +56,9 @@ pub struct Run {
     /// The clock that drives the loops
     #[arg(long, default_value = "virtual")]
     pub clock: Clock,
+    /// Home the axes first, as the machine file says
+    #[arg(long)]
+    pub home: bool,
     /// Wait for Enter at M0, M1 and M6 instead of logging them
     #[arg(long)]
     pub pause: bool,
@@ -102,6 +107,9 @@ pub struct Mdi {
     /// The clock that drives the loops
     #[arg(long, default_value = "wall")]
     pub clock: Clock,
+    /// Home the axes first, and after every fault, as the machine file says
+    #[arg(long)]
+    pub home: bool,
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format
@@ -115,6 +123,24 @@ pub struct Check {
     pub program: PathBuf,
     #[command(flatten)]
     pub machine: Machine,
+}
+
+#[derive(Group)]
+pub struct Home {
+    #[command(flatten)]
+    pub machine: Machine,
+    /// Home this axis only
+    #[arg(long, value_name = "LETTER")]
+    pub axis: Option<char>,
+    /// The clock that drives the loops
+    #[arg(long, default_value = "virtual")]
+    pub clock: Clock,
+    /// Write every sample, in the coordinates of the drives
+    #[arg(long, value_name = "F.csv|F.ttr")]
+    pub trace: Option<PathBuf>,
+    /// Draw the motion, in the coordinates of the drives
+    #[arg(long, value_name = "F.html")]
+    pub report: Option<PathBuf>,
 }
 
 #[derive(Group)]
@@ -175,6 +201,15 @@ impl Operator {
     /// Whether no client can come.
     pub fn is_nowhere(&self) -> bool {
         self.listen.is_none() && self.listen_tcp.is_none()
+    }
+}
+
+impl From<Clock> for tandem_host::Clock {
+    fn from(clock: Clock) -> Self {
+        match clock {
+            Clock::Virtual => Self::Virtual,
+            Clock::Wall => Self::Wall,
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod args;
 mod built_in;
 mod check;
 mod corners;
+mod home;
 mod latency;
 mod mdi;
 mod operator;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Command::Run(options) => run::run(&options),
         Command::Mdi(options) => mdi::mdi(&options),
         Command::Check(options) => check::check(&options),
+        Command::Home(options) => home::home(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Latency(options) => latency::latency(&options),
     };

@@ -11,6 +11,7 @@ use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
+use crate::home::Corrections;
 use crate::operator::{Keyboard, Operator, Presence};
 use crate::progress::Progress;
 use crate::report::Collector;
@@ -31,10 +32,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         }
         other => other?,
     };
-    let clock = match options.clock {
-        args::Clock::Virtual => Clock::Virtual,
-        args::Clock::Wall => Clock::Wall,
-    };
+    let clock = options.clock.into();
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
@@ -57,6 +55,7 @@ fn switches(options: &args::Run, keys: bool) -> Switches {
         pause_at_stops: options.pause || (attended && !options.dry),
         optional_stop: options.pause || options.optional_stop,
         dry_run: options.dry,
+        home: options.home,
     }
 }
 
@@ -109,6 +108,7 @@ struct Sinks {
     told_of_time_constant: bool,
     switches: Switches,
     operator: Operator,
+    homed: Corrections,
     progress: Progress,
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
@@ -130,6 +130,7 @@ impl Sinks {
             told_of_time_constant: false,
             switches: switches(options, keys),
             operator: Operator::begin(&options.operator, machine, run, presence)?,
+            homed: Corrections::new(machine),
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
@@ -164,6 +165,7 @@ impl RunObserver for Sinks {
     }
 
     fn event(&mut self, event: &Event) {
+        self.homed.event(event);
         let Some(word) = stop_word(event.kind) else { return };
         let (line, switches) = (event.line, &self.switches);
         let waits =

@@ -131,6 +131,8 @@ fn config(order: u32) -> FineConfig {
         max_following_error_mm: AxisVector([f64::INFINITY; 8]),
         pause_at_stops: false,
         dry_run: false,
+        unhomed: 0,
+        record_drives: false,
     }
 }
 

@@ -35,6 +35,11 @@ pub struct FineConfig {
     pub pause_at_stops: bool,
     /// Spindle, coolant and user outputs are not switched, and nothing waits for the operator.
     pub dry_run: bool,
+    /// Bit per axis that is to be homed first: its travel does not count until then, and no sample is published before
+    /// all of them are homed.
+    pub unhomed: u32,
+    /// Samples are published from the start, and in the coordinates of the drives: a record of homing itself.
+    pub record_drives: bool,
 }
 
 impl FineConfig {

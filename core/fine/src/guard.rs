@@ -63,12 +63,18 @@ impl Guard {
         self.relaxed = RELAXED_SAMPLES;
     }
 
-    /// Judges `next` as the sample after the last one sent.
-    pub fn check(&self, next: &AxisVector) -> Checked {
+    /// Calls the place where the machine rests otherwise: `by` is added to the last position sent.
+    pub fn correct(&mut self, by: &AxisVector) {
+        self.position += *by;
+    }
+
+    /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
+    pub fn check(&self, next: &AxisVector, unhomed: u32) -> Checked {
         let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
         let mut checked = Checked { velocity, acceleration, buckets: self.buckets, breach: None };
         for axis in 0..self.config.axis_count() {
-            let breach = self.check_axis(axis, next[axis], &mut checked);
+            let travels = unhomed >> axis & 1 == 0;
+            let breach = self.check_axis(axis, next[axis], travels, &mut checked);
             checked.breach = checked.breach.or(breach);
         }
         checked
@@ -82,7 +88,7 @@ impl Guard {
         self.buckets = checked.buckets;
     }
 
-    fn check_axis(&self, axis: usize, next: f64, checked: &mut Checked) -> Option<FaultKind> {
+    fn check_axis(&self, axis: usize, next: f64, travels: bool, checked: &mut Checked) -> Option<FaultKind> {
         let limits = &self.config.limits.axes[axis];
         let period_s = self.config.period_s;
         // Each velocity is a difference of two positions that are known to half a unit in the last place.
@@ -100,7 +106,7 @@ impl Guard {
         if !next.is_finite() {
             return breach(Breach::NotFinite, next, 0.0);
         }
-        if next < limits.min_mm - rounding || next > limits.max_mm + rounding {
+        if travels && (next < limits.min_mm - rounding || next > limits.max_mm + rounding) {
             let nearest = if next < limits.min_mm { limits.min_mm } else { limits.max_mm };
             return breach(Breach::Position, next, nearest);
         }

@@ -1,6 +1,6 @@
 //! What events switch: outputs, spindle, permissions. They travel to the drives with the setpoint.
 
-use tandem_sdk::{Event, EventKind};
+use tandem_sdk::{AxisVector, Event, EventKind, MAX_AXES};
 
 /// Number of the output that stands for mist coolant; user outputs are 0 to 61.
 pub const MIST: u32 = 62;
@@ -32,13 +32,17 @@ pub struct Outputs {
     pub ended: bool,
     /// The program asks to wait for the operator.
     pub stop_requested: bool,
+    /// Axes are to be called otherwise: what is added to their coordinates, mm or rad.
+    pub correction: Option<AxisVector>,
+    /// Bit per axis that is not homed.
+    pub unhomed: u32,
     /// Spindle, coolant and user outputs stay as they are.
     dry_run: bool,
 }
 
 impl Outputs {
-    /// All off, all permitted.
-    pub fn new(dry_run: bool) -> Self {
+    /// All off, all permitted; `unhomed` are the axes to home.
+    pub fn new(dry_run: bool, unhomed: u32) -> Self {
         Self {
             bits: 0,
             spindle_rad_per_s: 0.0,
@@ -46,6 +50,8 @@ impl Outputs {
             adaptive_permitted: true,
             ended: false,
             stop_requested: false,
+            correction: None,
+            unhomed,
             dry_run,
         }
     }
@@ -64,6 +70,11 @@ impl Outputs {
             EventKind::ProgramStop | EventKind::ToolChange => self.stop_requested |= waits.program,
             EventKind::OptionalStop => self.stop_requested |= waits.optional,
             EventKind::ProgramEnd => self.ended = true,
+            EventKind::Correct => {
+                let axis = (event.index.unsigned_abs() as usize).min(MAX_AXES - 1);
+                self.correction.get_or_insert(AxisVector::ZERO)[axis] += event.value;
+            }
+            EventKind::Homed => self.unhomed &= !(1 << event.index.clamp(0, 31)),
             EventKind::ToolSelect | EventKind::SpindleOverride | EventKind::FeedHold => {}
         }
     }
@@ -74,6 +85,7 @@ impl Outputs {
         self.switch(MIST, false);
         self.switch(FLOOD, false);
         self.stop_requested = false;
+        self.correction = None;
     }
 
     fn switch(&mut self, output: u32, on: bool) {
@@ -88,7 +100,7 @@ mod tests {
     #[test]
     fn an_abort_leaves_user_outputs_and_nothing_else() {
         let waits = Waits { program: true, optional: true };
-        let mut outputs = Outputs::new(false);
+        let mut outputs = Outputs::new(false, 0);
         for (kind, index) in [(EventKind::Spindle, 0), (EventKind::Mist, 0), (EventKind::Flood, 0)] {
             outputs.apply(&Event::new(kind, 1, 0, index, 30.0), waits);
         }
@@ -99,8 +111,19 @@ mod tests {
     }
 
     #[test]
+    fn homing_corrects_an_axis_and_counts_down_to_none() {
+        let mut outputs = Outputs::new(true, 0b101);
+        outputs.apply(&Event::new(EventKind::Correct, 0, 0, 2, -3.5), Waits::default());
+        assert_eq!(outputs.correction.map(|by| (by[0], by[2])), Some((0.0, -3.5)));
+        outputs.apply(&Event::new(EventKind::Homed, 0, 0, 2, 0.0), Waits::default());
+        assert_eq!(outputs.unhomed, 0b001);
+        outputs.abort();
+        assert_eq!((outputs.correction, outputs.unhomed), (None, 0b001));
+    }
+
+    #[test]
     fn a_dry_run_switches_nothing() {
-        let mut outputs = Outputs::new(true);
+        let mut outputs = Outputs::new(true, 0);
         for kind in [EventKind::Spindle, EventKind::Mist, EventKind::Flood, EventKind::DigitalOutput] {
             outputs.apply(&Event::new(kind, 1, 0, 7, 30.0), Waits::default());
         }
@@ -116,7 +139,7 @@ mod tests {
             (EventKind::OptionalStop, Waits { program: false, optional: true }),
         ] {
             let stops = |waits| {
-                let mut outputs = Outputs::new(false);
+                let mut outputs = Outputs::new(false, 0);
                 outputs.apply(&Event::new(kind, 1, 0, 0, 0.0), waits);
                 outputs.stop_requested
             };

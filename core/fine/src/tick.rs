@@ -89,6 +89,8 @@ pub struct FineLoop {
     line_moves: bool,
     governor: Governor,
     guard: Guard,
+    /// What the drives are sent beyond the axes' coordinates: homing has found it, mm or rad per joint.
+    offset: AxisVector,
     edge: EdgeWatch,
     stop: Option<Stop>,
     outputs: Outputs,
@@ -137,9 +139,10 @@ impl FineLoop {
             line_moves: false,
             governor: Governor::new(limits, axes, config.period_s),
             guard: Guard::new(config),
+            offset: AxisVector::ZERO,
             edge: EdgeWatch::default(),
             stop: None,
-            outputs: Outputs::new(config.dry_run),
+            outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
             state: MachineState::Fault,
             starved: false,
@@ -165,7 +168,8 @@ impl FineLoop {
         self.exchange(&position);
         self.state = state::next(state::next(self.state, self.drives()), input);
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
-        if started && !ended && !self.outputs.ended {
+        let recorded = self.outputs.unhomed == 0 || self.config.record_drives;
+        if started && recorded && !ended && !self.outputs.ended {
             let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
         }
@@ -256,7 +260,7 @@ impl FineLoop {
     }
 
     fn ramp_out(&mut self, position: AxisVector, over: bool) -> AxisVector {
-        let checked = self.guard.check(&position);
+        let checked = self.guard.check(&position, self.outputs.unhomed);
         self.guard.sent(&position, &checked);
         if over {
             self.driver.quick_stop();

@@ -9,6 +9,7 @@ mod dry_run;
 mod error;
 mod fault_text;
 mod faults;
+mod homing;
 mod lateness;
 mod manual;
 mod monitor;

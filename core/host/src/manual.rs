@@ -180,10 +180,11 @@ impl Source for Lines {
     /// Also after an abort the session goes on, from where the machine stands.
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         let mut manual = lock(&self.0);
-        if rest.cause == RestCause::Abort {
-            manual.interpreter.set_position(rest.position);
-        } else {
-            manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+        match rest.cause {
+            RestCause::Abort | RestCause::Corrected => manual.interpreter.set_position(rest.position),
+            RestCause::Edge | RestCause::Missed | RestCause::Already => {
+                manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+            }
         }
         manual.standing = 0;
         true

@@ -68,6 +68,8 @@ pub struct Pump<'a> {
     soft_error: Option<String>,
     /// The rest of the operator's abort.
     pub aborted: Option<Rest>,
+    /// Moves of homing, which have no program line, are neither counted nor recorded.
+    pub skips_homing: bool,
     commands: CommandLog,
     pub planning_ns: u128,
 }
@@ -81,7 +83,18 @@ impl<'a> Pump<'a> {
         observer: &'a mut dyn RunObserver,
     ) -> Self {
         let commands = CommandLog::new(Given::of(&host.controls));
-        Self { rough, host, strategy, monitor, observer, soft_error: None, aborted: None, commands, planning_ns: 0 }
+        Self {
+            rough,
+            host,
+            strategy,
+            monitor,
+            observer,
+            soft_error: None,
+            aborted: None,
+            skips_homing: false,
+            commands,
+            planning_ns: 0,
+        }
     }
 
     /// One rough period.
@@ -90,7 +103,8 @@ impl<'a> Pump<'a> {
             return;
         }
         let started = Instant::now();
-        let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted: &mut self.aborted };
+        let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
+        let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
         if let Err(error) = self.rough.step(&mut both) {
             self.fail(error.to_string());
         }
@@ -179,10 +193,14 @@ struct Both<'a> {
     monitor: &'a mut Monitor,
     observer: &'a mut dyn RunObserver,
     aborted: &'a mut Option<Rest>,
+    skips_homing: bool,
 }
 
 impl Observer for Both<'_> {
     fn block(&mut self, block: &Block, report: &BlockReport) {
+        if self.skips_homing && block.line == 0 {
+            return;
+        }
         self.monitor.block(block, report);
         self.observer.block(block, report);
     }

@@ -163,6 +163,8 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         max_following_error_mm: AxisVector([f64::INFINITY; 8]),
         pause_at_stops: false,
         dry_run: false,
+        unhomed: 0,
+        record_drives: false,
     };
     let (rough, end, host) = bridge(Sizes { segments: 16, samples: 256 });
     let mut driver = tandem_sim::SimulatedDrives::new(tandem_sim::Options::default());

@@ -4,6 +4,7 @@ use tandem_machine::{GuardMode, JerkMode, Machine, Place};
 use tandem_sdk::{DriverDescription, PlannerDescription};
 
 use crate::error::HostError;
+use crate::run::Switches;
 
 /// Checks planner, driver and guard against each other.
 pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDescription) -> Result<(), HostError> {
@@ -47,6 +48,21 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
             "the machine states a jerk limit and {name} keeps none; with motion.jerk = \"report\" it is only reported"
         );
         return refuse("planner.plugin", cause);
+    }
+    Ok(())
+}
+
+/// Checks what homing asks of the machine, and what the machine asks of homing.
+pub fn check_homing(machine: &Machine, switches: Switches) -> Result<(), HostError> {
+    let refuse = |key: &str, cause: &str| Err(refusal(machine, key, cause));
+    if switches.home && machine.homing.is_empty() {
+        return refuse("homing", "no axis has a [homing.<axis>] table: there is nothing to home");
+    }
+    if switches.home && machine.kinematics.plugin != "identity" {
+        return refuse("kinematics.plugin", "homing is supported where the joints are the axes, and not with gantries");
+    }
+    if machine.require_homing && !switches.home && !machine.homing.is_empty() {
+        return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");
     }
     Ok(())
 }

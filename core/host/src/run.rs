@@ -13,6 +13,7 @@ use tandem_sdk::{AxisVector, Block, Driver, Planner};
 use crate::command::Timed;
 use crate::error::HostError;
 use crate::fault_text::describe;
+use crate::homing::Homing;
 use crate::monitor::Monitor;
 use crate::pump::{Pump, RunObserver};
 use crate::registry::Registry;
@@ -43,6 +44,8 @@ pub struct Switches {
     /// No spindle, coolant or user output is switched, nothing waits for the operator, and feed motion runs at the
     /// machine's dry-run feed.
     pub dry_run: bool,
+    /// The axes that the machine file tells how to are homed before the program.
+    pub home: bool,
 }
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
@@ -119,6 +122,7 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
+        rules::check_homing(&machine, switches)?;
         let checked = first_pass(&machine, planner.as_ref(), &mut program, switches)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
@@ -126,7 +130,7 @@ impl Run {
         let name = program.name().to_string();
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
         let source = setup::source(&machine, stream, switches);
-        Self::assemble(machine, registry, name, source, planner, driver, checked, switches)
+        Self::assemble(machine, registry, Some(name), source, planner, driver, checked, switches)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -140,14 +144,32 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        Self::assemble(machine, registry, name, source, planner, driver, CheckReport::default(), switches)
+        rules::check_homing(&machine, switches)?;
+        let source = setup::behind_homing(&machine, source, switches);
+        Self::assemble(machine, registry, Some(name), source, planner, driver, CheckReport::default(), switches)
+    }
+
+    /// A run that homes the axes of [`Machine::homing`] and nothing else. Its samples are in the coordinates of the
+    /// drives, which homing does not change.
+    ///
+    /// # Errors
+    /// Everything that refuses: plugins, what does not go together.
+    pub fn home(machine: Machine, registry: &Registry) -> Result<Self, HostError> {
+        let switches = Switches { home: true, ..Switches::default() };
+        let planner = setup::planner(&machine, registry)?;
+        let driver = setup::driver(&machine, registry)?;
+        rules::check(&machine, &planner.describe(), driver.describe())?;
+        rules::check_homing(&machine, switches)?;
+        let source = Box::new(Homing::new(&machine, &machine.homing, None));
+        let checked = CheckReport::default();
+        Self::assemble(machine, registry, None, source, planner, driver, checked, switches)
     }
 
     #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
     fn assemble(
         machine: Machine,
         registry: &Registry,
-        program: String,
+        program: Option<String>,
         source: Box<dyn Source + Send>,
         planner: Box<dyn Planner>,
         mut driver: Box<dyn Driver>,
@@ -162,7 +184,8 @@ impl Run {
         setup::open(&machine, driver.as_mut(), joints)?;
         let (rough_end, fine_end, host) = bridge(Sizes::default());
         let description = planner.describe();
-        let fine_config = setup::fine_config(&machine, &description, switches);
+        let mut fine_config = setup::fine_config(&machine, &description, switches);
+        fine_config.record_drives = program.is_none();
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let rough_config = RoughConfig::new(machine.rough_period_s);
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
@@ -171,7 +194,7 @@ impl Run {
             rough: RoughLoop::new(rough_config, source, planner, rough_end),
             fine,
             machine,
-            program,
+            program: program.unwrap_or_else(|| HOMING.to_string()),
             host,
             strategy,
             switches,
@@ -211,6 +234,7 @@ impl Run {
         let mut fine = self.fine;
         let monitor = Monitor::new(&machine, self.leaves_path);
         let mut pump = Pump::new(self.rough, self.host, self.strategy, monitor, observer);
+        pump.skips_homing = self.switches.home;
         let mut measured = None;
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
@@ -236,6 +260,9 @@ impl Run {
         Ok(Outcome { summary, fault, position })
     }
 }
+
+/// What stands for the name of a program in a run that only homes.
+const HOMING: &str = "(homing)";
 
 fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
     let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;

@@ -5,11 +5,13 @@ use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rough::Source;
 use tandem_sdk::{
-    Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext, size_of_contract,
+    AxisVector, Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext,
+    size_of_contract,
 };
 
 use crate::dry_run::DryRun;
 use crate::error::HostError;
+use crate::homing::Homing;
 use crate::registry::Registry;
 use crate::rules::refusal;
 use crate::run::Switches;
@@ -21,7 +23,7 @@ const MOST_TIME_CONSTANT_S: f64 = 1.0;
 /// The interpreter's view of the machine.
 pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     let mut config = Config::new(machine.axes);
-    config.start = machine.start;
+    config.start = start(machine, switches);
     config.block_delete = switches.block_delete;
     config.reference = [machine.home; 2];
     config.time_constant_s =
@@ -34,8 +36,27 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     config
 }
 
-/// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
+/// Where the program starts: axes that are homed before it are at home.
+fn start(machine: &Machine, switches: Switches) -> AxisVector {
+    let mut start = machine.start;
+    for homing in machine.homing.iter().filter(|_| switches.home) {
+        start[homing.axis] = machine.home[homing.axis];
+    }
+    start
+}
+
+/// What the rough loop pulls: the program, behind homing where that is asked for.
 pub fn source(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
+    behind_homing(machine, program(machine, stream, switches), switches)
+}
+
+/// `source`, behind homing where that is asked for.
+pub fn behind_homing(machine: &Machine, source: Box<dyn Source + Send>, switches: Switches) -> Box<dyn Source + Send> {
+    if switches.home { Box::new(Homing::new(machine, &machine.homing, Some(source))) } else { source }
+}
+
+/// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
+fn program(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
     match machine.operator.dry_run_feed_mm_per_s.filter(|_| switches.dry_run) {
         Some(feed_mm_per_s) => Box::new(DryRun::new(stream, machine.axes, feed_mm_per_s)),
         None => Box::new(stream),
@@ -119,5 +140,7 @@ pub fn fine_config(machine: &Machine, planner: &PlannerDescription, switches: Sw
         max_following_error_mm: machine.max_following_error_mm,
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
+        unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },
+        record_drives: false,
     }
 }

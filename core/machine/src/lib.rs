@@ -20,6 +20,7 @@
 mod axes;
 mod convert;
 mod error;
+mod homing;
 mod joints;
 mod keys;
 mod limits;
@@ -42,6 +43,7 @@ mod units;
 mod values;
 
 pub use error::{MachineError, Place, Problem};
+pub use homing::AxisHoming;
 pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;

@@ -6,6 +6,7 @@ use tandem_sdk::{Axes, AxisVector, Limits};
 
 use crate::axes::AxisSet;
 use crate::error::{MachineError, Place};
+use crate::homing::{self, AxisHoming};
 use crate::joints::{self, Joint};
 use crate::keys::keys;
 use crate::load::Loader;
@@ -69,6 +70,10 @@ pub struct Machine {
     pub policy: Option<Policy>,
     /// What the spindle may do.
     pub spindle: Spindle,
+    /// How axes find their place, in the order in which they do; axes that are not in it know theirs.
+    pub homing: Vec<AxisHoming>,
+    /// A program is refused where they have not.
+    pub require_homing: bool,
     /// The probe, if there is one.
     pub probe: Option<Probe>,
     /// What the operator's switches mean.
@@ -120,6 +125,7 @@ impl Machine {
 struct Moving {
     axes: AxisSet,
     joints: Vec<Joint>,
+    homing: Vec<AxisHoming>,
     tools: ToolTable,
 }
 
@@ -127,13 +133,19 @@ impl Moving {
     fn read(root: &Section<'_>, axes: AxisSet, problems: &Problems) -> Self {
         let tools = Some(root.section("tools")).filter(Section::exists);
         let tools = tools.and_then(|section| ToolTable::read(&section, &axes.axes, problems));
-        Self { joints: joints::read(root, &axes), tools: tools.unwrap_or_default(), axes }
+        Self {
+            joints: joints::read(root, &axes),
+            homing: homing::read(root, &axes),
+            tools: tools.unwrap_or_default(),
+            axes,
+        }
     }
 }
 
 /// What the other tables say. Where one is wrong, which is reported, something stands in for it.
 struct Tables {
     name: Option<String>,
+    require_homing: bool,
     loops: Loops,
     motion: Motion,
     kinematics: PluginChoice,
@@ -155,6 +167,7 @@ impl Tables {
         let kinematics = optional("kinematics").and_then(|s| PluginChoice::read(&s));
         Self {
             name: root.section("machine").text("name").map(str::to_owned),
+            require_homing: root.section("machine").truth("require_homing").unwrap_or(false),
             loops: Loops::read(&root.section("loops")),
             motion: Motion::read(&root.section("motion")),
             kinematics: kinematics.unwrap_or_else(|| PluginChoice::named("identity")),
@@ -188,6 +201,8 @@ impl Tables {
             start,
             home,
             joints: moving.joints,
+            homing: moving.homing,
+            require_homing: self.require_homing,
             kinematics: self.kinematics,
             planner: self.planner,
             feed_strategy: self.feed_strategy,

@@ -13,6 +13,8 @@ pub enum RestCause {
     Already,
     /// The operator's abort.
     Abort,
+    /// An axis is called otherwise from here on ([`tandem_sdk::EventKind::Correct`]); nothing has moved.
+    Corrected,
 }
 
 /// A rest that ends an epoch. The fine loop drops everything queued behind it and moves again with entries of the next

@@ -22,8 +22,8 @@ pub trait Source {
     fn provide_input(&mut self, value: f64);
 
     /// The machine rests at `rest.position`, before the end of what was planned: behind an edge that a block waited for
-    /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), or after the operator's abort. The
-    /// next block starts there. Whether the stream goes on; where not, the program is over.
+    /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), or after the operator's abort; or
+    /// it is called otherwise (homing). The next block starts there. Whether the stream goes on; where not, the program is over.
     fn provide_rest(&mut self, rest: &Rest) -> bool;
 }
 
@@ -37,11 +37,12 @@ impl Source for Stream {
     }
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
-        if rest.cause == RestCause::Abort {
-            self.set_position(rest.position);
-            return false;
+        match rest.cause {
+            RestCause::Abort | RestCause::Corrected => self.set_position(rest.position),
+            RestCause::Edge | RestCause::Missed | RestCause::Already => {
+                self.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+            }
         }
-        self.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
-        true
+        rest.cause != RestCause::Abort
     }
 }

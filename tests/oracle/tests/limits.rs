@@ -166,3 +166,18 @@ fn a_dropped_row_and_a_number_that_is_none_are_found() {
     assert_finds(&verdict, &[Kind::NotFinite]);
     assert_eq!((verdict.findings[0].sample, verdict.findings[0].axis), (7, Some(1)));
 }
+
+#[test]
+fn a_record_begins_at_zero_or_behind_homing() {
+    let begin = |line: u32, ticks: f64| {
+        let mut samples = trace(&line_run(50.0, 1000.0));
+        for row in &mut samples.rows {
+            row.t_s += ticks * common::PERIOD_S;
+        }
+        samples.rows[0].line = line;
+        judge(&samples, LINE, &smooth_machine(), &Options::default())
+    };
+    assert_passes(&begin(0, 7000.0));
+    assert_finds(&begin(1, 7000.0), &[Kind::Period]);
+    assert_finds(&begin(0, 7000.5), &[Kind::Period]);
+}

@@ -26,8 +26,12 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     let real_time = options.clock == args::Clock::Wall;
     let keys = real_time && is_on_terminal();
     let attended = keys || (real_time && !options.operator.is_nowhere());
-    let switches =
-        Switches { block_delete: options.machine.block_delete, pause_at_stops: attended, ..Switches::default() };
+    let switches = Switches {
+        block_delete: options.machine.block_delete,
+        pause_at_stops: attended,
+        home: options.home,
+        ..Switches::default()
+    };
     let shared = Arc::new(Shared::new(real_time, keys));
     let conversation = Conversation::new(Arc::clone(&shared), machine.axes);
     let mut session = Session::new(machine.clone(), &registry, switches, Box::new(conversation))?;

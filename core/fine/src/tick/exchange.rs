@@ -12,7 +12,7 @@ use crate::state::Input;
 
 impl FineLoop {
     pub(super) fn exchange(&mut self, axes: &AxisVector) {
-        let joints = self.kinematics.as_ref().map_or(*axes, |k| k.to_joints(axes));
+        let joints = self.kinematics.as_ref().map_or(*axes, |k| k.to_joints(axes)) + self.offset;
         let rate = 1.0 / self.config.period_s;
         let velocity =
             if self.setpoint.enable == 0 { AxisVector::ZERO } else { (joints - self.setpoint.position) * rate };
@@ -48,20 +48,30 @@ impl FineLoop {
         }
     }
 
+    /// Axis coordinates of what the drives report, mm or rad.
+    pub(super) fn axes_of(&self, joints: &AxisVector) -> AxisVector {
+        let joints = *joints - self.offset;
+        self.kinematics.as_ref().map_or(joints, |k| k.to_axes(&joints))
+    }
+
     pub(super) fn drives(&self) -> Input {
         let on = self.feedback.state[..self.joints].iter().all(|s| *s == JointState::Enabled);
         if on { Input::DrivesOn } else { Input::DrivesOff }
     }
 
     pub(super) fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
-        let to_axes = |v: &AxisVector| self.kinematics.as_ref().map_or(*v, |k| k.to_axes(v));
+        let (command, feedback) = if self.config.record_drives {
+            (*command + self.offset, self.feedback.position)
+        } else {
+            (*command, self.axes_of(&self.feedback.position))
+        };
         let sample = Sample {
             tick: self.tick,
             block: self.cursor.segment().block,
             line: self.cursor.segment().line,
             state: self.state,
-            command: *command,
-            feedback: to_axes(&self.feedback.position),
+            command,
+            feedback,
             speed: self.feedback.speed,
             current_a: self.feedback.current_a,
             feed_mm_per_s,

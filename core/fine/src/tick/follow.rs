@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
-use tandem_sdk::AxisVector;
+use tandem_sdk::{AxisVector, EventKind};
 
 use super::{FineLoop, Phase};
 use crate::config::GuardMode;
@@ -45,11 +45,13 @@ impl FineLoop {
         let waits = self.waits();
         let reached = self.cursor.advance(delta_s, |event| {
             self.outputs.apply(event, waits);
-            self.outputs.stop_requested
+            // At home one sample rests, so that a record begins with it.
+            let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed);
+            self.outputs.stop_requested || homing
         });
         self.begin_edge();
         let position = self.cursor.position();
-        let checked = self.guard.check(&position);
+        let checked = self.guard.check(&position, self.outputs.unhomed);
         let position = self.let_pass(position, &checked);
         (position, self.input(ask, reached))
     }

@@ -26,10 +26,14 @@ impl Stop {
 }
 
 impl FineLoop {
-    /// Before a period: an abort, or a motion that ended without its edge.
+    /// Before a period: an abort, axes that are to be called otherwise, or a motion that ended without its edge.
     pub(super) fn look_for_stop(&mut self) {
         if self.given.abort {
             self.stop = Some(Stop::abort());
+        } else if let Some(by) = self.outputs.correction.filter(|_| self.cursor.is_resting()) {
+            self.outputs.correction = None;
+            self.correct(&by);
+            self.stop = Some(Stop { cause: RestCause::Corrected, latch: None });
         } else if self.cursor.is_resting() && self.cursor.segment().stop_on.edge != Edge::None {
             self.stop.get_or_insert(Stop { cause: RestCause::Missed, latch: None });
         }
@@ -47,6 +51,12 @@ impl FineLoop {
             (Ask::Stop, _) => StopCause::None,
             (Ask::Starve, _) => StopCause::Starvation,
         }
+    }
+
+    /// Calls the place where the machine rests otherwise. The drives are sent what they were sent before.
+    fn correct(&mut self, by: &AxisVector) {
+        self.guard.correct(by);
+        self.offset = self.offset - *by;
     }
 
     /// Behind a move: a motion that waits for an edge may have begun.
@@ -69,7 +79,6 @@ impl FineLoop {
 
     /// At rest: reports it and ends the epoch. Where nobody has taken the reports before, it waits.
     pub(super) fn part(&mut self, stop: Stop) -> Input {
-        let to_axes = |v: AxisVector| self.kinematics.as_ref().map_or(v, |k| k.to_axes(&v));
         let rest = Rest {
             epoch: self.cursor.epoch(),
             cause: stop.cause,
@@ -78,7 +87,7 @@ impl FineLoop {
             line: self.cursor.segment().line,
             stop_on: self.cursor.segment().stop_on,
             position: *self.guard.position(),
-            latch: stop.latch.map(to_axes),
+            latch: stop.latch.map(|joints| self.axes_of(&joints)),
             program_time_s: self.cursor.program_time_s(),
             path_mm: self.cursor.path_mm(),
         };

@@ -82,6 +82,8 @@ impl Bench {
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             pause_at_stops: false,
             dry_run: false,
+            unhomed: 0,
+            record_drives: false,
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));

@@ -175,6 +175,8 @@ impl Machine {
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 3,
             dry_run: false,
+            unhomed: 0,
+            record_drives: false,
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,

@@ -83,6 +83,8 @@ impl Rig {
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             pause_at_stops: false,
             dry_run: false,
+            unhomed: 0,
+            record_drives: false,
         };
         let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { unreachable!("it is a driver") };
         let mut driver = make("latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]").unwrap();

@@ -123,6 +123,10 @@ fn the_other_tables() {
     let policy = machine.policy.unwrap();
     assert_eq!(policy.script, fixtures().join("good/corner.wasm"));
     assert_eq!(policy.parameters["corner_error_um"].as_integer(), Some(20));
+    let [c, x] = machine.homing[..] else { panic!("two axes home: {:?}", machine.homing) };
+    assert!(machine.require_homing && c.sequence == 1 && !c.inverted && close(c.switch_mm, PI));
+    assert_eq!((x.axis, x.input, x.inverted, x.search_mm_per_s, x.latch_mm_per_s), (0, 10, true, -10.0, 1.0));
+    assert_eq!((x.back_off_mm, x.switch_mm), (3.0, -305.0));
     let probe = machine.probe.unwrap();
     assert_eq!((probe.input, probe.inverted), (5, true));
     assert!(close(machine.spindle.min_rad_per_s, 2.0 * PI) && close(machine.spindle.max_rad_per_s, 400.0 * PI));
@@ -146,9 +150,9 @@ fn tools() {
 fn places() {
     let machine = read(&fixtures().join("good/full.toml"), &["planner.options.zeta=2"]).unwrap();
     let place = |key: &str| machine.place(key).to_string().replace(&format!("{}/", fixtures().display()), "");
-    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:25:1");
+    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:26:1");
     assert_eq!(place("axes.x.max_jerk_mm_per_s3"), "good/shared/axes.toml:9:1");
-    assert_eq!(place("planner.options.gamma"), "good/full.toml:67:10", "the table, where the key is absent");
+    assert_eq!(place("planner.options.gamma"), "good/full.toml:68:10", "the table, where the key is absent");
     assert_eq!(place("guard.severity"), "good/shared/drives.toml:10:2");
     assert_eq!(place("coolant"), "good/full.toml:1:1");
     assert_eq!(machine.place("planner.options.zeta"), Place::Override("planner.options.zeta".to_owned()));

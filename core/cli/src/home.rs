@@ -1,0 +1,91 @@
+//! `tandem home`.
+
+use std::error::Error;
+
+use tandem_host::{Run, RunObserver};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::{Event, EventKind};
+
+use crate::report::Collector;
+use crate::trace::TraceSink;
+use crate::{FAULT, args, built_in};
+
+/// Homes the axes of a machine.
+pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
+    let mut machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    if let Some(letter) = options.axis {
+        let axis = machine.axes.index(letter.to_ascii_uppercase());
+        machine.homing.retain(|homing| Some(homing.axis) == axis);
+        if machine.homing.is_empty() {
+            return Err(format!("the machine has no [homing.{}]", letter.to_ascii_lowercase()).into());
+        }
+    }
+    let run = Run::home(machine.clone(), &built_in::registry()?)?;
+    let trace = options.trace.as_ref().map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
+    let report = options.report.as_ref().map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
+    let mut observer = Observer { corrections: Corrections::new(&machine), trace: trace.transpose()?, report };
+    let outcome = run.drive(options.clock.into(), &[], &mut observer)?;
+    observer.trace.map_or(Ok(()), TraceSink::finish)?;
+    if let (Some(report), Some(path)) = (observer.report, &options.report) {
+        report.write(path, &outcome.summary)?;
+    }
+    for failure in outcome.summary.fault.iter().chain(&outcome.summary.stopped) {
+        say!("fault: {failure}");
+    }
+    let failed = outcome.summary.fault.is_some() || outcome.summary.stopped.is_some();
+    Ok(if failed { FAULT } else { 0 })
+}
+
+struct Observer {
+    corrections: Corrections,
+    trace: Option<TraceSink>,
+    report: Option<Collector>,
+}
+
+impl RunObserver for Observer {
+    fn note(&mut self, note: &str) {
+        say!("{note}");
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.corrections.event(event);
+    }
+
+    fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
+        if let Some(trace) = &mut self.trace {
+            trace.sample(sample, signals);
+        }
+        if let Some(report) = &mut self.report {
+            report.sample(sample, deviation_mm, signals);
+        }
+    }
+}
+
+/// Says where each axis was found.
+pub struct Corrections {
+    /// Letter, home position, internal units a unit of messages, and that unit, per axis.
+    axes: Vec<(char, f64, f64, &'static str)>,
+}
+
+impl Corrections {
+    pub fn new(machine: &Machine) -> Self {
+        let axis = |axis: usize| {
+            let rotary = machine.axes.is_rotary(axis);
+            let (scale, unit) = if rotary { (1f64.to_radians(), "deg") } else { (1.0, "mm") };
+            (machine.axes.letter(axis).to_ascii_lowercase(), machine.home[axis], scale, unit)
+        };
+        Self { axes: (0..machine.axes.count()).map(axis).collect() }
+    }
+
+    pub fn event(&self, event: &Event) {
+        let Some((letter, home, scale, unit)) = self.axes.get(event.index.unsigned_abs() as usize) else { return };
+        match event.kind {
+            EventKind::Correct => {
+                say!("homing {letter}: the switch is found; the axis stood {:+.6} {unit} off", event.value / scale);
+            }
+            EventKind::Homed => say!("homing {letter}: goes home, to {:.6} {unit}", home / scale),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! One axis on its way home: which step follows which answer.
+
+use tandem_machine::{AxisHoming, Machine};
+use tandem_rings::{Rest, RestCause};
+
+/// Part of the travel that a search may go beyond it.
+const MARGIN: f64 = 0.1;
+
+/// What an axis does next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Reads the switch.
+    Look,
+    /// Goes towards the switch until it trips.
+    Search,
+    /// Stands on the switch: goes away until it is released.
+    Leave,
+    /// Goes off the switch, and waits until it does not bounce.
+    BackOff,
+    /// Goes slowly onto the switch: the position counts.
+    Latch,
+    /// Is called otherwise.
+    Correct {
+        /// What is added to its coordinate, mm.
+        by_mm: f64,
+    },
+    /// Goes to its home position.
+    GoHome,
+}
+
+/// An axis to home.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis {
+    pub plan: AxisHoming,
+    /// Where it goes in the end, mm.
+    pub home_mm: f64,
+    letter: char,
+    travel_mm: f64,
+    acceleration_mm_per_s2: f64,
+    /// mm a unit of messages: 1, or a degree in rad.
+    unit: (f64, &'static str),
+}
+
+impl Axis {
+    /// The axis of `plan` on `machine`.
+    pub fn new(machine: &Machine, plan: &AxisHoming) -> Self {
+        let limits = &machine.limits.axes()[plan.axis];
+        let rotary = machine.axes.is_rotary(plan.axis);
+        Self {
+            plan: *plan,
+            home_mm: machine.home[plan.axis],
+            letter: machine.axes.letter(plan.axis).to_ascii_lowercase(),
+            travel_mm: limits.max_mm - limits.min_mm,
+            acceleration_mm_per_s2: limits.acceleration_mm_per_s2,
+            unit: if rotary { (1f64.to_radians(), "deg") } else { (1.0, "mm") },
+        }
+    }
+
+    /// 1 or −1.
+    pub fn direction(&self) -> f64 {
+        self.plan.search_mm_per_s.signum()
+    }
+
+    /// The longest search, signed, mm.
+    pub fn search_mm(&self) -> f64 {
+        self.direction() * (self.travel_mm * (1.0 + MARGIN) + self.plan.back_off_mm)
+    }
+
+    /// The longest way back onto the switch: what it backed off, what the search ran past the edge, and as much again.
+    pub fn latch_mm(&self) -> f64 {
+        let overrun_mm = self.plan.search_mm_per_s.powi(2) / (2.0 * self.acceleration_mm_per_s2);
+        self.direction() * 2.0 * (self.plan.back_off_mm + overrun_mm)
+    }
+
+    /// What follows the level of the switch.
+    ///
+    /// # Errors
+    /// The switch does not let go.
+    pub fn after_input(&self, step: Step, value: f64) -> Result<Step, String> {
+        match step {
+            Step::Look => Ok(if (value == 1.0) == self.plan.inverted { Step::Search } else { Step::Leave }),
+            _ if value < 0.0 => {
+                let back = self.shown(self.plan.back_off_mm);
+                Err(self.failure(&format!("is still on {back} behind its edge: it sticks, or back_off is too short")))
+            }
+            _ => Ok(Step::Latch),
+        }
+    }
+
+    /// What follows a rest.
+    ///
+    /// # Errors
+    /// The switch did not change where it should have.
+    pub fn after_rest(&self, step: Step, rest: &Rest) -> Result<Step, String> {
+        let edge_mm = rest.latch.map(|latch| latch[self.plan.axis]);
+        match (step, rest.cause, edge_mm) {
+            (Step::Search | Step::Leave, RestCause::Edge, _) => Ok(Step::BackOff),
+            (Step::Latch, RestCause::Edge, Some(edge_mm)) => Ok(Step::Correct { by_mm: self.plan.switch_mm - edge_mm }),
+            (Step::Correct { .. }, RestCause::Corrected, _) => Ok(Step::GoHome),
+            (_, RestCause::Abort, _) => Ok(Step::Look),
+            (Step::Leave, ..) => {
+                let way = self.shown(self.search_mm());
+                Err(self.failure(&format!("is on and was not released within {way}: it sticks, or invert is wrong")))
+            }
+            (Step::Search, ..) => {
+                let way = self.shown(self.search_mm());
+                Err(self
+                    .failure(&format!("did not trip within {way}: it does not work, or the search goes away from it")))
+            }
+            _ => Err(self.failure("did not trip again: it does not work")),
+        }
+    }
+
+    fn failure(&self, what: &str) -> String {
+        format!("homing {}: the switch on input {} {what}", self.letter, self.plan.input)
+    }
+
+    fn shown(&self, mm: f64) -> String {
+        format!("{:.3} {}", mm.abs() / self.unit.0, self.unit.1)
+    }
+}
