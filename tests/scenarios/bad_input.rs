@@ -83,3 +83,17 @@ fn options_beyond_reason_are_refused() {
     assert_eq!(done.status(), 1);
     assert!(done.errors().contains("buffer_blocks = 1000000000000: from 2 to"), "{}", done.errors());
 }
+
+#[test]
+fn a_command_file_is_told_all_that_is_wrong_with_it() {
+    let program = "G21 G90\nF3000\nG1 X20\nM2\n";
+    let done = Scenario::text(program).commands("# a comment\n5,hodl\n\n9,hold\nx,resume\n3,resume\n").run();
+    let errors = done.errors();
+    let place = |line: u32, words: &str| errors.contains(&format!("commands.csv:{line}: {words}"));
+    assert!(place(2, "no command is called \"hodl\"") && place(5, "\"x\" is not"), "{errors}");
+    assert!(place(6, "tick 3 comes after tick 9"), "{errors}");
+    assert_eq!((done.status(), errors.lines().count()), (1, 3), "{errors}");
+    let done = Scenario::text(program).commands(&"1,hodl\n".repeat(250)).run();
+    assert_eq!(done.errors().lines().count(), 101);
+    assert!(done.errors().ends_with("and 150 more\n"), "{}", done.errors());
+}

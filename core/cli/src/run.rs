@@ -93,14 +93,32 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
         );
     }
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    let parse = |(index, line)| Timed::parse(line).map_err(|e| format!("{}:{}: {e}", path.display(), index + 1));
-    let commands = lines.map(parse).collect::<Result<Vec<_>, _>>()?;
-    match commands.windows(2).find(|pair| pair[1].tick < pair[0].tick) {
-        Some(pair) => Err(format!("{}: tick {} comes after tick {}", path.display(), pair[1].tick, pair[0].tick)),
-        None => Ok(commands),
+    let (mut commands, mut errors): (Vec<Timed>, Vec<String>) = (vec![], vec![]);
+    for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
+    {
+        let at = |cause: String| format!("{}:{number}: {cause}", path.display());
+        match (Timed::parse(line), commands.last()) {
+            (Err(cause), _) => errors.push(at(cause)),
+            (Ok(now), Some(last)) if now.tick < last.tick => {
+                errors.push(at(format!("tick {} comes after tick {}", now.tick, last.tick)));
+            }
+            (Ok(now), _) => commands.push(now),
+        }
+    }
+    if errors.is_empty() { Ok(commands) } else { Err(listed(&errors)) }
+}
+
+/// The first errors, a line each, and how many more there are.
+fn listed(errors: &[String]) -> String {
+    let first = errors[..errors.len().min(MOST_ERRORS)].join("\n");
+    match errors.len() - errors.len().min(MOST_ERRORS) {
+        0 => first,
+        more => format!("{first}\nand {more} more"),
     }
 }
+
+/// Errors of a command file that are told one by one.
+const MOST_ERRORS: usize = 100;
 
 /// Everything that a run is written to.
 struct Sinks {

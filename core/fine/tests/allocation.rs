@@ -1,54 +1,22 @@
 //! No fine period touches the heap, whatever happens in it.
-#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
 
 mod common;
+#[path = "../../../tests/counting_allocator.rs"]
+mod counting_allocator;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
+use counting_allocator::{HeapUse, heap_use_of};
 use tandem_fine::{FaultKind, GuardMode};
 use tandem_rings::{MachineState, Ratio};
 use tandem_sdk::EventKind;
 
-struct Counting;
-
-thread_local! {
-    static ARMED: Cell<bool> = const { Cell::new(false) };
-    static CALLS: Cell<u64> = const { Cell::new(0) };
-}
-
-fn count() {
-    CALLS.with(|calls| calls.set(calls.get() + u64::from(ARMED.with(Cell::get))));
-}
-
-// SAFETY: hands every call to the system allocator unchanged; what is counted lies outside the heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 /// Runs `periods` fine periods; none may allocate or free.
 fn tick(bench: &mut Bench, periods: u32) {
     for _ in 0..periods {
-        ARMED.with(|armed| armed.set(true));
-        bench.fine.tick();
-        ARMED.with(|armed| armed.set(false));
-        let calls = CALLS.with(|calls| calls.replace(0));
-        assert_eq!(calls, 0, "the heap was used in state {:?}", bench.state());
+        let used = heap_use_of(|| bench.fine.tick());
+        assert_eq!(used, HeapUse::default(), "the heap was used in state {:?}", bench.state());
     }
 }
 
@@ -65,10 +33,8 @@ fn tick_until(bench: &mut Bench, state: MachineState) {
 
 #[test]
 fn the_counter_counts() {
-    ARMED.with(|armed| armed.set(true));
-    drop(std::hint::black_box(Box::new(1)));
-    ARMED.with(|armed| armed.set(false));
-    assert_eq!(CALLS.with(|calls| calls.replace(0)), 2);
+    let used = heap_use_of(|| drop(std::hint::black_box(Box::new(1))));
+    assert_eq!(used, HeapUse { allocations: 1, frees: 1 });
 }
 
 #[test]

@@ -1,34 +1,11 @@
 //! A steady state allocates nothing: neither lines to items, nor chunks to lines.
-#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "../../../tests/counting_allocator.rs"]
+mod counting_allocator;
 
+use counting_allocator::{HeapUse, heap_use_of};
 use tandem_gcode::{Config, Program, Stream, check};
 use tandem_sdk::Axes;
-
-struct Counting;
-
-thread_local! {
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call goes to the system's allocator as it is.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the promises of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the promises of `dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn a_steady_state_allocates_nothing() {
@@ -44,9 +21,10 @@ fn a_steady_state_allocates_nothing() {
         stream.next_items(&mut items).unwrap();
         items.clear();
     }
-    let before = COUNT.with(Cell::get);
-    while stream.next_items(&mut items).unwrap() {
-        items.clear();
-    }
-    assert_eq!(COUNT.with(Cell::get) - before, 0);
+    let used = heap_use_of(|| {
+        while stream.next_items(&mut items).unwrap() {
+            items.clear();
+        }
+    });
+    assert_eq!(used, HeapUse::default());
 }

@@ -15,7 +15,9 @@ function tickLabels(places) {
   const largest = Math.max(...places.map(Math.abs));
   if (largest >= 1e5) return places.map((p) => thousands(p, step));
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  return places.map((p) => minus((Math.abs(p) < step * 1e-6 ? 0 : p).toFixed(decimals)));
+  const plain = places.map((p) => minus((Math.abs(p) < step * 1e-6 ? 0 : p).toFixed(decimals)));
+  if (largest > 1e-3 || Math.max(...plain.map((text) => text.length)) < 9) return plain;
+  return places.map((p) => (Math.abs(p) < step * 1e-6 ? "0" : minus(p.toExponential(1))));
 }
 
 function thousands(value, step) {

@@ -36,7 +36,7 @@ function axisCurve(axis, i, column, what) {
   return new Curve(columns[column + i], columns["marks" + i], {
     key: "axis " + axis.letter, label: axis.letter, colour: () => axisColour(axis.letter), bit: what.bit,
     limit: what.limit ? axis[what.limit] : null, scale: what.scale ? what.scale(axis) : () => 1, judged: what.judged !== false,
-    least: axis.max_acceleration * (what.least || 1e-9),
+    least: what.smallest || axis.max_acceleration * (what.least || 1e-9),
   });
 }
 
@@ -73,7 +73,8 @@ function deviationPlot() {
 
 function followingPlots() {
   const scale = (axis) => (axis.linear ? () => 1000 : () => 1);
-  return axisPlots("Following error", "following", { scale, bit: 0, plot: (unit) => ({ unit: () => (unit === "mm" ? "µm" : "deg") }) });
+  // Below a hundredth of a µm or of a degree there is nothing to see.
+  return axisPlots("Following error", "following", { scale, bit: 0, smallest: 1e-2, plot: (unit) => ({ unit: () => (unit === "mm" ? "µm" : "deg") }) });
 }
 
 function sigmaPlot() {

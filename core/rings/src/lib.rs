@@ -109,11 +109,23 @@ pub struct HostEnd {
     pub requests: Producer<StrategyRequest>,
 }
 
+/// A ring whose memory has been written once, so that no page of it faults when the fine loop writes there first.
+fn touched<T: Copy + Default>(size: usize) -> (Producer<T>, Consumer<T>) {
+    let (mut input, mut output) = RingBuffer::new(size);
+    if let Ok(slots) = input.write_chunk_uninit(size) {
+        slots.fill_from_iter(std::iter::repeat_n(T::default(), size));
+    }
+    if let Ok(written) = output.read_chunk(size) {
+        written.commit_all();
+    }
+    (input, output)
+}
+
 /// Makes the bridge between the loops. Allocates for good.
 pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
-    let (samples_in, samples_out) = RingBuffer::new(sizes.samples);
+    let (samples_in, samples_out) = touched(sizes.samples);
     let (requests_in, requests_out) = RingBuffer::new(8);
     let (rests_in, rests_out) = RingBuffer::new(8);
     let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());

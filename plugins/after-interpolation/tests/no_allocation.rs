@@ -1,35 +1,12 @@
 //! In a steady state no method of the planner allocates.
 
 mod common;
-
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "../../../tests/counting_allocator.rs"]
+mod counting_allocator;
 
 use common::{FILTERS, context, open, polyline};
+use counting_allocator::heap_use_of;
 use tandem_sdk::{Accepted, Block, BlockReport, Planner, Segment, SegmentSink};
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: hands every call to the system allocator unchanged; the counter is a plain thread-local number.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 struct Nowhere;
 
@@ -52,12 +29,11 @@ fn a_steady_stream_does_not_allocate() {
     let points: Vec<_> = (1..4000_u32).map(|k| [f64::from(k) * 0.05, f64::from(k % 2) * 0.01, 0.0]).collect();
     let blocks = polyline(&points, 50.0);
     for filter in FILTERS {
-        let before = ALLOCATIONS.with(Cell::get);
+        let opening = heap_use_of(|| drop(open(filter, 50.0, &context(0.001))));
+        assert!(opening.allocations > 0, "the counter counts");
         let mut planner = open(filter, 50.0, &context(0.001));
         stream(&mut *planner, &blocks[..2000]);
-        let opened = ALLOCATIONS.with(Cell::get);
-        assert!(opened > before, "the counter counts");
-        stream(&mut *planner, &blocks[2000..]);
-        assert_eq!(ALLOCATIONS.with(Cell::get), opened, "{filter}");
+        let steady = heap_use_of(|| stream(&mut *planner, &blocks[2000..]));
+        assert_eq!(steady.allocations, 0, "{filter}");
     }
 }
