@@ -136,18 +136,22 @@ fn only_the_axis_asked_for_moves() {
 fn manual_input_begins_at_home() {
     use std::io::Write;
     let options = format!("driver.options={{unknown_start_mm=40,seed=9,switches=[{SWITCHES}]}}");
-    let mdi = |home: &[&str]| {
+    let mdi = |home: &[&str], lines: &[u8]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
         command.args(["mdi", "--clock", "virtual", "--machine"]).arg(machine()).args(home);
         command.args(["--set", "probe.input=3", "--set", &options]);
         let pipes = command.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
         let mut child = pipes.stderr(std::process::Stdio::piped()).spawn().unwrap();
         // A refused session closes its input: that is what is to be seen.
-        let _ = child.stdin.take().unwrap().write_all(b"G38.2 Z-20 F600\nG0 X[0-#5063]\n");
+        let _ = child.stdin.take().unwrap().write_all(lines);
         child.wait_with_output().unwrap()
     };
-    let homed = mdi(&["--home"]);
+    let homed = mdi(&["--home"], b"G38.2 Z-20 F600\nG0 X[0-#5063]\n");
     let said = String::from_utf8_lossy(&homed.stdout).into_owned();
     assert!(homed.status.success() && said.contains("x_mm 5.3000  y_mm 0.0000"), "{said}{}", errors(&homed));
-    assert_eq!(mdi(&[]).status.code(), Some(1));
+    // A fault: the axes home again, from where the drives stand.
+    let again = mdi(&["--home"], b"G0 X50 Y-20\nG38.2 Z-2 F600\n!reset\nG38.2 Z-20 F600\nG0 X[0-#5063]\n");
+    let said = String::from_utf8_lossy(&again.stdout).into_owned();
+    assert!(said.ends_with("x_mm 5.3000  y_mm 0.0000  z_mm -5.3600\n"), "{said}{}", errors(&again));
+    assert_eq!(mdi(&[], b"G0 X1\n").status.code(), Some(1));
 }

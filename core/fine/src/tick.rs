@@ -210,6 +210,11 @@ impl FineLoop {
         self.driver_error.as_ref()
     }
 
+    /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Host.
+    pub fn sent(&self) -> AxisVector {
+        *self.guard.position() + self.offset
+    }
+
     /// Whether the program has ended, or a fault has brought the machine to rest.
     pub fn is_over(&self) -> bool {
         self.outputs.ended || matches!(self.phase, Phase::Faulted)

@@ -254,7 +254,8 @@ impl Run {
             summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
             summary.page_faults = Some(page_faults);
         }
-        let position = pump.monitor.position;
+        // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
+        let position = if self.switches.home { fine.sent() } else { pump.monitor.position };
         fine.into_driver().stop();
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault, position })
