@@ -24,7 +24,11 @@ fn on_a_terminal(arguments: &[&str]) -> Option<(Running, ChildStdin, Client<Unix
 
 /// The run in a shell that writes down the terminal's settings before and after, and the run's process.
 fn spawn(folder: &Path, arguments: &[&str]) -> Child {
-    let run = command(folder, arguments);
+    shell(folder, &command(folder, arguments))
+}
+
+/// The same for any command.
+pub fn shell(folder: &Path, run: &Command) -> Child {
     let quoted = |word: &std::ffi::OsStr| format!("'{}'", word.to_str().unwrap());
     let words: Vec<String> = std::iter::once(run.get_program()).chain(run.get_args()).map(quoted).collect();
     let inner = format!("echo $$ > pid; exec {}", words.join(" ")).replace('\'', "\"");

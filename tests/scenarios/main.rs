@@ -14,6 +14,7 @@ mod following;
 mod harness;
 mod hold;
 mod homing;
+mod jog;
 mod keys;
 mod latency;
 mod mdi;

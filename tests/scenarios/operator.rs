@@ -117,7 +117,7 @@ impl<S: Read + Write> Client<S> {
         if line.is_empty() { Value::Null } else { serde_json::from_str(&line).unwrap() }
     }
 
-    fn ask(&mut self, line: &str) -> Value {
+    pub fn ask(&mut self, line: &str) -> Value {
         self.say(line);
         self.hear()
     }

@@ -27,6 +27,8 @@ pub enum Command {
     Mdi(Box<Mdi>),
     /// Home the axes, as the machine file says
     Home(Home),
+    /// Move single axes by hand: with keys, over a socket, or by lines of a pipe
+    Jog(Box<Jog>),
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
@@ -111,6 +113,24 @@ pub struct Mdi {
     /// Home the axes first, and after every fault, as the machine file says
     #[arg(long)]
     pub home: bool,
+    #[command(flatten)]
+    pub operator: Operator,
+    /// Write every sample; a name that ends in .ttr asks for the binary format
+    #[arg(long, value_name = "F.csv|F.ttr")]
+    pub trace: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Jog {
+    /// The machine file
+    #[arg(long = "machine", value_name = "M.toml")]
+    pub machine: PathBuf,
+    /// Override a key of the machine file, as in operator.jog_keep_alive_ms=100
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    pub overrides: Vec<(String, String)>,
+    /// The clock that drives the loops
+    #[arg(long, default_value = "wall")]
+    pub clock: Clock,
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format

@@ -13,6 +13,7 @@ mod built_in;
 mod check;
 mod corners;
 mod home;
+mod jog;
 mod latency;
 mod mdi;
 mod operator;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
     let status = match Args::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Mdi(options) => mdi::mdi(&options),
+        Command::Jog(options) => jog::jog(&options),
         Command::Check(options) => check::check(&options),
         Command::Home(options) => home::home(&options),
         Command::Trace(command) => trace::trace(&command),

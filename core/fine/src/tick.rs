@@ -3,6 +3,7 @@
 mod exchange;
 mod follow;
 mod govern;
+mod keep_alive;
 mod request;
 mod rest;
 mod single_block;
@@ -28,6 +29,7 @@ use crate::points::Points;
 use crate::preview::{LineEnd, Preview};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
+use keep_alive::KeepAlive;
 use rest::Stop;
 
 /// What the fine loop counted.
@@ -93,6 +95,7 @@ pub struct FineLoop {
     offset: AxisVector,
     edge: EdgeWatch,
     stop: Option<Stop>,
+    keep_alive: KeepAlive,
     outputs: Outputs,
     phase: Phase,
     state: MachineState,
@@ -142,6 +145,7 @@ impl FineLoop {
             offset: AxisVector::ZERO,
             edge: EdgeWatch::default(),
             stop: None,
+            keep_alive: KeepAlive::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
             state: MachineState::Fault,
@@ -160,6 +164,7 @@ impl FineLoop {
     pub fn tick(&mut self) {
         self.given = Given::of(&self.controls);
         self.cause = StopCause::None;
+        self.watch_jog();
         self.take_requests();
         let ended = self.outputs.ended;
         let waiting = matches!(self.phase, Phase::Waiting);
@@ -180,6 +185,7 @@ impl FineLoop {
     /// Fine periods went by without a sample; more than `most` are a fault. Fine thread.
     pub fn missed(&mut self, periods: u64, most: u64) {
         self.counters.missed_periods += periods;
+        self.miss_beats(periods);
         if periods > most {
             self.fail(FaultKind::MissedPeriods);
         }
@@ -255,7 +261,7 @@ impl FineLoop {
         if self.state != MachineState::Standstill {
             return Input::Rest;
         }
-        if self.given.abort {
+        if self.given.abort || self.is_jog_let_go() {
             return self.part(Stop::abort());
         }
         if self.depth.may_start(self.cursor.program_time_s()) {

@@ -10,6 +10,7 @@ mod error;
 mod fault_text;
 mod faults;
 mod homing;
+pub mod jog;
 mod lateness;
 mod manual;
 mod monitor;

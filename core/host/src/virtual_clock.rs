@@ -39,11 +39,14 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         }
         pump.drain();
         pump.serve_stop();
+        if pump.is_waiting() {
+            progress.tick = tick;
+        }
         let stuck_ticks = progress.ticks_without(pump.host.status.program_time_s.load(), tick);
         if stuck_ticks > 0 && pump.is_attended() {
             // Somebody at a keyboard lives in real time.
             thread::sleep(Duration::from_secs_f64(pump.period_s() * f64::from(fine_per_rough)));
-        } else if commands.peek().is_none() && !pump.is_waiting() && stuck_ticks > patience {
+        } else if commands.peek().is_none() && stuck_ticks > patience {
             pump.give_up();
         }
     }

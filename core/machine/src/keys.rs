@@ -93,6 +93,7 @@ static MACHINE: &[Key] = &[
     key("homing.<axis>.latch_deg_per_min", "deg/min", "required", "Feed at which the position of the switch is taken"),
     key("homing.<axis>.back_off_deg", "deg", "required", "How far the axis backs off before that"),
     key("homing.<axis>.switch_deg", "deg", "required", "Machine coordinate of the edge of the switch"),
+    key("operator.jog_keep_alive_ms", "ms", "200", "Time without a keep-alive, as key repeats are, after which a jog stops"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
 ];
 

@@ -76,17 +76,25 @@ impl Policy {
     }
 }
 
-/// What the operator's switches mean on this machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Time without a keep-alive after which a jog stops where the machine states none, ms: key repeats come every 30 to 50 ms.
+const JOG_KEEP_ALIVE_MS: f64 = 200.0;
+
+/// What the operator's switches and keys mean on this machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Operator {
     /// Feed of all feed motion in a dry run, mm/s; none: the programmed feed.
     pub dry_run_feed_mm_per_s: Option<f64>,
+    /// Time without a keep-alive after which a jog stops, s.
+    pub jog_keep_alive_s: f64,
 }
 
 impl Operator {
     /// Reads `[operator]`.
     pub(crate) fn read(operator: &Section<'_>) -> Self {
-        Self { dry_run_feed_mm_per_s: operator.positive("dry_run_feed_mm_per_min").map(|feed| feed / 60.0) }
+        Self {
+            dry_run_feed_mm_per_s: operator.positive("dry_run_feed_mm_per_min").map(|feed| feed / 60.0),
+            jog_keep_alive_s: operator.positive("jog_keep_alive_ms").unwrap_or(JOG_KEEP_ALIVE_MS) / 1e3,
+        }
     }
 }
 

@@ -4,6 +4,18 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 
 use crate::{AtomicF64, Counts};
 
+/// The jog that moves, and what keeps it alive.
+#[derive(Debug, Default)]
+pub struct JogControls {
+    /// Counts how often the operator has said that the jog is to go on. Written by the soft side.
+    pub beats: AtomicU64,
+    /// Fine periods without a beat after which the jog is let go; 0 where nothing needs to be kept alive.
+    pub most_periods: AtomicU64,
+    /// The jog is let go: stop on the path, drop what is queued, and report the rest. Set by the soft side, and by the
+    /// fine loop where the keep-alive is late; cleared by the soft side when it has the rest. Holds stay as they are.
+    pub let_go: AtomicBool,
+}
+
 /// The operator's commands. Each acts in the next fine period.
 #[derive(Debug)]
 pub struct Controls {
@@ -26,6 +38,8 @@ pub struct Controls {
     pub abort: AtomicBool,
     /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
     pub soft_fault: AtomicBool,
+    /// The jog that moves.
+    pub jog: JogControls,
 }
 
 impl Default for Controls {
@@ -40,6 +54,7 @@ impl Default for Controls {
             emergency_stop: AtomicBool::new(false),
             abort: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),
+            jog: JogControls::default(),
         }
     }
 }

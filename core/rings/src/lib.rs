@@ -13,7 +13,7 @@ mod rest;
 mod sample;
 
 pub use atomics::{AtomicF64, Depth, STOP_JERK_SHARE, STOP_SHARE};
-pub use controls::{Controls, Status};
+pub use controls::{Controls, JogControls, Status};
 pub use counts::Counts;
 pub use given::Given;
 pub use request::{RequestKind, StrategyRequest};

@@ -11,7 +11,7 @@ pub enum RestCause {
     Missed,
     /// The input had the level waited for before the motion began.
     Already,
-    /// The operator's abort.
+    /// The operator's abort, or a jog that is let go.
     Abort,
     /// An axis is called otherwise from here on ([`tandem_sdk::EventKind::Correct`]); nothing has moved.
     Corrected,

@@ -113,7 +113,9 @@ impl RoughLoop {
     /// # Errors
     /// The program or the planner cannot go on; what is queued is still driven to its end.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
-        let result = self.take_rests(observer).and_then(|()| self.fill(observer));
+        let rested = self.take_rests(observer);
+        self.source.period();
+        let result = rested.and_then(|()| self.fill(observer));
         self.queue.flush(self.stretch_over || result.is_err());
         self.queue.tell_of_blocks(observer);
         result?;
@@ -121,9 +123,9 @@ impl RoughLoop {
         Ok(if self.done { Progress::Done } else { Progress::Working })
     }
 
-    /// Whether the program waits for an input (M66).
+    /// Whether the program waits for an input (M66), or its source for time to pass.
     pub fn is_waiting(&self) -> bool {
-        self.waiting.is_some()
+        self.waiting.is_some() || self.source.is_waiting()
     }
 
     fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {

@@ -18,12 +18,21 @@ pub trait Source {
         true
     }
 
+    /// A rough period begins. Soft side; for sources that follow machine time.
+    fn period(&mut self) {}
+
+    /// Whether the source waits for machine time to pass: nothing moving is then no sign of a run that hangs.
+    fn is_waiting(&self) -> bool {
+        false
+    }
+
     /// Answers an [`Item::Wait`]: 1, 0, or −1 for none in time.
     fn provide_input(&mut self, value: f64);
 
     /// The machine rests at `rest.position`, before the end of what was planned: behind an edge that a block waited for
-    /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), or after the operator's abort; or
-    /// it is called otherwise (homing). The next block starts there. Whether the stream goes on; where not, the program is over.
+    /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), after the operator's abort, or after
+    /// a jog that was let go; or it is called otherwise (homing). The next block starts there. Whether the stream goes on;
+    /// where not, the program is over.
     fn provide_rest(&mut self, rest: &Rest) -> bool;
 }
 

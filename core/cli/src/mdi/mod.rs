@@ -1,7 +1,7 @@
 //! `tandem mdi`: manual input.
 
 mod conversation;
-mod input;
+pub mod input;
 
 use std::error::Error;
 use std::sync::Arc;

@@ -36,15 +36,31 @@ impl Keyboard {
         say!("{HELP}");
     }
 
-    /// Takes the terminal.
+    /// Takes the terminal: its keys command the run at `desk`.
     ///
     /// # Errors
     /// The system's words.
     pub fn begin(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
+        Self::begin_with(move |keys| {
+            // An arrow or function key is no letter.
+            if keys[0] == ESCAPE && keys.len() > 1 {
+                return;
+            }
+            for words in keys.iter().filter_map(|key| press(*key, &desk, &stops)) {
+                tell(&words);
+            }
+        })
+    }
+
+    /// Takes the terminal: what is typed goes to `take` as it comes, on a thread of its own.
+    ///
+    /// # Errors
+    /// The system's words.
+    pub fn begin_with(take: impl FnMut(&[u8]) + Send + 'static) -> Result<Self, String> {
         let terminal = RawTerminal::take()?;
         let over = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&over);
-        let thread = thread::spawn(move || listen(&desk, &stops, &seen));
+        let thread = thread::spawn(move || listen(take, &seen));
         Ok(Self { over, thread: Some(thread), _terminal: terminal })
     }
 }
@@ -59,7 +75,7 @@ impl Drop for Keyboard {
     }
 }
 
-fn listen(desk: &Desk, stops: &Stops, over: &AtomicBool) {
+fn listen(mut take: impl FnMut(&[u8]), over: &AtomicBool) {
     let mut keys = [0; 16];
     let timeout = Timespec { tv_sec: 0, tv_nsec: LOOK_NS };
     while !over.load(Ordering::Acquire) {
@@ -70,18 +86,12 @@ fn listen(desk: &Desk, stops: &Stops, over: &AtomicBool) {
         }
         // No bytes: the terminal is gone, and its signal stops the machine.
         let Ok(count @ 1..) = rustix::io::read(input, &mut keys) else { return };
-        // An arrow or function key is no letter.
-        if keys[0] == ESCAPE && count > 1 {
-            continue;
-        }
-        for words in keys[..count].iter().filter_map(|key| press(*key, desk, stops)) {
-            tell(&words);
-        }
+        take(&keys[..count]);
     }
 }
 
 /// What a key does, and what is said of it.
-fn press(key: u8, desk: &Desk, stops: &Stops) -> Option<String> {
+pub fn press(key: u8, desk: &Desk, stops: &Stops) -> Option<String> {
     let controls = desk.controls();
     let on = |switch: &AtomicBool| switch.load(Ordering::Relaxed);
     let (command, words) = match key {

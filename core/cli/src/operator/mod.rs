@@ -19,9 +19,8 @@ use tandem_rings::Sample;
 use crate::args;
 
 use enter::Enter;
-pub use keys::Keyboard;
-use signals::Signals;
-pub use signals::Stops;
+pub use keys::{Keyboard, press};
+pub use signals::{Signals, Stops};
 pub use terminal::is_on_terminal;
 
 /// How often a program stop is looked after while machine time stands still.
@@ -59,8 +58,15 @@ impl Operator {
     /// # Errors
     /// The socket, the token file or the terminal with the cause.
     pub fn begin(options: &args::Operator, machine: &Machine, run: &Run, presence: Presence) -> Result<Self, String> {
+        Self::at(Arc::new(Desk::new(machine, run.controls(), run.status())), options, presence)
+    }
+
+    /// The same at a desk that is there.
+    ///
+    /// # Errors
+    /// As [`Operator::begin`].
+    pub fn at(desk: Arc<Desk>, options: &args::Operator, presence: Presence) -> Result<Self, String> {
         let Presence { real_time, pause, keys } = presence;
-        let desk = Arc::new(Desk::new(machine, run.controls(), run.status()));
         let server = serve(options, &desk)?;
         let signals = real_time.then(|| Signals::catch(Arc::clone(&desk))).transpose()?;
         let stops = signals.as_ref().map(Signals::stops);
@@ -146,7 +152,7 @@ impl Operator {
 }
 
 /// A line to standard error, over the progress where that is shown.
-fn tell(words: &str) {
+pub fn tell(words: &str) {
     let clear = if stderr().is_terminal() { "\r\x1b[K" } else { "" };
     say!("{clear}{words}");
 }

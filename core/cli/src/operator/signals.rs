@@ -45,9 +45,16 @@ impl Signals {
     /// # Errors
     /// The system's words.
     pub fn catch(desk: Arc<Desk>) -> Result<Self, String> {
+        Self::catch_with(desk, Stops::default())
+    }
+
+    /// The same, counted on in `stops`.
+    ///
+    /// # Errors
+    /// The system's words.
+    pub fn catch_with(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
         let mut received = Received::new([SIGINT, SIGTERM, SIGHUP]).map_err(|e| format!("signals: {e}"))?;
         let handle = received.handle();
-        let stops = Stops::default();
         let asked = stops.clone();
         let thread = thread::spawn(move || {
             for _ in received.forever() {

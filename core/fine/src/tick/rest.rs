@@ -26,10 +26,13 @@ impl Stop {
 }
 
 impl FineLoop {
-    /// Before a period: an abort, axes that are to be called otherwise, or a motion that ended without its edge.
+    /// Before a period: an abort, a jog that is let go, axes that are to be called otherwise, or a motion that ended without
+    /// its edge.
     pub(super) fn look_for_stop(&mut self) {
         if self.given.abort {
             self.stop = Some(Stop::abort());
+        } else if self.is_jog_let_go() {
+            self.stop.get_or_insert(Stop::abort());
         } else if let Some(by) = self.outputs.correction.filter(|_| self.cursor.is_resting()) {
             self.outputs.correction = None;
             self.correct(&by);
@@ -99,7 +102,8 @@ impl FineLoop {
         self.preview.clear();
         self.line_end.forget();
         (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);
-        if stop.cause == RestCause::Abort {
+        // A jog that is let go leaves a hold as it is: the next one waits for its end too.
+        if self.given.abort {
             self.outputs.abort();
             let controls = &self.controls;
             for flag in [&controls.hold, &controls.program_hold, &controls.abort] {

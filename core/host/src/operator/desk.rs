@@ -9,12 +9,12 @@ use tandem_rings::{Controls, MachineState, Sample, Status};
 use tandem_sdk::{Axes, AxisVector};
 
 use crate::command::Command;
+use crate::jog::{JogWords, Jogs};
 
 use super::status::{Counters, Position, StatusLine};
 
 /// The operator's desk: keys, sockets and whatever else gives commands share one. Soft side; never waits for the fine
 /// loop.
-#[derive(Debug)]
 pub struct Desk {
     controls: Arc<Controls>,
     status: Arc<Status>,
@@ -24,6 +24,8 @@ pub struct Desk {
     /// An answer to a program stop: set by a resume, taken by the run.
     go_on: AtomicBool,
     clients: AtomicUsize,
+    /// Where jogs are asked for, in a session that jogs.
+    jogs: Option<Arc<Jogs>>,
 }
 
 /// What the recorder last saw.
@@ -59,7 +61,13 @@ impl Desk {
             latest: Mutex::new(latest),
             go_on: AtomicBool::new(false),
             clients: AtomicUsize::new(0),
+            jogs: None,
         }
+    }
+
+    /// The desk of a session that jogs.
+    pub fn with_jogs(self, jogs: Arc<Jogs>) -> Self {
+        Self { jogs: Some(jogs), ..self }
     }
 
     /// Gives a command: the one way to the fine loop for keys and sockets. It acts in the next fine period. The answer is
@@ -73,7 +81,28 @@ impl Desk {
             self.go_on.store(true, Release);
         }
         command.give(&self.controls);
-        Ok(self.status.tick.load(Relaxed))
+        if let (Command::Abort, Some(jogs)) = (command, &self.jogs) {
+            jogs.forget();
+        }
+        Ok(self.now())
+    }
+
+    /// Asks for a jog, or keeps one alive; without words, lets go of what moves. The answer is that of [`Desk::give`].
+    ///
+    /// # Errors
+    /// Nothing is jogged here, or the jog is refused; nothing has changed.
+    pub fn jog(&self, words: Option<&JogWords>) -> Result<u64, String> {
+        let jogs = self.jogs.as_ref().ok_or("nothing is jogged here: tandem jog does")?;
+        match words {
+            Some(words) => jogs.ask(words.on(&self.axes)?)?,
+            None => jogs.let_go(),
+        }
+        Ok(self.now())
+    }
+
+    /// Number of the next fine period.
+    pub fn now(&self) -> u64 {
+        self.status.tick.load(Relaxed)
     }
 
     fn check(&self, command: Command) -> Result<(), String> {

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::reply::Problem;
 use crate::command::Command;
+use crate::jog::{JogWords, ReachWords};
 
 /// Highest rate of a subscription, Hz: the status is made once in a rough period.
 pub const MAX_RATE_HZ: f64 = 100.0;
@@ -20,6 +21,8 @@ pub enum Request {
     Status,
     /// The control lease.
     Lease(LeaseWord),
+    /// A jog, or its keep-alive; none lets go of what moves.
+    Jog(Option<JogWords>),
     /// Who the client is, over TCP.
     Token(String),
 }
@@ -42,6 +45,7 @@ struct Line {
     subscribe: Option<Subscribe>,
     status: Option<Empty>,
     lease: Option<LeaseWord>,
+    jog: Option<JogLine>,
     token: Option<String>,
 }
 
@@ -49,6 +53,18 @@ struct Line {
 #[serde(deny_unknown_fields)]
 struct Subscribe {
     rate_hz: f64,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct JogLine {
+    axis: Option<char>,
+    direction: Option<i64>,
+    distance_mm: Option<f64>,
+    distance_deg: Option<f64>,
+    feed_mm_per_min: Option<f64>,
+    feed_deg_per_min: Option<f64>,
+    stop: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -61,7 +77,7 @@ struct Empty {}
 /// The line is malformed: what, where, why.
 pub fn parse(text: &str) -> Result<Request, Problem> {
     let line: Line = serde_json::from_str(text).map_err(|error| Problem::of_json(&error))?;
-    let Line { command, value, subscribe, status, lease, token } = line;
+    let Line { command, value, subscribe, status, lease, jog, token } = line;
     let commands = command.map(|name| to_command(&name, value.as_ref()));
     if commands.is_none() && value.is_some() {
         return Err(Problem::malformed("key \"value\"", "it goes with \"command\""));
@@ -71,12 +87,13 @@ pub fn parse(text: &str) -> Result<Request, Problem> {
         subscribe.map(rate).transpose()?,
         status.map(|_| Request::Status),
         lease.map(Request::Lease),
+        jog.map(|line| line.read().map_err(|why| Problem::malformed("key \"jog\"", why))).transpose()?,
         token.map(Request::Token),
     ];
     let mut requests = requests.into_iter().flatten();
     match (requests.next(), requests.next()) {
         (Some(request), None) => Ok(request),
-        (None, _) => Err(Problem::malformed("the whole line", "it has none of command, subscribe, status, lease")),
+        (None, _) => Err(Problem::malformed("the whole line", "it has none of command, subscribe, status, lease, jog")),
         (Some(_), Some(_)) => Err(Problem::malformed("the whole line", "it asks for more than one thing")),
     }
 }
@@ -91,6 +108,36 @@ fn to_command(name: &str, value: Option<&Value>) -> Result<Request, Problem> {
     Command::parse(name, text.as_deref()).map(Request::Command).map_err(|why| Problem::malformed(place, &why))
 }
 
+impl JogLine {
+    fn read(&self) -> Result<Request, &'static str> {
+        let of_jog = [self.distance_mm, self.distance_deg, self.feed_mm_per_min, self.feed_deg_per_min];
+        let stops = self.stop == Some(true);
+        if stops && self.axis.is_none() && self.direction.is_none() && of_jog.iter().all(Option::is_none) {
+            return Ok(Request::Jog(None));
+        }
+        if self.stop.is_some() {
+            return Err("\"stop\" is true and stands alone");
+        }
+        let (feed_per_min, degrees) = match (self.feed_mm_per_min, self.feed_deg_per_min) {
+            (Some(feed), None) => (feed, false),
+            (None, Some(feed)) => (feed, true),
+            _ => return Err("it needs one of feed_mm_per_min and feed_deg_per_min"),
+        };
+        let distance = if degrees { self.distance_deg } else { self.distance_mm };
+        if self.distance_mm.or(self.distance_deg) != distance {
+            return Err("feed and distance are both in mm or both in deg");
+        }
+        let reach = match (self.direction, distance) {
+            (Some(direction @ (1 | -1)), None) => ReachWords::On { positive: direction == 1 },
+            (None, Some(distance)) => ReachWords::By(distance),
+            (Some(_), None) => return Err("\"direction\" is 1 or -1"),
+            _ => return Err("it needs one of direction and distance"),
+        };
+        let axis = self.axis.ok_or("it needs an axis")?;
+        Ok(Request::Jog(Some(JogWords { axis, reach, feed_per_min, degrees: Some(degrees) })))
+    }
+}
+
 fn rate(Subscribe { rate_hz }: Subscribe) -> Result<Request, Problem> {
     if (0.0..=MAX_RATE_HZ).contains(&rate_hz) {
         return Ok(Request::Subscribe(rate_hz));
@@ -101,6 +148,10 @@ fn rate(Subscribe { rate_hz }: Subscribe) -> Result<Request, Problem> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn jog(reach: ReachWords, degrees: bool) -> Request {
+        Request::Jog(Some(JogWords { axis: 'x', reach, feed_per_min: 600.0, degrees: Some(degrees) }))
+    }
 
     #[test]
     fn every_request() {
@@ -114,6 +165,12 @@ mod tests {
             (r#"{"status":{}}"#, Request::Status),
             (r#"{"lease":"take"}"#, Request::Lease(LeaseWord::Take)),
             (r#" { "lease" : "release" } "#, Request::Lease(LeaseWord::Release)),
+            (r#"{"jog":{"stop":true}}"#, Request::Jog(None)),
+            (
+                r#"{"jog":{"axis":"x","feed_mm_per_min":600,"direction":-1}}"#,
+                jog(ReachWords::On { positive: false }, false),
+            ),
+            (r#"{"jog":{"axis":"x","distance_deg":0.1,"feed_deg_per_min":600}}"#, jog(ReachWords::By(0.1), true)),
             (r#"{"token":"abc"}"#, Request::Token("abc".to_string())),
         ] {
             assert_eq!(parse(text), Ok(request), "{text}");
@@ -138,6 +195,13 @@ mod tests {
             (r#"{"status":{},"lease":"take"}"#, "the whole line", "more than one"),
             (r#"{"lease":"steal"}"#, "column", "unknown variant"),
             (r#"{"subscribe":{"rate_hz":1000}}"#, "\"rate_hz\"", "within 0 to 100"),
+            (r#"{"jog":{}}"#, "\"jog\"", "feed_mm_per_min"),
+            (r#"{"jog":{"axis":"xy","feed_mm_per_min":1,"direction":1}}"#, "column", "character"),
+            (r#"{"jog":{"feed_mm_per_min":1,"direction":1}}"#, "\"jog\"", "an axis"),
+            (r#"{"jog":{"axis":"x","feed_mm_per_min":1,"direction":2}}"#, "\"jog\"", "1 or -1"),
+            (r#"{"jog":{"axis":"x","feed_mm_per_min":1,"distance_deg":2}}"#, "\"jog\"", "both in mm"),
+            (r#"{"jog":{"axis":"x","feed_mm_per_min":1}}"#, "\"jog\"", "direction and distance"),
+            (r#"{"jog":{"stop":true,"axis":"x"}}"#, "\"jog\"", "alone"),
             (r#"{"status":{},"status":{}}"#, "column", "duplicate field"),
         ] {
             let problem = parse(text).expect_err(text);

@@ -10,6 +10,7 @@ use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
 use super::token;
 use crate::command::Command;
+use crate::jog::JogWords;
 
 /// What a line led to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,6 +104,7 @@ impl Session {
         match request {
             Request::Command(command) => self.command(*command, desk, lease),
             Request::Status => Ok(reply::status(&desk.status())),
+            Request::Jog(words) => self.jog(words.as_ref(), desk, lease),
             Request::Lease(word) => self.lease(*word, lease),
             Request::Token(_) => Err(Problem::refused("key \"token\"", "no token is asked for here".to_string())),
             Request::Subscribe(rate_hz) => {
@@ -123,6 +125,17 @@ impl Session {
         Ok(reply::ok(&json!({ "command": command.name(), "tick": tick })))
     }
 
+    fn jog(&self, words: Option<&JogWords>, desk: &Desk, lease: &Lease) -> Result<String, Problem> {
+        let refused = |why: String| Problem::refused("key \"jog\"", why);
+        // To stop is safety.
+        if words.is_some() && !lease.is_held_by(self.client) {
+            return Err(refused(without_lease(lease)));
+        }
+        let tick = desk.jog(words).map_err(refused)?;
+        let axis = words.map(|words| words.axis.to_ascii_lowercase());
+        Ok(reply::ok(&json!({ "jog": axis.map_or(json!("stop"), |axis| json!({ "axis": axis })), "tick": tick })))
+    }
+
     fn lease(&self, word: LeaseWord, lease: &mut Lease) -> Result<String, Problem> {
         let refused = |why: String| Problem::refused("key \"lease\"", why);
         match word {
@@ -140,7 +153,7 @@ impl Session {
 
 fn without_lease(lease: &Lease) -> String {
     let holder = lease.holder().map_or("nobody holds it".to_string(), |client| format!("client {client} holds it"));
-    format!("it needs the control lease, and {holder}; only hold and emergency-stop need none")
+    format!("it needs the control lease, and {holder}; only hold, emergency-stop and the stop of a jog need none")
 }
 
 #[cfg(test)]

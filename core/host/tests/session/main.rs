@@ -1,6 +1,7 @@
 //! Rests that end an epoch: where the machine stands, what is forgotten, and that it goes on from there.
 
 mod depth;
+mod jog;
 mod rig;
 
 use std::sync::atomic::Ordering::Relaxed;

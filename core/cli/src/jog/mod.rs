@@ -1,0 +1,138 @@
+//! `tandem jog`: single axes by hand.
+
+mod hand;
+mod keys;
+mod line;
+mod shared;
+
+use std::error::Error;
+use std::sync::Arc;
+
+use tandem_host::jog::{JogSession, Jogs};
+use tandem_host::operator::Desk;
+use tandem_host::{Clock, Run, RunObserver, Summary, Timed};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+
+use crate::operator::{Keyboard, Operator, Presence, Signals, is_on_terminal};
+use crate::trace::TraceSink;
+use crate::{FAULT, REFUSED, args, built_in};
+
+use hand::{Hand, Script};
+use keys::Panel;
+use shared::Shared;
+
+/// The word that takes back a fault.
+const RESET: &str = "!reset";
+
+/// Jogs until the operator ends it.
+pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
+    let machine = Machine::read(&options.machine, &options.overrides)?;
+    let registry = built_in::registry()?;
+    let real_time = options.clock == args::Clock::Wall;
+    let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
+    let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
+    let hand = Hand::new(Arc::clone(&shared), script);
+    let mut session = JogSession::new(machine.clone(), &registry, Box::new(hand.clone()))?;
+    let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
+    let mut sinks = Sinks::new(Arc::clone(&shared));
+    let faulted = loop {
+        let run = session.enable()?;
+        sinks.begin(options, &machine, session.jogs(), &run)?;
+        let clock = if real_time { Clock::Wall } else { Clock::Virtual };
+        let outcome = run.drive(clock, &[], &mut sinks)?;
+        sinks.end(outcome.summary.clone());
+        session.stands_at(outcome.position);
+        let Some(fault) = outcome.summary.fault else { break false };
+        shared.say(&format!("fault: {fault}; {} goes on from here", if shared.keys { "r" } else { RESET }));
+        if !waits_for_reset(&hand, &shared, real_time)? {
+            break true;
+        }
+    };
+    drop(keyboard);
+    sinks.trace.map_or(Ok(()), TraceSink::finish)?;
+    Ok(if faulted { FAULT } else { u8::from(shared.has_refused()) * REFUSED })
+}
+
+fn take_keys(shared: &Arc<Shared>, jogs: &Arc<Jogs>) -> Result<Keyboard, String> {
+    let mut panel = Panel::new(Arc::clone(shared), Arc::clone(jogs));
+    panel.explain();
+    Keyboard::begin_with(move |bytes| panel.take(bytes))
+}
+
+/// Signals of the run that is over are gone: meanwhile others end the session.
+fn waits_for_reset(hand: &Hand, shared: &Shared, real_time: bool) -> Result<bool, String> {
+    let desk = shared.desk().filter(|_| real_time && shared.keys);
+    let _signals = desk.map(|(desk, stops)| Signals::catch_with(desk, stops)).transpose()?;
+    Ok(hand.is_reset())
+}
+
+/// What is kept of all runs of a session.
+struct Sinks {
+    shared: Arc<Shared>,
+    trace: Option<TraceSink>,
+    operator: Option<Operator>,
+    /// Tick of the session at which the run began: a trace goes on after a reset.
+    first_tick: u64,
+    next_tick: u64,
+    /// What the computer did not grant has been said.
+    noted: bool,
+}
+
+impl Sinks {
+    fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, trace: None, operator: None, first_tick: 0, next_tick: 0, noted: false }
+    }
+
+    fn begin(&mut self, options: &args::Jog, machine: &Machine, jogs: &Arc<Jogs>, run: &Run) -> Result<(), String> {
+        if let (None, Some(path)) = (&self.trace, &options.trace) {
+            self.trace = Some(TraceSink::create(path, machine, "jogging", run, false)?);
+        }
+        let desk = Desk::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
+        let presence = Presence { real_time: options.clock == args::Clock::Wall, pause: false, keys: false };
+        let operator = Operator::at(Arc::new(desk), &options.operator, presence)?;
+        self.shared.follow(&operator);
+        self.operator = Some(operator);
+        self.first_tick = self.next_tick;
+        Ok(())
+    }
+
+    fn end(&mut self, mut summary: Summary) {
+        // A jog that is stopped is the order of the day.
+        summary.stopped = None;
+        if let Some(mut operator) = self.operator.take() {
+            operator.end(&summary);
+        }
+        self.noted = true;
+    }
+}
+
+impl RunObserver for Sinks {
+    fn note(&mut self, note: &str) {
+        if !self.noted {
+            self.shared.say(note);
+        }
+    }
+
+    fn is_attended(&self) -> bool {
+        self.operator.as_ref().is_some_and(Operator::is_attended)
+    }
+
+    fn command(&mut self, command: &Timed) {
+        if let Some(trace) = &mut self.trace {
+            trace.command(&Timed { tick: self.first_tick + command.tick, ..*command });
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
+        let sample = Sample { tick: self.first_tick + sample.tick, ..*sample };
+        self.next_tick = sample.tick + 1;
+        self.shared.sample(&sample);
+        if let Some(operator) = &self.operator {
+            operator.sample(&sample, 1.0);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.sample(&sample, signals);
+        }
+    }
+}

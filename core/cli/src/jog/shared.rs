@@ -1,0 +1,131 @@
+//! What keys, script and command share; it outlives faults.
+
+use std::io::{Write, stderr, stdout};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tandem_host::jog::{JogEnd, JogRest, Jogs};
+use tandem_host::operator::{Desk, Position};
+use tandem_rings::Sample;
+use tandem_sdk::{Axes, AxisVector};
+
+use crate::operator::{Operator, Stops, tell};
+
+/// What keys, script and command share.
+pub struct Shared {
+    /// Keys are taken from the terminal.
+    pub keys: bool,
+    axes: Axes,
+    refused: AtomicBool,
+    /// The operator wants to go on after a fault.
+    pub reset: AtomicBool,
+    /// The operator ends the session.
+    pub quit: AtomicBool,
+    inner: Mutex<Inner>,
+}
+
+struct Inner {
+    position: AxisVector,
+    desk: Option<Arc<Desk>>,
+    stops: Stops,
+    /// What the terminal was told last: a key that repeats is told once.
+    said: String,
+}
+
+impl Shared {
+    /// Nothing said yet, at `position`.
+    pub fn new(keys: bool, axes: Axes, position: AxisVector) -> Self {
+        let inner = Inner { position, desk: None, stops: Stops::default(), said: String::new() };
+        Self {
+            keys,
+            axes,
+            refused: AtomicBool::new(false),
+            reset: AtomicBool::new(false),
+            quit: AtomicBool::new(false),
+            inner: Mutex::new(inner),
+        }
+    }
+
+    /// From now on commands go to this operator's desk.
+    pub fn follow(&self, operator: &Operator) {
+        let mut inner = self.inner();
+        inner.desk = Some(Arc::clone(operator.desk()));
+        inner.stops = operator.stops().unwrap_or_default();
+    }
+
+    /// The desk of the run, and how it is stopped.
+    pub fn desk(&self) -> Option<(Arc<Desk>, Stops)> {
+        let inner = self.inner();
+        inner.desk.clone().map(|desk| (desk, inner.stops.clone()))
+    }
+
+    /// Whether the session is to end.
+    pub fn is_over(&self) -> bool {
+        self.quit.load(Relaxed) || self.inner().stops.are_asked()
+    }
+
+    /// Something was refused, in words.
+    pub fn refuse(&self, why: &str) {
+        self.refused.store(true, Relaxed);
+        self.say(why);
+    }
+
+    /// Whether anything was refused.
+    pub fn has_refused(&self) -> bool {
+        self.refused.load(Relaxed)
+    }
+
+    /// Words for the operator.
+    pub fn say(&self, words: &str) {
+        if !self.keys {
+            say!("{words}");
+        } else if std::mem::replace(&mut self.inner().said, words.to_string()) != words {
+            tell(words);
+        }
+    }
+
+    /// A jog is over.
+    pub fn rested(&self, jogs: &Jogs, rest: &JogRest) {
+        self.inner().position = rest.position;
+        let name = jogs.name(rest.axis);
+        match rest.end {
+            JogEnd::AtLimit => {
+                let limit = jogs.shown(rest.axis, rest.position[rest.axis]);
+                self.say(&format!("{name} is at its travel limit, {limit}"));
+            }
+            // A key that is let go says no more than that.
+            JogEnd::Late if !self.keys => self.say(&format!("{name} stopped: the keep-alive was late")),
+            _ => self.inner().said.clear(),
+        }
+        if !self.keys {
+            self.tell_position();
+        }
+    }
+
+    /// Where the machine is, as a line of standard output.
+    pub fn tell_position(&self) {
+        // A reader that has gone away is no reason to stop.
+        let _ = writeln!(stdout(), "{}", self.position(4));
+    }
+
+    /// A sample was sent.
+    pub fn sample(&self, sample: &Sample) {
+        self.inner().position = sample.command;
+        if self.keys && sample.tick.is_multiple_of(100) {
+            let feed = sample.feed_mm_per_s * 60.0;
+            // A terminal that has gone away ends the session with its signal.
+            let _ = write!(stderr(), "\r\x1b[K{}  {}  F{feed:.0}", sample.state.name(), self.position(3));
+            let _ = stderr().flush();
+        }
+    }
+
+    fn position(&self, digits: usize) -> String {
+        let position = Position::new(&self.axes, &self.inner().position);
+        let each = position.values().iter().map(|(name, value)| format!("{name} {value:.digits$}"));
+        each.collect::<Vec<_>>().join("  ")
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,137 @@
+//! A machine that is jogged, through faults, and its jogs as the rough loop pulls them.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tandem_gcode::Item;
+use tandem_machine::Machine;
+use tandem_rings::Rest;
+use tandem_rough::Source;
+use tandem_sdk::AxisVector;
+
+use super::{JogRest, Jogs};
+use crate::error::HostError;
+use crate::registry::Registry;
+use crate::run::{Run, Switches};
+use crate::setup;
+
+/// The operator's side of a session. Called on the soft side.
+pub trait JogHand: Send {
+    /// A rough period begins: what is due is asked of `jogs`. On the virtual clock it may wait for words, and machine time
+    /// stands still meanwhile.
+    fn period(&mut self, jogs: &Jogs);
+
+    /// Whether time has to pass before more is asked.
+    fn is_waiting(&self) -> bool;
+
+    /// A jog is over and the machine rests.
+    fn rested(&mut self, jogs: &Jogs, rest: &JogRest);
+
+    /// A jog that was taken could not begin, in words.
+    fn refused(&mut self, why: &str);
+}
+
+type Hand = Arc<Mutex<Box<dyn JogHand>>>;
+
+/// Jogging on one machine.
+pub struct JogSession<'a> {
+    machine: Machine,
+    registry: &'a Registry,
+    jogs: Arc<Jogs>,
+    hand: Hand,
+}
+
+impl<'a> JogSession<'a> {
+    /// A session in which nothing has moved. Host.
+    ///
+    /// # Errors
+    /// The planner refuses.
+    pub fn new(machine: Machine, registry: &'a Registry, hand: Box<dyn JogHand>) -> Result<Self, HostError> {
+        let judge = setup::planner(&machine, registry)?;
+        let jogs = Arc::new(Jogs::new(&machine, judge));
+        Ok(Self { machine, registry, jogs, hand: Arc::new(Mutex::new(hand)) })
+    }
+
+    /// Where jogs are asked for.
+    pub fn jogs(&self) -> &Arc<Jogs> {
+        &self.jogs
+    }
+
+    /// Enables the machine where it stands: a run that jogs until the session ends, or a fault ends it.
+    ///
+    /// # Errors
+    /// The plugins refuse, or do not go together.
+    pub fn enable(&self) -> Result<Run, HostError> {
+        let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
+        let (machine, name) = (self.machine.clone(), "jogging".to_string());
+        let run = Run::of_source(machine, self.registry, name, Box::new(source), Switches::default())?;
+        self.jogs.enable(run.controls());
+        Ok(run)
+    }
+
+    /// The run is over and the machine rests at `position`: the next one starts there.
+    pub fn stands_at(&mut self, position: AxisVector) {
+        self.machine.start = position;
+        self.jogs.disable(position);
+    }
+}
+
+/// Times in a row that the rough loop finds everything driven before it is believed: the fine loop says so once a period,
+/// and may have taken a segment since.
+const STANDING: u32 = 2;
+
+/// The session as the rough loop pulls it.
+struct Jogging {
+    jogs: Arc<Jogs>,
+    hand: Hand,
+    /// How often in a row everything was driven.
+    standing: u32,
+}
+
+impl Jogging {
+    fn hand(&self) -> MutexGuard<'_, Box<dyn JogHand>> {
+        // A panic of the hand leaves the jogs as they were.
+        self.hand.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Source for Jogging {
+    fn period(&mut self) {
+        self.hand().period(&self.jogs);
+    }
+
+    fn is_waiting(&self) -> bool {
+        self.hand().is_waiting()
+    }
+
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        self.standing = if driven { self.standing + 1 } else { 0 };
+        if self.standing < STANDING {
+            return false;
+        }
+        if let Some(rest) = self.jogs.arrived() {
+            self.hand().rested(&self.jogs, &rest);
+        }
+        true
+    }
+
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        let (more, refused) = self.jogs.next(items);
+        for why in refused {
+            self.hand().refused(&why);
+        }
+        if !items.is_empty() {
+            self.standing = 0;
+        }
+        Ok(more)
+    }
+
+    fn provide_input(&mut self, _value: f64) {}
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        self.standing = 0;
+        if let Some(rest) = self.jogs.rests(rest) {
+            self.hand().rested(&self.jogs, &rest);
+        }
+        true
+    }
+}
