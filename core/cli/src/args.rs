@@ -125,7 +125,7 @@ pub struct Jog {
     /// The machine file
     #[arg(long = "machine", value_name = "M.toml")]
     pub machine: PathBuf,
-    /// Override a key of the machine file, as in operator.jog_keep_alive_ms=100
+    /// Override a key of the machine file, as in planner.plugin=look-ahead
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub overrides: Vec<(String, String)>,
     /// The clock that drives the loops

@@ -123,7 +123,7 @@ impl Jogs {
     /// `value` of an axis in words, mm or deg.
     pub fn shown(&self, axis: usize, value: f64) -> String {
         let (value, unit) = if self.machine.axes.is_rotary(axis) { (value.to_degrees(), "deg") } else { (value, "mm") };
-        format!("{} {unit}", (value * 1e9).round() / 1e9)
+        format!("{} {unit}", (value * 1e6).round() / 1e6)
     }
 
     /// Name of an axis.

@@ -66,6 +66,7 @@ impl Desk {
     }
 
     /// The desk of a session that jogs.
+    #[must_use]
     pub fn with_jogs(self, jogs: Arc<Jogs>) -> Self {
         Self { jogs: Some(jogs), ..self }
     }
