@@ -102,12 +102,15 @@ fn a_late_keep_alive_stops_after_its_time_and_the_way_to_rest() {
         assert_eq!(said.status, 0, "{}", said.errors);
         assert!(said.errors.contains("x stopped: the keep-alive was late"), "{}", said.errors);
         let x = said.column(0);
-        let (_, last) = moved(&x);
-        // The jog was asked for before the first sample.
+        // It begins to move after it was asked for.
+        let (first, last) = moved(&x);
         let speed = x.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max) / PERIOD_S;
         let stop_periods = (speed / ACCELERATION_MM_PER_S2 / PERIOD_S).ceil() as usize;
-        assert!(last <= keep_alive_ms + stop_periods + 1, "{feed_mm_per_min}: last motion in period {last}");
-        assert!(last > keep_alive_ms - 50, "{feed_mm_per_min}: it has moved at all, until {last}");
+        assert!(last - first <= keep_alive_ms + stop_periods + 1, "{feed_mm_per_min}: last motion in period {last}");
+        assert!(
+            last - first + 50 > keep_alive_ms + stop_periods,
+            "{feed_mm_per_min}: it has moved at all, until {last}"
+        );
     }
 }
 
@@ -200,6 +203,22 @@ fn a_fault_is_left_with_reset_from_where_the_machine_stands() {
     assert!(x > 5.0 && x < 15.0 && y == 1.0, "{x} {y}");
     let unreset = say("x+ 6000\nwait 0.1\nemergency-stop\n");
     assert_eq!(unreset.status, 3);
+}
+
+#[test]
+fn a_machine_that_asks_for_homing_is_jogged_behind_it() {
+    let machine = root().join("examples/machines/mill-homing.toml");
+    let folder = tempfile::TempDir::new().unwrap();
+    let refused = command(folder.path(), &machine, &["--clock", "virtual"]).stdin(Stdio::null()).output().unwrap();
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("machine.require_homing"));
+    let mut child = command(folder.path(), &machine, &["--clock", "virtual", "--home"]).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(b"where\nx-1 600\nx+0.25 600\n").unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let x: Vec<f64> = said.lines().map(|line| line.split_whitespace().nth(1).unwrap().parse().unwrap()).collect();
+    assert_eq!(x, [x[0], x[0] - 1.0, x[0] - 0.75], "{said}");
 }
 
 /// In real time with a socket.

@@ -131,6 +131,9 @@ pub struct Jog {
     /// The clock that drives the loops
     #[arg(long, default_value = "wall")]
     pub clock: Clock,
+    /// Home the axes first, and after every fault, as the machine file says
+    #[arg(long)]
+    pub home: bool,
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format

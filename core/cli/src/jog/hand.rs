@@ -154,7 +154,7 @@ impl JogHand for Hand {
             return;
         }
         let mut script = self.script();
-        let Some(script) = &mut *script else { return };
+        let Some(script) = script.as_mut().filter(|_| jogs.is_ready()) else { return };
         while script.is_due(jogs) {
             script.wait = Wait::Nothing;
             match script.input.next(script.may_wait) {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use tandem_host::jog::{JogSession, Jogs};
 use tandem_host::operator::Desk;
-use tandem_host::{Clock, Run, RunObserver, Summary, Timed};
+use tandem_host::{Clock, Run, RunObserver, Summary, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
@@ -32,8 +32,9 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let real_time = options.clock == args::Clock::Wall;
     let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
     let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
+    let switches = Switches { home: options.home, ..Switches::default() };
     let hand = Hand::new(Arc::clone(&shared), script);
-    let mut session = JogSession::new(machine.clone(), &registry, Box::new(hand.clone()))?;
+    let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(hand.clone()))?;
     let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
     let mut sinks = Sinks::new(Arc::clone(&shared));
     let faulted = loop {

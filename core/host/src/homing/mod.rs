@@ -146,6 +146,14 @@ impl Source for Homing {
         Ok(true)
     }
 
+    fn period(&mut self) {
+        self.program.iter_mut().for_each(|program| program.period());
+    }
+
+    fn is_waiting(&self) -> bool {
+        self.program.as_ref().is_some_and(|program| program.is_waiting())
+    }
+
     fn may_go_on(&mut self, driven: bool) -> bool {
         let program = self.program.as_mut().filter(|_| self.axes.is_empty());
         program.is_none_or(|program| program.may_go_on(driven))

@@ -36,6 +36,8 @@ struct Inner {
     ended_by_word: bool,
     /// Blocks made so far.
     blocks: u32,
+    /// The machine stands and takes jogs: it is enabled, and homed where that was asked for.
+    ready: bool,
     over: bool,
 }
 
@@ -56,6 +58,7 @@ impl Jogs {
             waiting: VecDeque::new(),
             ended_by_word: false,
             blocks: 0,
+            ready: false,
             over: false,
         };
         let periods = (machine.operator.jog_keep_alive_s / machine.fine_period_s).round();
@@ -78,6 +81,9 @@ impl Jogs {
         let Some(controls) = inner.controls.clone().filter(|_| !inner.over) else {
             return Err("the machine is not enabled: it is in fault, or the session is over".to_string());
         };
+        if !inner.ready {
+            return Err("the machine is not ready: it is being enabled, or homes".to_string());
+        }
         let judged = match jog.reach {
             Reach::On { .. } => self.go_on(&mut inner, &controls, jog)?,
             Reach::By { .. } => self.step(&mut inner, &controls, jog)?,
@@ -114,6 +120,11 @@ impl Jogs {
         inner.stop();
     }
 
+    /// Whether jogs are taken: the machine is enabled, and homed where that was asked for.
+    pub fn is_ready(&self) -> bool {
+        self.lock().ready
+    }
+
     /// Whether nothing moves and nothing waits.
     pub fn is_still(&self) -> bool {
         let inner = self.lock();
@@ -139,7 +150,7 @@ impl Jogs {
     /// The run is over: the machine stands at `position`.
     pub(super) fn disable(&self, position: AxisVector) {
         let mut inner = self.lock();
-        (inner.controls, inner.moving, inner.position) = (None, None, position);
+        (inner.controls, inner.moving, inner.position, inner.ready) = (None, None, position, false);
         inner.waiting.clear();
     }
 
@@ -165,6 +176,7 @@ impl Jogs {
     /// At rest: the next jog as a block, with the words for those that cannot be; `false` where nothing more will come.
     pub(super) fn next(&self, items: &mut Vec<Item>) -> (bool, Vec<String>) {
         let mut inner = self.lock();
+        inner.ready = true;
         let mut refused = vec![];
         while let Some(jog) = inner.waiting.pop_front() {
             match self.begin(&mut inner, jog) {

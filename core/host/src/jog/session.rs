@@ -36,6 +36,7 @@ type Hand = Arc<Mutex<Box<dyn JogHand>>>;
 pub struct JogSession<'a> {
     machine: Machine,
     registry: &'a Registry,
+    switches: Switches,
     jogs: Arc<Jogs>,
     hand: Hand,
 }
@@ -45,10 +46,15 @@ impl<'a> JogSession<'a> {
     ///
     /// # Errors
     /// The planner refuses.
-    pub fn new(machine: Machine, registry: &'a Registry, hand: Box<dyn JogHand>) -> Result<Self, HostError> {
+    pub fn new(
+        machine: Machine,
+        registry: &'a Registry,
+        switches: Switches,
+        hand: Box<dyn JogHand>,
+    ) -> Result<Self, HostError> {
         let judge = setup::planner(&machine, registry)?;
         let jogs = Arc::new(Jogs::new(&machine, judge));
-        Ok(Self { machine, registry, jogs, hand: Arc::new(Mutex::new(hand)) })
+        Ok(Self { machine, registry, switches, jogs, hand: Arc::new(Mutex::new(hand)) })
     }
 
     /// Where jogs are asked for.
@@ -63,7 +69,7 @@ impl<'a> JogSession<'a> {
     pub fn enable(&self) -> Result<Run, HostError> {
         let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
-        let run = Run::of_source(machine, self.registry, name, Box::new(source), Switches::default())?;
+        let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
         self.jogs.enable(run.controls());
         Ok(run)
     }

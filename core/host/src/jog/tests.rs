@@ -27,6 +27,7 @@ impl Rig {
         let jogs = Jogs::new(&machine, setup::planner(&machine, &registry).unwrap());
         let controls = Arc::<Controls>::default();
         jogs.enable(Arc::clone(&controls));
+        jogs.next(&mut vec![]);
         Self { jogs, controls }
     }
 
@@ -141,6 +142,8 @@ fn a_machine_that_is_not_enabled_is_not_jogged() {
     rig.jogs.disable(AxisVector::from_slice(&[250.0]));
     assert!(rig.on('x', false).unwrap_err().contains("not enabled"));
     rig.jogs.enable(Arc::clone(&rig.controls));
+    assert!(rig.on('x', false).unwrap_err().contains("not ready"));
+    assert!(rig.begins().is_none());
     assert_eq!(rig.on('x', true).unwrap_err(), "x stands at its travel limit, 250 mm");
     rig.jogs.end();
     assert!(rig.on('x', false).is_err());
