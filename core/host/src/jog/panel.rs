@@ -82,7 +82,7 @@ impl Jogs {
             return Err("the machine is not enabled: it is in fault, or the session is over".to_string());
         };
         if !inner.ready {
-            return Err("the machine is not ready: it is being enabled, or homes".to_string());
+            return Err("the machine is not ready: it homes".to_string());
         }
         let judged = match jog.reach {
             Reach::On { .. } => self.go_on(&mut inner, &controls, jog)?,
@@ -142,9 +142,10 @@ impl Jogs {
         self.machine.axes.letter(axis).to_ascii_lowercase()
     }
 
-    /// A run begins with these atomics, at rest at `position`.
-    pub(super) fn enable(&self, controls: Arc<Controls>) {
-        self.lock().controls = Some(controls);
+    /// A run begins with these atomics; it homes first, or is `ready`.
+    pub(super) fn enable(&self, controls: Arc<Controls>, ready: bool) {
+        let mut inner = self.lock();
+        (inner.controls, inner.ready) = (Some(controls), ready);
     }
 
     /// The run is over: the machine stands at `position`.

@@ -70,7 +70,7 @@ impl<'a> JogSession<'a> {
         let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
-        self.jogs.enable(run.controls());
+        self.jogs.enable(run.controls(), !self.switches.home);
         Ok(run)
     }
 
