@@ -20,7 +20,9 @@ const JERK_SHARE: f64 = 0.9;
 impl FineLoop {
     /// Chooses the rate for this period; gives the program time that passes, s.
     pub(super) fn govern(&mut self, ask: Ask) -> f64 {
-        self.cursor.scan(self.config.period_s, &mut self.points);
+        // While slowing down no more program time passes than at the present rate: what lies beyond does not count.
+        let most = if ask == Ask::Run || self.config.order >= 3 { 1.0 } else { self.governor.sigma() };
+        self.cursor.scan(most * self.config.period_s, &mut self.points);
         if self.config.order >= 3 {
             self.cursor.look_out(self.config.period_s, &mut self.outlook);
         }
