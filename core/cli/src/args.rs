@@ -32,6 +32,9 @@ pub enum Command {
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
+    /// Make, build, check and measure policy scripts
+    #[command(subcommand)]
+    Script(Script),
     /// Measure how late the fine loop wakes on this computer, as a histogram
     Latency(Latency),
 }
@@ -211,6 +214,57 @@ pub enum Trace {
         /// The other
         b: PathBuf,
     },
+}
+
+#[derive(Subcommand)]
+pub enum Script {
+    /// Make a folder with a first script and the SDK of its language
+    New {
+        /// The folder; its last part names the script
+        name: PathBuf,
+        /// The language
+        #[arg(long, default_value = "as")]
+        lang: Language,
+    },
+    /// Build a module from a .ts, a .c, or the folder of a Rust crate
+    Build {
+        /// The source
+        source: PathBuf,
+        /// The module to write; beside the source where it is not stated
+        #[arg(long, value_name = "F.wasm")]
+        out: Option<PathBuf>,
+    },
+    /// Print what a module is: calls, parameters, memory; try it on a sample
+    Check {
+        /// The module
+        script: PathBuf,
+        /// Take parameters and limits from this machine
+        #[arg(long, value_name = "M.toml")]
+        machine: Option<PathBuf>,
+        /// Override a key of the machine file
+        #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value, requires = "machine")]
+        overrides: Vec<(String, String)>,
+    },
+    /// Measure what a module costs: fuel and time of a call
+    Bench {
+        /// The module
+        script: PathBuf,
+        /// Calls to measure
+        #[arg(long, default_value = "100000", value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+        calls: u32,
+    },
+    /// Say which languages can be built on this computer, and what to install for the others
+    Doctor,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Language {
+    /// TypeScript with the numbers of WASM, compiled by asc
+    As,
+    /// C
+    C,
+    /// Rust
+    Rust,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

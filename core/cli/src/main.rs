@@ -21,6 +21,7 @@ mod program;
 mod progress;
 mod report;
 mod run;
+mod script;
 mod trace;
 
 use std::process::ExitCode;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Check(options) => check::check(&options),
         Command::Home(options) => home::home(&options),
         Command::Trace(command) => trace::trace(&command),
+        Command::Script(command) => script::script(&command),
         Command::Latency(options) => latency::latency(&options),
     };
     ExitCode::from(status.unwrap_or_else(|error| {

@@ -24,6 +24,8 @@ pub enum Command {
     EmergencyStop,
     /// Stop on the path, drop what is queued, and end the program.
     Abort,
+    /// Loads the policy script anew, and takes it out of quarantine.
+    ReloadPolicy,
     /// A test's doing: the rough loop does nothing for so many rough periods. Virtual clock only.
     StallRough(u64),
 }
@@ -40,6 +42,7 @@ impl Command {
             Self::SingleBlock(on) => controls.single_block.store(on, Relaxed),
             Self::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
             Self::Abort => controls.abort.store(true, Relaxed),
+            Self::ReloadPolicy => controls.reload_policy.store(true, Relaxed),
             Self::StallRough(_) => {}
         }
     }
@@ -82,6 +85,7 @@ impl fmt::Display for Timed {
             Command::SingleBlock(on) => write!(f, "single-block,{}", u8::from(on)),
             Command::EmergencyStop => write!(f, "emergency-stop"),
             Command::Abort => write!(f, "abort"),
+            Command::ReloadPolicy => write!(f, "reload-policy"),
             Command::StallRough(periods) => write!(f, "stall-rough,{periods}"),
         }
     }
@@ -99,6 +103,7 @@ impl Command {
             Self::SingleBlock(_) => "single-block",
             Self::EmergencyStop => "emergency-stop",
             Self::Abort => "abort",
+            Self::ReloadPolicy => "reload-policy",
             Self::StallRough(_) => "stall-rough",
         }
     }
@@ -123,6 +128,7 @@ impl Command {
             "resume" => Self::Resume,
             "emergency-stop" => Self::EmergencyStop,
             "abort" => Self::Abort,
+            "reload-policy" => Self::ReloadPolicy,
             "feed-override" => return number().map(Self::FeedOverride),
             "rapid-override" => return number().map(Self::RapidOverride),
             "optional-stop" => return switch().map(Self::OptionalStop),
@@ -131,7 +137,7 @@ impl Command {
             _ => {
                 return Err(format!(
                     "no command is called {name:?}: hold, resume, feed-override, rapid-override, optional-stop, \
-                     single-block, abort, emergency-stop, stall-rough"
+                     single-block, abort, emergency-stop, reload-policy, stall-rough"
                 ));
             }
         };
@@ -146,7 +152,13 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let lines = ["1,hold", "2,resume", "3,feed-override,0.1", "4,rapid-override,1", "5,optional-stop,1"];
-        for line in lines.into_iter().chain(["6,single-block,0", "7,emergency-stop", "8,abort", "9,stall-rough,7"]) {
+        for line in lines.into_iter().chain([
+            "6,single-block,0",
+            "7,emergency-stop",
+            "8,abort",
+            "9,stall-rough,7",
+            "10,reload-policy",
+        ]) {
             assert_eq!(Timed::parse(line).unwrap().to_string(), line);
         }
     }

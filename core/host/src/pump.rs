@@ -10,7 +10,8 @@ use tandem_sdk::{Block, BlockReport, Event};
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
 use crate::monitor::Monitor;
-use crate::strategy::StrategyRunner;
+use crate::policy::Reloader;
+use crate::strategy::FeedRunner;
 
 /// What is to happen where the program waits at rest for the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +62,8 @@ impl RunObserver for () {}
 pub struct Pump<'a> {
     rough: RoughLoop,
     pub host: HostEnd,
-    strategy: Option<StrategyRunner>,
+    feed: Option<FeedRunner>,
+    reloader: Option<Reloader>,
     pub monitor: Monitor,
     observer: &'a mut dyn RunObserver,
     /// The defect on the soft side that ends the run, in words.
@@ -78,7 +80,8 @@ impl<'a> Pump<'a> {
     pub fn new(
         rough: RoughLoop,
         host: HostEnd,
-        strategy: Option<StrategyRunner>,
+        feed: Option<FeedRunner>,
+        reloader: Option<Reloader>,
         monitor: Monitor,
         observer: &'a mut dyn RunObserver,
     ) -> Self {
@@ -86,7 +89,8 @@ impl<'a> Pump<'a> {
         Self {
             rough,
             host,
-            strategy,
+            feed,
+            reloader,
             monitor,
             observer,
             soft_error: None,
@@ -103,12 +107,28 @@ impl<'a> Pump<'a> {
             return;
         }
         let started = Instant::now();
+        self.serve_policy();
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
         let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
         if let Err(error) = self.rough.step(&mut both) {
             self.fail(error.to_string());
         }
         self.planning_ns += started.elapsed().as_nanos();
+    }
+
+    /// Puts a new policy script in place, if there is one.
+    fn serve_policy(&mut self) {
+        let asked = self.host.controls.reload_policy.swap(false, Relaxed);
+        let Some(reloader) = &self.reloader else { return };
+        reloader.serve(asked);
+        self.tell_policy_notes();
+    }
+
+    /// Tells what the policy script did since the last time.
+    pub fn tell_policy_notes(&mut self) {
+        for note in self.reloader.iter().flat_map(Reloader::take_notes) {
+            self.observer.note(&note);
+        }
     }
 
     /// Passes a note on to the observer.
@@ -119,7 +139,7 @@ impl<'a> Pump<'a> {
     /// Gives a command of the command file to the fine loop, or does what it says of the rough loop.
     pub fn give(&mut self, timed: &Timed) {
         timed.command.give(&self.host.controls);
-        if matches!(timed.command, Command::StallRough(_)) {
+        if matches!(timed.command, Command::StallRough(_) | Command::ReloadPolicy) {
             self.observer.command(timed);
         }
     }
@@ -131,11 +151,11 @@ impl<'a> Pump<'a> {
                 self.observer.command(&command);
             }
             let deviation_mm = self.monitor.sample(&sample);
-            let signals = self.strategy.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
-            let count = self.strategy.as_ref().map_or(0, |s| s.signals().len());
+            let signals = self.feed.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
+            let count = self.feed.as_ref().map_or(0, |s| s.signals().len());
             self.observer.sample(&sample, deviation_mm, &signals[..count]);
-            if let (Some(strategy), None) = (&mut self.strategy, &self.soft_error) {
-                strategy.sample(&sample, &mut self.host);
+            if let (Some(feed), None) = (&mut self.feed, &self.soft_error) {
+                feed.sample(&sample, &mut self.host);
             }
         }
     }
@@ -178,7 +198,7 @@ impl<'a> Pump<'a> {
 
     /// Why the soft side stops the machine, in words.
     pub fn soft_cause(&self) -> Option<&str> {
-        let of_strategy = || self.strategy.as_ref()?.fault.as_deref();
+        let of_strategy = || self.feed.as_ref()?.fault.as_deref();
         self.soft_error.as_deref().or_else(of_strategy)
     }
 

@@ -30,12 +30,6 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
             format!("following errors are those of joints, and {} has joints of its own", machine.kinematics.plugin);
         return refuse(&key, cause);
     }
-    if machine.policy.is_some() {
-        return refuse(
-            "policy.script",
-            "policy scripts are not supported: this machine would run without its policy".to_string(),
-        );
-    }
     if !machine.joints.is_empty() {
         return refuse(
             "joints",

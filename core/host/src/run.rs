@@ -15,9 +15,10 @@ use crate::error::HostError;
 use crate::fault_text::describe;
 use crate::homing::Homing;
 use crate::monitor::Monitor;
+use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::registry::Registry;
-use crate::strategy::StrategyRunner;
+use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, Summary};
 use crate::wall_clock::Periods;
 use crate::{faults, rules, setup, virtual_clock, wall_clock};
@@ -55,7 +56,8 @@ pub struct Run {
     rough: RoughLoop,
     fine: FineLoop,
     host: HostEnd,
-    strategy: Option<StrategyRunner>,
+    feed: Option<FeedRunner>,
+    policy: Option<PolicyHost>,
     steps: bool,
     leaves_path: bool,
     switches: Switches,
@@ -177,7 +179,9 @@ impl Run {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let kinematics = setup::kinematics(&machine, registry)?;
-        let strategy = setup::strategy(&machine, registry)?;
+        // Homing knows its own feeds.
+        let policy = program.as_ref().map_or(Ok(None), |_| PolicyHost::open(&machine))?;
+        let feed = setup::feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
         let axes = machine.axes.count();
         let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
         driver = faults::wrap(&machine, driver, joints)?;
@@ -187,6 +191,7 @@ impl Run {
         let mut fine_config = setup::fine_config(&machine, &description, switches);
         fine_config.record_drives = program.is_none();
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
+        let source = setup::tuned(&machine, registry, source, policy.as_ref())?;
         let rough_config = RoughConfig::new(machine.rough_period_s);
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();
@@ -196,7 +201,8 @@ impl Run {
             machine,
             program: program.unwrap_or_else(|| HOMING.to_string()),
             host,
-            strategy,
+            feed,
+            policy,
             switches,
             steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
             leaves_path: description.leaves_path != 0,
@@ -221,7 +227,7 @@ impl Run {
 
     /// Names of the feed strategy's signals.
     pub fn signals(&self) -> &'static [&'static str] {
-        self.strategy.as_ref().map_or(&[], StrategyRunner::signals)
+        self.feed.as_ref().map_or(&[], FeedRunner::signals)
     }
 
     /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
@@ -233,7 +239,13 @@ impl Run {
         let machine = self.machine;
         let mut fine = self.fine;
         let monitor = Monitor::new(&machine, self.leaves_path);
-        let mut pump = Pump::new(self.rough, self.host, self.strategy, monitor, observer);
+        let mut reloader = self.policy.as_ref().map(PolicyHost::reloader);
+        if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
+            && let Err(note) = reloader.watch()
+        {
+            observer.note(&note);
+        }
+        let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
         pump.skips_homing = self.switches.home;
         let mut measured = None;
         match clock {
@@ -243,10 +255,12 @@ impl Run {
                 (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
             }
         }
+        pump.tell_policy_notes();
         let fault = fine.fault();
         let text = fault.map(|f| describe(&machine, &f, pump.soft_cause(), fine.driver_error()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
+        summary.policy = self.policy.as_ref().map(PolicyHost::summary);
         summary.fault = text;
         summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
         if let Some((timing, page_faults)) = measured {
@@ -319,6 +333,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         end_position_mm: each(&monitor.position),
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
+        policy: None,
         stops: monitor.stops.stops.clone(),
         stop_count: monitor.stops.count,
         fault: None,

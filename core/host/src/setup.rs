@@ -3,19 +3,20 @@
 use tandem_fine::FineConfig;
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
-use tandem_rough::Source;
+use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, Kinematics, Planner, PlannerContext, PlannerDescription, StrategyContext,
-    size_of_contract,
+    AxisVector, Driver, DriverContext, FeedStrategy, Kinematics, Planner, PlannerContext, PlannerDescription,
+    StrategyContext, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
 use crate::error::HostError;
 use crate::homing::Homing;
+use crate::policy::{Means, PolicyHost};
 use crate::registry::Registry;
 use crate::rules::refusal;
 use crate::run::Switches;
-use crate::strategy::StrategyRunner;
+use crate::strategy::FeedRunner;
 
 /// Greatest time constant that a program may ask for where the machine states no range, s.
 const MOST_TIME_CONSTANT_S: f64 = 1.0;
@@ -34,6 +35,17 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     config.probe = machine.probe.map(|probe| ProbeInput { input: probe.input, inverted: probe.inverted });
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config
+}
+
+/// `source` tuned by the policy, where there is one.
+pub fn tuned(
+    machine: &Machine,
+    registry: &Registry,
+    source: Box<dyn Source + Send>,
+    policy: Option<&PolicyHost>,
+) -> Result<Box<dyn Source + Send>, HostError> {
+    let Some(policy) = policy else { return Ok(source) };
+    Ok(Box::new(Tuned::new(source, policy.tuner(planner(machine, registry)?))))
 }
 
 /// Where the program starts: axes that are homed before it are at home.
@@ -108,8 +120,25 @@ pub fn kinematics(machine: &Machine, registry: &Registry) -> Result<Option<Box<d
     made.map(Some).map_err(|e| refusal(machine, "kinematics.plugin", e))
 }
 
+/// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.
+pub fn feed(
+    machine: &Machine,
+    registry: &Registry,
+    policy: Option<&PolicyHost>,
+    length_mm: f64,
+) -> Result<Option<FeedRunner>, HostError> {
+    let strategy = strategy(machine, registry)?;
+    if strategy.is_none() && policy.is_none() {
+        return Ok(None);
+    }
+    let signals = strategy.as_ref().map_or::<&[&str], _>(&[], |strategy| strategy.signals());
+    let policy = policy.map(|p| (p.clone(), Means::new(machine.axes, machine.fine_period_s, length_mm, signals)));
+    let per_window = machine.fine_periods_per_rough as usize;
+    Ok(Some(FeedRunner::new(strategy, policy, per_window, machine.motion.max_feed_ratio)))
+}
+
 /// Makes the machine's feed strategy, if it names one.
-pub fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<StrategyRunner>, HostError> {
+fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
     let Some(choice) = &machine.feed_strategy else { return Ok(None) };
     let context = StrategyContext {
         size: size_of_contract::<StrategyContext>(),
@@ -119,9 +148,7 @@ pub fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Strateg
         max_feed_ratio: machine.motion.max_feed_ratio,
     };
     let made = registry.strategy(&choice.plugin, &choice.options, &context);
-    let strategy = made.map_err(|e| refusal(machine, "feed_strategy.plugin", e))?;
-    let per_window = machine.fine_periods_per_rough as usize;
-    Ok(Some(StrategyRunner::new(strategy, per_window, machine.motion.max_feed_ratio)))
+    made.map(Some).map_err(|e| refusal(machine, "feed_strategy.plugin", e))
 }
 
 /// The fine loop's view of the machine.

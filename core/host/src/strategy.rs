@@ -1,33 +1,42 @@
-//! The feed strategy between the sample ring and the ratio ring.
+//! Feed strategy and policy between the sample ring and the ratio ring.
 
 use tandem_rings::{HostEnd, Ratio, RequestKind, Sample, StrategyRequest};
 use tandem_sdk::{Answer, FeedStrategy, FineSample, RawSlice, Request, Window, size_of_contract};
 
-/// Collects the samples of a rough period and asks the strategy.
-pub struct StrategyRunner {
-    strategy: Box<dyn FeedStrategy>,
+use crate::policy::{Means, PolicyHost};
+
+/// Collects the samples of a rough period and asks the strategy and the policy.
+pub struct FeedRunner {
+    strategy: Option<Box<dyn FeedStrategy>>,
+    policy: Option<(PolicyHost, Means)>,
     window: Vec<FineSample>,
     per_window: usize,
     max_ratio: f64,
-    /// The last answer.
+    /// The last answer of the strategy.
     pub answer: Option<Answer>,
     /// Why the strategy stops the machine, in words: it is not asked again.
     pub fault: Option<String>,
 }
 
-impl StrategyRunner {
+impl FeedRunner {
     /// A runner for windows of `per_window` fine samples. Ratios are kept within 0 and `max_ratio`.
-    pub fn new(strategy: Box<dyn FeedStrategy>, per_window: usize, max_ratio: f64) -> Self {
-        Self { strategy, window: Vec::with_capacity(per_window), per_window, max_ratio, answer: None, fault: None }
+    pub fn new(
+        strategy: Option<Box<dyn FeedStrategy>>,
+        policy: Option<(PolicyHost, Means)>,
+        per_window: usize,
+        max_ratio: f64,
+    ) -> Self {
+        let window = Vec::with_capacity(per_window);
+        Self { strategy, policy, window, per_window, max_ratio, answer: None, fault: None }
     }
 
     /// Names of the strategy's signals.
     pub fn signals(&self) -> &'static [&'static str] {
-        self.strategy.signals()
+        self.strategy.as_ref().map_or(&[], |strategy| strategy.signals())
     }
 
-    /// Takes a sample; where it completes a rough period k, what the strategy answers goes out for the first tick of
-    /// period k + 2.
+    /// Takes a sample; where it completes a rough period k, the lesser of the ratios that strategy and policy ask for goes
+    /// out for the first tick of period k + 2, and what else the strategy asks for with it.
     pub fn sample(&mut self, sample: &Sample, host: &mut HostEnd) {
         if self.fault.is_some() {
             return;
@@ -38,28 +47,43 @@ impl StrategyRunner {
         }
         let period = sample.tick / self.per_window as u64;
         let tick = (period + 2) * self.per_window as u64;
-        let kind = match self.ask(period) {
+        let asked = self.ask(period);
+        let kind = match asked {
             Ok(answer) => {
+                self.answer = answer.or(self.answer);
+                let strategy = answer.map(|answer| answer.ratio);
+                let ratio = match (strategy, self.ask_policy(period)) {
+                    (Some(strategy), Some(policy)) => strategy.min(policy),
+                    (strategy, policy) => strategy.or(policy).unwrap_or(1.0),
+                };
                 // A full ring means that 64 ratios wait for their tick: the fine loop has stopped, and the last one stands.
-                let _ = host.ratios.push(Ratio { tick, ratio: answer.ratio.clamp(0.0, self.max_ratio) });
-                self.answer = Some(answer);
-                match answer.request {
-                    Request::None => return,
-                    Request::Hold => RequestKind::Hold,
-                    Request::Fault(code) => self.fail(&format!("fault {code}")),
+                let _ = host.ratios.push(Ratio { tick, ratio: ratio.clamp(0.0, self.max_ratio) });
+                match answer.map_or(Request::None, |answer| answer.request) {
+                    Request::None => None,
+                    Request::Hold => Some(RequestKind::Hold),
+                    Request::Fault(code) => Some(self.fail(&format!("fault {code}"))),
                 }
             }
-            Err(cause) => self.fail(&cause),
+            Err(cause) => Some(self.fail(&cause)),
         };
-        // Where the ring is full the same was asked for eight times, and has not acted yet.
-        let _ = host.requests.push(StrategyRequest { tick, kind });
+        self.window.clear();
+        if let Some(kind) = kind {
+            // Where the ring is full the same was asked for eight times, and has not acted yet.
+            let _ = host.requests.push(StrategyRequest { tick, kind });
+        }
     }
 
-    fn ask(&mut self, period: u64) -> Result<Answer, String> {
+    fn ask(&mut self, period: u64) -> Result<Option<Answer>, String> {
+        let Some(strategy) = &mut self.strategy else { return Ok(None) };
         let window = Window { size: size_of_contract::<Window>(), period, samples: RawSlice::new(&self.window) };
-        let answer = self.strategy.update(&window).map_err(|e| e.to_string())?;
-        self.window.clear();
-        if answer.ratio.is_finite() { Ok(answer) } else { Err(format!("ratio {}", answer.ratio)) }
+        let answer = strategy.update(&window).map_err(|e| e.to_string())?;
+        if answer.ratio.is_finite() { Ok(Some(answer)) } else { Err(format!("ratio {}", answer.ratio)) }
+    }
+
+    fn ask_policy(&mut self, period: u64) -> Option<f64> {
+        let (policy, means) = self.policy.as_mut()?;
+        let strategy = self.answer.as_ref().map(|answer| (answer.ratio, answer.signals.as_slice()));
+        policy.period(&means.of(period, &self.window, strategy))
     }
 
     fn fail(&mut self, cause: &str) -> RequestKind {

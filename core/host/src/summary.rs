@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::lateness::Lateness;
+use crate::policy::PolicySummary;
 use crate::realtime::PageFaults;
 use crate::stops::Stop;
 
@@ -78,6 +79,8 @@ pub struct Summary {
     pub wall_time_s: f64,
     /// Time spent in the rough loop a block, ns.
     pub planning_ns_per_block: f64,
+    /// The policy script, where the machine has one.
+    pub policy: Option<PolicySummary>,
     /// The stops, the first thousand: holds, program stops, starvation, aborts and faults.
     pub stops: Vec<Stop>,
     /// How many stops there were.

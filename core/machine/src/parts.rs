@@ -63,6 +63,20 @@ impl GuardMode {
 pub struct Policy {
     /// The WASM module; absolute where a file states it.
     pub script: PathBuf,
+    /// Instructions that one call may use.
+    pub fuel_per_call: u32,
+    /// Instructions for each block of a window, on top.
+    pub fuel_per_block: u32,
+    /// Pages of memory, 64 KiB each, that it may use.
+    pub memory_pages: u32,
+    /// Shortest and longest time constant that it may ask for, s.
+    pub time_constant_s: (f64, f64),
+    /// Smallest and largest path tolerance that it may ask for, mm; none: up to the one in force.
+    pub path_tolerance_mm: Option<(f64, f64)>,
+    /// Least share of the programmed feed that it may ask for.
+    pub lowest_feed_ratio: f64,
+    /// How fast it may change the feed ratio, 1/s; infinite where the machine states no limit.
+    pub ratio_change_per_s: f64,
     /// Its parameters, by name.
     pub parameters: toml::Table,
 }
@@ -72,8 +86,34 @@ impl Policy {
     pub(crate) fn read(policy: &Section<'_>) -> Option<Self> {
         let script = policy.required("script", Section::text)?.into();
         let parameters = policy.section("parameters").table().map(plain).unwrap_or_default();
-        Some(Self { script, parameters })
+        let time_constant_ms =
+            policy.range("time_constant_ms").filter(|range| above_zero(policy, "time_constant_ms", range));
+        let tolerance_mm =
+            policy.range("path_tolerance_mm").filter(|range| above_zero(policy, "path_tolerance_mm", range));
+        let ratio = policy.positive("lowest_feed_ratio").unwrap_or(0.05);
+        if ratio > 1.0 {
+            policy.refuse("lowest_feed_ratio", format!("must be at most 1, not {ratio}"));
+        }
+        Some(Self {
+            script,
+            fuel_per_call: policy.whole("fuel_per_call", 100, 1_000_000_000).unwrap_or(20_000),
+            fuel_per_block: policy.whole("fuel_per_block", 0, 10_000_000).unwrap_or(1_000),
+            memory_pages: policy.whole("memory_pages", 1, 1024).unwrap_or(32),
+            time_constant_s: time_constant_ms.map_or((0.001, 1.0), |(low, high)| (low / 1e3, high / 1e3)),
+            path_tolerance_mm: tolerance_mm,
+            lowest_feed_ratio: ratio,
+            ratio_change_per_s: policy.positive("ratio_change_per_s").unwrap_or(f64::INFINITY),
+            parameters,
+        })
     }
+}
+
+/// Whether a range begins above zero; where not, that is reported.
+fn above_zero(section: &Section<'_>, key: &str, range: &(f64, f64)) -> bool {
+    if range.0 <= 0.0 {
+        section.refuse(key, format!("must begin above 0, not at {}", range.0));
+    }
+    range.0 > 0.0
 }
 
 /// Time without a keep-alive after which a jog stops where the machine states none, ms: key repeats come every 30 to 50 ms.

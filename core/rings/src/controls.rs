@@ -36,6 +36,8 @@ pub struct Controls {
     /// Abort: stop on the path, drop what is queued, and report the rest. Cleared by the fine loop when it has, and with
     /// it both holds: nothing is left that they could hold.
     pub abort: AtomicBool,
+    /// The policy script is to be loaded anew: read and cleared by the host between two rough periods.
+    pub reload_policy: AtomicBool,
     /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
     pub soft_fault: AtomicBool,
     /// The jog that moves.
@@ -53,6 +55,7 @@ impl Default for Controls {
             optional_stop: AtomicBool::new(false),
             emergency_stop: AtomicBool::new(false),
             abort: AtomicBool::new(false),
+            reload_policy: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),
             jog: JogControls::default(),
         }

@@ -2,6 +2,7 @@
 //! period; it may allocate and be late, but what it queues can always be brought to rest on the path.
 
 mod depth;
+mod policy;
 mod queue;
 mod rest;
 mod rough;
@@ -9,6 +10,7 @@ mod source;
 mod window;
 
 pub use depth::QueueDepth;
+pub use policy::{BlockPolicy, Tuned, WINDOW_BLOCKS};
 pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
 pub use source::Source;
 

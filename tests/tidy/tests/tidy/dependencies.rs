@@ -13,6 +13,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/report", &[]),
     ("core/motion", &["tandem-sdk"]),
     ("core/gcode", &["tandem-motion", "tandem-sdk"]),
+    ("core/policy", &["tandem-motion", "tandem-sdk"]),
     ("core/machine", &["tandem-sdk"]),
     ("core/rings", &["tandem-sdk"]),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),
@@ -25,6 +26,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-gcode",
             "tandem-machine",
             "tandem-motion",
+            "tandem-policy",
             "tandem-rings",
             "tandem-rough",
             "tandem-sdk",
@@ -32,6 +34,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     ("hal-drivers", &["tandem-sdk"]),
+    ("scripts", &[]),
     ("tests/oracle", &[]),
     ("tests/tidy", &[]),
 ];

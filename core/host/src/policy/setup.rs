@@ -1,0 +1,86 @@
+//! What the machine file says of its policy script.
+
+use tandem_machine::{Machine, Policy};
+use tandem_policy::{Bounds, Budget, Facts, Values};
+use tandem_sdk::Axes;
+use toml::Value;
+
+use crate::error::HostError;
+use crate::rules::refusal;
+
+/// Parameters, budget, bounds and what the script is told of the machine.
+#[derive(Clone, Debug)]
+pub struct PolicySetup {
+    /// Parameters by name.
+    pub values: Values,
+    /// What the script may use.
+    pub budget: Budget,
+    /// What it may ask for.
+    pub bounds: Bounds,
+    /// The machine as it needs it.
+    pub facts: Facts,
+}
+
+impl PolicySetup {
+    /// As `machine` states it, or by default.
+    ///
+    /// # Errors
+    /// A parameter is not a number, with its place.
+    pub fn of(machine: &Machine) -> Result<Self, HostError> {
+        let facts = Facts {
+            axes: machine.axes,
+            time_constant_s: machine.motion.time_constant_s,
+            path_tolerance_mm: machine.motion.path_tolerance_mm,
+            rough_period_s: machine.rough_period_s,
+        };
+        let bounds = Bounds { max_feed_ratio: machine.motion.max_feed_ratio, ..Bounds::default() };
+        let this = Self { bounds, facts, ..Self::default() };
+        let Some(policy) = &machine.policy else { return Ok(this) };
+        let values = values(machine, &policy.parameters)?;
+        Ok(Self { values, budget: budget(policy), bounds: stated(policy, bounds), ..this })
+    }
+}
+
+impl Default for PolicySetup {
+    fn default() -> Self {
+        let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap_or_else(|e| unreachable!("{e}"));
+        let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 };
+        Self { values: vec![], budget: Budget::default(), bounds: Bounds::default(), facts }
+    }
+}
+
+/// The parameters of the machine file as numbers; true and false are 1 and 0.
+fn values(machine: &Machine, table: &toml::Table) -> Result<Values, HostError> {
+    let number = |(name, value): (&String, &Value)| {
+        let number = match value {
+            Value::Float(number) => *number,
+            Value::Integer(number) => *number as f64,
+            Value::Boolean(truth) => f64::from(u8::from(*truth)),
+            _ => {
+                let key = format!("policy.parameters.{name}");
+                return Err(refusal(machine, &key, "a parameter is a number, or true or false"));
+            }
+        };
+        Ok((name.clone(), number))
+    };
+    table.iter().map(number).collect()
+}
+
+fn budget(policy: &Policy) -> Budget {
+    Budget {
+        fuel_per_call: u64::from(policy.fuel_per_call),
+        fuel_per_block: u64::from(policy.fuel_per_block),
+        memory_pages: policy.memory_pages,
+    }
+}
+
+fn stated(policy: &Policy, default: Bounds) -> Bounds {
+    let tolerance_mm = policy.path_tolerance_mm.map(|(smallest, largest)| (smallest, Some(largest)));
+    Bounds {
+        time_constant_s: policy.time_constant_s,
+        path_tolerance_mm: tolerance_mm.unwrap_or(default.path_tolerance_mm),
+        lowest_feed_ratio: policy.lowest_feed_ratio,
+        ratio_change_per_s: policy.ratio_change_per_s,
+        ..default
+    }
+}

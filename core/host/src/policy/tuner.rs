@@ -1,0 +1,50 @@
+//! The script between interpreter and planner.
+
+use tandem_rough::BlockPolicy;
+use tandem_sdk::{Block, Planner};
+
+use super::PolicyHost;
+
+/// Tunes blocks as the script asks, as far as the planner takes them.
+pub struct Tuner {
+    host: PolicyHost,
+    /// Checks only: the planner that drives is busy with the blocks before.
+    checker: Box<dyn Planner>,
+}
+
+impl Tuner {
+    pub fn new(host: PolicyHost, checker: Box<dyn Planner>) -> Self {
+        Self { host, checker }
+    }
+}
+
+impl BlockPolicy for Tuner {
+    fn offer(&mut self, block: &Block) {
+        self.host.lock().offer(block);
+    }
+
+    fn decide(&mut self, next: Option<&Block>) {
+        self.host.lock().decide(next);
+    }
+
+    fn tuned(&mut self, index: usize, block: &Block) -> Block {
+        let mut policy = self.host.lock();
+        let tuning = policy.tuning(index);
+        if tuning.is_empty() {
+            return *block;
+        }
+        let tuned = Block {
+            time_constant_s: tuning.time_constant_s.unwrap_or(block.time_constant_s),
+            path_tolerance_mm: tuning.path_tolerance_mm.unwrap_or(block.path_tolerance_mm),
+            feed_cap_mm_per_s: tuning.feed_cap_mm_per_s.unwrap_or(block.feed_cap_mm_per_s),
+            ..*block
+        };
+        match self.checker.check(&tuned) {
+            Ok(()) => tuned,
+            Err(refusal) => {
+                policy.refused_by_planner(block.line, &refusal.to_string());
+                *block
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! One live module: its store, its memory, its functions.
+
+use wasmtime::{Memory, Store, Trap, TypedFunc, WasmParams, WasmResults};
+
+use crate::abi;
+use crate::budget::Budget;
+use crate::error::{Refusal, Trouble};
+use crate::layout::Layout;
+use crate::limits::Limits;
+use crate::parameters::{Parameter, resolve};
+use crate::script::Script;
+
+/// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
+pub type Asks = [f64; 3];
+
+/// A live script. After an error of a call it must not be called again.
+pub struct Instance {
+    store: Store<Limits>,
+    memory: Memory,
+    layout: Layout,
+    budget: Budget,
+    blocks: Option<TypedFunc<(u32, u32), ()>>,
+    period: Option<TypedFunc<u32, f64>>,
+    save: Option<TypedFunc<(), u32>>,
+    restore: Option<TypedFunc<u32, ()>>,
+    /// Fuel that the last call used.
+    pub fuel_used: u64,
+}
+
+impl Instance {
+    /// Starts `script` with the parameters `stated`, by name. Allocates.
+    ///
+    /// # Errors
+    /// It does not start within its budget, its layout is wrong, or the parameters do not fit.
+    pub fn new(script: &Script, budget: &Budget, stated: &[(String, f64)]) -> Result<Self, Refusal> {
+        let mut store = Store::new(script.module.engine(), Limits::new(budget));
+        store.limiter(|limits| limits);
+        let fuel = budget.start();
+        let _ = store.set_fuel(fuel);
+        let made = wasmtime::Instance::new(&mut store, &script.module, &[]);
+        let instance = made.map_err(|e| Refusal::Start(trouble(&mut store, &e, fuel)))?;
+        let missing = || Refusal::Exports(vec!["an export has gone".to_string()]);
+        let memory = instance.get_memory(&mut store, abi::MEMORY_EXPORT).ok_or_else(missing)?;
+        let locate = instance.get_typed_func::<(), u32>(&mut store, abi::LAYOUT_EXPORT).map_err(|_| missing())?;
+        let located = locate.call(&mut store, ());
+        let address = located.map_err(|e| Refusal::Start(trouble(&mut store, &e, fuel)))?;
+        let layout = Layout::read(memory.data(&store), address)?;
+        let values = resolve(&layout.declared, stated)?;
+        for (index, value) in values.iter().enumerate() {
+            abi::put_f64(memory.data_mut(&mut store), layout.value(index), *value);
+        }
+        Ok(Self {
+            blocks: instance.get_typed_func(&mut store, abi::BLOCKS_EXPORT).ok(),
+            period: instance.get_typed_func(&mut store, abi::PERIOD_EXPORT).ok(),
+            save: instance.get_typed_func(&mut store, abi::SAVE_EXPORT).ok(),
+            restore: instance.get_typed_func(&mut store, abi::RESTORE_EXPORT).ok(),
+            store,
+            memory,
+            layout,
+            budget: *budget,
+            fuel_used: 0,
+        })
+    }
+
+    /// The parameters that the script declares.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.layout.declared
+    }
+
+    /// Pages of memory in use.
+    pub fn memory_pages(&self) -> u64 {
+        self.memory.size(&self.store)
+    }
+
+    /// Hands over the window of `records`, blocks of [`abi::block`] one after the other, and appends what is asked for to
+    /// `asks`. Does not allocate where `asks` has room.
+    ///
+    /// # Errors
+    /// What went wrong in the script. An infinite number in an answer is an error too.
+    pub fn blocks(&mut self, records: &[u8], asks: &mut Vec<Asks>) -> Result<(), Trouble> {
+        let Some(function) = self.blocks.clone() else { return Ok(()) };
+        let count = records.len() / abi::block::BYTES;
+        let (window, stride) = (self.layout.window, self.layout.block_bytes);
+        self.write(window, stride, records, abi::block::BYTES);
+        self.call(&function, (window as u32, count as u32), self.budget.window(count))?;
+        let memory = self.memory.data(&self.store);
+        for index in 0..count {
+            let at = window + index * stride + abi::block::ASK_TIME_CONSTANT;
+            asks.push(finite_or_nan(memory, at)?);
+        }
+        Ok(())
+    }
+
+    /// Hands over the means of a rough period, as [`abi::period`] lays them out; gives the ratio, NaN for none. Does not
+    /// allocate.
+    ///
+    /// # Errors
+    /// What went wrong in the script.
+    pub fn period(&mut self, record: &[u8]) -> Result<f64, Trouble> {
+        let Some(function) = self.period.clone() else { return Ok(f64::NAN) };
+        let place = self.layout.period;
+        self.write(place, record.len(), record, record.len());
+        let ratio = self.call(&function, place as u32, self.budget.fuel_per_call)?;
+        if ratio.is_infinite() { Err(not_finite("a ratio", ratio)) } else { Ok(ratio) }
+    }
+
+    /// What must survive a reload. Allocates.
+    ///
+    /// # Errors
+    /// What went wrong in the script.
+    pub fn save(&mut self) -> Result<Vec<u8>, Trouble> {
+        let Some(function) = self.save.clone() else { return Ok(vec![]) };
+        let bytes = self.call(&function, (), self.budget.fuel_per_call)? as usize;
+        if bytes > self.layout.state_bytes {
+            return Err(Trouble::Trap(format!("save gave {bytes} bytes, the buffer has {}", self.layout.state_bytes)));
+        }
+        let start = self.layout.state;
+        Ok(self.memory.data(&self.store)[start..start + bytes].to_vec())
+    }
+
+    /// Hands over what another instance saved; more than fits is left out as a whole.
+    ///
+    /// # Errors
+    /// What went wrong in the script.
+    pub fn restore(&mut self, state: &[u8]) -> Result<(), Trouble> {
+        let Some(function) = self.restore.clone() else { return Ok(()) };
+        if state.is_empty() || state.len() > self.layout.state_bytes {
+            return Ok(());
+        }
+        let start = self.layout.state;
+        self.memory.data_mut(&mut self.store)[start..start + state.len()].copy_from_slice(state);
+        self.call(&function, state.len() as u32, self.budget.fuel_per_call)
+    }
+
+    /// Copies `records`, each of `bytes`, to places `stride` apart. The layout has been checked to lie in the memory, which
+    /// never shrinks.
+    fn write(&mut self, start: usize, stride: usize, records: &[u8], bytes: usize) {
+        let memory = self.memory.data_mut(&mut self.store);
+        if stride == bytes {
+            memory[start..start + records.len()].copy_from_slice(records);
+            return;
+        }
+        for (index, record) in records.chunks_exact(bytes).enumerate() {
+            let at = start + index * stride;
+            memory[at..at + bytes].copy_from_slice(record);
+        }
+    }
+
+    fn call<P: WasmParams, R: WasmResults>(
+        &mut self,
+        function: &TypedFunc<P, R>,
+        arguments: P,
+        fuel: u64,
+    ) -> Result<R, Trouble> {
+        let _ = self.store.set_fuel(fuel);
+        let answer = function.call(&mut self.store, arguments).map_err(|e| trouble(&mut self.store, &e, fuel));
+        self.fuel_used = fuel - self.store.get_fuel().unwrap_or(0).min(fuel);
+        answer
+    }
+}
+
+fn finite_or_nan(memory: &[u8], at: usize) -> Result<Asks, Trouble> {
+    const NAMES: [&str; 3] = ["a time constant", "a path tolerance", "a feed cap"];
+    let mut asks = [f64::NAN; 3];
+    for (index, ask) in asks.iter_mut().enumerate() {
+        *ask = abi::get_f64(memory, at + 8 * index).unwrap_or(f64::NAN);
+        if ask.is_infinite() {
+            return Err(not_finite(NAMES[index], *ask));
+        }
+    }
+    Ok(asks)
+}
+
+fn not_finite(what: &'static str, value: f64) -> Trouble {
+    Trouble::NotFinite { what, value: value.to_string() }
+}
+
+fn trouble(store: &mut Store<Limits>, error: &wasmtime::Error, fuel: u64) -> Trouble {
+    if let Some(asked) = store.data_mut().refused.take() {
+        return Trouble::Memory(asked);
+    }
+    match error.downcast_ref::<Trap>() {
+        Some(Trap::OutOfFuel) => Trouble::Fuel(fuel),
+        Some(Trap::StackOverflow) => Trouble::Stack,
+        Some(other) => Trouble::Trap(other.to_string().trim_start_matches("wasm trap: ").to_string()),
+        None => Trouble::Trap(format!("{error:#}").chars().filter(|c| !c.is_control()).take(200).collect()),
+    }
+}

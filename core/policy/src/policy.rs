@@ -1,0 +1,260 @@
+//! A script at work: windows, periods, strikes, quarantine, reload.
+
+use tandem_sdk::Block;
+
+use crate::bounds::{Bounds, InForce, Tuning};
+use crate::budget::Budget;
+use crate::counters::Counters;
+use crate::error::{Refusal, Trouble};
+use crate::facts::Facts;
+use crate::instance::{Asks, Instance};
+use crate::notes::Notes;
+use crate::parameters::Values;
+use crate::period::Period;
+use crate::script::Script;
+use crate::window::Window;
+
+/// Calls that go wrong before a script is not called any more.
+pub const MAX_STRIKES: u32 = 3;
+
+/// A script that runs. Where it fails, the default policy takes over: blocks as programmed, ratio 1.
+pub struct Policy {
+    script: Script,
+    values: Values,
+    budget: Budget,
+    bounds: Bounds,
+    instance: Option<Instance>,
+    strikes: u32,
+    window: Window,
+    asks: Vec<Asks>,
+    tunings: Vec<Tuning>,
+    ratio: f64,
+    notes: Notes,
+    counters: Counters,
+}
+
+impl Policy {
+    /// Starts `script` with the parameters `values` of the machine file. Allocates.
+    ///
+    /// # Errors
+    /// It does not start, its layout is wrong, or the parameters do not fit.
+    pub fn new(script: Script, values: Values, budget: Budget, bounds: Bounds, facts: &Facts) -> Result<Self, Refusal> {
+        let instance = Instance::new(&script, &budget, &values)?;
+        Ok(Self {
+            script,
+            values,
+            budget,
+            bounds,
+            instance: Some(instance),
+            strikes: 0,
+            window: Window::new(facts),
+            asks: Vec::with_capacity(crate::abi::WINDOW_BLOCKS),
+            tunings: Vec::with_capacity(crate::abi::WINDOW_BLOCKS),
+            ratio: 1.0,
+            notes: Notes::new(facts.rough_period_s),
+            counters: Counters::default(),
+        })
+    }
+
+    /// Takes the next block of the window, at most 64 of them. The first one after [`Self::decide`] begins a new window.
+    pub fn offer(&mut self, block: &Block) {
+        if !self.tunings.is_empty() {
+            self.tunings.clear();
+            self.window.clear();
+        }
+        self.window.push(block);
+    }
+
+    /// Asks the script about the blocks offered; `next` follows them in the same stretch.
+    pub fn decide(&mut self, next: Option<&Block>) {
+        self.window.close(next);
+        self.asks.clear();
+        if self.script.tunes_blocks && self.ask_window().is_none() {
+            self.asks.clear();
+        }
+        for (index, block) in self.window.blocks().iter().enumerate() {
+            let asks = self.asks.get(index).copied().unwrap_or([f64::NAN; 3]);
+            let (tuning, limited) = self.bounds.apply(&asks, block);
+            count(&mut self.counters, &tuning, limited);
+            note(&mut self.notes, block, &asks, &tuning, limited);
+            self.tunings.push(tuning);
+        }
+    }
+
+    /// What block `index` of the window gets.
+    pub fn tuning(&self, index: usize) -> Tuning {
+        self.tunings.get(index).copied().unwrap_or_default()
+    }
+
+    /// The planner refused a tuning: the block is driven as programmed.
+    pub fn refused_by_planner(&mut self, line: u32, cause: &str) {
+        self.counters.refused_by_planner += 1;
+        self.notes.note(|| format!("policy: line {line}: the planner refuses what was asked for, {cause}"));
+    }
+
+    /// The feed ratio after a rough period; `None` where the script asks for none.
+    pub fn period(&mut self, period: &Period) -> Option<f64> {
+        self.notes.period();
+        if !self.script.answers_periods {
+            return None;
+        }
+        let Some(asked) = self.ask_period(period).filter(|asked| !asked.is_nan()) else {
+            self.ratio = 1.0;
+            return None;
+        };
+        let (ratio, limited) = self.bounds.ratio(asked, self.ratio, period.duration_s);
+        self.counters.limited += u64::from(limited);
+        self.counters.ratios += u64::from(ratio != 1.0);
+        if ratio != self.ratio {
+            let (line, old) = (period.line, self.ratio);
+            self.notes.note(|| format!("policy: line {line}: feed ratio {old:.3} -> {ratio:.3}"));
+        }
+        self.ratio = ratio;
+        Some(ratio)
+    }
+
+    /// Puts `script`, started as `instance`, in the place of the one that runs, and hands over its state where both keep
+    /// any. Strikes and quarantine are forgotten. Not to be called between [`Self::offer`] and [`Self::decide`].
+    ///
+    /// # Errors
+    /// The new script does not take over the state: the old one goes on.
+    pub fn swap(&mut self, script: Script, mut instance: Instance) -> Result<(), Refusal> {
+        if let Some(old) = &mut self.instance
+            && script.keeps_state
+        {
+            // Where the old one cannot save, the new one begins afresh.
+            let state = old.save().unwrap_or_default();
+            instance.restore(&state).map_err(Refusal::Restore)?;
+        }
+        (self.script, self.instance, self.strikes) = (script, Some(instance), 0);
+        self.counters.reloads += 1;
+        self.notes.always("policy: the script is loaded anew".to_string());
+        Ok(())
+    }
+
+    /// A new script is not taken: the one that runs goes on.
+    pub fn keep(&mut self, why: &str) {
+        self.counters.refused_reloads += 1;
+        self.notes.always(format!("policy: the new script is refused, the old one goes on: {why}"));
+    }
+
+    /// The parameters of the machine file, for a new instance.
+    pub fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// The budget, for a new instance.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// What has been counted.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Whether the script is not called any more.
+    pub fn is_quarantined(&self) -> bool {
+        self.strikes >= MAX_STRIKES
+    }
+
+    /// Calls that went wrong since the script was loaded.
+    pub fn strikes(&self) -> u32 {
+        self.strikes
+    }
+
+    /// What has been noted since the last look, a line each.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        self.notes.take()
+    }
+
+    fn ask_window(&mut self) -> Option<()> {
+        let mut instance = self.live()?;
+        (self.counters.windows, self.counters.blocks) =
+            (self.counters.windows + 1, self.counters.blocks + self.window.blocks().len() as u64);
+        let asked = instance.blocks(self.window.bytes(), &mut self.asks);
+        self.counters.most_window_fuel = self.counters.most_window_fuel.max(instance.fuel_used);
+        let line = self.window.blocks().first().map_or(0, |block| block.line);
+        self.settle(instance, asked, "on_blocks", line)
+    }
+
+    fn ask_period(&mut self, period: &Period) -> Option<f64> {
+        let mut instance = self.live()?;
+        self.counters.periods += 1;
+        let asked = instance.period(&period.bytes(self.ratio));
+        self.counters.most_period_fuel = self.counters.most_period_fuel.max(instance.fuel_used);
+        self.settle(instance, asked, "on_period", period.line)
+    }
+
+    /// The instance, made anew where the last one went wrong; none in quarantine.
+    fn live(&mut self) -> Option<Instance> {
+        while self.instance.is_none() && !self.is_quarantined() {
+            match Instance::new(&self.script, &self.budget, &self.values) {
+                Ok(instance) => self.instance = Some(instance),
+                Err(refusal) => self.strike(&Trouble::Trap(refusal.to_string()), "start", 0),
+            }
+        }
+        self.instance.take()
+    }
+
+    /// Keeps the instance where the call went well, else drops it.
+    fn settle<T>(&mut self, instance: Instance, answer: Result<T, Trouble>, call: &str, line: u32) -> Option<T> {
+        match answer {
+            Ok(answer) => {
+                self.instance = Some(instance);
+                Some(answer)
+            }
+            Err(trouble) => {
+                self.strike(&trouble, call, line);
+                None
+            }
+        }
+    }
+
+    fn strike(&mut self, trouble: &Trouble, call: &str, line: u32) {
+        self.counters.count(trouble);
+        self.strikes += 1;
+        let then = if self.is_quarantined() {
+            "in quarantine until the file changes; the default policy goes on"
+        } else {
+            "the default policy takes over, the script is made anew"
+        };
+        let strikes = self.strikes;
+        self.notes.always(format!("policy: line {line}: {call}: {trouble}; strike {strikes} of {MAX_STRIKES}, {then}"));
+    }
+}
+
+fn count(counters: &mut Counters, tuning: &Tuning, limited: [bool; 3]) {
+    counters.time_constants += u64::from(tuning.time_constant_s.is_some());
+    counters.tolerances += u64::from(tuning.path_tolerance_mm.is_some());
+    counters.feed_caps += u64::from(tuning.feed_cap_mm_per_s.is_some());
+    counters.limited += limited.iter().filter(|limited| **limited).count() as u64;
+}
+
+/// Notes each change of a block, in the units of the machine file.
+fn note(notes: &mut Notes, block: &InForce, asks: &Asks, tuning: &Tuning, limited: [bool; 3]) {
+    let feed_mm_per_s = block.programmed_feed_mm_per_s.min(block.feed_cap_mm_per_s);
+    let rows = [
+        ("time constant", "ms", 1e3, block.time_constant_s, tuning.time_constant_s),
+        ("path tolerance", "mm", 1.0, block.path_tolerance_mm, tuning.path_tolerance_mm),
+        ("feed", "mm/min", 60.0, feed_mm_per_s, tuning.feed_cap_mm_per_s),
+    ];
+    for (index, (what, unit, scale, old, new)) in rows.into_iter().enumerate() {
+        if new.is_none() && !limited[index] {
+            continue;
+        }
+        let (line, scaled) = (block.line, |value: f64| shown((value * scale).clamp(f64::MIN, f64::MAX)));
+        let change = || match new {
+            Some(new) => format!("{} -> {} {unit}", scaled(old), scaled(new)),
+            None => format!("stays {} {unit}", scaled(old)),
+        };
+        let asked = || if limited[index] { format!(", {} was asked for", scaled(asks[index])) } else { String::new() };
+        notes.note(|| format!("policy: line {line}: {what} {}{}", change(), asked()));
+    }
+}
+
+/// A number of any size, short.
+fn shown(value: f64) -> String {
+    let plain = value == 0.0 || (1e-3..1e7).contains(&value.abs());
+    if plain { format!("{}", (value * 1e4).round() / 1e4) } else { format!("{value:.3e}") }
+}

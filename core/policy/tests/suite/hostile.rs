@@ -1,0 +1,109 @@
+//! Scripts that mean harm: contained every time, and the same every time.
+
+use tandem_policy::{Bounds, Period, Policy, Refusal};
+use tandem_sdk::Block;
+
+use crate::{chain, decide, each, read, start};
+
+/// Windows and periods in turn; what came out.
+fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
+    let mut seen = vec![];
+    for period in 0..60 {
+        decide(policy, blocks);
+        for index in 0..blocks.len() {
+            let tuning = policy.tuning(index);
+            let asked = [tuning.time_constant_s, tuning.path_tolerance_mm, tuning.feed_cap_mm_per_s];
+            seen.extend(asked.iter().map(|ask| ask.map_or(0, f64::to_bits)));
+        }
+        let ratio = policy.period(&Period { period, duration_s: 0.008, ..Period::default() });
+        seen.push(ratio.map_or(0, f64::to_bits));
+    }
+    seen
+}
+
+#[test]
+fn every_hostile_script_is_contained_and_asks_for_nothing_beyond_the_machine() {
+    let blocks = chain(&[0.0, 90.0, 45.0, 180.0]);
+    let bounds = Bounds::default();
+    let files = each("tests/fixtures/policies/hostile");
+    assert!(files.len() > 12, "{}", files.len());
+    for (name, bytes) in files {
+        let mut policy = start(&bytes, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let seen = live(&mut policy, &blocks);
+        for bits in seen.iter().filter(|bits| **bits != 0) {
+            let value = f64::from_bits(*bits);
+            assert!(value.is_finite() && value > 0.0 && value <= bounds.time_constant_s.1.max(50.0), "{name}: {value}");
+        }
+        let mut again = start(&bytes, &[]).unwrap();
+        assert_eq!(live(&mut again, &blocks), seen, "{name} is not the same twice");
+        assert_eq!(again.counters(), policy.counters(), "{name}");
+        let harmless = ["largest-numbers", "most-negative-numbers", "nan", "tiny-numbers", "flutter", "vandal"];
+        let expected = u32::from(!harmless.contains(&name.as_str())) * 3;
+        assert_eq!(policy.strikes(), expected, "{name}: {:?}", policy.take_notes());
+        assert_eq!(policy.is_quarantined(), expected == 3, "{name}");
+    }
+}
+
+#[test]
+fn each_kind_of_trouble_is_counted_as_what_it_is() {
+    let of = |name: &str| {
+        let mut policy = start(&read(&format!("tests/fixtures/policies/hostile/{name}.wat")), &[]).unwrap();
+        live(&mut policy, &chain(&[0.0, 90.0]));
+        (policy.counters().clone(), policy.take_notes().join("\n"))
+    };
+    assert_eq!(of("infinite-loop").0.out_of_fuel, 3);
+    assert_eq!(of("deep-recursion").0.stack_overflows + of("deep-recursion").0.out_of_fuel, 3);
+    assert_eq!(of("memory-growth").0.memory_refusals, 3);
+    assert_eq!(of("memory-growth-slow").0.memory_refusals, 3);
+    assert_eq!(of("table-growth").0.memory_refusals, 3);
+    assert_eq!(of("unreachable").0.traps, 3);
+    assert_eq!(of("infinities").0.not_finite, 3);
+    let (counters, notes) = of("infinite-loop");
+    assert_eq!((counters.windows, counters.periods), (2, 1), "not called after the third strike");
+    assert!(notes.contains("line 7: on_blocks: out of fuel: more than 22000 instructions in one call"), "{notes}");
+    assert!(notes.contains("strike 3 of 3, in quarantine"), "{notes}");
+}
+
+#[test]
+fn requests_beyond_the_machine_are_limited_and_counted() {
+    let mut policy = start(&read("tests/fixtures/policies/hostile/largest-numbers.wat"), &[]).unwrap();
+    let blocks = chain(&[0.0, 90.0]);
+    decide(&mut policy, &blocks);
+    assert_eq!(policy.tuning(0).time_constant_s, Some(1.0));
+    assert_eq!((policy.tuning(0).feed_cap_mm_per_s, policy.tuning(0).path_tolerance_mm), (None, None));
+    assert_eq!((policy.counters().limited, policy.counters().time_constants), (6, 2));
+    let notes = policy.take_notes().join("\n");
+    assert!(notes.contains("line 7: time constant 50 -> 1000 ms, 1.798e308 was asked for"), "{notes}");
+}
+
+#[test]
+fn truncated_and_random_bytes_are_refused_or_run_within_their_budget() {
+    let whole = read("scripts/policies/corner-time-constant.wasm");
+    let blocks = chain(&[0.0, 90.0]);
+    let try_out = |bytes: &[u8]| match start(bytes, &[]) {
+        Ok(mut policy) => drop(live(&mut policy, &blocks)),
+        Err(refusal) => assert!(refusal.to_string().len() < 2000, "{refusal}"),
+    };
+    for end in (0..whole.len()).step_by(37) {
+        assert!(matches!(start(&whole[..end], &[]), Err(Refusal::NotAModule(_) | Refusal::Exports(_))), "{end} bytes");
+    }
+    let seed = std::time::UNIX_EPOCH.elapsed().unwrap().subsec_nanos() | 1;
+    println!("seed {seed}");
+    let mut state = u64::from(seed);
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    for _ in 0..200 {
+        let mut bytes = whole.clone();
+        for _ in 0..=random() % 4 {
+            let at = random() as usize % bytes.len();
+            bytes[at] = random() as u8;
+        }
+        try_out(&bytes);
+        let noise: Vec<u8> = (0..random() % 200).map(|_| random() as u8).collect();
+        try_out(&noise);
+    }
+}

@@ -1,0 +1,70 @@
+//! Another script in the place of the one that runs.
+
+use tandem_policy::{Budget, Instance, Period, Policy};
+
+use crate::{chain, compile, decide, read, start, values};
+
+fn swap(policy: &mut Policy, bytes: &[u8]) -> Result<(), String> {
+    let script = compile(bytes).map_err(|e| e.to_string())?;
+    let instance = Instance::new(&script, &Budget::default(), policy.values()).map_err(|e| e.to_string())?;
+    policy.swap(script, instance).map_err(|e| e.to_string())
+}
+
+/// Feed caps of a window of lines.
+fn caps(policy: &mut Policy, blocks: usize) -> Vec<Option<f64>> {
+    decide(policy, &chain(&vec![0.0; blocks]));
+    (0..blocks).map(|index| policy.tuning(index).feed_cap_mm_per_s).collect()
+}
+
+#[test]
+fn state_that_is_saved_survives() {
+    let bytes = read("scripts/policies/gentle-start.wasm");
+    let mut kept = start(&bytes, &[]).unwrap();
+    let mut reloaded = start(&bytes, &[]).unwrap();
+    for _ in 0..3 {
+        assert_eq!(caps(&mut reloaded, 1), caps(&mut kept, 1));
+        swap(&mut reloaded, &bytes).unwrap();
+    }
+    assert_eq!(reloaded.counters().reloads, 3);
+    // A script made afresh begins its cut again.
+    assert_ne!(caps(&mut start(&bytes, &[]).unwrap(), 1), caps(&mut reloaded, 1));
+}
+
+#[test]
+fn a_bad_script_leaves_the_old_one_running() {
+    let mut policy = start(&read("tests/fixtures/policies/good/half-feed.wat"), &[]).unwrap();
+    for (name, _) in crate::each("tests/fixtures/policies/refused") {
+        let bytes = read(&format!("tests/fixtures/policies/refused/{name}.wat"));
+        let why = swap(&mut policy, &bytes).unwrap_err();
+        policy.keep(&why);
+        assert_eq!(caps(&mut policy, 2), [Some(25.0), Some(25.0)], "{name}");
+    }
+    assert!(policy.counters().refused_reloads >= 14 && policy.counters().reloads == 0);
+    assert!(policy.take_notes()[0].contains("refused, the old one goes on"));
+}
+
+#[test]
+fn a_new_script_ends_the_quarantine() {
+    let mut policy = start(&read("tests/fixtures/policies/hostile/unreachable.wat"), &[]).unwrap();
+    for _ in 0..5 {
+        assert_eq!(caps(&mut policy, 1), [None]);
+    }
+    assert!(policy.is_quarantined());
+    swap(&mut policy, &read("tests/fixtures/policies/good/half-feed.wat")).unwrap();
+    assert!(!policy.is_quarantined());
+    assert_eq!(caps(&mut policy, 1), [Some(25.0)]);
+    let odd = Period { period: 3, duration_s: 0.008, ..Period::default() };
+    assert_eq!(policy.period(&odd), Some(0.9));
+}
+
+#[test]
+fn parameters_of_the_machine_file_reach_the_new_script() {
+    let bytes = read("scripts/policies/material-feed.wasm");
+    let mut policy = start(&bytes, &[("material", 3.0)]).unwrap();
+    let before = caps(&mut policy, 1);
+    swap(&mut policy, &bytes).unwrap();
+    assert_eq!((caps(&mut policy, 1), before), (vec![Some(800.0 / 60.0)], vec![Some(800.0 / 60.0)]));
+    assert_eq!(*policy.values(), values(&[("material", 3.0)]));
+    // A script that does not know the parameter is refused.
+    assert!(swap(&mut policy, &read("scripts/policies/load-feed.wasm")).unwrap_err().contains("no parameter"));
+}

@@ -1,0 +1,191 @@
+//! Policies: blocks are tuned in windows of a fixed number before the planner sees them.
+
+use std::collections::VecDeque;
+
+use tandem_gcode::Item;
+use tandem_rings::{Rest, RestCause};
+use tandem_sdk::Block;
+
+use crate::source::Source;
+
+/// Blocks of a full window.
+pub const WINDOW_BLOCKS: usize = 64;
+
+/// What decides on blocks, a window at a time. Called on the rough loop; may allocate.
+pub trait BlockPolicy: Send {
+    /// The next block of a window; its curve is valid for the call.
+    fn offer(&mut self, block: &Block);
+
+    /// The window is complete: it is full, or the stretch ends with it. `next` follows it in the same stretch.
+    fn decide(&mut self, next: Option<&Block>);
+
+    /// Block `index` of the window as it is to be driven: only time constant, path tolerance and feed cap may differ.
+    fn tuned(&mut self, index: usize, block: &Block) -> Block;
+}
+
+/// A source whose blocks a policy has tuned.
+///
+/// A window is full, or ends where the stretch does: at a wait, behind a block that an input ends, where the source gives
+/// nothing for now, and at the end. So what a policy sees does not depend on when the rough loop asks.
+pub struct Tuned<S, P> {
+    source: S,
+    policy: P,
+    /// Items of windows to come; the first are those of the next.
+    items: VecDeque<Item>,
+    /// Blocks among them.
+    blocks: usize,
+    /// Scratch.
+    fetched: Vec<Item>,
+    /// Nothing is known of what follows the items until the machine has answered.
+    stretch_ends: bool,
+    /// The program is over.
+    over: bool,
+    /// Met behind the items.
+    error: Option<String>,
+}
+
+impl<S: Source, P: BlockPolicy> Tuned<S, P> {
+    /// `source` tuned by `policy`.
+    pub fn new(source: S, policy: P) -> Self {
+        Self {
+            source,
+            policy,
+            items: VecDeque::new(),
+            blocks: 0,
+            fetched: vec![],
+            stretch_ends: false,
+            over: false,
+            error: None,
+        }
+    }
+
+    /// Fetches items until a window and the block behind it are there; whether the stretch ends with them.
+    fn fetch(&mut self) -> bool {
+        loop {
+            if self.over || self.stretch_ends || self.error.is_some() {
+                return true;
+            }
+            match self.source.next_items(&mut self.fetched) {
+                Ok(more) => self.over = !more,
+                Err(error) => self.error = Some(error),
+            }
+            if self.fetched.is_empty() {
+                return true;
+            }
+            self.stretch_ends = self.fetched.iter().any(ends_stretch);
+            self.blocks += self.fetched.iter().filter(|item| is_block(item)).count();
+            self.items.extend(self.fetched.drain(..));
+            if self.blocks > WINDOW_BLOCKS {
+                return false;
+            }
+        }
+    }
+
+    /// Asks the policy about the first `count` blocks.
+    fn tune(&mut self, count: usize) {
+        let Self { policy, items, .. } = self;
+        let mut blocks = items.iter().filter(|item| is_block(item));
+        for item in blocks.by_ref().take(count) {
+            with_block(item, |block| policy.offer(block));
+        }
+        match blocks.next() {
+            Some(next) => with_block(next, |block| policy.decide(Some(block))),
+            None => policy.decide(None),
+        }
+        let blocks = items.iter_mut().filter(|item| is_block(item)).take(count);
+        for (index, item) in blocks.enumerate() {
+            let tuned = with_block(item, |block| policy.tuned(index, block));
+            let facts = match item {
+                Item::Block(block) => block,
+                Item::Curve(curve) => curve.facts_mut(),
+                _ => continue,
+            };
+            facts.time_constant_s = tuned.time_constant_s;
+            facts.path_tolerance_mm = tuned.path_tolerance_mm;
+            facts.feed_cap_mm_per_s = tuned.feed_cap_mm_per_s;
+        }
+    }
+
+    /// Hands over everything up to the last block of a window of `count`; at the end of a stretch everything.
+    fn hand_over(&mut self, count: usize, ends: bool, items: &mut Vec<Item>) {
+        let mut left = count;
+        while let Some(item) = self.items.pop_front() {
+            if is_block(&item) {
+                left -= 1;
+            }
+            items.push(item);
+            if left == 0 && !ends {
+                break;
+            }
+        }
+        self.blocks -= count;
+        self.stretch_ends &= !self.items.is_empty();
+    }
+}
+
+impl<S: Source, P: BlockPolicy> Source for Tuned<S, P> {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        let whole = self.fetch();
+        // More than a window may have come at once: then the stretch goes on behind this one.
+        let ends = whole && self.blocks <= WINDOW_BLOCKS;
+        let count = self.blocks.min(WINDOW_BLOCKS);
+        if count > 0 {
+            self.tune(count);
+        }
+        if self.items.is_empty()
+            && let Some(error) = self.error.take()
+        {
+            return Err(error);
+        }
+        self.hand_over(count, ends, items);
+        Ok(!(self.over && self.items.is_empty()))
+    }
+
+    fn provide_input(&mut self, value: f64) {
+        self.source.provide_input(value);
+    }
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        if rest.cause == RestCause::Abort {
+            self.items.clear();
+            (self.blocks, self.stretch_ends) = (0, false);
+        }
+        self.over = !self.source.provide_rest(rest);
+        !self.over
+    }
+}
+
+impl<S: Source + ?Sized> Source for Box<S> {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        (**self).next_items(items)
+    }
+
+    fn provide_input(&mut self, value: f64) {
+        (**self).provide_input(value);
+    }
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        (**self).provide_rest(rest)
+    }
+}
+
+fn is_block(item: &Item) -> bool {
+    matches!(item, Item::Block(_) | Item::Curve(_))
+}
+
+/// Whether nothing is known of what follows until the machine has answered.
+fn ends_stretch(item: &Item) -> bool {
+    matches!(item, Item::Wait(_) | Item::End) || item.is_probe()
+}
+
+fn with_block<T>(item: &Item, call: impl FnOnce(&Block) -> T) -> T {
+    match item {
+        Item::Block(block) => call(block),
+        Item::Curve(curve) => curve.with(call),
+        _ => unreachable!("only blocks are asked about"),
+    }
+}
+
+#[cfg(test)]
+#[path = "policy_tests.rs"]
+mod tests;

@@ -1,0 +1,157 @@
+//! Windows: filled by order, whatever the source hands out at once.
+
+use std::sync::{Arc, Mutex};
+
+use super::*;
+use tandem_gcode::{Input, InputMode, InputWait};
+use tandem_sdk::{AxisVector, BlockKind, Edge, Event, EventKind, StopOn};
+
+/// What a policy was shown: blocks of each window by their index, and the block behind it.
+type Seen = Arc<Mutex<Vec<(Vec<u64>, Option<u64>)>>>;
+
+/// Caps the feed of every block at its index in the window.
+#[derive(Default)]
+struct Recorder {
+    window: Vec<u64>,
+    seen: Seen,
+}
+
+impl BlockPolicy for Recorder {
+    fn offer(&mut self, block: &Block) {
+        self.window.push(block.index);
+    }
+
+    fn decide(&mut self, next: Option<&Block>) {
+        let window = std::mem::take(&mut self.window);
+        self.seen.lock().unwrap().push((window, next.map(|block| block.index)));
+    }
+
+    fn tuned(&mut self, index: usize, block: &Block) -> Block {
+        Block { feed_cap_mm_per_s: index as f64, line: 999, ..*block }
+    }
+}
+
+/// Hands out what it was given, a list at a time.
+struct Script(VecDeque<Result<Vec<Item>, String>>);
+
+impl Source for Script {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        match self.0.pop_front() {
+            Some(Ok(more)) => items.extend(more),
+            Some(Err(error)) => return Err(error),
+            None => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn provide_input(&mut self, _value: f64) {}
+
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        true
+    }
+}
+
+fn block(index: u64) -> Item {
+    Item::Block(Block { kind: BlockKind::Line, index, line: 1, ..Block::at(AxisVector::ZERO) })
+}
+
+fn probe(index: u64) -> Item {
+    let stop_on = StopOn { edge: Edge::Rising, ..StopOn::default() };
+    Item::Block(Block { kind: BlockKind::Line, index, stop_on, ..Block::at(AxisVector::ZERO) })
+}
+
+fn wait() -> Item {
+    let (input, mode) = (Input::Digital(0), InputMode::High);
+    Item::Wait(InputWait { line: 1, before_block: 0, input, mode, timeout_s: 1.0 })
+}
+
+fn tuned(script: Vec<Result<Vec<Item>, String>>) -> (Tuned<Script, Recorder>, Seen) {
+    let recorder = Recorder::default();
+    let seen = Arc::clone(&recorder.seen);
+    (Tuned::new(Script(script.into()), recorder), seen)
+}
+
+/// Everything that comes, until the source is dry or refuses.
+fn drain(source: &mut impl Source) -> (Vec<Item>, Option<String>) {
+    let mut items = vec![];
+    loop {
+        let before = items.len();
+        match source.next_items(&mut items) {
+            Ok(false) if items.len() == before => return (items, None),
+            Ok(_) => {}
+            Err(error) => return (items, Some(error)),
+        }
+    }
+}
+
+fn windows(seen: &Seen) -> Vec<(usize, Option<u64>)> {
+    seen.lock().unwrap().iter().map(|(window, next)| (window.len(), *next)).collect()
+}
+
+#[test]
+fn windows_are_full_whatever_comes_at_once() {
+    for at_once in [1, 7, 64, 65, 200] {
+        let all: Vec<u64> = (0..150).collect();
+        let script = all.chunks(at_once).map(|chunk| Ok(chunk.iter().map(|i| block(*i)).collect())).collect();
+        let (mut source, seen) = tuned(script);
+        let (items, error) = drain(&mut source);
+        assert_eq!(windows(&seen), [(64, Some(64)), (64, Some(128)), (22, None)], "{at_once} at once");
+        let caps = items.iter().map(|item| with_block(item, |b| (b.index, b.feed_cap_mm_per_s, b.line)));
+        let expected = all.iter().map(|i| (*i, (*i % 64) as f64, 1));
+        assert!(caps.eq(expected) && error.is_none(), "only what a policy may change has changed");
+    }
+}
+
+#[test]
+fn a_stretch_ends_a_window_and_nothing_behind_it_is_asked_for() {
+    let event = || Item::Event(Event::new(EventKind::Mist, 1, 1, 0, 0.0));
+    let script = vec![
+        Ok(vec![block(0), event()]),
+        Ok(vec![block(1), wait()]),
+        Ok(vec![block(2)]),
+        Ok(vec![probe(3), event()]),
+        Ok(vec![block(4), Item::End]),
+    ];
+    let (mut source, seen) = tuned(script);
+    for expected in [4, 3, 2] {
+        let mut items = vec![];
+        assert_eq!(source.next_items(&mut items), Ok(true));
+        assert_eq!(items.len(), expected);
+    }
+    assert_eq!(windows(&seen), [(2, None), (2, None), (1, None)]);
+}
+
+#[test]
+fn nothing_for_now_ends_a_window() {
+    let (mut source, seen) = tuned(vec![Ok(vec![block(0)]), Ok(vec![]), Ok(vec![block(1)])]);
+    drain(&mut source);
+    assert_eq!(windows(&seen), [(1, None), (1, None)]);
+}
+
+#[test]
+fn blocks_before_an_error_are_handed_out_first() {
+    let (mut source, seen) = tuned(vec![Ok(vec![block(0)]), Err("line 2: no".to_string())]);
+    let (items, error) = drain(&mut source);
+    assert_eq!((items.len(), error.as_deref(), windows(&seen)), (1, Some("line 2: no"), vec![(1, None)]));
+}
+
+#[test]
+fn an_abort_drops_the_blocks_of_windows_to_come() {
+    let (mut source, seen) = tuned(vec![Ok((0..100).map(block).collect()), Ok(vec![block(100)])]);
+    source.next_items(&mut vec![]).unwrap();
+    let rest = Rest {
+        epoch: 0,
+        cause: RestCause::Abort,
+        tick: 0,
+        block: 0,
+        line: 1,
+        stop_on: StopOn::default(),
+        position: AxisVector::ZERO,
+        latch: None,
+        program_time_s: 0.0,
+        path_mm: 0.0,
+    };
+    assert!(source.provide_rest(&rest));
+    let (items, _) = drain(&mut source);
+    assert_eq!((items.len(), windows(&seen)), (1, vec![(64, Some(64)), (1, None)]));
+}
