@@ -7,6 +7,7 @@ mod bench;
 mod clocks;
 mod defective;
 mod disturbances;
+mod estimate;
 mod every_tick;
 mod examples;
 mod faults;

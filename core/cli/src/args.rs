@@ -29,6 +29,10 @@ pub enum Command {
     Home(Home),
     /// Move single axes by hand: with keys, over a socket, or by lines of a pipe
     Jog(Box<Jog>),
+    /// Say how long part programs take; nothing moves
+    Estimate(Estimate),
+    /// Find out by an experiment how a control takes its time, for estimates
+    Calibrate(Calibrate),
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
@@ -168,6 +172,56 @@ pub struct Home {
     /// Draw the motion, in the coordinates of the drives
     #[arg(long, value_name = "F.html")]
     pub report: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Estimate {
+    /// The part programs; several are estimated at once
+    #[arg(required = true)]
+    pub programs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub machine: Machine,
+    /// The model: simulate, look-ahead, overlap, regression, or the file that calibrate wrote
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "simulate")]
+    pub model: String,
+    /// Write a list for programs instead of a table for people
+    #[arg(long)]
+    pub json: bool,
+    /// Draw the length of the blocks against the feed reached in them
+    #[arg(long, value_name = "F.html")]
+    pub report: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Calibrate {
+    #[command(flatten)]
+    pub machine: Machine,
+    /// Write the model
+    #[arg(long, value_name = "MODEL.toml", required_unless_present = "program")]
+    pub out: Option<PathBuf>,
+    /// Fit to the times of a file instead of an experiment; docs/machining-time.md has its columns
+    #[arg(long, value_name = "F.csv")]
+    pub from: Option<PathBuf>,
+    /// Only write the experiment as a program, to be run and timed at another control
+    #[arg(long, value_name = "F.ngc", conflicts_with_all = ["out", "from", "model"])]
+    pub program: Option<PathBuf>,
+    /// Fit this form instead of the one that fits best
+    #[arg(long)]
+    pub model: Option<Form>,
+    /// The clock that drives the experiment
+    #[arg(long, default_value = "virtual")]
+    pub clock: Clock,
+}
+
+/// The forms that can be fitted.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Form {
+    /// Blocks of at least a constant time
+    Overlap,
+    /// Junction feeds
+    LookAhead,
+    /// The published linear regression
+    Regression,
 }
 
 #[derive(Group)]

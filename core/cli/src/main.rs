@@ -10,8 +10,10 @@ macro_rules! say {
 
 mod args;
 mod built_in;
+mod calibrate;
 mod check;
 mod corners;
+mod estimate;
 mod home;
 mod jog;
 mod latency;
@@ -42,6 +44,8 @@ fn main() -> ExitCode {
         Command::Jog(options) => jog::jog(&options),
         Command::Check(options) => check::check(&options),
         Command::Home(options) => home::home(&options),
+        Command::Estimate(options) => estimate::estimate(&options),
+        Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Script(command) => script::script(&command),
         Command::Latency(options) => latency::latency(&options),

@@ -44,6 +44,6 @@ pub use realtime_latency::{Latency, measure_latency};
 pub use realtime_periods::Timing;
 pub use record::{BlocksCsv, Output, TraceCsv};
 pub use registry::Registry;
-pub use run::{Clock, Outcome, Run, Switches, check_program};
+pub use run::{Clock, Outcome, Run, Switches, check_program, each_block};
 pub use stops::Stop;
 pub use summary::{LatenessUs, Summary};

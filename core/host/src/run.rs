@@ -90,6 +90,23 @@ pub fn check_program(
     first_pass(machine, planner.as_ref(), program, switches)
 }
 
+/// Hands every block of the program to `per_block`, in order; nothing moves, and no plugin is asked.
+///
+/// # Errors
+/// The program cannot be read. What is wrong with the program is in the report.
+pub fn each_block(
+    machine: &Machine,
+    program: &mut Program,
+    switches: Switches,
+    per_block: &mut dyn FnMut(&Block),
+) -> Result<CheckReport, HostError> {
+    let config = setup::interpreter_config(machine, switches);
+    Ok(check(program, &config, &mut |block| {
+        per_block(block);
+        Ok(())
+    })?)
+}
+
 /// The whole program through the interpreter and `planner`, which stays as it was.
 fn first_pass(
     machine: &Machine,

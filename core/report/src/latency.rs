@@ -1,6 +1,6 @@
 //! How late a thread woke, drawn: a page of its own, without a script.
 
-mod scale;
+pub(crate) mod scale;
 mod svg;
 
 use std::io::{self, Write};

@@ -3,7 +3,7 @@
 //! The page needs no network, no server and no other file: style, script and samples are inside it. It shows the tool
 //! path coloured by feed, and over one shared time axis the path feed, each axis' velocity, acceleration and jerk with
 //! their limits, the path deviation, σ and the following error. What exceeds a limit is red and listed.
-//! [`LatencyReport`] draws how late a thread woke.
+//! [`LatencyReport`] draws how late a thread woke, [`EstimateReport`] what programs are estimated to take.
 //!
 //! ```
 //! use tandem_report::{Axis, Report, Samples, Unit};
@@ -30,6 +30,7 @@
 mod columns;
 mod differences;
 mod encode;
+mod estimate;
 mod findings;
 mod judge;
 mod latency;
@@ -40,5 +41,6 @@ mod tables;
 mod text;
 mod thin;
 
+pub use estimate::{EstimateReport, EstimatedField, EstimatedProgram};
 pub use latency::{LatencyBin, LatencyReport, LatencySeries};
 pub use model::{Axis, Report, Samples, Signal, Unit};

@@ -32,6 +32,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-sdk",
         ],
     ),
+    (
+        "core/estimate",
+        &["tandem-gcode", "tandem-host", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"],
+    ),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     ("hal-drivers", &["tandem-sdk"]),
     ("scripts", &[]),

@@ -1,0 +1,226 @@
+//! The experiment: polygons to be timed, and corners whose minimum feed is looked for. As a program, and as a run.
+
+use std::fmt::Write as _;
+
+use tandem_gcode::Program;
+use tandem_host::{Clock, HostError, Registry, Run, RunObserver, Switches};
+use tandem_machine::Machine;
+use tandem_rings::Sample;
+use tandem_sdk::AxisVector;
+
+use crate::diagnose::Corner;
+use crate::polygon::{CORNERS, FEED_MM_PER_MIN, Polygon, SIDES_MM, Timed};
+
+/// Turns of the V paths, degrees.
+const TURNS_DEG: [f64; 11] = [0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 90.0];
+/// Their feeds, mm/min.
+const FEEDS_MM_PER_MIN: [f64; 10] = [200.0, 400.0, 600.0, 800.0, 1200.0, 1600.0, 2000.0, 2400.0, 2800.0, 3200.0];
+/// How long a leg of a V takes at its feed, s: enough to reach it, and to see it.
+const LEG_S: f64 = 0.5;
+/// What a leg is longer than that, mm.
+const LEG_MM: f64 = 2.0;
+const MM_PER_MIN: f64 = 60.0;
+
+/// Two legs that meet at the centre.
+#[derive(Clone, Copy, Debug)]
+struct Vee {
+    turn_rad: f64,
+    feed_mm_per_s: f64,
+    leg_mm: f64,
+}
+
+/// The experiment for one machine.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// The polygons that fit into the travel.
+    pub polygons: Vec<Polygon>,
+    /// Polygons that do not.
+    pub left_out: Vec<Polygon>,
+    /// Feed of the polygons, mm/s: 5000 mm/min, or what the machine can.
+    pub feed_mm_per_s: f64,
+    vees: Vec<Vee>,
+    center_mm: [f64; 2],
+    axes: [usize; 2],
+}
+
+/// What was measured.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Times of the polygons.
+    pub timed: Vec<Timed>,
+    /// Minimum feeds of the corners.
+    pub corners: Vec<Corner>,
+}
+
+/// The lines of one polygon or V in the program.
+#[derive(Clone, Copy, Debug)]
+struct Lines {
+    first: u32,
+    last: u32,
+}
+
+impl Experiment {
+    /// The experiment in the plane of X and Y of `machine`, with at least `blocks` blocks to each polygon.
+    ///
+    /// # Errors
+    /// The machine has no such plane, or no room in it.
+    pub fn new(machine: &Machine, blocks: u32) -> Result<Self, String> {
+        let axis = |letter| machine.axes.index(letter).ok_or_else(|| format!("the experiment needs an axis {letter}"));
+        let axes = [axis('X')?, axis('Y')?];
+        let limits = axes.map(|axis| machine.limits.axes()[axis]);
+        let middle = |i: usize| f64::midpoint(limits[i].min_mm, limits[i].max_mm);
+        let half = |i: usize| (limits[i].max_mm - limits[i].min_mm) / 2.0;
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        let room_mm = half(0).min(half(1));
+        let feed = FEED_MM_PER_MIN / MM_PER_MIN;
+        let all = CORNERS.iter().flat_map(|corners| SIDES_MM.map(|side_mm| (*corners, side_mm)));
+        let all = all.map(|(corners, side_mm)| Polygon { corners, side_mm, rounds: blocks.div_ceil(corners) });
+        let (polygons, left_out) = all.partition::<Vec<_>, _>(|polygon| polygon.radius_mm() <= room_mm);
+        let this = Self {
+            polygons,
+            left_out,
+            feed_mm_per_s: limits.iter().fold(feed, |feed, axis| feed.min(axis.feed_mm_per_s)),
+            vees: vees().filter(|vee| vee.leg_mm <= room_mm).collect(),
+            center_mm: [finite(middle(0)), finite(middle(1))],
+            axes,
+        };
+        if this.polygons.len() < 6 {
+            return Err(format!("the travel leaves room for {} of the polygons only", this.polygons.len()));
+        }
+        Ok(this)
+    }
+
+    /// The whole experiment as a program. With `stops` it waits before each polygon and says what to note; the V paths,
+    /// whose feeds nobody can read by hand, are left out.
+    pub fn program(&self, stops: bool) -> String {
+        self.write(stops).0
+    }
+
+    fn write(&self, stops: bool) -> (String, Vec<Lines>) {
+        let mut text = "G21 G90 G94 G17 G40 G49 G80\nG64\n".to_string();
+        let mut lines = Lines { first: 0, last: 2 };
+        let mut all = vec![];
+        for polygon in &self.polygons {
+            if stops {
+                let Polygon { corners, side_mm, rounds } = polygon;
+                let _ = writeln!(text, "(note the seconds from here: n {corners} side {side_mm} repetitions {rounds})");
+                text += "M0\n";
+                lines.last += 2;
+            }
+            lines = self.polygon(polygon, lines.last, &mut text);
+            all.push(lines);
+        }
+        for vee in self.vees.iter().filter(|_| !stops) {
+            lines = self.vee(vee, lines.last, &mut text);
+            all.push(lines);
+        }
+        text += "M2\n";
+        (text, all)
+    }
+
+    fn polygon(&self, polygon: &Polygon, before: u32, text: &mut String) -> Lines {
+        let points: Vec<_> = polygon.points_mm(self.center_mm).collect();
+        let start = points[0];
+        let _ = writeln!(text, "G0 X{:.6} Y{:.6}", start[0], start[1]);
+        let _ = writeln!(text, "G4 P0.1");
+        let _ = writeln!(text, "F{:.3}", self.feed_mm_per_s * MM_PER_MIN);
+        for point in points.iter().cycle().skip(1).take(polygon.blocks() as usize) {
+            let _ = writeln!(text, "G1 X{:.6} Y{:.6}", point[0], point[1]);
+        }
+        Lines { first: before + 4, last: before + 3 + polygon.blocks() }
+    }
+
+    fn vee(&self, vee: &Vee, before: u32, text: &mut String) -> Lines {
+        let [x, y] = self.center_mm;
+        let end = [x + vee.leg_mm * vee.turn_rad.cos(), y + vee.leg_mm * vee.turn_rad.sin()];
+        let _ = writeln!(text, "G0 X{:.6} Y{y:.6}", x - vee.leg_mm);
+        let _ = writeln!(text, "G4 P0.1");
+        let _ = writeln!(text, "G1 X{x:.6} Y{y:.6} F{:.3}", vee.feed_mm_per_s * MM_PER_MIN);
+        let _ = writeln!(text, "G1 X{:.6} Y{:.6}", end[0], end[1]);
+        Lines { first: before + 3, last: before + 4 }
+    }
+
+    /// Runs the experiment on the machine's driver.
+    ///
+    /// # Errors
+    /// The machine refuses, or the run does not come to its end.
+    pub fn run(&self, machine: &Machine, registry: &Registry, clock: Clock) -> Result<Measured, String> {
+        let (text, lines) = self.write(false);
+        let program = Program::spool("the experiment", text.as_bytes()).map_err(|e| e.to_string())?;
+        let run = Run::prepare(machine.clone(), registry, program, Switches::default()).map_err(|e| match e {
+            HostError::Check(report) => report.diagnostics.first().map_or_else(String::new, ToString::to_string),
+            other => other.to_string(),
+        })?;
+        let mut watch = Watch {
+            experiment: self,
+            lines: &lines,
+            period_s: machine.fine_period_s,
+            samples: vec![0; lines.len()],
+            least: vec![f64::INFINITY; lines.len()],
+            now: 0,
+            last: None,
+        };
+        let summary = run.drive(clock, &[], &mut watch).map_err(|e| e.to_string())?.summary;
+        if let Some(cause) = summary.fault.or(summary.stopped) {
+            return Err(format!("the experiment ended early: {cause}"));
+        }
+        Ok(watch.measured())
+    }
+}
+
+fn vees() -> impl Iterator<Item = Vee> {
+    let all = TURNS_DEG.iter().flat_map(|turn| FEEDS_MM_PER_MIN.map(|feed| (turn.to_radians(), feed / MM_PER_MIN)));
+    all.map(|(turn_rad, feed_mm_per_s)| Vee { turn_rad, feed_mm_per_s, leg_mm: LEG_MM + LEG_S * feed_mm_per_s })
+}
+
+/// Takes times and feeds from the samples that were sent.
+struct Watch<'a> {
+    experiment: &'a Experiment,
+    lines: &'a [Lines],
+    period_s: f64,
+    samples: Vec<u64>,
+    least: Vec<f64>,
+    now: usize,
+    last: Option<AxisVector>,
+}
+
+impl RunObserver for Watch<'_> {
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
+        let last = self.last.replace(sample.command);
+        while self.now < self.lines.len() && sample.line > self.lines[self.now].last {
+            self.now += 1;
+        }
+        let Some(lines) = self.lines.get(self.now).filter(|lines| sample.line >= lines.first) else { return };
+        self.samples[self.now] += u64::from(sample.line <= lines.last);
+        if let (Some(vee), Some(last)) = (self.vee(), last) {
+            let [x, y] = self.experiment.axes.map(|axis| sample.command[axis] - last[axis]);
+            let near = |position: &AxisVector| {
+                let [x, y] = self.experiment.axes.map(|axis| position[axis]);
+                (x - self.experiment.center_mm[0]).hypot(y - self.experiment.center_mm[1]) < vee.leg_mm / 2.0
+            };
+            if near(&last) && near(&sample.command) {
+                self.least[self.now] = self.least[self.now].min(x.hypot(y) / self.period_s);
+            }
+        }
+    }
+}
+
+impl Watch<'_> {
+    fn vee(&self) -> Option<&Vee> {
+        self.experiment.vees.get(self.now.checked_sub(self.experiment.polygons.len())?)
+    }
+
+    fn measured(self) -> Measured {
+        let Experiment { polygons, vees, feed_mm_per_s, .. } = self.experiment;
+        let times = self.samples.iter().map(|samples| *samples as f64 * self.period_s);
+        let timed = polygons.iter().zip(times);
+        let timed = timed.map(|(polygon, time_s)| Timed { polygon: *polygon, feed_mm_per_s: *feed_mm_per_s, time_s });
+        let corners = vees.iter().zip(&self.least[polygons.len()..]).filter(|(_, least)| least.is_finite());
+        let corner = |(vee, least): (&Vee, &f64)| Corner {
+            turn_rad: vee.turn_rad,
+            feed_mm_per_s: vee.feed_mm_per_s,
+            least_mm_per_s: *least,
+        };
+        Measured { timed: timed.collect(), corners: corners.map(corner).collect() }
+    }
+}

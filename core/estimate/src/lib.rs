@@ -1,0 +1,34 @@
+//! How long a part program takes: models of machining time, and their calibration.
+//!
+//! Four models behind one trait: the machine's own planner on the virtual clock ([`Choice::Simulate`]), the closed forms
+//! of a look-ahead and of an overlap control, and the published regression. [`estimate`] streams a program through one.
+
+mod choice;
+pub mod diagnose;
+mod element;
+mod estimate;
+pub mod experiment;
+pub mod fit;
+mod four_cases;
+mod histogram;
+mod junction;
+mod look_ahead;
+pub mod measurements;
+mod model;
+pub mod model_file;
+mod overlap;
+pub mod polygon;
+mod regression;
+mod tally;
+
+pub use choice::{Choice, NAMES};
+pub use element::{Element, Kind};
+pub use estimate::{Estimate, EstimateError, estimate, program_errors};
+pub use four_cases::{Driven, drive};
+pub use histogram::{Field, Histogram};
+pub use junction::{Junction, Rows, Rule};
+pub use look_ahead::LookAhead;
+pub use model::{Case, Model, Sink, Spent, total_s};
+pub use overlap::{Constants, Overlap};
+pub use regression::{CORRECTED_LONG, Coefficients, PRINTED_CUBE, PRINTED_SHORT, Regression, Switch, long_terms};
+pub use tally::{Part, Tally};

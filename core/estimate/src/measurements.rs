@@ -1,0 +1,70 @@
+//! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, and `feed_mm_per_min` where it was not 5000.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::polygon::{FEED_MM_PER_MIN, Polygon, Timed};
+
+/// A row as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    n: u32,
+    side_mm: f64,
+    repetitions: u32,
+    seconds: f64,
+    feed_mm_per_min: Option<f64>,
+}
+
+/// Reads the measurements in the file at `path`. Lines that begin with # are left out.
+///
+/// # Errors
+/// What cannot be read, with file, line and cause.
+pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
+    let name = path.display();
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_path(path);
+    let reader = reader.as_mut().map_err(|e| format!("{name}: {e}"))?;
+    let headers = reader.headers().map_err(|e| format!("{name}: {e}"))?.clone();
+    let mut all = vec![];
+    for record in reader.records() {
+        let record = record.map_err(|e| format!("{name}: {e}"))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let row: Row = record.deserialize(Some(&headers)).map_err(|e| format!("{name}:{line}: {}", cause(&e)))?;
+        all.push(row.timed().map_err(|cause| format!("{name}:{line}: {cause}"))?);
+    }
+    if all.len() < 6 {
+        return Err(format!(
+            "{name}: {} measurements do not make a calibration; there should be 6 at least",
+            all.len()
+        ));
+    }
+    Ok(all)
+}
+
+fn cause(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
+        _ => error.to_string(),
+    }
+}
+
+impl Row {
+    fn timed(&self) -> Result<Timed, String> {
+        let feed_mm_per_min = self.feed_mm_per_min.unwrap_or(FEED_MM_PER_MIN);
+        let positive = [("side_mm", self.side_mm), ("seconds", self.seconds), ("feed_mm_per_min", feed_mm_per_min)];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("{name}: {value} is not above zero"));
+            }
+        }
+        if self.n < 3 || self.repetitions == 0 {
+            return Err("n: a polygon has 3 corners at least, and is gone round once at least".to_string());
+        }
+        if self.n.checked_mul(self.repetitions).is_none_or(|blocks| blocks > 10_000_000) {
+            return Err("repetitions: more blocks than anybody times".to_string());
+        }
+        let polygon = Polygon { corners: self.n, side_mm: self.side_mm, rounds: self.repetitions };
+        Ok(Timed { polygon, feed_mm_per_s: feed_mm_per_min / 60.0, time_s: self.seconds })
+    }
+}

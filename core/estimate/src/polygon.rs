@@ -1,0 +1,109 @@
+//! The polygons of the calibration: what they are made of, and what a model says they take.
+
+use std::f64::consts::TAU;
+
+use crate::element::Element;
+use crate::model::{Model, Spent};
+
+/// Corners of the polygons.
+pub const CORNERS: [u32; 12] = [3, 4, 5, 6, 8, 9, 12, 18, 36, 72, 180, 360];
+/// Sides of the polygons, mm: the paper's 0.10, 0.42 and 1.00, and two longer ones.
+pub const SIDES_MM: [f64; 5] = [0.1, 0.42, 1.0, 2.0, 4.0];
+/// Their feed, mm/min.
+pub const FEED_MM_PER_MIN: f64 = 5000.0;
+
+/// Blocks after which nothing changes any more from round to round.
+const ENOUGH_BLOCKS: u32 = 1000;
+
+/// A regular polygon, gone round some times without a stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polygon {
+    /// Corners.
+    pub corners: u32,
+    /// Side, mm.
+    pub side_mm: f64,
+    /// How often it is gone round.
+    pub rounds: u32,
+}
+
+/// A polygon and the time it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timed {
+    /// The polygon.
+    pub polygon: Polygon,
+    /// Programmed feed, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Time, s.
+    pub time_s: f64,
+}
+
+impl Polygon {
+    /// Turn at each corner, rad.
+    pub fn turn_rad(&self) -> f64 {
+        TAU / f64::from(self.corners)
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> u32 {
+        self.corners * self.rounds
+    }
+
+    /// Corners around a centre, mm, the first side along +X and the turn to the left.
+    pub fn points_mm(&self, center_mm: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+        let (turn, radius) = (self.turn_rad(), self.radius_mm());
+        (0..self.corners).map(move |k| {
+            let angle = f64::from(k) * turn - std::f64::consts::FRAC_PI_2 - turn / 2.0;
+            [center_mm[0] + radius * angle.cos(), center_mm[1] + radius * angle.sin()]
+        })
+    }
+
+    /// Radius of the circle through the corners, mm.
+    pub fn radius_mm(&self) -> f64 {
+        self.side_mm / (2.0 * (self.turn_rad() / 2.0).sin())
+    }
+
+    /// Its blocks.
+    pub fn elements(&self, feed_mm_per_s: f64) -> impl Iterator<Item = Element> {
+        let (turn, side_mm) = (self.turn_rad(), self.side_mm);
+        let round: Vec<_> =
+            (0..self.corners).map(|k| Element::line(side_mm, f64::from(k) * turn, feed_mm_per_s)).collect();
+        let count = self.blocks() as usize;
+        round.into_iter().cycle().take(count)
+    }
+}
+
+impl Timed {
+    /// Time of a block, s.
+    pub fn block_s(&self) -> f64 {
+        self.time_s / f64::from(self.polygon.blocks())
+    }
+
+    /// Mean feed, mm/s.
+    pub fn mean_feed_mm_per_s(&self) -> f64 {
+        self.polygon.side_mm / self.block_s()
+    }
+
+    /// Minimum feed by equations (7) and (8), with the acceleration that the paper assumes, mm/s; it may come out
+    /// negative, where that acceleration is not the machine's.
+    pub fn minimum_feed_mm_per_s(&self, acceleration_mm_per_s2: f64) -> f64 {
+        let ramp_s = self.block_s() / 2.0;
+        self.polygon.side_mm / 2.0 / ramp_s - acceleration_mm_per_s2 * ramp_s / 2.0
+    }
+
+    /// What `model` says it takes, s. Where there are many rounds, those in the middle are taken to be alike.
+    pub fn under(&self, model: &mut dyn Model) -> f64 {
+        let corners = self.polygon.corners as usize;
+        let rounds = self.polygon.rounds.min(ENOUGH_BLOCKS.div_ceil(self.polygon.corners));
+        let shorter = Polygon { rounds, ..self.polygon };
+        let from = rounds as usize / 2 * corners;
+        let (mut total_s, mut round_s, mut number) = (0.0, 0.0, 0);
+        let mut add = |_: &Element, spent: &Spent| {
+            total_s += spent.time_s;
+            round_s += if (from..from + corners).contains(&number) { spent.time_s } else { 0.0 };
+            number += 1;
+        };
+        shorter.elements(self.feed_mm_per_s).for_each(|element| model.block(&element, &mut add));
+        model.finish(&mut add);
+        total_s + f64::from(self.polygon.rounds - rounds) * round_s
+    }
+}

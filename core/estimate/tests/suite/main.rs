@@ -1,0 +1,6 @@
+//! The reference cases, and the tie between the published model and the planners.
+
+mod calibration;
+mod common;
+mod paper;
+mod tie;
