@@ -164,12 +164,12 @@ fn a_calibrated_overlap_machine_is_estimated_by_both_forms() {
     let folder = tempfile::TempDir::new().unwrap();
     let programs = ["raster", "serpentine", "spiral", "square"].map(example);
     let programs: Vec<&str> = programs.iter().map(String::as_str).collect();
-    let run = estimates(&[&programs, &OVERLAP[..]].concat());
+    let run = estimates(&[&programs[..], &OVERLAP[..]].concat());
     for (form, most) in [("overlap", 0.01), ("regression", 0.05)] {
         let (output, model) = calibrated(folder.path(), &[&["--model", form], &OVERLAP[..]].concat());
         assert!(output.status.success(), "{}", text(&output.stderr));
         assert!(text(&output.stdout).contains("this is an overlap control"), "{}", text(&output.stdout));
-        let list = estimates(&[&programs, &["--model", &*model], &OVERLAP[..]].concat());
+        let list = estimates(&[&programs[..], &["--model", &*model], &OVERLAP[..]].concat());
         for (estimate, run) in list.iter().zip(&run) {
             let off = number(estimate, "estimated_s") / number(run, "estimated_s") - 1.0;
             assert!(off.abs() < most, "{form} on {}: {off:+.5}", run["program"]);

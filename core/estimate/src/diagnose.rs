@@ -16,6 +16,8 @@ pub const LEAST_R2: f64 = 0.99;
 /// Greatest root mean square of the relative residuals of the times.
 pub const MOST_RMS: f64 = 0.03;
 
+/// By how much the fit may be worse with blocks of whole ticks, where the control's period is known.
+const TICK_RMS: f64 = 1e-3;
 const MM_PER_MIN: f64 = 60.0;
 
 /// A minimum feed measured between two long blocks.
@@ -120,10 +122,10 @@ impl Evidence {
 
 /// Fits the forms that a control may have to the times. `tick_s` is the control's period where it is known.
 pub fn fit_all(timed: &[Timed], tick_s: Option<f64>) -> Vec<Fitted> {
-    let mut all = vec![Fitted::new(overlap(timed, None), timed)];
-    if let Some(tick_s) = tick_s {
-        all.push(Fitted::new(overlap(timed, Some(tick_s)), timed));
-    }
+    let plain = Fitted::new(overlap(timed, None), timed);
+    // The polygons hardly tell ticks from none; programs with long blocks do.
+    let ticks = tick_s.map(|tick_s| Fitted::new(overlap(timed, Some(tick_s)), timed));
+    let mut all = vec![ticks.filter(|ticks| ticks.rms <= plain.rms + TICK_RMS).unwrap_or(plain)];
     all.push(Fitted::new(tangent(timed), timed));
     all.push(Fitted::new(by_axes(timed), timed));
     all

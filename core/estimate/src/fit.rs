@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn positive_parameters_are_found_from_far_away() {
         let [a, b] = positive_parameters([1.0, 1.0], |[a, b]| {
-            (1..20).map(|x| f64::from(x)).map(|x| (a * (-x / b).exp() - 50.0 * (-x / 7.0).exp()) / 50.0).collect()
+            (1..20).map(f64::from).map(|x| (a * (-x / b).exp() - 50.0 * (-x / 7.0).exp()) / 50.0).collect()
         });
         assert!((a - 50.0).abs() < 1e-6 && (b - 7.0).abs() < 1e-6, "{a} {b}");
     }

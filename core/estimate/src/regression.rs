@@ -116,10 +116,13 @@ impl Coefficients {
         element.length_mm / 2.0 <= switch_mm
     }
 
-    /// The feed at the end of a block that moves on into a block of `next_feed_mm_per_s`, mm/s.
-    pub fn end_mm_per_s(&self, element: &Element, turn_rad: f64, next_feed_mm_per_s: f64) -> f64 {
+    /// The feed at the end of a block that moves on into `next`, mm/s.
+    pub fn end_mm_per_s(&self, element: &Element, turn_rad: f64, next: &Element) -> f64 {
+        let next_feed_mm_per_s = next.feed_mm_per_s;
         let end = if self.is_short(element) {
             self.short_mm_per_min(element.length_mm / 2.0, turn_rad)
+        } else if self.ramp_s.is_some() && self.is_short(next) {
+            self.short_mm_per_min(next.length_mm / 2.0, turn_rad)
         } else {
             self.long_mm_per_min(turn_rad, element.feed_mm_per_s * MM_PER_MIN)
         };
@@ -169,7 +172,7 @@ impl Model for Regression {
         if let Some(before) = self.waiting.replace(*element) {
             let rests = before.rests_before(element);
             let turn_rad = if rests { 0.0 } else { before.turn_rad(element) };
-            let end = self.coefficients.end_mm_per_s(&before, turn_rad, element.feed_mm_per_s);
+            let end = self.coefficients.end_mm_per_s(&before, turn_rad, element);
             self.emit(&before, if rests { 0.0 } else { end }, out);
             if rests {
                 self.start_mm_per_s = 0.0;

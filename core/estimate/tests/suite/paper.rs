@@ -30,7 +30,7 @@ fn a_program_with_the_printed_coefficients() {
     for case in file["cases"].as_array().unwrap() {
         let elements = elements(&points, number(&case["F"]), &limits(1e9));
         for (pair, feed) in elements.windows(2).zip(numbers(&case["fm_regression"])) {
-            let end = coefficients.end_mm_per_s(&pair[0], pair[0].turn_rad(&pair[1]), pair[1].feed_mm_per_s);
+            let end = coefficients.end_mm_per_s(&pair[0], pair[0].turn_rad(&pair[1]), &pair[1]);
             assert_near(end * MM_PER_MIN, feed, 1e-6, "feed at the end");
         }
         let all = spent(&mut Regression::new(coefficients.clone()), &elements);
@@ -148,7 +148,7 @@ fn the_moving_switch_keeps_the_short_form_up_to_the_feed_times_the_block_time() 
     let fixed = Coefficients::default();
     let end = |model: &Coefficients, length_mm: f64| {
         let line = |angle: f64| tandem_estimate::Element::line(length_mm, angle, 5000.0 / MM_PER_MIN);
-        model.end_mm_per_s(&line(0.0), 0.1, line(0.1).feed_mm_per_s) * MM_PER_MIN
+        model.end_mm_per_s(&line(0.0), 0.1, &line(0.1)) * MM_PER_MIN
     };
     let short = |half: f64| fixed.short_mm_per_min(half, 0.1);
     assert_near(end(&fixed, 1.0), short(0.5), 1e-9, "fixed, below");
