@@ -148,8 +148,9 @@ impl Run {
         }
         let name = program.name().to_string();
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
-        let source = setup::source(&machine, stream, switches);
-        Self::assemble(machine, registry, Some(name), source, planner, driver, checked, switches)
+        let policy = PolicyHost::open(&machine)?;
+        let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
+        Self::assemble(machine, registry, Some(name), source, policy, planner, driver, checked, switches)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -165,7 +166,7 @@ impl Run {
         rules::check(&machine, &planner.describe(), driver.describe())?;
         rules::check_homing(&machine, switches)?;
         let source = setup::behind_homing(&machine, source, switches);
-        Self::assemble(machine, registry, Some(name), source, planner, driver, CheckReport::default(), switches)
+        Self::assemble(machine, registry, Some(name), source, None, planner, driver, CheckReport::default(), switches)
     }
 
     /// A run that homes the axes of [`Machine::homing`] and nothing else. Its samples are in the coordinates of the
@@ -181,7 +182,7 @@ impl Run {
         rules::check_homing(&machine, switches)?;
         let source = Box::new(Homing::new(&machine, &machine.homing, None));
         let checked = CheckReport::default();
-        Self::assemble(machine, registry, None, source, planner, driver, checked, switches)
+        Self::assemble(machine, registry, None, source, None, planner, driver, checked, switches)
     }
 
     #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
@@ -190,14 +191,13 @@ impl Run {
         registry: &Registry,
         program: Option<String>,
         source: Box<dyn Source + Send>,
+        policy: Option<PolicyHost>,
         planner: Box<dyn Planner>,
         mut driver: Box<dyn Driver>,
         checked: CheckReport,
         switches: Switches,
     ) -> Result<Self, HostError> {
         let kinematics = setup::kinematics(&machine, registry)?;
-        // Homing knows its own feeds.
-        let policy = program.as_ref().map_or(Ok(None), |_| PolicyHost::open(&machine))?;
         let feed = setup::feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
         let axes = machine.axes.count();
         let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
@@ -208,7 +208,6 @@ impl Run {
         let mut fine_config = setup::fine_config(&machine, &description, switches);
         fine_config.record_drives = program.is_none();
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
-        let source = setup::tuned(&machine, registry, source, policy.as_ref())?;
         let rough_config = RoughConfig::new(machine.rough_period_s);
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
         fine.reset();

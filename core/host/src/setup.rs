@@ -37,17 +37,6 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     config
 }
 
-/// `source` tuned by the policy, where there is one.
-pub fn tuned(
-    machine: &Machine,
-    registry: &Registry,
-    source: Box<dyn Source + Send>,
-    policy: Option<&PolicyHost>,
-) -> Result<Box<dyn Source + Send>, HostError> {
-    let Some(policy) = policy else { return Ok(source) };
-    Ok(Box::new(Tuned::new(source, policy.tuner(planner(machine, registry)?))))
-}
-
 /// Where the program starts: axes that are homed before it are at home.
 fn start(machine: &Machine, switches: Switches) -> AxisVector {
     let mut start = machine.start;
@@ -57,9 +46,19 @@ fn start(machine: &Machine, switches: Switches) -> AxisVector {
     start
 }
 
-/// What the rough loop pulls: the program, behind homing where that is asked for.
-pub fn source(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
-    behind_homing(machine, program(machine, stream, switches), switches)
+/// What the rough loop pulls: the program, tuned by the policy where there is one, behind homing where that is asked for.
+pub fn source(
+    machine: &Machine,
+    registry: &Registry,
+    stream: Stream,
+    switches: Switches,
+    policy: Option<&PolicyHost>,
+) -> Result<Box<dyn Source + Send>, HostError> {
+    let mut source = program(machine, stream, switches);
+    if let Some(policy) = policy {
+        source = Box::new(Tuned::new(source, policy.tuner(planner(machine, registry)?)));
+    }
+    Ok(behind_homing(machine, source, switches))
 }
 
 /// `source`, behind homing where that is asked for.

@@ -65,6 +65,10 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
             if self.over || self.stretch_ends || self.error.is_some() {
                 return true;
             }
+            // What waits for the machine to have driven what is there ends the window.
+            if !self.items.is_empty() && !self.source.may_go_on(false) {
+                return true;
+            }
             match self.source.next_items(&mut self.fetched) {
                 Ok(more) => self.over = !more,
                 Err(error) => self.error = Some(error),
@@ -141,6 +145,18 @@ impl<S: Source, P: BlockPolicy> Source for Tuned<S, P> {
         Ok(!(self.over && self.items.is_empty()))
     }
 
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        !self.items.is_empty() || self.source.may_go_on(driven)
+    }
+
+    fn period(&mut self) {
+        self.source.period();
+    }
+
+    fn is_waiting(&self) -> bool {
+        self.source.is_waiting()
+    }
+
     fn provide_input(&mut self, value: f64) {
         self.source.provide_input(value);
     }
@@ -152,20 +168,6 @@ impl<S: Source, P: BlockPolicy> Source for Tuned<S, P> {
         }
         self.over = !self.source.provide_rest(rest);
         !self.over
-    }
-}
-
-impl<S: Source + ?Sized> Source for Box<S> {
-    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        (**self).next_items(items)
-    }
-
-    fn provide_input(&mut self, value: f64) {
-        (**self).provide_input(value);
-    }
-
-    fn provide_rest(&mut self, rest: &Rest) -> bool {
-        (**self).provide_rest(rest)
     }
 }
 

@@ -36,6 +36,33 @@ pub trait Source {
     fn provide_rest(&mut self, rest: &Rest) -> bool;
 }
 
+/// A source on the heap is that source: every method is passed on.
+impl<S: Source + ?Sized> Source for Box<S> {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        (**self).next_items(items)
+    }
+
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        (**self).may_go_on(driven)
+    }
+
+    fn period(&mut self) {
+        (**self).period();
+    }
+
+    fn is_waiting(&self) -> bool {
+        (**self).is_waiting()
+    }
+
+    fn provide_input(&mut self, value: f64) {
+        (**self).provide_input(value);
+    }
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        (**self).provide_rest(rest)
+    }
+}
+
 impl Source for Stream {
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         Stream::next_items(self, items).map_err(|e| e.to_string())

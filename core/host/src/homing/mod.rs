@@ -147,11 +147,11 @@ impl Source for Homing {
     }
 
     fn period(&mut self) {
-        self.program.iter_mut().for_each(|program| program.period());
+        self.program.iter_mut().for_each(Source::period);
     }
 
     fn is_waiting(&self) -> bool {
-        self.program.as_ref().is_some_and(|program| program.is_waiting())
+        self.program.as_ref().is_some_and(Source::is_waiting)
     }
 
     fn may_go_on(&mut self, driven: bool) -> bool {
