@@ -33,3 +33,19 @@ fn the_report_opens_in_a_browser() {
     assert!(dom.contains("data-ready=\"1\""), "the page did not come up: {}", String::from_utf8_lossy(&shown.stderr));
     assert!(!dom.contains("data-errors=\""), "script errors");
 }
+
+#[test]
+fn the_path_is_judged_by_the_tolerance_of_the_program() {
+    let report = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let page = folder.path().join("report.html");
+        let path = page.to_string_lossy().into_owned();
+        let done = Scenario::text(text).with(&["--set", "planner.plugin=block-overlap", "--report", &path]).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        std::fs::read_to_string(&page).unwrap()
+    };
+    let wide = report("G21 G90 G64 P0.05\nF5000\nG1 X20\nG1 Y20\nM2\n");
+    assert!(wide.contains("of 0.05 mm allowed") && !wide.contains("<li class=\"bad\">"), "a wide tolerance is kept");
+    let both = report("G21 G90 G64 P0.05\nF5000\nG1 X20\nG1 Y20\nG64 P0.002\nG1 X0\nG1 Y0\nM2\n");
+    assert!(both.contains("of 0.002 to 0.05 mm allowed") && !both.contains("<li class=\"bad\">"));
+}

@@ -24,6 +24,7 @@ mod progress;
 mod report;
 mod run;
 mod script;
+mod tolerances;
 mod trace;
 
 use std::process::ExitCode;

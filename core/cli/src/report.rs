@@ -9,6 +9,7 @@ use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport};
 
 use crate::corners::Corners;
+use crate::tolerances::Tolerances;
 
 /// Keeps every sample in memory: about 150 bytes a sample for three axes.
 pub struct Collector {
@@ -16,6 +17,7 @@ pub struct Collector {
     axes: Axes,
     deviation_mm: Vec<f64>,
     corners: Corners,
+    tolerances: Tolerances,
 }
 
 impl Collector {
@@ -36,12 +38,14 @@ impl Collector {
             jerk_is_judged: machine.motion.jerk == JerkMode::Limit,
             ..Report::default()
         };
-        Self { report, axes: machine.axes, deviation_mm: vec![], corners: Corners::default() }
+        let tolerances = Tolerances::new(machine.motion.path_tolerance_mm);
+        Self { report, axes: machine.axes, deviation_mm: vec![], corners: Corners::default(), tolerances }
     }
 
     /// A block is planned for good.
     pub fn block(&mut self, block: &Block, report: &BlockReport) {
         self.corners.block(block, report);
+        self.tolerances.block(block);
     }
 
     /// Adds a sample.
@@ -55,6 +59,7 @@ impl Collector {
         samples.programmed_feed_mm_s.push(if programmed.is_finite() { programmed } else { f64::NAN });
         self.deviation_mm.push(deviation_mm);
         self.corners.sample(sample);
+        self.tolerances.sample(sample);
         push(&mut samples.command, &sample.command, &self.axes);
         push(&mut samples.feedback, &sample.feedback, &self.axes);
         for (signal, value) in self.report.signals.iter_mut().zip(signals) {
@@ -67,6 +72,8 @@ impl Collector {
         self.report.samples.deviation_mm = Some(self.deviation_mm);
         self.report.facts = facts(summary);
         self.report.signals.extend(self.corners.signals());
+        let (most_mm, each_mm) = self.tolerances.of_run_mm();
+        (self.report.path_tolerance_mm, self.report.samples.tolerance_mm) = (Some(most_mm), each_mm);
         let mut out = Output::create(path)?;
         self.report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
         out.finish()

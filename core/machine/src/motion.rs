@@ -40,17 +40,27 @@ impl Motion {
         let linear = motion.at_least("allowable_speed_difference_mm_per_min", 0.0).unwrap_or(0.0);
         let rotary = motion.at_least("allowable_speed_difference_deg_per_min", 0.0).unwrap_or(linear);
         let modes = [("limit", JerkMode::Limit), ("report", JerkMode::Report)];
+        let time_constant_s = motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0;
+        let time_constant_range_s = time_constant_range(motion);
+        let (least_s, most_s) = time_constant_range_s.unwrap_or((0.0, LONGEST_S));
+        if !(least_s..=most_s).contains(&time_constant_s) {
+            let (least, most) = (least_s * 1000.0, most_s * 1000.0);
+            motion.refuse("time_constant_ms", format!("must be {least} to {most}, the time constants of this machine"));
+        }
         Self {
             speed_difference_mm_per_s: linear / 60.0,
             speed_difference_rad_per_s: rotary.to_radians() / 60.0,
             path_tolerance_mm: motion.at_least("path_tolerance_mm", 0.0).unwrap_or(0.01),
-            time_constant_s: motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0,
-            time_constant_range_s: time_constant_range(motion),
+            time_constant_s,
+            time_constant_range_s,
             jerk: motion.choice("jerk", &modes).unwrap_or_default(),
             max_feed_ratio: motion.at_least("max_feed_ratio", 1.0).unwrap_or(1.0),
         }
     }
 }
+
+/// The longest time constant where the machine states no range, s.
+const LONGEST_S: f64 = 1.0;
 
 fn time_constant_range(motion: &Section<'_>) -> Option<(f64, f64)> {
     let key = "time_constant_range_ms";

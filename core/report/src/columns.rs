@@ -88,8 +88,9 @@ impl Derived {
 }
 
 fn off_path(report: &Report) -> Vec<u8> {
-    match (&report.samples.deviation_mm, report.path_tolerance_mm) {
-        (Some(values), Some(limit)) => values.iter().map(|&d| u8::from(d > limit)).collect(),
+    let off = |(i, d): (usize, &f64)| u8::from(report.tolerance_at_mm(i).is_some_and(|limit| *d > limit));
+    match &report.samples.deviation_mm {
+        Some(values) if report.path_tolerance_mm.is_some() => values.iter().enumerate().map(off).collect(),
         _ => Vec::new(),
     }
 }
@@ -118,7 +119,7 @@ fn check(report: &Report) -> io::Result<()> {
     let needed = samples.command.iter().chain([&samples.feed_mm_s]).chain(report.signals.iter().map(|s| &s.values));
     let optional = samples.feedback.iter().chain([&samples.sigma, &samples.programmed_feed_mm_s]);
     let optional = optional.filter(|column| !column.is_empty());
-    let lengths = needed.chain(optional).chain(&samples.deviation_mm).map(Vec::len);
+    let lengths = needed.chain(optional).chain(&samples.deviation_mm).chain(&samples.tolerance_mm).map(Vec::len);
     match lengths.chain([samples.line.len()]).find(|&length| length != n) {
         Some(length) => refuse(format!("a column has {length} samples, t_s has {n}")),
         None => Ok(()),

@@ -27,6 +27,8 @@ pub(crate) struct Finding {
     pub limit: f64,
     /// Samples that exceed the limit.
     pub samples: usize,
+    /// Whether it is the distance from the path, whose limit may change from sample to sample.
+    pub of_path: bool,
 }
 
 /// All that exceeds a limit.
@@ -50,7 +52,13 @@ impl Findings {
             findings.add_axis(report, axis, motion);
         }
         if let (Some(limit), Some(values)) = (report.path_tolerance_mm, &report.samples.deviation_mm) {
-            let kind = Finding { what: "path deviation".into(), unit: "mm".into(), limit, ..Finding::default() };
+            let kind = Finding {
+                what: "path deviation".into(),
+                unit: "mm".into(),
+                limit,
+                of_path: true,
+                ..Finding::default()
+            };
             findings.off_path = findings.add(report, &kind, values, off_path, 1);
         }
         findings.listed.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
@@ -100,7 +108,8 @@ impl Findings {
 impl Finding {
     fn starting(&self, report: &Report, i: usize, value: f64) -> Self {
         let (t_s, line) = (report.samples.t_s[i], report.samples.line[i]);
-        Self { from_s: t_s, to_s: t_s, line, peak: value.abs(), samples: 1, ..self.clone() }
+        let limit = if self.of_path { report.tolerance_at_mm(i).unwrap_or(self.limit) } else { self.limit };
+        Self { from_s: t_s, to_s: t_s, line, peak: value.abs(), samples: 1, limit, ..self.clone() }
     }
 
     fn extend(&mut self, t_s: f64, value: f64) {

@@ -25,7 +25,8 @@ pub struct Report {
     pub samples: Samples,
     /// Further curves over the same time axis, each in a plot of its own.
     pub signals: Vec<Signal>,
-    /// How far a sample may lie from the programmed path, in mm; `None` where nothing was promised.
+    /// How far a sample may lie from the programmed path, in mm; `None` where nothing was promised. Where the program
+    /// changes it, [`Samples::tolerance_mm`] says it sample by sample.
     pub path_tolerance_mm: Option<f64>,
     /// `false` where the jerk limit is only reported: jerk above it is still red, but is no violation.
     pub jerk_is_judged: bool,
@@ -34,6 +35,12 @@ pub struct Report {
 }
 
 impl Report {
+    /// How far sample `i` may lie from the path, mm, where something was promised.
+    pub(crate) fn tolerance_at_mm(&self, i: usize) -> Option<f64> {
+        let each = self.samples.tolerance_mm.as_ref().and_then(|each| each.get(i));
+        each.copied().or(self.path_tolerance_mm)
+    }
+
     /// Writes the page: a complete HTML document in UTF-8.
     ///
     /// Above two million samples every curve is thinned to the extremes of equal time slices, and the page says so;
@@ -106,6 +113,8 @@ pub struct Samples {
     pub programmed_feed_mm_s: Vec<f64>,
     /// Distance from the programmed path, in mm; `None` where nobody measured it.
     pub deviation_mm: Option<Vec<f64>>,
+    /// How far each sample may lie from the path, mm; `None` where it is the same for all.
+    pub tolerance_mm: Option<Vec<f64>>,
 }
 
 /// A further curve, such as a spindle load.

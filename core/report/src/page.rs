@@ -106,7 +106,8 @@ fn about(report: &Report, derived: &Derived) -> io::Result<String> {
     let about = About {
         axes: axes.collect(),
         signals: signals.collect(),
-        path_tolerance_mm: report.path_tolerance_mm,
+        // A line in the plot stands for one tolerance only.
+        path_tolerance_mm: report.path_tolerance_mm.filter(|_| report.samples.tolerance_mm.is_none()),
         jerk_is_judged: report.jerk_is_judged,
     };
     Ok(serde_json::to_string(&about)?.replace('<', "\\u003c"))

@@ -33,7 +33,13 @@ fn deviation_chip(report: &Report, off_path: usize) -> String {
     let Some(values) = &report.samples.deviation_mm else {
         return chip("", "path deviation", "not measured", "");
     };
-    let note = report.path_tolerance_mm.map(|limit| format!("of {} mm allowed", number(limit)));
+    let note = report.path_tolerance_mm.map(|limit| match &report.samples.tolerance_mm {
+        None => format!("of {} mm allowed", number(limit)),
+        Some(each) => {
+            let low = each.iter().copied().fold(f64::INFINITY, f64::min);
+            format!("of {} to {} mm allowed", number(low), number(peak(each)))
+        }
+    });
     let state = match report.path_tolerance_mm {
         None => "",
         Some(_) if off_path == 0 => "good",
