@@ -16,6 +16,8 @@ pub struct Item<'a> {
     pub block: &'a Entry,
     /// Highest feed by itself, mm/s.
     pub own_mm_per_s: f64,
+    /// Highest feed in full overlap as far as its neighbours are known, mm/s.
+    pub reach_mm_per_s: f64,
     /// Highest feed where one of its ends is late or at rest, mm/s.
     pub ramped_mm_per_s: f64,
     /// The feed is no longer open: the block has been joined to the one before.
@@ -23,10 +25,10 @@ pub struct Item<'a> {
 }
 
 impl Item<'_> {
-    /// Whether the block may be joined to the next one in full overlap, and otherwise.
-    fn possible(&self, corner: &Corner) -> [bool; 2] {
+    /// Whether the block may be joined to the next one in full overlap at most at `flow_mm_per_s`, and otherwise.
+    fn possible(&self, corner: &Corner, flow_mm_per_s: f64) -> [bool; 2] {
         let kept = |feed: f64| !self.fixed || feed >= self.own_mm_per_s * (1.0 - ROUNDING);
-        [!corner.rest && corner.cap_mm_per_s > 0.0 && kept(corner.cap_mm_per_s), kept(self.ramped_mm_per_s)]
+        [!corner.rest && corner.cap_mm_per_s > 0.0 && kept(flow_mm_per_s), kept(self.ramped_mm_per_s)]
     }
 }
 
@@ -56,31 +58,37 @@ impl Way {
         if item.block.path.is_none() {
             return (Self::START, [Mode::Late; 2]);
         }
-        let possible = item.possible(corner);
-        let Some(next) = next.filter(|_| !corner.rest) else { return self.further(item, possible, corner, 0.0) };
-        if is_free(item, corner, next) {
-            return self.freely();
+        let Some(next) = next.filter(|_| !corner.rest) else {
+            return self.further(item, item.possible(corner, 0.0), [0.0; 2], 0.0);
+        };
+        let flow_mm_per_s = flow_mm_per_s(item, corner, next);
+        if is_free(item, next, flow_mm_per_s) {
+            return self.freely(item);
         }
+        let possible = item.possible(corner, flow_mm_per_s[0]);
         let ramp = |item: &Item<'_>| item.ramped_mm_per_s * item.block.slope_s2_per_mm;
         let overlap_s = late_overlap_s(rules, corner, [item.block, next.block], lesser(ramp(item), ramp(next)));
-        self.further(item, possible, corner, overlap_s)
+        self.further(item, possible, flow_mm_per_s, overlap_s)
     }
 
-    /// Full overlap holds neither block down: it is taken, and how long the block takes no longer matters.
-    fn freely(&self) -> (Self, [Mode; 2]) {
-        let before = if self.cost_s[FLOW] <= self.cost_s[LATE] { Mode::Flow } else { Mode::Late };
-        (Self { cost_s: [0.0, f64::INFINITY], highest_mm_per_s: f64::INFINITY, lent_s: 0.0 }, [before; 2])
+    /// Full overlap holds neither block down: it is taken, and what came before no longer matters.
+    fn freely(&self, item: &Item<'_>) -> (Self, [Mode; 2]) {
+        let way = Self { cost_s: [0.0, f64::INFINITY], highest_mm_per_s: f64::INFINITY, lent_s: 0.0 };
+        let open = self.cost_s[FLOW] < f64::INFINITY && self.cost_s[LATE] < f64::INFINITY;
+        let further_s = |from: usize| self.time_s(item, [from, FLOW], item.own_mm_per_s, 0.0);
+        let ways_s = [FLOW, LATE].map(|from| self.cost_s[from] + if open { further_s(from) } else { 0.0 });
+        (way, [if ways_s[FLOW] <= ways_s[LATE] { Mode::Flow } else { Mode::Late }; 2])
     }
 
-    fn further(&self, item: &Item<'_>, possible: [bool; 2], corner: &Corner, overlap_s: f64) -> (Self, [Mode; 2]) {
-        let mut way = Self { cost_s: [f64::INFINITY; 2], highest_mm_per_s: corner.cap_mm_per_s, lent_s: overlap_s };
+    fn further(&self, item: &Item<'_>, possible: [bool; 2], flow: [f64; 2], overlap_s: f64) -> (Self, [Mode; 2]) {
+        let mut way = Self { cost_s: [f64::INFINITY; 2], highest_mm_per_s: flow[1], lent_s: overlap_s };
         let mut before = [Mode::Flow; 2];
         for to in [FLOW, LATE] {
             for from in [FLOW, LATE] {
                 if !possible[to] || self.cost_s[from] == f64::INFINITY {
                     continue;
                 }
-                let cost_s = self.cost_s[from] + self.time_s(item, from, to, corner, overlap_s);
+                let cost_s = self.cost_s[from] + self.time_s(item, [from, to], flow[0], overlap_s);
                 if cost_s < way.cost_s[to] {
                     way.cost_s[to] = cost_s;
                     before[to] = if from == FLOW { Mode::Flow } else { Mode::Late };
@@ -91,14 +99,14 @@ impl Way {
     }
 
     /// Time of a block: length over feed, and half of each ramp that nothing overlaps.
-    fn time_s(&self, item: &Item<'_>, from: usize, to: usize, corner: &Corner, overlap_s: f64) -> f64 {
+    fn time_s(&self, item: &Item<'_>, [from, to]: [usize; 2], flow_mm_per_s: f64, overlap_s: f64) -> f64 {
         let late = (from == LATE) || (to == LATE);
-        let mut feed = if late { item.ramped_mm_per_s } else { item.own_mm_per_s };
+        let mut feed = if late { item.ramped_mm_per_s } else { item.reach_mm_per_s };
         if from == FLOW {
             feed = lesser(feed, self.highest_mm_per_s);
         }
         if to == FLOW {
-            feed = lesser(feed, corner.cap_mm_per_s);
+            feed = lesser(feed, flow_mm_per_s);
         }
         let ramp_s = feed * item.block.slope_s2_per_mm;
         let side = |late: bool, overlap_s: f64| if late { (ramp_s - lesser(overlap_s, ramp_s)) / 2.0 } else { 0.0 };
@@ -116,7 +124,21 @@ impl Way {
     }
 }
 
+/// The highest feeds of two blocks in full overlap: under the cap, and no further apart than the axes allow.
+fn flow_mm_per_s(item: &Item<'_>, corner: &Corner, next: &Item<'_>) -> [f64; 2] {
+    let mut feeds = [item, next].map(|of| lesser(of.reach_mm_per_s, corner.cap_mm_per_s));
+    if feeds[0] == feeds[1] {
+        return feeds;
+    }
+    if feeds[0] > feeds[1] {
+        feeds[0] = lesser(feeds[0], corner.lift_mm_per_s(feeds[1], item.block.slope_s2_per_mm));
+    } else {
+        feeds[1] = lesser(feeds[1], corner.lift_mm_per_s(feeds[0], next.block.slope_s2_per_mm));
+    }
+    feeds
+}
+
 /// Whether full overlap holds neither of the two blocks down.
-fn is_free(item: &Item<'_>, corner: &Corner, next: &Item<'_>) -> bool {
-    corner.cap_mm_per_s >= item.own_mm_per_s && corner.cap_mm_per_s >= next.own_mm_per_s
+fn is_free(item: &Item<'_>, next: &Item<'_>, flow_mm_per_s: [f64; 2]) -> bool {
+    flow_mm_per_s[0] >= item.own_mm_per_s && flow_mm_per_s[1] >= next.own_mm_per_s
 }

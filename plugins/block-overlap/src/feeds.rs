@@ -4,8 +4,17 @@ use crate::buffer::Ring;
 use crate::choose::{Item, ROUNDING, Way};
 use crate::corner::Corner;
 use crate::entry::Entry;
-use crate::join::{Mode, late_overlap_s};
+use crate::join::{Mode, late_overlap_s, rest_ramp_s};
 use crate::rules::{Rules, TURN_SHARE, greater, lesser};
+
+/// How many further plans are tried where much time may be won.
+const ROUNDS: usize = 3;
+
+/// Share of its ramp that a block loses where it is worth another plan.
+const RAMP_SHARE: f64 = 0.1;
+
+/// Share of a plan's time that is much.
+const MUCH: f64 = 0.004;
 
 /// What is fixed before the window.
 #[derive(Clone, Copy, Debug)]
@@ -25,31 +34,114 @@ pub struct Plan {
     pub modes: Vec<Mode>,
     own: Vec<[f64; 2]>,
     better: Vec<[Mode; 2]>,
+    /// The plan before it was made again.
+    earlier: (Vec<f64>, Vec<Mode>),
+    /// Feeds that the choice counts on in full overlap, mm/s.
+    reach: Vec<f64>,
+    /// Time that lowering feeds for their neighbours has cost, s.
+    lost_s: f64,
     fixed: bool,
 }
 
 impl Plan {
     /// Memory for `capacity` blocks.
     pub fn new(capacity: usize) -> Self {
-        let (feeds, modes) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        Self { feeds, modes, own: Vec::with_capacity(capacity), better: Vec::with_capacity(capacity), fixed: false }
+        let feeds = || Vec::with_capacity(capacity);
+        let modes = || Vec::with_capacity(capacity);
+        let (own, better) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let earlier = (feeds(), modes());
+        Self { feeds: feeds(), modes: modes(), own, better, earlier, reach: feeds(), lost_s: 0.0, fixed: false }
     }
 
     /// Plans the blocks of `ring`, to rest after the last one. `false` where what is fixed before does not allow it.
     pub fn make(&mut self, rules: &Rules, ring: &Ring, before: &Before) -> bool {
         self.fixed = before.feed_mm_per_s.is_some();
         self.own_feeds(rules, ring, before);
-        if !self.choose(rules, ring) {
+        self.reach.clear();
+        self.reach.extend(self.own.iter().map(|own| own[0]));
+        if !self.choose(rules, ring) || !self.settle(rules, ring) {
             return false;
         }
-        self.start_feeds(ring);
-        if !self.backward(rules, ring) || !self.forward(rules, ring) {
-            return false;
+        if self.lost_s > rules.tick_s {
+            self.improve(rules, ring, before.tau_s);
         }
         if rules.grid {
             self.round_to_ticks(rules, ring, before.tau_s);
         }
         true
+    }
+
+    /// The feeds that go with the modes; `false` where what is fixed does not allow them.
+    fn settle(&mut self, rules: &Rules, ring: &Ring) -> bool {
+        self.lost_s = 0.0;
+        self.start_feeds(ring);
+        self.backward(rules, ring) && self.forward(rules, ring)
+    }
+
+    /// Where lowering feeds for their neighbours has cost much, chooses again with the feeds that the choice led to, and
+    /// once with full overlap wherever it can be. The fastest plan stays.
+    fn improve(&mut self, rules: &Rules, ring: &Ring, tau_s: f64) {
+        let mut least_s = self.time_s(rules, ring, tau_s);
+        for round in 0..ROUNDS {
+            if self.lost_s <= MUCH * least_s {
+                return;
+            }
+            self.reach.clear();
+            self.reach.extend_from_slice(&self.feeds);
+            let lost_s = self.lost_s;
+            self.swap();
+            let chosen = if round + 1 == ROUNDS { self.overlap_all(ring) } else { self.choose(rules, ring) };
+            let time_s =
+                if chosen && self.settle(rules, ring) { self.time_s(rules, ring, tau_s) } else { f64::INFINITY };
+            if time_s < least_s {
+                least_s = time_s;
+            } else {
+                self.swap();
+                self.lost_s = lost_s;
+            }
+        }
+    }
+
+    /// Full overlap at every junction that allows it.
+    fn overlap_all(&mut self, ring: &Ring) -> bool {
+        let count = ring.len();
+        self.modes.clear();
+        self.modes.extend((0..count).map(|k| match ring.corner(k) {
+            corner if corner.rest || k + 1 == count => Mode::Rest,
+            corner if corner.cap_mm_per_s > 0.0 => Mode::Flow,
+            _ => Mode::Late,
+        }));
+        !self.fixed || self.modes[0] != Mode::Flow || ring.corner(0).cap_mm_per_s >= self.own[0][0]
+    }
+
+    fn swap(&mut self) {
+        std::mem::swap(&mut self.feeds, &mut self.earlier.0);
+        std::mem::swap(&mut self.modes, &mut self.earlier.1);
+    }
+
+    /// How long the window takes, s: length over feed, and half of each ramp that nothing overlaps.
+    fn time_s(&self, rules: &Rules, ring: &Ring, tau_s: f64) -> f64 {
+        let (mut time_s, mut tau_s, mut before) = (0.0, tau_s, if self.fixed { Mode::Flow } else { Mode::Rest });
+        for k in 0..ring.len() {
+            let (block, feed, mode) = (ring.entry(k), self.feeds[k], self.modes[k]);
+            if block.path.is_none() {
+                continue;
+            }
+            let ramp_s = feed * block.slope_s2_per_mm;
+            let side = |mode: Mode, tau_s: f64| match mode {
+                Mode::Flow => 0.0,
+                Mode::Late => ramp_s / 2.0,
+                Mode::Rest => rest_ramp_s(rules, block, feed, tau_s) / 2.0,
+            };
+            time_s += block.length_mm / feed + side(before, tau_s) + side(mode, ring.corner(k).tau_s);
+            if mode == Mode::Late {
+                let next = ring.entry(k + 1);
+                let next_s = self.feeds[k + 1] * next.slope_s2_per_mm;
+                time_s -= late_overlap_s(rules, ring.corner(k), [block, next], lesser(ramp_s, next_s));
+            }
+            (tau_s, before) = (ring.corner(k).tau_s, mode);
+        }
+        time_s
     }
 
     /// The highest feed of each block by itself, in full overlap on both sides and otherwise.
@@ -73,7 +165,8 @@ impl Plan {
 
     fn item<'a>(&self, ring: &'a Ring, k: usize) -> Item<'a> {
         let [own_mm_per_s, ramped_mm_per_s] = self.own[k];
-        Item { block: ring.entry(k), own_mm_per_s, ramped_mm_per_s, fixed: self.fixed && k == 0 }
+        let reach_mm_per_s = self.reach[k];
+        Item { block: ring.entry(k), own_mm_per_s, reach_mm_per_s, ramped_mm_per_s, fixed: self.fixed && k == 0 }
     }
 
     fn choose(&mut self, rules: &Rules, ring: &Ring) -> bool {
@@ -143,7 +236,7 @@ impl Plan {
             if self.fixed && k == 0 {
                 return false;
             }
-            self.feeds[k] = lift;
+            self.lower(ring, k, lift);
         }
         true
     }
@@ -156,28 +249,58 @@ impl Plan {
             }
             let lift = ring.corner(k).lift_mm_per_s(self.feeds[k], ring.entry(k + 1).slope_s2_per_mm);
             if self.feeds[k + 1] > lift && !self.start_late(rules, ring, k, (k + 1, lift)) {
-                self.feeds[k + 1] = lift;
+                self.lower(ring, k + 1, lift);
             }
         }
         true
     }
 
+    /// Lowers the feed of block `k`. What it loses counts where it is much beside a ramp: along short blocks, feeds that
+    /// rise and fall step by step are no loss.
+    fn lower(&mut self, ring: &Ring, k: usize, feed_mm_per_s: f64) {
+        let (block, from) = (ring.entry(k), self.feeds[k]);
+        let lost_s = block.length_mm * (1.0 / feed_mm_per_s - 1.0 / from);
+        if lost_s > RAMP_SHARE * from * block.slope_s2_per_mm {
+            self.lost_s += lost_s;
+        }
+        self.feeds[k] = feed_mm_per_s;
+    }
+
     /// Lets the block after junction `k` start late where that costs less than lowering the feed of one block to `lift`.
+    /// Either feed comes down to what leaves room for its ramps.
     fn start_late(&mut self, rules: &Rules, ring: &Ring, k: usize, (lowered, lift): (usize, f64)) -> bool {
         let blocks = [ring.entry(k), ring.entry(k + 1)];
         let feeds = [self.feeds[k], self.feeds[k + 1]];
-        if feeds[0] > self.own[k][1] || feeds[1] > self.own[k + 1][1] {
+        let late = [0, 1].map(|i| lesser(feeds[i], self.own[k + i][1]));
+        if late[0] < feeds[0] && !self.may_lower(ring, k, late[0], lowered == k) {
             return false;
         }
-        let ramps_s = [0, 1].map(|i| feeds[i] * blocks[i].slope_s2_per_mm);
+        let ramps_s = [0, 1].map(|i| late[i] * blocks[i].slope_s2_per_mm);
         let overlap_s = late_overlap_s(rules, ring.corner(k), blocks, lesser(ramps_s[0], ramps_s[1]));
-        let late_s = f64::midpoint(ramps_s[0], ramps_s[1]) - overlap_s;
-        let lower_s = ring.entry(lowered).length_mm * (1.0 / lift - 1.0 / self.feeds[lowered]);
-        let fixed = self.fixed && lowered == 0;
-        if late_s < lower_s || fixed {
+        // A ramp on the other side of a block becomes shorter with its feed.
+        let ramped =
+            [k == 0 && !self.fixed || k > 0 && self.modes[k - 1] != Mode::Flow, self.modes[k + 1] != Mode::Flow];
+        let longer_s = |i: usize, feed: f64| {
+            let saved_s = if ramped[i] { (feeds[i] - feed) * blocks[i].slope_s2_per_mm / 2.0 } else { 0.0 };
+            blocks[i].length_mm * (1.0 / feed - 1.0 / feeds[i]) - saved_s
+        };
+        let late_s = f64::midpoint(ramps_s[0], ramps_s[1]) - overlap_s + longer_s(0, late[0]) + longer_s(1, late[1]);
+        let chosen = late_s < longer_s(lowered - k, lift) || self.fixed && lowered == 0;
+        if chosen {
             self.modes[k] = Mode::Late;
+            self.lower(ring, k, late[0]);
+            self.lower(ring, k + 1, late[1]);
         }
-        late_s < lower_s || fixed
+        chosen
+    }
+
+    /// Whether block `k` may be lowered to `feed`: it is open, and the block before can still hand over to it or is seen
+    /// to afterwards.
+    fn may_lower(&self, ring: &Ring, k: usize, feed: f64, backward: bool) -> bool {
+        if k == 0 || backward || self.modes[k - 1] != Mode::Flow {
+            return !(self.fixed && k == 0);
+        }
+        self.feeds[k - 1] <= ring.corner(k - 1).lift_mm_per_s(feed, ring.entry(k - 1).slope_s2_per_mm)
     }
 
     /// The published rounding: whole ticks where both ends have the time constant, and the axes still take the feed.

@@ -3,35 +3,15 @@
 
 mod common;
 
-use common::{Collected, context, lines, published, run};
+use common::{Collected, Random, context, lines, published, run};
 use tandem_block_overlap::{CornerControl, LimitMode, Options};
 use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, PlannerContext, SegmentFlags};
 
 const PERIOD_S: f64 = 1e-3;
 
-/// xorshift64*: the same program for the same seed everywhere.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-        of[(self.unit() * of.len() as f64) as usize]
-    }
-}
-
 /// A walk of long moves, chords, noise and reversals, with feeds, time constants, tolerances, stops and rapids at random.
 fn program(seed: u64) -> Vec<Block> {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut random = Random::new(seed);
     let mut points = vec![AxisVector::ZERO];
     let count = 20 + (random.unit() * 80.0) as usize;
     let (mut scale, mut heading) = (1.0, 0.0);
