@@ -69,6 +69,28 @@ fn the_square_is_no_slower_than_with_exact_stops() {
 }
 
 #[test]
+fn the_reason_is_what_cut_the_overlap() {
+    let reasons = |text: &str, set: &[&str]| {
+        let done = Scenario::text(text).with(OVERLAP).with(set).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        (done.number("motion_time_s"), blocks(&done, "limited_by"))
+    };
+    let square = |p: f64| format!("G21 G90\nG64 P{p}\nF5000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n");
+    let wide = [0.5, 2.0, 10.0].map(|p| reasons(&square(p), &[]));
+    assert_eq!(wide[0], wide[1], "the tolerance no longer acts");
+    assert_eq!(wide[0], wide[2]);
+    assert!(wide[0].1[..3].iter().all(|reason| reason == "junction"), "{:?}", wide[0]);
+    assert_eq!(reasons(&square(0.01), &[]).1[0], "tolerance");
+    let reversal = reasons("G21 G90\nG64 P0.5\nF3000\nG1 X20\nG1 X0\nM2\n", &[]).1;
+    assert!(reversal[0] == "junction" || reversal[0] == "acceleration", "{reversal:?}");
+    let off = ["--set", "planner.options.corner_control=off"];
+    let angle = reasons("G21 G90\nF3000\nG1 X20 TA50\nG1 Y20\nM2\n", &off).1;
+    assert_eq!(angle[0], "junction");
+    let rise = reasons("G21 G90\nG64\nF1000\nG1 X10 TA5\nG1 X70 F15000\nM2\n", &[]).1;
+    assert_eq!(rise[0], "time-constant");
+}
+
+#[test]
 fn a_tighter_tolerance_is_kept_and_costs_time() {
     let text = |tolerance: f64| format!("G21 G90\nG64 P{tolerance}\nF3000\nG1 X20\nG1 Y20\nG1 X0\nM2\n");
     let mut last_s = 0.0;

@@ -92,7 +92,7 @@ impl BlockOverlap {
         let end_mm_per_s = passing(taken.next_feed_mm_per_s, taken.join.overlap_s, taken.join.up_s);
         sink.block(&BlockReport {
             size: size_of_contract::<BlockReport>(),
-            limited_by: limited_by(&self.rules, entry, &taken),
+            limited_by: limited_by(&self.rules, entry, self.buffer.ring().numbered(taken.number + 1), &taken),
             block: entry.index,
             start_feed_mm_per_s: self.start_mm_per_s,
             peak_feed_mm_per_s: taken.feed_mm_per_s,

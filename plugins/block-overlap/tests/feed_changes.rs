@@ -12,12 +12,12 @@ const PERIOD_S: f64 = 1e-3;
 /// Lines, straight on or around corners, whose feeds change by up to 15 times.
 fn program(seed: u64) -> Vec<Block> {
     let mut random = Random::new(seed);
-    let (straight, tau_s) = (seed % 3 == 0, random.between(1.0, 100.0).round() / 1e3);
+    let (straight, tau_s) = (seed.is_multiple_of(3), random.between(1.0, 100.0).round() / 1e3);
     let mut points = vec![AxisVector::ZERO];
     let (mut heading, mut feed, mut feeds) = (0.0, 1000.0, vec![]);
     for _ in 0..3 + (random.unit() * 12.0) as usize {
         if !straight {
-            heading += random.pick(&[0.0, 0.01, 0.1, 0.5, 1.5, 3.14]) * random.between(-1.0, 1.0);
+            heading += random.pick(&[0.0, 0.01, 0.1, 0.5, 1.5, std::f64::consts::PI]) * random.between(-1.0, 1.0);
         }
         let length = random.pick(&[0.3, 2.0, 10.0, 20.0, 60.0]) * random.between(0.5, 1.0);
         let step = [length * f64::cos(heading), length * f64::sin(heading)];
@@ -26,7 +26,9 @@ fn program(seed: u64) -> Vec<Block> {
         feeds.push(feed);
     }
     let mut blocks = lines(&points, |index| feeds[index]);
-    blocks.iter_mut().for_each(|block| block.time_constant_s = tau_s);
+    for block in &mut blocks {
+        block.time_constant_s = tau_s;
+    }
     blocks
 }
 
@@ -52,7 +54,9 @@ fn driving_through_is_no_slower_than_stopping() {
     for seed in 1..=600 {
         let blocks = program(seed);
         let mut stops = blocks.clone();
-        stops.iter_mut().for_each(|block| block.path_mode = PathMode::ExactStop);
+        for block in &mut stops {
+            block.path_mode = PathMode::ExactStop;
+        }
         for options in options() {
             let [through_s, stopping_s] = [&blocks, &stops].map(|blocks| time_s(&options, blocks));
             assert!(
@@ -95,7 +99,9 @@ fn three_lines_s(lengths_mm: [f64; 3], feed: f64, middle: f64, tau_s: f64) -> f6
     let [first, second, third] = lengths_mm;
     let points = [0.0, first, first + second, first + second + third].map(|x| AxisVector::from_slice(&[x]));
     let mut blocks = lines(&points, |index| if index == 1 { middle } else { feed });
-    blocks.iter_mut().for_each(|block| block.time_constant_s = tau_s);
+    for block in &mut blocks {
+        block.time_constant_s = tau_s;
+    }
     time_s(&Options::default(), &blocks)
 }
 
