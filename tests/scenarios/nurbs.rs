@@ -82,3 +82,49 @@ fn the_baseline_does_not_start_under_the_guard() {
     assert_eq!(refused.status(), 1);
     assert!(refused.errors().contains("guard.mode = \"count\""), "{}", refused.errors());
 }
+
+/// The form `scan` on a machine whose jerk is a limit, with corners, tangent lines, arcs and dwells between the curves.
+#[test]
+fn curves_are_driven_within_the_jerk_limit() {
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
+    for scenario in [Scenario::of(&butterfly), Scenario::text(MIXTURE), Scenario::text(&many_curves())] {
+        let done = scenario.on(&machine).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        for count in ["limit_violations", "guard_stops", "starvations"] {
+            assert_eq!(done.number(count), 0.0, "{count}");
+        }
+        // At knots single points between the samples exceed the jerk limit a little, and the fine loop answers.
+        assert!(done.number("jerk_relaxed_samples") < 4.0, "{}", done.number("jerk_relaxed_samples"));
+        let verdict = done.judge(|options| {
+            options.sample_tolerance_mm = Some(2e-6);
+            options.vertex_tolerance_mm = Some(0.3);
+        });
+        assert!(verdict.passed(), "{verdict}");
+    }
+}
+
+/// Three hundred curves: half of them join smoothly in a line, the others meet at corners.
+fn many_curves() -> String {
+    let mut text = String::from("F6000\n");
+    for n in 0..150 {
+        let x = f64::from(n % 50) * 2.0;
+        let y = f64::from(n / 50);
+        text += &format!("G0 X{x} Y{y}\nG5 X{} Y{y} I0.3 J0.4 P-0.3 Q0.4\n", x + 1.0);
+        text += &format!("G5 X{} Y{y} I0.3 J-0.4 P-0.3 Q-0.4\n", x + 2.0);
+    }
+    text
+}
+
+#[test]
+fn a_hold_on_the_butterfly_stays_within_the_limits() {
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
+    let commands = "300,hold\n420,resume\n700,feed-override,0.4\n900,feed-override,1\n";
+    let done = Scenario::of(&butterfly).on(&machine).commands(commands).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    for count in ["limit_violations", "guard_stops", "starvations"] {
+        assert_eq!(done.number(count), 0.0, "{count}");
+    }
+    assert!(done.number("jerk_relaxed_samples") < 10.0, "{}", done.number("jerk_relaxed_samples"));
+}

@@ -25,6 +25,16 @@ pub struct Stretch {
     /// Length, mm.
     pub length_mm: f64,
     table: Option<ArcLength>,
+    /// Where its knots lie inside: there the third derivative may jump, mm from its start.
+    knots_mm: Vec<f64>,
+}
+
+impl Stretch {
+    /// The first knot behind `s_mm`; infinite where there is none. Does not allocate.
+    pub fn next_knot_mm(&self, s_mm: f64) -> f64 {
+        let index = self.knots_mm.partition_point(|knot| *knot <= s_mm);
+        self.knots_mm.get(index).copied().unwrap_or(f64::INFINITY)
+    }
 }
 
 impl Course {
@@ -36,14 +46,16 @@ impl Course {
         let end = block.end;
         if block.kind != BlockKind::Nurbs {
             return Ok(Path::new(block).map(|path| {
-                let stretches = vec![Stretch { length_mm: path.length_mm(), table: None }];
+                let stretches = vec![Stretch { length_mm: path.length_mm(), table: None, knots_mm: Vec::new() }];
                 Self { shape: Shape::Path(Box::new(path)), stretches, end }
             }));
         }
         let curve = curve_of(axes, block)?;
-        let stretch = |piece: &_| {
+        let stretch = |piece: &tandem_motion::nurbs::Piece| {
             let table = ArcLength::of_piece(&curve, piece);
-            Stretch { length_mm: table.length().mm, table: Some(table) }
+            let inside = curve.inner_knots().filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
+            let knots_mm = inside.map(|knot| table.length_at(&curve, knot)).collect();
+            Stretch { length_mm: table.length().mm, table: Some(table), knots_mm }
         };
         let stretches = curve.pieces().iter().map(stretch).collect();
         Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end }))
@@ -71,6 +83,7 @@ impl Course {
                 position: path.position(s_mm),
                 direction: path.direction(s_mm),
                 curvature: path.curvature(s_mm),
+                third: third(path, s_mm),
                 ..AlongPath::default()
             },
             (Shape::Curve(_), None) => AlongPath::default(),
@@ -86,6 +99,13 @@ impl Course {
             Shape::Path(_) => vector.0.iter().map(|v| v * v).sum::<f64>().sqrt(),
         }
     }
+}
+
+/// Third derivative of a line or arc: on a circle the direction turns evenly, and its axes do so alone.
+fn third(path: &Path, s_mm: f64) -> AxisVector {
+    let (direction, bends) = (path.direction(s_mm), path.max_curvature());
+    let squared = path.rad_per_mm() * path.rad_per_mm();
+    AxisVector(std::array::from_fn(|axis| if bends[axis] > 0.0 { -squared * direction[axis] } else { 0.0 }))
 }
 
 /// The curve of `block`, checked.

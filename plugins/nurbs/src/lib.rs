@@ -2,6 +2,7 @@
 //!
 //! | `form` | what it keeps |
 //! |---|---|
+//! | `scan` (default) | velocity, acceleration and jerk of every axis, feed and chord error; near time-optimal |
 //! | `adaptive` | feed and chord error only, as published: acceleration and jerk break the limits |
 //!
 //! `adaptive` is the baseline that the literature compares with, after Yeh and Hsu, "Adaptive-feedrate interpolation for
@@ -21,11 +22,13 @@
 //! feed is common to all of them. Lines and arcs go the same way as curves.
 
 mod adaptive;
+mod baseline;
 mod course;
 mod limit;
 mod options;
 mod piece;
 mod planner;
+mod scan;
 
 pub use course::{Course, Stretch};
 pub use limit::chord_feed_mm_per_s;

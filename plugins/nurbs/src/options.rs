@@ -4,18 +4,22 @@ use serde::Deserialize;
 use tandem_sdk::{PluginError, parse_options};
 
 /// What decides the feed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
     /// As published: the chord error at the place where a fine period begins. Breaks acceleration and jerk limits.
     Adaptive,
+    /// Near time-optimal within velocity, acceleration and jerk of every axis and the chord error.
+    #[default]
+    Scan,
 }
 
 /// The options.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Options {
-    /// What decides the feed; to be said, because the one form there is breaks limits.
+    /// What decides the feed.
+    #[serde(default)]
     pub form: Form,
     /// Most that the chord of a fine period may stand off the curve, µm: 0.001 to 1000.
     #[serde(default = "one")]
@@ -30,7 +34,7 @@ impl Options {
     /// Reads and checks the TOML text of the options.
     ///
     /// # Errors
-    /// An unknown key or form, none, or a chord error out of range.
+    /// An unknown key or form, or a chord error out of range.
     pub fn parse(text: &str) -> Result<Self, PluginError> {
         let options: Self = parse_options(text)?;
         // The range is asked in this form because a comparison with NaN is false.
@@ -49,8 +53,8 @@ mod tests {
     fn options_are_read_and_checked() {
         let plain = Options::parse("form = \"adaptive\"").unwrap();
         assert_eq!(plain, Options { form: Form::Adaptive, chord_error_um: 1.0 });
+        assert_eq!(Options::parse("").unwrap().form, Form::Scan);
         for (text, word) in [
-            ("", "form"),
             ("form = \"fast\"", "fast"),
             ("form = \"adaptive\"\nchord_error_um = 0", "chord_error_um"),
             ("form = \"adaptive\"\nchord_error_um = nan", "chord_error_um"),

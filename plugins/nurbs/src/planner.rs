@@ -1,237 +1,69 @@
-//! The planner itself: blocks in, segments out.
+//! The planner: its form, and what all forms have in common.
 
-use std::collections::VecDeque;
-
-use tandem_motion::nurbs::Place;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, NurbsGeometry, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink, size_of_contract,
+    PlannerDescription, PluginError, SegmentSink, size_of_contract,
 };
 
-use crate::adaptive::{Adaptive, next_mm};
+use crate::baseline::Baseline;
 use crate::course::{Course, curve_of};
-use crate::options::Options;
-use crate::piece::Piece;
+use crate::options::{Form, Options};
+use crate::scan::ScanPlanner;
 
 /// Most blocks that wait to be driven.
 pub const BUFFER_BLOCKS: usize = 64;
-/// Share of an axis limit that a feed may reach.
-const AIM: f64 = 0.999;
 
-/// A block that has not begun.
-#[derive(Debug)]
-struct Waiting {
-    block: Block,
-    course: Option<Course>,
-}
-
-/// The block being driven.
-#[derive(Debug)]
-struct Driving {
-    course: Course,
-    profile: Adaptive,
-    stretch: usize,
-    s_mm: f64,
-    place: Place,
-    /// What is left of the piece being drawn.
-    piece: Option<Piece>,
-}
-
-/// Rough loop. A block allocates when it is accepted, driving it does not.
+/// Rough loop. A block allocates when it is accepted; so does a form `scan` whose window is longer than any before.
 #[derive(Debug)]
 pub struct NurbsPlanner {
     context: PlannerContext,
-    chord_error_mm: f64,
-    waiting: VecDeque<Waiting>,
-    driving: Option<Driving>,
-    /// What is left of a dwell.
-    dwell: Option<Segment>,
-    /// The blank of the block being driven, and its next segment.
-    segment: Segment,
-    path_mm: f64,
-    /// Where the block being driven ends.
-    end: AxisVector,
-    moving: bool,
-    /// The block being driven ends at rest, whatever follows.
-    ends_at_rest: bool,
-    finished: bool,
+    form: Driver,
+}
+
+#[derive(Debug)]
+enum Driver {
+    Adaptive(Box<Baseline>),
+    Scan(Box<ScanPlanner>),
 }
 
 impl NurbsPlanner {
     /// A planner at rest.
     ///
     /// # Errors
-    /// A machine with a speed or acceleration limit that is no positive number.
+    /// A machine with a speed or acceleration limit, for the form `scan` also a jerk limit, that is no positive number.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         let axes = context.limits.axes();
+        let sound = |value: f64| value > 0.0 && value.is_finite();
         let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
-        if !values.into_iter().all(|value| value > 0.0 && value.is_finite()) {
+        if !values.into_iter().all(sound) {
             return Err(PluginError::fixed("nurbs needs finite speed and acceleration limits of all axes"));
         }
-        Ok(Self {
-            context: *context,
-            chord_error_mm: options.chord_error_um / 1000.0,
-            waiting: VecDeque::with_capacity(BUFFER_BLOCKS),
-            driving: None,
-            dwell: None,
-            segment: Segment::rest(&context.position, 0.0),
-            path_mm: 0.0,
-            end: context.position,
-            moving: false,
-            ends_at_rest: false,
-            finished: false,
-        })
-    }
-
-    fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let next_rests = self.waiting.front().map_or(self.finished, |next| next.block.starts_at_rest());
-        if self.moving && (self.ends_at_rest || next_rests) {
-            self.rest(sink);
-            return true;
+        if options.form == Form::Scan && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
+            return Err(PluginError::fixed("nurbs with form = \"scan\" needs a jerk limit (max_jerk) of all axes"));
         }
-        let Some(Waiting { block, course }) = self.waiting.pop_front() else { return false };
-        match course {
-            Some(course) => self.begin_motion(&block, course, sink),
-            None => self.begin_dwell(&block, sink),
+        let chord_error_mm = options.chord_error_um / 1000.0;
+        let form = match options.form {
+            Form::Adaptive => Driver::Adaptive(Box::new(Baseline::new(context, chord_error_mm))),
+            Form::Scan => Driver::Scan(Box::new(ScanPlanner::new(context, chord_error_mm))),
+        };
+        Ok(Self { context: *context, form })
+    }
+
+    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+        match &mut self.form {
+            Driver::Adaptive(form) => Ok(form.emit(left_s, sink)),
+            Driver::Scan(form) => form.emit(left_s, sink),
         }
-        true
-    }
-
-    fn begin_motion(&mut self, block: &Block, course: Course, sink: &mut dyn SegmentSink) {
-        let (feed_mm_per_s, limited_by) = self.feed_mm_per_s(block, &course);
-        let (chord_error_mm, period_s) = (self.chord_error_mm, self.context.fine_period_s);
-        let profile = Adaptive { feed_mm_per_s, chord_error_mm, period_s };
-        let (time_s, feeds) = profile.summary(&course);
-        let slowed = feeds[1] < feed_mm_per_s;
-        let limited_by = if slowed { LimitedBy::Tolerance } else { limited_by };
-        sink.block(&report(block, limited_by, feeds, time_s));
-        self.segment = self.blank(block);
-        (self.end, self.ends_at_rest) = (*course.end(), block.ends_at_rest());
-        self.driving = Some(Driving { course, profile, stretch: 0, s_mm: 0.0, place: Place::default(), piece: None });
-        self.moving = true;
-    }
-
-    fn begin_dwell(&mut self, block: &Block, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&block.end, block.dwell_s);
-        (rest.block, rest.line) = (block.index, block.line);
-        rest.path[0] = self.path_mm;
-        rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
-        self.dwell = Some(rest);
-        sink.block(&report(block, LimitedBy::Feed, [0.0; 3], block.dwell_s));
-    }
-
-    /// The feed to be driven where no chord limits it, mm/s.
-    fn feed_mm_per_s(&self, block: &Block, course: &Course) -> (f64, LimitedBy) {
-        if block.kind == BlockKind::Rapid {
-            let direction = course.at(0, 0.0, &mut Place::default()).direction;
-            let limits = self.context.limits.along(&block.start, &direction);
-            return (AIM * limits.rapid_mm_per_s, LimitedBy::Feed);
-        }
-        let capped = block.feed_cap_mm_per_s < block.feed_mm_per_s;
-        let limited_by = if capped { LimitedBy::Policy } else { LimitedBy::Feed };
-        (block.command_feed_mm_per_s() * self.context.max_feed_ratio, limited_by)
-    }
-
-    fn blank(&self, block: &Block) -> Segment {
-        let mut blank = Segment::rest(&block.start, 0.0);
-        (blank.block, blank.line) = (block.index, block.line);
-        blank.flags = SegmentFlags::BLOCK_BEGINS;
-        if block.kind == BlockKind::Rapid {
-            blank.flags = blank.flags.with(SegmentFlags::RAPID);
-        } else {
-            blank.feed_mm_per_s = block.command_feed_mm_per_s();
-        }
-        // A path deceleration that no axis exceeds, whatever the direction; this form serves simulated drives only.
-        let axes = self.context.limits.axes();
-        blank.stop_deceleration_mm_per_s2 =
-            axes.iter().map(|axis| axis.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
-        blank
-    }
-
-    /// Rest where the last block ended, exactly.
-    fn rest(&mut self, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&self.end, 0.0);
-        (rest.block, rest.line) = (self.segment.block, self.segment.line);
-        rest.path[0] = self.path_mm;
-        self.moving = false;
-        sink.segment(&rest);
-    }
-
-    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
-        if let Some(rest) = self.dwell.take() {
-            return Some(self.emit_dwell(rest, left_s, sink));
-        }
-        let Some(mut driving) = self.driving.take() else { return self.begin(sink).then_some(0.0) };
-        let over = driving.draw(left_s, &mut self.segment);
-        self.segment.path[0] += self.path_mm + driving.before_mm();
-        if over {
-            self.path_mm += driving.length_mm();
-            self.segment.flags = self.segment.flags.with(SegmentFlags::BLOCK_ENDS);
-        } else {
-            self.driving = Some(driving);
-        }
-        sink.segment(&self.segment);
-        let flags = self.segment.flags.0 & !(SegmentFlags::BLOCK_BEGINS.0 | SegmentFlags::BLOCK_ENDS.0);
-        self.segment.flags = SegmentFlags(flags);
-        Some(self.segment.duration_s)
-    }
-
-    fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let later_s = (rest.duration_s - left_s).max(0.0);
-        rest.duration_s -= later_s;
-        if later_s > 0.0 {
-            let flags = SegmentFlags(rest.flags.0 & !SegmentFlags::BLOCK_BEGINS.0);
-            self.dwell = Some(Segment { duration_s: later_s, flags, ..rest });
-        } else {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        sink.segment(&rest);
-        rest.duration_s
     }
 }
 
-impl Driving {
-    /// Draws the next segment, at most `left_s` long; true where it ends the block.
-    fn draw(&mut self, left_s: f64, segment: &mut Segment) -> bool {
-        let whole = self.piece.take();
-        let piece = whole.unwrap_or_else(|| self.profile.piece(&self.course, self.stretch, self.s_mm, &mut self.place));
-        if whole.is_none() {
-            self.s_mm = next_mm(&piece, self.course.stretches()[self.stretch].length_mm, self.profile.period_s);
-        }
-        let now = piece.part(0.0, piece.duration_s.min(left_s));
-        let undrawn = now.draw(&self.course, self.stretch, &mut self.place, segment);
-        let later_s = piece.duration_s - now.duration_s;
-        let drawn_s = segment.duration_s;
-        if undrawn.is_some() || later_s > 0.0 {
-            self.piece = Some(piece.part(drawn_s, piece.duration_s - drawn_s));
-            return false;
-        }
-        self.stretch_over()
-    }
-
-    /// Goes to the next stretch where this one has ended; true behind the last.
-    fn stretch_over(&mut self) -> bool {
-        if self.s_mm < self.course.stretches()[self.stretch].length_mm {
-            return false;
-        }
-        if self.stretch + 1 == self.course.stretches().len() {
-            return true;
-        }
-        self.stretch += 1;
-        (self.s_mm, self.place) = (0.0, Place::default());
-        false
-    }
-
-    fn before_mm(&self) -> f64 {
-        self.course.stretches()[..self.stretch].iter().map(|stretch| stretch.length_mm).sum()
-    }
-
-    fn length_mm(&self) -> f64 {
-        self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
-    }
+/// The report of a dwell.
+pub(crate) fn dwell_report(block: &Block) -> BlockReport {
+    report(block, LimitedBy::Feed, [0.0; 3], block.dwell_s)
 }
 
-fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) -> BlockReport {
+/// The report of `block`: feeds at the start, highest and at the end.
+pub(crate) fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) -> BlockReport {
     BlockReport {
         size: size_of_contract::<BlockReport>(),
         limited_by,
@@ -246,7 +78,10 @@ fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) ->
 
 impl Planner for NurbsPlanner {
     fn describe(&self) -> PlannerDescription {
-        PlannerDescription { breaks_limits: 1, ..PlannerDescription::order_2() }
+        match self.form {
+            Driver::Adaptive(_) => PlannerDescription { breaks_limits: 1, ..PlannerDescription::order_2() },
+            Driver::Scan(_) => PlannerDescription { order: 3, ..PlannerDescription::order_2() },
+        }
     }
 
     fn check(&self, block: &Block) -> Result<(), PluginError> {
@@ -269,38 +104,50 @@ impl Planner for NurbsPlanner {
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        if self.waiting.len() >= BUFFER_BLOCKS {
+        let waiting = match &self.form {
+            Driver::Adaptive(form) => form.blocks(),
+            Driver::Scan(form) => form.blocks(),
+        };
+        if waiting >= BUFFER_BLOCKS {
             return Ok(Accepted::Full);
         }
         self.check(block)?;
         let course = Course::new(&self.context.axes, block).map_err(|error| PluginError::new(error.to_string()))?;
         // The slices of the curve are not valid any longer than this call: the course has its own copy.
         let block = Block { nurbs: NurbsGeometry::default(), ..*block };
-        self.waiting.push_back(Waiting { block, course });
-        self.finished = false;
+        match &mut self.form {
+            Driver::Adaptive(form) => form.accept(&block, course),
+            Driver::Scan(form) => form.accept(&block, course),
+        }
         Ok(Accepted::Accepted)
     }
 
     fn finish(&mut self) {
-        self.finished = true;
+        match &mut self.form {
+            Driver::Adaptive(form) => form.finish(),
+            Driver::Scan(form) => form.finish(),
+        }
     }
 
     fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         while emitted_s < duration_s {
-            match self.emit(duration_s - emitted_s, sink) {
+            match self.emit(duration_s - emitted_s, sink)? {
                 Some(part_s) => emitted_s += part_s,
                 None => break,
             }
         }
-        let empty = self.waiting.is_empty() && self.driving.is_none() && self.dwell.is_none() && !self.moving;
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
+        let done = match &self.form {
+            Driver::Adaptive(form) => form.is_done(),
+            Driver::Scan(form) => form.is_done(),
+        };
+        Ok(Advanced { duration_s: emitted_s, done: u32::from(done) })
     }
 
     fn reset(&mut self, position: &AxisVector) {
-        self.waiting.clear();
-        (self.driving, self.dwell) = (None, None);
-        self.segment = Segment::rest(position, 0.0);
-        (self.path_mm, self.moving, self.finished) = (0.0, false, false);
+        match &mut self.form {
+            Driver::Adaptive(form) => form.reset(position),
+            Driver::Scan(form) => form.reset(position),
+        }
     }
 }

@@ -1,0 +1,83 @@
+//! Windows as segments.
+
+use tandem_motion::hermite;
+use tandem_sdk::{MAX_AXES, Segment};
+
+use super::plan::State;
+use super::route::{Cursor, Route};
+use super::window::Window;
+
+/// Most that a segment may stand off its path, mm.
+const OFF_MM: f64 = 2e-8;
+/// Halvings of an interval until a segment follows the path.
+const MAX_HALVINGS: u32 = 30;
+/// A leg is over this near to its end, mm: rounding of path coordinates.
+const OVER_MM: f64 = 1e-9;
+
+/// Least duration of a segment, s: the derivatives of a shorter one are rounding.
+const LEAST_S: f64 = 5e-5;
+
+/// What was drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    /// Until when, s from the start of the window.
+    pub until_s: f64,
+    /// The leg at the front is over.
+    pub leg_over: bool,
+}
+
+/// Draws the segment from `from_s` on: at most to `to_s`, to the end of the interval of the grid, to the next knot and to
+/// the end of the leg at the front, where that leaves more than slivers. Position, velocity and acceleration of both ends
+/// are met. Does not allocate.
+pub fn draw(route: &Route, window: &Window, (from_s, to_s): (f64, f64), segment: &mut Segment) -> Drawn {
+    let k = window.interval(from_s);
+    let border_s = window.times[k + 1];
+    let asked_s = to_s.max(from_s + LEAST_S);
+    let mut until_s = if border_s - asked_s < LEAST_S { border_s } else { asked_s };
+    let mut cursor = Cursor::default();
+    let leg_end_mm = route.front().map_or(f64::INFINITY, |leg| leg.end_mm);
+    let start = window.at_in(k, from_s);
+    let break_mm = route.front().map_or(f64::INFINITY, |leg| leg.next_break_mm(start.s_mm + OVER_MM));
+    if window.at_in(k, until_s).s_mm > break_mm + OVER_MM {
+        let break_s = window.time_at(break_mm, (from_s, until_s)).max(from_s + LEAST_S);
+        if until_s - break_s > LEAST_S {
+            until_s = break_s;
+        }
+    }
+    let mut end = window.at_in(k, until_s);
+    for _ in 0..MAX_HALVINGS {
+        fill(route, &mut cursor, [&start, &end], until_s - from_s, segment);
+        if follows(route, &mut cursor, segment) {
+            break;
+        }
+        if until_s - from_s < 2.0 * LEAST_S {
+            break;
+        }
+        until_s = f64::midpoint(from_s, until_s);
+        end = window.at_in(k, until_s);
+    }
+    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - OVER_MM }
+}
+
+fn fill(route: &Route, cursor: &mut Cursor, ends: [&State; 2], duration_s: f64, segment: &mut Segment) {
+    let states = ends.map(|end| {
+        let (at, _) = route.at(end.s_mm, cursor);
+        let (v, a) = (end.speed_mm_per_s, end.acceleration_mm_per_s2);
+        [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
+    });
+    let [from, to] = &states;
+    for axis in 0..MAX_AXES {
+        segment.coefficients[axis] = hermite(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
+    }
+    let along = ends.map(|end| [end.s_mm, end.speed_mm_per_s, end.acceleration_mm_per_s2]);
+    segment.path = hermite(along[0], along[1], duration_s);
+    segment.duration_s = duration_s;
+}
+
+fn follows(route: &Route, cursor: &mut Cursor, segment: &Segment) -> bool {
+    [0.25, 0.5, 0.75].iter().all(|share| {
+        let t_s = share * segment.duration_s;
+        let off = route.at(segment.path_mm(t_s), cursor).0.position - segment.position(t_s);
+        off.0.iter().all(|off| off.abs() <= OFF_MM)
+    })
+}

@@ -1,0 +1,284 @@
+//! Blocks in, segments out.
+
+use tandem_sdk::{
+    AxisVector, Block, BlockKind, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags,
+    SegmentSink,
+};
+
+use super::draw::{Drawn, draw};
+use super::plan::{Planning, Start, State};
+use super::route::{Bounds, Cursor, Item, Leg, Route};
+use super::window::Window;
+use crate::course::Course;
+use crate::planner::{dwell_report, report};
+
+/// Share of the jerk limits on which a stop counts: the plan takes the rest.
+const STOP_JERK: f64 = 0.5;
+/// A window shorter than this that ends where the known path ends is driven to its end, s.
+const SHORT_S: f64 = 0.15;
+
+/// The form `scan`. Rough loop: blocks allocate when they are accepted, windows where one is longer than any before.
+#[derive(Debug)]
+pub struct ScanPlanner {
+    bounds: Bounds,
+    route: Route,
+    planning: Planning,
+    window: Window,
+    next: Window,
+    /// Driven and committed time of the window; none at rest.
+    driving: Option<(f64, f64)>,
+    dwell: Option<Segment>,
+    /// What segments of the present block say.
+    blank: Segment,
+    /// Path coordinate and position at rest.
+    at_mm: f64,
+    position: AxisVector,
+    finished: bool,
+}
+
+impl ScanPlanner {
+    /// At rest.
+    pub fn new(context: &PlannerContext, chord_error_mm: f64) -> Self {
+        Self {
+            bounds: Bounds { context: *context, chord_error_mm },
+            route: Route::default(),
+            planning: Planning::default(),
+            window: Window::default(),
+            next: Window::default(),
+            driving: None,
+            dwell: None,
+            blank: Segment::rest(&context.position, 0.0),
+            at_mm: 0.0,
+            position: context.position,
+            finished: false,
+        }
+    }
+
+    /// Number of blocks that have not ended.
+    pub fn blocks(&self) -> usize {
+        let ends = |item: &&Item| matches!(item, Item::Dwell(_)) || matches!(item, Item::Leg(leg) if leg.ends);
+        self.route.items.iter().filter(ends).count()
+    }
+
+    /// Takes a block. Allocates.
+    pub fn accept(&mut self, block: &Block, course: Option<Course>) {
+        self.route.push(block, course, &self.bounds);
+        self.finished = false;
+    }
+
+    /// No block follows for now.
+    pub fn finish(&mut self) {
+        self.finished = true;
+    }
+
+    /// Whether all is emitted.
+    pub fn is_done(&self) -> bool {
+        self.finished && self.route.items.is_empty() && self.driving.is_none() && self.dwell.is_none()
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self, position: &AxisVector) {
+        let Bounds { context, chord_error_mm } = self.bounds;
+        self.route = Route::default();
+        (self.driving, self.dwell, self.finished, self.at_mm) = (None, None, false, 0.0);
+        self.position = *position;
+        self.bounds = Bounds { context: PlannerContext { position: *position, ..context }, chord_error_mm };
+        self.blank = Segment::rest(position, 0.0);
+    }
+
+    /// Emits the next piece, at most `left_s` long; none where there is nothing.
+    pub fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+        if let Some(rest) = self.dwell.take() {
+            return Ok(Some(self.emit_dwell(rest, left_s, sink)));
+        }
+        let Some((driven_s, committed_s)) = self.driving else { return self.begin(sink) };
+        if driven_s < committed_s {
+            return Ok(Some(self.emit_motion((driven_s, committed_s), left_s, sink)));
+        }
+        if committed_s >= self.window.duration_s() {
+            self.rest(sink);
+        } else {
+            self.go_on(driven_s);
+        }
+        Ok(Some(0.0))
+    }
+
+    fn begin(&mut self, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+        match self.route.items.front() {
+            None => return Ok(None),
+            Some(Item::Dwell(block)) => {
+                let mut rest = Segment::rest(&block.end, block.dwell_s);
+                (rest.block, rest.line) = (block.index, block.line);
+                rest.path[0] = self.at_mm;
+                rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
+                self.position = block.end;
+                sink.block(&dwell_report(block));
+                self.dwell = Some(rest);
+                self.route.items.pop_front();
+            }
+            Some(Item::Leg(_)) => {
+                let state = State { s_mm: self.at_mm, ..State::default() };
+                let first_tick_s = self.bounds.context.fine_period_s;
+                let start = Start { state, history: [self.position; 3], first_tick_s };
+                let (end_mm, closed) = self.route.run_end(self.finished);
+                if !self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.window) {
+                    return Err(self.no_way());
+                }
+                self.driving = Some((0.0, commit_s(&self.window, closed)));
+            }
+        }
+        Ok(Some(0.0))
+    }
+
+    fn no_way(&self) -> PluginError {
+        let line = self.route.front().map_or(0, |leg| leg.block.line);
+        PluginError::new(format!(
+            "line {line}: no motion from rest at path coordinate {:.6} mm keeps velocity, acceleration, jerk and chord \
+             error; the path turns too sharply there",
+            self.at_mm
+        ))
+    }
+
+    /// The next window, from the state in motion; where none keeps the limits, this one to its end.
+    fn go_on(&mut self, now_s: f64) {
+        let window = &self.window;
+        let period_s = self.bounds.context.fine_period_s;
+        let ticks = ((now_s - window.first_tick_s) / period_s).floor();
+        let count = (ticks + 1.0).max(0.0) as usize;
+        let history = [0, 1, 2].map(|n| window.samples[count + n]);
+        let first_tick_s = window.first_tick_s + count as f64 * period_s - now_s;
+        let start = Start { state: window.at(now_s), history, first_tick_s };
+        let (end_mm, closed) = self.route.run_end(self.finished);
+        if self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.next) {
+            std::mem::swap(&mut self.window, &mut self.next);
+            self.driving = Some((0.0, commit_s(&self.window, closed)));
+        } else {
+            self.driving = Some((now_s, self.window.duration_s()));
+        }
+    }
+
+    fn emit_motion(&mut self, (from_s, to_s): (f64, f64), left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
+        let Some(leg) = self.route.front() else {
+            self.driving = Some((to_s, to_s));
+            return 0.0;
+        };
+        let begins = leg.begins && self.blank.flags.contains(SegmentFlags::BLOCK_ENDS);
+        if begins || from_s == 0.0 && self.is_new(leg) {
+            sink.block(&self.block_report(leg, from_s));
+            self.blank = blank(leg);
+        }
+        let mut segment = self.blank;
+        self.declare(&mut segment);
+        let Drawn { until_s, leg_over } =
+            draw(&self.route, &self.window, (from_s, to_s.min(from_s + left_s)), &mut segment);
+        if leg_over {
+            self.leg_over(&mut segment);
+        }
+        self.driving = Some((until_s, to_s));
+        if segment.duration_s > 0.0 {
+            sink.segment(&segment);
+            let flags = self.blank.flags.0 & !SegmentFlags::BLOCK_BEGINS.0;
+            self.blank.flags = SegmentFlags(flags);
+        }
+        segment.duration_s
+    }
+
+    fn is_new(&self, leg: &Leg) -> bool {
+        self.blank.block != leg.block.index || self.blank.line != leg.block.line || self.blank.duration_s == 0.0
+    }
+
+    fn leg_over(&mut self, segment: &mut Segment) {
+        if let Some(Item::Leg(leg)) = self.route.items.pop_front() {
+            self.position = if leg.ends { *leg.course.end() } else { segment.position(segment.duration_s) };
+            self.at_mm = leg.end_mm;
+            if leg.ends {
+                segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
+                self.blank.flags = self.blank.flags.with(SegmentFlags::BLOCK_ENDS);
+            }
+        }
+    }
+
+    /// What the window leaves for a stop.
+    fn declare(&self, segment: &mut Segment) {
+        let (a, j) = (self.window.stop_mm_per_s2, STOP_JERK * self.window.stop_mm_per_s3);
+        let v = self.window.most_mm_per_s.max(1e-9);
+        segment.stop_deceleration_mm_per_s2 = a;
+        (segment.max_sigma_rate_per_s, segment.max_sigma_acceleration_per_s2) = (a / v, j / v);
+    }
+
+    /// Rest where the window ends: exactly at the end of the block, where that is there.
+    fn rest(&mut self, sink: &mut dyn SegmentSink) {
+        let end_mm = self.window.coefficients.last().copied().unwrap_or(self.at_mm);
+        if end_mm > self.at_mm && self.route.front().is_some_and(|leg| end_mm > leg.start_mm) {
+            self.position = self.route.at(end_mm, &mut Cursor::default()).0.position;
+            self.at_mm = end_mm;
+        }
+        let mut rest = Segment::rest(&self.position, 0.0);
+        (rest.block, rest.line, rest.order) = (self.blank.block, self.blank.line, 3);
+        rest.path[0] = self.at_mm;
+        self.driving = None;
+        sink.segment(&rest);
+    }
+
+    fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
+        let later_s = (rest.duration_s - left_s).max(0.0);
+        rest.duration_s -= later_s;
+        if later_s > 0.0 {
+            let flags = SegmentFlags(rest.flags.0 & !SegmentFlags::BLOCK_BEGINS.0);
+            self.dwell = Some(Segment { duration_s: later_s, flags, ..rest });
+        } else {
+            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
+        }
+        sink.segment(&rest);
+        rest.duration_s
+    }
+
+    /// How the block is driven that begins at `from_s`. Where it ends beyond the window, its time is estimated from the
+    /// mean speed of the window.
+    fn block_report(&self, leg: &Leg, from_s: f64) -> BlockReport {
+        let window = &self.window;
+        let end_mm = leg.start_mm + leg.block_length_mm();
+        let whole_s = window.duration_s();
+        let state = window.at(from_s);
+        let last = window.at(whole_s);
+        let until_s = if last.s_mm > end_mm + 1e-9 { window.time_at(end_mm, (from_s, whole_s)) } else { whole_s };
+        let speeds = window.times.iter().filter(|t| **t >= from_s && **t <= until_s).map(|t| window.at(*t));
+        let peak = speeds.fold(state.speed_mm_per_s, |most, at| most.max(at.speed_mm_per_s));
+        let end = window.at(until_s);
+        let driven_mm = end.s_mm - state.s_mm;
+        let beyond_mm = (end_mm - end.s_mm).max(0.0);
+        let time_s = (until_s - from_s) * if beyond_mm > 1e-9 { (driven_mm + beyond_mm) / driven_mm } else { 1.0 };
+        let limited_by = match peak {
+            v if v > 0.995 * leg.feed_mm_per_s && leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s => {
+                LimitedBy::Policy
+            }
+            v if v > 0.995 * leg.feed_mm_per_s => LimitedBy::Feed,
+            _ => LimitedBy::Jerk,
+        };
+        report(&leg.block, limited_by, [state.speed_mm_per_s, peak, end.speed_mm_per_s], time_s)
+    }
+}
+
+impl Leg {
+    fn block_length_mm(&self) -> f64 {
+        self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
+    }
+}
+
+/// Until when a window is driven.
+fn commit_s(window: &Window, closed: bool) -> f64 {
+    let whole_s = window.duration_s();
+    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { window.commit_s() }
+}
+
+fn blank(leg: &Leg) -> Segment {
+    let mut blank = Segment::rest(&leg.block.start, 1.0);
+    (blank.block, blank.line, blank.order) = (leg.block.index, leg.block.line, 3);
+    blank.flags = SegmentFlags::BLOCK_BEGINS;
+    if leg.block.kind == BlockKind::Rapid {
+        blank.flags = blank.flags.with(SegmentFlags::RAPID);
+    } else {
+        blank.feed_mm_per_s = leg.block.command_feed_mm_per_s();
+    }
+    blank
+}

@@ -1,0 +1,198 @@
+//! The path ahead: stretches with what holds on them, and dwells.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use tandem_motion::nurbs::{AlongPath, Place};
+use tandem_sdk::{Block, BlockKind, PlannerContext};
+
+use crate::course::Course;
+use crate::limit::chord_feed_mm_per_s;
+
+/// Share of a limit that a speed may reach.
+const AIM: f64 = 0.9995;
+/// Share of an axis's acceleration that turning may take.
+const TURNING: f64 = 0.8;
+/// Share of the jerk limit that a step of the centripetal acceleration may take in a fine period.
+const STEP: f64 = 0.1;
+/// Largest turn where stretches join without rest, rad.
+const STRAIGHT: f64 = 1e-6;
+
+/// A smooth stretch of a block.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    pub block: Block,
+    pub course: Arc<Course>,
+    pub stretch: usize,
+    /// Path coordinates of its ends, mm.
+    pub start_mm: f64,
+    pub end_mm: f64,
+    /// First and last stretch of its block.
+    pub begins: bool,
+    pub ends: bool,
+    /// The next leg goes on without rest.
+    pub joined: bool,
+    /// Highest speed that is to be driven, mm/s.
+    pub feed_mm_per_s: f64,
+}
+
+/// What comes next.
+#[derive(Clone, Debug)]
+pub enum Item {
+    Leg(Leg),
+    Dwell(Block),
+}
+
+/// The limits that count here.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub context: PlannerContext,
+    pub chord_error_mm: f64,
+}
+
+/// Where a look-up was.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cursor {
+    leg: usize,
+    place: Place,
+}
+
+/// The queue of stretches and dwells.
+#[derive(Debug, Default)]
+pub struct Route {
+    pub items: VecDeque<Item>,
+    /// Path coordinate where the next leg begins, mm.
+    pub end_mm: f64,
+}
+
+impl Leg {
+    /// Position and derivatives at the path coordinate `s_mm`, which is moved into the leg.
+    pub fn at(&self, s_mm: f64, place: &mut Place) -> AlongPath {
+        let s = (s_mm - self.start_mm).clamp(0.0, self.end_mm - self.start_mm);
+        self.course.at(self.stretch, s, place)
+    }
+
+    /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
+    pub fn next_break_mm(&self, s_mm: f64) -> f64 {
+        let stretch = &self.course.stretches()[self.stretch];
+        (self.start_mm + stretch.next_knot_mm(s_mm - self.start_mm)).min(self.end_mm)
+    }
+
+    /// Highest speed at a point: feed, chord error, axis speeds and turning.
+    pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
+        let curvature = self.course.counted_length(&at.curvature);
+        let chord = chord_feed_mm_per_s(curvature, bounds.chord_error_mm, bounds.context.fine_period_s);
+        let along = bounds.context.limits.along(&at.position, &at.direction);
+        let axes = if self.block.kind == BlockKind::Rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s };
+        let mut cap = self.feed_mm_per_s.min(chord).min(axes);
+        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let bend = at.curvature[axis].abs();
+            if bend > 0.0 {
+                cap = cap.min((TURNING * limits.acceleration_mm_per_s2 / bend).sqrt());
+            }
+        }
+        AIM * cap
+    }
+
+    /// Whether `next` goes on in the same direction, with a step of the acceleration too small to matter.
+    fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
+        let (mut place, mut next_place) = (Place::default(), Place::default());
+        let (before, after) = (self.at(self.end_mm, &mut place), next.at(next.start_mm, &mut next_place));
+        let speed = self.feed_mm_per_s.min(next.feed_mm_per_s);
+        let period_s = bounds.context.fine_period_s;
+        bounds.context.limits.axes().iter().enumerate().all(|(axis, limits)| {
+            let turn = (after.direction[axis] - before.direction[axis]).abs();
+            let step = (after.curvature[axis] - before.curvature[axis]).abs();
+            turn <= STRAIGHT && speed * speed * step <= STEP * limits.jerk_mm_per_s3 * period_s
+        })
+    }
+}
+
+impl Route {
+    /// Appends the stretches of `block`, or the dwell. Allocates.
+    pub fn push(&mut self, block: &Block, course: Option<Course>, bounds: &Bounds) {
+        let Some(course) = course.map(Arc::new) else {
+            self.items.push_back(Item::Dwell(*block));
+            return;
+        };
+        let count = course.stretches().len();
+        for stretch in 0..count {
+            let length_mm = course.stretches()[stretch].length_mm;
+            let leg = Leg {
+                block: *block,
+                course: Arc::clone(&course),
+                stretch,
+                start_mm: self.end_mm,
+                end_mm: self.end_mm + length_mm,
+                begins: stretch == 0,
+                ends: stretch + 1 == count,
+                joined: false,
+                feed_mm_per_s: feed_mm_per_s(block, &course, bounds),
+            };
+            self.end_mm = leg.end_mm;
+            if let Some(Item::Leg(before)) = self.items.back_mut() {
+                let rests = leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
+                before.joined = !rests && before.runs_into(&leg, bounds);
+            }
+            self.items.push_back(Item::Leg(leg));
+        }
+    }
+
+    /// The leg at the front.
+    pub fn front(&self) -> Option<&Leg> {
+        self.leg(0)
+    }
+
+    pub fn leg(&self, index: usize) -> Option<&Leg> {
+        match self.items.get(index) {
+            Some(Item::Leg(leg)) => Some(leg),
+            _ => None,
+        }
+    }
+
+    /// The leg on which `s_mm` lies, from the front over joined legs.
+    pub fn find(&self, s_mm: f64, cursor: &mut Cursor) -> &Leg {
+        loop {
+            let Some(leg) = self.leg(cursor.leg) else {
+                // Only a cursor kept over the end of a leg: it starts again at the front.
+                *cursor = Cursor::default();
+                continue;
+            };
+            if s_mm > leg.end_mm && leg.joined && self.leg(cursor.leg + 1).is_some() {
+                *cursor = Cursor { leg: cursor.leg + 1, place: Place::default() };
+            } else if s_mm < leg.start_mm && cursor.leg > 0 {
+                *cursor = Cursor { leg: cursor.leg - 1, place: Place::default() };
+            } else {
+                return leg;
+            }
+        }
+    }
+
+    /// Position and derivatives at `s_mm`, and the leg.
+    pub fn at(&self, s_mm: f64, cursor: &mut Cursor) -> (AlongPath, &Leg) {
+        let leg = self.find(s_mm, cursor);
+        (leg.at(s_mm, &mut cursor.place), leg)
+    }
+
+    /// Where the run from the front ends, mm, and whether it is known to end there.
+    pub fn run_end(&self, finished: bool) -> (f64, bool) {
+        let (mut end_mm, mut index) = (0.0, 0);
+        while let Some(leg) = self.leg(index) {
+            end_mm = leg.end_mm;
+            index += 1;
+            if !leg.joined {
+                break;
+            }
+        }
+        (end_mm, finished || index < self.items.len())
+    }
+}
+
+/// The speed to be driven where no other limit counts, mm/s.
+fn feed_mm_per_s(block: &Block, course: &Course, bounds: &Bounds) -> f64 {
+    if block.kind == BlockKind::Rapid {
+        let direction = course.at(0, 0.0, &mut Place::default()).direction;
+        return bounds.context.limits.along(&block.start, &direction).rapid_mm_per_s;
+    }
+    block.command_feed_mm_per_s() * bounds.context.max_feed_ratio
+}

@@ -1,0 +1,37 @@
+//! The path coordinate over pseudo-time: a uniform cubic B-spline.
+
+use super::plan::State;
+
+/// Value and derivatives of interval `k` at `z` of its length `step_s`.
+pub fn evaluate(coefficients: &[f64], k: usize, z: f64, step_s: f64) -> [f64; 4] {
+    // Relative to the first one: path coordinates are large, their differences are what counts.
+    let base = coefficients[k];
+    let [c1, c2, c3] = [1, 2, 3].map(|n| coefficients[k + n] - base);
+    let (y, zz) = (1.0 - z, z * z);
+    let value =
+        ((3.0 * zz * z - 6.0 * zz + 4.0) * c1 + (-3.0 * zz * z + 3.0 * zz + 3.0 * z + 1.0) * c2 + zz * z * c3) / 6.0;
+    let first = ((3.0 * zz - 4.0 * z) * c1 + (-3.0 * zz + 2.0 * z + 1.0) * c2 + zz * c3) / 2.0 / step_s;
+    let second = ((3.0 * z - 2.0) * c1 + (y - 2.0 * z) * c2 + z * c3) / (step_s * step_s);
+    let third = (3.0 * c1 - 3.0 * c2 + c3) / (step_s * step_s * step_s);
+    [base + value, first, second, third]
+}
+
+/// The spline of `intervals` through a timing (time, path coordinate), by its Greville ordinates, from `start` to rest.
+pub fn fill(to: &mut Vec<f64>, timing: &[(f64, f64)], intervals: usize, step_s: f64, start: &State) {
+    to.clear();
+    let (end_mm, mut at) = (timing[timing.len() - 1].1, 0);
+    for index in 0..intervals + 3 {
+        let t = (index as f64 - 1.0) * step_s;
+        while at + 2 < timing.len() && timing[at + 1].0 < t {
+            at += 1;
+        }
+        let (a, b) = (timing[at], timing[at + 1]);
+        let share = ((t - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
+        to.push(a.1 + (b.1 - a.1) * share);
+    }
+    let (v, a) = (start.speed_mm_per_s * step_s, start.acceleration_mm_per_s2 * step_s * step_s);
+    let middle = start.s_mm - a / 6.0;
+    to[..3].copy_from_slice(&[middle + a / 2.0 - v, middle, middle + a / 2.0 + v]);
+    let count = to.len();
+    to[count - 3..].fill(end_mm);
+}
