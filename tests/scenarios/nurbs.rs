@@ -106,14 +106,13 @@ fn curves_are_driven_within_the_jerk_limit() {
 
 /// Three hundred curves: half of them join smoothly in a line, the others meet at corners.
 fn many_curves() -> String {
-    let mut text = String::from("F6000\n");
-    for n in 0..150 {
-        let x = f64::from(n % 50) * 2.0;
-        let y = f64::from(n / 50);
-        text += &format!("G0 X{x} Y{y}\nG5 X{} Y{y} I0.3 J0.4 P-0.3 Q0.4\n", x + 1.0);
-        text += &format!("G5 X{} Y{y} I0.3 J-0.4 P-0.3 Q-0.4\n", x + 2.0);
-    }
-    text
+    let pair = |n: u32| {
+        let (x, y) = (f64::from(n % 50) * 2.0, f64::from(n / 50));
+        let first = format!("G0 X{x} Y{y}\nG5 X{} Y{y} I0.3 J0.4 P-0.3 Q0.4", x + 1.0);
+        format!("{first}\nG5 X{} Y{y} I0.3 J-0.4 P-0.3 Q-0.4\n", x + 2.0)
+    };
+    let pairs: Vec<String> = (0..150).map(pair).collect();
+    format!("F6000\n{}", pairs.concat())
 }
 
 #[test]
