@@ -1,0 +1,99 @@
+//! The form `scan` on curves that are hard to drive: limits kept on every sample, the end met, or an error that says why.
+
+mod common;
+
+use common::{Collected, context, curve_block};
+use tandem_nurbs::{NurbsPlanner, Options};
+use tandem_sdk::{AxisVector, NurbsData, Planner, PlannerContext};
+
+fn clamped(points: &[[f64; 2]], weights: Vec<f64>, degree: usize) -> NurbsData {
+    let spans = points.len() - degree;
+    let mut knots = vec![0.0; degree];
+    knots.extend((0..=spans).map(|n| n as f64));
+    knots.extend(vec![spans as f64; degree]);
+    let control_points = points.iter().map(|p| AxisVector::from_slice(p)).collect();
+    NurbsData { degree, control_points, weights, knots }
+}
+
+fn even(points: &[[f64; 2]], degree: usize) -> NurbsData {
+    clamped(points, vec![1.0; points.len()], degree)
+}
+
+fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
+    let period_s = context.fine_period_s;
+    // A rest restarts the ticks, so each motion from rest to rest is looked at by itself.
+    let mut worst = [0.0f64; 2];
+    let mut motion = Collected::default();
+    for segment in &collected.segments {
+        motion.segments.push(*segment);
+        if segment.duration_s > 0.0 {
+            continue;
+        }
+        let mut positions: Vec<AxisVector> = motion.samples(period_s).into_iter().map(|sample| sample.0).collect();
+        positions.splice(0..0, [positions[0]; 3]);
+        positions.extend([positions[positions.len() - 1]; 3]);
+        for axis in 0..2 {
+            let mut values: Vec<f64> = positions.iter().map(|p| p[axis]).collect();
+            for (order, limit) in [f64::INFINITY, 5000.0, 4e5].into_iter().enumerate() {
+                values = values.windows(2).map(|pair| (pair[1] - pair[0]) / period_s).collect();
+                if order > 0 {
+                    worst[order - 1] = values.iter().fold(worst[order - 1], |most, v| most.max(v.abs() / limit));
+                }
+            }
+        }
+        motion.segments.clear();
+    }
+    worst
+}
+
+fn drive(name: &str, data: NurbsData) {
+    let block = curve_block(data, 1.0, 100.0);
+    let context = context(block.facts().start);
+    let end = block.facts().end;
+    let mut planner = NurbsPlanner::new(&Options::parse("").unwrap(), &context).unwrap();
+    if let Err(error) = block.with(|b| planner.accept(b)) {
+        println!("{name}: refused: {error}");
+        return;
+    }
+    planner.finish();
+    let mut collected = Collected::default();
+    for _ in 0..200_000 {
+        match planner.advance(0.008, &mut collected) {
+            Ok(advanced) if advanced.done != 0 => break,
+            Ok(_) => {}
+            Err(error) => {
+                println!("{name}: {error}");
+                assert!(error.to_string().contains("line 1"), "{name}: {error}");
+                return;
+            }
+        }
+    }
+    let [acceleration, jerk] = shares(&collected, &context);
+    println!("{name}: {:.3} s, acceleration {acceleration:.3}, jerk {jerk:.3}", collected.duration_s());
+    assert!(acceleration <= 1.0 && jerk <= 1.0, "{name}: {acceleration} {jerk}");
+    let last = collected.segments.last().unwrap();
+    assert_eq!(last.position(0.0), end, "{name}");
+}
+
+#[test]
+fn hard_curves_keep_their_limits() {
+    let zigzag: Vec<[f64; 2]> = (0..12).map(|n| [f64::from(n), f64::from(n % 2) * 3.0]).collect();
+    drive("degree 1", even(&zigzag, 1));
+    drive("degree 2", even(&zigzag, 2));
+    drive("degree 3", even(&zigzag, 3));
+    drive("degree 5", even(&zigzag, 5));
+    let doubled: Vec<[f64; 2]> = zigzag.iter().flat_map(|p| [*p, *p]).collect();
+    drive("coincident points", even(&doubled, 3));
+    let weights = (0..12).map(|n| if n % 3 == 0 { 1e4 } else { 1.0 }).collect();
+    drive("weights 1e4", clamped(&zigzag, weights, 3));
+    let small: Vec<[f64; 2]> = zigzag.iter().map(|p| [p[0] * 1e-3, p[1] * 1e-3]).collect();
+    drive("small", even(&small, 3));
+    drive("straight", even(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]], 3));
+    drive("cusp", even(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]], 3));
+    let mut pinched = even(&zigzag, 3);
+    let knot = pinched.knots[6];
+    pinched.knots[7] = knot;
+    drive("double knot", pinched);
+    let long: Vec<[f64; 2]> = (0..10_000).map(|n| [0.02 * f64::from(n), (0.05 * f64::from(n)).sin()]).collect();
+    drive("10 000 points", even(&long, 3));
+}
