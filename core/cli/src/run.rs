@@ -5,7 +5,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use tandem_host::{
-    BlocksCsv, Clock, HostError, Outcome, Output, Run, RunObserver, Stop, StopAnswer, Summary, Switches, Timed,
+    BlocksCsv, Clock, HostError, Outcome, Output, PolicySummary, Run, RunObserver, Stop, StopAnswer, Summary, Switches,
+    Timed,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
@@ -211,6 +212,10 @@ impl RunObserver for Sinks {
         if let Some(trace) = &mut self.trace {
             trace.command(command);
         }
+    }
+
+    fn policy(&mut self, summary: &PolicySummary) {
+        self.operator.policy(summary);
     }
 
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {

@@ -10,7 +10,7 @@ use tandem_sdk::{Block, BlockReport, Event};
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
 use crate::monitor::Monitor;
-use crate::policy::Reloader;
+use crate::policy::{PolicySummary, Reloader};
 use crate::strategy::FeedRunner;
 
 /// What is to happen where the program waits at rest for the operator.
@@ -52,6 +52,9 @@ pub trait RunObserver {
     /// A command of the operator, or of the command file, acts in its tick; told before the sample of that tick.
     fn command(&mut self, _command: &Timed) {}
 
+    /// What the policy script did until now: told now and then, and where there is a note on it.
+    fn policy(&mut self, _summary: &PolicySummary) {}
+
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
 }
@@ -74,7 +77,12 @@ pub struct Pump<'a> {
     pub skips_homing: bool,
     commands: CommandLog,
     pub planning_ns: u128,
+    /// Rough periods since the observer was told of the policy.
+    untold: u32,
 }
+
+/// Rough periods between two reports of what the policy did.
+const TOLD_EVERY: u32 = 32;
 
 impl<'a> Pump<'a> {
     pub fn new(
@@ -98,6 +106,7 @@ impl<'a> Pump<'a> {
             skips_homing: false,
             commands,
             planning_ns: 0,
+            untold: TOLD_EVERY,
         }
     }
 
@@ -126,8 +135,15 @@ impl<'a> Pump<'a> {
 
     /// Tells what the policy script did since the last time.
     pub fn tell_policy_notes(&mut self) {
-        for note in self.reloader.iter().flat_map(Reloader::take_notes) {
-            self.observer.note(&note);
+        let Some(reloader) = &self.reloader else { return };
+        let notes = reloader.take_notes();
+        for note in &notes {
+            self.observer.note(note);
+        }
+        self.untold = if notes.is_empty() { self.untold + 1 } else { TOLD_EVERY };
+        if self.untold >= TOLD_EVERY {
+            self.observer.policy(&reloader.summary());
+            self.untold = 0;
         }
     }
 

@@ -12,7 +12,7 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_host::operator::{Desk, Listen, Server};
-use tandem_host::{Run, StopAnswer, Summary};
+use tandem_host::{PolicySummary, Run, StopAnswer, Summary};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
@@ -88,6 +88,13 @@ impl Operator {
     pub fn sample(&self, sample: &Sample, progress: f64) {
         if self.server.is_some() {
             self.desk.sample(sample, progress);
+        }
+    }
+
+    /// What the policy script did until now.
+    pub fn policy(&self, summary: &PolicySummary) {
+        if self.server.is_some() {
+            self.desk.policy(summary);
         }
     }
 

@@ -10,6 +10,7 @@ use tandem_sdk::{Axes, AxisVector};
 
 use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
+use crate::policy::PolicySummary;
 
 use super::status::{Counters, Position, StatusLine};
 
@@ -39,6 +40,7 @@ struct Latest {
     fault: Option<String>,
     stopped: Option<String>,
     ended: bool,
+    policy: Option<PolicySummary>,
 }
 
 impl Desk {
@@ -52,6 +54,7 @@ impl Desk {
             fault: None,
             stopped: None,
             ended: false,
+            policy: None,
         };
         Self {
             controls,
@@ -136,6 +139,11 @@ impl Desk {
         (latest.position, latest.sigma, latest.progress) = (sample.command, sample.sigma, progress);
     }
 
+    /// What the policy script did until now. Host; allocates.
+    pub fn policy(&self, summary: &PolicySummary) {
+        self.latest().policy = Some(summary.clone());
+    }
+
     /// The program waits on `line`: from now on a resume answers. Host.
     pub fn begin_wait(&self, line: u32) {
         self.go_on.store(false, Release);
@@ -202,6 +210,7 @@ impl Desk {
             waits_on_line: latest.waits_on_line,
             progress: latest.progress,
             counters: Counters::of(status),
+            policy: latest.policy.clone(),
             fault: latest.fault.clone(),
             stopped: latest.stopped.clone(),
         }

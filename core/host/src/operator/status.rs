@@ -6,6 +6,8 @@ use serde::{Serialize, Serializer};
 use tandem_rings::Status;
 use tandem_sdk::{Axes, AxisVector};
 
+use crate::policy::PolicySummary;
+
 /// The machine at one moment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StatusLine {
@@ -37,6 +39,8 @@ pub struct StatusLine {
     pub progress: f64,
     /// What was counted so far.
     pub counters: Counters,
+    /// What the policy script did, where the machine has one; some rough periods old.
+    pub policy: Option<PolicySummary>,
     /// The fault that stopped the machine, in words.
     pub fault: Option<String>,
     /// What else ended the run before its program was over: the operator's abort, in words.

@@ -16,6 +16,7 @@ use tandem_sdk::Planner;
 
 pub use means::Means;
 pub use reload::Reloader;
+use reload::{Stamp, stamp};
 pub use setup::PolicySetup;
 pub use summary::PolicySummary;
 pub use tuner::Tuner;
@@ -28,6 +29,8 @@ use crate::rules::refusal;
 pub struct PolicyHost {
     engine: Engine,
     path: PathBuf,
+    /// The file as it was when it was read.
+    stamp: Option<Stamp>,
     policy: Arc<Mutex<Policy>>,
 }
 
@@ -37,6 +40,7 @@ impl PolicyHost {
         let Some(choice) = &machine.policy else { return Ok(None) };
         let refuse = |cause: String| refusal(machine, "policy.script", cause);
         let path = choice.script.clone();
+        let stamp = stamp(&path);
         let bytes = std::fs::read(&path).map_err(|e| refuse(format!("{}: {e}", path.display())))?;
         let named = |e: tandem_policy::Refusal| refuse(format!("{}: {e}", path.display()));
         let engine = Engine::new().map_err(named)?;
@@ -47,7 +51,7 @@ impl PolicyHost {
             e @ tandem_policy::Refusal::Parameters(_) => refusal(machine, "policy.parameters", e.to_string()),
             e => refuse(format!("{}: {e}", path.display())),
         })?;
-        Ok(Some(Self { engine, path, policy: Arc::new(Mutex::new(policy)) }))
+        Ok(Some(Self { engine, path, stamp, policy: Arc::new(Mutex::new(policy)) }))
     }
 
     /// What tunes blocks; `checker` is a planner of the same making that only checks.

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 
 use tandem_policy::{Instance, Script};
 
-use super::PolicyHost;
+use super::{PolicyHost, PolicySummary};
 
 /// How often the file is looked at.
 const LOOK: Duration = Duration::from_secs(1);
@@ -70,6 +70,11 @@ impl Reloader {
         self.host.take_notes()
     }
 
+    /// What the script did until now.
+    pub fn summary(&self) -> PolicySummary {
+        self.host.summary()
+    }
+
     fn take(&self, candidate: Candidate) {
         let mut policy = self.host.lock();
         let swapped = candidate.and_then(|(script, instance)| policy.swap(script, instance).map_err(|e| e.to_string()));
@@ -93,7 +98,7 @@ fn candidate(host: &PolicyHost) -> Candidate {
 
 /// The life of the thread: until the run ends.
 fn look(host: &PolicyHost, asked: &Receiver<()>, found: &Sender<Candidate>) {
-    let mut seen = stamp(&host.path);
+    let mut seen = host.stamp;
     loop {
         let asked = match asked.recv_timeout(LOOK) {
             Ok(()) => true,
@@ -111,7 +116,54 @@ fn look(host: &PolicyHost, asked: &Receiver<()>, found: &Sender<Candidate>) {
     }
 }
 
-fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
+/// What changes with a file: when it was written, and its size.
+pub type Stamp = (SystemTime, u64);
+
+/// The stamp of a file that can be read.
+pub fn stamp(path: &Path) -> Option<Stamp> {
     let data = std::fs::metadata(path).ok()?;
     Some((data.modified().ok()?, data.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_machine::Machine;
+
+    const ONE: &str = include_str!("../../../../tests/fixtures/policies/good/half-feed.wat");
+    const OTHER: &str = include_str!("../../../../tests/fixtures/policies/hostile/nan.wat");
+
+    /// Looks every rough period, for a minute at most.
+    fn until(reloader: &Reloader, done: impl Fn(&PolicySummary) -> bool) -> PolicySummary {
+        for _ in 0..7500 {
+            reloader.serve(false);
+            let summary = reloader.summary();
+            if done(&summary) {
+                return summary;
+            }
+            thread::sleep(Duration::from_millis(8));
+        }
+        panic!("the file is not looked at: {:?}", reloader.summary());
+    }
+
+    #[test]
+    fn a_file_that_changes_is_taken_and_a_bad_one_leaves_the_old_script_running() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let file = folder.path().join("policy.wat");
+        std::fs::write(&file, ONE).unwrap();
+        let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let set = ("policy.script".to_string(), file.display().to_string());
+        let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap()).unwrap().unwrap();
+        let mut reloader = host.reloader();
+        reloader.watch().unwrap();
+        std::fs::write(&file, "no module").unwrap();
+        let refused = until(&reloader, |summary| summary.refused_reloads > 0);
+        assert_eq!(refused.reloads, 0);
+        assert!(reloader.take_notes()[0].contains("the old one goes on: not a WASM module"), "the cause is told");
+        std::fs::write(&file, OTHER).unwrap();
+        assert_eq!(until(&reloader, |summary| summary.reloads > 0).reloads, 1);
+        // Asked to, it takes a file that has not changed.
+        reloader.serve(true);
+        assert_eq!(until(&reloader, |summary| summary.reloads > 1).reloads, 2);
+    }
 }
