@@ -93,7 +93,7 @@ fn length(v: AxisVector) -> f64 {
 
 #[test]
 fn corners_lose_what_the_closed_form_says() {
-    for name in ["fig5", "fig7", "fig7_const50", "fig8", "fig8_const50"] {
+    for name in ["fig5", "fig7", "fig7_const50", "fig8", "fig8_const50", "fig9_S0", "fig9_S1", "fig9_S2", "fig9_S3"] {
         let case = case(&format!("001_{name}"));
         let (collected, blocks) = (run_case(&case, &published()), program(&case));
         let starts_s = collected.starts_s();
@@ -139,6 +139,36 @@ fn single_blocks_are_driven_as_the_corrected_rule_says() {
         let [first, last] = [0, collected.segments.len() - 2].map(|i| collected.segments[i].acceleration(0.0)[0]);
         near(first, &expect["A_acc_mm_s2"], 1e-6, "acceleration");
         near(-last, &expect["A_dec_mm_s2"], 1e-6, "deceleration");
+    }
+}
+
+/// The largest corner errors that a run leaves at sharp corners (above 30°) and at the others, mm.
+fn largest_errors_mm(name: &str) -> [f64; 2] {
+    let case = case(&format!("001_fig9_{name}"));
+    let (collected, blocks) = (run_case(&case, &published()), program(&case));
+    let starts_s = collected.starts_s();
+    let mut largest = [0.0f64; 2];
+    for corner in case["expect"]["corners"].as_array().unwrap() {
+        let after = corner["after"].as_u64().unwrap() as usize;
+        let tau_s = corner["tau_ms"].as_f64().unwrap() / 1e3;
+        let error_mm = least(starts_s[after], tau_s, |t| length(collected.at(t).0 - blocks[after].start));
+        let gentle = usize::from(corner["theta_deg"].as_f64().unwrap() <= 30.0);
+        largest[gentle] = largest[gentle].max(error_mm);
+    }
+    largest
+}
+
+#[test]
+fn shorter_constants_at_sharp_corners_lose_less_there_and_nothing_elsewhere() {
+    let summary = case("001_fig9_summary");
+    let errors = ["S0", "S1", "S2", "S3"].map(|name| {
+        let [sharp_mm, gentle_mm] = largest_errors_mm(name);
+        near(sharp_mm, &summary["expect"][name]["sharp_err_mm"], 1e-6, name);
+        near(gentle_mm, &summary["expect"][name]["gentle_err_mm"], 1e-6, name);
+        sharp_mm
+    });
+    for sharp_mm in &errors[1..] {
+        assert!((sharp_mm / errors[0] - 0.4).abs() < 1e-6, "{sharp_mm} of {}", errors[0]);
     }
 }
 
