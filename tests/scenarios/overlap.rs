@@ -49,7 +49,8 @@ fn the_claim_of_the_paper() {
 #[test]
 fn every_example_machine_takes_the_planner() {
     for machine in std::fs::read_dir(root().join("examples/machines")).unwrap().map(|entry| entry.unwrap().path()) {
-        let set = ["--set", "planner.options={}", "--set", "machine.require_homing=false"];
+        let set = ["planner.options={}", "machine.require_homing=false", "motion.jerk=report"];
+        let set = set.map(|set| ["--set", set]).concat();
         let done = Scenario::text("F600\nG1 X1\nM2\n").on(&machine).with(OVERLAP).with(&set).run();
         assert_eq!(done.status(), 0, "{}: {}", machine.display(), done.errors());
     }
@@ -155,7 +156,7 @@ fn time_constants_that_cannot_be_are_refused_with_their_place() {
         assert_eq!(done.status(), 1);
         assert!(done.errors().contains(&format!(":2:{column}:")) && done.errors().contains(words), "{}", done.errors());
     }
-    let range = ["--set", "motion.time_constant_range_ms=[5, 40]"];
+    let range = ["--set", "motion.time_constant_range_ms=[5, 40]", "--set", "motion.time_constant_ms=20"];
     let done = Scenario::text("F600\nG1 X1 TA50\nM2\n").with(OVERLAP).with(&range).run();
     assert!(done.status() == 1 && done.errors().contains("5 to 40 ms"), "{}", done.errors());
 }
