@@ -3,6 +3,7 @@
 //! | `form` | what it keeps |
 //! |---|---|
 //! | `scan` (default) | velocity, acceleration and jerk of every axis, feed and chord error; near time-optimal |
+//! | `windowed` | the same, and acceleration and jerk along the path; corners, look-ahead and cubic windows, as published |
 //! | `adaptive` | feed and chord error only, as published: acceleration and jerk break the limits |
 //!
 //! `adaptive` is the baseline that the literature compares with, after Yeh and Hsu, "Adaptive-feedrate interpolation for
@@ -18,8 +19,8 @@
 //! chord_error_um = 1
 //! ```
 //!
-//! What a form decides is a feed profile over the arc length ([`Piece`] by [`Piece`] in time); following the path at that
-//! feed is common to all of them. Lines and arcs go the same way as curves.
+//! What a form decides is the path coordinate over time; following the path at that speed is common to all of them.
+//! `scan` and `windowed` plan window by window (module `stream`). Lines and arcs go the same way as curves.
 
 mod adaptive;
 mod baseline;
@@ -29,6 +30,8 @@ mod options;
 mod piece;
 mod planner;
 mod scan;
+mod stream;
+mod windowed;
 
 pub use course::{Course, Stretch};
 pub use limit::chord_feed_mm_per_s;

@@ -9,6 +9,8 @@ use tandem_sdk::{PluginError, parse_options};
 pub enum Form {
     /// As published: the chord error at the place where a fine period begins. Breaks acceleration and jerk limits.
     Adaptive,
+    /// As published: corners, look-ahead with ripple propagation and cubic feed windows, within the limits of every axis.
+    Windowed,
     /// Near time-optimal within velocity, acceleration and jerk of every axis and the chord error.
     #[default]
     Scan,
@@ -54,6 +56,7 @@ mod tests {
         let plain = Options::parse("form = \"adaptive\"").unwrap();
         assert_eq!(plain, Options { form: Form::Adaptive, chord_error_um: 1.0 });
         assert_eq!(Options::parse("").unwrap().form, Form::Scan);
+        assert_eq!(Options::parse("form = \"windowed\"").unwrap().form, Form::Windowed);
         for (text, word) in [
             ("form = \"fast\"", "fast"),
             ("form = \"adaptive\"\nchord_error_um = 0", "chord_error_um"),

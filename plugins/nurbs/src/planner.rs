@@ -8,12 +8,14 @@ use tandem_sdk::{
 use crate::baseline::Baseline;
 use crate::course::{Course, curve_of};
 use crate::options::{Form, Options};
-use crate::scan::ScanPlanner;
+use crate::scan::Scan;
+use crate::stream::Streamer;
+use crate::windowed::Windowed;
 
 /// Most blocks that wait to be driven.
 pub const BUFFER_BLOCKS: usize = 64;
 
-/// Rough loop. A block allocates when it is accepted; so does a form `scan` whose window is longer than any before.
+/// Rough loop. A block allocates when it is accepted; so do `scan` and `windowed` where a window is longer than any before.
 #[derive(Debug)]
 pub struct NurbsPlanner {
     context: PlannerContext,
@@ -23,14 +25,16 @@ pub struct NurbsPlanner {
 #[derive(Debug)]
 enum Driver {
     Adaptive(Box<Baseline>),
-    Scan(Box<ScanPlanner>),
+    Windowed(Box<Streamer<Windowed>>),
+    Scan(Box<Streamer<Scan>>),
 }
 
 impl NurbsPlanner {
     /// A planner at rest.
     ///
     /// # Errors
-    /// A machine with a speed or acceleration limit, for the form `scan` also a jerk limit, that is no positive number.
+    /// A machine with a speed or acceleration limit, except for the form `adaptive` also a jerk limit, that is no positive
+    /// number.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         let axes = context.limits.axes();
         let sound = |value: f64| value > 0.0 && value.is_finite();
@@ -38,13 +42,16 @@ impl NurbsPlanner {
         if !values.into_iter().all(sound) {
             return Err(PluginError::fixed("nurbs needs finite speed and acceleration limits of all axes"));
         }
-        if options.form == Form::Scan && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
-            return Err(PluginError::fixed("nurbs with form = \"scan\" needs a jerk limit (max_jerk) of all axes"));
+        if options.form != Form::Adaptive && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
+            return Err(PluginError::fixed(
+                "nurbs needs a jerk limit (max_jerk) of all axes, except with form = \"adaptive\"",
+            ));
         }
         let chord_error_mm = options.chord_error_um / 1000.0;
         let form = match options.form {
             Form::Adaptive => Driver::Adaptive(Box::new(Baseline::new(context, chord_error_mm))),
-            Form::Scan => Driver::Scan(Box::new(ScanPlanner::new(context, chord_error_mm))),
+            Form::Windowed => Driver::Windowed(Box::new(Streamer::new(context, chord_error_mm))),
+            Form::Scan => Driver::Scan(Box::new(Streamer::new(context, chord_error_mm))),
         };
         Ok(Self { context: *context, form })
     }
@@ -52,6 +59,7 @@ impl NurbsPlanner {
     fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
         match &mut self.form {
             Driver::Adaptive(form) => Ok(form.emit(left_s, sink)),
+            Driver::Windowed(form) => form.emit(left_s, sink),
             Driver::Scan(form) => form.emit(left_s, sink),
         }
     }
@@ -80,7 +88,7 @@ impl Planner for NurbsPlanner {
     fn describe(&self) -> PlannerDescription {
         match self.form {
             Driver::Adaptive(_) => PlannerDescription { breaks_limits: 1, ..PlannerDescription::order_2() },
-            Driver::Scan(_) => PlannerDescription { order: 3, ..PlannerDescription::order_2() },
+            Driver::Windowed(_) | Driver::Scan(_) => PlannerDescription { order: 3, ..PlannerDescription::order_2() },
         }
     }
 
@@ -106,6 +114,7 @@ impl Planner for NurbsPlanner {
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
         let waiting = match &self.form {
             Driver::Adaptive(form) => form.blocks(),
+            Driver::Windowed(form) => form.blocks(),
             Driver::Scan(form) => form.blocks(),
         };
         if waiting >= BUFFER_BLOCKS {
@@ -117,6 +126,7 @@ impl Planner for NurbsPlanner {
         let block = Block { nurbs: NurbsGeometry::default(), ..*block };
         match &mut self.form {
             Driver::Adaptive(form) => form.accept(&block, course),
+            Driver::Windowed(form) => form.accept(&block, course),
             Driver::Scan(form) => form.accept(&block, course),
         }
         Ok(Accepted::Accepted)
@@ -125,6 +135,7 @@ impl Planner for NurbsPlanner {
     fn finish(&mut self) {
         match &mut self.form {
             Driver::Adaptive(form) => form.finish(),
+            Driver::Windowed(form) => form.finish(),
             Driver::Scan(form) => form.finish(),
         }
     }
@@ -139,6 +150,7 @@ impl Planner for NurbsPlanner {
         }
         let done = match &self.form {
             Driver::Adaptive(form) => form.is_done(),
+            Driver::Windowed(form) => form.is_done(),
             Driver::Scan(form) => form.is_done(),
         };
         Ok(Advanced { duration_s: emitted_s, done: u32::from(done) })
@@ -147,6 +159,7 @@ impl Planner for NurbsPlanner {
     fn reset(&mut self, position: &AxisVector) {
         match &mut self.form {
             Driver::Adaptive(form) => form.reset(position),
+            Driver::Windowed(form) => form.reset(position),
             Driver::Scan(form) => form.reset(position),
         }
     }

@@ -1,4 +1,4 @@
-//! The form `scan` on curves that are hard to drive: limits kept on every sample, the end met, or an error that says why.
+//! The forms with windows on curves that are hard to drive: limits kept on every sample, the end met, or an error that says why.
 
 mod common;
 
@@ -46,11 +46,18 @@ fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
     worst
 }
 
-fn drive(name: &str, data: NurbsData) {
+fn drive(name: &str, data: &NurbsData) {
+    for form in ["scan", "windowed"] {
+        drive_in(form, name, data.clone());
+    }
+}
+
+fn drive_in(form: &str, name: &str, data: NurbsData) {
+    let name = format!("{form} {name}");
     let block = curve_block(data, 1.0, 100.0);
     let context = context(block.facts().start);
     let end = block.facts().end;
-    let mut planner = NurbsPlanner::new(&Options::parse("").unwrap(), &context).unwrap();
+    let mut planner = NurbsPlanner::new(&Options::parse(&format!("form = \"{form}\"")).unwrap(), &context).unwrap();
     if let Err(error) = block.with(|b| planner.accept(b)) {
         println!("{name}: refused: {error}");
         return;
@@ -78,22 +85,22 @@ fn drive(name: &str, data: NurbsData) {
 #[test]
 fn hard_curves_keep_their_limits() {
     let zigzag: Vec<[f64; 2]> = (0..12).map(|n| [f64::from(n), f64::from(n % 2) * 3.0]).collect();
-    drive("degree 1", even(&zigzag, 1));
-    drive("degree 2", even(&zigzag, 2));
-    drive("degree 3", even(&zigzag, 3));
-    drive("degree 5", even(&zigzag, 5));
+    drive("degree 1", &even(&zigzag, 1));
+    drive("degree 2", &even(&zigzag, 2));
+    drive("degree 3", &even(&zigzag, 3));
+    drive("degree 5", &even(&zigzag, 5));
     let doubled: Vec<[f64; 2]> = zigzag.iter().flat_map(|p| [*p, *p]).collect();
-    drive("coincident points", even(&doubled, 3));
+    drive("coincident points", &even(&doubled, 3));
     let weights = (0..12).map(|n| if n % 3 == 0 { 1e4 } else { 1.0 }).collect();
-    drive("weights 1e4", clamped(&zigzag, weights, 3));
+    drive("weights 1e4", &clamped(&zigzag, weights, 3));
     let small: Vec<[f64; 2]> = zigzag.iter().map(|p| [p[0] * 1e-3, p[1] * 1e-3]).collect();
-    drive("small", even(&small, 3));
-    drive("straight", even(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]], 3));
-    drive("cusp", even(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]], 3));
+    drive("small", &even(&small, 3));
+    drive("straight", &even(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]], 3));
+    drive("cusp", &even(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]], 3));
     let mut pinched = even(&zigzag, 3);
     let knot = pinched.knots[6];
     pinched.knots[7] = knot;
-    drive("double knot", pinched);
+    drive("double knot", &pinched);
     let long: Vec<[f64; 2]> = (0..10_000).map(|n| [0.02 * f64::from(n), (0.05 * f64::from(n)).sin()]).collect();
-    drive("10 000 points", even(&long, 3));
+    drive("10 000 points", &even(&long, 3));
 }

@@ -1,63 +1,34 @@
 //! Planning one window.
 
 use tandem_motion::retime::{End, LaneLimits, MAX_LANES, PLACES, Point, Retimer};
-use tandem_sdk::AxisVector;
 
-use super::check::{self, Slow, Worst};
-use super::route::{Bounds, Cursor, Route};
+use super::motion::Rated;
+use super::points::{Slow, slow_down};
 use super::spline::{evaluate, fill};
 use super::timing::Timing;
-use super::window::Window;
+use crate::stream::check::check;
+use crate::stream::{Bounds, Cursor, Planning, Route, Slower, Start, TRIES, Window, lay_times, lower, window_s};
 
-/// Time of a window at least, s.
-const WINDOW_S: f64 = 1.0;
 /// Jerk share of the first try.
 const JERK_SHARE: f64 = 0.98;
-/// Tries in motion; and from rest, where each later one is slower.
-const TRIES: [usize; 2] = [6, 24];
 /// Tries that also lower the speed where single points exceed the jerk; then samples alone count.
 const LOCAL_TRIES: usize = 5;
 /// Intervals of the grid at least.
 const MIN_INTERVALS: usize = 8;
 
-/// A state on the path.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct State {
-    pub s_mm: f64,
-    pub speed_mm_per_s: f64,
-    pub acceleration_mm_per_s2: f64,
-}
-
-/// What a try takes back.
-#[derive(Clone, Copy, Debug)]
-pub struct Slower {
-    /// Factor of the speed caps.
-    pub speed: f64,
-    /// Share of the jerk limits.
-    pub jerk: f64,
-}
-
-/// From where a window is planned.
-#[derive(Clone, Copy, Debug)]
-pub struct Start {
-    pub state: State,
-    /// The last three samples, and when the next one comes, s.
-    pub history: [AxisVector; 3],
-    pub first_tick_s: f64,
-}
-
 /// The planning of windows; keeps its memory.
 #[derive(Debug, Default)]
-pub struct Planning {
+pub struct Scan {
     timing: Timing,
     retimer: Retimer,
     points: Vec<[Point; PLACES]>,
     slow: Vec<Slow>,
 }
 
-impl Planning {
-    /// Plans from `start` towards `end_mm` into `window`; false where no try keeps the limits.
-    pub fn plan(&mut self, route: &Route, bounds: &Bounds, start: &Start, end_mm: f64, window: &mut Window) -> bool {
+impl Planning for Scan {
+    type Motion = Rated;
+
+    fn plan(&mut self, route: &Route, bounds: &Bounds, start: &Start, end_mm: f64, window: &mut Window<Rated>) -> bool {
         let rests = start.state.speed_mm_per_s == 0.0;
         let mut slower = Slower { speed: 1.0, jerk: JERK_SHARE };
         let tries = TRIES[usize::from(rests)];
@@ -66,9 +37,9 @@ impl Planning {
         let mut kept = None;
         for n in 1..=tries {
             self.solve(route, bounds, &slower, start, end_mm, window);
-            let worst = check::check(route, bounds, start, window);
+            let worst = check(route, bounds, start, window);
             let known = self.slow.len();
-            let points_over = n < LOCAL_TRIES && check::slow_down(route, bounds, window, &mut self.slow);
+            let points_over = n < LOCAL_TRIES && slow_down(route, bounds, &window.motion, &mut self.slow);
             if worst.is_kept() && !points_over {
                 return true;
             }
@@ -82,9 +53,11 @@ impl Planning {
         let Some((slower, known)) = kept else { return false };
         self.slow.truncate(known);
         self.solve(route, bounds, &slower, start, end_mm, window);
-        check::check(route, bounds, start, window).is_kept()
+        check(route, bounds, start, window).is_kept()
     }
+}
 
+impl Scan {
     fn solve(
         &mut self,
         route: &Route,
@@ -92,29 +65,32 @@ impl Planning {
         slower: &Slower,
         start: &Start,
         end_mm: f64,
-        window: &mut Window,
+        window: &mut Window<Rated>,
     ) {
         let window_s = window_s(bounds, start.state.speed_mm_per_s);
         window.whole = self.timing.make(route, bounds, slower, &start.state, (end_mm, window_s));
         let steps = &self.timing.steps;
         let total_s = steps[steps.len() - 1].0;
         let intervals = ((total_s / grid_s(bounds)).ceil() as usize).max(MIN_INTERVALS);
-        window.step_s = total_s / intervals as f64;
-        fill(&mut window.coefficients, steps, intervals, window.step_s, &start.state);
-        self.fill_points(route, bounds, slower, window, intervals);
+        let motion = &mut window.motion;
+        let step_s = total_s / intervals as f64;
+        motion.step_s = step_s;
+        fill(&mut motion.coefficients, steps, intervals, step_s, &start.state);
+        self.fill_points(route, bounds, slower, motion, intervals);
         let begin = if start.state.speed_mm_per_s == 0.0 { End::Rest } else { End::Moving };
-        self.retimer.solve(&self.points, &lanes(bounds), slower.jerk, window.step_s, (begin, End::Rest));
-        std::mem::swap(&mut window.rate, &mut self.retimer.rate);
-        window.lay_times();
+        self.retimer.solve(&self.points, &lanes(bounds), slower.jerk, step_s, (begin, End::Rest));
+        std::mem::swap(&mut motion.rate, &mut self.retimer.rate);
+        let rate = &motion.rate;
+        lay_times(&mut window.times, (0..intervals).map(|k| rate.time_s(k, 1.0, step_s)));
     }
 
     /// The motion at the places of the grid, by the chain rule.
-    fn fill_points(&mut self, route: &Route, bounds: &Bounds, slower: &Slower, window: &Window, intervals: usize) {
+    fn fill_points(&mut self, route: &Route, bounds: &Bounds, slower: &Slower, motion: &Rated, intervals: usize) {
         self.points.clear();
         let (mut cursor, lanes) = (Cursor::default(), bounds.context.axes.count());
         for k in 0..intervals {
             self.points.push([0.0, 0.5, 1.0].map(|z| {
-                let [s, s1, s2, s3] = evaluate(&window.coefficients, k, z, window.step_s);
+                let [s, s1, s2, s3] = evaluate(&motion.coefficients, k, z, motion.step_s);
                 let (at, leg) = route.at(s, &mut cursor);
                 let mut point = Point::default();
                 for lane in 0..lanes {
@@ -136,33 +112,12 @@ impl Planning {
     }
 }
 
-/// What the next try takes back: what was exceeded, in proportion, and everything where that did not help.
-fn lower(slower: Slower, worst: &Worst, all: bool) -> Slower {
-    let mut next = slower;
-    if worst.jerk > 1.0 || worst.acceleration > 1.0 {
-        next.jerk *= (0.995 / worst.jerk.max(worst.acceleration)).max(0.8);
-    }
-    if worst.speed > 1.0 || all {
-        let share = if all { 0.7 } else { (0.998 / worst.speed).max(0.8) };
-        next.speed *= share;
-    }
-    next
-}
-
 /// Grid of pseudo-time, s: a fifth of the time in which an acceleration is built up.
 fn grid_s(bounds: &Bounds) -> f64 {
     let axes = bounds.context.limits.axes().iter();
     let build_up_s = axes.map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3).fold(f64::INFINITY, f64::min);
     let period_s = bounds.context.fine_period_s;
     (build_up_s / 5.0).clamp(period_s, (3.0 * period_s).max(0.008))
-}
-
-/// Time of a window, s: three stops from `speed_mm_per_s`.
-fn window_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
-    let stop_s = |a: &tandem_sdk::AxisLimits| {
-        speed_mm_per_s / a.acceleration_mm_per_s2 + a.acceleration_mm_per_s2 / a.jerk_mm_per_s3
-    };
-    bounds.context.limits.axes().iter().map(|a| 3.0 * stop_s(a)).fold(WINDOW_S, f64::max)
 }
 
 fn lanes(bounds: &Bounds) -> LaneLimits {

@@ -1,6 +1,6 @@
 //! The path coordinate over pseudo-time: a uniform cubic B-spline.
 
-use super::plan::State;
+use crate::stream::State;
 
 /// Value and derivatives of interval `k` at `z` of its length `step_s`.
 pub fn evaluate(coefficients: &[f64], k: usize, z: f64, step_s: f64) -> [f64; 4] {

@@ -1,11 +1,9 @@
 //! The first timing: speed caps on nodes along the path, and two passes over them.
 
-use super::plan::{Slower, State};
-use super::route::{Bounds, Cursor, Leg, Route};
 use tandem_motion::nurbs::AlongPath;
 
-/// Shares of acceleration and jerk that caps at a point may take.
-const THIRD: f64 = 0.9;
+use crate::stream::{Bounds, Cursor, Leg, Route, Slower, State};
+
 /// Time between nodes at most, s.
 const NODE_S: f64 = 0.5e-3;
 /// Nodes of a window at most: what lies beyond belongs to the next.
@@ -100,13 +98,7 @@ impl Timing {
 
 fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, slower: &Slower, s_mm: f64) -> Node {
     let along = bounds.context.limits.along(&at.position, &at.direction);
-    let mut cap = leg.cap_mm_per_s(at, bounds);
-    for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-        let third = at.third[axis].abs();
-        if third > 0.0 {
-            cap = cap.min((THIRD * limits.jerk_mm_per_s3 / third).cbrt());
-        }
-    }
+    let cap = leg.smooth_cap_mm_per_s(at, bounds);
     Node {
         s_mm,
         speed_mm_per_s: slower.speed * cap,

@@ -1,6 +1,8 @@
 //! The canonical curves as blocks, and a planner run as the rough loop runs it.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod measure;
+
 use serde_json::Value;
 use tandem_nurbs::{NurbsPlanner, Options};
 use tandem_sdk::{

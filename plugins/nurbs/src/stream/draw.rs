@@ -3,9 +3,7 @@
 use tandem_motion::hermite;
 use tandem_sdk::{MAX_AXES, Segment};
 
-use super::plan::State;
-use super::route::{Cursor, Route};
-use super::window::Window;
+use super::{Cursor, Motion, Route, State, Window};
 
 /// Most that a segment may stand off its path, mm.
 const OFF_MM: f64 = 2e-8;
@@ -29,7 +27,7 @@ pub struct Drawn {
 /// Draws the segment from `from_s` on: at most to `to_s`, to the end of the interval of the grid, to the next knot and to
 /// the end of the leg at the front, where that leaves more than slivers. Position, velocity and acceleration of both ends
 /// are met. Does not allocate.
-pub fn draw(route: &Route, window: &Window, (from_s, to_s): (f64, f64), segment: &mut Segment) -> Drawn {
+pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, f64), segment: &mut Segment) -> Drawn {
     let k = window.interval(from_s);
     let border_s = window.times[k + 1];
     let asked_s = to_s.max(from_s + LEAST_S);

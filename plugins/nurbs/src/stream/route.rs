@@ -13,6 +13,8 @@ use crate::limit::chord_feed_mm_per_s;
 const AIM: f64 = 0.9995;
 /// Share of an axis's acceleration that turning may take.
 const TURNING: f64 = 0.8;
+/// Share of an axis's jerk that the third derivative of the path may take.
+const THIRD: f64 = 0.9;
 /// Share of the jerk limit that a step of the centripetal acceleration may take in a fine period.
 const STEP: f64 = 0.1;
 /// Largest turn where stretches join without rest, rad.
@@ -34,6 +36,15 @@ pub struct Leg {
     pub joined: bool,
     /// Highest speed that is to be driven, mm/s.
     pub feed_mm_per_s: f64,
+    /// The least of acceleration and of jerk of the axes that move in it.
+    pub least: Least,
+}
+
+/// The least that any of some axes may do.
+#[derive(Clone, Copy, Debug)]
+pub struct Least {
+    pub acceleration_mm_per_s2: f64,
+    pub jerk_mm_per_s3: f64,
 }
 
 /// What comes next.
@@ -94,6 +105,18 @@ impl Leg {
         AIM * cap
     }
 
+    /// The same, and the jerk of the curve at that speed.
+    pub fn smooth_cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
+        let mut cap = self.cap_mm_per_s(at, bounds);
+        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let third = at.third[axis].abs();
+            if third > 0.0 {
+                cap = cap.min((THIRD * limits.jerk_mm_per_s3 / third).cbrt());
+            }
+        }
+        cap
+    }
+
     /// Whether `next` goes on in the same direction, with a step of the acceleration too small to matter.
     fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
         let (mut place, mut next_place) = (Place::default(), Place::default());
@@ -105,6 +128,23 @@ impl Leg {
             let step = (after.curvature[axis] - before.curvature[axis]).abs();
             turn <= STRAIGHT && speed * speed * step <= STEP * limits.jerk_mm_per_s3 * period_s
         })
+    }
+}
+
+impl Least {
+    /// Of the axes that move at some of a few places of a stretch.
+    fn on(course: &Course, stretch: usize, bounds: &Bounds) -> Self {
+        let length_mm = course.stretches()[stretch].length_mm;
+        let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
+        for share in [0.0, 0.23, 0.47, 0.71, 1.0] {
+            let at = course.at(stretch, share * length_mm, &mut place);
+            for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+                if at.direction[axis] != 0.0 {
+                    least = [least[0].min(limits.acceleration_mm_per_s2), least[1].min(limits.jerk_mm_per_s3)];
+                }
+            }
+        }
+        Self { acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
     }
 }
 
@@ -128,6 +168,7 @@ impl Route {
                 ends: stretch + 1 == count,
                 joined: false,
                 feed_mm_per_s: feed_mm_per_s(block, &course, bounds),
+                least: Least::on(&course, stretch, bounds),
             };
             self.end_mm = leg.end_mm;
             if let Some(Item::Leg(before)) = self.items.back_mut() {

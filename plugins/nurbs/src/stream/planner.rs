@@ -6,9 +6,8 @@ use tandem_sdk::{
 };
 
 use super::draw::{Drawn, draw};
-use super::plan::{Planning, Start, State};
-use super::route::{Bounds, Cursor, Item, Leg, Route};
-use super::window::Window;
+use super::route::Item;
+use super::{Bounds, Cursor, Leg, Motion, Planning, Route, Start, State, Window};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
 
@@ -17,14 +16,14 @@ const STOP_JERK: f64 = 0.5;
 /// A window shorter than this that ends where the known path ends is driven to its end, s.
 const SHORT_S: f64 = 0.15;
 
-/// The form `scan`. Rough loop: blocks allocate when they are accepted, windows where one is longer than any before.
+/// A form with windows. Rough loop: blocks allocate when they are accepted, windows where one is longer than any before.
 #[derive(Debug)]
-pub struct ScanPlanner {
+pub struct Streamer<P: Planning> {
     bounds: Bounds,
     route: Route,
-    planning: Planning,
-    window: Window,
-    next: Window,
+    planning: P,
+    window: Window<P::Motion>,
+    next: Window<P::Motion>,
     /// Driven and committed time of the window; none at rest.
     driving: Option<(f64, f64)>,
     dwell: Option<Segment>,
@@ -36,13 +35,13 @@ pub struct ScanPlanner {
     finished: bool,
 }
 
-impl ScanPlanner {
+impl<P: Planning> Streamer<P> {
     /// At rest.
     pub fn new(context: &PlannerContext, chord_error_mm: f64) -> Self {
         Self {
             bounds: Bounds { context: *context, chord_error_mm },
             route: Route::default(),
-            planning: Planning::default(),
+            planning: P::default(),
             window: Window::default(),
             next: Window::default(),
             driving: None,
@@ -153,7 +152,7 @@ impl ScanPlanner {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driving = Some((0.0, commit_s(&self.window, closed)));
         } else {
-            self.driving = Some((now_s, self.window.duration_s()));
+            self.driving = Some((now_s, P::Motion::later_s(&self.window, now_s)));
         }
     }
 
@@ -208,7 +207,7 @@ impl ScanPlanner {
 
     /// Rest where the window ends: exactly at the end of the block, where that is there.
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
-        let end_mm = self.window.coefficients.last().copied().unwrap_or(self.at_mm);
+        let end_mm = self.window.motion.end_mm();
         if end_mm > self.at_mm && self.route.front().is_some_and(|leg| end_mm > leg.start_mm) {
             self.position = self.route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
@@ -266,9 +265,9 @@ impl Leg {
 }
 
 /// Until when a window is driven.
-fn commit_s(window: &Window, closed: bool) -> f64 {
+fn commit_s<M: Motion>(window: &Window<M>, closed: bool) -> f64 {
     let whole_s = window.duration_s();
-    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { window.commit_s() }
+    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { M::commit_s(window) }
 }
 
 fn blank(leg: &Leg) -> Segment {

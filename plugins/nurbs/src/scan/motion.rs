@@ -1,0 +1,53 @@
+//! A window of the form `scan`: a spline over pseudo-time, and the rate at which that passes.
+
+use tandem_motion::retime::Rate;
+
+use super::spline::evaluate;
+use crate::stream::{Motion, State, Window};
+
+/// The motion.
+#[derive(Debug, Default)]
+pub struct Rated {
+    pub coefficients: Vec<f64>,
+    pub rate: Rate,
+    pub step_s: f64,
+}
+
+impl Rated {
+    /// Path coordinate and its first three derivatives by time at `z` of interval `k`.
+    pub fn derivatives(&self, k: usize, z: f64) -> [f64; 4] {
+        let [s_mm, s1, s2, s3] = evaluate(&self.coefficients, k, z, self.step_s);
+        let [b, b1, b2] = self.rate.at(k, z, self.step_s);
+        [s_mm, s1 * b.sqrt(), s2 * b + s1 * b1 / 2.0, b.sqrt() * (s3 * b + 1.5 * s2 * b1 + 0.5 * s1 * b2)]
+    }
+}
+
+impl Motion for Rated {
+    fn at(&self, k: usize, t_s: f64) -> State {
+        let z = self.rate.place(k, t_s, self.step_s);
+        let [s_mm, first, second, _] = evaluate(&self.coefficients, k, z, self.step_s);
+        let [b, slope, _] = self.rate.at(k, z, self.step_s);
+        State { s_mm, speed_mm_per_s: first * b.sqrt(), acceleration_mm_per_s2: second * b + first * slope / 2.0 }
+    }
+
+    fn end_mm(&self) -> f64 {
+        self.coefficients.last().copied().unwrap_or(0.0)
+    }
+
+    /// Where it has the least acceleration, in the middle; the latest of those about equal.
+    fn commit_s(window: &Window<Self>) -> f64 {
+        let whole_s = window.duration_s();
+        let (mut least, mut found) = (f64::INFINITY, 0.5 * whole_s);
+        for t in window.times.iter().copied().filter(|t| (0.42..=0.7).contains(&(t / whole_s))) {
+            let size = window.at(t).acceleration_mm_per_s2.abs();
+            if size <= least.max(1.0) {
+                (least, found) = (size.min(least), t);
+            }
+        }
+        found
+    }
+
+    fn later_s(window: &Window<Self>, _now_s: f64) -> f64 {
+        window.duration_s()
+    }
+}

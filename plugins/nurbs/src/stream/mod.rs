@@ -1,0 +1,104 @@
+//! What the forms with windows share: the path of consecutive stretches that join smoothly is planned window by window.
+//!
+//! A window begins in the present state and ends at rest, so that what is planned can always be driven to its end:
+//!
+//! 1. a form plans it ([`Planning`]): the path coordinate over time ([`Motion`]);
+//! 2. [`check`]: every limit on the samples of the fine period, with those before the window in front;
+//! 3. [`draw`]: the first part of the window as segments; then the next window.
+//!
+//! Where no next window is found in motion, the one before is driven on, at last to its end, which is checked already.
+
+pub mod check;
+mod draw;
+mod planner;
+mod route;
+mod window;
+
+use std::fmt::Debug;
+
+use tandem_sdk::AxisVector;
+
+pub use planner::Streamer;
+pub use route::{Bounds, Cursor, Leg, Route};
+pub use window::{Window, lay_times};
+
+use self::check::Worst;
+
+/// Time of a window at least, s.
+const WINDOW_S: f64 = 1.0;
+/// Tries of a window in motion; and from rest, where each later one is slower.
+pub const TRIES: [usize; 2] = [6, 24];
+
+/// A state on the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State {
+    pub s_mm: f64,
+    pub speed_mm_per_s: f64,
+    pub acceleration_mm_per_s2: f64,
+}
+
+/// From where a window is planned.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    pub state: State,
+    /// The last three samples, and when the next one comes, s.
+    pub history: [AxisVector; 3],
+    pub first_tick_s: f64,
+}
+
+/// The path coordinate over the time of a window, interval by interval.
+pub trait Motion: Debug + Default {
+    /// The state `t_s` after the start of interval `k`.
+    fn at(&self, k: usize, t_s: f64) -> State;
+    /// Where it ends, mm.
+    fn end_mm(&self) -> f64;
+    /// Until when the window is to be driven before the next one is planned, s.
+    fn commit_s(window: &Window<Self>) -> f64;
+    /// The same, where at `now_s` none was found.
+    fn later_s(window: &Window<Self>, now_s: f64) -> f64;
+}
+
+/// A form: how windows are planned. Keeps its memory.
+pub trait Planning: Debug + Default {
+    /// What it plans.
+    type Motion: Motion;
+    /// Plans from `start` towards `end_mm` into `window`, checked; false where no try keeps the limits.
+    fn plan(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        start: &Start,
+        end_mm: f64,
+        window: &mut Window<Self::Motion>,
+    ) -> bool;
+}
+
+/// What a try takes back.
+#[derive(Clone, Copy, Debug)]
+pub struct Slower {
+    /// Factor of the speed caps.
+    pub speed: f64,
+    /// Share of the jerk limits.
+    pub jerk: f64,
+}
+
+/// What the next try takes back: what was exceeded, in proportion, and everything where that did not help.
+pub fn lower(slower: Slower, worst: &Worst, all: bool) -> Slower {
+    let mut next = slower;
+    if worst.jerk > 1.0 || worst.acceleration > 1.0 {
+        next.jerk *= (0.995 / worst.jerk.max(worst.acceleration)).max(0.8);
+    }
+    if worst.speed > 1.0 || all {
+        let share = if all { 0.7 } else { (0.998 / worst.speed).max(0.8) };
+        next.speed *= share;
+    }
+    next
+}
+
+/// Time of a window, s: three stops from `speed_mm_per_s`.
+pub fn window_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
+    let stop_s = |a: &tandem_sdk::AxisLimits| {
+        speed_mm_per_s / a.acceleration_mm_per_s2 + a.acceleration_mm_per_s2 / a.jerk_mm_per_s3
+    };
+    bounds.context.limits.axes().iter().map(|a| 3.0 * stop_s(a)).fold(WINDOW_S, f64::max)
+}

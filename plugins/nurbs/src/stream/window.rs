@@ -1,0 +1,65 @@
+//! A planned window: the path coordinate over time, from a state to rest.
+
+use tandem_sdk::AxisVector;
+
+use super::{Motion, State};
+
+/// Sums up the durations of intervals into the times at their ends.
+pub fn lay_times(times: &mut Vec<f64>, durations_s: impl Iterator<Item = f64>) {
+    times.clear();
+    times.push(0.0);
+    let mut t = 0.0;
+    times.extend(durations_s.map(|duration_s| {
+        t += duration_s;
+        t
+    }));
+}
+
+/// A window.
+#[derive(Debug, Default)]
+pub struct Window<M> {
+    pub motion: M,
+    /// Time at the ends of the intervals, s from the start.
+    pub times: Vec<f64>,
+    /// Where it goes to the end of the run.
+    pub whole: bool,
+    /// Positions at the ticks of the fine period: three before its start, then from `first_tick_s` on.
+    pub samples: Vec<AxisVector>,
+    pub first_tick_s: f64,
+    /// Path deceleration and path jerk that are left everywhere in it, mm/s² and mm/s³, and its highest speed.
+    pub stop_mm_per_s2: f64,
+    pub stop_mm_per_s3: f64,
+    pub most_mm_per_s: f64,
+}
+
+impl<M: Motion> Window<M> {
+    pub fn duration_s(&self) -> f64 {
+        self.times[self.times.len() - 1]
+    }
+
+    /// The interval at `t_s`: the later one at a border.
+    pub fn interval(&self, t_s: f64) -> usize {
+        let behind = self.times.partition_point(|start| *start <= t_s);
+        behind.clamp(1, self.times.len() - 1) - 1
+    }
+
+    /// Path coordinate, speed and acceleration at `t_s`.
+    pub fn at(&self, t_s: f64) -> State {
+        self.at_in(self.interval(t_s), t_s)
+    }
+
+    /// The same, in interval `k`.
+    pub fn at_in(&self, k: usize, t_s: f64) -> State {
+        self.motion.at(k, t_s - self.times[k])
+    }
+
+    /// The time at which `s_mm` is reached between two times, by halving.
+    pub fn time_at(&self, s_mm: f64, (from_s, to_s): (f64, f64)) -> f64 {
+        let (mut low, mut high) = (from_s, to_s);
+        for _ in 0..50 {
+            let middle = f64::midpoint(low, high);
+            if self.at(middle).s_mm < s_mm { low = middle } else { high = middle }
+        }
+        high
+    }
+}

@@ -1,0 +1,119 @@
+//! Corners: places where the limit of the speed is lowest.
+
+use super::ramp::Tangential;
+use super::ripple::Corner;
+
+/// Places of a survey at most: what lies beyond belongs to the next window.
+const MAX_PLACES: usize = 40_000;
+/// Steps of a golden section: 1e-6 of the places around.
+const SECTIONS: usize = 30;
+
+/// What holds at a place of the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// Highest speed, mm/s.
+    pub speed_mm_per_s: f64,
+    /// What axes leave along the path.
+    pub tangential: Tangential,
+    /// Distance to the next place to be looked at, mm.
+    pub step_mm: f64,
+}
+
+/// The places of a window; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Survey {
+    places: Vec<Corner>,
+    /// Both ends and the corners between them, in their order.
+    pub corners: Vec<Corner>,
+    /// Highest speed anywhere, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Least of what the axes leave anywhere.
+    pub tangential: Option<Tangential>,
+}
+
+impl Survey {
+    /// Looks at the path from `start` to `end_mm`, or as far as it takes about `window_s`; the last corner is a rest.
+    /// Gives whether it goes to the end.
+    pub fn make(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {
+        let whole = self.look_around(start, end_mm, window_s, look);
+        self.feed_mm_per_s = self.places.iter().map(|place| place.speed_mm_per_s).fold(0.0, f64::max);
+        self.corners.clear();
+        self.corners.push(start);
+        self.find(look);
+        if let Some(last) = self.places.last() {
+            self.corners.push(Corner { speed_mm_per_s: 0.0, ..*last });
+        }
+        whole
+    }
+
+    fn look_around(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {
+        self.places.clear();
+        self.tangential = None;
+        let (mut at_mm, mut time_s, mut speed) = (start.at_mm, 0.0, start.speed_mm_per_s);
+        loop {
+            let spot = look(at_mm);
+            self.places.push(Corner { at_mm, speed_mm_per_s: spot.speed_mm_per_s });
+            self.tangential = Some(self.tangential.map_or(spot.tangential, |least| least.min(&spot.tangential)));
+            let ahead_mm = end_mm - at_mm;
+            if ahead_mm <= 0.0 {
+                return true;
+            }
+            if time_s > window_s || self.places.len() >= MAX_PLACES {
+                return false;
+            }
+            // No sliver before the end.
+            let step_mm = if ahead_mm < 1.5 * spot.step_mm { ahead_mm } else { spot.step_mm };
+            let faster = (speed * speed + 2.0 * spot.tangential.acceleration_mm_per_s2 * step_mm).sqrt();
+            let next = faster.min(spot.speed_mm_per_s);
+            time_s += 2.0 * step_mm / (speed + next);
+            speed = next;
+            at_mm = if step_mm == ahead_mm { end_mm } else { at_mm + step_mm };
+        }
+    }
+
+    /// Inner places where the speed is lower than on both sides; of level ones the middle.
+    fn find(&mut self, look: &mut dyn FnMut(f64) -> Spot) {
+        let mut i = 1;
+        while i + 1 < self.places.len() {
+            let speed = self.places[i].speed_mm_per_s;
+            let level = self.places[i..].iter().take_while(|c| c.speed_mm_per_s == speed).count();
+            let after = self.places.get(i + level).map_or(0.0, |c| c.speed_mm_per_s);
+            if speed < self.feed_mm_per_s && self.places[i - 1].speed_mm_per_s > speed && after > speed {
+                let between = (self.places[i - 1].at_mm, self.places[i + level].at_mm);
+                self.corners.push(lowest(between, &mut |at_mm| look(at_mm).speed_mm_per_s));
+            }
+            i += level;
+        }
+    }
+}
+
+/// The lowest place between two others, by golden section.
+fn lowest((mut from, mut to): (f64, f64), speed: &mut dyn FnMut(f64) -> f64) -> Corner {
+    let share = 0.5 * (5.0f64.sqrt() - 1.0);
+    let mut inner = [to - share * (to - from), from + share * (to - from)];
+    let mut speeds = inner.map(&mut *speed);
+    for _ in 0..SECTIONS {
+        if speeds[0] <= speeds[1] {
+            to = inner[1];
+            (inner[1], speeds[1]) = (inner[0], speeds[0]);
+            inner[0] = to - share * (to - from);
+            speeds[0] = speed(inner[0]);
+        } else {
+            from = inner[0];
+            (inner[0], speeds[0]) = (inner[1], speeds[1]);
+            inner[1] = from + share * (to - from);
+            speeds[1] = speed(inner[1]);
+        }
+    }
+    let n = usize::from(speeds[1] < speeds[0]);
+    Corner { at_mm: inner[n], speed_mm_per_s: speeds[n] }
+}
+
+impl Tangential {
+    fn min(&self, other: &Self) -> Self {
+        Self {
+            acceleration_mm_per_s2: self.acceleration_mm_per_s2.min(other.acceleration_mm_per_s2),
+            jerk_mm_per_s3: self.jerk_mm_per_s3.min(other.jerk_mm_per_s3),
+        }
+    }
+}

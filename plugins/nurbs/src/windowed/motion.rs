@@ -1,0 +1,44 @@
+//! A window of the stream as ramps of the published method.
+
+use super::ramp::Ramp;
+use crate::stream::{Motion, State, Window};
+
+/// Share of a window's time that is driven before the next one is planned.
+const COMMIT: f64 = 0.7;
+
+/// Least time that is driven where none was found, s.
+const LATER_S: f64 = 0.02;
+
+/// The ramps, one after the other.
+#[derive(Debug, Default)]
+pub struct Ramps(pub Vec<Ramp>);
+
+impl Motion for Ramps {
+    fn at(&self, k: usize, t_s: f64) -> State {
+        let [s_mm, speed_mm_per_s, acceleration_mm_per_s2, _] = self.0[k].at(t_s);
+        // Below zero it is the rounding of a ramp to rest.
+        State { s_mm, speed_mm_per_s: speed_mm_per_s.max(0.0), acceleration_mm_per_s2 }
+    }
+
+    fn end_mm(&self) -> f64 {
+        self.0.last().map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0])
+    }
+
+    /// In the first part: at its end where the speed is level there, else at the last border before, where there is no
+    /// acceleration either.
+    fn commit_s(window: &Window<Self>) -> f64 {
+        let whole_s = window.duration_s();
+        let until_s = COMMIT * whole_s;
+        let [_, b, c, d] = window.motion.0[window.interval(until_s)].speed;
+        if [b, c, d] == [0.0; 3] {
+            return until_s;
+        }
+        let within = |t: &f64| *t > 0.0 && *t <= until_s;
+        window.times.iter().copied().rfind(within).unwrap_or(whole_s)
+    }
+
+    /// A later border.
+    fn later_s(window: &Window<Self>, now_s: f64) -> f64 {
+        window.times.iter().copied().find(|t| *t > now_s + LATER_S).unwrap_or(window.duration_s())
+    }
+}

@@ -1,0 +1,98 @@
+//! Corners and the ramps between them, until no ramp is faster than the limit.
+
+use super::ramp::{LEAST_S, Ramp, Tangential};
+use super::ripple::{Corner, propagate, ramps};
+
+/// How often a ramp is compared with the limit, s.
+const LOOK_S: f64 = 0.2e-3;
+/// How much faster than the limit is as good as the limit.
+const OVER: f64 = 1e-4;
+/// Rounds of new corners at most: each adds one to a ramp at most.
+const ROUNDS: usize = 40;
+
+/// From one corner to the next, and what was found there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pair {
+    ends: [Corner; 2],
+    found: [Option<Corner>; 3],
+}
+
+/// Plans; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Rounds {
+    pairs: Vec<Pair>,
+    before: Vec<Pair>,
+}
+
+impl Rounds {
+    /// Lowers the speeds of `corners`, and adds corners, until the ramps between them keep below `limit` everywhere; gives
+    /// these.
+    pub fn make(
+        &mut self,
+        corners: &mut Vec<Corner>,
+        feed_mm_per_s: f64,
+        tangential: &Tangential,
+        limit: &mut dyn FnMut(f64) -> f64,
+        into: &mut Vec<Ramp>,
+    ) {
+        self.pairs.clear();
+        for _ in 0..ROUNDS {
+            propagate(corners, tangential);
+            std::mem::swap(&mut self.pairs, &mut self.before);
+            self.pairs.clear();
+            into.clear();
+            let mut known = self.before.iter().peekable();
+            for ends in corners.windows(2) {
+                let parts = ramps(&ends[0], &ends[1], feed_mm_per_s, tangential);
+                while known.next_if(|pair| pair.ends[0].at_mm < ends[0].at_mm).is_some() {}
+                // A pair looked at before, with the same speeds, has nothing new.
+                let found = match known.peek() {
+                    Some(pair) if pair.ends == *ends => pair.found,
+                    _ => parts.map(|ramp| worst(&ramp, limit)),
+                };
+                self.pairs.push(Pair { ends: [ends[0], ends[1]], found });
+                into.extend(parts.into_iter().filter(|ramp| ramp.duration_s > 0.0));
+            }
+            let found = self.pairs.iter().flat_map(|pair| pair.found.into_iter().flatten());
+            let count = corners.len();
+            corners.extend(found);
+            if corners.len() == count {
+                return;
+            }
+            corners.sort_unstable_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
+            merge(corners);
+        }
+    }
+}
+
+/// Corners that a ramp would pass in less than its least time are one, at the lower speed. Both ends stay where they are.
+fn merge(corners: &mut Vec<Corner>) {
+    let end = corners[corners.len() - 1];
+    corners.dedup_by(|next, kept| {
+        let near = next.at_mm - kept.at_mm < LEAST_S * f64::midpoint(next.speed_mm_per_s, kept.speed_mm_per_s);
+        if near {
+            kept.speed_mm_per_s = kept.speed_mm_per_s.min(next.speed_mm_per_s);
+        }
+        near
+    });
+    let count = corners.len();
+    corners[count - 1] = if count > 1 { end } else { corners[0] };
+}
+
+/// The place of a ramp that is furthest above the limit, as a corner at the limit.
+fn worst(ramp: &Ramp, limit: &mut dyn FnMut(f64) -> f64) -> Option<Corner> {
+    if ramp.duration_s == 0.0 {
+        return None;
+    }
+    let looks = (ramp.duration_s / LOOK_S).ceil().max(1.0);
+    let (mut most, mut found) = (1.0 + OVER, None);
+    for n in 0..=looks as usize {
+        let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
+        let allowed = limit(at_mm);
+        if speed > most * allowed {
+            most = speed / allowed;
+            found = Some(Corner { at_mm, speed_mm_per_s: allowed });
+        }
+    }
+    found
+}

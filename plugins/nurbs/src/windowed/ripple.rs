@@ -1,0 +1,51 @@
+//! Look-ahead over corners: what a corner asks of those before it, and the ramps between them.
+
+use super::ramp::{LEAST_S, Ramp, Tangential, highest};
+
+/// A place with a speed that is not to be exceeded there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// Path coordinate, mm.
+    pub at_mm: f64,
+    /// Speed, mm/s.
+    pub speed_mm_per_s: f64,
+}
+
+/// Lowers the speeds so that each can be reached from its neighbours: backward, so that a corner lowers the ones before it
+/// (the ripple effect), then forward.
+pub fn propagate(corners: &mut [Corner], limits: &Tangential) {
+    for i in (1..corners.len()).rev() {
+        let (way, speed) = (corners[i].at_mm - corners[i - 1].at_mm, corners[i - 1].speed_mm_per_s);
+        corners[i - 1].speed_mm_per_s = limits.reach_mm_per_s(corners[i].speed_mm_per_s, way, speed);
+    }
+    for i in 1..corners.len() {
+        let (way, speed) = (corners[i].at_mm - corners[i - 1].at_mm, corners[i].speed_mm_per_s);
+        corners[i].speed_mm_per_s = limits.reach_mm_per_s(corners[i - 1].speed_mm_per_s, way, speed);
+    }
+}
+
+/// The motion from one corner to the next: up to a peak, at most `feed_mm_per_s`, level, and down. A level stretch too
+/// short to be one makes a ramp longer.
+pub fn ramps(from: &Corner, to: &Corner, feed_mm_per_s: f64, limits: &Tangential) -> [Ramp; 3] {
+    let length = to.at_mm - from.at_mm;
+    let [start, end] = [from.speed_mm_per_s, to.speed_mm_per_s];
+    let way_mm = |peak: f64| limits.way_mm(start, peak) + limits.way_mm(peak, end);
+    let least = start.max(end);
+    let peak = highest((least, feed_mm_per_s.max(least)), |peak| way_mm(peak) <= length);
+    let [mut up_s, mut down_s] = [limits.duration_s(peak - start), limits.duration_s(peak - end)];
+    let mut level_s = if peak > 0.0 { (length - way_mm(peak)).max(0.0) / peak } else { 0.0 };
+    if level_s < LEAST_S && up_s > down_s {
+        up_s += level_s * peak / f64::midpoint(start, peak);
+        level_s = 0.0;
+    } else if level_s < LEAST_S && down_s > 0.0 {
+        down_s += level_s * peak / f64::midpoint(peak, end);
+        level_s = 0.0;
+    }
+    let level_mm = from.at_mm + f64::midpoint(start, peak) * up_s;
+    let down_mm = to.at_mm - f64::midpoint(peak, end) * down_s;
+    [
+        Ramp::new(from.at_mm, [start, peak], up_s),
+        Ramp::new(level_mm, [peak, peak], level_s),
+        Ramp::new(down_mm, [peak, end], down_s),
+    ]
+}

@@ -1,0 +1,47 @@
+//! The forms with windows on the canonical curves: limits on every sample, and the time against the best known.
+
+mod common;
+
+use common::measure::{BEST_S, Figures, figures};
+use common::{canonical, context, curve_block, run};
+use tandem_sdk::SegmentFlags;
+
+fn drive(form: &str, name: &str) -> Figures {
+    let (data, length_mm) = canonical(name);
+    let block = curve_block(data.clone(), length_mm, 250.0);
+    let (context, end) = (context(block.facts().start), block.facts().end);
+    let collected = run(&format!("form = \"{form}\""), &context, &[block]);
+    let last = collected.segments.last().unwrap();
+    assert!(last.flags.contains(SegmentFlags::ENDS_AT_REST) && last.position(0.0) == end);
+    let figures = figures(&collected, &data, &context);
+    println!("{form} {name}: {figures:?}, {} segments", collected.segments.len());
+    figures
+}
+
+/// What holds for both: limits per axis and of the chord, feed, one rest at the end, and the realised arc.
+fn assert_limits(figures: &Figures, name: &str) {
+    let [velocity, acceleration, jerk] = figures.axis;
+    assert!(velocity <= 1000.0 && acceleration <= 5000.0 && jerk <= 4e5, "{name}: {figures:?}");
+    assert!(figures.path[0] <= 250.0 * (1.0 + 1e-6), "{name}: {figures:?}");
+    assert!(figures.chord_um <= 1.01 && figures.fluctuation < 1e-5 && figures.rests == 1, "{name}: {figures:?}");
+}
+
+#[test]
+fn scan_keeps_the_limits_of_the_axes_near_the_best_time() {
+    for ((name, _, best_s), most) in BEST_S.into_iter().zip([1.08, 1.05, 1.05]) {
+        let figures = drive("scan", name);
+        assert_limits(&figures, name);
+        assert!(figures.time_s <= most * best_s, "{name}: {}", figures.time_s / best_s);
+    }
+}
+
+#[test]
+fn windowed_keeps_the_limits_along_the_path_too() {
+    for ((name, best_s, _), most) in BEST_S.into_iter().zip([1.15, 1.08, 1.03]) {
+        let figures = drive("windowed", name);
+        assert_limits(&figures, name);
+        let [_, acceleration, jerk] = figures.path;
+        assert!(acceleration <= 5000.0 && jerk <= 4e5, "{name}: {figures:?}");
+        assert!(figures.time_s <= most * best_s, "{name}: {}", figures.time_s / best_s);
+    }
+}
