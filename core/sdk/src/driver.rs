@@ -48,6 +48,9 @@ use crate::{AxisVector, MAX_AXES, PluginError, size_of_contract};
 /// Most latches a driver reports at once.
 pub const MAX_LATCHES: usize = 4;
 
+/// Most analog inputs a driver reports.
+pub const MAX_ANALOG: usize = 4;
+
 /// What a driver is told when it is opened.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -185,6 +188,8 @@ pub struct Feedback {
     pub current_a: AxisVector,
     /// Digital inputs, bit n is input n.
     pub inputs: u64,
+    /// Analog inputs, in units that the machine's builder knows: a dynamometer, a spindle load.
+    pub analog: [f64; MAX_ANALOG],
     /// Latched positions.
     pub latches: [Latch; MAX_LATCHES],
     /// Spindle speed, rad/s.
@@ -203,6 +208,7 @@ impl Default for Feedback {
             speed: AxisVector::ZERO,
             current_a: AxisVector::ZERO,
             inputs: 0,
+            analog: [0.0; MAX_ANALOG],
             latches: [Latch::default(); MAX_LATCHES],
             spindle_rad_per_s: 0.0,
             spindle_angle_rad: 0.0,

@@ -27,7 +27,9 @@ mod strategy;
 
 pub use axis::{Axes, AxisVector, MAX_AXES};
 pub use block::{ArcGeometry, Block, BlockKind, NurbsData, NurbsGeometry, OwnedBlock, PathMode};
-pub use driver::{Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_LATCHES, Setpoint};
+pub use driver::{
+    Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_LATCHES, Setpoint,
+};
 pub use event::{Event, EventKind};
 pub use kinematics::{Identity, Kinematics};
 pub use limits::{AxisLimits, Limits, PathLimits};

@@ -9,6 +9,7 @@ use tandem_sdk::{
 
 use crate::joint::{CURRENT_A_PER_MM_PER_S2, Motion, Servo};
 use crate::options::{Model, Options, Switch};
+use crate::servo::ServoJoints;
 use crate::spindle::Spindle;
 use crate::switches::Switches;
 use crate::watchdog::Watchdog;
@@ -42,6 +43,8 @@ pub struct SimulatedDrives {
     period_s: f64,
     start_position: AxisVector,
     servo: Servo,
+    /// The joints of the model `servo`, once started.
+    motors: Option<ServoJoints>,
     joints: [Motion; MAX_AXES],
     /// The setpoint that the joints followed last; none while they follow nothing.
     followed: Option<AxisVector>,
@@ -61,6 +64,7 @@ impl SimulatedDrives {
         let period_s = 0.001; // replaced by `open`
         Self {
             servo: servo(&options, period_s),
+            motors: None,
             spindle: Spindle::new(options.spindle_time_constant_s, period_s),
             watchdog: Watchdog::new(options.watchdog_periods),
             switches: Switches::new(&options.switches, options.latches, options.seed),
@@ -142,13 +146,22 @@ impl SimulatedDrives {
         self.followed = None;
         let deceleration = self.options.quick_stop_deceleration_mm_per_s2;
         self.joints[..self.joint_count].iter_mut().for_each(|joint| joint.brake(deceleration, self.period_s));
+        if let Some(motors) = &mut self.motors {
+            motors.hold(&self.joints[..self.joint_count]);
+        }
     }
 
     fn follow(&mut self, from: &AxisVector, to: &AxisVector) {
+        if let Some(motors) = &mut self.motors {
+            motors.follow(to, &self.velocity, self.spindle.speed);
+        }
         for (index, joint) in self.joints[..self.joint_count].iter_mut().enumerate() {
             match self.options.model {
-                Model::Ideal => *joint = Motion { position: to[index], speed: self.velocity[index] },
                 Model::SecondOrder => self.servo.follow(joint, from[index], to[index]),
+                Model::Ideal | Model::Servo => {
+                    let ideal = Motion { position: to[index], speed: self.velocity[index] };
+                    *joint = self.motors.as_ref().map_or(ideal, |motors| motors.motion(index));
+                }
             }
         }
         self.followed = Some(*to);
@@ -157,22 +170,24 @@ impl SimulatedDrives {
     fn report(&mut self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
         *feedback = Feedback::default();
         for (index, joint) in self.joints[..self.joint_count].iter().enumerate() {
-            feedback.position[index] = joint.position;
-            feedback.speed[index] = joint.speed;
-            feedback.current_a[index] = self.mean_current_a(&before[index], joint);
+            let seen = self.motors.as_ref().map_or(*joint, |motors| motors.measured(index));
+            feedback.position[index] = seen.position;
+            feedback.speed[index] = seen.speed;
+            let change = CURRENT_A_PER_MM_PER_S2 * (joint.speed - before[index].speed) / self.period_s;
+            feedback.current_a[index] = match (self.options.model, &mut self.motors) {
+                (Model::SecondOrder, _) => change,
+                (_, Some(motors)) => motors.current_a(index),
+                _ => 0.0,
+            };
             feedback.state[index] = self.state(enable, joint);
             feedback.fault_code[index] = if self.watchdog.is_tripped() { WATCHDOG_FAULT } else { 0 };
+        }
+        if let Some(motors) = &self.motors {
+            feedback.analog[..2].copy_from_slice(&[motors.truth.cutting_torque_nm, motors.truth.depth_mm]);
         }
         (feedback.inputs, feedback.latches) = self.switch(before);
         feedback.spindle_rad_per_s = self.spindle.speed;
         feedback.spindle_angle_rad = self.spindle.angle;
-    }
-
-    fn mean_current_a(&self, before: &Motion, now: &Motion) -> f64 {
-        match self.options.model {
-            Model::Ideal => 0.0,
-            Model::SecondOrder => CURRENT_A_PER_MM_PER_S2 * (now.speed - before.speed) / self.period_s,
-        }
     }
 
     fn state(&self, enable: bool, joint: &Motion) -> JointState {
@@ -239,6 +254,8 @@ impl Driver for SimulatedDrives {
             ["sim: start is refused: the driver is closed", "", "sim: start is refused: the driver is already running"];
         self.refuse_unless(Life::Opened, REFUSED)?;
         self.joints = std::array::from_fn(|i| Motion { position: self.start_position[i], speed: 0.0 });
+        self.motors = (self.options.model == Model::Servo)
+            .then(|| ServoJoints::new(&self.options, &self.start_position, self.joint_count, self.period_s));
         self.spindle = Spindle::new(self.options.spindle_time_constant_s, self.period_s);
         let at = self.real(&self.joints);
         self.switches.start(&at);

@@ -1,10 +1,12 @@
 //! Simulated drives: the driver `sim`.
 //!
 //! The same contract as real hardware ([`tandem_sdk::Driver`]), so that a simulation is the same host with another driver.
-//! Two models, chosen by the option `model`:
+//! Three models, chosen by the option `model`:
 //!
 //! - `"ideal"` (default): the feedback of an exchange is the setpoint of that exchange.
 //! - `"second-order"`: every joint is a position servo of second order with a following error.
+//! - `"servo"`: every joint is a motor with its loops, inertia, friction, encoder and current, loaded by a cutting process;
+//!   [`servo`] has its parts. Analog input 0 is the true cutting torque, input 1 the depth of cut.
 //!
 //! ```toml
 //! [driver]
@@ -29,6 +31,7 @@
 mod driver;
 mod joint;
 mod options;
+pub mod servo;
 mod shape;
 mod spindle;
 mod switches;

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use tandem_sdk::{PluginError, parse_options};
 
+use crate::servo::{CuttingOptions, ServoOptions};
 use crate::shape::{Bore, Shape};
 
 /// How a joint follows its setpoint.
@@ -14,6 +15,8 @@ pub enum Model {
     Ideal,
     /// A position servo of second order: x″ = ω²·(setpoint − x) − 2ζω·x′.
     SecondOrder,
+    /// A motor with its loops, inertia, friction, encoder and current, loaded by the cutting process.
+    Servo,
 }
 
 /// A simulated switch or surface: its input is 1 while the joints stand in a part of space. It has one shape: a joint
@@ -66,7 +69,11 @@ pub struct Options {
     /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
     /// random part of it. Switches are where they are; only homing finds out.
     pub unknown_start_mm: f64,
-    /// Seed of what is random: bounce and the unknown start.
+    /// The joints of the model `servo`, from joint 0; the last entry stands for all joints after it.
+    pub servo: Vec<ServoOptions>,
+    /// What the model `servo` cuts.
+    pub cutting: Option<CuttingOptions>,
+    /// Seed of what is random: bounce, the unknown start, noise of the current, a random workpiece.
     pub seed: u64,
 }
 
@@ -82,6 +89,8 @@ impl Default for Options {
             switches: Vec::new(),
             latches: true,
             unknown_start_mm: 0.0,
+            servo: Vec::new(),
+            cutting: None,
             seed: 1,
         }
     }
@@ -106,7 +115,20 @@ impl Options {
         within("spindle_time_constant_s", self.spindle_time_constant_s, 0.0, 1e4)?;
         within("unknown_start_mm", self.unknown_start_mm, 0.0, 1e6)?;
         within("watchdog_periods", f64::from(self.watchdog_periods), 0.0, 100.0)?;
-        self.switches.iter().try_for_each(Switch::check)
+        self.switches.iter().try_for_each(Switch::check)?;
+        self.check_servo()
+    }
+
+    fn check_servo(&self) -> Result<(), PluginError> {
+        if self.model != Model::Servo {
+            let unused = [("servo", !self.servo.is_empty()), ("cutting", self.cutting.is_some())];
+            return match unused.iter().find(|(_, stated)| *stated) {
+                Some((key, _)) => Err(refusal(&format!("{key}: goes with model = \"servo\" only"))),
+                None => Ok(()),
+            };
+        }
+        self.servo.iter().enumerate().try_for_each(|(index, servo)| servo.check(index))?;
+        self.cutting.as_ref().map_or(Ok(()), CuttingOptions::check)
     }
 }
 
@@ -143,7 +165,7 @@ impl Switch {
 /// What a switch is made of.
 const SHAPES: &str = "switches: a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
 
-fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError> {
+pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError> {
     // A comparison with NaN is false, so NaN is refused as well.
     if (low..=high).contains(&value) {
         return Ok(());
@@ -151,7 +173,7 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError>
     Err(refusal(&format!("{key} = {value}: must be {low} to {high}")))
 }
 
-fn refusal(what: &str) -> PluginError {
+pub(crate) fn refusal(what: &str) -> PluginError {
     PluginError::new(format!("options: {what}"))
 }
 
