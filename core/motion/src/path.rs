@@ -25,12 +25,18 @@ impl Path {
     pub fn new(block: &Block) -> Option<Self> {
         let shape = match block.kind {
             BlockKind::Line | BlockKind::Rapid if block.length_mm > 0.0 => {
-                Shape::Line((block.end - block.start) * (1.0 / block.length_mm))
+                return Some(Self::line(&block.start, &block.end, block.length_mm));
             }
             BlockKind::Arc if block.length_mm > 0.0 => Shape::Arc(Arc::new(block)),
             _ => return None,
         };
         Some(Self { start: block.start, end: block.end, length_mm: block.length_mm, shape })
+    }
+
+    /// A straight line; `length_mm`, above zero, is its length in the path's metric.
+    pub fn line(start: &AxisVector, end: &AxisVector, length_mm: f64) -> Self {
+        let shape = Shape::Line((*end - *start) * (1.0 / length_mm));
+        Self { start: *start, end: *end, length_mm, shape }
     }
 
     /// Length, mm.

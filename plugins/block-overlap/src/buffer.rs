@@ -1,7 +1,5 @@
 //! The buffered blocks and the plan for them.
 
-use tandem_motion::Path;
-
 use crate::corner::Corner;
 use crate::entry::Entry;
 use crate::feeds::{Before, Plan};
@@ -32,11 +30,6 @@ impl Ring {
     /// The junction after the block at place `k`; not known after the last.
     pub fn corner(&self, k: usize) -> &Corner {
         &self.corners[(self.first + k) & self.mask]
-    }
-
-    /// The path of a block that moves; `None` for a dwell.
-    pub fn path(&self, number: usize) -> Option<&Path> {
-        self.numbered(number).path.as_ref()
     }
 
     /// The block with the running number `number`; it stays until two more have been taken.
@@ -174,7 +167,7 @@ impl Buffer {
         let feed = self.feeds[slots[0]];
         let fixed = self.before.feed_mm_per_s.is_some();
         let mut taken = Taken { number, feed_mm_per_s: feed, mode, corner, ..Taken::default() };
-        if block.path.is_some() {
+        if !block.is_dwell() {
             taken.up_s = if fixed { self.up_s } else { rest_ramp_s(rules, block, feed, self.before.tau_s) };
             let feeds = [feed, if mode == Mode::Rest { feed } else { self.feeds[slots[1]] }];
             let blocks = [block, if mode == Mode::Rest { block } else { next }];

@@ -55,7 +55,7 @@ impl Way {
     /// The way over `item` to `corner`, which leads to `next`; gives it and, for each mode there, the better mode at the
     /// junction before.
     pub fn over(&self, rules: &Rules, item: &Item<'_>, corner: &Corner, next: Option<&Item<'_>>) -> (Self, [Mode; 2]) {
-        if item.block.path.is_none() {
+        if item.block.is_dwell() {
             return (Self::START, [Mode::Late; 2]);
         }
         let Some(next) = next.filter(|_| !corner.rest) else {

@@ -1,9 +1,10 @@
 //! The motion of at most two blocks, and the segments of it.
 
-use tandem_motion::{Path, SpeedPiece, hermite, state};
-use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags, SegmentSink};
+use tandem_motion::{SpeedPiece, hermite, state};
+use tandem_sdk::{AxisVector, BlockKind, Segment, SegmentFlags, SegmentSink};
 
 use crate::buffer::{Ring, Taken};
+use crate::entry::Entry;
 use crate::mover::{Mover, SAME_TICKS};
 use crate::rules::{greater, lesser};
 
@@ -24,12 +25,15 @@ pub struct Drive {
     /// Whether the segment holds powers above two.
     curved: bool,
     begins: bool,
+    /// Number of axes; what is past them stays zero.
+    axes: usize,
 }
 
 impl Drive {
-    /// Nothing moves.
-    pub fn new() -> Self {
+    /// Nothing moves on a machine of `axes` axes.
+    pub fn new(axes: usize) -> Self {
         Self {
+            axes,
             older: None,
             newer: None,
             next_at: None,
@@ -64,7 +68,7 @@ impl Drive {
     /// Starts `mover`, which is driven as `taken` says.
     pub fn start(&mut self, mover: Mover, taken: &Taken) {
         self.path_mm = self.path_mm();
-        self.older = self.newer.take();
+        std::mem::swap(&mut self.older, &mut self.newer);
         self.overlap_stop = [self.overlap_stop[1], taken.join.stop_mm_per_s2];
         self.next_at = (taken.join.overlap_s > 0.0).then(|| mover.next_at(taken.join.overlap_s));
         self.begins = true;
@@ -76,14 +80,12 @@ impl Drive {
         let Some(newer) = &self.newer else { return 0.0 };
         let to_next = self.next_at.map_or(f64::INFINITY, |at| at - newer.at);
         let mut ticks = lesser(lesser(left, to_next), newer.left());
-        let Some(path) = ring.path(newer.number) else { return 0.0 };
-        let older_path = self.older.as_ref().and_then(|older| ring.path(older.number));
-        if let Some((older, older_path)) = self.older.as_ref().zip(older_path) {
-            ticks = older.fitted(older_path, lesser(ticks, older.left()));
+        if let Some(older) = &self.older {
+            ticks = older.fitted(ring.numbered(older.number), lesser(ticks, older.left()));
         }
-        ticks = newer.fitted(path, ticks);
+        ticks = newer.fitted(ring.numbered(newer.number), ticks);
         if ticks > SAME_TICKS {
-            self.emit([older_path, Some(path)], ticks, sink);
+            self.emit(ring, ticks, sink);
         }
         self.advance(ring, ticks, sink);
         ticks
@@ -109,23 +111,24 @@ impl Drive {
     fn rest(&mut self, ring: &Ring, sink: &mut dyn SegmentSink) {
         self.path_mm = self.path_mm();
         let Some(newer) = self.newer.take() else { return };
-        let Some(path) = ring.path(newer.number) else { return };
-        let mut rest = Segment::rest(path.end(), 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) = (newer.index, newer.line, feed(&newer));
-        rest.flags = rest.flags.with(flags(&newer));
+        let entry = ring.numbered(newer.number);
+        let mut rest = Segment::rest(&entry.end, 0.0);
+        (rest.block, rest.line, rest.feed_mm_per_s) = (entry.index, entry.line, feed(entry));
+        rest.flags = rest.flags.with(flags(entry));
         rest.path[0] = self.path_mm;
         sink.segment(&rest);
     }
 
-    fn emit(&mut self, [older_path, path]: [Option<&Path>; 2], ticks: f64, sink: &mut dyn SegmentSink) {
-        let Some((newer, path)) = self.newer.as_ref().zip(path) else { return };
+    fn emit(&mut self, ring: &Ring, ticks: f64, sink: &mut dyn SegmentSink) {
+        let Some(newer) = &self.newer else { return };
         let piece = newer.piece(ticks);
-        let older = self.older.as_ref().map(|older| (older, older.piece(ticks)));
+        let entry = ring.numbered(newer.number);
+        let older = self.older.as_ref().map(|older| (ring.numbered(older.number), older.piece(ticks)));
         let segment = &mut self.segment;
         segment.duration_s = piece.duration_s;
-        (segment.block, segment.line, segment.feed_mm_per_s) = (newer.index, newer.line, feed(newer));
+        (segment.block, segment.line, segment.feed_mm_per_s) = (entry.index, entry.line, feed(entry));
         segment.stop_deceleration_mm_per_s2 = newer.stop_mm_per_s2;
-        segment.flags = flags(newer);
+        segment.flags = flags(entry);
         if self.begins {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_BEGINS);
         }
@@ -134,20 +137,21 @@ impl Drive {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
         }
         let start_mm = self.path_mm + piece.start_mm;
-        segment.path = [start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0, 0.0, 0.0, 0.0];
+        segment.path[..3].copy_from_slice(&[start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0]);
         if let Some((older, second)) = &older {
             segment.feed_mm_per_s = greater(segment.feed_mm_per_s, older.command_mm_per_s);
             segment.stop_deceleration_mm_per_s2 = self.overlap_stop[0];
-            segment.path[0] -= older.length_mm() - second.start_mm;
+            segment.path[0] -= older.length_mm - second.start_mm;
             segment.path[1] += second.speed_mm_per_s;
             segment.path[2] += second.acceleration_mm_per_s2 / 2.0;
         }
-        let curved = !newer.straight || older.as_ref().is_some_and(|(o, _)| !o.straight);
-        let moving = [older_path.zip(older.as_ref().map(|(_, piece)| piece)), Some((path, &piece))];
+        let curved = entry.arc.is_some() || older.as_ref().is_some_and(|(older, _)| older.arc.is_some());
+        let moving = (older, (entry, piece));
+        let coefficients = &mut segment.coefficients[..self.axes];
         if curved {
-            quintic(&moving, piece.duration_s, &mut segment.coefficients);
+            quintic(&moving, segment.duration_s, coefficients);
         } else {
-            parabola(&moving, self.curved, &mut segment.coefficients);
+            parabola(&moving, self.curved, coefficients);
         }
         self.curved = curved;
         self.begins = false;
@@ -155,33 +159,33 @@ impl Drive {
     }
 }
 
-type Moving<'a> = [Option<(&'a Path, &'a SpeedPiece)>; 2];
+/// The block that slows down, where there is one, and the one that moves on, each with its piece of motion.
+type Moving<'a> = (Option<(&'a Entry, SpeedPiece)>, (&'a Entry, SpeedPiece));
 
-fn feed(mover: &Mover) -> f64 {
-    if mover.rapid { f64::INFINITY } else { mover.command_mm_per_s }
+fn feed(entry: &Entry) -> f64 {
+    if entry.kind == BlockKind::Rapid { f64::INFINITY } else { entry.command_mm_per_s }
 }
 
-fn flags(mover: &Mover) -> SegmentFlags {
-    if mover.rapid { SegmentFlags::RAPID } else { SegmentFlags::default() }
+fn flags(entry: &Entry) -> SegmentFlags {
+    if entry.kind == BlockKind::Rapid { SegmentFlags::RAPID } else { SegmentFlags::default() }
 }
 
 /// Straight blocks: what moves adds up. What is left of the older block is negative and ends in exactly nothing.
 #[inline]
-fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_AXES]) {
-    let [older, Some((path, piece))] = moving else { return };
-    let (start, direction) = (path.start(), path.direction(0.0));
+fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]]) {
+    let (older, (entry, piece)) = moving;
+    let direction = &entry.directions[0];
     let [mm, speed, half] = [piece.start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
-    for (axis, c) in coefficients.iter_mut().enumerate() {
-        (c[0], c[1], c[2]) = (start[axis] + direction[axis] * mm, direction[axis] * speed, direction[axis] * half);
+    for (c, (start, direction)) in coefficients.iter_mut().zip(entry.start.0.iter().zip(&direction.0)) {
+        (c[0], c[1], c[2]) = (start + direction * mm, direction * speed, direction * half);
     }
-    if let Some((path, piece)) = older {
-        let direction = path.direction(0.0);
-        let left_mm = path.length_mm() - piece.start_mm;
+    if let Some((entry, piece)) = older {
+        let left_mm = entry.length_mm - piece.start_mm;
         let [speed, half] = [piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
-        for (axis, c) in coefficients.iter_mut().enumerate() {
-            c[0] -= direction[axis] * left_mm;
-            c[1] += direction[axis] * speed;
-            c[2] += direction[axis] * half;
+        for (c, direction) in coefficients.iter_mut().zip(&entry.directions[0].0) {
+            c[0] -= direction * left_mm;
+            c[1] += direction * speed;
+            c[2] += direction * half;
         }
     }
     if clear {
@@ -192,12 +196,14 @@ fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]; MAX_
 }
 
 /// With an arc among them: through position, velocity and acceleration at both ends.
-fn quintic(moving: &Moving<'_>, duration_s: f64, coefficients: &mut [[f64; 6]; MAX_AXES]) {
+fn quintic((older, newer): &Moving<'_>, duration_s: f64, coefficients: &mut [[f64; 6]]) {
     let mut ends = [[AxisVector::ZERO; 3]; 2];
-    for (index, (path, piece)) in moving.iter().enumerate().filter_map(|(i, m)| m.map(|m| (i, m))) {
+    let older = older.iter().map(|moving| (moving, moving.0.end));
+    for ((entry, piece), origin) in older.chain([(newer, AxisVector::ZERO)]) {
+        let path = entry.path();
         for (end, t_s) in ends.iter_mut().zip([0.0, duration_s]) {
-            let [at, velocity, acceleration] = state(path, piece, t_s);
-            end[0] += if index == 0 { at - *path.end() } else { at };
+            let [at, velocity, acceleration] = state(&path, piece, t_s);
+            end[0] += at - origin;
             end[1] += velocity;
             end[2] += acceleration;
         }

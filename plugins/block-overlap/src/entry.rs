@@ -1,9 +1,18 @@
 //! What the planner knows of one block by itself.
 
-use tandem_motion::Path;
+use tandem_motion::{Builder, Path};
 use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy};
 
-use crate::rules::{ARC_SHARE, Rules, TURN_SHARE, greater, largest, lesser};
+use crate::rules::{ARC_SHARE, Rules, TURN_SHARE, greater, lesser};
+
+/// The path of an arc, and how long a segment on it may be.
+#[derive(Clone, Debug)]
+pub struct Arc {
+    /// The path.
+    pub path: Path,
+    /// Segments on it.
+    pub fit: Builder,
+}
 
 /// A block with everything that its neighbours do not change.
 #[derive(Clone, Debug)]
@@ -16,10 +25,14 @@ pub struct Entry {
     pub kind: BlockKind,
     /// The program needs rest at the start and at the end.
     pub rests: [bool; 2],
-    /// Its path; `None` for a dwell.
-    pub path: Option<Path>,
-    /// Place and duration, s, of a dwell.
-    pub dwell: (AxisVector, f64),
+    /// Where it starts, exactly as programmed.
+    pub start: AxisVector,
+    /// Where it ends, exactly as programmed.
+    pub end: AxisVector,
+    /// Its path where that is an arc: lines need no more than their ends, and this is large.
+    pub arc: Option<Arc>,
+    /// Duration of a dwell, s.
+    pub dwell_s: f64,
     /// Length, mm.
     pub length_mm: f64,
     /// The programmed feed under the policy's cap, mm/s.
@@ -54,8 +67,10 @@ impl Entry {
             line: 0,
             kind: BlockKind::Dwell,
             rests: [true; 2],
-            path: None,
-            dwell: (AxisVector::ZERO, 0.0),
+            start: AxisVector::ZERO,
+            end: AxisVector::ZERO,
+            arc: None,
+            dwell_s: 0.0,
             length_mm: 0.0,
             command_mm_per_s: 0.0,
             feed_mm_per_s: 0.0,
@@ -80,45 +95,52 @@ impl Entry {
         self.command_mm_per_s = block.command_feed_mm_per_s();
         let stated = block.path_tolerance_mm;
         self.tolerance_mm = if stated.is_nan() { rules.tolerance_mm } else { stated };
-        self.path = Path::new(block);
-        let Some(path) = &self.path else {
-            (self.dwell, self.length_mm, self.feed_mm_per_s) = ((block.end, block.dwell_s), 0.0, 0.0);
-            return;
-        };
-        self.length_mm = path.length_mm();
-        self.directions = [path.direction(0.0), path.direction(self.length_mm)];
-        (self.bend, self.curvature_per_mm) = (0.0, 0.0);
-        if path.is_straight() {
-            self.slope_s2_per_mm = largest(&self.directions[0], &rules.per_acceleration);
-        } else {
-            self.set_arc(block, rules);
+        (self.start, self.end) = (block.start, block.end);
+        (self.bend, self.curvature_per_mm, self.arc) = (0.0, 0.0, None);
+        match block.kind {
+            BlockKind::Dwell => {
+                (self.dwell_s, self.length_mm, self.feed_mm_per_s) = (block.dwell_s, 0.0, 0.0);
+                return;
+            }
+            BlockKind::Arc => self.set_arc(block, rules),
+            _ => self.set_line(block, rules),
         }
-        self.set_feed(block, rules);
         self.reach_mm = self.feed_mm_per_s * greater(taus_s[0], taus_s[1]);
         self.triangle_mm_per_s = (self.length_mm / self.slope_s2_per_mm).sqrt();
     }
 
+    fn set_line(&mut self, block: &Block, rules: &Rules) {
+        self.length_mm = block.length_mm;
+        let direction = (block.end - block.start) * (1.0 / block.length_mm);
+        self.directions = [direction; 2];
+        self.slope_s2_per_mm = rules.largest(&direction);
+        self.set_feed(block, rules, &direction);
+    }
+
     /// Slope and bend of an arc: over its whole circle, whatever part of it is driven.
     fn set_arc(&mut self, block: &Block, rules: &Rules) {
-        let Some(path) = &self.path else { return };
+        let Some(path) = Path::new(block) else { return };
+        self.length_mm = path.length_mm();
+        self.directions = [path.direction(0.0), path.direction(self.length_mm)];
         let (turn, radius_mm) = (path.rad_per_mm(), path.radius_mm());
         let plane = block.arc.plane.map(|axis| axis as usize);
         let weak = greater(rules.per_acceleration[plane[0]], rules.per_acceleration[plane[1]]);
         let mut rise = self.directions[0];
         (rise[plane[0]], rise[plane[1]]) = (0.0, 0.0);
         let in_plane = radius_mm * turn * weak / ARC_SHARE;
-        self.slope_s2_per_mm = greater(in_plane, largest(&rise, &rules.per_acceleration));
+        self.slope_s2_per_mm = greater(in_plane, rules.largest(&rise));
         self.curvature_per_mm = radius_mm * turn * turn;
         self.bend = self.curvature_per_mm * weak;
+        self.set_feed(block, rules, &path.max_direction());
+        self.arc = Some(Arc { path, fit: Builder::new(&path, 0.0) });
     }
 
-    fn set_feed(&mut self, block: &Block, rules: &Rules) {
-        let Some(path) = &self.path else { return };
+    /// `most` is the largest share of each axis in the path.
+    fn set_feed(&mut self, block: &Block, rules: &Rules, most: &AxisVector) {
         let rapid = block.kind == BlockKind::Rapid;
         let (command, policy) = (block.feed_mm_per_s * rules.feed_ratio, block.feed_cap_mm_per_s);
-        let most = if path.is_straight() { self.directions[0] } else { path.max_direction() };
         let mut feed = lesser(command, policy);
-        for (speed, share) in rules.axis_mm_per_s[usize::from(rapid)].0.iter().zip(&most.0) {
+        for (speed, share) in rules.axis_mm_per_s[usize::from(rapid)].0.iter().zip(&most.0).take(rules.axes) {
             if feed * share.abs() > *speed {
                 feed = speed / share.abs();
             }
@@ -131,6 +153,17 @@ impl Entry {
             () => LimitedBy::Velocity,
         };
         self.feed_mm_per_s = lesser(feed, turning);
+    }
+
+    /// Whether nothing moves.
+    pub fn is_dwell(&self) -> bool {
+        self.kind == BlockKind::Dwell
+    }
+
+    /// Its path; of no use for a dwell.
+    pub fn path(&self) -> Path {
+        let line = || Path::line(&self.start, &self.end, self.length_mm);
+        self.arc.as_ref().map_or_else(line, |arc| arc.path)
     }
 
     /// Whether the program needs rest between this block and `next`.

@@ -124,7 +124,7 @@ impl Plan {
         let (mut time_s, mut tau_s, mut before) = (0.0, tau_s, if self.fixed { Mode::Flow } else { Mode::Rest });
         for k in 0..ring.len() {
             let (block, feed, mode) = (ring.entry(k), self.feeds[k], self.modes[k]);
-            if block.path.is_none() {
+            if block.is_dwell() {
                 continue;
             }
             let ramp_s = feed * block.slope_s2_per_mm;
@@ -151,7 +151,7 @@ impl Plan {
         for k in 0..ring.len() {
             let (block, corner) = (ring.entry(k), ring.corner(k));
             let taus_s = [tau_s, corner.tau_s];
-            if block.path.is_some() {
+            if !block.is_dwell() {
                 tau_s = corner.tau_s;
             }
             let own = if rules.shorten { block.feed_mm_per_s } else { slowed_mm_per_s(block, taus_s) };
@@ -173,15 +173,16 @@ impl Plan {
         let count = ring.len();
         let mut way = Way::START;
         self.better.clear();
+        let mut item = self.item(ring, 0);
         for k in 0..count {
-            let next = (k + 1 < count).then(|| self.item(ring, k + 1));
-            let corner = if next.is_some() { *ring.corner(k) } else { Corner { rest: true, ..*ring.corner(k) } };
-            let (further, better) = way.over(rules, &self.item(ring, k), &corner, next.as_ref());
+            let next = if k + 1 < count { Some(self.item(ring, k + 1)) } else { None };
+            let (further, better) = way.over(rules, &item, ring.corner(k), next.as_ref());
             if further.is_closed() {
                 return false;
             }
             way = further;
             self.better.push(better);
+            item = next.unwrap_or(item);
         }
         self.trace_back(ring, way.best());
         true
@@ -308,7 +309,7 @@ impl Plan {
         for k in 0..ring.len() {
             let (block, corner) = (ring.entry(k), ring.corner(k));
             let taus_s = [tau_s, corner.tau_s];
-            if block.path.is_none() {
+            if block.is_dwell() {
                 continue;
             }
             tau_s = corner.tau_s;

@@ -3,7 +3,7 @@
 use crate::choose::ROUNDING;
 use crate::corner::Corner;
 use crate::entry::Entry;
-use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, largest, lesser};
+use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, lesser};
 
 /// How a junction is passed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -140,7 +140,7 @@ pub fn late_overlap_s(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], ramp_
 fn turn_share(rules: &Rules, blocks: [&Entry; 2]) -> f64 {
     let ends = [blocks[0].directions[1], blocks[1].directions[0]];
     let [falling, rising] = [0, 1].map(|i| ends[i] * (1.0 / blocks[i].slope_s2_per_mm));
-    largest(&(rising - falling), &rules.per_acceleration)
+    rules.largest(&(rising - falling))
 }
 
 fn bent_share(blocks: [&Entry; 2], overlap_s: f64) -> f64 {

@@ -1,7 +1,6 @@
 //! One block in motion: its trapezoid of speed, in ticks.
 
-use tandem_motion::{Builder, Path, SpeedPiece};
-use tandem_sdk::BlockKind;
+use tandem_motion::SpeedPiece;
 
 use crate::buffer::Taken;
 use crate::entry::Entry;
@@ -13,25 +12,14 @@ pub const SAME_TICKS: f64 = 1e-9;
 /// A block that moves.
 #[derive(Clone, Debug)]
 pub struct Mover {
-    /// Index of the block, its line and its command feed.
-    pub index: u64,
-    /// Program line.
-    pub line: u32,
-    /// The programmed feed under the policy's cap, mm/s.
-    pub command_mm_per_s: f64,
-    /// Rapid motion.
-    pub rapid: bool,
-    /// Running number, by which the buffer has its path.
+    /// Running number, by which the buffer has it.
     pub number: usize,
-    /// Whether the path is straight.
-    pub straight: bool,
     /// Time since its start, ticks.
     pub at: f64,
     /// The knot that comes next; 3 at the end.
     phase: usize,
     /// Path deceleration that is left while nothing else moves, mm/s².
     pub stop_mm_per_s2: f64,
-    fit: Builder,
     length_mm: f64,
     feed_mm_per_s: f64,
     /// End of speeding up, start of slowing down, and end, ticks.
@@ -43,28 +31,26 @@ pub struct Mover {
 impl Mover {
     /// The block `entry`, driven as `taken` says; `None` for a dwell.
     pub fn new(rules: &Rules, entry: &Entry, taken: &Taken) -> Option<Self> {
-        let path = entry.path.as_ref()?;
+        if entry.is_dwell() {
+            return None;
+        }
         let (feed, tick_s) = (taken.feed_mm_per_s, rules.tick_s);
         let per_tick = 1.0 / tick_s;
         let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s * per_tick, rules.grid));
         let cruise = round(entry.length_mm / feed * per_tick + (up - down) / 2.0, rules.grid);
         let slow_from = greater(up, cruise);
         let slope = entry.slope_s2_per_mm;
+        // A block without a ramp begins behind its first knot.
+        let phase = usize::from(up <= 0.0) + usize::from(slow_from <= 0.0);
+        let knots = [up, slow_from, slow_from + down];
         Some(Self {
-            index: entry.index,
-            line: entry.line,
-            command_mm_per_s: entry.command_mm_per_s,
-            rapid: entry.kind == BlockKind::Rapid,
             at: 0.0,
-            // A block without a ramp begins behind its first knot.
-            phase: usize::from(up <= 0.0) + usize::from(slow_from <= 0.0),
+            phase,
             stop_mm_per_s2: if slope > 0.0 { 1.0 / slope } else { rules.weakest_mm_per_s2 },
             number: taken.number,
-            straight: path.is_straight(),
-            fit: Builder::new(path, 0.0),
             length_mm: entry.length_mm,
             feed_mm_per_s: feed,
-            knots: [up, slow_from, slow_from + down],
+            knots,
             accelerations: [feed / (up * tick_s), -feed / (down * tick_s)],
             tick_s,
         })
@@ -100,11 +86,10 @@ impl Mover {
     }
 
     /// The longest piece from here, at most `most`, that one polynomial fits, ticks.
-    pub fn fitted(&self, path: &Path, most: f64) -> f64 {
-        if self.straight {
-            return most;
-        }
-        lesser(most, self.fit.longest_s(path, &self.piece(most)) / self.tick_s)
+    #[inline]
+    pub fn fitted(&self, entry: &Entry, most: f64) -> f64 {
+        let Some(arc) = &entry.arc else { return most };
+        lesser(most, arc.fit.longest_s(&arc.path, &self.piece(most)) / self.tick_s)
     }
 
     /// Moves on; a knot is met exactly.

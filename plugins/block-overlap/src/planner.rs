@@ -58,7 +58,7 @@ impl BlockOverlap {
             context: *context,
             options: options.clone(),
             buffer: Buffer::new(options.buffer_blocks, tau_s),
-            drive: Drive::new(),
+            drive: Drive::new(rules.axes),
             rules,
             dwell: None,
             start_mm_per_s: 0.0,
@@ -205,9 +205,10 @@ impl Planner for BlockOverlap {
     }
 }
 
-/// Whether all entries are finite, without a branch for each.
+/// Whether all entries are finite, without a branch for each: nothing times a finite number is nothing.
 fn is_finite(vector: &AxisVector) -> bool {
-    vector.0.iter().fold(true, |all, v| all & v.is_finite())
+    let [a, b, c, d, e, f, g, h] = vector.0.map(|v| v * 0.0);
+    ((a + e) + (b + f)) + ((c + g) + (d + h)) == 0.0
 }
 
 /// Speed of a block at the edge of an overlap inside its ramp, mm/s.
@@ -221,7 +222,7 @@ fn constant_s(taken: &Taken) -> f64 {
 }
 
 fn dwell(entry: &Entry, path_mm: f64) -> Segment {
-    let mut rest = Segment::rest(&entry.dwell.0, entry.dwell.1);
+    let mut rest = Segment::rest(&entry.end, entry.dwell_s);
     (rest.block, rest.line) = (entry.index, entry.line);
     rest.path[0] = path_mm;
     rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
@@ -236,7 +237,7 @@ fn dwell_report(entry: &Entry) -> BlockReport {
         start_feed_mm_per_s: 0.0,
         peak_feed_mm_per_s: 0.0,
         end_feed_mm_per_s: 0.0,
-        time_s: entry.dwell.1,
+        time_s: entry.dwell_s,
         time_constant_s: f64::NAN,
     }
 }

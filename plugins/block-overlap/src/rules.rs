@@ -83,13 +83,20 @@ impl Rules {
     #[inline]
     pub fn turn(&self, from: &AxisVector, to: &AxisVector) -> (f64, f64) {
         let (mut most, mut squares) = (0.0, 0.0);
-        for axis in 0..self.axes {
+        for axis in 0..self.axes.min(MAX_AXES) {
             let step = to[axis] - from[axis];
             most = greater(most, (step * self.per_acceleration[axis]).abs());
             let off = step * self.metric[axis];
             squares += off * off;
         }
         (most, squares)
+    }
+
+    /// The largest |v|/acceleration of an axis.
+    #[inline]
+    pub fn largest(&self, vector: &AxisVector) -> f64 {
+        let shares = vector.0.iter().zip(&self.per_acceleration.0).take(self.axes);
+        shares.fold(0.0, |most, (v, w)| greater(most, (v * w).abs()))
     }
 
     /// The nearest whole number of ticks, at least one, s.
@@ -108,14 +115,4 @@ pub fn lesser(a: f64, b: f64) -> f64 {
 #[inline]
 pub fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
-}
-
-/// The largest |v·w| over the axes.
-#[inline]
-pub fn largest(vector: &AxisVector, weight: &AxisVector) -> f64 {
-    let mut most = 0.0;
-    for (v, w) in vector.0.iter().zip(&weight.0) {
-        most = greater(most, (v * w).abs());
-    }
-    most
 }
