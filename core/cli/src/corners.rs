@@ -58,7 +58,7 @@ impl Corners {
             values: self.places.iter().map(|place| self.list.get(*place as usize).map_or(f64::NAN, of)).collect(),
         };
         vec![
-            curve("time constant", "ms", |corner| corner.time_constant_ms),
+            curve("time constant where the block ends", "ms", |corner| corner.time_constant_ms),
             curve("error of the corner where the block starts", "µm", |corner| corner.error_um),
         ]
     }

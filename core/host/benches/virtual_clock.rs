@@ -11,18 +11,24 @@ use tandem_machine::Machine;
 
 fn main() {
     divan::main();
-    for name in ["serpentine", "raster", "spiral"] {
-        let example = Example::new(name);
-        let runs = (0..50).map(|_| timed(&example));
-        let (elapsed, summary) = runs.min_by_key(|(elapsed, _)| *elapsed).unwrap();
-        let (motion_s, took_s) = (summary.motion_time_s, elapsed.as_secs_f64());
-        println!(
-            "{name}: {} blocks, {motion_s:.1} s of motion in {:.1} ms, {:.0} × real time",
-            summary.blocks,
-            took_s * 1e3,
-            motion_s / took_s
-        );
+    for planner in ["look-ahead", "block-overlap"] {
+        for name in ["serpentine", "raster", "spiral"] {
+            fastest(planner, name);
+        }
     }
+}
+
+fn fastest(planner: &str, name: &str) {
+    let example = Example::new(planner, name);
+    let runs = (0..50).map(|_| timed(&example));
+    let (elapsed, summary) = runs.min_by_key(|(elapsed, _)| *elapsed).unwrap();
+    let (motion_s, took_s) = (summary.motion_time_s, elapsed.as_secs_f64());
+    println!(
+        "{planner}, {name}: {} blocks, {motion_s:.1} s of motion in {:.1} ms, {:.0} × real time",
+        summary.blocks,
+        took_s * 1e3,
+        motion_s / took_s
+    );
 }
 
 /// A program of the examples on the example machine.
@@ -33,13 +39,17 @@ struct Example {
 }
 
 impl Example {
-    fn new(name: &str) -> Self {
+    fn new(planner: &str, name: &str) -> Self {
         let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
+        registry.register(tandem_block_overlap::PLUGIN).unwrap();
         registry.register(tandem_sim::PLUGIN).unwrap();
+        // Each planner takes its own default options.
+        let overrides = [("planner.plugin", planner), ("planner.options", "{}")];
+        let overrides = overrides.map(|(key, value)| (key.to_string(), value.to_string()));
         Self {
-            machine: Machine::read(&examples.join("machines/mill-3axis.toml"), &[]).unwrap(),
+            machine: Machine::read(&examples.join("machines/mill-3axis.toml"), &overrides).unwrap(),
             registry,
             text: std::fs::read(examples.join(format!("programs/{name}.ngc"))).unwrap(),
         }
@@ -63,7 +73,16 @@ fn timed(example: &Example) -> (Duration, Summary) {
 
 #[divan::bench(args = ["serpentine", "raster", "spiral"])]
 fn run(bencher: divan::Bencher, name: &str) {
-    let example = Example::new(name);
+    drive(bencher, "look-ahead", name);
+}
+
+#[divan::bench(args = ["serpentine", "raster", "spiral"])]
+fn run_block_overlap(bencher: divan::Bencher, name: &str) {
+    drive(bencher, "block-overlap", name);
+}
+
+fn drive(bencher: divan::Bencher, planner: &str, name: &str) {
+    let example = Example::new(planner, name);
     let samples = example.run().samples;
     bencher.counter(ItemsCount::new(samples)).bench_local(|| example.run());
 }

@@ -48,9 +48,13 @@ class Curve {
     let previous = null;
     for (let px = 0, i = indexAt(state.from); px < frame.width; px++) {
       const end = indexAt(frame.time(px + 1));
-      const [low, high] = this.extremes.of(i, end);
+      const [low, high] = this.extremes.of(i, end), sampled = end > i;
       i = end;
-      if (low > high) continue;
+      if (low > high) {
+        // Samples without a value are a gap; a column without samples is none.
+        if (sampled) previous = null;
+        continue;
+      }
       const x = frame.left + px + 0.5;
       let ends = [frame.y(low * scale), frame.y(high * scale)];
       if (previous !== null && Math.abs(previous - ends[1]) < Math.abs(previous - ends[0])) ends.reverse();

@@ -24,9 +24,9 @@ pub fn limited_by(rules: &Rules, entry: &Entry, next: &Entry, taken: &Taken) -> 
             let room_mm = lesser(lesser(entry.length_mm, corner.room_mm), corner.cap_mm_per_s * corner.longest_s);
             if room_mm < corner.span_mm { LimitedBy::Junction } else { LimitedBy::Tolerance }
         }
+        () if at_most(entry.triangle_mm_per_s) => LimitedBy::Acceleration,
         () if rules.grid && at_most(slowed) && taken.mode != Mode::Late => LimitedBy::TimeConstant,
         () if rules.grid && rounded_s <= rules.tick_s => entry.reason,
-        () if at_most(entry.triangle_mm_per_s) => LimitedBy::Acceleration,
         () if taken.mode == Mode::Flow && taken.next_feed_mm_per_s < feed => LimitedBy::Acceleration,
         () => LimitedBy::Junction,
     }
