@@ -8,7 +8,7 @@ use crate::join::{Mode, late_overlap_s, rest_ramp_s};
 use crate::rules::{Rules, TURN_SHARE, greater, lesser};
 
 /// How many further plans are tried where much time may be won.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
 
 /// Share of its ramp that a block loses where it is worth another plan.
 const RAMP_SHARE: f64 = 0.1;
@@ -38,6 +38,8 @@ pub struct Plan {
     earlier: (Vec<f64>, Vec<Mode>),
     /// Feeds that the choice counts on in full overlap, mm/s.
     reach: Vec<f64>,
+    /// Blocks start out at these feeds rather than at their own.
+    capped: bool,
     /// Time that lowering feeds for their neighbours has cost, s.
     lost_s: f64,
     fixed: bool,
@@ -50,12 +52,22 @@ impl Plan {
         let modes = || Vec::with_capacity(capacity);
         let (own, better) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let earlier = (feeds(), modes());
-        Self { feeds: feeds(), modes: modes(), own, better, earlier, reach: feeds(), lost_s: 0.0, fixed: false }
+        Self {
+            feeds: feeds(),
+            modes: modes(),
+            own,
+            better,
+            earlier,
+            reach: feeds(),
+            capped: false,
+            lost_s: 0.0,
+            fixed: false,
+        }
     }
 
     /// Plans the blocks of `ring`, to rest after the last one. `false` where what is fixed before does not allow it.
     pub fn make(&mut self, rules: &Rules, ring: &Ring, before: &Before) -> bool {
-        self.fixed = before.feed_mm_per_s.is_some();
+        (self.fixed, self.capped) = (before.feed_mm_per_s.is_some(), false);
         self.own_feeds(rules, ring, before);
         self.reach.clear();
         self.reach.extend(self.own.iter().map(|own| own[0]));
@@ -78,8 +90,9 @@ impl Plan {
         self.backward(rules, ring) && self.forward(rules, ring)
     }
 
-    /// Where lowering feeds for their neighbours has cost much, chooses again with the feeds that the choice led to, and
-    /// once with full overlap wherever it can be. The fastest plan stays.
+    /// Where lowering feeds for their neighbours has cost much, chooses again with the feeds that the choice led to, once
+    /// with full overlap wherever it can be, and once with no block above the feed that its neighbours left it: a late start
+    /// that saved a higher one may not be worth it then. The fastest plan stays.
     fn improve(&mut self, rules: &Rules, ring: &Ring, tau_s: f64) {
         let mut least_s = self.time_s(rules, ring, tau_s);
         for round in 0..ROUNDS {
@@ -90,7 +103,8 @@ impl Plan {
             self.reach.extend_from_slice(&self.feeds);
             let lost_s = self.lost_s;
             self.swap();
-            let chosen = if round + 1 == ROUNDS { self.overlap_all(ring) } else { self.choose(rules, ring) };
+            self.capped = round + 1 == ROUNDS;
+            let chosen = if round + 2 == ROUNDS { self.overlap_all(ring) } else { self.choose(rules, ring) };
             let time_s =
                 if chosen && self.settle(rules, ring) { self.time_s(rules, ring, tau_s) } else { f64::INFINITY };
             if time_s < least_s {
@@ -212,6 +226,9 @@ impl Plan {
             let after = self.modes[k];
             let [own, ramped] = self.own[k];
             let mut feed = if before == Mode::Flow && after == Mode::Flow { own } else { ramped };
+            if self.capped {
+                feed = lesser(feed, self.reach[k]);
+            }
             if before == Mode::Flow {
                 feed = lesser(feed, cap);
             }
