@@ -9,6 +9,7 @@ mod path;
 mod profile;
 pub mod retime;
 mod segment;
+pub mod tube;
 mod vector;
 
 pub use geometry::{half_angle_turn_rad, one_minus_cos};

@@ -26,7 +26,8 @@ mod solve;
 mod timing;
 
 pub use solve::{Retimer, Status};
-pub use timing::Rate;
+pub use banded::Pentadiagonal;
+pub use timing::{Rate, weights};
 
 /// Axes that a retiming takes.
 pub const MAX_LANES: usize = tandem_sdk::MAX_AXES;

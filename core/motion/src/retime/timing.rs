@@ -17,6 +17,7 @@ pub struct Rate {
 }
 
 /// Weights of the three coefficients for b, b′·h and b″·h² at `z` of the interval.
+#[inline]
 pub fn weights(z: f64) -> [[f64; 3]; 3] {
     let y = 1.0 - z;
     [[y * y / 2.0, 0.5 + z - z * z, z * z / 2.0], [-y, 1.0 - 2.0 * z, z], [1.0, -2.0, 1.0]]
@@ -29,14 +30,17 @@ impl Rate {
     }
 
     /// b, b′ and b″ by τ at `z` of interval `k`, whose length is `step_s`. Does not allocate.
+    #[inline]
     pub fn at(&self, k: usize, z: f64, step_s: f64) -> [f64; 3] {
         let c = &self.coefficients[k..k + 3];
         let scale = [1.0, 1.0 / step_s, 1.0 / (step_s * step_s)];
         let w = weights(z);
-        std::array::from_fn(|n| scale[n] * (w[n][0] * c[0] + w[n][1] * c[1] + w[n][2] * c[2]))
+        let part = |n: usize| scale[n] * (w[n][0] * c[0] + w[n][1] * c[1] + w[n][2] * c[2]);
+        [part(0), part(1), part(2)]
     }
 
     /// Time that the stretch from 0 to `z` of interval `k` takes, s. Does not allocate.
+    #[inline]
     pub fn time_s(&self, k: usize, z: f64, step_s: f64) -> f64 {
         let inverse = |(at, weight): &(f64, f64)| weight / self.at(k, at * z, step_s)[0].sqrt();
         step_s * z * GAUSS.iter().map(inverse).sum::<f64>()

@@ -1,0 +1,23 @@
+//! Motions inside a tube around a path: where to go within the tolerance, and how fast.
+//!
+//! A motion is a uniform cubic B-spline x(τ) in a pseudo-time τ, one lane an axis. Two solvers take turns:
+//!
+//! * [`Smoother`]: the spline with the least jerk that passes boxes around given points at given pseudo-times;
+//! * [`Pacer`]: the rate b(τ) = (dτ/dt)² for which the time is least and every lane keeps its limits. What is said of
+//!   [`crate::retime`] holds here; this one works on all lanes at once, for the short grids of a planner on the move.
+//!
+//! Both are primal-dual interior point methods on banded systems: the work is linear in the grid, and bounded.
+//!
+//! Rough loop. The solvers allocate where a grid is larger than any before; solving again does not.
+
+mod banded;
+mod lanes;
+mod pace_share;
+mod pacer;
+mod smoother;
+mod spline;
+
+pub use lanes::{Lanes, each};
+pub use pacer::{Asked, PaceStatus, Pacer, Place};
+pub use smoother::{Site, SmoothStatus, Smoother};
+pub use spline::Spline;

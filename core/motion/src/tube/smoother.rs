@@ -1,0 +1,253 @@
+//! The spline of least jerk through boxes.
+
+use super::banded::{self, Row};
+use super::lanes::{Lanes, each, larger, largest, smaller};
+use super::spline::{Spline, weights};
+
+/// Iterations at most.
+const ITERATIONS: usize = 14;
+/// Mean complementarity at which a solution is good enough.
+const ENOUGH: f64 = 2e-3;
+/// Violation of a box, as a share of its half width, that is as good as none.
+const FEASIBLE: f64 = 0.02;
+/// How near to its bound a step may go.
+const BOUNDARY: f64 = 0.95;
+/// Weight of the squared jerk below the hinge.
+const GENTLE: f64 = 0.1;
+/// Share of the jerk limit from which on jerk counts in full.
+const HINGE: f64 = 0.7;
+/// From here on the Hessian takes the hinge as closed.
+const CLOSING: f64 = 0.9 * HINGE;
+
+/// A box that the motion passes at a given pseudo-time.
+#[derive(Clone, Copy, Debug)]
+pub struct Site<const L: usize> {
+    /// Interval.
+    pub interval: u32,
+    /// Place in the interval, 0 to 1.
+    pub z: f64,
+    /// Middle of the box.
+    pub point: Lanes<L>,
+    /// Half width of the box in every lane, above zero.
+    pub half: Lanes<L>,
+}
+
+/// How smoothing ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmoothStatus {
+    /// Iterations made.
+    pub iterations: usize,
+    /// Largest violation of a box, as a share of its half width.
+    pub violation: f64,
+}
+
+/// A site as rows `±(B·c − p)/w ≤ 1`, their slacks, multipliers and residuals.
+#[derive(Clone, Copy, Debug)]
+struct Rows<const L: usize> {
+    interval: usize,
+    weights: [f64; 4],
+    point: Lanes<L>,
+    per_half: Lanes<L>,
+    slack: [Lanes<L>; 2],
+    multiplier: [Lanes<L>; 2],
+    residual: [Lanes<L>; 2],
+}
+
+/// Smooths; keeps its memory from one time to the next.
+#[derive(Debug)]
+pub struct Smoother<const L: usize> {
+    rows: Vec<Rows<L>>,
+    matrix: Vec<Row<L>>,
+    step: Vec<Lanes<L>>,
+    /// 1/(h³·J) of each lane.
+    scale: Lanes<L>,
+}
+
+impl<const L: usize> Default for Smoother<L> {
+    fn default() -> Self {
+        Self { rows: Vec::new(), matrix: Vec::new(), step: Vec::new(), scale: [0.0; L] }
+    }
+}
+
+/// Value of the forms of a row group at the control points `c`.
+#[inline(always)]
+fn combine<const L: usize>(w: &[f64; 4], c: &[Lanes<L>; 4]) -> Lanes<L> {
+    each(|l| w[0] * c[0][l] + w[1] * c[1][l] + w[2] * c[2][l] + w[3] * c[3][l])
+}
+
+impl<const L: usize> Smoother<L> {
+    /// Moves the control points of `spline`, but for the first and the last three, to where the jerk is least:
+    /// `Σ 0.05·r² + ½·max(0, |r| − 0.7)²` with r the jerk of each interval in units of `jerk_mm_per_s3`. Rough loop.
+    pub fn smooth(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has what the function is compiled for.
+            return unsafe { self.smooth_wide(spline, sites, jerk_mm_per_s3) };
+        }
+        self.smooth_any(spline, sites, jerk_mm_per_s3)
+    }
+
+    /// The same in wider instructions; the numbers are the same bit for bit.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn smooth_wide(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
+        self.smooth_any(spline, sites, jerk_mm_per_s3)
+    }
+
+    #[inline(always)]
+    fn smooth_any(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
+        let cube = spline.step_s * spline.step_s * spline.step_s;
+        self.scale = each(|l| 1.0 / (cube * jerk_mm_per_s3[l]));
+        self.begin(spline, sites);
+        let mut gap = self.gap();
+        let mut shrink = [0.1; L];
+        let mut status = SmoothStatus { iterations: 0, violation: f64::INFINITY };
+        loop {
+            let target = each(|l| shrink[l] * gap[l]);
+            status.violation = self.assemble(spline, &target);
+            let good = largest(&gap) < ENOUGH && status.violation < FEASIBLE;
+            if good || status.iterations == ITERATIONS {
+                return status;
+            }
+            let free = 3..spline.points.len() - 3;
+            banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
+            let length = self.advance(spline, &target);
+            shrink = each(|l| if length[l] > 0.8 { 0.1 } else { 0.4 });
+            gap = self.gap();
+            status.iterations += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn begin(&mut self, spline: &Spline<L>, sites: &[Site<L>]) {
+        self.rows.clear();
+        for site in sites {
+            let (interval, w) = (site.interval as usize, weights(site.z));
+            let per_half: Lanes<L> = each(|l| 1.0 / site.half[l]);
+            let at = combine(&w, control(spline, interval));
+            let value: Lanes<L> = each(|l| (at[l] - site.point[l]) * per_half[l]);
+            let slack = [each(|l| larger(1.0 - value[l], 0.2)), each(|l| larger(1.0 + value[l], 0.2))];
+            let multiplier = [each(|l| 0.05 / slack[0][l]), each(|l| 0.05 / slack[1][l])];
+            let residual = [[0.0; L]; 2];
+            self.rows.push(Rows { interval, weights: w, point: site.point, per_half, slack, multiplier, residual });
+        }
+    }
+
+    #[inline(always)]
+    fn gap(&self) -> Lanes<L> {
+        let mut sum = [0.0; L];
+        for row in &self.rows {
+            for n in 0..2 {
+                sum = each(|l| sum[l] + row.slack[n][l] * row.multiplier[n][l]);
+            }
+        }
+        let per = 0.5 / self.rows.len().max(1) as f64;
+        each(|l| sum[l] * per)
+    }
+
+    /// The Newton system; gives the largest violation.
+    #[inline(always)]
+    fn assemble(&mut self, spline: &Spline<L>, target: &Lanes<L>) -> f64 {
+        let count = spline.points.len();
+        self.matrix.clear();
+        self.matrix.resize(count, [[0.0; L]; 4]);
+        self.step.clear();
+        self.step.resize(count, [0.0; L]);
+        for k in 0..spline.intervals() {
+            self.assemble_jerk(k, control(spline, k));
+        }
+        let mut violation = [0.0; L];
+        for row in &mut self.rows {
+            let value = combine(&row.weights, control(spline, row.interval));
+            let value: Lanes<L> = each(|l| (value[l] - row.point[l]) * row.per_half[l]);
+            violation = each(|l| larger(violation[l], value[l].abs() - 1.0));
+            let (mut weight, mut slope) = ([0.0; L], [0.0; L]);
+            for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
+                let (slack, multiplier) = (&row.slack[n], &row.multiplier[n]);
+                row.residual[n] = each(|l| sign * value[l] - 1.0 + slack[l]);
+                let per_slack: Lanes<L> = each(|l| 1.0 / slack[l]);
+                weight = each(|l| weight[l] + multiplier[l] * per_slack[l]);
+                slope = each(|l| slope[l] + sign * (target[l] + multiplier[l] * row.residual[n][l]) * per_slack[l]);
+            }
+            let weight: Lanes<L> = each(|l| weight[l] * row.per_half[l] * row.per_half[l]);
+            let slope: Lanes<L> = each(|l| slope[l] * row.per_half[l]);
+            for i in 0..4 {
+                let (at, wi) = (row.interval + i, row.weights[i]);
+                for j in i..4 {
+                    let entry = &mut self.matrix[at][j - i];
+                    let w = wi * row.weights[j];
+                    *entry = each(|l| entry[l] + w * weight[l]);
+                }
+                let entry = &mut self.step[at];
+                *entry = each(|l| entry[l] - wi * slope[l]);
+            }
+        }
+        largest(&violation)
+    }
+
+    /// What the jerk of interval `k` adds: its form is (−1, 3, −3, 1).
+    #[inline(always)]
+    fn assemble_jerk(&mut self, k: usize, c: &[Lanes<L>; 4]) {
+        const D: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+        let scale = &self.scale;
+        let jerk: Lanes<L> = each(|l| (c[3][l] - c[0][l] + 3.0 * (c[1][l] - c[2][l])) * scale[l]);
+        let bend: Lanes<L> =
+            each(|l| (GENTLE + if jerk[l].abs() > CLOSING { 1.0 } else { 0.0 }) * scale[l] * scale[l]);
+        let slope: Lanes<L> = each(|l| {
+            let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
+            (GENTLE * jerk[l] + over) * scale[l]
+        });
+        for i in 0..4 {
+            for j in i..4 {
+                let entry = &mut self.matrix[k + i][j - i];
+                *entry = each(|l| entry[l] + D[i] * D[j] * bend[l]);
+            }
+            let entry = &mut self.step[k + i];
+            *entry = each(|l| entry[l] - D[i] * slope[l]);
+        }
+    }
+
+    /// Goes along the step as far as slacks and multipliers stay positive, lane by lane; gives the primal lengths.
+    #[inline(always)]
+    fn advance(&mut self, spline: &mut Spline<L>, target: &Lanes<L>) -> Lanes<L> {
+        let count = spline.points.len();
+        self.step[..3].fill([0.0; L]);
+        self.step[count - 3..].fill([0.0; L]);
+        // The largest relative decrease of a slack and of a multiplier.
+        let (mut most, mut most_back) = ([0.0; L], [0.0; L]);
+        for row in &mut self.rows {
+            let steps = self.step[row.interval..].first_chunk().expect("four control points");
+            let along = combine(&row.weights, steps);
+            for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
+                let (slack, multiplier) = (&row.slack[n], &row.multiplier[n]);
+                row.residual[n] = each(|l| -row.residual[n][l] - sign * along[l] * row.per_half[l]);
+                let change = &row.residual[n];
+                most = each(|l| larger(most[l], -change[l] / slack[l]));
+                // The multiplier's change over itself: (target/λ − s − Δs)/s.
+                most_back = each(|l| {
+                    larger(most_back[l], (slack[l] + change[l] - target[l] / multiplier[l]) / slack[l])
+                });
+            }
+        }
+        let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
+        let back: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most_back[l], 1e-9)));
+        for row in &mut self.rows {
+            for n in 0..2 {
+                let (slack, multiplier, change) = (row.slack[n], row.multiplier[n], row.residual[n]);
+                row.slack[n] = each(|l| slack[l] + length[l] * change[l]);
+                row.multiplier[n] = each(|l| {
+                    multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) / slack[l]
+                });
+            }
+        }
+        for (point, step) in spline.points.iter_mut().zip(&self.step) {
+            *point = each(|l| point[l] + length[l] * step[l]);
+        }
+        length
+    }
+}
+
+#[inline(always)]
+fn control<const L: usize>(spline: &Spline<L>, k: usize) -> &[Lanes<L>; 4] {
+    spline.points[k..].first_chunk().expect("four control points")
+}

@@ -1,0 +1,112 @@
+//! Arcs and curves as chords fine enough to count as the path itself.
+
+use tandem_motion::Path;
+use tandem_motion::nurbs::{ArcLength, Nurbs, NurbsError, Place};
+use tandem_motion::tube::Lanes;
+use tandem_sdk::{Axes, Block, BlockKind, PluginError};
+
+use crate::frame::Frame;
+
+/// Share of the tolerance that chords of a curved block stand off it.
+pub const SAGITTA_SHARE: f64 = 0.015;
+/// Longest chord of a curved block, mm.
+const LONGEST_MM: f64 = 1.0;
+/// Most chords of one block.
+pub const MAX_CHORDS: usize = 100_000;
+
+/// The ends of the chords of a block; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Flat<const L: usize> {
+    pub points: Vec<Lanes<L>>,
+    /// The block is no line.
+    pub curved: bool,
+}
+
+impl<const L: usize> Flat<L> {
+    /// Lays the chords of `block`, which stand off it by at most [`SAGITTA_SHARE`] of the tolerance. Allocates.
+    ///
+    /// # Errors
+    /// A curve that is none.
+    pub fn lay(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, tolerance_mm: f64) -> Result<(), NurbsError> {
+        self.points.clear();
+        self.curved = matches!(block.kind, BlockKind::Arc | BlockKind::Nurbs);
+        let sagitta_mm = SAGITTA_SHARE * tolerance_mm;
+        match block.kind {
+            BlockKind::Arc => self.lay_arc(frame, block, sagitta_mm),
+            BlockKind::Nurbs => return self.lay_curve(axes, frame, block, sagitta_mm),
+            _ => self.points.push(frame.lanes(&block.end)),
+        }
+        Ok(())
+    }
+
+    fn lay_arc(&mut self, frame: &Frame<L>, block: &Block, sagitta_mm: f64) {
+        let Some(path) = Path::new(block) else { return };
+        // The circle as the oracle of distances sees it: rotary lanes beside it go straight.
+        let count = count(block.arc.radius_mm, block.arc.sweep_rad, sagitta_mm);
+        for n in 1..=count {
+            let at = path.position(block.length_mm * n as f64 / count as f64);
+            self.points.push(frame.lanes(&at));
+        }
+    }
+
+    fn lay_curve(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, sagitta: f64) -> Result<(), NurbsError> {
+        // SAFETY: the block is handed over in the call that asks, and its slices with it.
+        let data = unsafe { block.nurbs.to_data() };
+        let curve = Nurbs::new(&data, axes)?;
+        for piece in &curve.pieces() {
+            let table = ArcLength::of_piece(&curve, piece);
+            let (length, mut place, mut s) = (table.length().mm, Place::default(), 0.0);
+            while s < length {
+                let reach = |s: f64, place: &mut Place| step(frame, &curve, &table, s, place, sagitta);
+                let first = reach(s, &mut place);
+                // Where the curve bends more sharply further on, that counts.
+                let mut next = first;
+                for share in [0.5, 1.0] {
+                    next = next.min(reach((s + share * first).min(length), &mut place).max(0.3 * first));
+                }
+                s = if length - s < 1.3 * next { length } else { s + next };
+                let at = table.position(&curve, s, &mut place);
+                self.points.push(frame.lanes(&at));
+                if self.points.len() > MAX_CHORDS {
+                    break;
+                }
+            }
+        }
+        if let Some(last) = self.points.last_mut() {
+            *last = frame.lanes(&block.end);
+        }
+        Ok(())
+    }
+}
+
+/// Whether the curve of `block` is one.
+///
+/// # Errors
+/// Why not.
+pub fn check(axes: &Axes, block: &Block) -> Result<(), PluginError> {
+    // SAFETY: the block is handed over in the call that asks, and its slices with it.
+    let data = unsafe { block.nurbs.to_data() };
+    Nurbs::new(&data, axes).map(|_| ()).map_err(|error| PluginError::new(error.to_string()))
+}
+
+/// Chords of a circle.
+pub fn count(radius: f64, sweep_rad: f64, sagitta: f64) -> usize {
+    let angle = (8.0 * sagitta / radius).sqrt().min(LONGEST_MM / radius).min(0.3);
+    ((sweep_rad.abs() / angle).ceil() as usize).clamp(1, MAX_CHORDS)
+}
+
+/// Length of a chord that stands off the curve by `sagitta` where it bends as at `s`.
+fn step<const L: usize>(
+    frame: &Frame<L>,
+    curve: &Nurbs,
+    table: &ArcLength,
+    s: f64,
+    place: &mut Place,
+    sagitta: f64,
+) -> f64 {
+    let bend = table.along_path(curve, s, place).map_or(0.0, |at| {
+        let lanes = frame.lanes(&at.curvature);
+        lanes.iter().map(|v| v * v).sum::<f64>().sqrt()
+    });
+    (8.0 * sagitta / bend.max(1e-9)).sqrt().min(0.3 / bend.max(1e-9)).clamp(1e-4, LONGEST_MM)
+}

@@ -1,0 +1,40 @@
+//! The planner `smooth`: velocity, acceleration and jerk of every axis within limits, the path within its tolerance, near
+//! the shortest time, also where blocks are short.
+//!
+//! 1. A guess of the timing of the path gives pseudo-time ([`timing`]).
+//! 2. In pseudo-time the spline of least jerk is laid through boxes around the path ([`sites`], `tandem_motion::tube`).
+//! 3. That motion is driven as fast as the limits allow; the times found are the timing of the next round ([`plan`]).
+//! 4. The quintics that come out are checked as they are, up to their rest at the end ([`verify`]).
+//! 5. The first part is driven; the next window begins in a state on it ([`core`]).
+//!
+//! A window that is refused costs time, never limits: the one before is driven on, at most to its rest, and it is checked
+//! to its end. From rest a shorter window is tried, in the end a single straight piece ([`profile`]).
+
+mod core;
+mod emit;
+mod flatten;
+mod frame;
+mod options;
+mod plan;
+mod planner;
+mod profile;
+mod report;
+mod route;
+mod sites;
+mod timing;
+mod verify;
+mod window;
+
+pub use options::Options;
+pub use plan::{Effort, Tuning};
+pub use planner::{BUFFER_CHORDS, SmoothPlanner};
+
+use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind};
+
+/// The plugin as the host registers it.
+pub const PLUGIN: Plugin =
+    Plugin { name: "smooth", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
+
+fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    Ok(Box::new(SmoothPlanner::new(&Options::parse(options)?, context)?))
+}

@@ -1,0 +1,350 @@
+//! Planning one window: smoothing and pacing take turns.
+
+use tandem_motion::retime::End;
+use tandem_motion::tube::{Asked, Lanes, Pacer, Place, Smoother, Spline, each};
+
+use crate::frame::Frame;
+use crate::route::Run;
+use crate::sites::{Grid, Sites};
+use crate::timing::{Mark, Reach, Timing};
+use crate::verify::{Checked, Checker};
+use crate::window::{Piece, State, Window};
+
+/// Shares of the limits that the solution may take: the rest covers what lies between the places asked.
+const JERK_SHARE: f64 = 0.995;
+const ACCELERATION_SHARE: f64 = 0.985;
+const FEED_SHARE: f64 = 0.9995;
+/// Intervals of a window at least and at most.
+pub const INTERVALS: (usize, usize) = (7, 420);
+/// Largest rate squared.
+const MOST: f64 = 16.0;
+/// Mean complementarity asked of the last round, and of those before.
+const GAP: f64 = 1e-5;
+const LOOSE: f64 = 1e-3;
+/// Gain of a round, as a share of the time, that is worth another.
+const GAIN: f64 = 2e-3;
+
+/// What can be tuned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuning {
+    /// Step of the grid, s.
+    pub step_s: f64,
+    /// Time of a window, s.
+    pub window_s: f64,
+    /// Share of the boxes that is used.
+    pub box_share: f64,
+    /// Rounds.
+    pub rounds: usize,
+    /// Rounds more where the window does not pass.
+    pub repairs: usize,
+}
+
+/// From where a window is planned, and how far.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a, const L: usize> {
+    pub state: State<L>,
+    pub s: f64,
+    pub resting: bool,
+    /// Positions before, a fine period apart.
+    pub before: &'a [Lanes<L>],
+    /// Path coordinate that it may go to at most.
+    pub end: f64,
+    pub window_s: f64,
+    /// The window that it goes on from, and when.
+    pub old: Option<(&'a Window<L>, f64)>,
+}
+
+/// Part of what is left of the window before whose timing is taken over.
+const WARM: f64 = 0.55;
+
+/// Counts of what was done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Effort {
+    pub windows: u64,
+    pub rejected: u64,
+    pub stops: u64,
+    pub repairs: u64,
+    pub intervals: u64,
+    pub smooth_iterations: u64,
+    pub pace_iterations: u64,
+    pub rounds: u64,
+}
+
+/// The planning of windows; keeps its memory.
+#[derive(Debug)]
+pub struct Planning<const L: usize> {
+    pub tuning: Tuning,
+    pub effort: Effort,
+    timing: Timing,
+    sites: Sites<L>,
+    spline: Spline<L>,
+    smoother: Smoother<L>,
+    pacer: Pacer<L>,
+    marks: Vec<Mark>,
+    times: Vec<f64>,
+    checker: Checker<L>,
+}
+
+/// What a round takes back.
+#[derive(Clone, Copy, Debug)]
+struct Shares {
+    jerk: f64,
+    acceleration: f64,
+    boxes: f64,
+    feed: f64,
+}
+
+impl<const L: usize> Planning<L> {
+    /// Nothing planned yet.
+    pub fn new(tuning: Tuning) -> Self {
+        Self {
+            tuning,
+            effort: Effort::default(),
+            timing: Timing::default(),
+            sites: Sites::default(),
+            spline: Spline::default(),
+            smoother: Smoother::default(),
+            pacer: Pacer::default(),
+            marks: Vec::new(),
+            times: Vec::new(),
+            checker: Checker::default(),
+        }
+    }
+
+    /// Path coordinate where the last window planned ends.
+    pub fn end(&self) -> f64 {
+        self.marks.last().map_or(0.0, |mark| mark.s)
+    }
+
+    /// Plans into `window`; false where what was found does not pass.
+    pub fn plan(&mut self, run: &Run<'_, L>, frame: &Frame<L>, start: &Start<'_, L>, window: &mut Window<L>) -> bool {
+        self.effort.windows += 1;
+        let counted = frame.counted(run.rotary);
+        let reach = self.take_over(start);
+        self.timing.make(run, frame, &counted, &reach, &mut self.marks);
+        let end = self.marks[self.marks.len() - 1].s;
+        self.sites.gather(run, start.s, end);
+        let mut shares = Shares {
+            jerk: JERK_SHARE,
+            acceleration: ACCELERATION_SHARE,
+            boxes: self.tuning.box_share,
+            feed: FEED_SHARE,
+        };
+        let mut before_s = self.marks[self.marks.len() - 1].t;
+        let (mut round, mut repairs, mut settled) = (1, 0, false);
+        loop {
+            let last = settled || round >= self.tuning.rounds;
+            self.effort.rounds += 1;
+            if !self.round(run, frame, start, &shares, &counted, last) {
+                return false;
+            }
+            let now_s = self.marks[self.marks.len() - 1].t;
+            let gained = (before_s - now_s) / now_s;
+            before_s = now_s;
+            if !last {
+                settled = gained.abs() < GAIN;
+                round += 1;
+                continue;
+            }
+            self.build(window);
+            let checked = self.checker.check(run, frame, &counted, start, window);
+            if checked.passes() {
+                window.whole = run.closed && end >= run.end() - 1e-9;
+                return true;
+            }
+            if repairs == self.tuning.repairs || !checked.is_finite() {
+                self.effort.rejected += 1;
+                return false;
+            }
+            shares = take_back(shares, &checked);
+            repairs += 1;
+            round = self.tuning.rounds;
+            self.effort.repairs += 1;
+        }
+    }
+
+    /// Begins the marks with the timing of the window before; gives what is to be timed behind them.
+    fn take_over(&mut self, start: &Start<'_, L>) -> Reach {
+        self.marks.clear();
+        self.marks.push(Mark { t: 0.0, s: start.s });
+        let size = |v: &Lanes<L>| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let mut reach =
+            Reach { s: start.s, speed: size(&start.state[1]), window_s: start.window_s, end: start.end };
+        if let Some((old, now_s)) = start.old {
+            let until_s = now_s + WARM * (old.duration_s() - now_s);
+            let known = old.marks.iter().filter(|mark| mark.t > now_s && mark.t <= until_s && mark.s > start.s);
+            self.marks.extend(known.map(|mark| Mark { t: mark.t - now_s, s: mark.s }));
+            let last = self.marks[self.marks.len() - 1];
+            reach.s = last.s;
+            reach.speed = size(&old.state(now_s + last.t)[1]);
+            reach.window_s -= last.t;
+        }
+        reach
+    }
+
+    /// One turn; the marks are then those of the faster timing. False where it has none.
+    fn round(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        start: &Start<'_, L>,
+        shares: &Shares,
+        counted: &Lanes<L>,
+        last: bool,
+    ) -> bool {
+        let total_s = self.marks[self.marks.len() - 1].t;
+        let intervals = ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
+        let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
+        self.lay_spline(run, start, &grid);
+        self.sites.choose(run, &self.marks, grid, shares.boxes);
+        let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.sites, &frame.jerk);
+        self.fill_pacer(run, frame, shares, counted);
+        let asked = if last {
+            Asked { gap: GAP, violation: 0.004, iterations: 25 }
+        } else {
+            Asked { gap: LOOSE, violation: 0.05, iterations: 25 }
+        };
+        let begin = if start.resting { End::Rest } else { End::Moving };
+        let paced = self.pacer.solve((begin, End::Rest), &asked);
+        self.effort.intervals += intervals as u64;
+        self.effort.smooth_iterations += smoothed.iterations as u64;
+        self.effort.pace_iterations += paced.iterations as u64;
+        self.lay_marks(start.s)
+    }
+
+    /// The spline's first guess: the path at the Greville places of its control points.
+    fn lay_spline(&mut self, run: &Run<'_, L>, start: &Start<'_, L>, grid: &Grid) {
+        let (marks, h) = (&self.marks, grid.step_s);
+        self.spline.step_s = h;
+        self.spline.points.clear();
+        let (mut at, mut chord) = (0, run.chord_at(start.s, 0));
+        for index in 0..grid.intervals + 3 {
+            let t = (index as f64 - 1.0) * h;
+            while at + 2 < marks.len() && marks[at + 1].t < t {
+                at += 1;
+            }
+            let (a, b) = (marks[at], marks[at + 1]);
+            let s = a.s + (b.s - a.s) * ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
+            chord = run.chord_at(s, chord);
+            self.spline.points.push(run.chords[chord].at(s));
+        }
+        let end = marks[marks.len() - 1].s;
+        let last = run.chord_at(end - 1e-9, chord);
+        self.spline.begin(&start.state);
+        self.spline.end(&run.chords[last].at(end));
+    }
+
+    fn fill_pacer(&mut self, run: &Run<'_, L>, frame: &Frame<L>, shares: &Shares, counted: &Lanes<L>) {
+        let speed = &frame.speed[usize::from(run.rapid)];
+        let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
+        let per_jerk: Lanes<L> = frame.jerk.map(|j| 1.0 / (shares.jerk * j));
+        let per_acceleration: Lanes<L> = frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
+        let mut feeds = Feeds { run, along: &self.sites.along, sites: &self.sites.sites, at: 0 };
+        let place = |[_, first, second, _]: &[Lanes<L>; 4], feed: f64| {
+            let (mut squared, mut axis) = (0.0, 0.0f64);
+            for l in 0..L {
+                squared += (counted[l] * first[l]).powi(2);
+                let share = (first[l] * per_speed[l]).abs();
+                axis = if share > axis { share } else { axis };
+            }
+            let most = (shares.feed * feed).powi(2) / squared.max(1e-12);
+            let most = most.min(1.0 / (axis * axis).max(1e-12)).min(MOST);
+            Place { first: *first, second: *second, most }
+        };
+        self.pacer.begin();
+        let mut ends = self.spline.at(0, 0.0);
+        for k in 0..self.spline.intervals() {
+            let feed = feeds.of(k);
+            let start = place(&ends, feed);
+            let middle = self.spline.at(k, 0.5);
+            let third = middle[3];
+            let middle = place(&middle, feed);
+            ends = self.spline.at(k, 1.0);
+            let limits = (&per_acceleration, &per_jerk);
+            self.pacer.push((&start, &middle, [&ends[1], &ends[2]]), &third, limits, self.spline.step_s);
+        }
+    }
+
+    /// The times of the knots, and the marks: when the motion passes the sites.
+    fn lay_marks(&mut self, from: f64) -> bool {
+        let (rate, h) = (&self.pacer.rate, self.spline.step_s);
+        self.times.clear();
+        self.times.push(0.0);
+        let mut t = 0.0;
+        for k in 0..rate.intervals() {
+            t += rate.time_s(k, 1.0, h);
+            self.times.push(t);
+        }
+        let end = self.marks[self.marks.len() - 1].s;
+        self.marks.clear();
+        self.marks.push(Mark { t: 0.0, s: from });
+        for (site, (s, _)) in self.sites.sites.iter().zip(&self.sites.along) {
+            let k = site.interval as usize;
+            let time = self.times[k] + rate.time_s(k, site.z, h);
+            self.marks.push(Mark { t: time, s: *s });
+        }
+        self.marks.push(Mark { t, s: end });
+        t.is_finite()
+    }
+
+    /// The quintics between the knots.
+    fn build(&mut self, window: &mut Window<L>) {
+        let h = self.spline.step_s;
+        window.pieces.clear();
+        window.marks.clone_from(&self.marks);
+        let state = |k: usize, z: f64| -> State<L> {
+            let [x, x1, x2, _] = self.spline.at(k, z);
+            let [b, slope, _] = self.pacer.rate.at(k, z, h);
+            let rate = b.max(1e-9).sqrt();
+            [x, each(|l| x1[l] * rate), each(|l| x2[l] * b + x1[l] * (slope / 2.0))]
+        };
+        let mut from = state(0, 0.0);
+        for k in 0..self.spline.intervals() {
+            let to = state(k, 1.0);
+            let (start_s, end_s) = (self.times[k], self.times[k + 1]);
+            window.pieces.push(Piece::between(&from, &to, start_s, end_s - start_s));
+            from = to;
+        }
+    }
+}
+
+/// The feed of intervals, asked for in order: the lowest of the chords whose sites lie in or next to one.
+struct Feeds<'a, const L: usize> {
+    run: &'a Run<'a, L>,
+    along: &'a [(f64, u32)],
+    sites: &'a [tandem_motion::tube::Site<L>],
+    at: usize,
+}
+
+impl<const L: usize> Feeds<'_, L> {
+    fn of(&mut self, k: usize) -> f64 {
+        while self.at + 1 < self.sites.len() && (self.sites[self.at + 1].interval as usize) < k {
+            self.at += 1;
+        }
+        let mut feed = f64::INFINITY;
+        let mut n = self.at;
+        while n < self.sites.len() {
+            let chord = self.along[n].1 as usize;
+            feed = feed.min(self.run.chords[chord].feed);
+            if (self.sites[n].interval as usize) > k {
+                break;
+            }
+            n += 1;
+        }
+        if feed.is_infinite() && self.sites.is_empty() {
+            feed = self.run.chords.iter().fold(f64::INFINITY, |least, chord| least.min(chord.feed));
+        }
+        feed
+    }
+}
+
+/// Shares for the next round: what was exceeded, in proportion.
+fn take_back(shares: Shares, checked: &Checked) -> Shares {
+    let less = |share: f64, ratio: f64, aim: f64| if ratio > 1.0 { share * (aim / ratio).max(0.7) } else { share };
+    Shares {
+        jerk: less(shares.jerk, checked.jerk, 0.998),
+        acceleration: less(shares.acceleration, checked.acceleration, 0.998),
+        boxes: less(shares.boxes, checked.deviation, 0.96),
+        feed: less(shares.feed, checked.speed, 0.9995),
+    }
+}

@@ -1,0 +1,102 @@
+//! How blocks are driven.
+
+use tandem_motion::tube::Lanes;
+use tandem_sdk::{Block, BlockReport, LimitedBy, size_of_contract};
+
+use crate::route::Leg;
+use crate::window::{Bound, Window};
+
+/// A report of `block`: feeds at the start, highest and at the end.
+pub fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) -> BlockReport {
+    BlockReport {
+        size: size_of_contract::<BlockReport>(),
+        limited_by,
+        block: block.index,
+        start_feed_mm_per_s: feeds[0],
+        peak_feed_mm_per_s: feeds[1],
+        end_feed_mm_per_s: feeds[2],
+        time_s,
+        time_constant_s: f64::NAN,
+    }
+}
+
+/// Path speed of a velocity.
+pub fn path_speed<const L: usize>(counted: &Lanes<L>, velocity: &Lanes<L>) -> f64 {
+    velocity.iter().zip(counted).map(|(v, c)| (v * c) * (v * c)).sum::<f64>().sqrt()
+}
+
+/// The report of the leg that is driven from `from_s` to `to_s` of `window`. Where it goes on beyond the window, its time is
+/// estimated from the mean speed.
+pub fn of_leg<const L: usize>(
+    window: &Window<L>,
+    counted: &Lanes<L>,
+    leg: &Leg,
+    (from_s, to_s): (f64, f64),
+) -> BlockReport {
+    let first = window.piece_at(from_s);
+    let speed = |n: usize, t: f64| {
+        let piece = &window.pieces[n];
+        path_speed(counted, &piece.velocity((t - piece.start_s).clamp(0.0, piece.duration_s)))
+    };
+    let start = speed(first, from_s);
+    let (mut peak, mut last) = (start, first);
+    // Time by what binds.
+    let mut bound_s = [0.0f64; 5];
+    for (n, piece) in window.pieces.iter().enumerate().skip(first) {
+        if piece.start_s >= to_s {
+            break;
+        }
+        last = n;
+        let until = piece.end_s().min(to_s);
+        bound_s[piece.bound as usize] += until - piece.start_s.max(from_s);
+        peak = peak.max(speed(n, until));
+    }
+    let end = speed(last, to_s);
+    let (driven, whole) = (window.along(to_s) - leg.start.max(window.along(from_s)), leg.end - leg.start);
+    let time_s = if driven > 0.0 && leg.end > window.end() + 1e-9 {
+        (to_s - from_s) * (whole / driven).max(1.0)
+    } else {
+        to_s - from_s
+    };
+    report(&leg.block, limited_by(&bound_s, leg), [start, peak, end], time_s)
+}
+
+fn limited_by(bound_s: &[f64; 5], leg: &Leg) -> LimitedBy {
+    let most = (0..5).fold(0, |best, n| if bound_s[n] > bound_s[best] { n } else { best });
+    let capped = leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s;
+    match most {
+        n if n == Bound::Jerk as usize => LimitedBy::Jerk,
+        n if n == Bound::Acceleration as usize => LimitedBy::Acceleration,
+        n if n == Bound::Velocity as usize => LimitedBy::Velocity,
+        n if n == Bound::Feed as usize && capped => LimitedBy::Policy,
+        n if n == Bound::Feed as usize => LimitedBy::Feed,
+        _ => LimitedBy::Tolerance,
+    }
+}
+
+/// The polynomial of the path coordinate over a piece that begins at `from_mm`: its length and the speeds at its ends are
+/// met, the accelerations where that leaves it growing. Gives its end.
+pub fn path<const L: usize>(
+    counted: &Lanes<L>,
+    piece: &crate::window::Piece<L>,
+    from_mm: f64,
+    path: &mut [f64; 6],
+) -> f64 {
+    let t = piece.duration_s;
+    let speed = |at: f64| path_speed(counted, &piece.velocity(at * t));
+    let (v0, v1) = (speed(0.0), speed(1.0));
+    // Simpson's rule on quarters.
+    let length = t / 12.0 * (v0 + 4.0 * (speed(0.25) + speed(0.75)) + 2.0 * speed(0.5) + v1);
+    let along = |v: &Lanes<L>, a: &Lanes<L>, speed: f64| {
+        let product: f64 = (0..L).map(|l| counted[l] * v[l] * counted[l] * a[l]).sum();
+        if speed > 1e-6 { product / speed } else { 0.0 }
+    };
+    let a0 = along(&piece.velocity(0.0), &piece.acceleration(0.0), v0);
+    let a1 = along(&piece.velocity(t), &piece.acceleration(t), v1);
+    *path = tandem_motion::hermite([from_mm, v0, a0], [from_mm + length, v1, a1], t);
+    let rate = |t: f64| path[1] + t * (2.0 * path[2] + t * (3.0 * path[3] + t * (4.0 * path[4] + t * 5.0 * path[5])));
+    if [0.125, 0.25, 0.5, 0.75, 0.875].iter().any(|share| rate(share * t) < 0.0) {
+        *path = [from_mm, length / t, 0.0, 0.0, 0.0, 0.0];
+    }
+    from_mm + length
+}

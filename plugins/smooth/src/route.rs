@@ -1,0 +1,259 @@
+//! The path ahead: blocks as chords, and where the machine comes to rest.
+
+use std::collections::VecDeque;
+
+use tandem_motion::tube::Lanes;
+use tandem_sdk::{Block, BlockKind};
+
+use crate::flatten::{Flat, SAGITTA_SHARE};
+use crate::frame::{Frame, dot, minus, plus};
+
+/// Way behind the present place that still counts, mm.
+const BEHIND: f64 = 2.0;
+/// Direction cosine between blocks below which the path turns back: it rests there (150°).
+const TURNS_BACK: f64 = -0.866;
+
+/// A straight piece of the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Chord<const L: usize> {
+    /// Where it starts.
+    pub start: Lanes<L>,
+    /// Of unit length.
+    pub direction: Lanes<L>,
+    /// Path coordinate of its start: lengths of chords, in lanes, since the last reset.
+    pub s: f64,
+    /// Length.
+    pub length: f64,
+    /// Path speed that may be driven, as path speed counts, mm/s or rad/s; infinite for rapids.
+    pub feed: f64,
+    /// What the motion may stand off the chord.
+    pub tolerance: f64,
+    /// Size of the turn at its start: the change of direction; zero behind a rest.
+    pub turn: f64,
+}
+
+impl<const L: usize> Chord<L> {
+    /// The point at path coordinate `s`.
+    #[inline(always)]
+    pub fn at(&self, s: f64) -> Lanes<L> {
+        plus(&self.start, s - self.s, &self.direction)
+    }
+
+    /// Path coordinate of its end.
+    #[inline(always)]
+    pub fn end(&self) -> f64 {
+        self.s + self.length
+    }
+}
+
+/// A block with a path.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    pub block: Block,
+    /// Path coordinates of its ends.
+    pub start: f64,
+    pub end: f64,
+    /// Path speed counts rotary axes.
+    pub rotary: bool,
+    /// The machine rests at its end.
+    pub rests: bool,
+    /// The time it takes at its feed, s.
+    pub least_s: f64,
+    /// Its chords, counted from the first ever.
+    pub first_chord: u64,
+    pub chords: u32,
+}
+
+/// What comes next.
+#[derive(Clone, Debug)]
+pub enum Item {
+    /// Rest.
+    Dwell(Block),
+    /// Motion.
+    Leg(Leg),
+}
+
+/// The path that is known and not driven yet.
+#[derive(Debug)]
+pub struct Route<const L: usize> {
+    /// Blocks in order.
+    pub items: VecDeque<Item>,
+    chords: Vec<Chord<L>>,
+    /// Number of the first chord kept.
+    first: u64,
+    /// Number of the first chord behind the last rest.
+    run_first: u64,
+    end: f64,
+}
+
+impl<const L: usize> Default for Route<L> {
+    fn default() -> Self {
+        Self { items: VecDeque::new(), chords: Vec::new(), first: 0, run_first: 0, end: 0.0 }
+    }
+}
+
+/// A stretch of path from rest to rest, or as far as it is known.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a, const L: usize> {
+    /// Its chords.
+    pub chords: &'a [Chord<L>],
+    /// Its end is a rest of the program.
+    pub closed: bool,
+    /// Path speed counts rotary axes.
+    pub rotary: bool,
+    /// It is a rapid.
+    pub rapid: bool,
+}
+
+impl<const L: usize> Run<'_, L> {
+    /// Path coordinate of its end.
+    pub fn end(&self) -> f64 {
+        self.chords.last().map_or(0.0, Chord::end)
+    }
+
+    /// The chord that `s` lies in, the later one at a vertex; `near` is where the last look-up was.
+    #[inline(always)]
+    pub fn chord_at(&self, s: f64, near: usize) -> usize {
+        let mut i = near.min(self.chords.len() - 1);
+        while i + 1 < self.chords.len() && self.chords[i + 1].s <= s {
+            i += 1;
+        }
+        while i > 0 && self.chords[i].s > s {
+            i -= 1;
+        }
+        i
+    }
+}
+
+impl<const L: usize> Route<L> {
+    /// Path coordinate where the known path ends.
+    pub fn end(&self) -> f64 {
+        self.end
+    }
+
+    /// Chords kept.
+    pub fn chord_count(&self) -> usize {
+        self.chords.len()
+    }
+
+    /// The leg in front.
+    pub fn front(&self) -> Option<&Leg> {
+        match self.items.front() {
+            Some(Item::Leg(leg)) => Some(leg),
+            _ => None,
+        }
+    }
+
+    /// Takes a rest.
+    pub fn push_dwell(&mut self, block: &Block) {
+        self.rest_behind_last();
+        self.items.push_back(Item::Dwell(*block));
+    }
+
+    fn rest_behind_last(&mut self) {
+        if let Some(Item::Leg(last)) = self.items.back_mut() {
+            last.rests = true;
+        }
+    }
+
+    /// Takes a block with a path; `flat` are the ends of its chords behind `block.start`. Gives the time that it takes at
+    /// its feed, s. Allocates.
+    pub fn push(&mut self, block: &Block, flat: &Flat<L>, frame: &Frame<L>, feed_ratio: f64, tolerance_mm: f64) -> f64 {
+        let rotary = frame.counts_rotary(block);
+        let counted = frame.counted(rotary);
+        let joins = match self.items.back() {
+            Some(Item::Leg(last)) => !last.rests && last.rotary == rotary && !block.starts_at_rest(),
+            _ => false,
+        };
+        let mut before = self.chords.last().filter(|_| joins).map(|chord| chord.direction);
+        let (start, first_chord) = (self.end, self.first + self.chords.len() as u64);
+        let mut from = frame.lanes(&block.start);
+        for point in &flat.points {
+            let way = minus(point, &from);
+            let length = dot(&way, &way).sqrt();
+            if length < 1e-12 {
+                continue;
+            }
+            let direction: Lanes<L> = way.map(|v| v / length);
+            let cosine = before.as_ref().map_or(1.0, |b| dot(b, &direction));
+            if cosine < TURNS_BACK {
+                before = None;
+            }
+            let turned = before.as_ref().map(|b| minus(&direction, b));
+            let turn = turned.map_or(0.0, |d| dot(&d, &d).sqrt());
+            if first_chord == self.first + self.chords.len() as u64 && before.is_none() {
+                self.rest_behind_last();
+            }
+            let speed: f64 = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>();
+            // A vertex of a chord whose direction path speed does not count takes no feed: axis limits alone hold.
+            let feed = if speed > 0.0 { block.command_feed_mm_per_s() * feed_ratio } else { f64::INFINITY };
+            let tolerance = tolerance_mm * (1.0 - if flat.curved { SAGITTA_SHARE } else { 0.0 });
+            self.chords.push(Chord { start: from, direction, s: self.end, length, feed, tolerance, turn });
+            self.end += length;
+            from = *point;
+            before = Some(direction);
+        }
+        let chords = (self.first + self.chords.len() as u64 - first_chord) as u32;
+        let rests = block.ends_at_rest();
+        let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
+        let fastest = before.map_or(f64::INFINITY, |direction| frame.along(limits, &direction));
+        let least_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);
+        // The slices of a curve are not valid any longer than the call.
+        let block = Block { nurbs: tandem_sdk::NurbsGeometry::default(), ..*block };
+        self.items.push_back(Item::Leg(Leg {
+            block,
+            start,
+            end: self.end,
+            rotary,
+            rests,
+            least_s,
+            first_chord,
+            chords,
+        }));
+        least_s
+    }
+
+    /// The machine rests at `s`: what lies before it belongs to no run any more.
+    pub fn begin_run(&mut self, s: f64) {
+        self.run_first = self.first + self.chords.partition_point(|chord| chord.end() <= s + 1e-9) as u64;
+    }
+
+    /// The path around `s` from the last rest to the next.
+    pub fn run(&self, s: f64, finished: bool) -> Run<'_, L> {
+        let legs = self.items.iter().map_while(|item| if let Item::Leg(leg) = item { Some(leg) } else { None });
+        let (mut end, mut closed, mut rotary, mut rapid) = (self.first, false, false, false);
+        for (n, leg) in legs.enumerate() {
+            end = leg.first_chord + u64::from(leg.chords);
+            (rotary, rapid) = (leg.rotary, leg.block.kind == BlockKind::Rapid || rapid && n > 0);
+            if leg.rests {
+                closed = true;
+                break;
+            }
+        }
+        let all = &self.chords[(self.run_first.max(self.first) - self.first) as usize..(end - self.first) as usize];
+        let from = all.partition_point(|chord| chord.end() <= s - BEHIND);
+        Run { chords: &all[from.min(all.len().saturating_sub(1))..], closed: closed || finished, rotary, rapid }
+    }
+
+    /// Takes the leg in front off.
+    pub fn pop(&mut self) -> Option<Item> {
+        self.items.pop_front()
+    }
+
+    /// Forgets chords that lie well behind `s`.
+    pub fn forget(&mut self, s: f64) {
+        let count = self.chords.partition_point(|chord| chord.end() < s - BEHIND);
+        // Moving the rest down is worth it only where there is not much of it.
+        if count > 256 && 2 * count > self.chords.len() {
+            self.chords.drain(..count);
+            self.first += count as u64;
+        }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.items.clear();
+        self.chords.clear();
+        (self.first, self.run_first, self.end) = (0, 0, 0.0);
+    }
+}

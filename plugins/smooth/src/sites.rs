@@ -1,0 +1,267 @@
+//! Where the motion must pass, and how near.
+
+use tandem_motion::tube::{Lanes, Site, each};
+
+use crate::frame::{dot, largest, minus};
+use crate::route::Run;
+use crate::timing::Mark;
+
+/// Share of the tolerance that boxes use.
+pub const BOX_SHARE: f64 = 0.955;
+/// A turn by more than this always has a site.
+const SHARP: f64 = 0.1;
+/// Way over which turns count for the shape of a box, mm.
+const NEAR: f64 = 0.6;
+/// Vertices looked at on each side.
+const LOOKS: usize = 24;
+
+/// A place that may become a site.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<const L: usize> {
+    pub s: f64,
+    chord: u32,
+    /// At the start of the chord.
+    vertex: bool,
+    /// It is always a site.
+    firm: bool,
+    /// Half widths, once they are known.
+    half: Option<Lanes<L>>,
+}
+
+/// Sites of a window; keeps its memory.
+#[derive(Debug)]
+pub struct Sites<const L: usize> {
+    candidates: Vec<Candidate<L>>,
+    /// The sites chosen, with their path coordinates and chords.
+    pub sites: Vec<Site<L>>,
+    pub along: Vec<(f64, u32)>,
+}
+
+impl<const L: usize> Default for Sites<L> {
+    fn default() -> Self {
+        Self { candidates: Vec::new(), sites: Vec::new(), along: Vec::new() }
+    }
+}
+
+/// The grid of pseudo-time.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    pub intervals: usize,
+    pub step_s: f64,
+    /// Lanes in use.
+    pub lanes: usize,
+}
+
+impl<const L: usize> Sites<L> {
+    /// Vertices between two path coordinates, and middles of chords that bulge between them.
+    pub fn gather(&mut self, run: &Run<'_, L>, from: f64, to: f64) {
+        self.candidates.clear();
+        let mut i = run.chord_at(from, 0);
+        while i < run.chords.len() && run.chords[i].s < to {
+            let chord = &run.chords[i];
+            let turn = run.chords.get(i + 1).map_or(chord.turn, |next| next.turn.max(chord.turn));
+            let sagitta = turn * chord.length / 8.0;
+            let mut add = |s: f64, vertex: bool, firm: bool| {
+                if s > from && s < to {
+                    self.candidates.push(Candidate { s, chord: i as u32, vertex, firm, half: None });
+                }
+            };
+            add(chord.s, true, chord.turn > SHARP);
+            if sagitta > 0.05 * chord.tolerance {
+                add(chord.s + chord.length / 2.0, false, sagitta > 0.3 * chord.tolerance);
+            }
+            i += 1;
+        }
+    }
+
+    /// Chooses sites by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
+    /// gap exceeds three quarters of a step. `share` of the tolerance is used.
+    pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, share: f64) {
+        self.sites.clear();
+        self.along.clear();
+        let h = grid.step_s;
+        let end_s = grid.intervals as f64 * h;
+        let (mut timer, mut last_t) = (Timer { marks, at: 0 }, 0.0);
+        for n in 0..self.candidates.len() {
+            let candidate = self.candidates[n];
+            let t = timer.time(candidate.s);
+            if !candidate.firm && t < last_t + h / 3.0 {
+                continue;
+            }
+            self.fill(run, marks, &mut last_t, t, grid, share);
+            if t > 0.4 * h && t < end_s {
+                let half = candidate.half.unwrap_or_else(|| half_widths(run, &candidate, grid.lanes));
+                self.candidates[n].half = Some(half);
+                self.add(run, t, &candidate, &half, grid, share);
+            }
+            last_t = t;
+        }
+        self.fill(run, marks, &mut last_t, end_s, grid, share);
+    }
+
+    /// Places between `last_t` and `t`.
+    fn fill(&mut self, run: &Run<'_, L>, marks: &[Mark], last_t: &mut f64, t: f64, grid: Grid, share: f64) {
+        let h = grid.step_s;
+        let count = ((t - *last_t) / (0.75 * h) * (1.0 - 1e-9)).ceil() as usize;
+        if count < 2 {
+            return;
+        }
+        let mut at = self.along.last().map_or(0, |last| last.1 as usize);
+        let mut mark = marks.partition_point(|mark| mark.t <= *last_t).max(1);
+        for n in 1..count {
+            let time = *last_t + (t - *last_t) * n as f64 / count as f64;
+            if time < 0.4 * h || time > (grid.intervals as f64 - 0.5) * h {
+                continue;
+            }
+            while mark + 1 < marks.len() && marks[mark].t <= time {
+                mark += 1;
+            }
+            let (a, b) = (marks[mark - 1], marks[mark]);
+            let s = a.s + (b.s - a.s) * ((time - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
+            at = run.chord_at(s, at);
+            let candidate = Candidate { s, chord: at as u32, vertex: false, firm: false, half: None };
+            let half = half_widths(run, &candidate, grid.lanes);
+            self.add(run, time, &candidate, &half, grid, share);
+        }
+    }
+
+    fn add(
+        &mut self,
+        run: &Run<'_, L>,
+        t: f64,
+        candidate: &Candidate<L>,
+        half: &Lanes<L>,
+        grid: Grid,
+        share: f64,
+    ) {
+        let place = t / grid.step_s;
+        let interval = (place as usize).min(grid.intervals - 1);
+        let point = run.chords[candidate.chord as usize].at(candidate.s);
+        let half = each(|l| share * half[l]);
+        self.sites.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
+        self.along.push((candidate.s, candidate.chord));
+    }
+}
+
+/// Time along marks, asked for in order.
+pub struct Timer<'a> {
+    pub marks: &'a [Mark],
+    pub at: usize,
+}
+
+impl Timer<'_> {
+    /// When the motion passes `s`.
+    #[inline(always)]
+    pub fn time(&mut self, s: f64) -> f64 {
+        while self.at + 2 < self.marks.len() && self.marks[self.at + 1].s <= s {
+            self.at += 1;
+        }
+        let (a, b) = (self.marks[self.at], self.marks[self.at + 1]);
+        let way = b.s - a.s;
+        if way > 0.0 { a.t + (b.t - a.t) * ((s - a.s) / way).clamp(0.0, 1.0) } else { b.t }
+    }
+}
+
+/// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
+/// that turn get most of it. Along the path the box may be longer.
+fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes: usize) -> Lanes<L> {
+    let chords = run.chords;
+    let (i, s) = (candidate.chord as usize, candidate.s);
+    let tolerance = if candidate.vertex && i > 0 {
+        chords[i].tolerance.min(chords[i - 1].tolerance)
+    } else {
+        chords[i].tolerance
+    };
+    let (mut need, sharp_way) = needs(run, i, s);
+    let most = largest(&need);
+    if most > 0.0 {
+        need = each(|l| (need[l] + 0.08 * most) / (1.08 * most));
+    } else {
+        need = [1.0; L];
+    }
+    // Lanes without an axis take nothing of the tolerance.
+    need[lanes..].fill(0.0);
+    let widen = |half: Lanes<L>| each(|l| if half[l] > 0.0 { half[l] } else { tolerance });
+    let Some(tangent) = tangent(run, candidate) else {
+        // Round a sharp vertex the motion may be anywhere in a disc.
+        let size = dot(&need, &need).sqrt();
+        return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)));
+    };
+    let loose = (0.5 * sharp_way / tolerance).clamp(1.0, 10.0);
+    for l in 0..lanes {
+        let t = tangent[l].abs();
+        let across = (1.0 - t * t).max(1e-6).sqrt();
+        need[l] = need[l].max(t * (0.3 / across).min(loose));
+    }
+    let worst = farthest(&need, &tangent);
+    widen(each(|l| need[l] * (BOX_SHARE * tolerance / worst)))
+}
+
+/// How much every lane turns near `s`, and the way to the nearest sharp turn or end.
+fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) {
+    let chords = run.chords;
+    let (mut need, mut sharp_way) = ([0.0; L], f64::INFINITY);
+    let mut look = |v: usize| {
+        let turn = minus(&chords[v].direction, &chords[v - 1].direction);
+        for l in 0..L {
+            need[l] = f64::max(need[l], turn[l].abs());
+        }
+    };
+    // A chord behind a rest, or a turn back, has no turn.
+    let mut v = i;
+    for _ in 0..LOOKS {
+        if v == 0 || s - chords[v].s > NEAR {
+            break;
+        }
+        look(v);
+        if chords[v].turn > SHARP {
+            sharp_way = sharp_way.min(s - chords[v].s);
+        }
+        v -= 1;
+    }
+    for v in i + 1..(i + 1 + LOOKS).min(chords.len()) {
+        if chords[v].s - s > NEAR {
+            break;
+        }
+        look(v);
+        if chords[v].turn > SHARP {
+            sharp_way = sharp_way.min(chords[v].s - s);
+        }
+    }
+    (need, sharp_way.min(run.end() - s))
+}
+
+/// The direction of the path; none at a sharp vertex.
+fn tangent<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>) -> Option<Lanes<L>> {
+    let i = candidate.chord as usize;
+    let chord = &run.chords[i];
+    if !candidate.vertex || i == 0 {
+        return Some(chord.direction);
+    }
+    let last = &run.chords[i - 1].direction;
+    let sum: Lanes<L> = each(|l| last[l] + chord.direction[l]);
+    let size = dot(&sum, &sum).sqrt();
+    (size >= 1.95).then(|| each(|l| sum[l] / size))
+}
+
+/// How far the corners of the box `need` stand off a line through its middle along `tangent`.
+fn farthest<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>) -> f64 {
+    if L > 4 {
+        // A bound: every pair of lanes at its worst.
+        let mut sum = 0.0;
+        for i in 0..L {
+            for j in 0..L {
+                let entry = f64::from(u8::from(i == j)) - tangent[i] * tangent[j];
+                sum += entry.abs() * need[i] * need[j];
+            }
+        }
+        return sum.sqrt();
+    }
+    let mut most = 0.0f64;
+    for signs in 0..1 << (L - 1) {
+        let corner: Lanes<L> = each(|l| if signs >> l & 1 == 1 { -need[l] } else { need[l] });
+        let along = dot(&corner, tangent);
+        most = most.max(dot(&corner, &corner) - along * along);
+    }
+    most.sqrt()
+}

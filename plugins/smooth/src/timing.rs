@@ -1,0 +1,237 @@
+//! The first timing: speed caps on nodes along the path, and two passes over them.
+
+use tandem_motion::tube::{Lanes, each};
+
+use crate::frame::{Frame, largest};
+use crate::route::{Chord, Run};
+
+/// A turn by more than this is sharp: nodes gather around it.
+const SHARP: f64 = 0.25;
+/// Distances of the nodes around a sharp turn: the first, and the factor from one to the next.
+const GRADED: (f64, f64) = (1e-3, 1.35);
+/// Longest distance between nodes.
+const LONGEST: f64 = 1.0;
+/// Distance below which vertices that are not sharp are no nodes of their own.
+const SHORTEST: f64 = 0.02;
+/// Factor from one speed tried to the next.
+const SLOWER: f64 = 0.9;
+
+/// A place on the path.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    s: f64,
+    speed: f64,
+    /// Along the path.
+    acceleration: f64,
+    jerk: f64,
+}
+
+/// Time and path coordinate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mark {
+    pub t: f64,
+    pub s: f64,
+}
+
+/// Memory of the nodes.
+#[derive(Debug, Default)]
+pub struct Timing {
+    nodes: Vec<Node>,
+}
+
+/// From where and how far.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// Path coordinate and speed at the start.
+    pub s: f64,
+    pub speed: f64,
+    /// Time after which the window stops, s.
+    pub window_s: f64,
+    /// The farthest that it may end.
+    pub end: f64,
+}
+
+/// Directions at `s` and a way behind and before it, looked up in chords.
+struct Looker<'a, const L: usize> {
+    chords: &'a [Chord<L>],
+    at: usize,
+}
+
+impl<const L: usize> Looker<'_, L> {
+    #[inline(always)]
+    fn behind(&self, s: f64) -> &Lanes<L> {
+        let mut i = self.at;
+        while i > 0 && self.chords[i].s > s {
+            i -= 1;
+        }
+        &self.chords[i].direction
+    }
+
+    #[inline(always)]
+    fn before(&self, s: f64) -> &Lanes<L> {
+        let mut i = self.at;
+        while i + 1 < self.chords.len() && self.chords[i + 1].s <= s {
+            i += 1;
+        }
+        &self.chords[i].direction
+    }
+
+    /// The direction here: at a vertex the mean.
+    fn here(&self, s: f64) -> Lanes<L> {
+        let chord = &self.chords[self.at];
+        if self.at > 0 && s <= chord.s + 1e-9 {
+            let last = &self.chords[self.at - 1].direction;
+            return each(|l| f64::midpoint(last[l], chord.direction[l]));
+        }
+        chord.direction
+    }
+}
+
+/// The highest speed, of `most` and downwards, at which a motion that runs over the path around `s` for the time of a corner
+/// keeps acceleration and jerk.
+fn cap<const L: usize>(looker: &Looker<'_, L>, frame: &Frame<L>, s: f64, most: f64, corner_s: f64) -> f64 {
+    let here = looker.here(s);
+    let mut v = most;
+    for _ in 0..80 {
+        let way = v * corner_s;
+        let (from, to) = (looker.behind(s - way), looker.before(s + way));
+        let mut fits = true;
+        for l in 0..L {
+            let bend = (from[l] - 2.0 * here[l] + to[l]).abs();
+            let turn = (to[l] - from[l]).abs() / (2.0 * corner_s);
+            fits &= v * bend <= 1.5 * frame.jerk[l] * corner_s * corner_s
+                && v * turn <= frame.acceleration[l]
+                && v * turn * turn <= frame.jerk[l];
+        }
+        if fits {
+            break;
+        }
+        v *= SLOWER;
+    }
+    v
+}
+
+impl Timing {
+    /// Times the path from `reach.s` on, behind the `marks` that are known already; the last mark is at rest.
+    pub fn make<const L: usize>(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        counted: &Lanes<L>,
+        reach: &Reach,
+        marks: &mut Vec<Mark>,
+    ) {
+        self.place_nodes(run, frame, counted, reach);
+        let last = self.nodes.len() - 1;
+        self.nodes[last].speed = 0.0;
+        for i in (1..last).rev() {
+            let (next, node) = (self.nodes[i + 1], &mut self.nodes[i]);
+            node.speed = node.speed.min(gain(&next, next.s - node.s));
+        }
+        let mut t = marks.last().map_or(0.0, |mark| mark.t);
+        for pair in self.nodes.windows(2) {
+            let way = pair[1].s - pair[0].s;
+            let cell_s = 2.0 * way / (pair[0].speed + pair[1].speed);
+            // From rest and to rest way goes with the third power of time.
+            let (from_rest, to_rest) = (pair[0].speed == 0.0, pair[1].speed == 0.0);
+            let cell_s = if from_rest || to_rest { 1.5 * cell_s } else { cell_s };
+            if from_rest != to_rest {
+                for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
+                    let part: f64 = if from_rest { share } else { 1.0 - share };
+                    let gone = if from_rest { part.powi(3) } else { 1.0 - part.powi(3) };
+                    marks.push(Mark { t: t + share * cell_s, s: pair[0].s + gone * way });
+                }
+            }
+            t += cell_s;
+            marks.push(Mark { t, s: pair[1].s });
+        }
+    }
+
+    fn place_nodes<const L: usize>(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        counted: &Lanes<L>,
+        reach: &Reach,
+    ) {
+        self.nodes.clear();
+        let mut looker = Looker { chords: run.chords, at: run.chord_at(reach.s, 0) };
+        let limits = frame.speed[usize::from(run.rapid)];
+        let (mut s, mut t, mut last_cap) = (reach.s, 0.0, f64::INFINITY);
+        // Where the next sharp turn before and the last one behind are.
+        let mut ahead = looker.at;
+        let mut grown = 0.25;
+        loop {
+            looker.at = run.chord_at(s, looker.at);
+            let chord = &run.chords[looker.at];
+            let speed = feed(chord, counted).min(frame.along(&limits, &chord.direction));
+            let jerk = frame.along(&frame.jerk, &chord.direction);
+            let tolerance = chord.tolerance;
+            let corner_s = (6.0 * tolerance / frame.jerk[0].min(jerk)).cbrt();
+            let most = speed.min(last_cap / (SLOWER * SLOWER * SLOWER * SLOWER));
+            let cap = cap(&looker, frame, s, most, corner_s);
+            last_cap = cap;
+            let acceleration = frame.along(&frame.acceleration, &chord.direction);
+            let mut node = Node { s, speed: cap, acceleration, jerk };
+            if let Some(before) = self.nodes.last() {
+                let way = s - before.s;
+                node.speed = cap.min(gain(before, way));
+                t += 2.0 * way / (before.speed + node.speed);
+            } else {
+                node.speed = reach.speed;
+            }
+            self.nodes.push(node);
+            if s >= reach.end || t >= reach.window_s && self.nodes.len() > 8 {
+                return;
+            }
+            s = next_node(run, &looker, reach, s, &mut ahead, &mut grown);
+        }
+    }
+}
+
+/// Path coordinate of the node behind the one at `s`.
+fn next_node<const L: usize>(
+    run: &Run<'_, L>,
+    looker: &Looker<'_, L>,
+    reach: &Reach,
+    s: f64,
+    ahead: &mut usize,
+    grown: &mut f64,
+) -> f64 {
+    let chords = run.chords;
+    let i = looker.at;
+    *ahead = (*ahead).max(i + 1);
+    // Nodes gather around sharp turns and the ends: behind one the distance grows, before one it shrinks.
+    let behind = if i == 0 || chords[i].turn > SHARP { s - chords[i].s.max(reach.s) } else { f64::INFINITY };
+    let next = chords.get(i + 1);
+    let vertex = next.map_or(reach.end, |next| next.s.min(reach.end));
+    let sharp = next.is_none_or(|next| next.turn > SHARP) || vertex >= reach.end;
+    let before = if sharp { vertex - s } else { f64::INFINITY };
+    let spread = (GRADED.1 - 1.0) * behind + GRADED.0;
+    let narrow = ((GRADED.1 - 1.0) / GRADED.1 * before).max(GRADED.0);
+    *grown = if i + 1 == *ahead && s > chords[i].s { (*grown * 1.2).min(LONGEST) } else { 0.25 };
+    let step = spread.min(narrow).min(*grown);
+    if !sharp && step >= vertex - s {
+        // Vertices that are near each other share a node.
+        let mut k = i + 1;
+        while k + 1 < chords.len() && chords[k].s < s + SHORTEST && chords[k + 1].turn <= SHARP {
+            k += 1;
+        }
+        return chords[k].s.min(reach.end).max(s + 1e-9);
+    }
+    if vertex - s < 1.3 * step { vertex } else { s + step }
+}
+
+/// The lane speed along a chord at which path speed reaches the feed.
+pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
+    let weighted: Lanes<L> = each(|l| counted[l] * chord.direction[l]);
+    let size = weighted.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if size > 0.0 && largest(&weighted) > 0.0 { chord.feed / size } else { f64::INFINITY }
+}
+
+/// The speed reached from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
+fn gain(from: &Node, way: f64) -> f64 {
+    let v = from.speed;
+    let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way;
+    (ramp * ramp).cbrt().min((v * v + 1.6 * from.acceleration * way).sqrt())
+}

@@ -1,0 +1,158 @@
+//! A planned window: quintics over time, from a state to rest.
+
+use tandem_motion::hermite;
+use tandem_motion::tube::{Lanes, each};
+
+use crate::sites::Timer;
+use crate::timing::Mark;
+
+/// Position, velocity and acceleration.
+pub type State<const L: usize> = [Lanes<L>; 3];
+
+/// What binds a piece of motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bound {
+    #[default]
+    Jerk,
+    Acceleration,
+    Velocity,
+    Feed,
+    Tolerance,
+}
+
+/// A polynomial of time in every lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<const L: usize> {
+    /// Coefficients, lowest power first.
+    pub c: [Lanes<L>; 6],
+    /// When it starts, s from the start of the window, and how long it takes.
+    pub start_s: f64,
+    pub duration_s: f64,
+    pub bound: Bound,
+}
+
+impl<const L: usize> Piece<L> {
+    /// The quintic from one state to another.
+    pub fn between(from: &State<L>, to: &State<L>, start_s: f64, duration_s: f64) -> Self {
+        let mut c = [[0.0; L]; 6];
+        for l in 0..L {
+            let ends = [from, to].map(|s| [s[0][l], s[1][l], s[2][l]]);
+            let lane = hermite(ends[0], ends[1], duration_s);
+            for n in 0..6 {
+                c[n][l] = lane[n];
+            }
+        }
+        Self { c, start_s, duration_s, bound: Bound::default() }
+    }
+
+    /// When it ends.
+    pub fn end_s(&self) -> f64 {
+        self.start_s + self.duration_s
+    }
+
+    /// Position at local time `t`.
+    #[inline(always)]
+    pub fn position(&self, t: f64) -> Lanes<L> {
+        let c = &self.c;
+        each(|l| c[0][l] + t * (c[1][l] + t * (c[2][l] + t * (c[3][l] + t * (c[4][l] + t * c[5][l])))))
+    }
+
+    /// Velocity at local time `t`.
+    #[inline(always)]
+    pub fn velocity(&self, t: f64) -> Lanes<L> {
+        let c = &self.c;
+        each(|l| {
+            c[1][l] + t * (2.0 * c[2][l] + t * (3.0 * c[3][l] + t * (4.0 * c[4][l] + t * 5.0 * c[5][l])))
+        })
+    }
+
+    /// Acceleration at local time `t`.
+    #[inline(always)]
+    pub fn acceleration(&self, t: f64) -> Lanes<L> {
+        let c = &self.c;
+        each(|l| 2.0 * c[2][l] + t * (6.0 * c[3][l] + t * (12.0 * c[4][l] + t * 20.0 * c[5][l])))
+    }
+
+    /// Jerk at local time `t`.
+    #[inline(always)]
+    pub fn jerk(&self, t: f64) -> Lanes<L> {
+        let c = &self.c;
+        each(|l| 6.0 * c[3][l] + t * (24.0 * c[4][l] + t * 60.0 * c[5][l]))
+    }
+
+    /// All three at local time `t`.
+    pub fn state(&self, t: f64) -> State<L> {
+        [self.position(t), self.velocity(t), self.acceleration(t)]
+    }
+}
+
+/// A window.
+#[derive(Debug)]
+pub struct Window<const L: usize> {
+    pub pieces: Vec<Piece<L>>,
+    /// Time and path coordinate, both growing.
+    pub marks: Vec<Mark>,
+    /// It ends where the run ends, and the run is closed.
+    pub whole: bool,
+    /// Until when it is to be driven, s.
+    pub commit_s: f64,
+    /// What it leaves for a stop: path deceleration and path jerk; and its highest path speed.
+    pub stop: Stop,
+}
+
+/// What a window leaves for a stop, as path speed counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    pub deceleration: f64,
+    pub jerk: f64,
+    pub speed: f64,
+}
+
+impl Default for Stop {
+    fn default() -> Self {
+        Self { deceleration: f64::INFINITY, jerk: f64::INFINITY, speed: 0.0 }
+    }
+}
+
+impl<const L: usize> Default for Window<L> {
+    fn default() -> Self {
+        Self { pieces: Vec::new(), marks: Vec::new(), whole: false, commit_s: 0.0, stop: Stop::default() }
+    }
+}
+
+impl<const L: usize> Window<L> {
+    /// How long it takes to its end.
+    pub fn duration_s(&self) -> f64 {
+        self.pieces.last().map_or(0.0, Piece::end_s)
+    }
+
+    /// The piece at `t`: the later one at a border.
+    pub fn piece_at(&self, t: f64) -> usize {
+        self.pieces.partition_point(|piece| piece.start_s <= t).max(1) - 1
+    }
+
+    /// Position, velocity and acceleration at `t`.
+    pub fn state(&self, t: f64) -> State<L> {
+        let piece = &self.pieces[self.piece_at(t)];
+        piece.state((t - piece.start_s).clamp(0.0, piece.duration_s))
+    }
+
+    /// When the motion passes `s`.
+    pub fn time_of(&self, s: f64) -> f64 {
+        let at = self.marks.partition_point(|mark| mark.s <= s).max(1) - 1;
+        Timer { marks: &self.marks, at: at.min(self.marks.len().saturating_sub(2)) }.time(s)
+    }
+
+    /// Path coordinate at `t`.
+    pub fn along(&self, t: f64) -> f64 {
+        let at = self.marks.partition_point(|mark| mark.t <= t).clamp(1, self.marks.len() - 1);
+        let (a, b) = (self.marks[at - 1], self.marks[at]);
+        let time = b.t - a.t;
+        if time > 0.0 { a.s + (b.s - a.s) * ((t - a.t) / time).clamp(0.0, 1.0) } else { b.s }
+    }
+
+    /// Path coordinate of its end.
+    pub fn end(&self) -> f64 {
+        self.marks.last().map_or(0.0, |mark| mark.s)
+    }
+}
