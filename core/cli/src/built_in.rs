@@ -9,6 +9,7 @@ pub fn registry() -> Result<Registry, String> {
     registry.register(tandem_after_interpolation::PLUGIN)?;
     registry.register(tandem_block_overlap::PLUGIN)?;
     registry.register(tandem_nurbs::PLUGIN)?;
+    registry.register(tandem_smooth::PLUGIN)?;
     registry.register(tandem_sim::PLUGIN)?;
     Ok(registry)
 }

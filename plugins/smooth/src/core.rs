@@ -10,7 +10,7 @@ use crate::plan::{Effort, Planning, Start, Tuning};
 use crate::profile;
 use crate::report::report;
 use crate::route::{Item, Route};
-use crate::window::{State, Window};
+use crate::window::{Piece, State, Window};
 
 /// Part of a window in which it may be left for the next.
 const COMMIT: (f64, f64) = (0.42, 0.70);
@@ -190,7 +190,15 @@ impl<const L: usize> Core<L> {
         let s = window.along(now_s);
         let run = self.route.run(s, self.finished);
         let window_s = self.planning.tuning.window_s;
-        let start = Start { state, s, resting: false, before: &self.before, end: run.end(), window_s, old: Some((&self.window, now_s)) };
+        let start = Start {
+            state,
+            s,
+            resting: false,
+            before: &self.before,
+            end: run.end(),
+            window_s,
+            old: Some((&self.window, now_s)),
+        };
         if self.planning.plan(&run, &self.frame, &start, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driven_s = Some(0.0);
@@ -201,7 +209,7 @@ impl<const L: usize> Core<L> {
             let whole_s = window.duration_s();
             let later_s = now_s + LATER * whole_s;
             let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
-            window.commit_s = window.pieces.get(place).map_or(whole_s, |piece| piece.end_s());
+            window.commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
             if window.commit_s > 0.97 * whole_s {
                 window.commit_s = whole_s;
             }
@@ -271,4 +279,3 @@ impl<const L: usize> AnyCore for Core<L> {
         self.planning.effort
     }
 }
-

@@ -75,17 +75,17 @@ impl<const L: usize> Frame<L> {
             _ => 0.0,
         })
     }
+}
 
-    /// The largest `x` with `x·|direction| ≤ limit` in every lane.
-    #[inline(always)]
-    pub fn along(&self, limit: &Lanes<L>, direction: &Lanes<L>) -> f64 {
-        let mut least = f64::INFINITY;
-        for i in 0..L {
-            let x = limit[i] / direction[i].abs().max(1e-12);
-            least = if x < least { x } else { least };
-        }
-        least
+/// The largest `x` with `x·|direction| ≤ limit` in every lane.
+#[inline(always)]
+pub fn along<const L: usize>(limit: &Lanes<L>, direction: &Lanes<L>) -> f64 {
+    let mut least = f64::INFINITY;
+    for l in 0..L {
+        let x = limit[l] / direction[l].abs().max(1e-12);
+        least = if x < least { x } else { least };
     }
+    least
 }
 
 /// Inner product.

@@ -60,13 +60,21 @@ const WARM: f64 = 0.55;
 /// Counts of what was done.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Effort {
+    /// Windows planned, refused ones too.
     pub windows: u64,
+    /// Windows refused.
     pub rejected: u64,
+    /// Rests where the program asks for none.
     pub stops: u64,
+    /// Rounds that a refusal of the check made necessary.
     pub repairs: u64,
+    /// Intervals of all rounds.
     pub intervals: u64,
+    /// Iterations of smoothing.
     pub smooth_iterations: u64,
+    /// Iterations of pacing.
     pub pace_iterations: u64,
+    /// Turns of smoothing and pacing.
     pub rounds: u64,
 }
 
@@ -168,8 +176,7 @@ impl<const L: usize> Planning<L> {
         self.marks.clear();
         self.marks.push(Mark { t: 0.0, s: start.s });
         let size = |v: &Lanes<L>| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let mut reach =
-            Reach { s: start.s, speed: size(&start.state[1]), window_s: start.window_s, end: start.end };
+        let mut reach = Reach { s: start.s, speed: size(&start.state[1]), window_s: start.window_s, end: start.end };
         if let Some((old, now_s)) = start.old {
             let until_s = now_s + WARM * (old.duration_s() - now_s);
             let known = old.marks.iter().filter(|mark| mark.t > now_s && mark.t <= until_s && mark.s > start.s);
@@ -197,7 +204,7 @@ impl<const L: usize> Planning<L> {
         let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
         self.lay_spline(run, start, &grid);
         self.sites.choose(run, &self.marks, grid, shares.boxes);
-        let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.sites, &frame.jerk);
+        let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.chosen, &frame.jerk);
         self.fill_pacer(run, frame, shares, counted);
         let asked = if last {
             Asked { gap: GAP, violation: 0.004, iterations: 25 }
@@ -239,7 +246,7 @@ impl<const L: usize> Planning<L> {
         let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
         let per_jerk: Lanes<L> = frame.jerk.map(|j| 1.0 / (shares.jerk * j));
         let per_acceleration: Lanes<L> = frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
-        let mut feeds = Feeds { run, along: &self.sites.along, sites: &self.sites.sites, at: 0 };
+        let mut feeds = Feeds { run, along: &self.sites.along, sites: &self.sites.chosen, at: 0 };
         let place = |[_, first, second, _]: &[Lanes<L>; 4], feed: f64| {
             let (mut squared, mut axis) = (0.0, 0.0f64);
             for l in 0..L {
@@ -278,7 +285,7 @@ impl<const L: usize> Planning<L> {
         let end = self.marks[self.marks.len() - 1].s;
         self.marks.clear();
         self.marks.push(Mark { t: 0.0, s: from });
-        for (site, (s, _)) in self.sites.sites.iter().zip(&self.sites.along) {
+        for (site, (s, _)) in self.sites.chosen.iter().zip(&self.sites.along) {
             let k = site.interval as usize;
             let time = self.times[k] + rate.time_s(k, site.z, h);
             self.marks.push(Mark { t: time, s: *s });

@@ -72,7 +72,7 @@ impl Planner for SmoothPlanner {
                 refuse("a block needs a feed above zero")
             }
             BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
-            _ if !(tolerance_mm >= LEAST_TOLERANCE_MM) => {
+            _ if tolerance_mm.is_nan() || tolerance_mm < LEAST_TOLERANCE_MM => {
                 refuse("smooth needs a path tolerance of 0.0002 mm or more (G64 P); G61 drives lines exactly")
             }
             BlockKind::Nurbs => flatten::check(&self.context.axes, block),

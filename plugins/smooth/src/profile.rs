@@ -2,7 +2,7 @@
 
 use tandem_motion::tube::Lanes;
 
-use crate::frame::Frame;
+use crate::frame::{Frame, along};
 use crate::route::{Chord, Run};
 use crate::timing::{Mark, feed};
 use crate::window::{Bound, Piece, Stop, Window};
@@ -50,15 +50,15 @@ pub fn drive<const L: usize>(
     window: &mut Window<L>,
 ) {
     let direction = &chord.direction;
-    let speed = feed(chord, counted).min(frame.along(&frame.speed[usize::from(run.rapid)], direction));
-    let along = Along {
+    let speed = feed(chord, counted).min(along(&frame.speed[usize::from(run.rapid)], direction));
+    let limits = Along {
         speed: SHARE * speed,
-        acceleration: SHARE * frame.along(&frame.acceleration, direction),
-        jerk: SHARE * frame.along(&frame.jerk, direction),
+        acceleration: SHARE * along(&frame.acceleration, direction),
+        jerk: SHARE * along(&frame.jerk, direction),
     };
     let length = to - from;
-    let peak = along.peak(length);
-    let (rise, constant) = along.ramp(peak);
+    let peak = limits.peak(length);
+    let (rise, constant) = limits.ramp(peak);
     let cruise = ((length - peak * (2.0 * rise + constant)) / peak).max(0.0);
     let jerk = if rise > 0.0 { peak / (rise * (rise + constant)) } else { 0.0 };
     let phases =
@@ -66,7 +66,7 @@ pub fn drive<const L: usize>(
     window.pieces.clear();
     window.marks.clear();
     window.marks.push(Mark { t: 0.0, s: from });
-    let bound = if peak >= along.speed { Bound::Feed } else { Bound::Jerk };
+    let bound = if peak >= limits.speed { Bound::Feed } else { Bound::Jerk };
     let (mut t, mut way, mut v, mut a) = (0.0, 0.0, 0.0, 0.0);
     for (time, j) in phases.into_iter().filter(|(time, _)| *time > 1e-12) {
         let start = chord.at(from + way);
@@ -92,8 +92,8 @@ pub fn drive<const L: usize>(
 fn stop<const L: usize>(frame: &Frame<L>, counted: &Lanes<L>, direction: &Lanes<L>, peak: f64) -> Stop {
     let per = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>().sqrt().max(1e-12);
     Stop {
-        deceleration: per * frame.along(&frame.acceleration, direction),
-        jerk: per * frame.along(&frame.jerk, direction),
+        deceleration: per * along(&frame.acceleration, direction),
+        jerk: per * along(&frame.jerk, direction),
         speed: per * peak,
     }
 }

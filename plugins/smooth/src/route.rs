@@ -6,12 +6,12 @@ use tandem_motion::tube::Lanes;
 use tandem_sdk::{Block, BlockKind};
 
 use crate::flatten::{Flat, SAGITTA_SHARE};
-use crate::frame::{Frame, dot, minus, plus};
+use crate::frame::{Frame, along, dot, minus, plus};
 
 /// Way behind the present place that still counts, mm.
 const BEHIND: f64 = 2.0;
-/// Direction cosine between blocks below which the path turns back: it rests there (150°).
-const TURNS_BACK: f64 = -0.866;
+/// Direction cosine between blocks below which the path turns back: it rests there (a quarter of a degree off).
+const TURNS_BACK: f64 = -0.999_99;
 
 /// A straight piece of the path.
 #[derive(Clone, Copy, Debug)]
@@ -126,11 +126,6 @@ impl<const L: usize> Run<'_, L> {
 }
 
 impl<const L: usize> Route<L> {
-    /// Path coordinate where the known path ends.
-    pub fn end(&self) -> f64 {
-        self.end
-    }
-
     /// Chords kept.
     pub fn chord_count(&self) -> usize {
         self.chords.len()
@@ -196,8 +191,9 @@ impl<const L: usize> Route<L> {
         let chords = (self.first + self.chords.len() as u64 - first_chord) as u32;
         let rests = block.ends_at_rest();
         let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
-        let fastest = before.map_or(f64::INFINITY, |direction| frame.along(limits, &direction));
-        let least_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);
+        let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
+        let least_s =
+            (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);
         // The slices of a curve are not valid any longer than the call.
         let block = Block { nurbs: tandem_sdk::NurbsGeometry::default(), ..*block };
         self.items.push_back(Item::Leg(Leg {

@@ -33,13 +33,13 @@ pub struct Candidate<const L: usize> {
 pub struct Sites<const L: usize> {
     candidates: Vec<Candidate<L>>,
     /// The sites chosen, with their path coordinates and chords.
-    pub sites: Vec<Site<L>>,
+    pub chosen: Vec<Site<L>>,
     pub along: Vec<(f64, u32)>,
 }
 
 impl<const L: usize> Default for Sites<L> {
     fn default() -> Self {
-        Self { candidates: Vec::new(), sites: Vec::new(), along: Vec::new() }
+        Self { candidates: Vec::new(), chosen: Vec::new(), along: Vec::new() }
     }
 }
 
@@ -77,7 +77,7 @@ impl<const L: usize> Sites<L> {
     /// Chooses sites by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
     /// gap exceeds three quarters of a step. `share` of the tolerance is used.
     pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, share: f64) {
-        self.sites.clear();
+        self.chosen.clear();
         self.along.clear();
         let h = grid.step_s;
         let end_s = grid.intervals as f64 * h;
@@ -125,20 +125,12 @@ impl<const L: usize> Sites<L> {
         }
     }
 
-    fn add(
-        &mut self,
-        run: &Run<'_, L>,
-        t: f64,
-        candidate: &Candidate<L>,
-        half: &Lanes<L>,
-        grid: Grid,
-        share: f64,
-    ) {
+    fn add(&mut self, run: &Run<'_, L>, t: f64, candidate: &Candidate<L>, half: &Lanes<L>, grid: Grid, share: f64) {
         let place = t / grid.step_s;
         let interval = (place as usize).min(grid.intervals - 1);
         let point = run.chords[candidate.chord as usize].at(candidate.s);
         let half = each(|l| share * half[l]);
-        self.sites.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
+        self.chosen.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
         self.along.push((candidate.s, candidate.chord));
     }
 }
@@ -167,11 +159,8 @@ impl Timer<'_> {
 fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes: usize) -> Lanes<L> {
     let chords = run.chords;
     let (i, s) = (candidate.chord as usize, candidate.s);
-    let tolerance = if candidate.vertex && i > 0 {
-        chords[i].tolerance.min(chords[i - 1].tolerance)
-    } else {
-        chords[i].tolerance
-    };
+    let tolerance =
+        if candidate.vertex && i > 0 { chords[i].tolerance.min(chords[i - 1].tolerance) } else { chords[i].tolerance };
     let (mut need, sharp_way) = needs(run, i, s);
     let most = largest(&need);
     if most > 0.0 {

@@ -2,7 +2,7 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, largest};
+use crate::frame::{Frame, along, largest};
 use crate::route::{Chord, Run};
 
 /// A turn by more than this is sharp: nodes gather around it.
@@ -147,13 +147,7 @@ impl Timing {
         }
     }
 
-    fn place_nodes<const L: usize>(
-        &mut self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        counted: &Lanes<L>,
-        reach: &Reach,
-    ) {
+    fn place_nodes<const L: usize>(&mut self, run: &Run<'_, L>, frame: &Frame<L>, counted: &Lanes<L>, reach: &Reach) {
         self.nodes.clear();
         let mut looker = Looker { chords: run.chords, at: run.chord_at(reach.s, 0) };
         let limits = frame.speed[usize::from(run.rapid)];
@@ -164,14 +158,14 @@ impl Timing {
         loop {
             looker.at = run.chord_at(s, looker.at);
             let chord = &run.chords[looker.at];
-            let speed = feed(chord, counted).min(frame.along(&limits, &chord.direction));
-            let jerk = frame.along(&frame.jerk, &chord.direction);
+            let speed = feed(chord, counted).min(along(&limits, &chord.direction));
+            let jerk = along(&frame.jerk, &chord.direction);
             let tolerance = chord.tolerance;
             let corner_s = (6.0 * tolerance / frame.jerk[0].min(jerk)).cbrt();
             let most = speed.min(last_cap / (SLOWER * SLOWER * SLOWER * SLOWER));
             let cap = cap(&looker, frame, s, most, corner_s);
             last_cap = cap;
-            let acceleration = frame.along(&frame.acceleration, &chord.direction);
+            let acceleration = along(&frame.acceleration, &chord.direction);
             let mut node = Node { s, speed: cap, acceleration, jerk };
             if let Some(before) = self.nodes.last() {
                 let way = s - before.s;

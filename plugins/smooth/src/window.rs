@@ -61,9 +61,7 @@ impl<const L: usize> Piece<L> {
     #[inline(always)]
     pub fn velocity(&self, t: f64) -> Lanes<L> {
         let c = &self.c;
-        each(|l| {
-            c[1][l] + t * (2.0 * c[2][l] + t * (3.0 * c[3][l] + t * (4.0 * c[4][l] + t * 5.0 * c[5][l])))
-        })
+        each(|l| c[1][l] + t * (2.0 * c[2][l] + t * (3.0 * c[3][l] + t * (4.0 * c[4][l] + t * 5.0 * c[5][l]))))
     }
 
     /// Acceleration at local time `t`.
@@ -71,13 +69,6 @@ impl<const L: usize> Piece<L> {
     pub fn acceleration(&self, t: f64) -> Lanes<L> {
         let c = &self.c;
         each(|l| 2.0 * c[2][l] + t * (6.0 * c[3][l] + t * (12.0 * c[4][l] + t * 20.0 * c[5][l])))
-    }
-
-    /// Jerk at local time `t`.
-    #[inline(always)]
-    pub fn jerk(&self, t: f64) -> Lanes<L> {
-        let c = &self.c;
-        each(|l| 6.0 * c[3][l] + t * (24.0 * c[4][l] + t * 60.0 * c[5][l]))
     }
 
     /// All three at local time `t`.

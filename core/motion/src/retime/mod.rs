@@ -25,8 +25,8 @@ mod rows;
 mod solve;
 mod timing;
 
-pub use solve::{Retimer, Status};
 pub use banded::Pentadiagonal;
+pub use solve::{Retimer, Status};
 pub use timing::{Rate, weights};
 
 /// Axes that a retiming takes.

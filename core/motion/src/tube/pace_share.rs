@@ -61,7 +61,15 @@ impl<const L: usize> Default for Share<L> {
 impl<const L: usize> Share<L> {
     /// Adds the pair of rows `group`.
     #[inline(always)]
-    pub fn pair(&mut self, form: &Form<L>, beta: &[f64; 3], sides: &Sides, rows: &mut Rows<L>, group: usize, target: f64) {
+    pub fn pair(
+        &mut self,
+        form: &Form<L>,
+        beta: &[f64; 3],
+        sides: &Sides,
+        rows: &mut Rows<L>,
+        group: usize,
+        target: f64,
+    ) {
         let value: Lanes<L> = each(|l| form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2]);
         let over = sides.common - sides.right;
         self.violation = each(|l| larger(self.violation[l], over + value[l].abs()));
@@ -116,9 +124,6 @@ impl<const L: usize> Share<L> {
     #[inline(always)]
     pub fn sums(&self) -> ([f64; 6], [f64; 3]) {
         let (h, g) = (&self.hessian, &self.gradient);
-        (
-            [sum(&h[0]), sum(&h[1]), sum(&h[2]), sum(&h[3]), sum(&h[4]), sum(&h[5])],
-            [sum(&g[0]), sum(&g[1]), sum(&g[2])],
-        )
+        ([sum(&h[0]), sum(&h[1]), sum(&h[2]), sum(&h[3]), sum(&h[4]), sum(&h[5])], [sum(&g[0]), sum(&g[1]), sum(&g[2])])
     }
 }

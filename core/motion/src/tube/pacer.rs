@@ -165,7 +165,7 @@ impl<const L: usize> Pacer<L> {
             status.violation = self.assemble(target);
             let good = status.gap < asked.gap && status.violation < asked.violation;
             // Multipliers grow without bound where no rate keeps the rows.
-            let lost = !(status.gap < HOPELESS);
+            let lost = status.gap > HOPELESS || status.gap.is_nan();
             if good || lost || status.iterations == asked.iterations {
                 return status;
             }
@@ -313,9 +313,8 @@ impl<const L: usize> Pacer<L> {
                     let change = rows.residual[group][n];
                     let (slack, multiplier) = (rows.slack[group][n], rows.multiplier[group][n]);
                     rows.slack[group][n] = each(|l| slack[l] + length * change[l]);
-                    rows.multiplier[group][n] = each(|l| {
-                        multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) / slack[l]
-                    });
+                    rows.multiplier[group][n] =
+                        each(|l| multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) / slack[l]);
                 }
             }
             for n in 0..SINGLES {

@@ -191,8 +191,7 @@ impl<const L: usize> Smoother<L> {
         const D: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
         let scale = &self.scale;
         let jerk: Lanes<L> = each(|l| (c[3][l] - c[0][l] + 3.0 * (c[1][l] - c[2][l])) * scale[l]);
-        let bend: Lanes<L> =
-            each(|l| (GENTLE + if jerk[l].abs() > CLOSING { 1.0 } else { 0.0 }) * scale[l] * scale[l]);
+        let bend: Lanes<L> = each(|l| (GENTLE + if jerk[l].abs() > CLOSING { 1.0 } else { 0.0 }) * scale[l] * scale[l]);
         let slope: Lanes<L> = each(|l| {
             let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
             (GENTLE * jerk[l] + over) * scale[l]
@@ -224,9 +223,8 @@ impl<const L: usize> Smoother<L> {
                 let change = &row.residual[n];
                 most = each(|l| larger(most[l], -change[l] / slack[l]));
                 // The multiplier's change over itself: (target/λ − s − Δs)/s.
-                most_back = each(|l| {
-                    larger(most_back[l], (slack[l] + change[l] - target[l] / multiplier[l]) / slack[l])
-                });
+                most_back =
+                    each(|l| larger(most_back[l], (slack[l] + change[l] - target[l] / multiplier[l]) / slack[l]));
             }
         }
         let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
@@ -235,9 +233,8 @@ impl<const L: usize> Smoother<L> {
             for n in 0..2 {
                 let (slack, multiplier, change) = (row.slack[n], row.multiplier[n], row.residual[n]);
                 row.slack[n] = each(|l| slack[l] + length[l] * change[l]);
-                row.multiplier[n] = each(|l| {
-                    multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) / slack[l]
-                });
+                row.multiplier[n] =
+                    each(|l| multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) / slack[l]);
             }
         }
         for (point, step) in spline.points.iter_mut().zip(&self.step) {

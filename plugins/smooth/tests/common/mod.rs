@@ -1,0 +1,192 @@
+//! Programs as blocks, a planner run as the rough loop runs it, and its samples judged by brute force.
+#![allow(dead_code, reason = "each user takes its own part")]
+
+use tandem_sdk::{
+    Accepted, Axes, AxisLimits, AxisVector, Block, BlockKind, BlockReport, Limits, Planner, PlannerContext, Segment,
+    SegmentSink, size_of_contract,
+};
+use tandem_smooth::{Effort, Options, SmoothPlanner};
+
+pub type Point = [f64; 3];
+
+/// Three linear axes: 250 mm/s, 1000 mm/s², 20 000 mm/s³.
+pub fn context(position: &Point, tolerance_mm: f64) -> PlannerContext {
+    let axis = AxisLimits {
+        min_mm: -1e4,
+        max_mm: 1e4,
+        feed_mm_per_s: 250.0,
+        rapid_mm_per_s: 250.0,
+        acceleration_mm_per_s2: 1000.0,
+        jerk_mm_per_s3: 20000.0,
+        speed_difference_mm_per_s: 0.0,
+    };
+    PlannerContext {
+        size: size_of_contract::<PlannerContext>(),
+        axes: Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap(),
+        limits: Limits::new(&[axis; 3]).unwrap(),
+        fine_period_s: 0.001,
+        rough_period_s: 0.008,
+        path_tolerance_mm: tolerance_mm,
+        time_constant_s: 0.05,
+        max_feed_ratio: 1.0,
+        position: AxisVector::from_slice(position),
+    }
+}
+
+/// What a planner emitted.
+#[derive(Default)]
+pub struct Collected {
+    pub segments: Vec<Segment>,
+    pub reports: Vec<BlockReport>,
+}
+
+impl SegmentSink for Collected {
+    fn segment(&mut self, segment: &Segment) {
+        self.segments.push(*segment);
+    }
+    fn block(&mut self, report: &BlockReport) {
+        self.reports.push(*report);
+    }
+}
+
+/// Lines through `points`.
+pub fn lines(points: &[Point], feed_mm_per_s: f64) -> Vec<Block> {
+    let pairs = points.windows(2).filter(|pair| pair[0] != pair[1]).enumerate();
+    pairs
+        .map(|(index, pair)| {
+            let mut block = Block::at(AxisVector::from_slice(&pair[0]));
+            block.end = AxisVector::from_slice(&pair[1]);
+            (block.kind, block.index, block.line) = (BlockKind::Line, index as u64, index as u32 + 1);
+            block.length_mm = (0..3).map(|i| (pair[1][i] - pair[0][i]).powi(2)).sum::<f64>().sqrt();
+            block.feed_mm_per_s = feed_mm_per_s;
+            block
+        })
+        .collect()
+}
+
+/// A part program of G1 lines with all axes, or a case with `points` and `limits`: points and feed, mm/s.
+pub fn read(path: &str) -> (Vec<Point>, f64) {
+    let text = std::fs::read_to_string(path).unwrap();
+    if text.starts_with('{') {
+        let case: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let numbers = |v: &serde_json::Value| -> Point { std::array::from_fn(|i| v[i].as_f64().unwrap_or(0.0)) };
+        let points = case["points"].as_array().map_or(vec![], |all| all.iter().map(numbers).collect());
+        return (points, case["limits"]["feed"].as_f64().unwrap());
+    }
+    let (mut points, mut feed) = (vec![[0.0; 3]], 50.0);
+    for line in text.lines() {
+        if let Some(f) = line.strip_prefix('F') {
+            feed = f.trim().parse::<f64>().unwrap() / 60.0;
+        }
+        if line.starts_with("G1X") {
+            let number = |from: char, to: Option<char>| -> f64 {
+                let rest = line.split(from).nth(1).unwrap();
+                to.map_or(rest, |to| rest.split(to).next().unwrap()).trim().parse().unwrap()
+            };
+            points.push([number('X', Some('Y')), number('Y', Some('Z')), number('Z', None)]);
+        }
+    }
+    (points, feed)
+}
+
+/// Drives `blocks` from the first one's start.
+pub fn run(blocks: &[Block], options: &Options, context: &PlannerContext) -> (Collected, Effort) {
+    let mut planner = SmoothPlanner::new(options, context).unwrap();
+    let (mut collected, mut next) = (Collected::default(), 0);
+    loop {
+        while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
+            next += 1;
+        }
+        if next == blocks.len() {
+            planner.finish();
+        }
+        if planner.advance(0.008, &mut collected).unwrap().done != 0 {
+            return (collected, planner.effort());
+        }
+    }
+}
+
+/// The samples of a fine period of 1 ms: a rest ends its period.
+pub fn samples(segments: &[Segment]) -> Vec<Point> {
+    let mut samples = Vec::new();
+    let (mut start_s, mut next_s) = (0.0, 0.0);
+    for segment in segments {
+        let end_s = start_s + segment.duration_s;
+        while next_s < end_s - 1e-12 {
+            let at = segment.position(next_s - start_s);
+            samples.push([at[0], at[1], at[2]]);
+            next_s += 1e-3;
+        }
+        start_s = end_s;
+        if segment.duration_s == 0.0 {
+            let at = segment.position(0.0);
+            samples.push([at[0], at[1], at[2]]);
+            (start_s, next_s) = (0.0, 1e-3);
+        }
+    }
+    samples
+}
+
+/// What samples reach.
+#[derive(Clone, Copy, Debug)]
+pub struct Peaks {
+    pub time_s: f64,
+    pub speed: f64,
+    pub axis_speed: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+    /// Of the samples from the path, and of its vertices from the samples.
+    pub deviation_mm: [f64; 2],
+}
+
+/// Judges samples; distances by brute force over every chord where that is affordable.
+pub fn judge(samples: &[Point], points: &[Point]) -> Peaks {
+    let mut padded = vec![samples[0]; 4];
+    padded.extend(samples);
+    padded.extend([samples[samples.len() - 1]; 4]);
+    let differences = |values: &[Point]| -> Vec<Point> {
+        values.windows(2).map(|p| std::array::from_fn(|i| (p[1][i] - p[0][i]) * 1e3)).collect()
+    };
+    let most = |values: &[Point]| values.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+    let velocity = differences(&padded);
+    let acceleration = differences(&velocity);
+    let jerk = differences(&acceleration);
+    let size = |v: &Point| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let brute = points.len() * samples.len() < 30_000_000;
+    Peaks {
+        time_s: (samples.len() - 1) as f64 * 1e-3,
+        speed: velocity.iter().map(size).fold(0.0, f64::max),
+        axis_speed: most(&velocity),
+        acceleration: most(&acceleration),
+        jerk: most(&jerk),
+        deviation_mm: [deviation(samples, points, brute), deviation(points, samples, brute)],
+    }
+}
+
+fn distance(p: &Point, a: &Point, b: &Point) -> f64 {
+    let d: Point = std::array::from_fn(|i| b[i] - a[i]);
+    let w: Point = std::array::from_fn(|i| p[i] - a[i]);
+    let squared: f64 = d.iter().map(|v| v * v).sum();
+    let along: f64 = d.iter().zip(&w).map(|(d, w)| d * w).sum();
+    let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (0..3).map(|i| (w[i] - share * d[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The largest distance of `points` from the chain; not by brute force it is looked for near the last place.
+fn deviation(points: &[Point], chain: &[Point], brute: bool) -> f64 {
+    let (mut near, mut worst) = (0usize, 0.0f64);
+    for point in points {
+        let last = chain.len() - 1;
+        let (from, to) = if brute { (0, last) } else { (near.saturating_sub(60), (near + 120).min(last)) };
+        let (mut best, mut found) = (f64::INFINITY, near);
+        for i in from..to {
+            let off = distance(point, &chain[i], &chain[i + 1]);
+            if off < best {
+                (best, found) = (off, i);
+            }
+        }
+        near = found;
+        worst = worst.max(best);
+    }
+    worst
+}

@@ -1,0 +1,66 @@
+//! The programs that other planners are compared on: time, limits, tolerance, and how little the settings matter.
+
+mod common;
+
+use common::{Peaks, context, judge, lines, read, run, samples};
+use tandem_smooth::{Effort, Options};
+
+fn path(name: &str) -> String {
+    let root = format!("{}/../..", env!("CARGO_MANIFEST_DIR"));
+    match name {
+        "square" | "serpentine" | "raster" | "spiral" => format!("{root}/examples/programs/{name}.ngc"),
+        _ => format!("{root}/tests/fixtures/cases/smooth_{name}.json"),
+    }
+}
+
+/// Drives a program, and sees to it that every limit is kept.
+fn drive(name: &str, options: &Options) -> (Peaks, Effort) {
+    let (points, feed) = read(&path(name));
+    let (collected, effort) = run(&lines(&points, feed), options, &context(&points[0], 0.01));
+    let peaks = judge(&samples(&collected.segments), &points);
+    let what = format!("{name} {options:?}: {peaks:?}");
+    assert!(peaks.axis_speed <= 250.0 && peaks.speed <= feed, "{what}");
+    assert!(peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01, "{what}");
+    assert!(peaks.deviation_mm.iter().all(|off| *off <= 0.01), "{what}");
+    assert_eq!(collected.reports.len(), points.len() - 1, "{what}");
+    (peaks, effort)
+}
+
+/// The median over neighbouring grids and shares of the tolerance.
+fn median_s(name: &str) -> f64 {
+    let mut times = Vec::new();
+    for grid_ms in [5.5, 6.0, 6.5] {
+        for tolerance_share in [0.945, 0.955, 0.965] {
+            let options = Options { grid_ms, tolerance_share, ..Options::default() };
+            let (peaks, effort) = drive(name, &options);
+            assert_eq!(effort.stops, 0, "{name} {options:?}");
+            times.push(peaks.time_s);
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    println!("{name}: {:.3} to {:.3} s, median {:.3} s", times[0], times[8], times[4]);
+    times[4]
+}
+
+#[test]
+fn times_are_near_the_best_known_whatever_the_settings() {
+    for (name, most_s) in [
+        ("square", 1.41),
+        ("serpentine", 2.82),
+        ("raster", 28.95),
+        ("spiral", 20.30),
+        ("corner90", 1.375),
+        ("zigzag", 1.40),
+        ("arcline", 1.065),
+    ] {
+        assert!(median_s(name) <= most_s, "{name}");
+    }
+}
+
+#[test]
+fn cases_of_every_kind_keep_all_limits() {
+    for name in ["rand2d", "rand3d", "noisy", "tiny", "fast"] {
+        let (peaks, effort) = drive(name, &Options::default());
+        println!("{name}: {:.3} s, {} stops, {} windows refused", peaks.time_s, effort.stops, effort.rejected);
+    }
+}
