@@ -93,12 +93,10 @@ fn curves_are_driven_within_the_jerk_limit() {
         for scenario in [Scenario::of(&butterfly), Scenario::text(MIXTURE), Scenario::text(&many_curves())] {
             let done = scenario.on(&machine).with(&["--set", &format!("planner.options.form={form}")]).run();
             assert_eq!(done.status(), 0, "{}", done.errors());
-            for count in ["limit_violations", "guard_stops", "starvations"] {
-                assert_eq!(done.number(count), 0.0, "{count}");
+            for count in ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
+            {
+                assert_eq!(done.number(count), 0.0, "{form} {count}");
             }
-            // At knots single points between the samples exceed the jerk limit a little, and the fine loop answers.
-            assert!(done.number("jerk_relaxed_samples") < 4.0, "{}", done.number("jerk_relaxed_samples"));
-            println!("{form} {} {}", done.number("motion_time_s"), done.number("governed_samples"));
             let verdict = done.judge(|options| {
                 options.sample_tolerance_mm = Some(2e-6);
                 options.vertex_tolerance_mm = Some(0.3);

@@ -90,6 +90,14 @@ impl Course {
         }
     }
 
+    /// Distance from `s_mm` of stretch `index` within which the path has no feature that it does not have there, mm. Does
+    /// not allocate.
+    pub fn smooth_for_mm(&self, index: usize, s_mm: f64, place: &mut Place) -> f64 {
+        let Some(table) = &self.stretches[index].table else { return f64::INFINITY };
+        let (length_mm, end_mm) = table.part(s_mm, place);
+        (length_mm / 3.0).min((end_mm - s_mm).max(length_mm / 100.0))
+    }
+
     /// Length of a vector over the axes that path speed counts.
     pub fn counted_length(&self, vector: &AxisVector) -> f64 {
         match &self.shape {

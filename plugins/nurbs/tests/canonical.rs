@@ -3,8 +3,8 @@
 mod common;
 
 use common::measure::{BEST_S, Figures, figures};
-use common::{canonical, context, curve_block, run};
-use tandem_sdk::SegmentFlags;
+use common::{canonical, case, context, curve_block, run};
+use tandem_sdk::{AxisVector, Block, BlockKind, OwnedBlock, SegmentFlags};
 
 fn drive(form: &str, name: &str) -> Figures {
     let (data, length_mm) = canonical(name);
@@ -43,5 +43,23 @@ fn windowed_keeps_the_limits_along_the_path_too() {
         let [_, acceleration, jerk] = figures.path;
         assert!(acceleration <= 5000.0 && jerk <= 4e5, "{name}: {figures:?}");
         assert!(figures.time_s <= most * best_s, "{name}: {}", figures.time_s / best_s);
+    }
+}
+
+/// From rest to rest in a line, against the closed form of the fastest motion under limits of the axes.
+#[test]
+fn lines_take_the_shortest_time() {
+    for row in case("002_line")["cases"].as_array().unwrap().iter().filter(|row| row["limits"] == "axis") {
+        let number = |key: &str| row[key].as_f64().unwrap();
+        let (length_mm, angle) = (number("L_mm"), number("angle_deg").to_radians());
+        let mut block = Block::at(AxisVector::ZERO);
+        block.end = AxisVector::from_slice(&[length_mm * angle.cos(), length_mm * angle.sin()]);
+        (block.kind, block.length_mm, block.feed_mm_per_s) = (BlockKind::Line, length_mm, 250.0);
+        for (form, most) in [("scan", 1.03), ("windowed", 1.15)] {
+            let block = OwnedBlock::new(block, None);
+            let collected = run(&format!("form = \"{form}\""), &context(AxisVector::ZERO), &[block]);
+            let ratio = collected.duration_s() / number("T_closed_form_s");
+            assert!(ratio > 0.999 && ratio < most, "{form} {row}: {ratio}");
+        }
     }
 }

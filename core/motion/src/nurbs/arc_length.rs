@@ -124,6 +124,13 @@ impl ArcLength {
         fit.start_mm + curve.length_in(fit.span, fit.from, u.min(fit.to)).mm
     }
 
+    /// Length of the part of the table that holds `s_mm`, and where it ends, mm: the curve is smooth on this scale, and
+    /// sharp features have parts of their own. Does not allocate.
+    pub fn part(&self, s_mm: f64, place: &mut Place) -> (f64, f64) {
+        let fit = &self.fits[self.find(s_mm, place)];
+        (fit.length_mm, fit.start_mm + fit.length_mm)
+    }
+
     /// The part that holds `s_mm`, sought a few parts around `place`, then by halving.
     #[inline]
     fn find(&self, s_mm: f64, place: &mut Place) -> usize {

@@ -46,12 +46,15 @@ pub struct Point {
     pub third: [f64; MAX_LANES],
     /// Highest rate squared here: feed, chord error and axis speeds together.
     pub most: f64,
+    /// Share of the jerk limits that may be used here, beside that of the whole motion: less where the motion between the
+    /// places takes more jerk than at them.
+    pub jerk_share: f64,
 }
 
 impl Default for Point {
     fn default() -> Self {
         let zero = [0.0; MAX_LANES];
-        Self { first: zero, second: zero, third: zero, most: f64::INFINITY }
+        Self { first: zero, second: zero, third: zero, most: f64::INFINITY, jerk_share: 1.0 }
     }
 }
 

@@ -53,7 +53,7 @@ pub fn push_forms(forms: &mut Vec<Form>, points: &[Point; PLACES], limits: &Lane
     let places: [[Form; 3]; PLACES] = [0.0, 0.5, 1.0].map(weights);
     for (point, [value, slope, curve]) in points.iter().zip(&places) {
         for lane in 0..limits.lanes {
-            let per = 1.0 / (jerk_share * limits.jerk[lane]);
+            let per = 1.0 / (jerk_share * point.jerk_share * limits.jerk[lane]);
             let (x1, x2, x3) = (point.first[lane], point.second[lane], point.third[lane]);
             forms.push(std::array::from_fn(|n| {
                 per * (x3 * value[n] + 1.5 * x2 * slope[n] * scales[1] + 0.5 * x1 * curve[n] * scales[2])

@@ -10,12 +10,28 @@ use super::{End, LaneLimits, PLACES, Point};
 const ITERATIONS: usize = 40;
 /// Mean complementarity at which a solution is good enough.
 const ENOUGH: f64 = 1e-5;
+/// Mean complementarity from which no solution is found any more: there is none.
+const LOST: f64 = 1e6;
 /// Violation of a row, as a share of its limit, that is as good as none.
 const FEASIBLE: f64 = 2e-3;
 /// How near to its bound a step may go.
 const BOUNDARY: f64 = 0.95;
 /// Bounds on b of an interval.
 const SINGLES: usize = PLACES + 1;
+
+/// How solving starts.
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    /// Least slack.
+    slack: f64,
+    /// Slack times multiplier.
+    product: f64,
+}
+
+/// From a rate of 1, which may be far from what is sought.
+const FIRST: Start = Start { slack: 0.1, product: 0.05 };
+/// From a rate that was found for about the same points.
+const AGAIN: Start = Start { slack: 0.01, product: 1e-3 };
 
 /// How solving ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +80,35 @@ impl Retimer {
         step_s: f64,
         ends: (End, End),
     ) -> Status {
+        self.prepare(points, limits, jerk_share, step_s, ends);
+        self.rate.coefficients.clear();
+        self.rate.coefficients.resize(points.len() + 2, 1.0);
+        self.start(FIRST);
+        self.iterate()
+    }
+
+    /// The same, from the present [`Retimer::rate`]: that of points which were about the same, on the same grid.
+    pub fn solve_again(
+        &mut self,
+        points: &[[Point; PLACES]],
+        limits: &LaneLimits,
+        jerk_share: f64,
+        step_s: f64,
+        ends: (End, End),
+    ) -> Status {
+        self.prepare(points, limits, jerk_share, step_s, ends);
+        self.start(AGAIN);
+        self.iterate()
+    }
+
+    fn prepare(
+        &mut self,
+        points: &[[Point; PLACES]],
+        limits: &LaneLimits,
+        jerk_share: f64,
+        step_s: f64,
+        ends: (End, End),
+    ) {
         self.lanes = limits.lanes;
         self.values = value_weights();
         self.forms.clear();
@@ -73,8 +118,6 @@ impl Retimer {
         self.bounds.clear();
         self.bounds.extend(points.iter().map(Bounds::new));
         self.name_unknowns(points.len() + 2, ends);
-        self.start(points.len());
-        self.iterate()
     }
 
     fn iterate(&mut self) -> Status {
@@ -83,7 +126,7 @@ impl Retimer {
         loop {
             let target = shrink * status.gap;
             status.violation = self.assemble(target);
-            if status.iterations == ITERATIONS || status.gap < ENOUGH && status.is_feasible() {
+            if status.iterations == ITERATIONS || status.gap > LOST || status.gap < ENOUGH && status.is_feasible() {
                 return status;
             }
             self.matrix.solve(&mut self.step);
@@ -117,22 +160,30 @@ impl Retimer {
         self.unknowns = next as usize;
     }
 
-    fn start(&mut self, intervals: usize) {
-        self.rate.coefficients.clear();
-        self.rate.coefficients.resize(intervals + 2, 1.0);
+    /// Slacks and multipliers for the present rate.
+    fn start(&mut self, Start { slack: least, product }: Start) {
+        let per_interval = (PLACES + 2) * self.lanes;
+        let pair = |value: f64, common: f64, right: f64| {
+            let slack = [(right - common - value).max(least), (right - common + value).max(least)];
+            Pair { slack, multiplier: slack.map(|s| product / s), residual: [0.0; 2] }
+        };
+        let single = |room: f64| {
+            let slack = room.max(least);
+            Single { slack, multiplier: product / slack, residual: 0.0 }
+        };
         self.pairs.clear();
-        self.pairs.extend(self.forms.iter().map(|form| {
-            // At b = 1 all right sides are 1: that of the jerk rows is 3/2 less the 1/2 that b takes.
-            let value = form[0] + form[1] + form[2];
-            let slack = [(1.0 - value).max(0.1), (1.0 + value).max(0.1)];
-            Pair { slack, multiplier: slack.map(|s| 0.05 / s), residual: [0.0; 2] }
-        }));
         self.singles.clear();
-        for bounds in &self.bounds {
-            for slack in bounds.most.iter().map(|most| most - 1.0).chain([1.0 - LEAST]) {
-                let slack = slack.max(0.1);
-                self.singles.push(Single { slack, multiplier: 0.05 / slack, residual: 0.0 });
+        for k in 0..self.bounds.len() {
+            let beta = self.beta(k);
+            for (n, form) in self.forms[k * per_interval..(k + 1) * per_interval].iter().enumerate() {
+                let jerk = (n / self.lanes < PLACES).then(|| self.place(n / self.lanes, &beta));
+                let (common, right) = jerk.map_or((0.0, 1.0), |place| (place.common, place.right));
+                self.pairs.push(pair(dot(form, &beta), common, right));
             }
+            for (n, most) in self.bounds[k].most.iter().enumerate() {
+                self.singles.push(single(most - dot(&self.values[n], &beta)));
+            }
+            self.singles.push(single(dot(&self.values[1], &beta) - LEAST));
         }
     }
 

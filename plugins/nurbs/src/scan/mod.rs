@@ -7,6 +7,7 @@
 //!
 //! A window that the check refuses is planned again with less jerk or lower caps.
 
+mod first;
 mod motion;
 mod plan;
 mod points;

@@ -3,14 +3,25 @@
 use tandem_motion::retime::Rate;
 
 use super::spline::evaluate;
-use crate::stream::{Motion, State, Window};
+use crate::stream::{Motion, State, interval};
+use crate::windowed::Ramps;
 
-/// The motion.
+/// A spline at a rate.
 #[derive(Debug, Default)]
 pub struct Rated {
     pub coefficients: Vec<f64>,
     pub rate: Rate,
     pub step_s: f64,
+}
+
+/// What a window drives.
+#[derive(Debug, Default)]
+pub struct Driven {
+    pub rated: Rated,
+    /// Where no rate keeps the limits: ramps between corners.
+    pub ramps: Ramps,
+    /// It drives the ramps.
+    pub by_ramps: bool,
 }
 
 impl Rated {
@@ -20,9 +31,7 @@ impl Rated {
         let [b, b1, b2] = self.rate.at(k, z, self.step_s);
         [s_mm, s1 * b.sqrt(), s2 * b + s1 * b1 / 2.0, b.sqrt() * (s3 * b + 1.5 * s2 * b1 + 0.5 * s1 * b2)]
     }
-}
 
-impl Motion for Rated {
     fn at(&self, k: usize, t_s: f64) -> State {
         let z = self.rate.place(k, t_s, self.step_s);
         let [s_mm, first, second, _] = evaluate(&self.coefficients, k, z, self.step_s);
@@ -30,24 +39,35 @@ impl Motion for Rated {
         State { s_mm, speed_mm_per_s: first * b.sqrt(), acceleration_mm_per_s2: second * b + first * slope / 2.0 }
     }
 
-    fn end_mm(&self) -> f64 {
-        self.coefficients.last().copied().unwrap_or(0.0)
-    }
-
     /// Where it has the least acceleration, in the middle; the latest of those about equal.
-    fn commit_s(window: &Window<Self>) -> f64 {
-        let whole_s = window.duration_s();
+    fn commit_s(&self, times: &[f64]) -> f64 {
+        let whole_s = times[times.len() - 1];
         let (mut least, mut found) = (f64::INFINITY, 0.5 * whole_s);
-        for t in window.times.iter().copied().filter(|t| (0.42..=0.7).contains(&(t / whole_s))) {
-            let size = window.at(t).acceleration_mm_per_s2.abs();
+        for t in times.iter().copied().filter(|t| (0.42..=0.7).contains(&(t / whole_s))) {
+            let k = interval(times, t);
+            let size = self.at(k, t - times[k]).acceleration_mm_per_s2.abs();
             if size <= least.max(1.0) {
                 (least, found) = (size.min(least), t);
             }
         }
         found
     }
+}
 
-    fn later_s(window: &Window<Self>, _now_s: f64) -> f64 {
-        window.duration_s()
+impl Motion for Driven {
+    fn at(&self, k: usize, t_s: f64) -> State {
+        if self.by_ramps { self.ramps.at(k, t_s) } else { self.rated.at(k, t_s) }
+    }
+
+    fn end_mm(&self) -> f64 {
+        if self.by_ramps { self.ramps.end_mm() } else { self.rated.coefficients.last().copied().unwrap_or(0.0) }
+    }
+
+    fn commit_s(&self, times: &[f64]) -> f64 {
+        if self.by_ramps { self.ramps.commit_s(times) } else { self.rated.commit_s(times) }
+    }
+
+    fn later_s(&self, times: &[f64], now_s: f64) -> f64 {
+        if self.by_ramps { self.ramps.later_s(times, now_s) } else { times[times.len() - 1] }
     }
 }

@@ -16,18 +16,20 @@ pub fn evaluate(coefficients: &[f64], k: usize, z: f64, step_s: f64) -> [f64; 4]
     [base + value, first, second, third]
 }
 
-/// The spline of `intervals` through a timing (time, path coordinate), by its Greville ordinates, from `start` to rest.
-pub fn fill(to: &mut Vec<f64>, timing: &[(f64, f64)], intervals: usize, step_s: f64, start: &State) {
+/// The spline of `intervals` that follows `motion` (time to path coordinate and acceleration) from `start` to rest at
+/// `end_mm`. The coefficient `s − h²/6·s″` reproduces cubics.
+pub fn fill(
+    to: &mut Vec<f64>,
+    mut motion: impl FnMut(f64) -> [f64; 2],
+    (intervals, step_s): (usize, f64),
+    start: &State,
+    end_mm: f64,
+) {
     to.clear();
-    let (end_mm, mut at) = (timing[timing.len() - 1].1, 0);
     for index in 0..intervals + 3 {
         let t = (index as f64 - 1.0) * step_s;
-        while at + 2 < timing.len() && timing[at + 1].0 < t {
-            at += 1;
-        }
-        let (a, b) = (timing[at], timing[at + 1]);
-        let share = ((t - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
-        to.push(a.1 + (b.1 - a.1) * share);
+        let [s_mm, acceleration] = motion(t);
+        to.push(s_mm - step_s * step_s / 6.0 * acceleration);
     }
     let (v, a) = (start.speed_mm_per_s * step_s, start.acceleration_mm_per_s2 * step_s * step_s);
     let middle = start.s_mm - a / 6.0;

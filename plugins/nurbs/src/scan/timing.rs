@@ -2,7 +2,8 @@
 
 use tandem_motion::nurbs::AlongPath;
 
-use crate::stream::{Bounds, Cursor, Leg, Route, Slower, State};
+use crate::stream::relief::Reliefs;
+use crate::stream::{Bounds, Cursor, Leg, Route, State};
 
 /// Time between nodes at most, s.
 const NODE_S: f64 = 0.5e-3;
@@ -33,11 +34,11 @@ impl Timing {
         &mut self,
         route: &Route,
         bounds: &Bounds,
-        slower: &Slower,
+        reliefs: &Reliefs,
         start: &State,
         (end_mm, window_s): (f64, f64),
     ) -> bool {
-        let whole = self.place_nodes(route, bounds, slower, start, (end_mm, window_s));
+        let whole = self.place_nodes(route, bounds, reliefs, start, (end_mm, window_s));
         self.nodes[0].speed_mm_per_s = start.speed_mm_per_s;
         let last = self.nodes.len() - 1;
         self.nodes[last].speed_mm_per_s = 0.0;
@@ -59,12 +60,21 @@ impl Timing {
         whole
     }
 
+    /// Path coordinate at `t_s`; `at` is where the last one was found.
+    pub fn at(&self, t_s: f64, at: &mut usize) -> f64 {
+        while *at + 2 < self.steps.len() && self.steps[*at + 1].0 < t_s {
+            *at += 1;
+        }
+        let (a, b) = (self.steps[*at], self.steps[*at + 1]);
+        a.1 + (b.1 - a.1) * ((t_s - a.0) / (b.0 - a.0)).clamp(0.0, 1.0)
+    }
+
     /// Nodes with their caps, and the pass forward, until the time of the window has gone by.
     fn place_nodes(
         &mut self,
         route: &Route,
         bounds: &Bounds,
-        slower: &Slower,
+        reliefs: &Reliefs,
         start: &State,
         (end_mm, window_s): (f64, f64),
     ) -> bool {
@@ -72,7 +82,7 @@ impl Timing {
         let (mut cursor, mut s_mm, mut t) = (Cursor::default(), start.s_mm, 0.0);
         loop {
             let (at, leg) = route.at(s_mm, &mut cursor);
-            let mut node = node(leg, &at, bounds, slower, s_mm);
+            let mut node = node(leg, &at, bounds, reliefs, s_mm);
             let cap = node.speed_mm_per_s;
             if let Some(before) = self.nodes.last() {
                 let way = s_mm - before.s_mm;
@@ -96,14 +106,14 @@ impl Timing {
     }
 }
 
-fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, slower: &Slower, s_mm: f64) -> Node {
+fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, reliefs: &Reliefs, s_mm: f64) -> Node {
     let along = bounds.context.limits.along(&at.position, &at.direction);
     let cap = leg.smooth_cap_mm_per_s(at, bounds);
     Node {
         s_mm,
-        speed_mm_per_s: slower.speed * cap,
-        acceleration: slower.speed * along.acceleration_mm_per_s2,
-        jerk: slower.speed * along.jerk_mm_per_s3,
+        speed_mm_per_s: reliefs.at(s_mm)[0] * cap,
+        acceleration: along.acceleration_mm_per_s2,
+        jerk: along.jerk_mm_per_s3,
     }
 }
 

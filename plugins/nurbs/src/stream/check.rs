@@ -1,13 +1,23 @@
 //! Every limit on the samples of the fine period.
 
+use tandem_motion::nurbs::AlongPath;
 use tandem_sdk::{AxisVector, BlockKind};
 
-use super::{Bounds, Cursor, Motion, Route, Start, Window};
+use super::relief::{Relief, Reliefs};
+use super::{Bounds, Cursor, Leg, Motion, Route, Start, State, Window};
 
 /// Share of a limit that a sampled difference may reach.
 const AIM: f64 = 0.9995;
+/// Share of the chord error below which the middle of a chord says enough.
+const FAR: f64 = 0.8;
 /// What the chord error may exceed: the feed is right for the curvature at one place of the period.
 const CHORD: f64 = 1.005;
+
+/// Share of the jerk limit that a motion may reach at any point: the fine loop looks at single points of a period.
+pub const POINT: f64 = 1.004;
+
+/// Where a motion has no value the speed is lowered on so much of the path, mm.
+const LOST_MM: f64 = 0.05;
 
 /// The largest of each, as a share of what is allowed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,82 +32,152 @@ impl Worst {
         // A comparison with NaN is false.
         self.speed <= 1.0 && self.acceleration <= 1.0 && self.jerk <= 1.0
     }
+
+    fn join(&mut self, other: &Self) {
+        self.speed = self.speed.max(other.speed);
+        self.acceleration = self.acceleration.max(other.acceleration);
+        self.jerk = self.jerk.max(other.jerk);
+    }
+
+    /// What would keep the limits, between two path coordinates.
+    fn relief(&self, from_mm: f64, to_mm: f64) -> Relief {
+        let over = self.acceleration.max(self.jerk);
+        Relief {
+            from_mm,
+            to_mm,
+            speed: if self.speed > 1.0 { (0.998 / self.speed).max(0.8) } else { 1.0 },
+            jerk: if over > 1.0 { (0.995 / over).max(0.5) } else { 1.0 },
+        }
+    }
 }
 
-/// Samples the window into its memory, with the samples before it in front, and compares.
-pub fn check<M: Motion>(route: &Route, bounds: &Bounds, start: &Start, window: &mut Window<M>) -> Worst {
+/// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
+/// `reliefs` get what would keep it.
+pub fn check<M: Motion>(
+    route: &Route,
+    bounds: &Bounds,
+    start: &Start,
+    window: &mut Window<M>,
+    reliefs: &mut Reliefs,
+) -> Worst {
     window.samples.clear();
     window.samples.extend(start.history);
     window.first_tick_s = start.first_tick_s;
     (window.stop_mm_per_s2, window.stop_mm_per_s3, window.most_mm_per_s) = (f64::INFINITY, f64::INFINITY, 0.0);
-    let (period_s, duration_s) = (bounds.context.fine_period_s, window.duration_s());
-    let (mut cursor, mut worst, mut before_mm) = (Cursor::default(), Worst::default(), start.state.s_mm);
-    let mut count = 0;
+    let (period_s, duration_s, known) = (bounds.context.fine_period_s, window.duration_s(), reliefs.count());
+    let (mut cursor, mut worst, mut before_mm) = (Cursor::default(), Worst::default(), [start.state.s_mm; 3]);
     let mut rests = 0;
     while rests < 4 {
-        let t = start.first_tick_s + f64::from(count) * period_s;
-        count += 1;
+        let count = window.samples.len() - start.history.len();
+        let t = start.first_tick_s + count as f64 * period_s;
         rests += u32::from(t >= duration_s);
         let state = window.at(t.min(duration_s));
-        let (at, leg) = route.at(state.s_mm, &mut cursor);
-        let speed = state.speed_mm_per_s;
-        if !speed.is_finite() {
+        if !state.speed_mm_per_s.is_finite() {
+            reliefs.add(known, Relief { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
             return Worst { speed: f64::NAN, ..worst };
         }
-        worst.speed = worst.speed.max(speed / (leg.feed_mm_per_s * (1.0 - 1e-9)));
-        window.most_mm_per_s = window.most_mm_per_s.max(speed);
-        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-            let along = at.direction[axis].abs();
-            let turning = at.direction[axis].signum() * at.curvature[axis] * speed * speed;
-            let left = limits.acceleration_mm_per_s2 + turning.min(0.0);
-            window.stop_mm_per_s2 = window.stop_mm_per_s2.min(left / along);
-            window.stop_mm_per_s3 = window.stop_mm_per_s3.min(limits.jerk_mm_per_s3 / along);
-        }
-        let rapid = leg.block.kind == BlockKind::Rapid;
-        if count > 1 && !rapid {
-            let chord = chord_error_mm(route, &mut cursor, (before_mm, state.s_mm)) / bounds.chord_error_mm;
-            // The chord error goes with the square of the speed.
-            worst.speed = worst.speed.max((chord / CHORD).sqrt());
-        }
-        before_mm = state.s_mm;
+        let (at, leg) = route.at(state.s_mm, &mut cursor);
+        note_reserve(window, bounds, &at, state.speed_mm_per_s);
         window.samples.push(at.position);
-        differences(&mut worst, bounds, &window.samples, rapid);
+        let first = if count == 0 { state.s_mm } else { before_mm[2] };
+        let here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
+        if !here.is_kept() {
+            reliefs.add(known, here.relief(before_mm[0], state.s_mm));
+        }
+        worst.join(&here);
+        before_mm = [before_mm[1], before_mm[2], state.s_mm];
     }
     worst
 }
 
-/// The differences that end at the last sample.
-fn differences(worst: &mut Worst, bounds: &Bounds, samples: &[AxisVector], rapid: bool) {
-    let &[p0, p1, p2, p3] = samples.last_chunk().expect("three samples stand in front");
-    let rate = 1.0 / bounds.context.fine_period_s;
+/// What a sample leaves for a stop.
+fn note_reserve<M>(window: &mut Window<M>, bounds: &Bounds, at: &AlongPath, speed: f64) {
+    window.most_mm_per_s = window.most_mm_per_s.max(speed);
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-        let [d0, d1, d2] = [p1[axis] - p0[axis], p2[axis] - p1[axis], p3[axis] - p2[axis]];
-        let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
-        worst.speed = worst.speed.max((d2 * rate).abs() / (AIM * most) - 1e-3);
-        let acceleration = (d2 - d1).abs() * rate * rate;
-        worst.acceleration = worst.acceleration.max(acceleration / (AIM * limits.acceleration_mm_per_s2));
-        let jerk = (d2 - 2.0 * d1 + d0).abs() * rate * rate * rate;
-        worst.jerk = worst.jerk.max(jerk / (AIM * limits.jerk_mm_per_s3));
+        let along = at.direction[axis].abs();
+        let turning = at.direction[axis].signum() * at.curvature[axis] * speed * speed;
+        let left = limits.acceleration_mm_per_s2 + turning.min(0.0);
+        window.stop_mm_per_s2 = window.stop_mm_per_s2.min(left / along);
+        window.stop_mm_per_s3 = window.stop_mm_per_s3.min(limits.jerk_mm_per_s3 / along);
     }
 }
 
-/// How far the path between two path coordinates stands off its chord, mm, looked at in three places.
-fn chord_error_mm(route: &Route, cursor: &mut Cursor, (from_mm, to_mm): (f64, f64)) -> f64 {
-    let start = route.at(from_mm, cursor).0.position;
-    let chord = route.at(to_mm, cursor).0.position - start;
+/// Feed, chord and differences at a sample; `before_mm` is where the one before was.
+fn compare(
+    route: &Route,
+    bounds: &Bounds,
+    leg: &Leg,
+    (before_mm, state, at): (f64, &State, &AlongPath),
+    samples: &[AxisVector],
+) -> Worst {
+    let rapid = leg.block.kind == BlockKind::Rapid;
+    let mut here = differences(bounds, samples, rapid);
+    here.speed = here.speed.max(state.speed_mm_per_s / (leg.feed_mm_per_s * (1.0 - 1e-9)));
+    if before_mm < state.s_mm && !rapid {
+        let curved = leg.course.counted_length(&at.curvature);
+        let chord = chord_error_mm(route, (before_mm, state.s_mm), samples, FAR * bounds.chord_error_mm, curved);
+        // The chord error goes with the square of the speed.
+        here.speed = here.speed.max((chord / (CHORD * bounds.chord_error_mm)).sqrt());
+    }
+    here
+}
+
+/// The differences that end at the last sample.
+fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Worst {
+    let &[p0, p1, p2, p3] = samples.last_chunk().expect("three samples stand in front");
+    let (rate, mut here) = (1.0 / bounds.context.fine_period_s, Worst::default());
+    for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+        let [d0, d1, d2] = [p1[axis] - p0[axis], p2[axis] - p1[axis], p3[axis] - p2[axis]];
+        let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
+        here.speed = here.speed.max((d2 * rate).abs() / (AIM * most) - 1e-3);
+        let acceleration = (d2 - d1).abs() * rate * rate;
+        here.acceleration = here.acceleration.max(acceleration / (AIM * limits.acceleration_mm_per_s2));
+        let jerk = (d2 - 2.0 * d1 + d0).abs() * rate * rate * rate;
+        here.jerk = here.jerk.max(jerk / (AIM * limits.jerk_mm_per_s3));
+    }
+    here
+}
+
+/// How far the path between the last two samples stands off its chord, mm: looked at in its middle, and where that is
+/// more than `far_mm` at its quarters too.
+fn chord_error_mm(
+    route: &Route,
+    (from_mm, to_mm): (f64, f64),
+    samples: &[AxisVector],
+    far_mm: f64,
+    curvature: f64,
+) -> f64 {
+    let way_mm = to_mm - from_mm;
+    // Half of that error would be no reason to look.
+    if curvature * way_mm * way_mm < 1e-3 * far_mm {
+        return 0.0;
+    }
+    let &[start, end] = samples.last_chunk().expect("three samples stand in front");
+    let chord = end - start;
     let squared = dot(&chord, &chord);
     if squared < 1e-18 {
         return 0.0;
     }
-    let off = |share: f64| {
-        let mut near = *cursor;
-        let point = route.at(from_mm + share * (to_mm - from_mm), &mut near).0.position - start;
+    let mut cursor = Cursor::default();
+    let mut off = |share: f64| {
+        let point = route.at(from_mm + share * way_mm, &mut cursor).0.position - start;
         let along = dot(&point, &chord);
         (dot(&point, &point) - along * along / squared).max(0.0).sqrt()
     };
-    [0.25, 0.5, 0.75].map(off).into_iter().fold(0.0, f64::max)
+    let middle = off(0.5);
+    if middle < far_mm { middle } else { middle.max(off(0.25)).max(off(0.75)) }
 }
 
 fn dot(a: &AxisVector, b: &AxisVector) -> f64 {
     a.0.iter().zip(b.0).map(|(a, b)| a * b).sum()
+}
+
+/// The largest jerk of an axis as a share of its limit, at a place passed with a speed and its derivatives.
+pub fn jerk_share(bounds: &Bounds, at: &AlongPath, [v, a, j]: [f64; 3]) -> f64 {
+    let axes = bounds.context.limits.axes().iter().enumerate();
+    let shares = axes.map(|(axis, limits)| {
+        let (x1, x2, x3) = (at.direction[axis], at.curvature[axis], at.third[axis]);
+        (x3 * v * v * v + 3.0 * x2 * v * a + x1 * j).abs() / limits.jerk_mm_per_s3
+    });
+    shares.fold(0.0, f64::max)
 }

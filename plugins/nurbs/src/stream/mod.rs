@@ -11,6 +11,7 @@
 pub mod check;
 mod draw;
 mod planner;
+pub mod relief;
 mod route;
 mod window;
 
@@ -20,15 +21,10 @@ use tandem_sdk::AxisVector;
 
 pub use planner::Streamer;
 pub use route::{Bounds, Cursor, Leg, Route};
-pub use window::{Window, lay_times};
-
-use self::check::Worst;
+pub use window::{Window, interval, lay_times};
 
 /// Time of a window at least, s.
 const WINDOW_S: f64 = 1.0;
-/// Tries of a window in motion; and from rest, where each later one is slower.
-pub const TRIES: [usize; 2] = [6, 24];
-
 /// A state on the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
@@ -52,10 +48,10 @@ pub trait Motion: Debug + Default {
     fn at(&self, k: usize, t_s: f64) -> State;
     /// Where it ends, mm.
     fn end_mm(&self) -> f64;
-    /// Until when the window is to be driven before the next one is planned, s.
-    fn commit_s(window: &Window<Self>) -> f64;
-    /// The same, where at `now_s` none was found.
-    fn later_s(window: &Window<Self>, now_s: f64) -> f64;
+    /// Until when it is to be driven before the next window is planned, s; `times` are those at the ends of the intervals.
+    fn commit_s(&self, times: &[f64]) -> f64;
+    /// The same, where at `now_s` no window was found.
+    fn later_s(&self, times: &[f64], now_s: f64) -> f64;
 }
 
 /// A form: how windows are planned. Keeps its memory.
@@ -71,28 +67,6 @@ pub trait Planning: Debug + Default {
         end_mm: f64,
         window: &mut Window<Self::Motion>,
     ) -> bool;
-}
-
-/// What a try takes back.
-#[derive(Clone, Copy, Debug)]
-pub struct Slower {
-    /// Factor of the speed caps.
-    pub speed: f64,
-    /// Share of the jerk limits.
-    pub jerk: f64,
-}
-
-/// What the next try takes back: what was exceeded, in proportion, and everything where that did not help.
-pub fn lower(slower: Slower, worst: &Worst, all: bool) -> Slower {
-    let mut next = slower;
-    if worst.jerk > 1.0 || worst.acceleration > 1.0 {
-        next.jerk *= (0.995 / worst.jerk.max(worst.acceleration)).max(0.8);
-    }
-    if worst.speed > 1.0 || all {
-        let share = if all { 0.7 } else { (0.998 / worst.speed).max(0.8) };
-        next.speed *= share;
-    }
-    next
 }
 
 /// Time of a window, s: three stops from `speed_mm_per_s`.

@@ -152,7 +152,7 @@ impl<P: Planning> Streamer<P> {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driving = Some((0.0, commit_s(&self.window, closed)));
         } else {
-            self.driving = Some((now_s, P::Motion::later_s(&self.window, now_s)));
+            self.driving = Some((now_s, self.window.motion.later_s(&self.window.times, now_s)));
         }
     }
 
@@ -267,7 +267,7 @@ impl Leg {
 /// Until when a window is driven.
 fn commit_s<M: Motion>(window: &Window<M>, closed: bool) -> f64 {
     let whole_s = window.duration_s();
-    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { M::commit_s(window) }
+    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { window.motion.commit_s(&window.times) }
 }
 
 fn blank(leg: &Leg) -> Segment {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tandem_motion::nurbs::{AlongPath, Place};
-use tandem_sdk::{Block, BlockKind, PlannerContext};
+use tandem_sdk::{AxisVector, Block, BlockKind, PlannerContext};
 
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
@@ -47,6 +47,9 @@ pub struct Least {
     pub jerk_mm_per_s3: f64,
 }
 
+/// How far beside a knot derivatives are taken, mm.
+const BESIDE_MM: f64 = 1e-7;
+
 /// What comes next.
 #[derive(Clone, Debug)]
 pub enum Item {
@@ -81,6 +84,11 @@ impl Leg {
     pub fn at(&self, s_mm: f64, place: &mut Place) -> AlongPath {
         let s = (s_mm - self.start_mm).clamp(0.0, self.end_mm - self.start_mm);
         self.course.at(self.stretch, s, place)
+    }
+
+    /// How far the path goes on from `s_mm` without a feature of its own, mm.
+    pub fn smooth_for_mm(&self, s_mm: f64, place: &mut Place) -> f64 {
+        self.course.smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
     }
 
     /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
@@ -213,6 +221,21 @@ impl Route {
     pub fn at(&self, s_mm: f64, cursor: &mut Cursor) -> (AlongPath, &Leg) {
         let leg = self.find(s_mm, cursor);
         (leg.at(s_mm, &mut cursor.place), leg)
+    }
+
+    /// How far the path goes on from `s_mm` without a feature of its own, mm.
+    pub fn smooth_for_mm(&self, s_mm: f64, cursor: &mut Cursor) -> f64 {
+        let leg = self.find(s_mm, cursor);
+        leg.smooth_for_mm(s_mm, &mut cursor.place)
+    }
+
+    /// The third derivatives on both sides of the first knot between two path coordinates.
+    pub fn sides(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> [Option<AxisVector>; 2] {
+        let break_mm = self.find(from_mm, cursor).next_break_mm(from_mm);
+        if break_mm >= to_mm {
+            return [None; 2];
+        }
+        [-BESIDE_MM, BESIDE_MM].map(|off| Some(self.at(break_mm + off, cursor).0.third))
     }
 
     /// Where the run from the front ends, mm, and whether it is known to end there.

@@ -15,6 +15,12 @@ pub fn lay_times(times: &mut Vec<f64>, durations_s: impl Iterator<Item = f64>) {
     }));
 }
 
+/// The interval of `times` that holds `t_s`: the later one at a border.
+pub fn interval(times: &[f64], t_s: f64) -> usize {
+    let behind = times.partition_point(|start| *start <= t_s);
+    behind.clamp(1, times.len() - 1) - 1
+}
+
 /// A window.
 #[derive(Debug, Default)]
 pub struct Window<M> {
@@ -33,14 +39,21 @@ pub struct Window<M> {
 }
 
 impl<M: Motion> Window<M> {
+    /// Exchanges everything but the motion with a window of another kind.
+    pub fn take_all_but_motion<N>(&mut self, other: &mut Window<N>) {
+        std::mem::swap(&mut self.times, &mut other.times);
+        std::mem::swap(&mut self.samples, &mut other.samples);
+        (self.whole, self.first_tick_s, self.most_mm_per_s) = (other.whole, other.first_tick_s, other.most_mm_per_s);
+        (self.stop_mm_per_s2, self.stop_mm_per_s3) = (other.stop_mm_per_s2, other.stop_mm_per_s3);
+    }
+
     pub fn duration_s(&self) -> f64 {
         self.times[self.times.len() - 1]
     }
 
     /// The interval at `t_s`: the later one at a border.
     pub fn interval(&self, t_s: f64) -> usize {
-        let behind = self.times.partition_point(|start| *start <= t_s);
-        behind.clamp(1, self.times.len() - 1) - 1
+        interval(&self.times, t_s)
     }
 
     /// Path coordinate, speed and acceleration at `t_s`.

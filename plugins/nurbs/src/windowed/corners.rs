@@ -22,7 +22,7 @@ pub struct Spot {
 /// The places of a window; keeps its memory.
 #[derive(Debug, Default)]
 pub struct Survey {
-    places: Vec<Corner>,
+    pub places: Vec<Corner>,
     /// Both ends and the corners between them, in their order.
     pub corners: Vec<Corner>,
     /// Highest speed anywhere, mm/s.
@@ -107,6 +107,34 @@ fn lowest((mut from, mut to): (f64, f64), speed: &mut dyn FnMut(f64) -> f64) -> 
     }
     let n = usize::from(speeds[1] < speeds[0]);
     Corner { at_mm: inner[n], speed_mm_per_s: speeds[n] }
+}
+
+/// The limit between the places of a survey, straight from one to the next.
+#[derive(Debug)]
+pub struct Limit<'a> {
+    places: &'a [Corner],
+    at: usize,
+}
+
+impl<'a> Limit<'a> {
+    /// Of two places at least.
+    pub fn new(places: &'a [Corner]) -> Self {
+        Self { places, at: 0 }
+    }
+
+    /// The limit at `at_mm`, mm/s; found soonest near the last one asked for.
+    pub fn at(&mut self, at_mm: f64) -> f64 {
+        let last = self.places.len() - 2;
+        while self.at < last && self.places[self.at + 1].at_mm < at_mm {
+            self.at += 1;
+        }
+        if self.places[self.at].at_mm > at_mm {
+            self.at = self.places.partition_point(|place| place.at_mm <= at_mm).max(1) - 1;
+        }
+        let [a, b] = [self.places[self.at], self.places[self.at + 1]];
+        let share = ((at_mm - a.at_mm) / (b.at_mm - a.at_mm)).clamp(0.0, 1.0);
+        a.speed_mm_per_s + share * (b.speed_mm_per_s - a.speed_mm_per_s)
+    }
 }
 
 impl Tangential {

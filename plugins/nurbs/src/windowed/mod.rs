@@ -11,10 +11,16 @@
 mod corners;
 mod motion;
 mod plan;
+mod points;
 mod ramp;
 mod ramps;
 mod ripple;
 #[cfg(test)]
 mod tests;
 
+pub use corners::{Limit, Spot, Survey};
+pub use motion::Ramps;
 pub use plan::Windowed;
+pub use ramp::{Ramp, Tangential};
+pub use ramps::Rounds;
+pub use ripple::Corner;

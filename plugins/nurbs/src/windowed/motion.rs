@@ -1,7 +1,7 @@
 //! A window of the stream as ramps of the published method.
 
 use super::ramp::Ramp;
-use crate::stream::{Motion, State, Window};
+use crate::stream::{Motion, State, interval};
 
 /// Share of a window's time that is driven before the next one is planned.
 const COMMIT: f64 = 0.7;
@@ -26,19 +26,19 @@ impl Motion for Ramps {
 
     /// In the first part: at its end where the speed is level there, else at the last border before, where there is no
     /// acceleration either.
-    fn commit_s(window: &Window<Self>) -> f64 {
-        let whole_s = window.duration_s();
+    fn commit_s(&self, times: &[f64]) -> f64 {
+        let whole_s = times[times.len() - 1];
         let until_s = COMMIT * whole_s;
-        let [_, b, c, d] = window.motion.0[window.interval(until_s)].speed;
+        let [_, b, c, d] = self.0[interval(times, until_s)].speed;
         if [b, c, d] == [0.0; 3] {
             return until_s;
         }
         let within = |t: &f64| *t > 0.0 && *t <= until_s;
-        window.times.iter().copied().rfind(within).unwrap_or(whole_s)
+        times.iter().copied().rfind(within).unwrap_or(whole_s)
     }
 
     /// A later border.
-    fn later_s(window: &Window<Self>, now_s: f64) -> f64 {
-        window.times.iter().copied().find(|t| *t > now_s + LATER_S).unwrap_or(window.duration_s())
+    fn later_s(&self, times: &[f64], now_s: f64) -> f64 {
+        times.iter().copied().find(|t| *t > now_s + LATER_S).unwrap_or(times[times.len() - 1])
     }
 }

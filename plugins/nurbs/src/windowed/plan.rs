@@ -1,21 +1,39 @@
 //! Planning one window.
 
-use super::corners::{Spot, Survey};
+use super::corners::{Limit, Spot, Survey};
 use super::motion::Ramps;
+use super::points::ease;
 use super::ramp::Tangential;
 use super::ramps::Rounds;
 use super::ripple::Corner;
 use crate::stream::check::check;
-use crate::stream::{Bounds, Cursor, Planning, Route, Slower, Start, TRIES, Window, lay_times, lower, window_s};
+use crate::stream::relief::Reliefs;
+use crate::stream::{Bounds, Cursor, Planning, Route, Start, Window, lay_times, window_s};
 
 /// Share of acceleration and jerk of the first try.
 const SHARE: f64 = 0.9995;
+
+/// Tries that also lower the speed where single points exceed the jerk.
+const LOCAL_TRIES: usize = 4;
+
+/// Tries of a window in motion; and from rest, where each later one is slower.
+const TRIES: [usize; 2] = [6, 24];
+
+/// What a try takes back.
+#[derive(Clone, Copy, Debug)]
+struct Slower {
+    /// Factor of the speed caps.
+    speed: f64,
+    /// Share of the jerk limits.
+    jerk: f64,
+}
 
 /// The planning of windows; keeps its memory.
 #[derive(Debug, Default)]
 pub struct Windowed {
     survey: Survey,
     rounds: Rounds,
+    reliefs: Reliefs,
 }
 
 impl Planning for Windowed {
@@ -24,16 +42,20 @@ impl Planning for Windowed {
     fn plan(&mut self, route: &Route, bounds: &Bounds, start: &Start, end_mm: f64, window: &mut Window<Ramps>) -> bool {
         let rests = start.state.speed_mm_per_s == 0.0;
         let mut slower = Slower { speed: 1.0, jerk: SHARE };
+        self.reliefs.keep_first(0);
         let tries = TRIES[usize::from(rests)];
         for n in 1..=tries {
             if !self.solve(route, bounds, &slower, start, end_mm, window) {
                 return false;
             }
-            let worst = check(route, bounds, start, window);
-            if worst.is_kept() {
+            let worst = check(route, bounds, start, window, &mut self.reliefs);
+            // After some tries samples alone count.
+            if worst.is_kept() && (n > LOCAL_TRIES || !ease(route, bounds, &window.motion.0, &mut self.reliefs)) {
                 return true;
             }
-            slower = lower(slower, &worst, rests && n >= TRIES[0]);
+            let over = worst.acceleration.max(worst.jerk);
+            slower.jerk *= if over > 1.0 { (0.995 / over).max(0.8) } else { 1.0 };
+            slower.speed *= if rests && !worst.is_kept() && n >= TRIES[0] { 0.7 } else { 1.0 };
         }
         false
     }
@@ -51,13 +73,18 @@ impl Windowed {
         window: &mut Window<Ramps>,
     ) -> bool {
         let mut cursor = Cursor::default();
-        let mut look = |at_mm: f64| spot(route, bounds, slower, at_mm, &mut cursor);
+        let reliefs = &self.reliefs;
+        let mut look = |at_mm: f64| {
+            let mut spot = spot(route, bounds, slower, at_mm, &mut cursor);
+            spot.speed_mm_per_s *= reliefs.at(at_mm)[0];
+            spot
+        };
         let speed = start.state.speed_mm_per_s;
         let begin = Corner { at_mm: start.state.s_mm, speed_mm_per_s: speed };
         window.whole = self.survey.make(begin, end_mm, window_s(bounds, speed), &mut look);
         let Some(tangential) = self.survey.tangential else { return false };
         let corners = &mut self.survey.corners;
-        let mut limit = |at_mm: f64| look(at_mm).speed_mm_per_s;
+        let mut limit = Limit::new(&self.survey.places);
         let ramps = &mut window.motion.0;
         self.rounds.make(corners, self.survey.feed_mm_per_s, &tangential, &mut limit, ramps);
         lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
@@ -74,6 +101,6 @@ fn spot(route: &Route, bounds: &Bounds, slower: &Slower, at_mm: f64, cursor: &mu
             acceleration_mm_per_s2: slower.jerk * leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: slower.jerk * leg.least.jerk_mm_per_s3,
         },
-        step_mm: (0.03 / bend).clamp(3e-4, 0.05),
+        step_mm: (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(3e-4, 0.05),
     }
 }

@@ -44,20 +44,35 @@ impl Tangential {
         if most_mm_per_s <= from_mm_per_s {
             return most_mm_per_s;
         }
-        highest((from_mm_per_s, most_mm_per_s), |speed| self.way_mm(from_mm_per_s, speed) <= way_mm)
+        highest((from_mm_per_s, most_mm_per_s), |speed| way_mm - self.way_mm(from_mm_per_s, speed))
     }
 }
 
-/// The highest value up to `most` for which `holds`, which it does at `least` and up to some value; by halving, to
-/// rounding.
-pub fn highest((least, most): (f64, f64), holds: impl Fn(f64) -> bool) -> f64 {
-    if holds(most) {
-        return most;
+/// Room, mm, that is as good as none.
+const ENOUGH_MM: f64 = 1e-12;
+
+/// The highest value between two up to which there is `room`, which falls, and which there is at the lower one: false
+/// position after Illinois, so a few steps.
+pub fn highest((least, most): (f64, f64), room: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high, mut rooms, mut side) = (least, most, [room(least), room(most)], 0);
+    if rooms[1] >= 0.0 || rooms[0] <= 0.0 {
+        return if rooms[1] >= 0.0 { most } else { least };
     }
-    let (mut low, mut high) = (least, most);
     for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if holds(middle) { low = middle } else { high = middle }
+        let middle = low + (high - low) * rooms[0] / (rooms[0] - rooms[1]);
+        let found = room(middle);
+        if found >= 0.0 {
+            (low, rooms[0]) = (middle, found);
+            rooms[1] *= if side == 1 { 0.5 } else { 1.0 };
+            side = 1;
+        } else {
+            (high, rooms[1]) = (middle, found);
+            rooms[0] *= if side == 2 { 0.5 } else { 1.0 };
+            side = 2;
+        }
+        if (0.0..ENOUGH_MM).contains(&found) || high - low <= 1e-15 * high {
+            break;
+        }
     }
     low
 }

@@ -1,5 +1,6 @@
 //! Corners and the ramps between them, until no ramp is faster than the limit.
 
+use super::corners::Limit;
 use super::ramp::{LEAST_S, Ramp, Tangential};
 use super::ripple::{Corner, propagate, ramps};
 
@@ -32,7 +33,7 @@ impl Rounds {
         corners: &mut Vec<Corner>,
         feed_mm_per_s: f64,
         tangential: &Tangential,
-        limit: &mut dyn FnMut(f64) -> f64,
+        limit: &mut Limit,
         into: &mut Vec<Ramp>,
     ) {
         self.pairs.clear();
@@ -80,7 +81,7 @@ fn merge(corners: &mut Vec<Corner>) {
 }
 
 /// The place of a ramp that is furthest above the limit, as a corner at the limit.
-fn worst(ramp: &Ramp, limit: &mut dyn FnMut(f64) -> f64) -> Option<Corner> {
+fn worst(ramp: &Ramp, limit: &mut Limit) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
     }
@@ -88,7 +89,7 @@ fn worst(ramp: &Ramp, limit: &mut dyn FnMut(f64) -> f64) -> Option<Corner> {
     let (mut most, mut found) = (1.0 + OVER, None);
     for n in 0..=looks as usize {
         let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
-        let allowed = limit(at_mm);
+        let allowed = limit.at(at_mm);
         if speed > most * allowed {
             most = speed / allowed;
             found = Some(Corner { at_mm, speed_mm_per_s: allowed });

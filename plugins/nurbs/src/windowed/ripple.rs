@@ -31,7 +31,7 @@ pub fn ramps(from: &Corner, to: &Corner, feed_mm_per_s: f64, limits: &Tangential
     let [start, end] = [from.speed_mm_per_s, to.speed_mm_per_s];
     let way_mm = |peak: f64| limits.way_mm(start, peak) + limits.way_mm(peak, end);
     let least = start.max(end);
-    let peak = highest((least, feed_mm_per_s.max(least)), |peak| way_mm(peak) <= length);
+    let peak = highest((least, feed_mm_per_s.max(least)), |peak| length - way_mm(peak));
     let [mut up_s, mut down_s] = [limits.duration_s(peak - start), limits.duration_s(peak - end)];
     let mut level_s = if peak > 0.0 { (length - way_mm(peak)).max(0.0) / peak } else { 0.0 };
     if level_s < LEAST_S && up_s > down_s {

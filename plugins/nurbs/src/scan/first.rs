@@ -1,0 +1,94 @@
+//! The first timing of a window: ramps between corners, as the form `windowed` drives them.
+
+use super::timing::Timing;
+use crate::stream::relief::Reliefs;
+use crate::stream::{Bounds, Cursor, Route, State};
+use crate::windowed::{Corner, Limit, Ramp, Rounds, Spot, Survey, Tangential};
+
+/// Multiples of acceleration and jerk that ramps take where the speed at the start is too high for less: in motion the
+/// window before may brake in less way than a cubic ramp.
+const HASTE: [f64; 4] = [1.0, 1.25, 1.6, 2.2];
+
+/// A timing; keeps its memory.
+#[derive(Debug, Default)]
+pub struct First {
+    survey: Survey,
+    rounds: Rounds,
+    corners: Vec<Corner>,
+    ramps: Vec<Ramp>,
+    /// Where the speed at the start is too high for ramps.
+    steps: Timing,
+}
+
+impl First {
+    /// From `start` to rest at `end_mm`, or `window_s` later. Gives whether it goes to the end.
+    pub fn make(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        reliefs: &Reliefs,
+        start: &State,
+        (end_mm, window_s): (f64, f64),
+    ) -> bool {
+        let mut cursor = Cursor::default();
+        let mut look = |at_mm: f64| spot(route, bounds, reliefs, at_mm, &mut cursor);
+        let begin = Corner { at_mm: start.s_mm, speed_mm_per_s: start.speed_mm_per_s };
+        let whole = self.survey.make(begin, end_mm, window_s, &mut look);
+        self.steps.steps.clear();
+        if HASTE.iter().any(|haste| self.ramp(start, *haste)) {
+            return whole;
+        }
+        self.steps.make(route, bounds, reliefs, start, (end_mm, window_s))
+    }
+
+    /// The ramps, with a multiple of acceleration and jerk; false where the speed at the start is too high for them.
+    fn ramp(&mut self, start: &State, haste: f64) -> bool {
+        let Some(Tangential { acceleration_mm_per_s2: a, jerk_mm_per_s3: j }) = self.survey.tangential else {
+            return false;
+        };
+        let tangential = Tangential { acceleration_mm_per_s2: haste * a, jerk_mm_per_s3: haste * j };
+        self.corners.clone_from(&self.survey.corners);
+        let mut limit = Limit::new(&self.survey.places);
+        self.rounds.make(&mut self.corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &mut self.ramps);
+        self.corners[0].speed_mm_per_s >= start.speed_mm_per_s && !self.ramps.is_empty()
+    }
+
+    /// Its duration, s, and where it ends, mm.
+    pub fn end(&self) -> (f64, f64) {
+        if let Some((time_s, end_mm)) = self.steps.steps.last() {
+            return (*time_s, *end_mm);
+        }
+        let end_mm = self.ramps.last().map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0]);
+        (self.ramps.iter().map(|ramp| ramp.duration_s).sum(), end_mm)
+    }
+
+    /// Path coordinate and acceleration over time, asked for in order.
+    pub fn motion(&self) -> impl FnMut(f64) -> [f64; 2] {
+        let (mut at, mut start_s) = (0, 0.0);
+        move |t_s| {
+            if !self.steps.steps.is_empty() {
+                return [self.steps.at(t_s, &mut at), 0.0];
+            }
+            while at + 1 < self.ramps.len() && start_s + self.ramps[at].duration_s < t_s {
+                start_s += self.ramps[at].duration_s;
+                at += 1;
+            }
+            let ramp = &self.ramps[at];
+            let [s_mm, _, acceleration, _] = ramp.at((t_s - start_s).clamp(0.0, ramp.duration_s));
+            [s_mm, acceleration]
+        }
+    }
+}
+
+fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &mut Cursor) -> Spot {
+    let (at, leg) = route.at(at_mm, cursor);
+    let bend = leg.course.counted_length(&at.curvature).max(1e-9);
+    Spot {
+        speed_mm_per_s: reliefs.at(at_mm)[0] * leg.smooth_cap_mm_per_s(&at, bounds),
+        tangential: Tangential {
+            acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
+            jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
+        },
+        step_mm: (0.05 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.1),
+    }
+}
