@@ -44,16 +44,38 @@ pub enum Command {
 }
 
 #[derive(Group)]
-pub struct Machine {
+pub struct MachineFile {
     /// The machine file
     #[arg(long = "machine", value_name = "M.toml")]
     pub path: PathBuf,
-    /// Leave out the lines that begin with /
-    #[arg(long)]
-    pub block_delete: bool,
     /// Override a key of the machine file, as in planner.plugin=look-ahead
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub overrides: Vec<(String, String)>,
+}
+
+#[derive(Group)]
+pub struct Machine {
+    #[command(flatten)]
+    pub file: MachineFile,
+    /// Leave out the lines that begin with /
+    #[arg(long)]
+    pub block_delete: bool,
+}
+
+/// How a machine is kept ready for what comes while it runs.
+#[derive(Group)]
+pub struct Session {
+    /// The clock that drives the loops
+    #[arg(long, default_value = "wall")]
+    pub clock: Clock,
+    /// Home the axes first, and after every fault, as the machine file says
+    #[arg(long)]
+    pub home: bool,
+    #[command(flatten)]
+    pub operator: Operator,
+    /// Write every sample; a name that ends in .ttr asks for the binary format
+    #[arg(long, value_name = "F.csv|F.ttr")]
+    pub trace: Option<PathBuf>,
 }
 
 #[derive(Group)]
@@ -114,38 +136,16 @@ pub struct Operator {
 pub struct Mdi {
     #[command(flatten)]
     pub machine: Machine,
-    /// The clock that drives the loops
-    #[arg(long, default_value = "wall")]
-    pub clock: Clock,
-    /// Home the axes first, and after every fault, as the machine file says
-    #[arg(long)]
-    pub home: bool,
     #[command(flatten)]
-    pub operator: Operator,
-    /// Write every sample; a name that ends in .ttr asks for the binary format
-    #[arg(long, value_name = "F.csv|F.ttr")]
-    pub trace: Option<PathBuf>,
+    pub session: Session,
 }
 
 #[derive(Group)]
 pub struct Jog {
-    /// The machine file
-    #[arg(long = "machine", value_name = "M.toml")]
-    pub machine: PathBuf,
-    /// Override a key of the machine file, as in planner.plugin=look-ahead
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
-    pub overrides: Vec<(String, String)>,
-    /// The clock that drives the loops
-    #[arg(long, default_value = "wall")]
-    pub clock: Clock,
-    /// Home the axes first, and after every fault, as the machine file says
-    #[arg(long)]
-    pub home: bool,
     #[command(flatten)]
-    pub operator: Operator,
-    /// Write every sample; a name that ends in .ttr asks for the binary format
-    #[arg(long, value_name = "F.csv|F.ttr")]
-    pub trace: Option<PathBuf>,
+    pub machine: MachineFile,
+    #[command(flatten)]
+    pub session: Session,
 }
 
 #[derive(Group)]

@@ -22,7 +22,7 @@ const BLOCKS_TIMED: u32 = 2000;
 
 /// Runs the experiment, or takes its times from a file, and fits a model.
 pub fn calibrate(options: &args::Calibrate) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     if let Some(path) = &options.program {
         return program(path, &machine);
     }

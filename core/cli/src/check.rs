@@ -11,7 +11,7 @@ use crate::{REFUSED, built_in, program};
 
 /// Lists every error of a program.
 pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let mut program = program::open(&options.program)?;
     let name = program.name().to_string();
     let switches = Switches { block_delete: options.machine.block_delete, ..Switches::default() };

@@ -13,7 +13,7 @@ use crate::{FAULT, args, built_in};
 
 /// Homes the axes of a machine.
 pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
-    let mut machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let mut machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     if let Some(letter) = options.axis {
         let axis = machine.axes.index(letter.to_ascii_uppercase());
         machine.homing.retain(|homing| Some(homing.axis) == axis);

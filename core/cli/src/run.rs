@@ -21,7 +21,7 @@ use crate::{FAULT, REFUSED, args, built_in, operator, program};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
@@ -63,7 +63,7 @@ fn switches(options: &args::Run, keys: bool) -> Switches {
 /// Refuses to write a file twice, or over what the run reads.
 fn distinct_files(options: &args::Run) -> Result<(), String> {
     let written = [&options.trace, &options.summary, &options.report, &options.blocks];
-    let mut taken = vec![resolved(&options.program), resolved(&options.machine.path)];
+    let mut taken = vec![resolved(&options.program), resolved(&options.machine.file.path)];
     taken.extend(options.commands.iter().map(|path| resolved(path)));
     for path in written.into_iter().flatten() {
         let file = resolved(path);

@@ -18,7 +18,7 @@ use crate::{REFUSED, args, built_in, program};
 
 /// Estimates the time of programs.
 pub fn estimate(options: &args::Estimate) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let choice = choice(&options.model, &machine)?;
     let switches = Switches { block_delete: options.machine.block_delete, ..Switches::default() };
     let one = |path: &Path| one(path, &machine, switches, &choice);

@@ -27,12 +27,12 @@ const RESET: &str = "!reset";
 
 /// Jogs until the operator ends it.
 pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine, &options.overrides)?;
+    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
     let registry = built_in::registry()?;
-    let real_time = options.clock == args::Clock::Wall;
+    let real_time = options.session.clock == args::Clock::Wall;
     let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
     let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
-    let switches = Switches { home: options.home, ..Switches::default() };
+    let switches = Switches { home: options.session.home, ..Switches::default() };
     let hand = Hand::new(Arc::clone(&shared), script);
     let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(hand.clone()))?;
     let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
@@ -86,12 +86,12 @@ impl Sinks {
     }
 
     fn begin(&mut self, options: &args::Jog, machine: &Machine, jogs: &Arc<Jogs>, run: &Run) -> Result<(), String> {
-        if let (None, Some(path)) = (&self.trace, &options.trace) {
+        if let (None, Some(path)) = (&self.trace, &options.session.trace) {
             self.trace = Some(TraceSink::create(path, machine, "jogging", run, false)?);
         }
         let desk = Desk::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
-        let presence = Presence { real_time: options.clock == args::Clock::Wall, pause: false, keys: false };
-        let operator = Operator::at(Arc::new(desk), &options.operator, presence)?;
+        let presence = Presence { real_time: options.session.clock == args::Clock::Wall, pause: false, keys: false };
+        let operator = Operator::at(Arc::new(desk), &options.session.operator, presence)?;
         self.shared.follow(&operator);
         self.operator = Some(operator);
         self.first_tick = self.next_tick;

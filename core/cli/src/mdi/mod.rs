@@ -21,15 +21,15 @@ const RESET: &str = "!reset";
 
 /// Takes lines until there are no more.
 pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let registry = built_in::registry()?;
-    let real_time = options.clock == args::Clock::Wall;
+    let real_time = options.session.clock == args::Clock::Wall;
     let keys = real_time && is_on_terminal();
-    let attended = keys || (real_time && !options.operator.is_nowhere());
+    let attended = keys || (real_time && !options.session.operator.is_nowhere());
     let switches = Switches {
         block_delete: options.machine.block_delete,
         pause_at_stops: attended,
-        home: options.home,
+        home: options.session.home,
         ..Switches::default()
     };
     let shared = Arc::new(Shared::new(real_time, keys));
@@ -74,10 +74,10 @@ impl Sinks {
         presence: Presence,
         shared: &Shared,
     ) -> Result<(), String> {
-        if let (None, Some(path)) = (&self.trace, &options.trace) {
+        if let (None, Some(path)) = (&self.trace, &options.session.trace) {
             self.trace = Some(TraceSink::create(path, machine, "manual input", run, false)?);
         }
-        let operator = Operator::begin(&options.operator, machine, run, presence)?;
+        let operator = Operator::begin(&options.session.operator, machine, run, presence)?;
         shared.follow(&operator);
         self.operator = Some(operator);
         self.first_tick = self.next_tick;
