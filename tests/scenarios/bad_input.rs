@@ -81,7 +81,11 @@ fn a_device_is_written_and_not_replaced() {
 fn options_beyond_reason_are_refused() {
     let done = Scenario::text("M2\n").with(&["--set", "planner.options.buffer_blocks=1000000000000"]).run();
     assert_eq!(done.status(), 1);
-    assert!(done.errors().contains("buffer_blocks = 1000000000000: from 2 to"), "{}", done.errors());
+    assert!(
+        done.errors().contains("planner.options.buffer_blocks: planner look-ahead: 1000000000000: must be from 2"),
+        "{}",
+        done.errors()
+    );
 }
 
 #[test]

@@ -8,8 +8,8 @@ use tandem_machine::Machine;
 use tandem_oracle::{Options, Row, Trace, Verdict, judge};
 use tandem_rings::{MachineState, Sample};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Made, Planner, PlannerContext, PlannerDescription, Plugin,
-    PluginError, PluginKind, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, PluginError,
+    RawOptions, Segment, SegmentSink, local_plugin,
 };
 
 use crate::harness::mill;
@@ -162,9 +162,10 @@ impl RunObserver for Kept {
 }
 
 fn registry() -> Registry {
-    let planner = |name, make| Plugin { name, version: "0", kind: PluginKind::Planner(make) };
+    let watched = local_plugin!(planner "watched" = watched);
+    let boastful = local_plugin!(planner "boastful" = boastful);
     let mut registry = Registry::default();
-    for plugin in [tandem_sim::PLUGIN, planner("watched", watched), planner("boastful", boastful)] {
+    for plugin in [tandem_sim::PLUGIN, watched, boastful] {
         registry.register(plugin).unwrap();
     }
     registry
@@ -174,19 +175,14 @@ thread_local! {
     static EMITTED: RefCell<Vec<Segment>> = const { RefCell::new(vec![]) };
 }
 
-fn look_ahead(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
-    make(options, context)
-}
-
 /// The look-ahead planner; what it emits is kept.
-fn watched(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(Watched { inner: look_ahead(options, context)?, boast: 1.0 }))
+fn watched(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
+    Ok(Watched { inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?, boast: 1.0 })
 }
 
 /// The same, and it declares to leave twice the deceleration to stop with: half the depth of the ring.
-fn boastful(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(Watched { inner: look_ahead(options, context)?, boast: 2.0 }))
+fn boastful(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
+    Ok(Watched { inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?, boast: 2.0 })
 }
 
 struct Watched {

@@ -45,7 +45,7 @@ mod with_a_strategy {
     use tandem_host::{Clock, Registry, Run, RunObserver};
     use tandem_machine::Machine;
     use tandem_rings::Sample;
-    use tandem_sdk::{Answer, FeedStrategy, Made, Plugin, PluginError, PluginKind, Request, StrategyContext, Window};
+    use tandem_sdk::{Answer, FeedStrategy, NoOptions, PluginError, Request, StrategyContext, Window};
 
     use crate::harness::{mill, root};
 
@@ -58,8 +58,7 @@ mod with_a_strategy {
         }
 
         fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
-            // SAFETY: within the call.
-            let samples = unsafe { window.samples.as_slice() };
+            let samples = window.samples();
             let x_mm = samples.iter().map(|s| s.position[0]).sum::<f64>() / samples.len() as f64;
             let mut signals = [0.0; 8];
             signals[0] = x_mm;
@@ -67,9 +66,9 @@ mod with_a_strategy {
         }
     }
 
-    #[allow(clippy::unnecessary_wraps)] // the form of a factory
-    fn make(_options: &str, _context: &StrategyContext) -> Made<dyn FeedStrategy> {
-        Ok(Box::new(Fading))
+    #[allow(clippy::unnecessary_wraps)] // the form of a constructor
+    fn open(_options: &NoOptions, _context: &StrategyContext) -> Result<Fading, PluginError> {
+        Ok(Fading)
     }
 
     #[derive(Default)]
@@ -88,7 +87,7 @@ mod with_a_strategy {
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
         registry.register(tandem_sim::PLUGIN).unwrap();
-        registry.register(Plugin { name: "fading", version: "0", kind: PluginKind::FeedStrategy(make) }).unwrap();
+        registry.register(tandem_sdk::local_plugin!(feed_strategy "fading" = open)).unwrap();
         let program = tandem_gcode::Program::open(&root().join("examples/programs/square.ngc")).unwrap();
         let mut kept = Kept::default();
         let outcome = Run::prepare(machine, &registry, program, tandem_host::Switches::default())

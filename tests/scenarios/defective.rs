@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use tandem_host::{Clock, Outcome, Registry, Run, RunObserver, TraceCsv};
+use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_oracle::Kind;
 use tandem_rings::Sample;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Made, Planner, PlannerContext, PlannerDescription, Plugin,
-    PluginError, PluginKind, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, Plugin,
+    PluginError, Segment, SegmentSink,
 };
 
 use crate::harness::{judge_trace, mill};
@@ -16,12 +17,11 @@ use crate::harness::{judge_trace, mill};
 /// The look-ahead planner with one of the machine's numbers 1 % too high.
 macro_rules! optimist {
     ($name:ident, $change:expr) => {
-        fn $name(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+        fn $name(options: &Options, context: &PlannerContext) -> Result<LookAhead, PluginError> {
             let mut context = *context;
             let change: fn(&mut PlannerContext) = $change;
             change(&mut context);
-            let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
-            make(options, &context)
+            LookAhead::new(options, &context)
         }
     };
 }
@@ -32,46 +32,42 @@ optimist!(too_fast, |context| context.limits.axes.iter_mut().for_each(|axis| {
 }));
 optimist!(too_hard, |context| context.limits.axes.iter_mut().for_each(|axis| axis.acceleration_mm_per_s2 *= 1.011));
 /// 1 % faster than programmed, and it says that the feed was higher.
-fn too_keen(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+fn too_keen(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut keen = *context;
     keen.max_feed_ratio = 1.01;
-    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
     let bend = |segment: &mut Segment| segment.feed_mm_per_s *= 1.01;
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Box::new(Bent { inner: make(options, &keen)?, bend, allowed }))
+    Ok(Bent { inner: LookAhead::new(options, &keen)?, bend, allowed })
 }
 
 /// Steps where blocks meet twice as large as allowed, not declared.
-fn too_abrupt(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+fn too_abrupt(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut rough = *context;
     rough.limits.axes.iter_mut().for_each(|axis| axis.speed_difference_mm_per_s *= 4.0);
-    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
-    let inner = make(options, &rough)?;
-    Ok(Box::new(Bent { inner, bend: |_| {}, allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s) }))
+    let inner = LookAhead::new(options, &rough)?;
+    Ok(Bent { inner, bend: |_| {}, allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s) })
 }
 
 /// Off the path by a hundredth of a millimetre in Z, everywhere between the ends.
-fn off_the_path(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+fn off_the_path(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let bend = |segment: &mut Segment| {
         let at = segment.coefficients[0][0] / 40.0;
         segment.coefficients[2][0] += 1e-3 * (std::f64::consts::PI * at.clamp(0.0, 1.0)).sin();
     };
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Box::new(Bent { inner: make(options, context)?, bend, allowed }))
+    Ok(Bent { inner: LookAhead::new(options, context)?, bend, allowed })
 }
 
 /// Everything 1 % too far in X.
-fn too_far(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let PluginKind::Planner(make) = tandem_look_ahead::PLUGIN.kind else { unreachable!() };
+fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let bend = |segment: &mut Segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Box::new(Bent { inner: make(options, context)?, bend, allowed }))
+    Ok(Bent { inner: LookAhead::new(options, context)?, bend, allowed })
 }
 
 /// Changes what another planner emits.
 struct Bent {
-    inner: Box<dyn Planner>,
+    inner: LookAhead,
     bend: fn(&mut Segment),
     allowed: [f64; 8],
 }
@@ -118,7 +114,12 @@ impl RunObserver for Tracing {
     }
 }
 
-type Maker = fn(&str, &PlannerContext) -> Made<dyn Planner>;
+/// The plugin `defective` that a constructor makes.
+macro_rules! defective {
+    ($open:ident) => {
+        tandem_sdk::local_plugin!(planner "defective" = $open)
+    };
+}
 
 struct Ran {
     outcome: Outcome,
@@ -132,7 +133,7 @@ impl Ran {
     }
 }
 
-fn run(maker: Maker, text: &str, guard: &str) -> Ran {
+fn run(plugin: Plugin, text: &str, guard: &str) -> Ran {
     let folder = tempfile::tempdir().unwrap();
     let (program, trace) = (folder.path().join("p.ngc"), folder.path().join("trace.csv"));
     std::fs::write(&program, text).unwrap();
@@ -142,7 +143,7 @@ fn run(maker: Maker, text: &str, guard: &str) -> Ran {
     let machine = Machine::read(&machine_path, &overrides).unwrap();
     let mut registry = Registry::default();
     registry.register(tandem_sim::PLUGIN).unwrap();
-    registry.register(Plugin { name: "defective", version: "0", kind: PluginKind::Planner(maker) }).unwrap();
+    registry.register(plugin).unwrap();
     let run = Run::prepare(
         machine.clone(),
         &registry,
@@ -172,8 +173,9 @@ const LINE: &str = "G21 G90\nF3000\nG1 X40\nM2\n";
 
 #[test]
 fn the_guard_stops_what_exceeds_a_limit_and_ramps_out_within_limits() {
-    for (maker, text, word) in [(too_abrupt as Maker, CORNER, "acceleration"), (too_abrupt, RAPID, "")] {
-        let ran = run(maker, text, "stop");
+    for (plugin, text, word) in [(defective!(too_abrupt), CORNER, "acceleration"), (defective!(too_abrupt), RAPID, "")]
+    {
+        let ran = run(plugin, text, "stop");
         if word.is_empty() {
             assert_eq!(ran.outcome.summary.fault, None, "nothing steps here");
             continue;
@@ -187,8 +189,8 @@ fn the_guard_stops_what_exceeds_a_limit_and_ramps_out_within_limits() {
 
 #[test]
 fn the_governor_slows_what_exceeds_a_limit_and_counts_it() {
-    for maker in [too_fast as Maker, too_hard] {
-        let ran = run(maker, RAPID, "stop");
+    for plugin in [defective!(too_fast), defective!(too_hard)] {
+        let ran = run(plugin, RAPID, "stop");
         assert!(ran.outcome.summary.governed_samples > 0 || ran.outcome.summary.guard_stops > 0);
         assert_eq!(kinds(&ran, ran.outcome.fault.is_some()), [], "what was sent is within limits");
     }
@@ -196,22 +198,22 @@ fn the_governor_slows_what_exceeds_a_limit_and_counts_it() {
 
 #[test]
 fn the_oracle_sees_a_feed_one_percent_too_high() {
-    let ran = run(too_keen, LINE, "count");
+    let ran = run(defective!(too_keen), LINE, "count");
     assert_eq!(kinds(&ran, false), [Kind::Feed]);
 }
 
 #[test]
 fn the_oracle_sees_an_axis_one_percent_too_fast_or_accelerating_too_hard() {
-    assert_eq!(kinds(&run(too_fast, RAPID, "count"), false), [Kind::Velocity, Kind::Feed]);
-    assert_eq!(kinds(&run(too_hard, RAPID, "count"), false), [Kind::SpeedStep]);
+    assert_eq!(kinds(&run(defective!(too_fast), RAPID, "count"), false), [Kind::Velocity, Kind::Feed]);
+    assert_eq!(kinds(&run(defective!(too_hard), RAPID, "count"), false), [Kind::SpeedStep]);
 }
 
 #[test]
 fn the_oracle_sees_a_travel_one_percent_too_far() {
     let text = "G21 G90\nF6000\nG1 X249\nG1 X0\nM2\n";
-    let found = kinds(&run(too_far, text, "count"), false);
+    let found = kinds(&run(defective!(too_far), text, "count"), false);
     assert!(found.contains(&Kind::Travel) && found.contains(&Kind::PathDeviation), "{found:?}");
-    let ran = run(too_far, text, "stop");
+    let ran = run(defective!(too_far), text, "stop");
     assert!(
         ran.outcome.summary.fault.as_ref().is_some_and(|f| f.contains("travel")),
         "{:?}",
@@ -221,13 +223,13 @@ fn the_oracle_sees_a_travel_one_percent_too_far() {
 
 #[test]
 fn the_oracle_sees_a_planner_off_the_path() {
-    let ran = run(off_the_path, LINE, "count");
+    let ran = run(defective!(off_the_path), LINE, "count");
     assert!(kinds(&ran, false).contains(&Kind::PathDeviation), "{:?}", kinds(&ran, false));
 }
 
 #[test]
 fn the_oracle_sees_steps_that_are_too_large() {
-    let ran = run(too_abrupt, CORNER, "count");
+    let ran = run(defective!(too_abrupt), CORNER, "count");
     assert!(ran.outcome.summary.limit_violations > 0);
     assert_eq!(kinds(&ran, false), [Kind::SpeedStep]);
 }

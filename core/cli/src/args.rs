@@ -39,6 +39,9 @@ pub enum Command {
     /// Make, build, check and measure policy scripts
     #[command(subcommand)]
     Script(Script),
+    /// List plugins and their options; make and check plugins of one's own
+    #[command(subcommand)]
+    Plugin(Plugin),
     /// Measure how late the fine loop wakes on this computer, as a histogram
     Latency(Latency),
 }
@@ -309,6 +312,18 @@ pub enum Script {
     },
     /// Say which languages can be built on this computer, and what to install for the others
     Doctor,
+}
+
+#[derive(Subcommand)]
+pub enum Plugin {
+    /// Print the built-in plugins, or those of shared libraries
+    List {
+        /// The shared libraries
+        libraries: Vec<PathBuf>,
+        /// Print where each comes from and what its options are
+        #[arg(long, short)]
+        verbose: bool,
+    },
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

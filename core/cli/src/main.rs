@@ -19,6 +19,7 @@ mod jog;
 mod latency;
 mod mdi;
 mod operator;
+mod plugin;
 mod program;
 mod progress;
 mod report;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Script(command) => script::script(&command),
+        Command::Plugin(command) => plugin::plugin(&command),
         Command::Latency(options) => latency::latency(&options),
     };
     ExitCode::from(status.unwrap_or_else(|error| {

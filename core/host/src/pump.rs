@@ -4,12 +4,13 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
-use tandem_rough::{Observer, RoughLoop};
+use tandem_rough::{Observer, RoughError, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event};
 
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
 use crate::monitor::Monitor;
+use crate::plugin_log::drain_plugin_log;
 use crate::policy::{PolicySummary, Reloader};
 use crate::strategy::FeedRunner;
 
@@ -75,6 +76,8 @@ pub struct Pump<'a> {
     pub aborted: Option<Rest>,
     /// Moves of homing, which have no program line, are neither counted nor recorded.
     pub skips_homing: bool,
+    /// The planner's name, or the file that it came from: for a fault's words.
+    pub planner: String,
     commands: CommandLog,
     pub planning_ns: u128,
     /// Rough periods since the observer was told of the policy.
@@ -104,6 +107,7 @@ impl<'a> Pump<'a> {
             soft_error: None,
             aborted: None,
             skips_homing: false,
+            planner: String::new(),
             commands,
             planning_ns: 0,
             untold: TOLD_EVERY,
@@ -117,10 +121,15 @@ impl<'a> Pump<'a> {
         }
         let started = Instant::now();
         self.serve_policy();
+        self.tell_plugin_log();
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
         let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
         if let Err(error) = self.rough.step(&mut both) {
-            self.fail(error.to_string());
+            let words = match &error {
+                RoughError::Planner { line, cause } => format!("planner {}: line {line}: {cause}", self.planner),
+                _ => error.to_string(),
+            };
+            self.fail(words);
         }
         self.planning_ns += started.elapsed().as_nanos();
     }
@@ -145,6 +154,11 @@ impl<'a> Pump<'a> {
             self.observer.policy(&reloader.summary());
             self.untold = 0;
         }
+    }
+
+    /// Tells what plugins have written to the log.
+    pub fn tell_plugin_log(&mut self) {
+        drain_plugin_log(&mut |line| self.observer.note(line));
     }
 
     /// Passes a note on to the observer.

@@ -1,13 +1,33 @@
-//! Plugins by kind and name.
+//! Plugins by kind and name, or by the file that holds them.
 
+use tandem_machine::PluginChoice;
 use tandem_sdk::{
-    Driver, FeedStrategy, Kinematics, Made, Planner, PlannerContext, Plugin, PluginKind, StrategyContext,
+    Driver, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext, Plugin, PluginError, PluginKind,
+    StrategyContext,
 };
 
-/// The plugins a host knows. It names none itself: they are registered from outside.
-#[derive(Default)]
+use crate::{loading, plugin_log};
+
+/// The plugins a host knows. It names none itself: they are registered from outside, or loaded by path.
 pub struct Registry {
     plugins: Vec<Plugin>,
+}
+
+/// Why a plugin is not there, or does not start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PluginRefusal {
+    /// The option that is wrong, where it is one: a dotted path below `options`.
+    pub option: Option<String>,
+    /// What is wrong, with the plugin's kind and name.
+    pub cause: String,
+}
+
+impl Default for Registry {
+    /// No plugin, and a log for those to come.
+    fn default() -> Self {
+        plugin_log::listen();
+        Self { plugins: vec![] }
+    }
 }
 
 impl Registry {
@@ -16,9 +36,9 @@ impl Registry {
     /// # Errors
     /// A plugin of that kind and name is there already.
     pub fn register(&mut self, plugin: Plugin) -> Result<(), String> {
-        let kind = plugin.kind.name();
-        if self.find(kind, plugin.name).is_some() {
-            return Err(format!("a {kind} called {} is registered twice", plugin.name));
+        let (kind, name) = (plugin.kind(), plugin.name());
+        if self.named(kind, name).is_some() {
+            return Err(format!("a {} called {name} is registered twice", kind.name()));
         }
         self.plugins.push(plugin);
         Ok(())
@@ -29,72 +49,94 @@ impl Registry {
         &self.plugins
     }
 
-    /// Makes the planner called `name`.
+    /// The plugin of `kind` that a machine asks for: a registered one by its name, or one in a shared library, which is
+    /// loaded for good.
+    ///
+    /// # Errors
+    /// It is not there, or the library is refused.
+    pub fn find(&self, kind: PluginKind, choice: &PluginChoice) -> Result<Plugin, PluginRefusal> {
+        let found = match &choice.library {
+            Some(path) => self.loaded(kind, path).map_err(|cause| format!("{}: {cause}", path.display())),
+            None => self.named(kind, &choice.plugin).ok_or_else(|| self.unknown(kind, &choice.plugin)),
+        };
+        found.map_err(|cause| PluginRefusal { option: None, cause })
+    }
+
+    /// Opens the planner that a machine asks for.
     ///
     /// # Errors
     /// It is not there, or refuses its options.
-    pub fn planner(&self, name: &str, options: &str, context: &PlannerContext) -> Result<Box<dyn Planner>, String> {
-        self.make("planner", name, |kind| match kind {
-            PluginKind::Planner(make) => Some(make(options, context)),
-            _ => None,
-        })
+    pub fn planner(&self, choice: &PluginChoice, context: &PlannerContext) -> Result<Box<dyn Planner>, PluginRefusal> {
+        let plugin = self.find(PluginKind::Planner, choice)?;
+        plugin.planner(&choice.options, context).map_err(|e| refused(plugin, &e))
     }
 
-    /// Makes the feed strategy called `name`.
+    /// Opens the feed strategy that a machine asks for.
     ///
     /// # Errors
     /// It is not there, or refuses its options.
     pub fn strategy(
         &self,
-        name: &str,
-        options: &str,
+        choice: &PluginChoice,
         context: &StrategyContext,
-    ) -> Result<Box<dyn FeedStrategy>, String> {
-        self.make("feed strategy", name, |kind| match kind {
-            PluginKind::FeedStrategy(make) => Some(make(options, context)),
-            _ => None,
-        })
+    ) -> Result<Box<dyn FeedStrategy>, PluginRefusal> {
+        let plugin = self.find(PluginKind::FeedStrategy, choice)?;
+        plugin.feed_strategy(&choice.options, context).map_err(|e| refused(plugin, &e))
     }
 
-    /// Makes the driver called `name`.
+    /// Makes the driver that a machine asks for.
     ///
     /// # Errors
     /// It is not there, or refuses its options.
-    pub fn driver(&self, name: &str, options: &str) -> Result<Box<dyn Driver>, String> {
-        self.make("driver", name, |kind| match kind {
-            PluginKind::Driver(make) => Some(make(options)),
-            _ => None,
-        })
+    pub fn driver(&self, choice: &PluginChoice) -> Result<Box<dyn Driver>, PluginRefusal> {
+        let plugin = self.find(PluginKind::Driver, choice)?;
+        plugin.driver(&choice.options).map_err(|e| refused(plugin, &e))
     }
 
-    /// Makes the kinematics called `name`.
+    /// Makes the kinematics that a machine asks for.
     ///
     /// # Errors
     /// It is not there, or refuses its options.
-    pub fn kinematics(&self, name: &str, options: &str) -> Result<Box<dyn Kinematics>, String> {
-        self.make("kinematics", name, |kind| match kind {
-            PluginKind::Kinematics(make) => Some(make(options)),
-            _ => None,
-        })
-    }
-
-    fn find(&self, kind: &str, name: &str) -> Option<&Plugin> {
-        self.plugins.iter().find(|p| p.kind.name() == kind && p.name == name)
-    }
-
-    fn make<T: ?Sized>(
+    pub fn kinematics(
         &self,
-        kind: &str,
-        name: &str,
-        make: impl Fn(&PluginKind) -> Option<Made<T>>,
-    ) -> Result<Box<T>, String> {
-        let made = self.find(kind, name).and_then(|plugin| make(&plugin.kind));
-        made.ok_or_else(|| self.unknown(kind, name))?.map_err(|e| format!("{kind} {name}: {e}"))
+        choice: &PluginChoice,
+        context: &KinematicsContext,
+    ) -> Result<Box<dyn Kinematics>, PluginRefusal> {
+        let plugin = self.find(PluginKind::Kinematics, choice)?;
+        plugin.kinematics(&choice.options, context).map_err(|e| refused(plugin, &e))
     }
 
-    fn unknown(&self, kind: &str, name: &str) -> String {
-        let known: Vec<&str> = self.plugins.iter().filter(|p| p.kind.name() == kind).map(|p| p.name).collect();
-        let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-        format!("no {kind} is called {name:?}; there is: {known}")
+    fn named(&self, kind: PluginKind, name: &str) -> Option<Plugin> {
+        self.plugins.iter().find(|p| p.kind() == kind && p.name() == name).copied()
     }
+
+    fn loaded(&self, kind: PluginKind, path: &std::path::Path) -> Result<Plugin, String> {
+        let all = loading::load(path)?;
+        let mut fitting = all.iter().filter(|plugin| plugin.kind() == kind);
+        let plugin = *fitting.next().ok_or_else(|| wrong_kind(kind, &all))?;
+        if fitting.next().is_some() {
+            return Err(format!("it holds several plugins of kind {}; one can be chosen by its file", kind.name()));
+        }
+        let name = plugin.name();
+        match self.named(kind, name) {
+            Some(_) => Err(format!("it calls itself {name}, and a {} of that name is there already", kind.name())),
+            None => Ok(plugin),
+        }
+    }
+
+    fn unknown(&self, kind: PluginKind, name: &str) -> String {
+        let known: Vec<&str> = self.plugins.iter().filter(|p| p.kind() == kind).map(Plugin::name).collect();
+        let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
+        format!("no {} is called {name:?}; there is: {known}. A shared library is named by its path", kind.name())
+    }
+}
+
+fn wrong_kind(kind: PluginKind, all: &[Plugin]) -> String {
+    let there: Vec<String> = all.iter().map(|p| format!("{} {}", p.kind().name(), p.name())).collect();
+    format!("it is no {}: it holds {}", kind.name(), there.join(", "))
+}
+
+fn refused(plugin: Plugin, error: &PluginError) -> PluginRefusal {
+    let cause = format!("{} {}: {}", plugin.kind().name(), plugin.name(), error.message());
+    PluginRefusal { option: error.option().map(str::to_string), cause }
 }

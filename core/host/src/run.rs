@@ -263,6 +263,7 @@ impl Run {
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
         pump.skips_homing = self.switches.home;
+        pump.planner.clone_from(&machine.planner.plugin);
         let mut measured = None;
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
@@ -272,6 +273,7 @@ impl Run {
             }
         }
         pump.tell_policy_notes();
+        pump.tell_plugin_log();
         let fault = fine.fault();
         let text = fault.map(|f| describe(&machine, &f, pump.soft_cause(), fine.driver_error()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);

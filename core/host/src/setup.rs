@@ -5,15 +5,15 @@ use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, FeedStrategy, Kinematics, Planner, PlannerContext, PlannerDescription,
-    StrategyContext, size_of_contract,
+    AxisVector, Driver, DriverContext, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext,
+    PlannerDescription, StrategyContext, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
 use crate::error::HostError;
 use crate::homing::Homing;
 use crate::policy::{Means, PolicyHost};
-use crate::registry::Registry;
+use crate::registry::{PluginRefusal, Registry};
 use crate::rules::refusal;
 use crate::run::Switches;
 use crate::strategy::FeedRunner;
@@ -92,13 +92,21 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
         position: machine.start,
     };
     let choice = &machine.planner;
-    registry.planner(&choice.plugin, &choice.options, &context).map_err(|e| refusal(machine, "planner.plugin", e))
+    registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))
+}
+
+/// A plugin's refusal with the place in the machine file: of the option that is wrong, or of the plugin's name.
+fn refused(machine: &Machine, section: &str, refused: PluginRefusal) -> HostError {
+    let key = match refused.option {
+        Some(option) => format!("{section}.options.{option}"),
+        None => format!("{section}.plugin"),
+    };
+    refusal(machine, &key, refused.cause)
 }
 
 /// Makes the machine's driver; it is not open yet.
 pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>, HostError> {
-    let choice = &machine.driver;
-    registry.driver(&choice.plugin, &choice.options).map_err(|e| refusal(machine, "driver.plugin", e))
+    registry.driver(&machine.driver).map_err(|e| refused(machine, "driver", e))
 }
 
 /// Claims the drives.
@@ -106,7 +114,10 @@ pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: usize) -> Result
     let mut context = DriverContext::new(joints, machine.fine_period_s);
     context.start_position = machine.start;
     let opened = driver.open(&context).and_then(|()| driver.start());
-    opened.map_err(|e| refusal(machine, "driver.plugin", format!("driver {}: {e}", machine.driver.plugin)))
+    opened.map_err(|e| {
+        let cause = format!("driver {}: {}", machine.driver.plugin, e.message());
+        refused(machine, "driver", PluginRefusal { option: e.option().map(str::to_string), cause })
+    })
 }
 
 /// Makes the machine's kinematics; `None` where joints are axes, so that identity costs nothing.
@@ -115,8 +126,8 @@ pub fn kinematics(machine: &Machine, registry: &Registry) -> Result<Option<Box<d
     if choice.plugin == "identity" {
         return Ok(None);
     }
-    let made = registry.kinematics(&choice.plugin, &choice.options);
-    made.map(Some).map_err(|e| refusal(machine, "kinematics.plugin", e))
+    let made = registry.kinematics(choice, &KinematicsContext::new(machine.axes));
+    made.map(Some).map_err(|e| refused(machine, "kinematics", e))
 }
 
 /// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.
@@ -133,7 +144,9 @@ pub fn feed(
     let signals = strategy.as_ref().map_or::<&[&str], _>(&[], |strategy| strategy.signals());
     let policy = policy.map(|p| (p.clone(), Means::new(machine.axes, machine.fine_period_s, length_mm, signals)));
     let per_window = machine.fine_periods_per_rough as usize;
-    Ok(Some(FeedRunner::new(strategy, policy, per_window, machine.motion.max_feed_ratio)))
+    let mut runner = FeedRunner::new(strategy, policy, per_window, machine.motion.max_feed_ratio);
+    runner.name = machine.feed_strategy.as_ref().map(|choice| choice.plugin.clone()).unwrap_or_default();
+    Ok(Some(runner))
 }
 
 /// Makes the machine's feed strategy, if it names one.
@@ -146,8 +159,8 @@ fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Fee
         rough_period_s: machine.rough_period_s,
         max_feed_ratio: machine.motion.max_feed_ratio,
     };
-    let made = registry.strategy(&choice.plugin, &choice.options, &context);
-    made.map(Some).map_err(|e| refusal(machine, "feed_strategy.plugin", e))
+    let made = registry.strategy(choice, &context);
+    made.map(Some).map_err(|e| refused(machine, "feed_strategy", e))
 }
 
 /// The fine loop's view of the machine.

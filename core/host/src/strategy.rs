@@ -1,13 +1,15 @@
 //! Feed strategy and policy between the sample ring and the ratio ring.
 
 use tandem_rings::{HostEnd, Ratio, RequestKind, Sample, StrategyRequest};
-use tandem_sdk::{Answer, FeedStrategy, FineSample, RawSlice, Request, Window, size_of_contract};
+use tandem_sdk::{Answer, FeedStrategy, FineSample, Request, Window};
 
 use crate::policy::{Means, PolicyHost};
 
 /// Collects the samples of a rough period and asks the strategy and the policy.
 pub struct FeedRunner {
     strategy: Option<Box<dyn FeedStrategy>>,
+    /// The strategy's name, or the file that it came from.
+    pub name: String,
     policy: Option<(PolicyHost, Means)>,
     window: Vec<FineSample>,
     per_window: usize,
@@ -27,7 +29,7 @@ impl FeedRunner {
         max_ratio: f64,
     ) -> Self {
         let window = Vec::with_capacity(per_window);
-        Self { strategy, policy, window, per_window, max_ratio, answer: None, fault: None }
+        Self { strategy, name: String::new(), policy, window, per_window, max_ratio, answer: None, fault: None }
     }
 
     /// Names of the strategy's signals.
@@ -75,9 +77,15 @@ impl FeedRunner {
 
     fn ask(&mut self, period: u64) -> Result<Option<Answer>, String> {
         let Some(strategy) = &mut self.strategy else { return Ok(None) };
-        let window = Window { size: size_of_contract::<Window>(), period, samples: RawSlice::new(&self.window) };
+        let window = Window::new(period, &self.window);
         let answer = strategy.update(&window).map_err(|e| e.to_string())?;
-        if answer.ratio.is_finite() { Ok(Some(answer)) } else { Err(format!("ratio {}", answer.ratio)) }
+        if !answer.ratio.is_finite() {
+            return Err(format!("update answers the ratio {}", answer.ratio));
+        }
+        match strategy.signals().iter().zip(answer.signals).find(|(_, value)| !value.is_finite()) {
+            Some((name, value)) => Err(format!("update answers {value} for the signal {name}")),
+            None => Ok(Some(answer)),
+        }
     }
 
     fn ask_policy(&mut self, period: u64) -> Option<f64> {
@@ -87,7 +95,7 @@ impl FeedRunner {
     }
 
     fn fail(&mut self, cause: &str) -> RequestKind {
-        self.fault = Some(format!("feed strategy: {cause}"));
+        self.fault = Some(format!("feed strategy {}: {cause}", self.name));
         RequestKind::Fault
     }
 }

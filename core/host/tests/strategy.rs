@@ -6,7 +6,7 @@ use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Run, RunObserver, Summary, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Answer, FeedStrategy, MAX_SIGNALS, Plugin, PluginError, PluginKind, Request, Window};
+use tandem_sdk::{Answer, FeedStrategy, MAX_SIGNALS, PluginError, RawOptions, Request, StrategyContext, Window};
 
 /// Rough period in whose samples the strategy finds what it acts on, and the tick in which that acts.
 const PERIOD: u64 = 20;
@@ -27,13 +27,10 @@ impl FeedStrategy for Once {
     }
 }
 
-const ONCE: Plugin = Plugin {
-    name: "once",
-    version: "1",
-    kind: PluginKind::FeedStrategy(|options, _| {
-        Ok(Box::new(Once(options.split('"').nth(1).unwrap_or("").to_string())))
-    }),
-};
+#[allow(clippy::unnecessary_wraps)] // the form of a constructor
+fn open(options: &RawOptions, _context: &StrategyContext) -> Result<Once, PluginError> {
+    Ok(Once(options.0.split('"').nth(1).unwrap_or("").to_string()))
+}
 
 #[derive(Default)]
 struct Samples(Vec<Sample>, Vec<String>);
@@ -50,7 +47,8 @@ impl RunObserver for Samples {
 
 fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
     let mut registry = Registry::default();
-    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN, ONCE] {
+    let once = tandem_sdk::local_plugin!(feed_strategy "once" = open);
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN, once] {
         registry.register(plugin).unwrap();
     }
     let settings = [
@@ -82,7 +80,9 @@ fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
 
 #[test]
 fn a_fault_and_a_defect_stop_on_the_path_in_their_tick() {
-    for (asks, words) in [("fault", "feed strategy: fault 7"), ("defect", "feed strategy: it has lost its way")] {
+    for (asks, words) in
+        [("fault", "feed strategy once: fault 7"), ("defect", "feed strategy once: it has lost its way")]
+    {
         let (summary, samples) = driven(asks, Clock::Virtual);
         assert!(summary.fault.as_ref().is_some_and(|fault| fault.starts_with(words)), "{:?}", summary.fault);
         let stop = &summary.stops[0];

@@ -174,7 +174,7 @@ impl Queue {
 impl SegmentSink for Queue {
     fn segment(&mut self, segment: &Segment) {
         if !is_sound(segment) {
-            self.defect = Some("a segment with a number that is not finite, or a negative duration");
+            self.defect = Some("advance emits a segment with a number that is not finite, or a negative duration");
             return;
         }
         while self.events.front().is_some_and(|event| event.before_block <= segment.block) {
@@ -196,7 +196,7 @@ impl SegmentSink for Queue {
         if report.block >= first && self.blocks.get(place).is_some_and(given) {
             self.reported.push(*report);
         } else {
-            self.defect = Some("a report of a block that it was not given");
+            self.defect = Some("advance emits a report of a block that it was not given");
         }
     }
 }

@@ -146,7 +146,7 @@ impl RoughLoop {
             }
             self.queue.flush(false);
             if advanced.duration_s == 0.0 && !self.finished {
-                return Err(planner_error(self.line, "it is full and emits nothing"));
+                return Err(planner_error(self.line, "it is full, and advance emits nothing"));
             }
         }
         Ok(())

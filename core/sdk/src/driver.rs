@@ -24,10 +24,7 @@
 //!     }
 //!
 //!     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-//!         feedback.position = setpoint.position;
-//!         feedback.speed = setpoint.velocity;
-//!         let state = if setpoint.enable != 0 { JointState::Enabled } else { JointState::Disabled };
-//!         feedback.state[..self.joints].fill(state);
+//!         feedback.follow(setpoint, self.joints);
 //!         Ok(())
 //!     }
 //!
@@ -213,6 +210,16 @@ impl Default for Feedback {
             spindle_rad_per_s: 0.0,
             spindle_angle_rad: 0.0,
         }
+    }
+}
+
+impl Feedback {
+    /// What ideal drives report: `joints` joints stand where they are told to, and hold while they are enabled. Any loop;
+    /// does not allocate.
+    pub fn follow(&mut self, setpoint: &Setpoint, joints: usize) {
+        (self.position, self.speed) = (setpoint.position, setpoint.velocity);
+        let state = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+        self.state[..joints].fill(state);
     }
 }
 

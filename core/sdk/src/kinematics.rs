@@ -1,6 +1,23 @@
 //! Axis space to joint space and back.
 
-use crate::AxisVector;
+use crate::{Axes, AxisVector, PluginError, size_of_contract};
+
+/// What a kinematics is told when it is made.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct KinematicsContext {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// The machine's axes.
+    pub axes: Axes,
+}
+
+impl KinematicsContext {
+    /// The context of a machine with these axes.
+    pub fn new(axes: Axes) -> Self {
+        Self { size: size_of_contract::<Self>(), axes }
+    }
+}
 
 /// The map between axes (what the program speaks of) and joints (what the drives move).
 ///
@@ -21,6 +38,15 @@ pub trait Kinematics: Send + Sync {
     /// of [`Kinematics::to_joints`], exact for linear maps.
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
         self.to_joints(&(*position + *direction)) - self.to_joints(position)
+    }
+
+    /// Why there is no joint position for a place that was asked for: asked where an answer is not finite, on the fine
+    /// loop too. A plugin that has panicked says so here.
+    ///
+    /// # Errors
+    /// The reason. Use [`PluginError::fixed`], which does not allocate.
+    fn health(&self) -> Result<(), PluginError> {
+        Ok(())
     }
 }
 

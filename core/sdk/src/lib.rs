@@ -13,33 +13,48 @@
 //!
 //! No plugin reads a clock or a source of randomness: time and seeds are arguments.
 
+pub mod abi;
 mod axis;
 mod block;
 mod driver;
+mod error;
 mod event;
 mod kinematics;
 mod limits;
+pub mod log;
+mod option_values;
+mod options;
 mod planner;
 mod plugin;
 mod segment;
 mod slice;
 mod strategy;
+mod text;
 
 pub use axis::{Axes, AxisVector, MAX_AXES};
 pub use block::{ArcGeometry, Block, BlockKind, NurbsData, NurbsGeometry, OwnedBlock, PathMode};
 pub use driver::{
     Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_LATCHES, Setpoint,
 };
+pub use error::PluginError;
 pub use event::{Event, EventKind};
-pub use kinematics::{Identity, Kinematics};
+pub use kinematics::{Identity, Kinematics, KinematicsContext};
 pub use limits::{AxisLimits, Limits, PathLimits};
+pub use options::{NoOptions, OptionDoc, PluginOptions, RawOptions, parse_options};
 pub use planner::{
     Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription, SegmentSink,
 };
-pub use plugin::{Made, Plugin, PluginError, PluginKind, parse_options};
+pub use plugin::{Made, Plugin, PluginKind};
 pub use segment::{Edge, RingEntry, Segment, SegmentFlags, StopOn};
 pub use slice::RawSlice;
 pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
+
+#[doc(hidden)]
+pub use serde;
+
+// The macros name this crate as their users do.
+#[doc(hidden)]
+extern crate self as tandem_sdk;
 
 /// Number of the plugin contract. A plugin built against another number is refused.
 pub const ABI_VERSION: u32 = 1;

@@ -18,17 +18,17 @@ impl<T> RawSlice<T> {
     pub const EMPTY: Self = Self { pointer: std::ptr::NonNull::dangling().as_ptr(), length: 0 };
 
     /// Describes `slice`.
-    pub fn new(slice: &[T]) -> Self {
+    pub const fn new(slice: &[T]) -> Self {
         Self { pointer: slice.as_ptr(), length: slice.len() }
     }
 
     /// Number of elements.
-    pub fn len(&self) -> usize {
+    pub const fn len(&self) -> usize {
         self.length
     }
 
     /// Whether there is no element.
-    pub fn is_empty(&self) -> bool {
+    pub const fn is_empty(&self) -> bool {
         self.length == 0
     }
 

@@ -1,5 +1,7 @@
 //! The feed-strategy contract: the samples of one rough period in, a feed ratio out.
 
+use std::marker::PhantomData;
+
 use crate::{AxisVector, PluginError, RawSlice};
 
 /// Most named signals a strategy publishes.
@@ -52,13 +54,27 @@ pub struct StrategyContext {
 /// One rough period.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Window {
+pub struct Window<'a> {
     /// Size of this structure in bytes.
     pub size: u32,
     /// Number of the rough period since the start of the run.
     pub period: u64,
-    /// Every fine sample of it. Valid for the call only.
-    pub samples: RawSlice<FineSample>,
+    samples: RawSlice<FineSample>,
+    borrowed: PhantomData<&'a [FineSample]>,
+}
+
+impl<'a> Window<'a> {
+    /// The window of rough period `period` with all its fine samples.
+    pub fn new(period: u64, samples: &'a [FineSample]) -> Self {
+        let size = crate::size_of_contract::<Self>();
+        Self { size, period, samples: RawSlice::new(samples), borrowed: PhantomData }
+    }
+
+    /// Every fine sample of the period, in order.
+    pub fn samples(&self) -> &'a [FineSample] {
+        // SAFETY: made by `new` from a slice that lives as long as this, and nobody else can make one.
+        unsafe { self.samples.as_slice() }
+    }
 }
 
 /// What a strategy asks for beside the ratio.
@@ -86,12 +102,33 @@ pub struct Answer {
     pub signals: [f64; MAX_SIGNALS],
 }
 
+impl Answer {
+    /// An answer that asks for `ratio` and nothing else.
+    pub fn of_ratio(ratio: f64) -> Self {
+        Self { ratio, request: Request::None, signals: [0.0; MAX_SIGNALS] }
+    }
+
+    /// The same with the values of the named signals; what is beyond [`MAX_SIGNALS`] is left out.
+    #[must_use]
+    pub fn with_signals(mut self, values: &[f64]) -> Self {
+        for (signal, value) in self.signals.iter_mut().zip(values) {
+            *signal = *value;
+        }
+        self
+    }
+}
+
 /// Adapts the feed to what the machine feels. Called once a rough period, on the rough loop; allocates nothing in a
 /// steady state. The ratio made from the samples of rough period k takes effect at the first tick of period k + 2.
 pub trait FeedStrategy: Send {
     /// Names of the signals, at most [`MAX_SIGNALS`], lower case with underscores and a unit.
     fn signals(&self) -> &'static [&'static str] {
         &[]
+    }
+
+    /// How fast the ratio changes at most, 1/s: what the strategy promises of itself, and the conformance kit judges.
+    fn max_ratio_change_per_s(&self) -> f64 {
+        f64::INFINITY
     }
 
     /// The answer for one rough period.

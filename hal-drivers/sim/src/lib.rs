@@ -42,12 +42,11 @@ pub use joint::CURRENT_A_PER_MM_PER_S2;
 pub use options::{Model, Options, Switch};
 pub use shape::Bore;
 
-use tandem_sdk::{Driver, Made, Plugin, PluginKind};
+use tandem_sdk::PluginError;
 
-/// The plugin as a host registers it.
-pub const PLUGIN: Plugin = Plugin { name: "sim", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Driver(make) };
+tandem_sdk::plugin!(driver "sim" = open);
 
-/// Makes the driver from the TOML text of its options.
-fn make(options: &str) -> Made<dyn Driver> {
-    Ok(Box::new(SimulatedDrives::new(Options::parse(options)?)))
+fn open(options: &Options) -> Result<SimulatedDrives, PluginError> {
+    options.check()?;
+    Ok(SimulatedDrives::new(options.clone()))
 }

@@ -1,13 +1,13 @@
 //! The options of the simulated drives and what is refused.
 
-use serde::Deserialize;
-use tandem_sdk::{PluginError, parse_options};
+use serde::{Deserialize, Serialize};
+use tandem_sdk::{PluginError, PluginOptions};
 
 use crate::servo::{CuttingOptions, ServoOptions};
 use crate::shape::{Bore, Shape};
 
 /// How a joint follows its setpoint.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Model {
     /// The feedback is the setpoint of the same exchange; no motor current.
@@ -23,7 +23,7 @@ pub enum Model {
 /// above or below a position, a box of joints 0 to 2, or the wall of a bore.
 ///
 /// Several switches may share an input; it is 1 while any of them is on.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Switch {
     /// Number of the digital input, 0 to 63.
@@ -45,54 +45,35 @@ pub struct Switch {
     pub bounce_periods: u32,
 }
 
-/// Options of the simulated drives; the keys of `[driver.options]`.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Options {
-    /// How the joints follow.
-    pub model: Model,
-    /// Undamped natural frequency of a second-order joint, Hz. Without effect on ideal ones.
-    pub natural_frequency_hz: f64,
-    /// Damping ratio ζ of a second-order joint: below 1 it overshoots. Without effect on ideal ones.
-    pub damping_ratio: f64,
-    /// Time constant with which the spindle's speed follows its command, s; 0: at once.
-    pub spindle_time_constant_s: f64,
-    /// Deceleration with which every joint stops by itself: in a quick stop, and when the drives are let go, mm/s².
-    pub quick_stop_deceleration_mm_per_s2: f64,
-    /// How many fine periods in a row may pass without a new setpoint (an exchange with a new tick) before the drives
-    /// stop by themselves, 0 to 100; 0: they never do.
-    pub watchdog_periods: u32,
-    /// Simulated switches on the digital inputs; all other inputs are 0.
-    pub switches: Vec<Switch>,
-    /// Whether the drives catch the position at each edge of a switch, between two exchanges.
-    pub latches: bool,
-    /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
-    /// random part of it. Switches are where they are; only homing finds out.
-    pub unknown_start_mm: f64,
-    /// The joints of the model `servo`, from joint 0; the last entry stands for all joints after it.
-    pub servo: Vec<ServoOptions>,
-    /// What the model `servo` cuts.
-    pub cutting: Option<CuttingOptions>,
-    /// Seed of what is random: bounce, the unknown start, noise of the current, a random workpiece.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            model: Model::Ideal,
-            natural_frequency_hz: 30.0,
-            damping_ratio: 0.7,
-            spindle_time_constant_s: 0.0,
-            quick_stop_deceleration_mm_per_s2: 5000.0,
-            watchdog_periods: 5,
-            switches: Vec::new(),
-            latches: true,
-            unknown_start_mm: 0.0,
-            servo: Vec::new(),
-            cutting: None,
-            seed: 1,
-        }
+tandem_sdk::options! {
+    /// Options of the simulated drives; the keys of `[driver.options]`.
+    pub struct Options {
+        /// How the joints follow.
+        pub model: Model = Model::Ideal,
+        /// Undamped natural frequency of a second-order joint, Hz. Without effect on ideal ones.
+        pub natural_frequency_hz: f64 = 30.0,
+        /// Damping ratio ζ of a second-order joint: below 1 it overshoots. Without effect on ideal ones.
+        pub damping_ratio: f64 = 0.7,
+        /// Time constant with which the spindle's speed follows its command, s; 0: at once.
+        pub spindle_time_constant_s: f64 = 0.0,
+        /// Deceleration with which every joint stops by itself: in a quick stop, and when the drives are let go, mm/s².
+        pub quick_stop_deceleration_mm_per_s2: f64 = 5000.0,
+        /// How many fine periods in a row may pass without a new setpoint (an exchange with a new tick) before the drives
+        /// stop by themselves, 0 to 100; 0: they never do.
+        pub watchdog_periods: u32 = 5,
+        /// Simulated switches on the digital inputs; all other inputs are 0.
+        pub switches: Vec<Switch> = Vec::new(),
+        /// Whether the drives catch the position at each edge of a switch, between two exchanges.
+        pub latches: bool = true,
+        /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
+        /// random part of it. Switches are where they are; only homing finds out.
+        pub unknown_start_mm: f64 = 0.0,
+        /// The joints of the model `servo`, from joint 0; the last entry stands for all joints after it.
+        pub servo: Vec<ServoOptions> = Vec::new(),
+        /// What the model `servo` cuts.
+        pub cutting: Option<CuttingOptions> = None,
+        /// Seed of what is random: bounce, the unknown start, noise of the current, a random workpiece.
+        pub seed: u64 = 1,
     }
 }
 
@@ -102,12 +83,15 @@ impl Options {
     /// # Errors
     /// An unknown key, a wrong type, or a value that makes no sense, with the reason.
     pub fn parse(text: &str) -> Result<Self, PluginError> {
-        let options: Self = parse_options(text)?;
-        options.check()?;
-        Ok(options)
+        let options = Self::read(text)?;
+        options.check().map(|()| options)
     }
 
-    fn check(&self) -> Result<(), PluginError> {
+    /// Checks what a type cannot say.
+    ///
+    /// # Errors
+    /// A value that makes no sense, with the reason.
+    pub fn check(&self) -> Result<(), PluginError> {
         // The bounds keep the closed form of the servo far from overflow and underflow at any fine period.
         within("natural_frequency_hz", self.natural_frequency_hz, 1e-3, 1e5)?;
         within("damping_ratio", self.damping_ratio, 1e-3, 1e3)?;
@@ -123,7 +107,7 @@ impl Options {
         if self.model != Model::Servo {
             let unused = [("servo", !self.servo.is_empty()), ("cutting", self.cutting.is_some())];
             return match unused.iter().find(|(_, stated)| *stated) {
-                Some((key, _)) => Err(refusal(&format!("{key}: goes with model = \"servo\" only"))),
+                Some((key, _)) => Err(refusal(key, "goes with model = \"servo\" only")),
                 None => Ok(()),
             };
         }
@@ -135,7 +119,7 @@ impl Options {
 impl Switch {
     fn check(&self) -> Result<(), PluginError> {
         if self.input > 63 {
-            return Err(refusal(&format!("switches: input = {}: the inputs are 0 to 63", self.input)));
+            return Err(refusal("switches", &format!("input = {}: the inputs are 0 to 63", self.input)));
         }
         let positions = [self.above_mm, self.below_mm].into_iter().flatten();
         let corners = [self.low_mm, self.high_mm].into_iter().flatten().flatten();
@@ -144,10 +128,10 @@ impl Switch {
             .iter()
             .flat_map(|bore| [bore.centre_mm[0], bore.centre_mm[1], bore.radius_mm, bore.top_mm.unwrap_or(0.0)]);
         if let Some(wrong) = positions.chain(corners).chain(circle).find(|v| !v.is_finite()) {
-            return Err(refusal(&format!("switches: {wrong}: not a position")));
+            return Err(refusal("switches", &format!("{wrong}: not a position")));
         }
-        within("switches: bounce_periods", f64::from(self.bounce_periods), 0.0, 1e4)?;
-        self.shape().map(|_| ()).ok_or_else(|| refusal(SHAPES))
+        within("switches.bounce_periods", f64::from(self.bounce_periods), 0.0, 1e4)?;
+        self.shape().map(|_| ()).ok_or_else(|| refusal("switches", SHAPES))
     }
 
     /// Where it is on; none where the keys do not say one shape.
@@ -163,18 +147,18 @@ impl Switch {
 }
 
 /// What a switch is made of.
-const SHAPES: &str = "switches: a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
+const SHAPES: &str = "a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
 
 pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError> {
     // A comparison with NaN is false, so NaN is refused as well.
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(refusal(&format!("{key} = {value}: must be {low} to {high}")))
+    Err(PluginError::of_option(key, format!("{value}: must be {low} to {high}")))
 }
 
-pub(crate) fn refusal(what: &str) -> PluginError {
-    PluginError::new(format!("options: {what}"))
+pub(crate) fn refusal(key: &str, what: &str) -> PluginError {
+    PluginError::of_option(key, what)
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! What trips a simulated switch: a part of the space of the joints.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use tandem_sdk::{AxisVector, MAX_AXES};
 
 /// Halvings of a period in search of the edge: far below a nanometre at any speed.
 const HALVINGS: usize = 60;
 
 /// A hole along joint 2 in a plate: the wall and the plate around it.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bore {
     /// Centre, by joints 0 and 1, mm.

@@ -2,13 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use tandem_sdk::{AxisVector, Driver, DriverContext, Feedback, JointState, PluginKind, Setpoint};
+use tandem_sdk::{AxisVector, Driver, DriverContext, Feedback, JointState, Setpoint};
 
 const PERIOD_S: f64 = 0.001;
 
 fn make(options: &str) -> Box<dyn Driver> {
-    let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { panic!("sim is a driver") };
-    make(options).unwrap()
+    tandem_sim::PLUGIN.driver(options).unwrap()
 }
 
 fn running(options: &str) -> Box<dyn Driver> {

@@ -4,7 +4,7 @@
 mod counting_allocator;
 
 use counting_allocator::{HeapUse, heap_use_of};
-use tandem_sdk::{AxisVector, DriverContext, Feedback, PluginKind, Setpoint};
+use tandem_sdk::{AxisVector, DriverContext, Feedback, Setpoint};
 
 #[test]
 fn the_counter_counts() {
@@ -15,8 +15,7 @@ fn the_counter_counts() {
 #[test]
 fn exchange_and_quick_stop_do_not_allocate() {
     let options = "model = \"second-order\"\n[[switches]]\ninput = 0\njoint = 0\nabove_mm = 0.5";
-    let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { panic!("sim is a driver") };
-    let mut driver = make(options).unwrap();
+    let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();
     driver.open(&DriverContext::new(8, 0.001)).unwrap();
     let mut feedback = Feedback::default();
     let mut setpoint = Setpoint { enable: 1, spindle_rad_per_s: 5.0, ..Setpoint::default() };

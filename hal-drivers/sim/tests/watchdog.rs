@@ -1,14 +1,13 @@
 //! The drives' heartbeat: a host that falls silent is noticed within the watchdog time, and the joints ramp to rest.
 
-use tandem_sdk::{AxisVector, Driver, DriverContext, Feedback, JointState, PluginKind, Setpoint};
+use tandem_sdk::{AxisVector, Driver, DriverContext, Feedback, JointState, Setpoint};
 use tandem_sim::WATCHDOG_FAULT;
 
 const PERIOD_S: f64 = 0.001;
 const SPEED_MM_PER_S: f64 = 50.0;
 
 fn running(options: &str) -> Box<dyn Driver> {
-    let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { panic!("sim is a driver") };
-    let mut driver = make(options).unwrap();
+    let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();
     driver.open(&DriverContext::new(1, PERIOD_S)).unwrap();
     driver.start().unwrap();
     driver

@@ -38,13 +38,11 @@ mod signal;
 pub use options::{FilterKind, Options};
 pub use planner::{AfterInterpolation, BUFFER_BLOCKS};
 
-use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind};
+use tandem_sdk::{PlannerContext, PluginError};
 
-/// The plugin as a host registers it.
-pub const PLUGIN: Plugin =
-    Plugin { name: "after-interpolation", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(make) };
+tandem_sdk::plugin!(planner "after-interpolation" = open);
 
-/// Opens the planner from the TOML text of its options.
-fn make(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(AfterInterpolation::new(&Options::parse(options)?, context)?))
+fn open(options: &Options, context: &PlannerContext) -> Result<AfterInterpolation, PluginError> {
+    options.check()?;
+    AfterInterpolation::new(options, context)
 }

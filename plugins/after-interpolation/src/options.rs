@@ -1,10 +1,10 @@
 //! `[planner.options]` of the planner.
 
-use serde::Deserialize;
-use tandem_sdk::{PluginError, parse_options};
+use serde::{Deserialize, Serialize};
+use tandem_sdk::PluginError;
 
 /// The filter behind the interpolation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FilterKind {
     /// Moving average over the time constant: a step of feed becomes a linear ramp.
@@ -16,45 +16,47 @@ pub enum FilterKind {
     Bell,
 }
 
-/// The options.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Options {
-    /// The filter, the same for every axis.
-    pub filter: FilterKind,
-    /// Its time constant, ms: 0.1 to 10000.
-    pub time_constant_ms: f64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { filter: FilterKind::Linear, time_constant_ms: 50.0 }
+tandem_sdk::options! {
+    /// The options.
+    #[derive(Copy)]
+    pub struct Options {
+        /// The filter, the same for every axis.
+        pub filter: FilterKind = FilterKind::Linear,
+        /// Its time constant, ms: 0.1 to 10000.
+        pub time_constant_ms: f64 = 50.0,
     }
 }
 
 impl Options {
-    /// Reads and checks the TOML text of the options.
+    /// Checks what a type cannot say.
     ///
     /// # Errors
-    /// An unknown key or filter, or a time constant out of range.
-    pub fn parse(text: &str) -> Result<Self, PluginError> {
-        let options: Self = parse_options(text)?;
+    /// A time constant out of range.
+    pub fn check(&self) -> Result<(), PluginError> {
         // The range is asked in this form because a comparison with NaN is false.
-        if (0.1..=10_000.0).contains(&options.time_constant_ms) {
-            return Ok(options);
+        if (0.1..=10_000.0).contains(&self.time_constant_ms) {
+            return Ok(());
         }
-        Err(PluginError::new(format!("options: time_constant_ms = {}: must be 0.1 to 10000", options.time_constant_ms)))
+        let wrong = format!("{}: must be 0.1 to 10000", self.time_constant_ms);
+        Err(PluginError::of_option("time_constant_ms", wrong))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use tandem_sdk::PluginOptions;
+
     use super::*;
+
+    fn parse(text: &str) -> Result<Options, PluginError> {
+        let options = Options::read(text)?;
+        options.check().map(|()| options)
+    }
 
     #[test]
     fn options_are_read_and_checked() {
-        assert_eq!(Options::parse("").unwrap(), Options::default());
-        let bell = Options::parse("filter = \"bell\"\ntime_constant_ms = 30").unwrap();
+        assert_eq!(parse("").unwrap(), Options::default());
+        let bell = parse("filter = \"bell\"\ntime_constant_ms = 30").unwrap();
         assert_eq!(bell, Options { filter: FilterKind::Bell, time_constant_ms: 30.0 });
         for (text, word) in [
             ("filter = \"parabolic\"", "parabolic"),
@@ -63,7 +65,7 @@ mod tests {
             ("time_constant_ms = nan", "time_constant_ms"),
             ("time_constant_s = 0.05", "time_constant_s"),
         ] {
-            let message = Options::parse(text).unwrap_err().to_string();
+            let message = parse(text).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");
         }
     }

@@ -4,7 +4,7 @@ mod common;
 
 use common::{FILTERS, Recorder, arc, context, drive, line, norm, numbered, open, polyline};
 use tandem_after_interpolation::{AfterInterpolation, BUFFER_BLOCKS, Options};
-use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, LimitedBy, PathMode, Planner, PluginKind, SegmentFlags};
+use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, LimitedBy, PathMode, Planner, SegmentFlags};
 
 /// Two lines with an exact stop between, an arc, a dwell, a rapid, a line of a rotary axis.
 fn program() -> Vec<Block> {
@@ -140,8 +140,8 @@ fn what_cannot_be_driven_is_refused() {
 
 #[test]
 fn machines_and_options_that_do_not_fit_are_refused() {
-    let PluginKind::Planner(make) = tandem_after_interpolation::PLUGIN.kind else { panic!("it is a planner") };
-    let refusal = |options: &str, machine| make(options, &machine).err().unwrap().to_string();
+    let open = |options: &str, machine| tandem_after_interpolation::PLUGIN.planner(options, &machine);
+    let refusal = |options: &str, machine| open(options, machine).err().unwrap().to_string();
     assert!(refusal("time_constant_ms = 0", context(0.001)).contains("time_constant_ms"));
     let mut endless = context(0.001);
     endless.limits.axes[1].rapid_mm_per_s = f64::INFINITY;

@@ -33,14 +33,4 @@ pub use corner::{corner_error_mm, tau_for_tolerance_s};
 pub use options::{CornerControl, LimitMode, Options};
 pub use planner::BlockOverlap;
 
-use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind, parse_options};
-
-/// The plugin as a host registers it.
-pub const PLUGIN: Plugin =
-    Plugin { name: "block-overlap", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
-
-/// Opens the planner from the TOML text of its options.
-fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let options: Options = parse_options(options)?;
-    Ok(Box::new(BlockOverlap::new(&options, context)?))
-}
+tandem_sdk::plugin!(planner "block-overlap" = BlockOverlap::new);

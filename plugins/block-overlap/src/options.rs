@@ -1,9 +1,9 @@
 //! `[planner.options]` of the block-overlap planner.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Whether the corner error is bounded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CornerControl {
     /// The path tolerance bounds it: the time constant is at most `TA`, and as much shorter as tolerance, axes and short
@@ -15,7 +15,7 @@ pub enum CornerControl {
 }
 
 /// What keeps the axis limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LimitMode {
     /// Lower feeds, or a later start of the next block, whichever costs less.
@@ -27,20 +27,16 @@ pub enum LimitMode {
     Off,
 }
 
-/// The options.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Options {
-    /// Whether the corner error is bounded.
-    pub corner_control: CornerControl,
-    /// What keeps the axis limits.
-    pub limits: LimitMode,
-    /// Blocks kept for looking ahead. At least 4.
-    pub buffer_blocks: usize,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { corner_control: CornerControl::default(), limits: LimitMode::default(), buffer_blocks: 512 }
+tandem_sdk::options! {
+    /// The options.
+    #[derive(Eq)]
+    pub struct Options {
+        /// Whether the path tolerance bounds the corner error.
+        pub corner_control: CornerControl = CornerControl::default(),
+        /// What keeps the axis limits: lower feeds, longer overlaps too, or nothing, as published (simulated drives with
+        /// `guard.mode = "count"` only).
+        pub limits: LimitMode = LimitMode::default(),
+        /// Blocks kept for looking ahead. At least 4.
+        pub buffer_blocks: usize = 512,
     }
 }

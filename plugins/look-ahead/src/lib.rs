@@ -17,13 +17,4 @@ mod rows;
 pub use options::{Junction, Options};
 pub use planner::LookAhead;
 
-use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind, parse_options};
-
-/// The plugin as the host registers it.
-pub const PLUGIN: Plugin =
-    Plugin { name: "look-ahead", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
-
-fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let options: Options = parse_options(options)?;
-    Ok(Box::new(LookAhead::new(&options, context)?))
-}
+tandem_sdk::plugin!(planner "look-ahead" = LookAhead::new);

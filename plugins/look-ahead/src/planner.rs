@@ -54,8 +54,9 @@ impl LookAhead {
     /// A buffer of fewer than two blocks, or beyond reason.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         if !(2..=MOST_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
-            let (asked, most) = (options.buffer_blocks, MOST_BUFFER_BLOCKS);
-            return Err(PluginError::new(format!("buffer_blocks = {asked}: from 2 to {most}")));
+            let asked = options.buffer_blocks;
+            let range = format!("{asked}: must be from 2 to {MOST_BUFFER_BLOCKS}");
+            return Err(PluginError::of_option("buffer_blocks", range));
         }
         let axes = context.limits.axes();
         Ok(Self {

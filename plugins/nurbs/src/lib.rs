@@ -39,12 +39,11 @@ pub use options::{Form, Options};
 pub use piece::Piece;
 pub use planner::{BUFFER_BLOCKS, NurbsPlanner};
 
-use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind};
+use tandem_sdk::{PlannerContext, PluginError};
 
-/// The plugin as the host registers it.
-pub const PLUGIN: Plugin =
-    Plugin { name: "nurbs", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
+tandem_sdk::plugin!(planner "nurbs" = open);
 
-fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(NurbsPlanner::new(&Options::parse(options)?, context)?))
+fn open(options: &Options, context: &PlannerContext) -> Result<NurbsPlanner, PluginError> {
+    options.check()?;
+    NurbsPlanner::new(options, context)
 }

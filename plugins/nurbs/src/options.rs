@@ -1,10 +1,10 @@
 //! `[planner.options]` of the planner.
 
-use serde::Deserialize;
-use tandem_sdk::{PluginError, parse_options};
+use serde::{Deserialize, Serialize};
+use tandem_sdk::{PluginError, PluginOptions};
 
 /// What decides the feed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
     /// As published: the chord error at the place where a fine period begins. Breaks acceleration and jerk limits.
@@ -16,20 +16,16 @@ pub enum Form {
     Scan,
 }
 
-/// The options.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Options {
-    /// What decides the feed.
-    #[serde(default)]
-    pub form: Form,
-    /// Most that the chord of a fine period may stand off the curve, µm: 0.001 to 1000.
-    #[serde(default = "one")]
-    pub chord_error_um: f64,
-}
-
-fn one() -> f64 {
-    1.0
+tandem_sdk::options! {
+    /// The options.
+    #[derive(Copy)]
+    pub struct Options {
+        /// What decides the feed: near time-optimal within all limits; the published look-ahead with cubic feed windows,
+        /// within them too; or as published, which breaks them (simulated drives with `guard.mode = "count"` only).
+        pub form: Form = Form::default(),
+        /// Most that the chord of a fine period may stand off the curve, µm: 0.001 to 1000.
+        pub chord_error_um: f64 = 1.0,
+    }
 }
 
 impl Options {
@@ -38,12 +34,21 @@ impl Options {
     /// # Errors
     /// An unknown key or form, or a chord error out of range.
     pub fn parse(text: &str) -> Result<Self, PluginError> {
-        let options: Self = parse_options(text)?;
+        let options = Self::read(text)?;
+        options.check().map(|()| options)
+    }
+
+    /// Checks what a type cannot say.
+    ///
+    /// # Errors
+    /// A chord error out of range.
+    pub fn check(&self) -> Result<(), PluginError> {
         // The range is asked in this form because a comparison with NaN is false.
-        if (0.001..=1000.0).contains(&options.chord_error_um) {
-            return Ok(options);
+        if (0.001..=1000.0).contains(&self.chord_error_um) {
+            return Ok(());
         }
-        Err(PluginError::new(format!("options: chord_error_um = {}: must be 0.001 to 1000", options.chord_error_um)))
+        let wrong = format!("{}: must be 0.001 to 1000", self.chord_error_um);
+        Err(PluginError::of_option("chord_error_um", wrong))
     }
 }
 

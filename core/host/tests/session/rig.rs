@@ -11,7 +11,7 @@ use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughError, RoughLoop, Source};
 use tandem_sdk::{
     Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, MAX_AXES, PlannerContext,
-    PluginKind, StopOn, size_of_contract,
+    StopOn, size_of_contract,
 };
 
 /// Fine period, s.
@@ -86,8 +86,8 @@ impl Rig {
             unhomed: 0,
             record_drives: false,
         };
-        let PluginKind::Driver(make) = tandem_sim::PLUGIN.kind else { unreachable!("it is a driver") };
-        let mut driver = make("latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]").unwrap();
+        let options = "latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]";
+        let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();
         driver.open(&DriverContext::new(3, PERIOD_S)).unwrap();
         driver.start().unwrap();
         let mut fine = FineLoop::new(&config, fine_end, driver, None);

@@ -1,12 +1,12 @@
 //! Friction of a servo axis.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Speed over which Coulomb friction changes its sign, rad/s: the simulated axis creeps instead of sticking.
 const SMOOTH_RAD_PER_S: f64 = 0.05;
 
 /// Friction torque at the motor shaft: Coulomb, viscous and Stribeck, and a constant torque such as gravity.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Friction {
     /// Coulomb friction, N·m.

@@ -1,6 +1,6 @@
 //! Options of servo axes and of the cutting process.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use tandem_sdk::PluginError;
 
 use super::friction::Friction;
@@ -8,7 +8,7 @@ use super::workpiece::{Profile, Workpiece};
 use crate::options::{refusal, within};
 
 /// A servo axis. The defaults are those of a 100 W motor on a screw of 20 mm lead without friction and with an exact encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoOptions {
     /// Inertia of motor, coupling, screw and table at the motor shaft, kg·m².
@@ -84,7 +84,7 @@ impl ServoOptions {
 }
 
 /// The cutting process. Without a workpiece nothing is cut.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CuttingOptions {
     /// Cutting force per area of the chip, N/mm²: force = this × depth × feed per tooth.
@@ -116,9 +116,9 @@ impl CuttingOptions {
         within("cutting.tooth_ripple", self.tooth_ripple, 0.0, 1.0)?;
         let finite = self.workpiece.origin_mm.iter().all(|v| v.is_finite()) && self.workpiece.direction_deg.is_finite();
         if !finite {
-            return Err(refusal("cutting.workpiece: origin_mm and direction_deg are numbers"));
+            return Err(refusal("cutting.workpiece", "origin_mm and direction_deg are numbers"));
         }
         within("cutting.workpiece.entry_radius_mm", self.workpiece.entry_radius_mm, 0.0, 1e4)?;
-        self.workpiece.profile().map(|_: Profile| ()).map_err(|what| refusal(&format!("cutting.workpiece: {what}")))
+        self.workpiece.profile().map(|_: Profile| ()).map_err(|what| refusal("cutting.workpiece", &what))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 
@@ -10,7 +10,7 @@ use super::noise::Noise;
 const MOST_SECTIONS: usize = 10_000;
 
 /// A workpiece: the depth of cut over a length.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Workpiece {
     /// What the length is.
@@ -36,7 +36,7 @@ pub struct Workpiece {
 }
 
 /// What a length is measured along.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Over {
     /// The path driven by joints 0 to 2 since the spindle turns in the workpiece.
@@ -47,7 +47,7 @@ pub enum Over {
 }
 
 /// A workpiece of random steps.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Random {
     /// Length of air before the first step, mm.

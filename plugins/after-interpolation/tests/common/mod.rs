@@ -3,7 +3,7 @@
 
 use tandem_sdk::{
     Accepted, ArcGeometry, Axes, AxisLimits, AxisVector, Block, BlockKind, BlockReport, Limits, Planner,
-    PlannerContext, PluginKind, Segment, SegmentSink,
+    PlannerContext, Segment, SegmentSink,
 };
 
 pub const FILTERS: [&str; 3] = ["linear", "exponential", "bell"];
@@ -32,8 +32,8 @@ pub fn context(fine_period_s: f64) -> PlannerContext {
 }
 
 pub fn open(filter: &str, time_constant_ms: f64, context: &PlannerContext) -> Box<dyn Planner> {
-    let PluginKind::Planner(make) = tandem_after_interpolation::PLUGIN.kind else { panic!("it is a planner") };
-    make(&format!("filter = \"{filter}\"\ntime_constant_ms = {time_constant_ms:?}"), context).unwrap()
+    let options = format!("filter = \"{filter}\"\ntime_constant_ms = {time_constant_ms:?}");
+    tandem_after_interpolation::PLUGIN.planner(&options, context).unwrap()
 }
 
 pub fn line(from: &AxisVector, to: &[f64], feed_mm_per_s: f64) -> Block {

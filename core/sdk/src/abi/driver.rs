@@ -1,0 +1,165 @@
+//! Drivers across the border.
+
+use std::ffi::c_void;
+use std::marker::PhantomData;
+
+use super::Descriptor;
+use super::entry::{self, Handle, Instance, ask, function};
+use crate::{
+    Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, PluginKind, PluginOptions, RawSlice,
+    Setpoint, size_of_contract,
+};
+
+type Errors = *mut PluginError;
+
+/// The functions of a driver. Each that answers writes its answer, or an error.
+#[repr(C)]
+pub struct Table {
+    size: u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
+    close: unsafe extern "C" fn(*mut c_void),
+    describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
+    claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
+    start: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+    exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
+    quick_stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+    stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+}
+
+pub const TABLE_SIZE: usize = size_of::<Table>();
+
+/// The plugin `name` of the driver that `open` makes from its options.
+pub const fn driver<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
+where
+    T: Driver + 'static,
+    O: PluginOptions + 'static,
+    F: Fn(&O) -> Result<T, PluginError> + Copy + 'static,
+{
+    Descriptor::new(PluginKind::Driver, (name, version), entry::describe::<O>, &Side::<T, O, F>::TABLE)
+}
+
+/// The plugin's side.
+struct Side<T, O, F>(PhantomData<(T, O, F)>);
+
+impl<T, O, F> Side<T, O, F>
+where
+    T: Driver + 'static,
+    O: PluginOptions + 'static,
+    F: Fn(&O) -> Result<T, PluginError> + Copy + 'static,
+{
+    const TABLE: Table = Table {
+        size: size_of_contract::<Table>(),
+        open: Self::open,
+        close: entry::close::<T>,
+        describe: describe::<T>,
+        claim: claim::<T>,
+        start: start::<T>,
+        exchange: exchange::<T>,
+        quick_stop: quick_stop::<T>,
+        stop: stop::<T>,
+    };
+
+    unsafe extern "C" fn open(options: RawSlice<u8>, handle: *mut *mut c_void, error: Errors) -> u32 {
+        // SAFETY: the host gives what lives for the call.
+        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options)) }
+    }
+}
+
+// SAFETY of all of these: the host passes the handle that `open` gave, places that can be written to, and references that
+// live for the call; it calls a driver from one thread at a time.
+
+unsafe extern "C" fn describe<T: Driver>(this: *const c_void, answer: *mut DriverDescription, error: Errors) -> u32 {
+    let this = unsafe { &*this.cast::<Instance<T>>() };
+    unsafe { this.fault.guard("describe", answer, error, || Ok(this.plugin.describe())) }
+}
+
+unsafe extern "C" fn claim<T: Driver>(
+    this: *mut c_void,
+    context: *const DriverContext,
+    answer: *mut (),
+    error: Errors,
+) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    unsafe { fault.guard("open", answer, error, || plugin.open(&*context)) }
+}
+
+unsafe extern "C" fn start<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    unsafe { fault.guard("start", answer, error, || plugin.start()) }
+}
+
+unsafe extern "C" fn exchange<T: Driver>(
+    this: *mut c_void,
+    setpoint: *const Setpoint,
+    feedback: *mut Feedback,
+    answer: *mut (),
+    error: Errors,
+) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    unsafe { fault.guard("exchange", answer, error, || plugin.exchange(&*setpoint, &mut *feedback)) }
+}
+
+unsafe extern "C" fn quick_stop<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    let work = || {
+        plugin.quick_stop();
+        Ok(())
+    };
+    unsafe { fault.guard("quick_stop", answer, error, work) }
+}
+
+unsafe extern "C" fn stop<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    let work = || {
+        plugin.stop();
+        Ok(())
+    };
+    unsafe { fault.guard("stop", answer, error, work) }
+}
+
+/// The host's side: a driver behind its table.
+struct Linked {
+    table: &'static Table,
+    handle: Handle,
+}
+
+/// Opens a driver behind its table.
+pub fn open(table: &'static Table, options: &str) -> Made<dyn Driver> {
+    let options = RawSlice::new(options.as_bytes());
+    // SAFETY: everything lives for the call.
+    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, handle, error) })?;
+    Ok(Box::new(Linked { table, handle }))
+}
+
+// SAFETY of the calls: the handle is open, `ask` gives places to write to, references live for the call.
+impl Driver for Linked {
+    fn describe(&self) -> DriverDescription {
+        let asked = ask(|answer, error| unsafe { (self.table.describe)(self.handle.instance, answer, error) });
+        // It has panicked, and says so when it is opened.
+        asked.unwrap_or_else(|_| DriverDescription::real())
+    }
+
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        ask(|answer, error| unsafe { (self.table.claim)(self.handle.instance, context, answer, error) })
+    }
+
+    fn start(&mut self) -> Result<(), PluginError> {
+        ask(|answer, error| unsafe { (self.table.start)(self.handle.instance, answer, error) })
+    }
+
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        ask(|answer, error| unsafe { (self.table.exchange)(self.handle.instance, setpoint, feedback, answer, error) })
+    }
+
+    fn quick_stop(&mut self) {
+        // It has panicked, and says so with the next exchange.
+        let _ = ask(|answer, error| unsafe { (self.table.quick_stop)(self.handle.instance, answer, error) });
+    }
+
+    fn stop(&mut self) {
+        // Nothing is asked of it any more that could tell.
+        if let Err(error) = ask(|answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) }) {
+            crate::log!(Error, "a driver did not stop: {error}");
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! What every entry of a plugin has in common: it catches panics, and a plugin that has panicked is not called again.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::c_void;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr::NonNull;
+use std::sync::OnceLock;
+
+use crate::options::OptionDocs;
+use crate::text::Text;
+use crate::{PluginError, PluginOptions, RawSlice};
+
+/// A call that did what it was asked for; what it answers is written.
+pub const DONE: u32 = 0;
+/// A call that failed; the error is written.
+pub const FAILED: u32 = 1;
+
+/// A plugin behind a handle.
+pub struct Instance<T> {
+    pub plugin: T,
+    pub fault: Fault,
+}
+
+/// The words of a plugin's panic. They are kept for good, so that repeating them needs no memory.
+#[derive(Debug, Default)]
+pub struct Fault(OnceLock<&'static str>);
+
+impl Fault {
+    /// Calls `work`, unless the plugin has panicked before; writes what it answers.
+    ///
+    /// # Safety
+    /// `answer` and `error` can be written to.
+    pub unsafe fn guard<R>(
+        &self,
+        method: &str,
+        answer: *mut R,
+        error: *mut PluginError,
+        work: impl FnOnce() -> Result<R, PluginError>,
+    ) -> u32 {
+        let outcome = match self.0.get() {
+            Some(words) => Err(PluginError::fixed(words)),
+            None => catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(self.keep(method, panic))),
+        };
+        // SAFETY: the caller's promise; the place of an error or an answer holds nothing to drop.
+        unsafe {
+            match outcome {
+                Ok(value) => answer.write(value),
+                Err(words) => {
+                    error.write(words);
+                    return FAILED;
+                }
+            }
+        }
+        DONE
+    }
+
+    #[cold]
+    fn keep(&self, method: &str, panic: Box<dyn Any + Send>) -> PluginError {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
+        let place = PLACE.with_borrow_mut(std::mem::take);
+        let text: &'static str = Box::leak(format!("panicked in {method}{place}: {words}").into_boxed_str());
+        // Dropping what the panic carries runs code of the plugin again, which may panic again.
+        std::mem::forget(panic);
+        let _ = self.0.set(text);
+        PluginError::fixed(text)
+    }
+
+    /// The words, if there was a panic.
+    pub fn words(&self) -> Option<&'static str> {
+        self.0.get().copied()
+    }
+}
+
+thread_local! {
+    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// Keeps where a panic happened instead of printing it: a backtrace takes tens of milliseconds. A shared library has a
+/// hook of its own, so that this touches nobody else's.
+pub fn quiet_panics() {
+    std::panic::set_hook(Box::new(|info| {
+        let place = info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+        PLACE.set(place);
+    }));
+}
+
+/// A function or closure that captures nothing, made from its type: it has no data.
+pub fn function<F: Copy + 'static>() -> F {
+    const {
+        assert!(size_of::<F>() == 0, "name the function itself, or a closure that captures nothing");
+    };
+    // SAFETY: a value without data is read from anywhere; `F` is `Copy`, and the one given to the macro exists.
+    unsafe { NonNull::<F>::dangling().read() }
+}
+
+/// Opens a plugin from its options.
+///
+/// # Safety
+/// `options` is a text that lives for the call; the other two can be written to.
+pub unsafe fn open<T, O: PluginOptions>(
+    options: RawSlice<u8>,
+    handle: *mut *mut c_void,
+    error: *mut PluginError,
+    make: impl FnOnce(&O) -> Result<T, PluginError>,
+) -> u32 {
+    let work = || {
+        // SAFETY: the caller's promise.
+        let text = unsafe { text(options) };
+        let plugin = make(&O::read(text)?)?;
+        Ok(Box::into_raw(Box::new(Instance { plugin, fault: Fault::default() })).cast::<c_void>())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { Fault::default().guard("its constructor", handle, error, work) }
+}
+
+/// Describes the options `O`, as TOML.
+///
+/// # Safety
+/// Both can be written to.
+pub unsafe extern "C" fn describe<O: PluginOptions>(answer: *mut Text, error: *mut PluginError) -> u32 {
+    let work = || {
+        let docs = OptionDocs { option: O::describe() };
+        toml::to_string(&docs).map(Text::owned).map_err(|e| PluginError::new(e.to_string()))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { Fault::default().guard("the description of its options", answer, error, work) }
+}
+
+/// Closes a plugin. One that has panicked is left as it is: what it would drop may be half made.
+///
+/// # Safety
+/// `handle` was given by [`open`] for the same type, and is not used again.
+pub unsafe extern "C" fn close<T>(handle: *mut c_void) {
+    // SAFETY: the caller's promise.
+    let instance = unsafe { Box::from_raw(handle.cast::<Instance<T>>()) };
+    if instance.fault.words().is_some() {
+        std::mem::forget(instance);
+        return;
+    }
+    let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) else { return };
+    std::mem::forget(panic);
+}
+
+/// A text of the other side.
+///
+/// # Safety
+/// It lives for the call.
+pub unsafe fn text<'a>(raw: RawSlice<u8>) -> &'a str {
+    // SAFETY: the caller's promise.
+    std::str::from_utf8(unsafe { raw.as_slice() }).unwrap_or("")
+}
+
+/// The host's side of an opened plugin.
+pub struct Handle {
+    pub instance: *mut c_void,
+    close: unsafe extern "C" fn(*mut c_void),
+}
+
+// SAFETY: every contract asks for plugins that may be sent, and those that are shared for plugins that may be.
+unsafe impl Send for Handle {}
+// SAFETY: as above: only a kinematics is called through a shared reference from several threads, and it is `Sync`.
+unsafe impl Sync for Handle {}
+
+impl Handle {
+    /// Opens a plugin with one of the `open` functions.
+    pub fn open(
+        close: unsafe extern "C" fn(*mut c_void),
+        call: impl FnOnce(*mut *mut c_void, *mut PluginError) -> u32,
+    ) -> Result<Self, PluginError> {
+        let instance = ask(call)?;
+        Ok(Self { instance, close })
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        // SAFETY: it was opened, and is closed once.
+        unsafe { (self.close)(self.instance) };
+    }
+}
+
+/// Makes a call of a table: room for its answer and its error, and the one of the two that came.
+#[inline]
+pub fn ask<R>(call: impl FnOnce(*mut R, *mut PluginError) -> u32) -> Result<R, PluginError> {
+    let mut answer = std::mem::MaybeUninit::<R>::uninit();
+    let mut error = std::mem::MaybeUninit::<PluginError>::uninit();
+    let status = call(answer.as_mut_ptr(), error.as_mut_ptr());
+    // SAFETY: each status says which of the two was written.
+    unsafe { if status == DONE { Ok(answer.assume_init()) } else { Err(error.assume_init()) } }
+}

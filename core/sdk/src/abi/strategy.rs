@@ -1,0 +1,138 @@
+//! Feed strategies across the border.
+
+use std::ffi::c_void;
+use std::marker::PhantomData;
+
+use super::Descriptor;
+use super::entry::{self, Handle, Instance, ask, function};
+use crate::{
+    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, PluginKind, PluginOptions, RawSlice, StrategyContext, Window,
+    size_of_contract,
+};
+
+type Errors = *mut PluginError;
+
+/// What a strategy says of itself.
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Description {
+    max_ratio_change_per_s: f64,
+    signal_count: u32,
+    signals: [RawSlice<u8>; MAX_SIGNALS],
+}
+
+/// The functions of a feed strategy. Each that answers writes its answer, or an error.
+#[repr(C)]
+pub struct Table {
+    size: u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
+    close: unsafe extern "C" fn(*mut c_void),
+    describe: unsafe extern "C" fn(*const c_void, *mut Description, Errors) -> u32,
+    update: unsafe extern "C" fn(*mut c_void, *const Window<'_>, *mut Answer, Errors) -> u32,
+}
+
+pub const TABLE_SIZE: usize = size_of::<Table>();
+
+/// The plugin `name` of the strategy that `open` makes from its options.
+pub const fn feed_strategy<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
+where
+    T: FeedStrategy + 'static,
+    O: PluginOptions + 'static,
+    F: Fn(&O, &StrategyContext) -> Result<T, PluginError> + Copy + 'static,
+{
+    Descriptor::new(PluginKind::FeedStrategy, (name, version), entry::describe::<O>, &Side::<T, O, F>::TABLE)
+}
+
+/// The plugin's side.
+struct Side<T, O, F>(PhantomData<(T, O, F)>);
+
+impl<T, O, F> Side<T, O, F>
+where
+    T: FeedStrategy + 'static,
+    O: PluginOptions + 'static,
+    F: Fn(&O, &StrategyContext) -> Result<T, PluginError> + Copy + 'static,
+{
+    const TABLE: Table = Table {
+        size: size_of_contract::<Table>(),
+        open: Self::open,
+        close: entry::close::<T>,
+        describe: describe::<T>,
+        update: update::<T>,
+    };
+
+    unsafe extern "C" fn open(
+        options: RawSlice<u8>,
+        context: *const StrategyContext,
+        handle: *mut *mut c_void,
+        error: Errors,
+    ) -> u32 {
+        // SAFETY: the host gives what lives for the call.
+        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options, &*context)) }
+    }
+}
+
+// SAFETY of both: the host passes the handle that `open` gave, places that can be written to, and references that live
+// for the call; it calls a strategy from one thread at a time.
+
+unsafe extern "C" fn describe<T: FeedStrategy>(this: *const c_void, answer: *mut Description, error: Errors) -> u32 {
+    let this = unsafe { &*this.cast::<Instance<T>>() };
+    unsafe { this.fault.guard("signals", answer, error, || description(&this.plugin)) }
+}
+
+fn description(strategy: &impl FeedStrategy) -> Result<Description, PluginError> {
+    let names = strategy.signals();
+    if names.len() > MAX_SIGNALS {
+        return Err(PluginError::new(format!("it names {} signals; {MAX_SIGNALS} are possible", names.len())));
+    }
+    let mut signals = [RawSlice::EMPTY; MAX_SIGNALS];
+    for (place, name) in signals.iter_mut().zip(names) {
+        *place = RawSlice::new(name.as_bytes());
+    }
+    let max_ratio_change_per_s = strategy.max_ratio_change_per_s();
+    Ok(Description { max_ratio_change_per_s, signal_count: names.len() as u32, signals })
+}
+
+unsafe extern "C" fn update<T: FeedStrategy>(
+    this: *mut c_void,
+    window: *const Window<'_>,
+    answer: *mut Answer,
+    error: Errors,
+) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    unsafe { fault.guard("update", answer, error, || plugin.update(&*window)) }
+}
+
+/// The host's side: a strategy behind its table.
+struct Linked {
+    table: &'static Table,
+    handle: Handle,
+    max_ratio_change_per_s: f64,
+    signals: &'static [&'static str],
+}
+
+/// Opens a strategy behind its table.
+pub fn open(table: &'static Table, options: &str, context: &StrategyContext) -> Made<dyn FeedStrategy> {
+    let options = RawSlice::new(options.as_bytes());
+    // SAFETY: everything lives for the call; the handle is open; names live as long as their library, which stays.
+    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, context, handle, error) })?;
+    let described = ask(|answer, error| unsafe { (table.describe)(handle.instance, answer, error) })?;
+    let names = &described.signals[..(described.signal_count as usize).min(MAX_SIGNALS)];
+    // The contract hands names out for good, and few strategies are opened: their list is never freed.
+    let signals = names.iter().map(|name| unsafe { entry::text(*name) }).collect::<Vec<_>>().leak();
+    Ok(Box::new(Linked { table, handle, max_ratio_change_per_s: described.max_ratio_change_per_s, signals }))
+}
+
+impl FeedStrategy for Linked {
+    fn signals(&self) -> &'static [&'static str] {
+        self.signals
+    }
+
+    fn max_ratio_change_per_s(&self) -> f64 {
+        self.max_ratio_change_per_s
+    }
+
+    fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
+        // SAFETY: the handle is open, `ask` gives places to write to, the window lives for the call.
+        ask(|answer, error| unsafe { (self.table.update)(self.handle.instance, window, answer, error) })
+    }
+}
