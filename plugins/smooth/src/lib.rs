@@ -32,12 +32,11 @@ pub use options::Options;
 pub use plan::{Effort, Tuning};
 pub use planner::{BUFFER_CHORDS, SmoothPlanner};
 
-use tandem_sdk::{Made, Planner, PlannerContext, Plugin, PluginKind};
+use tandem_sdk::{PlannerContext, PluginError};
 
-/// The plugin as the host registers it.
-pub const PLUGIN: Plugin =
-    Plugin { name: "smooth", version: env!("CARGO_PKG_VERSION"), kind: PluginKind::Planner(open) };
+tandem_sdk::plugin!(planner "smooth" = open);
 
-fn open(options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(SmoothPlanner::new(&Options::parse(options)?, context)?))
+fn open(options: &Options, context: &PlannerContext) -> Result<SmoothPlanner, PluginError> {
+    options.check()?;
+    SmoothPlanner::new(options, context)
 }

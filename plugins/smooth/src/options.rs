@@ -1,27 +1,21 @@
 //! `[planner.options]` of the planner.
 
-use serde::Deserialize;
-use tandem_sdk::{PluginError, parse_options};
+use tandem_sdk::{PluginError, PluginOptions};
 
 use crate::plan::Tuning;
 
-/// The options. All have defaults that need no change; they exist to see what they do.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Options {
-    /// Step of the grid in time, ms: 2 to 20.
-    pub grid_ms: f64,
-    /// Time that is planned at once, ms: 100 to 2000.
-    pub window_ms: f64,
-    /// Share of the tolerance that the first try uses: 0.5 to 1.
-    pub tolerance_share: f64,
-    /// Turns of smoothing and pacing: 1 to 8.
-    pub rounds: u32,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { grid_ms: 6.0, window_ms: 1000.0, tolerance_share: 0.955, rounds: 3 }
+tandem_sdk::options! {
+    /// The options. All have defaults that need no change; they exist to see what they do.
+    #[derive(Copy)]
+    pub struct Options {
+        /// Step of the grid in time, ms: 2 to 20.
+        pub grid_ms: f64 = 6.0,
+        /// Time that is planned at once, ms: 100 to 2000.
+        pub window_ms: f64 = 1000.0,
+        /// Share of the tolerance that the first try uses: 0.5 to 1.
+        pub tolerance_share: f64 = 0.955,
+        /// Turns of smoothing and pacing: 1 to 8.
+        pub rounds: u32 = 3,
     }
 }
 
@@ -31,20 +25,28 @@ impl Options {
     /// # Errors
     /// An unknown key, or a value out of range.
     pub fn parse(text: &str) -> Result<Self, PluginError> {
-        let options: Self = parse_options(text)?;
+        let options = Self::read(text)?;
+        options.check().map(|()| options)
+    }
+
+    /// Checks what a type cannot say.
+    ///
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), PluginError> {
         // The ranges are asked in this form because a comparison with NaN is false.
         let ranges = [
-            ("grid_ms", options.grid_ms, 2.0, 20.0),
-            ("window_ms", options.window_ms, 100.0, 2000.0),
-            ("tolerance_share", options.tolerance_share, 0.5, 1.0),
-            ("rounds", f64::from(options.rounds), 1.0, 8.0),
+            ("grid_ms", self.grid_ms, 2.0, 20.0),
+            ("window_ms", self.window_ms, 100.0, 2000.0),
+            ("tolerance_share", self.tolerance_share, 0.5, 1.0),
+            ("rounds", f64::from(self.rounds), 1.0, 8.0),
         ];
         for (key, value, low, high) in ranges {
             if !(low..=high).contains(&value) {
-                return Err(PluginError::new(format!("options: {key} = {value}: must be {low} to {high}")));
+                return Err(PluginError::of_option(key, format!("{value}: must be {low} to {high}")));
             }
         }
-        Ok(options)
+        Ok(())
     }
 
     pub(crate) fn tuning(&self) -> Tuning {
