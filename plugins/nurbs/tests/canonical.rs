@@ -18,6 +18,13 @@ fn drive(form: &str, name: &str) -> Figures {
     figures
 }
 
+fn drive_baseline(name: &str) -> Figures {
+    let (data, length_mm) = canonical(name);
+    let block = curve_block(data.clone(), length_mm, 250.0);
+    let context = context(block.facts().start);
+    figures(&run("form = \"adaptive\"", &context, &[block]), &data, &context)
+}
+
 /// What holds for both: limits per axis and of the chord, feed, one rest at the end, and the realised arc.
 fn assert_limits(figures: &Figures, name: &str) {
     let [velocity, acceleration, jerk] = figures.axis;
@@ -42,6 +49,9 @@ fn windowed_keeps_the_limits_along_the_path_too() {
         assert_limits(&figures, name);
         let [_, acceleration, jerk] = figures.path;
         assert!(acceleration <= 5000.0 && jerk <= 4e5, "{name}: {figures:?}");
+        // The jerk of the baseline, start and stop counted, is about a hundred times that.
+        let baseline = drive_baseline(name);
+        assert!(jerk < baseline.path[2] / 90.0 && baseline.path[1] > 5000.0, "{name}: {baseline:?}");
         assert!(figures.time_s <= most * best_s, "{name}: {}", figures.time_s / best_s);
     }
 }

@@ -9,7 +9,7 @@ use super::{End, LaneLimits, PLACES, Point};
 /// Iterations at most.
 const ITERATIONS: usize = 40;
 /// Mean complementarity at which a solution is good enough.
-const ENOUGH: f64 = 1e-5;
+const ENOUGH: f64 = 3e-5;
 /// Mean complementarity from which no solution is found any more: there is none.
 const LOST: f64 = 1e6;
 /// Violation of a row, as a share of its limit, that is as good as none.

@@ -3,11 +3,14 @@
 use super::timing::Timing;
 use crate::stream::relief::Reliefs;
 use crate::stream::{Bounds, Cursor, Route, State};
-use crate::windowed::{Corner, Limit, Ramp, Rounds, Spot, Survey, Tangential};
+use crate::windowed::{Care, Corner, Limit, Ramp, Rounds, Spot, Survey, Tangential};
 
 /// Multiples of acceleration and jerk that ramps take where the speed at the start is too high for less: in motion the
 /// window before may brake in less way than a cubic ramp.
 const HASTE: [f64; 4] = [1.0, 1.25, 1.6, 2.2];
+
+/// Roughly: what exceeds a limit is found later.
+const CARE: Care = Care { look_s: 1e-3, over: 0.01, rounds: 8 };
 
 /// A timing; keeps its memory.
 #[derive(Debug, Default)]
@@ -49,7 +52,7 @@ impl First {
         let tangential = Tangential { acceleration_mm_per_s2: haste * a, jerk_mm_per_s3: haste * j };
         self.corners.clone_from(&self.survey.corners);
         let mut limit = Limit::new(&self.survey.places);
-        self.rounds.make(&mut self.corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &mut self.ramps);
+        self.rounds.make(&mut self.corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &CARE, &mut self.ramps);
         self.corners[0].speed_mm_per_s >= start.speed_mm_per_s && !self.ramps.is_empty()
     }
 
@@ -89,6 +92,6 @@ fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: (0.05 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.1),
+        step_mm: (0.15 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.3),
     }
 }

@@ -39,11 +39,10 @@ impl Rated {
         State { s_mm, speed_mm_per_s: first * b.sqrt(), acceleration_mm_per_s2: second * b + first * slope / 2.0 }
     }
 
-    /// Where it has the least acceleration, in the middle; the latest of those about equal.
-    fn commit_s(&self, times: &[f64]) -> f64 {
-        let whole_s = times[times.len() - 1];
-        let (mut least, mut found) = (f64::INFINITY, 0.5 * whole_s);
-        for t in times.iter().copied().filter(|t| (0.42..=0.7).contains(&(t / whole_s))) {
+    /// Where it has the least acceleration, in the last part before `latest_s`; the latest of those about equal.
+    fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
+        let (mut least, mut found) = (f64::INFINITY, latest_s);
+        for t in times.iter().copied().filter(|t| (0.75..=1.0).contains(&(t / latest_s))) {
             let k = interval(times, t);
             let size = self.at(k, t - times[k]).acceleration_mm_per_s2.abs();
             if size <= least.max(1.0) {
@@ -63,8 +62,8 @@ impl Motion for Driven {
         if self.by_ramps { self.ramps.end_mm() } else { self.rated.coefficients.last().copied().unwrap_or(0.0) }
     }
 
-    fn commit_s(&self, times: &[f64]) -> f64 {
-        if self.by_ramps { self.ramps.commit_s(times) } else { self.rated.commit_s(times) }
+    fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
+        if self.by_ramps { self.ramps.commit_s(times, latest_s) } else { self.rated.commit_s(times, latest_s) }
     }
 
     fn later_s(&self, times: &[f64], now_s: f64) -> f64 {

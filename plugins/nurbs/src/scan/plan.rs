@@ -28,6 +28,8 @@ pub struct Scan {
     points: Vec<[Point; PLACES]>,
     /// Path coordinates of these.
     places_mm: Vec<[f64; PLACES]>,
+    /// Which intervals hold a knot of the curve.
+    knots: Vec<bool>,
     /// Reliefs that lowered the speed when they were made.
     slowed: Option<usize>,
     reliefs: Reliefs,
@@ -59,7 +61,7 @@ impl Planning for Scan {
             if !worst.is_kept() {
                 continue;
             }
-            if n == TRIES || !ease(route, bounds, &window.motion.rated, &mut self.reliefs) {
+            if n == TRIES || !ease(route, bounds, &window.motion.rated, &self.knots, &mut self.reliefs) {
                 return true;
             }
             kept = Some(known);
@@ -128,10 +130,12 @@ impl Scan {
     fn fill_points(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize) {
         self.points.clear();
         self.places_mm.clear();
+        self.knots.clear();
         let (mut cursor, lanes) = (Cursor::default(), bounds.context.axes.count());
         for k in 0..intervals {
             let states = [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
             let sides = route.sides([states[0][0], states[2][0]], &mut cursor);
+            self.knots.push(sides[0].is_some());
             self.places_mm.push(states.map(|state| state[0]));
             self.points.push(states.map(|[s, s1, s2, s3]| {
                 let (at, leg) = route.at(s, &mut cursor);

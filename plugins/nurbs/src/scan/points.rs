@@ -9,16 +9,16 @@ use crate::stream::{Bounds, Cursor, Route};
 const NEAR: f64 = 0.995;
 /// What the next try aims at.
 const AIM: f64 = 0.985;
-/// Where it is looked at in an interval.
-const PLACES: [f64; 5] = [0.02, 0.25, 0.5, 0.75, 0.98];
+/// Where it is looked at in an interval without a knot of the curve, and with one.
+const PLACES: [&[f64]; 2] = [&[0.25, 0.75], &[0.02, 0.25, 0.5, 0.75, 0.98]];
 
-/// Adds the intervals in which the jerk exceeds its limit. Gives whether there was one.
-pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, reliefs: &mut Reliefs) -> bool {
+/// Adds the intervals in which the jerk exceeds its limit; `knots` says which hold a knot of the curve. Gives whether there was one.
+pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, knots: &[bool], reliefs: &mut Reliefs) -> bool {
     let (mut cursor, known, mut over) = (Cursor::default(), reliefs.count(), false);
-    for k in 0..motion.rate.intervals() {
+    for (k, knot) in knots.iter().enumerate() {
         let mut worst = 0.0f64;
-        for z in PLACES {
-            let [s_mm, rest @ ..] = motion.derivatives(k, z);
+        for z in PLACES[usize::from(*knot)] {
+            let [s_mm, rest @ ..] = motion.derivatives(k, *z);
             worst = worst.max(jerk_share(bounds, &route.at(s_mm, &mut cursor).0, rest));
         }
         // What is near the limit here would be the next to exceed it.

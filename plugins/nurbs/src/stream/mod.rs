@@ -48,8 +48,9 @@ pub trait Motion: Debug + Default {
     fn at(&self, k: usize, t_s: f64) -> State;
     /// Where it ends, mm.
     fn end_mm(&self) -> f64;
-    /// Until when it is to be driven before the next window is planned, s; `times` are those at the ends of the intervals.
-    fn commit_s(&self, times: &[f64]) -> f64;
+    /// Until when it is to be driven before the next window is planned, at most `latest_s`; `times` are those at the ends of
+    /// the intervals.
+    fn commit_s(&self, times: &[f64], latest_s: f64) -> f64;
     /// The same, where at `now_s` no window was found.
     fn later_s(&self, times: &[f64], now_s: f64) -> f64;
 }
@@ -71,8 +72,13 @@ pub trait Planning: Debug + Default {
 
 /// Time of a window, s: three stops from `speed_mm_per_s`.
 pub fn window_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
-    let stop_s = |a: &tandem_sdk::AxisLimits| {
+    WINDOW_S.max(3.0 * stop_s(bounds, speed_mm_per_s))
+}
+
+/// Longest time in which an axis stops from `speed_mm_per_s`, s.
+fn stop_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
+    let of = |a: &tandem_sdk::AxisLimits| {
         speed_mm_per_s / a.acceleration_mm_per_s2 + a.acceleration_mm_per_s2 / a.jerk_mm_per_s3
     };
-    bounds.context.limits.axes().iter().map(|a| 3.0 * stop_s(a)).fold(WINDOW_S, f64::max)
+    bounds.context.limits.axes().iter().map(of).fold(0.0, f64::max)
 }

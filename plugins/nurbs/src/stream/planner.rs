@@ -7,12 +7,14 @@ use tandem_sdk::{
 
 use super::draw::{Drawn, draw};
 use super::route::Item;
-use super::{Bounds, Cursor, Leg, Motion, Planning, Route, Start, State, Window};
+use super::{Bounds, Cursor, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
 
 /// Share of the jerk limits on which a stop counts: the plan takes the rest.
 const STOP_JERK: f64 = 0.5;
+/// Stops before the end of a window that are left to the next one.
+const STOPS: f64 = 1.5;
 /// A window shorter than this that ends where the known path ends is driven to its end, s.
 const SHORT_S: f64 = 0.15;
 
@@ -123,7 +125,7 @@ impl<P: Planning> Streamer<P> {
                 if !self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.window) {
                     return Err(self.no_way());
                 }
-                self.driving = Some((0.0, commit_s(&self.window, closed)));
+                self.driving = Some((0.0, self.commit_s(closed)));
             }
         }
         Ok(Some(0.0))
@@ -150,10 +152,21 @@ impl<P: Planning> Streamer<P> {
         let (end_mm, closed) = self.route.run_end(self.finished);
         if self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
-            self.driving = Some((0.0, commit_s(&self.window, closed)));
+            self.driving = Some((0.0, self.commit_s(closed)));
         } else {
             self.driving = Some((now_s, self.window.motion.later_s(&self.window.times, now_s)));
         }
+    }
+
+    /// Until when the window is driven: it ends at rest, and what it slows down for that is left to the next one.
+    fn commit_s(&self, closed: bool) -> f64 {
+        let window = &self.window;
+        let whole_s = window.duration_s();
+        if window.whole && (closed || whole_s < SHORT_S) {
+            return whole_s;
+        }
+        let latest_s = whole_s - STOPS * stop_s(&self.bounds, window.most_mm_per_s);
+        window.motion.commit_s(&window.times, latest_s.max(0.5 * whole_s))
     }
 
     fn emit_motion(&mut self, (from_s, to_s): (f64, f64), left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
@@ -262,12 +275,6 @@ impl Leg {
     fn block_length_mm(&self) -> f64 {
         self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
     }
-}
-
-/// Until when a window is driven.
-fn commit_s<M: Motion>(window: &Window<M>, closed: bool) -> f64 {
-    let whole_s = window.duration_s();
-    if window.whole && (closed || whole_s < SHORT_S) { whole_s } else { window.motion.commit_s(&window.times) }
 }
 
 fn blank(leg: &Leg) -> Segment {

@@ -22,5 +22,5 @@ pub use corners::{Limit, Spot, Survey};
 pub use motion::Ramps;
 pub use plan::Windowed;
 pub use ramp::{Ramp, Tangential};
-pub use ramps::Rounds;
+pub use ramps::{Care, Rounds};
 pub use ripple::Corner;

@@ -3,9 +3,6 @@
 use super::ramp::Ramp;
 use crate::stream::{Motion, State, interval};
 
-/// Share of a window's time that is driven before the next one is planned.
-const COMMIT: f64 = 0.7;
-
 /// Least time that is driven where none was found, s.
 const LATER_S: f64 = 0.02;
 
@@ -24,11 +21,10 @@ impl Motion for Ramps {
         self.0.last().map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0])
     }
 
-    /// In the first part: at its end where the speed is level there, else at the last border before, where there is no
+    /// At the latest time where the speed is level there, else at the last border before, where there is no
     /// acceleration either.
-    fn commit_s(&self, times: &[f64]) -> f64 {
-        let whole_s = times[times.len() - 1];
-        let until_s = COMMIT * whole_s;
+    fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
+        let (whole_s, until_s) = (times[times.len() - 1], latest_s);
         let [_, b, c, d] = self.0[interval(times, until_s)].speed;
         if [b, c, d] == [0.0; 3] {
             return until_s;

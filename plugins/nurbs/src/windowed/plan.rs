@@ -4,7 +4,7 @@ use super::corners::{Limit, Spot, Survey};
 use super::motion::Ramps;
 use super::points::ease;
 use super::ramp::Tangential;
-use super::ramps::Rounds;
+use super::ramps::{Care, Rounds};
 use super::ripple::Corner;
 use crate::stream::check::check;
 use crate::stream::relief::Reliefs;
@@ -18,6 +18,9 @@ const LOCAL_TRIES: usize = 4;
 
 /// Tries of a window in motion; and from rest, where each later one is slower.
 const TRIES: [usize; 2] = [6, 24];
+
+/// As published.
+pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
 
 /// What a try takes back.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +89,7 @@ impl Windowed {
         let corners = &mut self.survey.corners;
         let mut limit = Limit::new(&self.survey.places);
         let ramps = &mut window.motion.0;
-        self.rounds.make(corners, self.survey.feed_mm_per_s, &tangential, &mut limit, ramps);
+        self.rounds.make(corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &CARE, ramps);
         lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
         corners[0].speed_mm_per_s >= speed && window.times.len() > 1
     }

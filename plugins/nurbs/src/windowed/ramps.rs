@@ -4,12 +4,16 @@ use super::corners::Limit;
 use super::ramp::{LEAST_S, Ramp, Tangential};
 use super::ripple::{Corner, propagate, ramps};
 
-/// How often a ramp is compared with the limit, s.
-const LOOK_S: f64 = 0.2e-3;
-/// How much faster than the limit is as good as the limit.
-const OVER: f64 = 1e-4;
-/// Rounds of new corners at most: each adds one to a ramp at most.
-const ROUNDS: usize = 40;
+/// How closely ramps are compared with the limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Care {
+    /// How often, s.
+    pub look_s: f64,
+    /// How much faster than the limit is as good as the limit, as a share.
+    pub over: f64,
+    /// Rounds of new corners at most: each adds one to a ramp at most.
+    pub rounds: usize,
+}
 
 /// From one corner to the next, and what was found there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,10 +38,11 @@ impl Rounds {
         feed_mm_per_s: f64,
         tangential: &Tangential,
         limit: &mut Limit,
+        care: &Care,
         into: &mut Vec<Ramp>,
     ) {
         self.pairs.clear();
-        for _ in 0..ROUNDS {
+        for _ in 0..care.rounds {
             propagate(corners, tangential);
             std::mem::swap(&mut self.pairs, &mut self.before);
             self.pairs.clear();
@@ -49,7 +54,7 @@ impl Rounds {
                 // A pair looked at before, with the same speeds, has nothing new.
                 let found = match known.peek() {
                     Some(pair) if pair.ends == *ends => pair.found,
-                    _ => parts.map(|ramp| worst(&ramp, limit)),
+                    _ => parts.map(|ramp| worst(&ramp, limit, care)),
                 };
                 self.pairs.push(Pair { ends: [ends[0], ends[1]], found });
                 into.extend(parts.into_iter().filter(|ramp| ramp.duration_s > 0.0));
@@ -81,12 +86,12 @@ fn merge(corners: &mut Vec<Corner>) {
 }
 
 /// The place of a ramp that is furthest above the limit, as a corner at the limit.
-fn worst(ramp: &Ramp, limit: &mut Limit) -> Option<Corner> {
+fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
     }
-    let looks = (ramp.duration_s / LOOK_S).ceil().max(1.0);
-    let (mut most, mut found) = (1.0 + OVER, None);
+    let looks = (ramp.duration_s / care.look_s).ceil().max(1.0);
+    let (mut most, mut found) = (1.0 + care.over, None);
     for n in 0..=looks as usize {
         let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
         let allowed = limit.at(at_mm);

@@ -5,6 +5,7 @@ use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
 use tandem_sdk::{Axes, AxisVector, NurbsData};
 
 use super::corners::{Limit, Spot, Survey};
+use super::plan::CARE;
 use super::ramp::{Ramp, Tangential, cubic};
 use super::ramps::Rounds;
 use super::ripple::{Corner, propagate, ramps};
@@ -158,7 +159,7 @@ fn windows_are_as_published() {
         }
         let (curve, table) = canonical(name);
         let (mut found, mut plan) = (survey(&curve, &table), Vec::new());
-        Rounds::default().make(&mut found.corners, FEED, &LIMITS, &mut Limit::new(&found.places), &mut plan);
+        Rounds::default().make(&mut found.corners, FEED, &LIMITS, &mut Limit::new(&found.places), &CARE, &mut plan);
         close(plan.iter().map(|ramp| ramp.duration_s).sum(), published_s, 0.02, 0.0);
         for pair in plan.windows(2) {
             let [end_mm, end, acceleration, _] = pair[0].at(pair[0].duration_s);
