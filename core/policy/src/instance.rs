@@ -9,6 +9,7 @@ use crate::layout::Layout;
 use crate::limits::Limits;
 use crate::parameters::{Parameter, resolve};
 use crate::script::Script;
+use crate::window::Record;
 
 /// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
 pub type Asks = [f64; 3];
@@ -72,23 +73,31 @@ impl Instance {
         self.memory.size(&self.store)
     }
 
-    /// Hands over the window of `records`, blocks of [`abi::block`] one after the other, and appends what is asked for to
-    /// `asks`. Does not allocate where `asks` has room.
+    /// Hands over the window of `records`, and appends what is asked for to `asks`. Does not allocate where `asks` has room.
     ///
     /// # Errors
     /// What went wrong in the script. An infinite number in an answer is an error too.
-    pub fn blocks(&mut self, records: &[u8], asks: &mut Vec<Asks>) -> Result<(), Trouble> {
-        let Some(function) = self.blocks.clone() else { return Ok(()) };
-        let count = records.len() / abi::block::BYTES;
+    pub fn blocks(&mut self, records: &[Record], asks: &mut Vec<Asks>) -> Result<(), Trouble> {
+        let Some(function) = &self.blocks else { return Ok(()) };
         let (window, stride) = (self.layout.window, self.layout.block_bytes);
-        self.write(window, stride, records, abi::block::BYTES);
-        self.call(&function, (window as u32, count as u32), self.budget.window(count))?;
-        let memory = self.memory.data(&self.store);
-        for index in 0..count {
-            let at = window + index * stride + abi::block::ASK_TIME_CONSTANT;
-            asks.push(finite_or_nan(memory, at)?);
+        let memory = self.memory.data_mut(&mut self.store);
+        if stride == abi::block::BYTES {
+            memory[window..][..records.len() * stride].copy_from_slice(records.as_flattened());
+        } else {
+            for (place, record) in memory[window..].chunks_exact_mut(stride).zip(records) {
+                place[..abi::block::BYTES].copy_from_slice(record);
+            }
         }
-        Ok(())
+        let fuel = self.budget.window(records.len());
+        let answer = call(&mut self.store, function, (window as u32, records.len() as u32), fuel);
+        self.fuel_used = fuel_used(&self.store, fuel);
+        answer?;
+        let answered = self.memory.data(&self.store)[window..].chunks_exact(stride).take(records.len());
+        asks.extend(answered.map(read_asks));
+        asks.iter().flatten().position(|ask| ask.is_infinite()).map_or(Ok(()), |at| {
+            const NAMES: [&str; 3] = ["a time constant", "a path tolerance", "a feed cap"];
+            Err(not_finite(NAMES[at % 3], asks[at / 3][at % 3]))
+        })
     }
 
     /// Hands over the means of a rough period, as [`abi::period`] lays them out; gives the ratio, NaN for none. Does not
@@ -97,10 +106,12 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn period(&mut self, record: &[u8]) -> Result<f64, Trouble> {
-        let Some(function) = self.period.clone() else { return Ok(f64::NAN) };
-        let place = self.layout.period;
-        self.write(place, record.len(), record, record.len());
-        let ratio = self.call(&function, place as u32, self.budget.fuel_per_call)?;
+        let Some(function) = &self.period else { return Ok(f64::NAN) };
+        let (place, fuel) = (self.layout.period, self.budget.fuel_per_call);
+        self.memory.data_mut(&mut self.store)[place..][..record.len()].copy_from_slice(record);
+        let answer = call(&mut self.store, function, place as u32, fuel);
+        self.fuel_used = fuel_used(&self.store, fuel);
+        let ratio = answer?;
         if ratio.is_infinite() { Err(not_finite("a ratio", ratio)) } else { Ok(ratio) }
     }
 
@@ -109,8 +120,8 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn save(&mut self) -> Result<Vec<u8>, Trouble> {
-        let Some(function) = self.save.clone() else { return Ok(vec![]) };
-        let bytes = self.call(&function, (), self.budget.fuel_per_call)? as usize;
+        let Some(function) = &self.save else { return Ok(vec![]) };
+        let bytes = call(&mut self.store, function, (), self.budget.fuel_per_call)? as usize;
         if bytes > self.layout.state_bytes {
             return Err(Trouble::Trap(format!("save gave {bytes} bytes, the buffer has {}", self.layout.state_bytes)));
         }
@@ -123,52 +134,37 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn restore(&mut self, state: &[u8]) -> Result<(), Trouble> {
-        let Some(function) = self.restore.clone() else { return Ok(()) };
+        let Some(function) = &self.restore else { return Ok(()) };
         if state.is_empty() || state.len() > self.layout.state_bytes {
             return Ok(());
         }
         let start = self.layout.state;
         self.memory.data_mut(&mut self.store)[start..start + state.len()].copy_from_slice(state);
-        self.call(&function, state.len() as u32, self.budget.fuel_per_call)
-    }
-
-    /// Copies `records`, each of `bytes`, to places `stride` apart. The layout has been checked to lie in the memory, which
-    /// never shrinks.
-    fn write(&mut self, start: usize, stride: usize, records: &[u8], bytes: usize) {
-        let memory = self.memory.data_mut(&mut self.store);
-        if stride == bytes {
-            memory[start..start + records.len()].copy_from_slice(records);
-            return;
-        }
-        for (index, record) in records.chunks_exact(bytes).enumerate() {
-            let at = start + index * stride;
-            memory[at..at + bytes].copy_from_slice(record);
-        }
-    }
-
-    fn call<P: WasmParams, R: WasmResults>(
-        &mut self,
-        function: &TypedFunc<P, R>,
-        arguments: P,
-        fuel: u64,
-    ) -> Result<R, Trouble> {
-        let _ = self.store.set_fuel(fuel);
-        let answer = function.call(&mut self.store, arguments).map_err(|e| trouble(&mut self.store, &e, fuel));
-        self.fuel_used = fuel - self.store.get_fuel().unwrap_or(0).min(fuel);
-        answer
+        call(&mut self.store, function, state.len() as u32, self.budget.fuel_per_call)
     }
 }
 
-fn finite_or_nan(memory: &[u8], at: usize) -> Result<Asks, Trouble> {
-    const NAMES: [&str; 3] = ["a time constant", "a path tolerance", "a feed cap"];
-    let mut asks = [f64::NAN; 3];
-    for (index, ask) in asks.iter_mut().enumerate() {
-        *ask = abi::get_f64(memory, at + 8 * index).unwrap_or(f64::NAN);
-        if ask.is_infinite() {
-            return Err(not_finite(NAMES[index], *ask));
-        }
-    }
-    Ok(asks)
+/// Calls `function` with `fuel`.
+fn call<P: WasmParams, R: WasmResults>(
+    store: &mut Store<Limits>,
+    function: &TypedFunc<P, R>,
+    arguments: P,
+    fuel: u64,
+) -> Result<R, Trouble> {
+    let _ = store.set_fuel(fuel);
+    function.call(&mut *store, arguments).map_err(|e| trouble(store, &e, fuel))
+}
+
+/// What a call with `fuel` has used.
+fn fuel_used(store: &Store<Limits>, fuel: u64) -> u64 {
+    fuel - store.get_fuel().unwrap_or(0).min(fuel)
+}
+
+/// What a record that has come back asks for.
+fn read_asks(record: &[u8]) -> Asks {
+    let at = abi::block::ASK_TIME_CONSTANT;
+    let asks: &[u8; 24] = record[at..].first_chunk().unwrap_or(&[0xff; 24]);
+    std::array::from_fn(|index| f64::from_le_bytes(std::array::from_fn(|byte| asks[8 * index + byte])))
 }
 
 fn not_finite(what: &'static str, value: f64) -> Trouble {

@@ -23,6 +23,7 @@ mod parameters;
 mod period;
 mod policy;
 mod script;
+mod shape;
 mod window;
 
 pub use bounds::{Bounds, Tuning};
@@ -37,3 +38,4 @@ pub use parameters::{Parameter, Values};
 pub use period::Period;
 pub use policy::{MAX_STRIKES, Policy};
 pub use script::Script;
+pub use window::Record;

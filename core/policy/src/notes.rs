@@ -33,10 +33,20 @@ impl Notes {
         }
     }
 
+    /// Whether the next note is left out.
+    pub fn is_full(&self) -> bool {
+        self.allowed == 0 || self.waiting.len() >= MOST
+    }
+
+    /// Leaves out `count` notes.
+    pub fn leave_out(&mut self, count: u64) {
+        self.left_out += count;
+    }
+
     /// Notes what `text` says, if it may.
     pub fn note(&mut self, text: impl FnOnce() -> String) {
-        if self.allowed == 0 || self.waiting.len() >= MOST {
-            self.left_out += 1;
+        if self.is_full() {
+            self.leave_out(1);
             return;
         }
         self.allowed -= 1;

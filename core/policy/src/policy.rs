@@ -76,7 +76,12 @@ impl Policy {
             let asks = self.asks.get(index).copied().unwrap_or([f64::NAN; 3]);
             let (tuning, limited) = self.bounds.apply(&asks, block);
             count(&mut self.counters, &tuning, limited);
-            note(&mut self.notes, block, &asks, &tuning, limited);
+            let told = told(&tuning, limited);
+            if self.notes.is_full() {
+                self.notes.leave_out(told);
+            } else if told > 0 {
+                note(&mut self.notes, block, &asks, &tuning, limited);
+            }
             self.tunings.push(tuning);
         }
     }
@@ -172,7 +177,7 @@ impl Policy {
         let mut instance = self.live()?;
         (self.counters.windows, self.counters.blocks) =
             (self.counters.windows + 1, self.counters.blocks + self.window.blocks().len() as u64);
-        let asked = instance.blocks(self.window.bytes(), &mut self.asks);
+        let asked = instance.blocks(self.window.records(), &mut self.asks);
         self.counters.most_window_fuel = self.counters.most_window_fuel.max(instance.fuel_used);
         let line = self.window.blocks().first().map_or(0, |block| block.line);
         self.settle(instance, asked, "on_blocks", line)
@@ -229,6 +234,13 @@ fn count(counters: &mut Counters, tuning: &Tuning, limited: [bool; 3]) {
     counters.tolerances += u64::from(tuning.path_tolerance_mm.is_some());
     counters.feed_caps += u64::from(tuning.feed_cap_mm_per_s.is_some());
     counters.limited += limited.iter().filter(|limited| **limited).count() as u64;
+}
+
+/// Notes that a block makes: what it is given, or asked for in vain.
+fn told(tuning: &Tuning, limited: [bool; 3]) -> u64 {
+    let given =
+        [tuning.time_constant_s.is_some(), tuning.path_tolerance_mm.is_some(), tuning.feed_cap_mm_per_s.is_some()];
+    (0..3).map(|index| u64::from(given[index] || limited[index])).sum()
 }
 
 /// Notes each change of a block, in the units of the machine file.

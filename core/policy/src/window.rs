@@ -1,36 +1,48 @@
 //! Windows of blocks: what the script sees of each.
 
-use tandem_motion::nurbs::Nurbs;
-use tandem_motion::{Path, half_angle_turn_rad};
-use tandem_sdk::{AxisVector, Block, BlockKind, Edge};
+use tandem_sdk::{Block, BlockKind, Edge};
 
 use crate::abi::{self, block as at, put_f64, put_u32};
 use crate::bounds::InForce;
 use crate::facts::Facts;
+use crate::shape::{Direction, HalfTurn, LinearAxes, Shape, half_turn, turns_rad};
 
-/// Places on a curve at which its curvature is looked at.
-const CURVATURE_PLACES: usize = 16;
+/// One block as it crosses into the script, laid out as [`abi::block`] says.
+pub type Record = [u8; at::BYTES];
 
 /// The blocks of a window as they cross into the script.
 #[derive(Debug)]
 pub struct Window {
     facts: Facts,
-    bytes: Vec<u8>,
+    axes: LinearAxes,
+    records: Vec<Record>,
     blocks: Vec<InForce>,
-    /// Direction at the end of the block before, over the linear axes; none after a rest in the stream.
-    last: Option<AxisVector>,
+    /// The turn into each block, and behind the last.
+    half_turns: Vec<HalfTurn>,
+    /// The same as angles; scratch.
+    turns_rad: Vec<f64>,
+    /// Direction at the end of the block before; none after a rest in the stream.
+    last: Option<Direction>,
 }
 
 impl Window {
     /// An empty window.
     pub fn new(facts: &Facts) -> Self {
-        let (bytes, blocks) = (abi::WINDOW_BLOCKS * at::BYTES, abi::WINDOW_BLOCKS);
-        Self { facts: *facts, bytes: Vec::with_capacity(bytes), blocks: Vec::with_capacity(blocks), last: None }
+        let most = abi::WINDOW_BLOCKS;
+        Self {
+            facts: *facts,
+            axes: LinearAxes::of(&facts.axes),
+            records: Vec::with_capacity(most),
+            blocks: Vec::with_capacity(most),
+            half_turns: Vec::with_capacity(most + 1),
+            turns_rad: Vec::with_capacity(most + 1),
+            last: None,
+        }
     }
 
     /// The records, one after the other.
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+    pub fn records(&self) -> &[Record] {
+        &self.records
     }
 
     /// What is in force for each block.
@@ -38,37 +50,36 @@ impl Window {
         &self.blocks
     }
 
-    /// Appends a block.
+    /// Appends a block. Its turns are known when the window is closed.
     pub fn push(&mut self, block: &Block) {
-        let shape = Shape::of(block, &self.facts);
-        let turn_rad = shape.turn_from(self.last.as_ref());
-        self.set_turn_out(turn_rad);
+        let shape = Shape::of(block, &self.facts.axes, &self.axes);
+        self.half_turns.push(half_turn(self.last.as_ref(), shape.start.as_ref()));
         self.last = shape.end;
         let in_force = in_force(block, &self.facts);
-        let record = self.bytes.len();
-        self.bytes.resize(record + at::BYTES, 0);
-        write(&mut self.bytes[record..], block, &in_force, turn_rad, shape.curvature_per_mm);
+        self.records.push(record(block, &in_force, shape.curvature_per_mm));
         self.blocks.push(in_force);
     }
 
-    /// The block behind the window, in the same stretch; without one the machine rests there.
+    /// The block behind the window, in the same stretch; without one the machine rests there. Sets the turns.
     pub fn close(&mut self, next: Option<&Block>) {
-        match next {
-            Some(next) => self.set_turn_out(Shape::of(next, &self.facts).turn_from(self.last.as_ref())),
-            None => self.last = None,
+        let next = next.map(|next| Shape::of(next, &self.facts.axes, &self.axes));
+        let start = next.as_ref().and_then(|next| next.start.as_ref());
+        self.half_turns.push(half_turn(self.last.as_ref(), start));
+        if next.is_none() {
+            self.last = None;
+        }
+        turns_rad(&self.half_turns, &mut self.turns_rad);
+        for (record, turns) in self.records.iter_mut().zip(self.turns_rad.windows(2)) {
+            put_f64(record, at::TURN_IN, turns[0]);
+            put_f64(record, at::TURN_OUT, turns[1]);
         }
     }
 
     /// Forgets the blocks.
     pub fn clear(&mut self) {
-        self.bytes.clear();
+        self.records.clear();
         self.blocks.clear();
-    }
-
-    fn set_turn_out(&mut self, turn_rad: f64) {
-        if let Some(record) = self.bytes.len().checked_sub(at::BYTES) {
-            put_f64(&mut self.bytes, record + at::TURN_OUT, turn_rad);
-        }
+        self.half_turns.clear();
     }
 }
 
@@ -85,93 +96,27 @@ fn in_force(block: &Block, facts: &Facts) -> InForce {
     }
 }
 
-fn write(record: &mut [u8], block: &Block, in_force: &InForce, turn_in_rad: f64, curvature_per_mm: f64) {
+fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64) -> Record {
     let starts = if block.starts_at_rest() { at::STARTS_AT_REST } else { 0 };
     let ends = if block.ends_at_rest() { at::ENDS_AT_REST } else { 0 };
-    put_u32(record, at::SIZE, at::BYTES as u32);
-    put_u32(record, at::LINE, block.line);
-    put_u32(record, at::KIND, block.kind as u32);
-    put_u32(record, at::TOOL, block.tool);
-    put_u32(record, at::FLAGS, starts | ends);
-    put_f64(record, at::LENGTH, block.length_mm);
+    let mut record = [0; at::BYTES];
+    put_u32(&mut record, at::SIZE, at::BYTES as u32);
+    put_u32(&mut record, at::LINE, block.line);
+    put_u32(&mut record, at::KIND, block.kind as u32);
+    put_u32(&mut record, at::TOOL, block.tool);
+    put_u32(&mut record, at::FLAGS, starts | ends);
+    put_f64(&mut record, at::LENGTH, block.length_mm);
     let feed_mm_per_s = if block.kind == BlockKind::Dwell { 0.0 } else { block.command_feed_mm_per_s() };
-    put_f64(record, at::FEED, feed_mm_per_s);
-    put_f64(record, at::TURN_IN, turn_in_rad);
-    put_f64(record, at::CURVATURE, curvature_per_mm);
-    put_f64(record, at::SPINDLE, block.spindle_rad_per_s);
-    put_f64(record, at::TIME_CONSTANT, in_force.time_constant_s);
-    put_f64(record, at::TOLERANCE, in_force.path_tolerance_mm);
-    put_f64(record, at::FEED_CAP, in_force.feed_cap_mm_per_s);
+    put_f64(&mut record, at::FEED, feed_mm_per_s);
+    put_f64(&mut record, at::CURVATURE, curvature_per_mm);
+    put_f64(&mut record, at::SPINDLE, block.spindle_rad_per_s);
+    put_f64(&mut record, at::TIME_CONSTANT, in_force.time_constant_s);
+    put_f64(&mut record, at::TOLERANCE, in_force.path_tolerance_mm);
+    put_f64(&mut record, at::FEED_CAP, in_force.feed_cap_mm_per_s);
     for ask in [at::ASK_TIME_CONSTANT, at::ASK_TOLERANCE, at::ASK_FEED_CAP] {
-        put_f64(record, ask, f64::NAN);
+        put_f64(&mut record, ask, f64::NAN);
     }
-}
-
-/// Directions at the ends over the linear axes, of unit length, and curvature.
-struct Shape {
-    start: Option<AxisVector>,
-    end: Option<AxisVector>,
-    curvature_per_mm: f64,
-}
-
-impl Shape {
-    fn of(block: &Block, facts: &Facts) -> Self {
-        let unit = |direction: AxisVector| unit(direction, facts);
-        match block.kind {
-            BlockKind::Nurbs => Self::of_curve(block, facts),
-            BlockKind::Rapid | BlockKind::Line => {
-                let direction = unit(block.end - block.start);
-                Self { start: direction, end: direction, curvature_per_mm: 0.0 }
-            }
-            BlockKind::Arc => match Path::new(block) {
-                Some(path) => Self {
-                    start: unit(path.direction(0.0)),
-                    end: unit(path.direction(path.length_mm())),
-                    curvature_per_mm: length(&path.curvature(0.0)),
-                },
-                None => Self::none(),
-            },
-            BlockKind::Dwell => Self::none(),
-        }
-    }
-
-    fn none() -> Self {
-        Self { start: None, end: None, curvature_per_mm: 0.0 }
-    }
-
-    /// A curve: its curvature is looked at in places of equal distance in its parameter.
-    fn of_curve(block: &Block, facts: &Facts) -> Self {
-        // SAFETY: the block is handed over for this call, and its curve with it.
-        let data = unsafe { block.nurbs.to_data() };
-        let Ok(curve) = Nurbs::new(&data, &facts.axes) else { return Self::none() };
-        let (from, to) = curve.range();
-        let direction = |u: f64| curve.along_path(&curve.derivatives(u)).and_then(|at| unit(at.direction, facts));
-        let place = |i: usize| from + (to - from) * i as f64 / CURVATURE_PLACES as f64;
-        let curvatures = (0..=CURVATURE_PLACES).filter_map(|i| curve.curvature(&curve.derivatives(place(i))));
-        Self { start: direction(from), end: direction(to), curvature_per_mm: curvatures.fold(0.0, f64::max) }
-    }
-
-    /// Turn from the direction `before` to the start of this; 0 where either has none.
-    fn turn_from(&self, before: Option<&AxisVector>) -> f64 {
-        match (before, &self.start) {
-            (Some(before), Some(start)) => half_angle_turn_rad(before, start),
-            _ => 0.0,
-        }
-    }
-}
-
-/// `direction` over the linear axes, of unit length; none where it has none of them.
-fn unit(direction: AxisVector, facts: &Facts) -> Option<AxisVector> {
-    let mut linear = AxisVector::ZERO;
-    for axis in (0..facts.axes.count()).filter(|axis| !facts.axes.is_rotary(*axis)) {
-        linear[axis] = direction[axis];
-    }
-    let inverse = 1.0 / length(&linear);
-    inverse.is_finite().then(|| linear * inverse)
-}
-
-fn length(vector: &AxisVector) -> f64 {
-    vector.0.iter().map(|v| v * v).sum::<f64>().sqrt()
+    record
 }
 
 #[cfg(test)]
@@ -179,7 +124,7 @@ mod tests {
     use super::*;
     use crate::abi::get_f64;
     use std::f64::consts::{FRAC_PI_2, PI};
-    use tandem_sdk::{ArcGeometry, Axes};
+    use tandem_sdk::{ArcGeometry, Axes, AxisVector};
 
     fn facts() -> Facts {
         let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
@@ -192,7 +137,7 @@ mod tests {
     }
 
     fn field(window: &Window, index: usize, field: usize) -> f64 {
-        get_f64(window.bytes(), index * at::BYTES + field).unwrap()
+        get_f64(&window.records()[index], field).unwrap()
     }
 
     #[test]
@@ -208,10 +153,12 @@ mod tests {
         }
         window.clear();
         window.push(&line([1.0, 1.0], [1.0, 0.0]));
-        assert!((field(&window, 0, at::TURN_IN) - PI).abs() < 1e-12);
         window.close(None);
+        assert!((field(&window, 0, at::TURN_IN) - PI).abs() < 1e-12);
+        assert_eq!(field(&window, 0, at::TURN_OUT), 0.0, "a stretch ends at rest");
         window.clear();
         window.push(&line([1.0, 0.0], [0.0, 0.0]));
+        window.close(None);
         assert_eq!(field(&window, 0, at::TURN_IN), 0.0, "a stretch begins at rest");
     }
 
@@ -228,6 +175,7 @@ mod tests {
         };
         let ends = line([2.0, -2.0], [2.0, 2.0]);
         window.push(&Block { kind: BlockKind::Arc, arc, length_mm: 2.0 * PI, ..ends });
+        window.close(None);
         assert!(field(&window, 1, at::TURN_IN) < 1e-9);
         assert!((field(&window, 1, at::CURVATURE) - 0.5).abs() < 1e-9);
         assert_eq!(field(&window, 1, at::TIME_CONSTANT), 0.05);

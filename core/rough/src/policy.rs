@@ -19,8 +19,9 @@ pub trait BlockPolicy: Send {
     /// The window is complete: it is full, or the stretch ends with it. `next` follows it in the same stretch.
     fn decide(&mut self, next: Option<&Block>);
 
-    /// Block `index` of the window as it is to be driven: only time constant, path tolerance and feed cap may differ.
-    fn tuned(&mut self, index: usize, block: &Block) -> Block;
+    /// Block `index` of the window as it is to be driven, where it is not to be driven as it is: only time constant, path
+    /// tolerance and feed cap may differ.
+    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block>;
 }
 
 /// A source whose blocks a policy has tuned.
@@ -98,7 +99,7 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
         }
         let blocks = items.iter_mut().filter(|item| is_block(item)).take(count);
         for (index, item) in blocks.enumerate() {
-            let tuned = with_block(item, |block| policy.tuned(index, block));
+            let Some(tuned) = with_block(item, |block| policy.tuned(index, block)) else { continue };
             let facts = match item {
                 Item::Block(block) => block,
                 Item::Curve(curve) => curve.facts_mut(),

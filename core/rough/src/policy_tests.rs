@@ -26,8 +26,8 @@ impl BlockPolicy for Recorder {
         self.seen.lock().unwrap().push((window, next.map(|block| block.index)));
     }
 
-    fn tuned(&mut self, index: usize, block: &Block) -> Block {
-        Block { feed_cap_mm_per_s: index as f64, line: 999, ..*block }
+    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block> {
+        Some(Block { feed_cap_mm_per_s: index as f64, line: 999, ..*block })
     }
 }
 

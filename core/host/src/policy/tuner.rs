@@ -27,11 +27,11 @@ impl BlockPolicy for Tuner {
         self.host.lock().decide(next);
     }
 
-    fn tuned(&mut self, index: usize, block: &Block) -> Block {
+    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block> {
         let mut policy = self.host.lock();
         let tuning = policy.tuning(index);
         if tuning.is_empty() {
-            return *block;
+            return None;
         }
         let tuned = Block {
             time_constant_s: tuning.time_constant_s.unwrap_or(block.time_constant_s),
@@ -40,10 +40,10 @@ impl BlockPolicy for Tuner {
             ..*block
         };
         match self.checker.check(&tuned) {
-            Ok(()) => tuned,
+            Ok(()) => Some(tuned),
             Err(refusal) => {
                 policy.refused_by_planner(block.line, &refusal.to_string());
-                *block
+                None
             }
         }
     }

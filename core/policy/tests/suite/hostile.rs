@@ -3,10 +3,11 @@
 use tandem_policy::{Bounds, Period, Policy, Refusal};
 use tandem_sdk::Block;
 
+use crate::random::Random;
 use crate::{chain, decide, each, read, start};
 
 /// Windows and periods in turn; what came out.
-fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
+pub fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
     let mut seen = vec![];
     for period in 0..60 {
         decide(policy, blocks);
@@ -21,19 +22,23 @@ fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
     seen
 }
 
+/// Time constants, tolerances, feed caps and ratios that a machine at 50 mm/s may get.
+pub fn assert_within_the_machine(name: &str, seen: &[u64]) {
+    for value in seen.iter().filter(|bits| **bits != 0).map(|bits| f64::from_bits(*bits)) {
+        let most = Bounds::default().time_constant_s.1.max(50.0);
+        assert!(value.is_finite() && value > 0.0 && value <= most, "{name}: {value}");
+    }
+}
+
 #[test]
 fn every_hostile_script_is_contained_and_asks_for_nothing_beyond_the_machine() {
     let blocks = chain(&[0.0, 90.0, 45.0, 180.0]);
-    let bounds = Bounds::default();
     let files = each("tests/fixtures/policies/hostile");
     assert!(files.len() > 12, "{}", files.len());
     for (name, bytes) in files {
         let mut policy = start(&bytes, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
         let seen = live(&mut policy, &blocks);
-        for bits in seen.iter().filter(|bits| **bits != 0) {
-            let value = f64::from_bits(*bits);
-            assert!(value.is_finite() && value > 0.0 && value <= bounds.time_constant_s.1.max(50.0), "{name}: {value}");
-        }
+        assert_within_the_machine(&name, &seen);
         let mut again = start(&bytes, &[]).unwrap();
         assert_eq!(live(&mut again, &blocks), seen, "{name} is not the same twice");
         assert_eq!(again.counters(), policy.counters(), "{name}");
@@ -87,23 +92,15 @@ fn truncated_and_random_bytes_are_refused_or_run_within_their_budget() {
     for end in (0..whole.len()).step_by(37) {
         assert!(matches!(start(&whole[..end], &[]), Err(Refusal::NotAModule(_) | Refusal::Exports(_))), "{end} bytes");
     }
-    let seed = std::time::UNIX_EPOCH.elapsed().unwrap().subsec_nanos() | 1;
-    println!("seed {seed}");
-    let mut state = u64::from(seed);
-    let mut random = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
+    let mut random = Random::from_the_clock();
     for _ in 0..200 {
         let mut bytes = whole.clone();
-        for _ in 0..=random() % 4 {
-            let at = random() as usize % bytes.len();
-            bytes[at] = random() as u8;
+        for _ in 0..=random.below(4) {
+            let at = random.below(bytes.len());
+            bytes[at] = random.number() as u8;
         }
         try_out(&bytes);
-        let noise: Vec<u8> = (0..random() % 200).map(|_| random() as u8).collect();
-        try_out(&noise);
+        let noise = random.below(200);
+        try_out(&random.bytes(noise));
     }
 }

@@ -1,6 +1,8 @@
 //! Scripts as a machine runs them: the built ones, refused ones, hostile ones.
 
+mod generated;
 mod hostile;
+mod random;
 mod refusals;
 mod reload;
 mod scripts;
