@@ -30,7 +30,8 @@ pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
     for record in reader.records() {
         let record = record.map_err(|e| format!("{name}: {e}"))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let row: Row = record.deserialize(Some(&headers)).map_err(|e| format!("{name}:{line}: {}", cause(&e)))?;
+        let row: Row =
+            record.deserialize(Some(&headers)).map_err(|e| format!("{name}:{line}: {}", cause(&e, &headers)))?;
         all.push(row.timed().map_err(|cause| format!("{name}:{line}: {cause}"))?);
     }
     if all.len() < 6 {
@@ -42,10 +43,12 @@ pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
     Ok(all)
 }
 
-fn cause(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
-        _ => error.to_string(),
+/// What is wrong with a row, by the name of its column.
+fn cause(error: &csv::Error, headers: &csv::StringRecord) -> String {
+    let csv::ErrorKind::Deserialize { err, .. } = error.kind() else { return error.to_string() };
+    match err.field().and_then(|field| headers.get(field as usize)) {
+        Some(column) => format!("{column}: {}", err.kind()),
+        None => err.to_string(),
     }
 }
 
@@ -66,5 +69,24 @@ impl Row {
         }
         let polygon = Polygon { corners: self.n, side_mm: self.side_mm, rounds: self.repetitions };
         Ok(Timed { polygon, feed_mm_per_s: feed_mm_per_min / 60.0, time_s: self.seconds })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slip_is_named_by_line_and_column() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for (text, expected) in [
+            ("n,side_mm,repetitions,seconds\n3,0.1,10,1\n4,wide,1,1\n", ":3: side_mm: invalid float literal"),
+            ("n,side,repetitions,seconds\n3,0.1,10,1\n", ":2: unknown field `side`, expected one of `n`, `side_mm`"),
+            ("n,side_mm,repetitions,seconds\n3,-1,10,1\n", ":2: side_mm: -1 is not above zero"),
+        ] {
+            std::fs::write(file.path(), text).unwrap();
+            let found = read(file.path()).unwrap_err();
+            assert!(found.contains(expected), "{found}");
+        }
     }
 }

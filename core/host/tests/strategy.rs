@@ -1,4 +1,5 @@
-//! What a feed strategy asks for acts in its tick: the first of the rough period after the next.
+//! What a feed strategy asks for acts in its tick: the first of the rough period after the next. The lesser of its ratio and
+//! that of the policy script acts, times the override.
 
 use std::path::Path;
 
@@ -30,6 +31,27 @@ impl FeedStrategy for Once {
 #[allow(clippy::unnecessary_wraps)] // the form of a constructor
 fn open(options: &RawOptions, _context: &StrategyContext) -> Result<Once, PluginError> {
     Ok(Once(options.0.split('"').nth(1).unwrap_or("").to_string()))
+}
+
+/// A ratio of its own, and from period 60 on a torque of twice the reference.
+struct Loaded;
+
+impl FeedStrategy for Loaded {
+    fn signals(&self) -> &'static [&'static str] {
+        &["reference_torque_nm", "cutting_torque_nm"]
+    }
+
+    fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
+        let mut signals = [0.0; MAX_SIGNALS];
+        (signals[0], signals[1]) = (3.0, if window.period < 60 { 3.0 } else { 6.0 });
+        let ratio = if window.period < 120 { 0.8 } else { 0.2 };
+        Ok(Answer { ratio, request: Request::None, signals })
+    }
+}
+
+#[allow(clippy::unnecessary_wraps)] // the form of a constructor
+fn open_loaded(_options: &RawOptions, _context: &StrategyContext) -> Result<Loaded, PluginError> {
+    Ok(Loaded)
 }
 
 #[derive(Default)]
@@ -76,6 +98,33 @@ fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
     assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "hold", Some(1)));
     assert_eq!(samples.1, [format!("{TICK},hold"), "400,resume".to_string()]);
     assert_eq!(summary.end_position_mm["x"], 60.0);
+}
+
+#[test]
+fn the_lesser_of_strategy_and_script_acts_times_the_override() {
+    let mut registry = Registry::default();
+    let loaded = tandem_sdk::local_plugin!(feed_strategy "loaded" = open_loaded);
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN, loaded] {
+        registry.register(plugin).unwrap();
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let script = root.join("scripts/policies/load-feed.wasm").display().to_string();
+    let settings = [("feed_strategy.plugin", "loaded".to_string()), ("policy.script", script)];
+    let settings = settings.map(|(key, value)| (key.to_string(), value));
+    let machine = Machine::read(&root.join("examples/machines/mill-3axis.toml"), &settings).unwrap();
+    let program = Program::spool("line", &b"G21 G90\nF1200\nG1 X14\nM2\n"[..]).unwrap();
+    let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
+    let mut samples = Samples::default();
+    let commands = [Timed::parse("1300,feed-override,0.5").unwrap()];
+    let summary = run.drive(Clock::Virtual, &commands, &mut samples).unwrap().summary;
+    let feed_mm_per_s = |tick: usize| samples.0[tick].feed_mm_per_s;
+    // 20 mm/s are programmed. The script asks for 1, and from period 60 on, where torque is twice the reference, for 0.3.
+    for (tick, expected) in [(440, 0.8 * 20.0), (920, 0.3 * 20.0), (1250, 0.2 * 20.0), (1500, 0.5 * 0.2 * 20.0)] {
+        assert!((feed_mm_per_s(tick) - expected).abs() < 1e-9, "tick {tick}: {} mm/s", feed_mm_per_s(tick));
+    }
+    let policy = summary.policy.unwrap();
+    assert_eq!((summary.fault, summary.late_ratios, policy.traps), (None, 0, 0));
+    assert!(policy.ratios_changed > 100 && policy.periods > policy.ratios_changed, "{policy:?}");
 }
 
 #[test]

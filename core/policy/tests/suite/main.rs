@@ -2,6 +2,7 @@
 
 mod generated;
 mod hostile;
+mod layouts;
 mod random;
 mod refusals;
 mod reload;
