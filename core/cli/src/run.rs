@@ -123,8 +123,8 @@ const MOST_ERRORS: usize = 100;
 
 /// Everything that a run is written to.
 struct Sinks {
-    /// It has been said that the planner knows no time constant.
-    told_of_time_constant: bool,
+    /// The planner, where it takes no time constants and that has not been said.
+    without_time_constants: Option<String>,
     switches: Switches,
     operator: Operator,
     homed: Corrections,
@@ -146,7 +146,7 @@ impl Sinks {
             Keyboard::explain();
         }
         Ok(Self {
-            told_of_time_constant: false,
+            without_time_constants: (!run.uses_time_constants()).then(|| machine.planner.plugin.clone()),
             switches: switches(options, keys),
             operator: Operator::begin(&options.operator, machine, run, presence)?,
             homed: Corrections::new(machine),
@@ -174,7 +174,7 @@ impl RunObserver for Sinks {
     }
 
     fn block(&mut self, block: &Block, report: &BlockReport) {
-        self.tell_of_time_constant(block, report);
+        self.tell_of_time_constant(block);
         if let Some(blocks) = &mut self.blocks {
             blocks.block(block, report);
         }
@@ -232,11 +232,12 @@ impl RunObserver for Sinks {
 
 impl Sinks {
     /// A time constant that the planner does not use is worth a line, once.
-    fn tell_of_time_constant(&mut self, block: &Block, report: &BlockReport) {
-        let unused = !block.time_constant_s.is_nan() && report.time_constant_s.is_nan() && block.length_mm > 0.0;
-        if unused && !self.told_of_time_constant {
-            say!("line {}: TA has no effect: the planner of this machine knows no time constant", block.line);
-            self.told_of_time_constant = true;
+    fn tell_of_time_constant(&mut self, block: &Block) {
+        if block.time_constant_s.is_nan() || block.length_mm == 0.0 {
+            return;
+        }
+        if let Some(planner) = self.without_time_constants.take() {
+            say!("line {}: TA has no effect: planner {planner} takes no time constants of programs and policies", block.line);
         }
     }
 }

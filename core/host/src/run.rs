@@ -60,6 +60,7 @@ pub struct Run {
     policy: Option<PolicyHost>,
     steps: bool,
     leaves_path: bool,
+    uses_time_constants: bool,
     switches: Switches,
     /// What the first pass found: totals.
     pub checked: CheckReport,
@@ -222,6 +223,7 @@ impl Run {
             switches,
             steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
             leaves_path: description.leaves_path != 0,
+            uses_time_constants: description.uses_time_constants != 0,
             checked,
         })
     }
@@ -239,6 +241,11 @@ impl Run {
     /// Whether the planner makes use of velocity steps where blocks meet.
     pub fn allows_steps(&self) -> bool {
         self.steps
+    }
+
+    /// Whether the planner drives each block with the time constant that it states.
+    pub fn uses_time_constants(&self) -> bool {
+        self.uses_time_constants
     }
 
     /// Names of the feed strategy's signals.

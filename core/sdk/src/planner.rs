@@ -41,6 +41,9 @@ pub struct PlannerDescription {
     pub breaks_limits: u32,
     /// 1 where the path left is not the path programmed (filters behind the interpolation, corner rounding).
     pub leaves_path: u32,
+    /// 1 where [`Block::time_constant_s`] decides how a block is driven. For other planners the host says once that `TA`
+    /// has no effect.
+    pub uses_time_constants: u32,
 }
 
 impl PlannerDescription {
@@ -52,6 +55,7 @@ impl PlannerDescription {
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             breaks_limits: 0,
             leaves_path: 0,
+            uses_time_constants: 0,
         }
     }
 }

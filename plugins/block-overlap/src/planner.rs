@@ -135,6 +135,7 @@ impl Planner for BlockOverlap {
         PlannerDescription {
             breaks_limits: u32::from(self.options.limits == LimitMode::Off),
             leaves_path: u32::from(self.options.corner_control == CornerControl::Off),
+            uses_time_constants: 1,
             ..PlannerDescription::order_2()
         }
     }
