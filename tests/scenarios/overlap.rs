@@ -117,7 +117,7 @@ fn a_line_into_a_tangent_arc_stays_within_the_tolerance() {
 
 #[test]
 fn without_corner_control_the_constant_is_the_programs() {
-    let text = "G21 G90\nF1200\nG1 X20 TA30\nG1 Y20\nTA80\nG1 X0\nG1 Y0\nM2\n";
+    let text = "G21 G90\nF1200\nG1 X20 TA29.6\nG1 Y20\nTA80.4\nG1 X0\nG1 Y0\nM2\n";
     let done = Scenario::text(text).with(OVERLAP).with(&["--set", "planner.options.corner_control=off"]).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     let constants = blocks(&done, "time_constant_ms");
@@ -129,7 +129,7 @@ fn without_corner_control_the_constant_is_the_programs() {
         (options.sample_tolerance_mm, options.vertex_tolerance_mm) = (Some(0.3), Some(0.3));
     });
     assert!(verdict.passed(), "{verdict}");
-    // F·τ·sin(θ/2)/4 with 20 mm/s and 80 ms.
+    // F·τ·sin(θ/2)/4 with 20 mm/s and 80 ms: constants are whole periods.
     assert!((verdict.maxima.vertex_deviation_mm - 0.4 * 0.5f64.sqrt()).abs() < 1e-5, "{verdict}");
 }
 
@@ -142,6 +142,22 @@ fn the_published_form_runs_under_count_only() {
     let counted = program("examples/programs/square.ngc").with(off).with(&["--set", "guard.mode=count"]).run();
     assert_eq!(counted.status(), 0, "{}", counted.errors());
     assert!(counted.number("limit_violations") > 0.0);
+}
+
+#[test]
+fn the_tolerance_holds_where_the_axes_do_not_count() {
+    let off = ["--set", "planner.options.limits=off", "--set", "guard.mode=count"];
+    for tolerance in [0.2, 0.05, 0.01, 0.001] {
+        let text = format!("G21 G90\nG64 P{tolerance}\nF5000\nG1 X20\nG1 Y20\nG1 X0\nG1 X20 Y19\nM2\n");
+        let done = Scenario::text(&text).with(OVERLAP).with(&off).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        let verdict = done.judge(overlapping);
+        let vertex_mm = verdict.maxima.vertex_deviation_mm;
+        assert!(vertex_mm <= tolerance, "{vertex_mm} of {tolerance} mm");
+        let overlaps = vertex_mm > 0.3 * tolerance;
+        assert_eq!(overlaps, tolerance > 0.04, "{vertex_mm} of {tolerance} mm");
+        assert_eq!(blocks(&done, "limited_by")[0], if overlaps { "feed" } else { "tolerance" });
+    }
 }
 
 #[test]
@@ -162,10 +178,15 @@ fn time_constants_that_cannot_be_are_refused_with_their_place() {
 }
 
 #[test]
-fn a_control_that_knows_no_time_constant_says_so() {
-    let done = Scenario::text("F600\nG1 X1\nG1 X2 TA20\nG1 X3\nM2\n").run();
-    done.assert_within_limits();
-    assert_eq!(done.errors().matches("line 3: TA has no effect").count(), 1, "{}", done.errors());
-    let overlapping = Scenario::text("F600\nG1 X1 TA20\nM2\n").with(OVERLAP).run();
-    assert!(!overlapping.errors().contains("TA has no effect"));
+fn a_planner_that_takes_no_time_constants_says_so_once() {
+    let text = "F600\nG1 X1\nG1 X2 TA20\nG1 X3\nM2\n";
+    let told = |set: &[&str]| {
+        let done = Scenario::text(text).with(set).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        done.errors().matches("line 3: TA has no effect").count()
+    };
+    let count = "guard.mode=count";
+    assert_eq!(told(&[]), 1);
+    assert_eq!(told(&["--set", "planner.plugin=after-interpolation", "--set", count]), 1);
+    assert_eq!(told(OVERLAP), 0);
 }

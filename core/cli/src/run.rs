@@ -237,7 +237,10 @@ impl Sinks {
             return;
         }
         if let Some(planner) = self.without_time_constants.take() {
-            say!("line {}: TA has no effect: planner {planner} takes no time constants of programs and policies", block.line);
+            say!(
+                "line {}: TA has no effect: planner {planner} takes no time constants from programs or policies",
+                block.line
+            );
         }
     }
 }

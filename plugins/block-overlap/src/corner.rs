@@ -10,8 +10,10 @@ use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, lesser};
 /// `|Δu| = 2·sin(θ/2)`) and the acceleration of an axis `F·Δu/τ`. Both depend on `F·τ` alone or on `F/τ` alone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Corner {
-    /// The program needs rest here.
+    /// The two blocks meet at rest.
     pub rest: bool,
+    /// No overlap is short enough for the tolerance, so it is a rest.
+    pub tight: bool,
     /// Acceleration that 1 mm/s over 1 s takes of the axis that turns most, as a share of its limit, s²/mm.
     pub turn_s2_per_mm: f64,
     /// The greatest F·τ that the tolerance allows, mm.
@@ -41,8 +43,11 @@ impl Corner {
         let span_mm = if rules.controlled { span_mm(rules, before, after, squares) } else { f64::INFINITY };
         if rules.limits == LimitMode::Off {
             let fastest = greater(before.feed_mm_per_s, after.feed_mm_per_s);
-            let most = (span_mm / fastest / rules.tick_s + 1e-9).floor().max(1.0) * rules.tick_s;
-            let tau_s = lesser(tau_s, most);
+            let ticks = most_ticks(span_mm / (fastest * rules.tick_s));
+            if ticks < 1.0 {
+                return Self { rest: true, tight: true, ..blank };
+            }
+            let tau_s = lesser(tau_s, ticks * rules.tick_s);
             return Self { tau_s, cap_mm_per_s: f64::INFINITY, room_mm: f64::INFINITY, span_mm, ..blank };
         }
         let shorter = lesser(before.length_mm, after.length_mm);
@@ -71,6 +76,13 @@ impl Corner {
         let by_time = (self.spare * self.longest_s + level) / slope;
         greater(lesser(lesser(by_room, by_time), self.cap_mm_per_s), slow_mm_per_s)
     }
+}
+
+/// The longest overlap where the axes do not count, in whole ticks; zero where none is short enough. `span` is the greatest
+/// F·τ that the tolerance allows, in ticks of travel. The chord between two samples lies inside the corner by its n-th part
+/// of a tick: `n + 1/n ≤ span`.
+fn most_ticks(span: f64) -> f64 {
+    if span < 2.0 { 0.0 } else { (f64::midpoint(span, (span * span - 4.0).sqrt()) + 1e-9).floor() }
 }
 
 /// The largest F with `F·g/τ + bend·F² ≤ TURN_SHARE` and `τ = min(longest, room/F)`.

@@ -14,7 +14,11 @@ const SAME: f64 = 1e-9;
 pub fn limited_by(rules: &Rules, entry: &Entry, next: &Entry, taken: &Taken) -> LimitedBy {
     let (feed, corner) = (taken.feed_mm_per_s, &taken.corner);
     if feed >= entry.feed_mm_per_s * (1.0 - SAME) {
-        return if taken.mode == Mode::Late { late_by(entry, next, taken) } else { entry.reason };
+        return match taken.mode {
+            Mode::Late => late_by(entry, next, taken),
+            Mode::Rest if corner.tight => LimitedBy::Tolerance,
+            _ => entry.reason,
+        };
     }
     let at_most = |limit: f64| feed >= limit * (1.0 - SAME);
     let slowed = 2.0 * entry.length_mm / (taken.up_s + taken.join.down_s);
