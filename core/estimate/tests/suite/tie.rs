@@ -80,6 +80,44 @@ fn the_look_ahead_machine_as_predicted() {
     }
 }
 
+/// The zig-zag, and the same in blocks of 1.2 mm in the mean, as coarse as those of the case, on the overlap machine of 30 ms: the
+/// closed forms against its time in whole ticks.
+#[test]
+fn coarser_programs_stay_within_the_spread_of_the_case() {
+    let (spread, file) = (case("tie_spread"), case("tie_zigzag"));
+    let calibration = &file["machines"]["M1 overlap tau=30"]["cal"];
+    let regression = |switch| Coefficients {
+        short: array(&calibration["p9"]),
+        long: array(&calibration["p11"]),
+        switch,
+        acceleration_mm_per_s2: A,
+        ramp_s: None,
+        rapid_acceleration_mm_per_s2: None,
+    };
+    let overlap =
+        |tick_s| Constants { time_constant_s: 0.03, obeys_program: true, tick_s, rapid_acceleration_mm_per_s2: None };
+    let mut fixed_worst = 0.0_f64;
+    for every in [1, 2] {
+        let points: Vec<_> = zigzag().into_iter().step_by(every).collect();
+        for (index, feed) in [1000.0, 2000.0, 3000.0, 5000.0].into_iter().enumerate() {
+            let elements = elements(&points, feed, &limits(A));
+            let true_s = total(Overlap::new(overlap(Some(0.001))), &elements);
+            let off = |time_s: f64| time_s / true_s - 1.0;
+            let fixed = off(total(Regression::new(regression(Switch::Fixed(0.5))), &elements));
+            let moving = off(total(Regression::new(regression(Switch::Moving(0.03))), &elements));
+            let plain = off(total(Overlap::new(overlap(None)), &elements));
+            println!("every {every} at {feed}: fixed {fixed:+.4}, moving {moving:+.4}, overlap {plain:+.4}");
+            assert!(moving.abs() < 0.05 && plain.abs() < 0.01, "every {every} at {feed}: {moving}, {plain}");
+            if every == 1 {
+                assert_near(moving, number(&spread["d_a_choice"][index]["own"]), 1e-6, "own half length");
+            }
+            fixed_worst = fixed_worst.max(fixed.abs());
+        }
+    }
+    let worst = number(&spread["worst"]["switch"]);
+    assert!(fixed_worst > 2.0 * worst, "the fixed switch fails on coarse programs, by {fixed_worst}");
+}
+
 pub const LOOK_AHEAD: &[(&str, &str)] = &[];
 pub const TANGENT: &[(&str, &str)] = &[("planner.options.junction", "tangent"), ("guard.mode", "count")];
 pub const OVERLAP: &[(&str, &str)] = &[
