@@ -12,6 +12,7 @@ mod every_tick;
 mod examples;
 mod faults;
 mod following;
+mod force;
 mod harness;
 mod hold;
 mod homing;

@@ -10,6 +10,7 @@ pub fn registry() -> Result<Registry, String> {
     registry.register(tandem_block_overlap::PLUGIN)?;
     registry.register(tandem_nurbs::PLUGIN)?;
     registry.register(tandem_smooth::PLUGIN)?;
+    registry.register(tandem_force_control::PLUGIN)?;
     registry.register(tandem_sim::PLUGIN)?;
     Ok(registry)
 }

@@ -139,7 +139,7 @@ impl Sinks {
         let signals = run.signals();
         let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
-        let report = options.report.as_ref().map(|_| Collector::new(machine, name, signals, run.allows_steps()));
+        let report = options.report.as_ref().map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
         let keys = keys_at_hand(options);
         let presence = Presence { real_time: options.clock == args::Clock::Wall, pause: options.pause, keys };
         if keys {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughError, RoughLoop};
-use tandem_sdk::{Block, BlockReport, Event};
+use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
@@ -78,6 +78,8 @@ pub struct Pump<'a> {
     pub skips_homing: bool,
     /// The planner's name, or the file that it came from: for a fault's words.
     pub planner: String,
+    /// How many analog inputs have a name.
+    pub analog: usize,
     commands: CommandLog,
     pub planning_ns: u128,
     /// Rough periods since the observer was told of the policy.
@@ -108,6 +110,7 @@ impl<'a> Pump<'a> {
             aborted: None,
             skips_homing: false,
             planner: String::new(),
+            analog: 0,
             commands,
             planning_ns: 0,
             untold: TOLD_EVERY,
@@ -181,13 +184,25 @@ impl<'a> Pump<'a> {
                 self.observer.command(&command);
             }
             let deviation_mm = self.monitor.sample(&sample);
-            let signals = self.feed.as_ref().and_then(|s| s.answer).map_or([0.0; 8], |a| a.signals);
-            let count = self.feed.as_ref().map_or(0, |s| s.signals().len());
+            let (signals, count) = self.signals(&sample);
             self.observer.sample(&sample, deviation_mm, &signals[..count]);
-            if let (Some(feed), None) = (&mut self.feed, &self.soft_error) {
-                feed.sample(&sample, &mut self.host);
+            if let (Some(feed), None) = (&mut self.feed, &self.soft_error)
+                && let Some(note) = feed.sample(&sample, &mut self.host)
+            {
+                self.observer.note(&note);
             }
         }
+    }
+
+    /// The strategy's last signals, and after them the named analog inputs.
+    fn signals(&self, sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
+        let mut signals = self.feed.as_ref().and_then(|s| s.answer).map_or([0.0; MAX_SIGNALS], |a| a.signals);
+        let own = self.feed.as_ref().map_or(0, |s| s.signals().len());
+        let count = (own + self.analog).min(MAX_SIGNALS);
+        for (to, from) in signals[own..count].iter_mut().zip(sample.analog) {
+            *to = from;
+        }
+        (signals, count)
     }
 
     /// Asks the operator where the program has stopped for one, then goes on.

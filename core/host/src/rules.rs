@@ -1,7 +1,7 @@
 //! What does not go together: refusals before a run starts.
 
 use tandem_machine::{GuardMode, JerkMode, Machine, Place};
-use tandem_sdk::{DriverDescription, PlannerDescription};
+use tandem_sdk::{DriverDescription, MAX_SIGNALS, PlannerDescription};
 
 use crate::error::HostError;
 use crate::run::Switches;
@@ -59,6 +59,21 @@ pub fn check_homing(machine: &Machine, switches: Switches) -> Result<(), HostErr
         return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");
     }
     Ok(())
+}
+
+/// Checks that trace and report have room for all signals, and that each has its own name.
+pub fn check_signals(machine: &Machine, of_strategy: &[&str]) -> Result<(), HostError> {
+    let count = of_strategy.len() + machine.analog.len();
+    if count > MAX_SIGNALS {
+        let cause = format!("{count} signals with those of the feed strategy: a trace has room for {MAX_SIGNALS}");
+        return Err(refusal(machine, "driver.analog", cause));
+    }
+    match machine.analog.iter().find(|name| of_strategy.contains(&name.as_str())) {
+        Some(name) => {
+            Err(refusal(machine, "driver.analog", format!("{name}: the feed strategy has a signal of this name")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// A refusal with the place in the machine file.

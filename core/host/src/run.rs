@@ -200,6 +200,7 @@ impl Run {
     ) -> Result<Self, HostError> {
         let kinematics = setup::kinematics(&machine, registry)?;
         let feed = setup::feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
+        rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
         let axes = machine.axes.count();
         let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
         driver = faults::wrap(&machine, driver, joints)?;
@@ -248,9 +249,10 @@ impl Run {
         self.uses_time_constants
     }
 
-    /// Names of the feed strategy's signals.
-    pub fn signals(&self) -> &'static [&'static str] {
-        self.feed.as_ref().map_or(&[], FeedRunner::signals)
+    /// Names of the feed strategy's signals, and after them those of the analog inputs.
+    pub fn signals(&self) -> Vec<&str> {
+        let own = self.feed.as_ref().map_or(&[][..], FeedRunner::signals);
+        own.iter().copied().chain(self.machine.analog.iter().map(String::as_str)).collect()
     }
 
     /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
@@ -269,7 +271,7 @@ impl Run {
             observer.note(&note);
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
-        pump.skips_homing = self.switches.home;
+        (pump.skips_homing, pump.analog) = (self.switches.home, machine.analog.len());
         pump.planner.clone_from(&machine.planner.plugin);
         let mut measured = None;
         match clock {

@@ -155,6 +155,7 @@ fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Fee
     let context = StrategyContext {
         size: size_of_contract::<StrategyContext>(),
         axis_count: machine.axes.count() as u32,
+        axes: machine.axes,
         fine_period_s: machine.fine_period_s,
         rough_period_s: machine.rough_period_s,
         max_feed_ratio: machine.motion.max_feed_ratio,

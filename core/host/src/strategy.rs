@@ -1,7 +1,7 @@
 //! Feed strategy and policy between the sample ring and the ratio ring.
 
 use tandem_rings::{HostEnd, Ratio, RequestKind, Sample, StrategyRequest};
-use tandem_sdk::{Answer, FeedStrategy, FineSample, Request, Window};
+use tandem_sdk::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, Window};
 
 use crate::policy::{Means, PolicyHost};
 
@@ -39,13 +39,14 @@ impl FeedRunner {
 
     /// Takes a sample; where it completes a rough period k, the lesser of the ratios that strategy and policy ask for goes
     /// out for the first tick of period k + 2, and what else the strategy asks for with it.
-    pub fn sample(&mut self, sample: &Sample, host: &mut HostEnd) {
+    /// Gives what is to be logged of it.
+    pub fn sample(&mut self, sample: &Sample, host: &mut HostEnd) -> Option<String> {
         if self.fault.is_some() {
-            return;
+            return None;
         }
         self.window.push(fine_sample(sample));
         if self.window.len() < self.per_window {
-            return;
+            return None;
         }
         let period = sample.tick / self.per_window as u64;
         let tick = (period + 2) * self.per_window as u64;
@@ -69,10 +70,18 @@ impl FeedRunner {
             Err(cause) => Some(self.fail(&cause)),
         };
         self.window.clear();
-        if let Some(kind) = kind {
-            // Where the ring is full the same was asked for eight times, and has not acted yet.
-            let _ = host.requests.push(StrategyRequest { tick, kind });
-        }
+        let kind = kind?;
+        // Where the ring is full the same was asked for eight times, and has not acted yet.
+        let _ = host.requests.push(StrategyRequest { tick, kind });
+        (kind == RequestKind::Hold).then(|| self.words_of_hold(sample, tick))
+    }
+
+    /// Who asks for a hold, where, and what its signals say.
+    fn words_of_hold(&self, sample: &Sample, tick: u64) -> String {
+        let values = self.answer.map_or([0.0; MAX_SIGNALS], |answer| answer.signals);
+        let signals: Vec<String> =
+            self.signals().iter().zip(values).map(|(name, value)| format!("{name} = {value:.4}")).collect();
+        format!("line {}: the feed strategy asks for a hold, at tick {tick}: {}", sample.line, signals.join(", "))
     }
 
     fn ask(&mut self, period: u64) -> Result<Option<Answer>, String> {

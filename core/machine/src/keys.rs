@@ -73,6 +73,7 @@ static MACHINE: &[Key] = &[
     key("feed_strategy.options.<option>", "plugin's", "none", "Options of the feed strategy"),
     key("driver.plugin", "name or file", "required", "Driver of the drives, simulated or not"),
     key("driver.options.<option>", "plugin's", "none", "Options of the driver"),
+    key("driver.analog", "names", "[]", "Names of the driver's analog inputs from 0 on, at most 4: signals of trace and report"),
     key("faults.<fault>", "wrapper's", "none", "Seeded faults around the driver"),
     key("guard.mode", "stop or count", "stop", "What a sample beyond a limit does: stops the machine, or is counted (simulated drives only)"),
     key("policy.script", "file", "required", "Policy script, a WASM module; without the table there is none"),

@@ -13,7 +13,7 @@ use crate::load::Loader;
 use crate::motion::{FineThread, Loops, Motion};
 use crate::node::plain;
 use crate::overrides;
-use crate::parts::{GuardMode, Operator, PluginChoice, Policy, Spindle, text};
+use crate::parts::{GuardMode, Operator, PluginChoice, Policy, Spindle, analog_names, text};
 use crate::places::Places;
 use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
@@ -62,6 +62,8 @@ pub struct Machine {
     pub feed_strategy: Option<PluginChoice>,
     /// Driver.
     pub driver: PluginChoice,
+    /// Names of the driver's analog inputs from 0 on, for trace and report.
+    pub analog: Vec<String>,
     /// Faults around the driver, as the file states them: the wrappers read them.
     pub faults: Option<toml::Table>,
     /// What the guard does.
@@ -152,6 +154,7 @@ struct Tables {
     planner: PluginChoice,
     feed_strategy: Option<PluginChoice>,
     driver: PluginChoice,
+    analog: Vec<String>,
     faults: Option<toml::Table>,
     guard: GuardMode,
     policy: Option<Policy>,
@@ -174,6 +177,7 @@ impl Tables {
             planner: required("planner"),
             feed_strategy: optional("feed_strategy").and_then(|s| PluginChoice::read(&s)),
             driver: required("driver"),
+            analog: analog_names(&root.section("driver")),
             faults: optional("faults").and_then(|s| s.table().map(plain)),
             guard: GuardMode::read(&root.section("guard")),
             policy: optional("policy").and_then(|s| Policy::read(&s)),
@@ -207,6 +211,7 @@ impl Tables {
             planner: self.planner,
             feed_strategy: self.feed_strategy,
             driver: self.driver,
+            analog: self.analog,
             faults: self.faults,
             guard: self.guard,
             policy: self.policy,

@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use crate::node::{Table, plain};
+use tandem_sdk::MAX_ANALOG;
+
+use crate::node::{Node, Table, plain};
 use crate::paths::is_library;
 use crate::section::Section;
 
@@ -31,6 +33,24 @@ impl PluginChoice {
         let options = section.section("options").table().map(|table| text(section, "options", table));
         Some(Self { options: options.unwrap_or_default(), ..choice })
     }
+}
+
+/// Reads the names of analog inputs; none where they are wrong, which is reported.
+pub(crate) fn analog_names(driver: &Section<'_>) -> Vec<String> {
+    let Some(node) = driver.right("analog") else { return vec![] };
+    let names: Option<Vec<&str>> = node.array().and_then(|names| names.iter().map(Node::text).collect());
+    let Some(names) = names.filter(|names| names.len() <= MAX_ANALOG) else {
+        driver.refuse("analog", format!("must be an array of at most {MAX_ANALOG} names"));
+        return vec![];
+    };
+    let letters = |name: &str| name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+    let twice = |name: &&&str| names.iter().filter(|other| other == name).count() > 1;
+    let wrong = names.iter().find(|name| name.is_empty() || !letters(name)).or_else(|| names.iter().find(twice));
+    if let Some(wrong) = wrong {
+        driver.refuse("analog", format!("{wrong:?}: a name is lower case with underscores, and stands once"));
+        return vec![];
+    }
+    names.into_iter().map(str::to_owned).collect()
 }
 
 /// A table as TOML text.

@@ -1,6 +1,6 @@
 //! One fine period, as the fine loop reports it.
 
-use tandem_sdk::AxisVector;
+use tandem_sdk::{AxisVector, MAX_ANALOG};
 
 use crate::Given;
 
@@ -115,6 +115,8 @@ pub struct Sample {
     pub ratio: f64,
     /// Spindle speed read back, rad/s.
     pub spindle_rad_per_s: f64,
+    /// Analog inputs of the driver.
+    pub analog: [f64; MAX_ANALOG],
     /// Why the machine is being stopped, as this position was chosen.
     pub cause: StopCause,
     /// What the operator asked for in this period.

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::{AxisVector, PluginError, RawSlice};
+use crate::{Axes, AxisVector, PluginError, RawSlice};
 
 /// Most named signals a strategy publishes.
 pub const MAX_SIGNALS: usize = 8;
@@ -19,11 +19,11 @@ pub struct FineSample {
     pub reserved: u32,
     /// Position commanded, mm or rad.
     pub command: AxisVector,
-    /// Position measured at the start of the period, mm or rad.
+    /// Position measured, as the exchange of the period answered it, mm or rad.
     pub position: AxisVector,
-    /// Speed measured, mm/s or rad/s.
+    /// Speed measured, of the same answer, mm/s or rad/s.
     pub speed: AxisVector,
-    /// Mean motor current over the past period, A.
+    /// Mean motor current over the period that ends with position and speed, A; per joint.
     pub current_a: AxisVector,
     /// Path speed commanded, mm/s.
     pub feed_mm_per_s: f64,
@@ -43,6 +43,8 @@ pub struct StrategyContext {
     pub size: u32,
     /// Number of axes.
     pub axis_count: u32,
+    /// The axes, in the order of all vectors.
+    pub axes: Axes,
     /// Fine period, s.
     pub fine_period_s: f64,
     /// Rough period, s.

@@ -41,6 +41,7 @@ pub struct Bounds {
 pub struct FeedLaw {
     law: Law,
     bounds: Bounds,
+    ceiling_mm_per_s: f64,
     integral_mm_per_s: f64,
     feed_mm_per_s: f64,
 }
@@ -48,7 +49,7 @@ pub struct FeedLaw {
 impl FeedLaw {
     /// A law that begins at the feed `feed_mm_per_s`.
     pub fn new(law: Law, bounds: Bounds, feed_mm_per_s: f64) -> Self {
-        Self { law, bounds, integral_mm_per_s: 0.0, feed_mm_per_s }
+        Self { law, bounds, ceiling_mm_per_s: f64::INFINITY, integral_mm_per_s: 0.0, feed_mm_per_s }
     }
 
     /// The feed to ask for, mm/s, after a rough period of mean torque `torque_nm` in a block of `programmed_mm_per_s`.
@@ -84,8 +85,18 @@ impl FeedLaw {
         }
     }
 
+    /// The feed asked for last, mm/s.
+    pub fn feed_mm_per_s(&self) -> f64 {
+        self.feed_mm_per_s
+    }
+
+    /// Bounds the law further, where the programmed feed or the machine allows less: no integral passes this feed, mm/s.
+    pub fn set_max(&mut self, mm_per_s: f64) {
+        self.ceiling_mm_per_s = mm_per_s;
+    }
+
     fn clip(&self, feed_mm_per_s: f64) -> f64 {
-        feed_mm_per_s.clamp(self.bounds.min_mm_per_s, self.bounds.max_mm_per_s)
+        feed_mm_per_s.min(self.bounds.max_mm_per_s.min(self.ceiling_mm_per_s)).max(self.bounds.min_mm_per_s)
     }
 }
 

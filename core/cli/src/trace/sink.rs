@@ -28,7 +28,7 @@ impl TraceSink {
     pub fn create(path: &Path, machine: &Machine, program: &str, run: &Run, dry_run: bool) -> Result<Self, String> {
         let signals = run.signals();
         if !is_binary_name(path) {
-            return TraceCsv::create(path, machine, signals).map(Self::Csv);
+            return TraceCsv::create(path, machine, &signals).map(Self::Csv);
         }
         let header = Header {
             fine_period_s: machine.fine_period_s,

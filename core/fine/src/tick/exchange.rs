@@ -79,6 +79,7 @@ impl FineLoop {
             sigma: self.governor.sigma(),
             ratio: self.ratio * self.given.feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
+            analog: self.feedback.analog,
             cause: self.cause,
             given: self.given,
         };

@@ -79,7 +79,9 @@ fn leaves(path: &str, table: &toml::Table, all: &mut Vec<String>) {
 
 fn stands_for(pattern: &str, path: &str) -> bool {
     let (pattern, path): (Vec<_>, Vec<_>) = (pattern.split('.').collect(), path.split('.').collect());
-    pattern.len() == path.len() && pattern.iter().zip(&path).all(|(a, b)| a.starts_with('<') || a == b)
+    // An option may be a table of its own.
+    let fits = pattern.len() == path.len() || (pattern.ends_with(&["<option>"]) && path.len() > pattern.len());
+    fits && pattern.iter().zip(&path).all(|(a, b)| a.starts_with('<') || a == b)
 }
 
 #[test]
