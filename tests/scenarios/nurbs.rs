@@ -129,3 +129,28 @@ fn a_hold_on_the_butterfly_stays_within_the_limits() {
     }
     assert!(done.number("jerk_relaxed_samples") < 10.0, "{}", done.number("jerk_relaxed_samples"));
 }
+
+/// A script sees curves as one block each and lowers the feed of those it is asked to.
+#[test]
+fn a_policy_script_slows_curves() {
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let script = root().join("scripts/policies/gentle-start.wasm");
+    let plain = Scenario::text(MIXTURE).on(&machine).run();
+    let done = Scenario::text(MIXTURE)
+        .on(&machine)
+        .with(&["--set", &format!("policy.script={}", script.display()), "--set", "policy.parameters.ramp_mm=80"])
+        .run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    for count in ["limit_violations", "guard_stops", "starvations", "governed_samples"] {
+        assert_eq!(done.number(count), 0.0, "{count}");
+    }
+    let policy = done.summary()["policy"].clone();
+    assert!(policy["feeds_capped"].as_u64().unwrap() > 0, "{policy}");
+    assert_eq!(policy["traps"], 0, "{policy}");
+    assert!(done.number("motion_time_s") > plain.number("motion_time_s") + 0.02);
+    let verdict = done.judge(|options| {
+        options.sample_tolerance_mm = Some(2e-6);
+        options.vertex_tolerance_mm = Some(0.3);
+    });
+    assert!(verdict.passed(), "{verdict}");
+}

@@ -15,6 +15,18 @@ fn drive(form: &str, name: &str) -> Figures {
     assert!(last.flags.contains(SegmentFlags::ENDS_AT_REST) && last.position(0.0) == end);
     let figures = figures(&collected, &data, &context);
     println!("{form} {name}: {figures:?}, {} segments", collected.segments.len());
+    // The fine loop looks at single points of the segments, and answers where they exceed the jerk by more than 1 %.
+    let (mut start_s, mut worst) = (0.0, (0.0, 0.0));
+    for segment in &collected.segments {
+        for t in [0.0, 0.5, 1.0].map(|share| share * segment.duration_s) {
+            for c in &segment.coefficients {
+                let jerk = (6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5])).abs() / 4e5;
+                worst = if jerk > worst.0 { (jerk, start_s + t) } else { worst };
+            }
+        }
+        start_s += segment.duration_s;
+    }
+    assert!(form != "scan" || worst.0 <= 1.01, "{form} {name}: {:.4} of the jerk at {:.4} s", worst.0, worst.1);
     figures
 }
 

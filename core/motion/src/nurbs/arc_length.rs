@@ -11,7 +11,7 @@ use super::{AlongPath, Nurbs, Piece};
 pub struct Place(usize);
 
 /// The parameter over the arc length: knot spans halved until a polynomial of degree 7 that meets u and its first three
-/// derivatives at both ends follows the curve to 2e-7 in speed and 2e-8 mm along the curve.
+/// derivatives at both ends follows the curve to 2e-8 in speed and 2e-9 mm along the curve.
 ///
 /// A look-up is one polynomial, without iteration. The table can be built span by span, so that a long curve costs no more
 /// at a time than is asked for.

@@ -17,9 +17,9 @@ pub(super) struct Fit {
 /// 0.3 and 0.7.
 const CHECKED: [f64; 5] = [0.15, 0.31, 0.5, 0.69, 0.85];
 /// Largest relative error of the path speed that a fit may make.
-const RATE: f64 = 2e-7;
+const RATE: f64 = 2e-8;
 /// Largest error of the path coordinate that a fit may make, mm.
-const OFF_MM: f64 = 2e-8;
+const OFF_MM: f64 = 2e-9;
 /// Parts this short are taken as straight in u, mm: at a cusp no polynomial fits.
 const SHORTEST_MM: f64 = 1e-9;
 

@@ -3,8 +3,14 @@
 use tandem_motion::retime::Rate;
 
 use super::spline::evaluate;
-use crate::stream::{Motion, State, interval};
+use crate::stream::{Motion, State};
 use crate::windowed::Ramps;
+
+/// Where the next window is planned: from this share of the latest time on.
+const EARLIEST: f64 = 0.55;
+/// Where none was found: so much later at least, s, and up to this share of the window.
+const LATER_S: f64 = 0.02;
+const LAST: f64 = 0.93;
 
 /// A spline at a rate.
 #[derive(Debug, Default)]
@@ -32,6 +38,16 @@ impl Rated {
         [s_mm, s1 * b.sqrt(), s2 * b + s1 * b1 / 2.0, b.sqrt() * (s3 * b + 1.5 * s2 * b1 + 0.5 * s1 * b2)]
     }
 
+    /// Where in interval `k` the path coordinate is `s_mm`, by halving.
+    pub fn place(&self, k: usize, s_mm: f64) -> f64 {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = f64::midpoint(low, high);
+            if evaluate(&self.coefficients, k, middle, self.step_s)[0] < s_mm { low = middle } else { high = middle }
+        }
+        low
+    }
+
     fn at(&self, k: usize, t_s: f64) -> State {
         let z = self.rate.place(k, t_s, self.step_s);
         let [s_mm, first, second, _] = evaluate(&self.coefficients, k, z, self.step_s);
@@ -39,14 +55,13 @@ impl Rated {
         State { s_mm, speed_mm_per_s: first * b.sqrt(), acceleration_mm_per_s2: second * b + first * slope / 2.0 }
     }
 
-    /// Where it has the least acceleration, in the last part before `latest_s`; the latest of those about equal.
-    fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
-        let (mut least, mut found) = (f64::INFINITY, latest_s);
-        for t in times.iter().copied().filter(|t| (0.75..=1.0).contains(&(t / latest_s))) {
-            let k = interval(times, t);
-            let size = self.at(k, t - times[k]).acceleration_mm_per_s2.abs();
+    /// Where it has the least acceleration between two times; the latest of those about equal.
+    fn calmest_s(&self, times: &[f64], (from_s, to_s): (f64, f64)) -> Option<f64> {
+        let (mut least, mut found) = (f64::INFINITY, None);
+        for (k, t) in times.iter().copied().enumerate().filter(|(_, t)| (from_s..=to_s).contains(t)) {
+            let size = self.at(k.min(times.len() - 2), 0.0).acceleration_mm_per_s2.abs();
             if size <= least.max(1.0) {
-                (least, found) = (size.min(least), t);
+                (least, found) = (size.min(least), Some(t));
             }
         }
         found
@@ -63,10 +78,19 @@ impl Motion for Driven {
     }
 
     fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
-        if self.by_ramps { self.ramps.commit_s(times, latest_s) } else { self.rated.commit_s(times, latest_s) }
+        if self.by_ramps {
+            self.ramps.commit_s(times, latest_s)
+        } else {
+            self.rated.calmest_s(times, (EARLIEST * latest_s, latest_s)).unwrap_or(latest_s)
+        }
     }
 
     fn later_s(&self, times: &[f64], now_s: f64) -> f64 {
-        if self.by_ramps { self.ramps.later_s(times, now_s) } else { times[times.len() - 1] }
+        if self.by_ramps {
+            self.ramps.later_s(times, now_s)
+        } else {
+            let whole_s = times[times.len() - 1];
+            self.rated.calmest_s(times, (now_s + LATER_S, LAST * whole_s)).unwrap_or(whole_s)
+        }
     }
 }

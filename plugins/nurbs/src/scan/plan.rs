@@ -16,7 +16,9 @@ use crate::windowed::{Ramps, Windowed};
 /// Share of the jerk limits that is used.
 const JERK_SHARE: f64 = 0.98;
 /// Tries.
-const TRIES: usize = 5;
+const TRIES: usize = 8;
+/// Tries after which limits of samples are to be kept, or never will.
+const HOPELESS: usize = 6;
 /// Intervals of the grid at least.
 const MIN_INTERVALS: usize = 40;
 
@@ -28,8 +30,6 @@ pub struct Scan {
     points: Vec<[Point; PLACES]>,
     /// Path coordinates of these.
     places_mm: Vec<[f64; PLACES]>,
-    /// Which intervals hold a knot of the curve.
-    knots: Vec<bool>,
     /// Reliefs that lowered the speed when they were made.
     slowed: Option<usize>,
     reliefs: Reliefs,
@@ -59,9 +59,12 @@ impl Planning for Scan {
             self.solve(route, bounds, start, end_mm, window);
             let worst = check(route, bounds, start, window, &mut self.reliefs);
             if !worst.is_kept() {
+                if n >= HOPELESS && kept.is_none() {
+                    break;
+                }
                 continue;
             }
-            if n == TRIES || !ease(route, bounds, &window.motion.rated, &self.knots, &mut self.reliefs) {
+            if n == TRIES || !ease(route, bounds, &window.motion.rated, &mut self.reliefs) {
                 return true;
             }
             kept = Some(known);
@@ -130,12 +133,10 @@ impl Scan {
     fn fill_points(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize) {
         self.points.clear();
         self.places_mm.clear();
-        self.knots.clear();
         let (mut cursor, lanes) = (Cursor::default(), bounds.context.axes.count());
         for k in 0..intervals {
             let states = [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
-            let sides = route.sides([states[0][0], states[2][0]], &mut cursor);
-            self.knots.push(sides[0].is_some());
+            let knot = route.knot([states[0][0], states[2][0]], &mut cursor);
             self.places_mm.push(states.map(|state| state[0]));
             self.points.push(states.map(|[s, s1, s2, s3]| {
                 let (at, leg) = route.at(s, &mut cursor);
@@ -147,7 +148,8 @@ impl Scan {
                     point.second[lane] = x2 * s1 * s1 + x1 * s2;
                     let jerk = |third: &AxisVector| third[lane] * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;
                     let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
-                    point.third[lane] = sides.iter().flatten().map(jerk).fold(jerk(&at.third), larger);
+                    let sides = knot.iter().flat_map(|(_, sides)| sides);
+                    point.third[lane] = sides.map(|side| jerk(&side.third)).fold(jerk(&at.third), larger);
                 }
                 if s1 > 1e-9 {
                     point.most = (speed * leg.cap_mm_per_s(&at, bounds) / s1).powi(2);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tandem_motion::nurbs::{AlongPath, Place};
-use tandem_sdk::{AxisVector, Block, BlockKind, PlannerContext};
+use tandem_sdk::{Block, BlockKind, PlannerContext};
 
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
@@ -229,13 +229,11 @@ impl Route {
         leg.smooth_for_mm(s_mm, &mut cursor.place)
     }
 
-    /// The third derivatives on both sides of the first knot between two path coordinates.
-    pub fn sides(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> [Option<AxisVector>; 2] {
+    /// The first knot between two path coordinates, mm, and the path on both sides of it.
+    pub fn knot(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> Option<(f64, [AlongPath; 2])> {
         let break_mm = self.find(from_mm, cursor).next_break_mm(from_mm);
-        if break_mm >= to_mm {
-            return [None; 2];
-        }
-        [-BESIDE_MM, BESIDE_MM].map(|off| Some(self.at(break_mm + off, cursor).0.third))
+        let sides = || [-BESIDE_MM, BESIDE_MM].map(|off| self.at(break_mm + off, cursor).0);
+        (break_mm < to_mm).then(sides).map(|sides| (break_mm, sides))
     }
 
     /// Where the run from the front ends, mm, and whether it is known to end there.
