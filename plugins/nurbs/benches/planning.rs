@@ -1,11 +1,10 @@
 //! Planning: a curve in, segments out, streaming, one core. `cargo bench -p tandem-nurbs`. After the table each run prints
-//! the fastest of twenty runs of each curve as motion time by planning time, and the longest single call, both in time of
-//! the processor, which a busy computer disturbs less.
+//! the fastest of twenty runs of each curve as motion time by planning time, and the longest single call.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::{canonical, context, curve_block};
 use tandem_nurbs::{NurbsPlanner, Options};
@@ -58,25 +57,19 @@ fn planner(form: &str, name: &str) -> (NurbsPlanner, OwnedBlock) {
     (NurbsPlanner::new(&options, &context(block.facts().start)).unwrap(), block)
 }
 
-/// Time that this thread has had of a processor, less `since`.
-fn processor_time(since: Duration) -> Duration {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    Duration::from_nanos(text.split(' ').next().unwrap().parse().unwrap()).saturating_sub(since)
-}
-
 /// From the curve to the last segment.
 fn drive(planner: &mut NurbsPlanner, block: &OwnedBlock) -> Run {
-    let (mut counter, started, mut longest) = (Counter::default(), processor_time(Duration::ZERO), Duration::ZERO);
+    let (mut counter, started, mut longest) = (Counter::default(), Instant::now(), Duration::ZERO);
     let start: AxisVector = block.facts().start;
     planner.reset(&start);
     block.with(|b| planner.accept(b)).unwrap();
     planner.finish();
     loop {
-        let called = processor_time(Duration::ZERO);
+        let called = Instant::now();
         let done = planner.advance(0.008, &mut counter).unwrap().done;
-        longest = longest.max(processor_time(called));
+        longest = longest.max(called.elapsed());
         if done != 0 {
-            return Run { motion_s: counter.motion_s, planning: processor_time(started), longest };
+            return Run { motion_s: counter.motion_s, planning: started.elapsed(), longest };
         }
     }
 }
