@@ -1,9 +1,19 @@
 //! Every example program, within limits; the published cases through the whole chain.
 
-use crate::harness::{Scenario, root};
+use crate::harness::{Scenario, mill, root};
 
 fn example(name: &str) -> std::path::PathBuf {
     root().join("examples/programs").join(name)
+}
+
+/// The machine that an example is for.
+fn machine_of(program: &std::path::Path) -> std::path::PathBuf {
+    match program.file_stem().and_then(|stem| stem.to_str()) {
+        Some("corexy") => root().join("examples/machines/corexy.toml"),
+        Some("portal") => root().join("examples/machines/gantry.toml"),
+        Some("cylinder") => root().join("examples/machines/rotary-table.toml"),
+        _ => mill(),
+    }
 }
 
 #[test]
@@ -11,7 +21,7 @@ fn every_example_runs_within_limits() {
     let programs = std::fs::read_dir(root().join("examples/programs")).unwrap();
     let mut count = 0;
     for program in programs.map(|entry| entry.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "ngc")) {
-        let done = Scenario::of(&program).run();
+        let done = Scenario::of(&program).on(&machine_of(&program)).run();
         done.assert_within_limits();
         assert_eq!(done.number("starvations"), 0.0);
         count += 1;

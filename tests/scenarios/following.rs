@@ -80,11 +80,3 @@ fn the_fault_repeats_what_the_driver_said() {
     let words = "fault: driver sim: the exchange failed: failed on purpose, by [faults] (line 6, tick 100, 0.100 s)";
     assert!(done.errors().contains(words), "{}", done.errors());
 }
-
-#[test]
-fn a_limit_for_joints_that_are_no_axes_is_refused() {
-    let done = run(&["kinematics.plugin=tripod", "axes.z.max_following_error_mm=1"]);
-    assert_eq!(done.status(), 1);
-    let words = "--set axes.z.max_following_error_mm: following errors are those of joints, and tripod has joints";
-    assert!(done.errors().contains(words), "{}", done.errors());
-}

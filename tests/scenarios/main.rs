@@ -18,6 +18,7 @@ mod hold;
 mod homing;
 mod jog;
 mod keys;
+mod kinematics;
 mod latency;
 mod mdi;
 mod nurbs;

@@ -11,6 +11,8 @@ pub fn registry() -> Result<Registry, String> {
     registry.register(tandem_nurbs::PLUGIN)?;
     registry.register(tandem_smooth::PLUGIN)?;
     registry.register(tandem_force_control::PLUGIN)?;
+    registry.register(tandem_corexy::PLUGIN)?;
+    registry.register(tandem_wrapped_rotary::PLUGIN)?;
     registry.register(tandem_sim::PLUGIN)?;
     Ok(registry)
 }

@@ -1,6 +1,6 @@
 //! What the fine loop knows of the machine.
 
-use tandem_sdk::{AxisVector, Limits, MAX_AXES};
+use tandem_sdk::{AxisVector, JointLanes, Limits, MAX_AXES};
 
 /// What the guard does with a sample beyond a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,20 +12,37 @@ pub enum GuardMode {
     Count,
 }
 
+/// How the joints hang on the axes, and what of them lies behind the axes in every vector of the fine loop.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Joints {
+    /// Each joint is an axis, or one scaled: nothing.
+    #[default]
+    Axes,
+    /// Some are sums of axes: a lane each, which segments carry and which is limited like an axis.
+    Sums(&'static JointLanes),
+    /// Their place is no linear function of the axes: all joints, as the kinematics give them. The guard alone sees them.
+    Curved {
+        /// Number of axes.
+        axes: usize,
+    },
+}
+
 /// Everything the fine loop is told before it runs.
 #[derive(Clone, Copy, Debug)]
 pub struct FineConfig {
     /// Fine period, s.
     pub period_s: f64,
-    /// Limits of the axes.
+    /// Limits of the axes, and of what `joints` puts behind them.
     pub limits: Limits,
+    /// How the joints hang on the axes.
+    pub joints: Joints,
     /// Allowable speed difference that the planner makes use of, per axis, mm/s.
     pub speed_difference_mm_per_s: [f64; MAX_AXES],
     /// Order of the limits that the planner keeps: 2 velocity and acceleration, 3 also jerk.
     pub order: u32,
     /// What the guard does.
     pub guard: GuardMode,
-    /// Where the machine stands.
+    /// Where the machine stands, with what `joints` puts behind the axes.
     pub position: AxisVector,
     /// Highest feed ratio that can be asked: the planner plans at it.
     pub max_feed_ratio: f64,
@@ -45,6 +62,24 @@ pub struct FineConfig {
 impl FineConfig {
     /// Number of axes.
     pub fn axis_count(&self) -> usize {
+        match self.joints {
+            Joints::Axes => self.lane_count(),
+            Joints::Sums(lanes) => lanes.first(),
+            Joints::Curved { axes } => axes,
+        }
+    }
+
+    /// Number of entries that are limited: the axes, and what `joints` puts behind them.
+    pub fn lane_count(&self) -> usize {
         self.limits.count as usize
+    }
+
+    /// `vector` without what lies behind the axes.
+    #[inline]
+    pub fn axes_alone(&self, vector: &AxisVector) -> AxisVector {
+        match self.joints {
+            Joints::Axes => *vector,
+            _ => AxisVector::from_slice(&vector.0[..self.axis_count()]),
+        }
     }
 }

@@ -22,7 +22,7 @@ pub enum FaultKind {
     Guard {
         /// Which limit.
         breach: Breach,
-        /// Axis index.
+        /// Axis index; behind the axes, the number of the joint lane.
         axis: usize,
         /// What the sample would have been, in the limit's unit.
         value: f64,
@@ -49,6 +49,11 @@ pub enum FaultKind {
         error_mm: f64,
         /// The limit.
         limit_mm: f64,
+    },
+    /// The kinematics give no finite number for a joint.
+    Kinematics {
+        /// Joint index.
+        joint: usize,
     },
     /// The driver failed to exchange.
     Driver,

@@ -72,7 +72,7 @@ impl Guard {
     pub fn check(&self, next: &AxisVector, unhomed: u32) -> Checked {
         let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
         let mut checked = Checked { velocity, acceleration, buckets: self.buckets, breach: None };
-        for axis in 0..self.config.axis_count() {
+        for axis in 0..self.config.lane_count() {
             let travels = unhomed >> axis & 1 == 0;
             let breach = self.check_axis(axis, next[axis], travels, &mut checked);
             checked.breach = checked.breach.or(breach);

@@ -19,6 +19,6 @@ mod ramp;
 mod state;
 mod tick;
 
-pub use config::{FineConfig, GuardMode};
+pub use config::{FineConfig, GuardMode, Joints};
 pub use fault::{Breach, Fault, FaultKind};
 pub use tick::{Counters, FineLoop};

@@ -1,8 +1,11 @@
-//! Ramping out: every axis to rest from the last samples sent, at its own limits. Leaves the path; asks no plugin.
+//! Ramping out: to rest from the last samples sent, at the limits. Leaves the path; asks no plugin.
+//!
+//! Every axis goes by its own limits. Where joints are sums of axes they go together instead: one law for the whole vector
+//! of velocities, so that every sum of axes goes by it too, and lasts as long as the joint or axis that needs most.
 
 use tandem_sdk::{AxisVector, MAX_AXES};
 
-use crate::config::FineConfig;
+use crate::config::{FineConfig, Joints};
 use crate::guard::Guard;
 use crate::law::to_rest;
 
@@ -19,31 +22,37 @@ pub struct Ramp {
     /// Infinite where the planner keeps no jerk limit.
     jerk: [f64; MAX_AXES],
     period_s: f64,
+    together: Option<Together>,
+    /// Entries that move.
+    axes: usize,
 }
 
 impl Ramp {
     /// From the last samples sent.
     pub fn new(config: &FineConfig, sent: &Guard) -> Self {
         let smooth = config.order >= 3;
-        Self {
+        let mut ramp = Self {
             position: *sent.position(),
             velocity: *sent.velocity(),
             acceleration: *sent.acceleration(),
             most: config.limits.axes.map(|l| l.acceleration_mm_per_s2),
             jerk: config.limits.axes.map(|l| if smooth { l.jerk_mm_per_s3 } else { f64::INFINITY }),
             period_s: config.period_s,
+            together: None,
+            axes: if matches!(config.joints, Joints::Curved { .. }) { config.axis_count() } else { MAX_AXES },
+        };
+        if matches!(config.joints, Joints::Sums(_)) {
+            ramp.together = Some(Together::new(&ramp, config.lane_count()));
         }
+        ramp
     }
 
     /// The next sample. Each axis slows by its limits, whatever lies ahead: the travel too.
     pub fn next(&mut self) -> AxisVector {
-        for axis in 0..MAX_AXES {
-            if self.jerk[axis].is_finite() {
-                self.slow_smoothly(axis);
-            } else {
-                let v = self.velocity[axis];
-                self.velocity[axis] = v.signum() * (v.abs() - self.most[axis] * self.period_s).max(0.0);
-            }
+        if let Some(together) = &mut self.together {
+            self.velocity = together.next(self.period_s);
+        } else {
+            (0..self.axes).for_each(|axis| self.slow(axis));
         }
         self.position += self.velocity * self.period_s;
         self.position
@@ -51,7 +60,16 @@ impl Ramp {
 
     /// Whether every axis rests.
     pub fn is_over(&self) -> bool {
-        self.velocity.0.iter().all(|v| *v == 0.0)
+        self.velocity.0[..self.axes].iter().all(|v| *v == 0.0)
+    }
+
+    fn slow(&mut self, axis: usize) {
+        if self.jerk[axis].is_finite() {
+            self.slow_smoothly(axis);
+        } else {
+            let v = self.velocity[axis];
+            self.velocity[axis] = v.signum() * (v.abs() - self.most[axis] * self.period_s).max(0.0);
+        }
     }
 
     /// The change of acceleration that leads to rest soonest. In samples `v ← v + T·a` follows `a ← a + T·j`: the law's
@@ -66,5 +84,99 @@ impl Ramp {
         let arrives = (velocity + period_s * next).abs() < 1e-3 * step * period_s && next.abs() < step;
         (self.velocity[axis], self.acceleration[axis]) =
             if arrives { (0.0, 0.0) } else { (velocity + period_s * next, next) };
+    }
+}
+
+/// All entries to rest by one law: first the acceleration runs out, then the velocity falls.
+#[derive(Clone, Copy, Debug)]
+struct Together {
+    velocity: AxisVector,
+    acceleration: AxisVector,
+    /// What is left of the velocity when the acceleration has run out.
+    steady: AxisVector,
+    /// Periods until then, and from then until rest.
+    periods: [f64; 2],
+    /// The velocity falls with `1 − 3τ² + 2τ³` where there is a jerk limit, else with `1 − τ`.
+    smooth: bool,
+    passed: f64,
+}
+
+impl Together {
+    /// From the state of `ramp`, within the limits of its first `count` entries.
+    fn new(ramp: &Ramp, count: usize) -> Self {
+        let (period_s, velocity, acceleration) = (ramp.period_s, ramp.velocity, ramp.acceleration);
+        let longest = |of: &dyn Fn(usize) -> f64| (0..count).map(of).fold(0.0, f64::max);
+        let smooth = ramp.jerk[..count].iter().any(|jerk| jerk.is_finite());
+        let out = (longest(&|i| acceleration[i].abs() / ramp.jerk[i]) / period_s).ceil();
+        let steady = velocity + acceleration * (0.5 * out * period_s);
+        // The falling law has its greatest slope 1.5 in the middle, its greatest bend 6 at the ends.
+        let fall_s = longest(&|i| {
+            let v = steady[i].abs();
+            if smooth { (1.5 * v / ramp.most[i]).max((6.0 * v / ramp.jerk[i]).sqrt()) } else { v / ramp.most[i] }
+        });
+        let fall = (fall_s / period_s).ceil().max(1.0);
+        Self { velocity, acceleration, steady, periods: [out, fall], smooth, passed: 0.0 }
+    }
+
+    /// The velocity in the next period.
+    fn next(&mut self, period_s: f64) -> AxisVector {
+        self.passed += 1.0;
+        let [out, fall] = self.periods;
+        if self.passed <= out {
+            let t_s = self.passed * period_s;
+            return self.velocity + self.acceleration * (t_s - 0.5 * t_s * self.passed / out);
+        }
+        let share = ((self.passed - out) / fall).min(1.0);
+        if share >= 1.0 {
+            return AxisVector::ZERO;
+        }
+        self.steady * if self.smooth { 1.0 - share * share * (3.0 - 2.0 * share) } else { 1.0 - share }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ramp(velocity: [f64; 2], acceleration: [f64; 2], jerk: f64) -> Ramp {
+        let lanes = |[x, y]: [f64; 2]| AxisVector::from_slice(&[x, y, x + y, x - y]);
+        let mut ramp = Ramp {
+            position: AxisVector::ZERO,
+            velocity: lanes(velocity),
+            acceleration: lanes(acceleration),
+            most: [1000.0, 800.0, 900.0, 900.0, 0.0, 0.0, 0.0, 0.0],
+            jerk: [jerk; MAX_AXES],
+            period_s: 0.001,
+            together: None,
+            axes: MAX_AXES,
+        };
+        ramp.together = Some(Together::new(&ramp, 4));
+        ramp
+    }
+
+    proptest! {
+        /// From any state within the limits, every entry keeps them, and a sum of axes stays their sum.
+        #[test]
+        fn together_within_all_limits(
+            v in proptest::array::uniform2(-150.0..150.0f64), a in proptest::array::uniform2(-440.0..440.0f64),
+            jerk in prop_oneof![Just(f64::INFINITY), 5_000.0..50_000.0f64],
+        ) {
+            let mut ramp = ramp(v, if jerk.is_finite() { a } else { [0.0; 2] }, jerk);
+            let (mut velocity, mut acceleration) = (ramp.velocity, ramp.acceleration);
+            for _ in 0..20_000 {
+                if ramp.is_over() { break; }
+                let at = ramp.next();
+                prop_assert!((at[2] - at[0] - at[1]).abs() < 1e-9 && (at[3] - at[0] + at[1]).abs() < 1e-9);
+                let next = (ramp.velocity - velocity) * 1e3;
+                let change = (next - acceleration) * 1e3;
+                for i in 0..4 {
+                    prop_assert!(next[i].abs() <= ramp.most[i] * (1.0 + 1e-6), "{i}: {}", next[i]);
+                    prop_assert!(change[i].abs() <= jerk * 1.01, "{i}: {}", change[i]);
+                }
+                (velocity, acceleration) = (ramp.velocity, next);
+            }
+            prop_assert!(ramp.is_over());
+        }
     }
 }

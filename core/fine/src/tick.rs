@@ -106,7 +106,7 @@ pub struct FineLoop {
     feedback: Feedback,
     counters: Counters,
     fault: Option<Fault>,
-    driver_error: Option<PluginError>,
+    plugin_error: Option<PluginError>,
 }
 
 impl FineLoop {
@@ -117,11 +117,11 @@ impl FineLoop {
         driver: Box<dyn Driver>,
         kinematics: Option<Box<dyn Kinematics>>,
     ) -> Self {
-        let (limits, axes) = (&config.limits.axes, config.axis_count());
+        let (limits, lanes) = (&config.limits.axes, config.lane_count());
         Self {
             config: *config,
             driver,
-            joints: kinematics.as_ref().map_or(axes, |k| k.joint_count(axes)),
+            joints: kinematics.as_ref().map_or(config.axis_count(), |k| k.joint_count(config.axis_count())),
             kinematics,
             controls: end.controls,
             given: Given::default(),
@@ -135,12 +135,12 @@ impl FineLoop {
             next_ratio: None,
             ratio: 1.0,
             cursor: Cursor::new(end.segments, &config.position),
-            points: Points::new(limits, axes),
-            outlook: Outlook::new(limits, axes, config.period_s),
+            points: Points::new(limits, lanes),
+            outlook: Outlook::new(limits, lanes, config.period_s),
             preview: Preview::new(),
             line_end: LineEnd::default(),
             line_moves: false,
-            governor: Governor::new(limits, axes, config.period_s),
+            governor: Governor::new(limits, lanes, config.period_s),
             guard: Guard::new(config),
             offset: AxisVector::ZERO,
             edge: EdgeWatch::default(),
@@ -156,7 +156,7 @@ impl FineLoop {
             feedback: Feedback::default(),
             counters: Counters::default(),
             fault: None,
-            driver_error: None,
+            plugin_error: None,
         }
     }
 
@@ -211,14 +211,14 @@ impl FineLoop {
         self.fault
     }
 
-    /// What the driver said when an exchange failed first. Host.
-    pub fn driver_error(&self) -> Option<&PluginError> {
-        self.driver_error.as_ref()
+    /// What the driver, or the kinematics, said when it failed first. Host.
+    pub fn plugin_error(&self) -> Option<&PluginError> {
+        self.plugin_error.as_ref()
     }
 
     /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Host.
     pub fn sent(&self) -> AxisVector {
-        *self.guard.position() + self.offset
+        self.config.axes_alone(self.guard.position()) + self.offset
     }
 
     /// Whether the program has ended, or a fault has brought the machine to rest.
@@ -241,8 +241,8 @@ impl FineLoop {
             Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
-                let position = ramp.next();
-                let over = ramp.is_over();
+                let (position, over) = (ramp.next(), ramp.is_over());
+                let position = self.with_joints(position);
                 (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }
             Phase::Faulted => {

@@ -4,23 +4,44 @@ use tandem_fine::{Breach, Fault, FaultKind};
 use tandem_machine::Machine;
 use tandem_sdk::PluginError;
 
-/// What happened, who did it, where. `soft` is the cause of a fault on the soft side, `driver` what the driver said.
-pub fn describe(machine: &Machine, fault: &Fault, soft: Option<&str>, driver: Option<&PluginError>) -> String {
-    let t_s = fault.tick as f64 * machine.fine_period_s;
-    format!("{} (line {}, tick {}, {t_s:.3} s)", cause(machine, &fault.kind, soft, driver), fault.line, fault.tick)
+use crate::joints::JointSpace;
+
+/// Who is meant by the numbers of a fault.
+struct Names<'a> {
+    machine: &'a Machine,
+    joints: &'a JointSpace,
 }
 
-fn cause(machine: &Machine, kind: &FaultKind, soft: Option<&str>, driver: Option<&PluginError>) -> String {
+/// What happened, who did it, where. `soft` is the cause of a fault on the soft side, `driver` what the driver said.
+pub fn describe(
+    machine: &Machine,
+    joints: &JointSpace,
+    fault: &Fault,
+    soft: Option<&str>,
+    driver: Option<&PluginError>,
+) -> String {
+    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints });
+    format!("{} (line {}, tick {}, {t_s:.3} s)", cause(&names, &fault.kind, soft, driver), fault.line, fault.tick)
+}
+
+fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option<&PluginError>) -> String {
+    let machine = names.machine;
     match kind {
-        FaultKind::Guard { breach, axis, value, limit } => guard(machine, *breach, *axis, *value, *limit),
+        FaultKind::Guard { breach, axis, value, limit } => names.guard(*breach, *axis, *value, *limit),
         FaultKind::Drive { joint, code } => {
-            format!("driver {}: the drive of joint {joint} reports fault {code}", machine.driver.plugin)
+            let joint = names.joint(*joint);
+            format!("driver {}: the drive of {joint} reports fault {code}", machine.driver.plugin)
         }
         FaultKind::Feedback { joint } => {
-            let of = joint.map_or("the spindle".to_string(), |joint| format!("joint {joint}"));
+            let of = joint.map_or("the spindle".to_string(), |joint| names.joint(joint));
             format!("driver {}: the feedback of {of} is not a finite number", machine.driver.plugin)
         }
-        FaultKind::Following { joint, error_mm, limit_mm } => following(machine, *joint, *error_mm, *limit_mm),
+        FaultKind::Following { joint, error_mm, limit_mm } => names.following(*joint, *error_mm, *limit_mm),
+        FaultKind::Kinematics { joint } => {
+            let (joint, plugin) = (names.joint(*joint), &machine.kinematics.plugin);
+            let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
+            format!("kinematics {plugin}: the position of {joint} is not a finite number{words}")
+        }
         FaultKind::Driver => {
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
             format!("driver {}: the exchange failed{words}", machine.driver.plugin)
@@ -33,34 +54,42 @@ fn cause(machine: &Machine, kind: &FaultKind, soft: Option<&str>, driver: Option
     }
 }
 
-fn following(machine: &Machine, joint: usize, error_mm: f64, limit_mm: f64) -> String {
-    // A limit is stated only where joints are axes.
-    let (error, limit, unit) = if machine.axes.is_rotary(joint) {
-        (error_mm.to_degrees(), limit_mm.to_degrees(), "deg")
-    } else {
-        (error_mm, limit_mm, "mm")
-    };
-    format!(
-        "driver {}: joint {joint} is {error:.6} {unit} away from its command, limit {limit:.6} {unit}",
-        machine.driver.plugin
-    )
-}
-
-fn guard(machine: &Machine, breach: Breach, axis: usize, value: f64, limit: f64) -> String {
-    let letter = machine.axes.letter(axis);
-    let (value, limit, unit) = if machine.axes.is_rotary(axis) {
-        (value.to_degrees(), limit.to_degrees(), "deg")
-    } else {
-        (value, limit, "mm")
-    };
-    let what = match breach {
-        Breach::NotFinite => format!("position {value}"),
-        Breach::Position => format!("position {value:.6} {unit}, travel ends at {limit:.6} {unit}"),
-        Breach::Velocity => format!("velocity {value:.6} {unit}/s, limit {limit:.6} {unit}/s"),
-        Breach::Acceleration => {
-            format!("acceleration {value:.3} {unit}/s² in a window already full, limit {limit:.3} {unit}/s²")
+impl Names<'_> {
+    /// A joint by its number, and by its name where the machine file has given it one.
+    fn joint(&self, joint: usize) -> String {
+        match self.joints.joints.get(joint).filter(|_| !self.machine.joints.is_empty()) {
+            Some(named) => format!("joint {joint} ({})", named.name),
+            None => format!("joint {joint}"),
         }
-        Breach::Jerk => format!("jerk {value:.1} {unit}/s³, limit {limit:.1} {unit}/s³"),
-    };
-    format!("guard: planner {} asks for axis {letter} {what}; the sample was not sent", machine.planner.plugin)
+    }
+
+    fn following(&self, joint: usize, error_mm: f64, limit_mm: f64) -> String {
+        let turns = self.joints.joints.get(joint).is_some_and(|joint| joint.rotary);
+        let (error, limit, unit) =
+            if turns { (error_mm.to_degrees(), limit_mm.to_degrees(), "deg") } else { (error_mm, limit_mm, "mm") };
+        let (driver, joint) = (&self.machine.driver.plugin, self.joint(joint));
+        format!("driver {driver}: {joint} is {error:.6} {unit} away from its command, limit {limit:.6} {unit}")
+    }
+
+    fn guard(&self, breach: Breach, entry: usize, value: f64, limit: f64) -> String {
+        let axes = &self.machine.axes;
+        let (who, turns, lacks) = match self.joints.behind(entry) {
+            Some((joint, lacks)) => (format!("joint {}", joint.name), joint.rotary, lacks),
+            None => (format!("axis {}", axes.letter(entry)), axes.is_rotary(entry), 0.0),
+        };
+        let lacks = if breach == Breach::Position { lacks } else { 0.0 };
+        let (value, limit) = (value + lacks, limit + lacks);
+        let (value, limit, unit) =
+            if turns { (value.to_degrees(), limit.to_degrees(), "deg") } else { (value, limit, "mm") };
+        let what = match breach {
+            Breach::NotFinite => format!("position {value}"),
+            Breach::Position => format!("position {value:.6} {unit}, travel ends at {limit:.6} {unit}"),
+            Breach::Velocity => format!("velocity {value:.6} {unit}/s, limit {limit:.6} {unit}/s"),
+            Breach::Acceleration => {
+                format!("acceleration {value:.3} {unit}/s² in a window already full, limit {limit:.3} {unit}/s²")
+            }
+            Breach::Jerk => format!("jerk {value:.1} {unit}/s³, limit {limit:.1} {unit}/s³"),
+        };
+        format!("guard: planner {} asks for {who} {what}; the sample was not sent", self.machine.planner.plugin)
+    }
 }

@@ -11,6 +11,7 @@ mod fault_text;
 mod faults;
 mod homing;
 pub mod jog;
+mod joints;
 mod lateness;
 mod loading;
 mod manual;
@@ -36,6 +37,7 @@ mod wall_clock;
 
 pub use command::{Command, Timed};
 pub use error::HostError;
+pub use joints::JointPeaks;
 pub use lateness::{Lateness, Row};
 pub use loading::load as load_plugins;
 pub use manual::{Dialogue, NextLine, Session};

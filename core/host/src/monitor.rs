@@ -4,11 +4,11 @@ use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
 
+use crate::joints::JointWatch;
 use crate::path_watch::PathWatch;
 use crate::stops::StopWatch;
 
 /// Watches a run. Finite differences at the fine period, with rest before the first sample.
-#[derive(Debug)]
 pub struct Monitor {
     rapid_mm_per_s: Vec<f64>,
     period_s: f64,
@@ -29,6 +29,8 @@ pub struct Monitor {
     pub stops: StopWatch,
     watch: PathWatch,
     axes: Axes,
+    /// What the joints do, where they are not the axes.
+    pub(crate) joints: Option<JointWatch>,
 }
 
 impl Monitor {
@@ -47,6 +49,7 @@ impl Monitor {
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::new(leaves_path),
             axes: machine.axes,
+            joints: None,
         }
     }
 
@@ -93,6 +96,9 @@ impl Monitor {
             }
         }
         self.last = [sample.command, velocity, acceleration];
+        if let Some(joints) = &mut self.joints {
+            joints.sample(&sample.command);
+        }
         self.position = sample.command;
         self.watch.sample(sample.block, &sample.command)
     }

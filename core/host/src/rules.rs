@@ -4,6 +4,7 @@ use tandem_machine::{GuardMode, JerkMode, Machine, Place};
 use tandem_sdk::{DriverDescription, MAX_SIGNALS, PlannerDescription};
 
 use crate::error::HostError;
+use crate::joints::JointSpace;
 use crate::run::Switches;
 
 /// Checks planner, driver and guard against each other.
@@ -22,20 +23,6 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
         );
         return refuse("planner.plugin", cause);
     }
-    let followed = (0..machine.axes.count()).find(|axis| machine.max_following_error_mm[*axis].is_finite());
-    if let Some(axis) = followed.filter(|_| machine.kinematics.plugin != "identity") {
-        let (letter, unit) = (machine.axes.letter(axis), if machine.axes.is_rotary(axis) { "deg" } else { "mm" });
-        let key = format!("axes.{}.max_following_error_{unit}", letter.to_ascii_lowercase());
-        let cause =
-            format!("following errors are those of joints, and {} has joints of its own", machine.kinematics.plugin);
-        return refuse(&key, cause);
-    }
-    if !machine.joints.is_empty() {
-        return refuse(
-            "joints",
-            "joints that differ from the axes are not supported: their limits would not be kept".to_string(),
-        );
-    }
     let jerk_stated = machine.limits.axes().iter().any(|a| a.jerk_mm_per_s3.is_finite());
     if jerk_stated && planner.order < 3 && machine.motion.jerk == JerkMode::Limit {
         let cause = format!(
@@ -47,13 +34,14 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
 }
 
 /// Checks what homing asks of the machine, and what the machine asks of homing.
-pub fn check_homing(machine: &Machine, switches: Switches) -> Result<(), HostError> {
+pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) -> Result<(), HostError> {
     let refuse = |key: &str, cause: &str| Err(refusal(machine, key, cause));
     if switches.home && machine.homing.is_empty() {
         return refuse("homing", "no axis has a [homing.<axis>] table: there is nothing to home");
     }
-    if switches.home && machine.kinematics.plugin != "identity" {
-        return refuse("kinematics.plugin", "homing is supported where the joints are the axes, and not with gantries");
+    if switches.home && !joints.are_axes() {
+        let key = if machine.kinematics.plugin == "identity" { "joints" } else { "kinematics.plugin" };
+        return refuse(key, "homing is supported where the joints are the axes, and not with gantries");
     }
     if machine.require_homing && !switches.home && !machine.homing.is_empty() {
         return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");

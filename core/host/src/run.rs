@@ -1,5 +1,6 @@
 //! One run of one program on one machine.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
@@ -14,6 +15,7 @@ use crate::command::Timed;
 use crate::error::HostError;
 use crate::fault_text::describe;
 use crate::homing::Homing;
+use crate::joints::{JointSpace, JointWatch};
 use crate::monitor::Monitor;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
@@ -61,6 +63,7 @@ pub struct Run {
     steps: bool,
     leaves_path: bool,
     uses_time_constants: bool,
+    joints: Arc<JointSpace>,
     switches: Switches,
     /// What the first pass found: totals.
     pub checked: CheckReport,
@@ -142,7 +145,7 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, switches)?;
+        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
         let checked = first_pass(&machine, planner.as_ref(), &mut program, switches)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
@@ -165,7 +168,7 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, switches)?;
+        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
         let source = setup::behind_homing(&machine, source, switches);
         Self::assemble(machine, registry, Some(name), source, None, planner, driver, CheckReport::default(), switches)
     }
@@ -180,7 +183,7 @@ impl Run {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
         rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, switches)?;
+        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
         let source = Box::new(Homing::new(&machine, &machine.homing, None));
         let checked = CheckReport::default();
         Self::assemble(machine, registry, None, source, None, planner, driver, checked, switches)
@@ -198,20 +201,19 @@ impl Run {
         checked: CheckReport,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let kinematics = setup::kinematics(&machine, registry)?;
+        let joints = Arc::new(JointSpace::of(&machine, registry)?);
         let feed = setup::feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
         rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
-        let axes = machine.axes.count();
-        let joints = kinematics.as_ref().map_or(axes, |k| k.joint_count(axes));
-        driver = faults::wrap(&machine, driver, joints)?;
-        setup::open(&machine, driver.as_mut(), joints)?;
+        driver = faults::wrap(&machine, driver, &joints)?;
+        setup::open(&machine, driver.as_mut(), &joints)?;
         let (rough_end, fine_end, host) = bridge(Sizes::default());
         let description = planner.describe();
-        let mut fine_config = setup::fine_config(&machine, &description, switches);
+        let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
         fine_config.record_drives = program.is_none();
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let rough_config = RoughConfig::new(machine.rough_period_s);
-        let mut fine = FineLoop::new(&fine_config, fine_end, driver, kinematics);
+        let mut fine =
+            FineLoop::new(&fine_config, fine_end, driver, JointSpace::of(&machine, registry)?.into_kinematics());
         fine.reset();
         Ok(Self {
             rough: RoughLoop::new(rough_config, source, planner, rough_end),
@@ -225,18 +227,19 @@ impl Run {
             steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
             leaves_path: description.leaves_path != 0,
             uses_time_constants: description.uses_time_constants != 0,
+            joints,
             checked,
         })
     }
 
     /// The operator's end of the run, to give commands from other threads.
-    pub fn controls(&self) -> std::sync::Arc<tandem_rings::Controls> {
-        std::sync::Arc::clone(&self.host.controls)
+    pub fn controls(&self) -> Arc<tandem_rings::Controls> {
+        Arc::clone(&self.host.controls)
     }
 
     /// The fine loop's status, to look at from other threads.
-    pub fn status(&self) -> std::sync::Arc<tandem_rings::Status> {
-        std::sync::Arc::clone(&self.host.status)
+    pub fn status(&self) -> Arc<tandem_rings::Status> {
+        Arc::clone(&self.host.status)
     }
 
     /// Whether the planner makes use of velocity steps where blocks meet.
@@ -263,7 +266,8 @@ impl Run {
         let started = Instant::now();
         let machine = self.machine;
         let mut fine = self.fine;
-        let monitor = Monitor::new(&machine, self.leaves_path);
+        let mut monitor = Monitor::new(&machine, self.leaves_path);
+        monitor.joints = JointWatch::new(&self.joints, machine.fine_period_s);
         let mut reloader = self.policy.as_ref().map(PolicyHost::reloader);
         if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
             && let Err(note) = reloader.watch()
@@ -284,7 +288,7 @@ impl Run {
         pump.tell_policy_notes();
         pump.tell_plugin_log();
         let fault = fine.fault();
-        let text = fault.map(|f| describe(&machine, &f, pump.soft_cause(), fine.driver_error()));
+        let text = fault.map(|f| describe(&machine, &self.joints, &f, pump.soft_cause(), fine.plugin_error()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
@@ -344,6 +348,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         max_velocity_mm_s: each(&monitor.peaks[0]),
         max_acceleration_mm_s2: each(&monitor.peaks[1]),
         max_jerk_mm_s3: each(&monitor.peaks[2]),
+        joints: monitor.joints.as_ref().map(JointWatch::peaks),
         max_path_deviation_mm: monitor.max_path_deviation_mm(),
         jerk: if machine.motion.jerk == JerkMode::Limit { "limit" } else { "report" }.to_string(),
         limit_violations: counters.limit_violations,

@@ -5,13 +5,14 @@ use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext,
-    PlannerDescription, StrategyContext, size_of_contract,
+    AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription, StrategyContext,
+    size_of_contract,
 };
 
 use crate::dry_run::DryRun;
 use crate::error::HostError;
 use crate::homing::Homing;
+use crate::joints::JointSpace;
 use crate::policy::{Means, PolicyHost};
 use crate::registry::{PluginRefusal, Registry};
 use crate::rules::refusal;
@@ -78,25 +79,27 @@ fn tool(tool: &tandem_machine::Tool) -> Tool {
     Tool { number: tool.number, pocket: Some(tool.pocket), offset: tool.offset, diameter_mm: tool.diameter_mm }
 }
 
-/// Opens the machine's planner.
+/// Opens the machine's planner. It keeps the limits of the joints, and their travel.
 pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
+    let joints = JointSpace::of(machine, registry)?;
     let context = PlannerContext {
         size: size_of_contract::<PlannerContext>(),
         axes: machine.axes,
-        limits: machine.limits,
+        limits: joints.planned(),
         fine_period_s: machine.fine_period_s,
         rough_period_s: machine.rough_period_s,
         path_tolerance_mm: machine.motion.path_tolerance_mm,
         time_constant_s: machine.motion.time_constant_s,
         max_feed_ratio: machine.motion.max_feed_ratio,
-        position: machine.start,
+        position: joints.with_lanes(&machine.start),
     };
     let choice = &machine.planner;
-    registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))
+    let planner = registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))?;
+    Ok(joints.carried(planner, machine))
 }
 
 /// A plugin's refusal with the place in the machine file: of the option that is wrong, or of the plugin's name.
-fn refused(machine: &Machine, section: &str, refused: PluginRefusal) -> HostError {
+pub fn refused(machine: &Machine, section: &str, refused: PluginRefusal) -> HostError {
     let key = match refused.option {
         Some(option) => format!("{section}.options.{option}"),
         None => format!("{section}.plugin"),
@@ -110,24 +113,14 @@ pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>,
 }
 
 /// Claims the drives.
-pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: usize) -> Result<(), HostError> {
-    let mut context = DriverContext::new(joints, machine.fine_period_s);
-    context.start_position = machine.start;
+pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
+    let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
+    context.start_position = joints.to_joints(&machine.start);
     let opened = driver.open(&context).and_then(|()| driver.start());
     opened.map_err(|e| {
         let cause = format!("driver {}: {}", machine.driver.plugin, e.message());
         refused(machine, "driver", PluginRefusal { option: e.option().map(str::to_string), cause })
     })
-}
-
-/// Makes the machine's kinematics; `None` where joints are axes, so that identity costs nothing.
-pub fn kinematics(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Kinematics>>, HostError> {
-    let choice = &machine.kinematics;
-    if choice.plugin == "identity" {
-        return Ok(None);
-    }
-    let made = registry.kinematics(choice, &KinematicsContext::new(machine.axes));
-    made.map(Some).map_err(|e| refused(machine, "kinematics", e))
 }
 
 /// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.
@@ -165,19 +158,25 @@ fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Fee
 }
 
 /// The fine loop's view of the machine.
-pub fn fine_config(machine: &Machine, planner: &PlannerDescription, switches: Switches) -> FineConfig {
+pub fn fine_config(
+    machine: &Machine,
+    joints: &JointSpace,
+    planner: &PlannerDescription,
+    switches: Switches,
+) -> FineConfig {
     FineConfig {
         period_s: machine.fine_period_s,
-        limits: machine.limits,
-        speed_difference_mm_per_s: planner.speed_difference_mm_per_s,
+        limits: joints.limits,
+        joints: joints.fine(),
+        speed_difference_mm_per_s: joints.speed_difference_mm_per_s(planner),
         order: planner.order,
         guard: match machine.guard {
             GuardMode::Stop => tandem_fine::GuardMode::Stop,
             GuardMode::Count => tandem_fine::GuardMode::Count,
         },
-        position: machine.start,
+        position: joints.with_lanes(&machine.start),
         max_feed_ratio: machine.motion.max_feed_ratio,
-        max_following_error_mm: machine.max_following_error_mm,
+        max_following_error_mm: joints.max_following_error_mm(),
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
         unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },

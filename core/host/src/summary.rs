@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::joints::JointPeaks;
 use crate::lateness::Lateness;
 use crate::policy::PolicySummary;
 use crate::realtime::PageFaults;
@@ -47,6 +48,9 @@ pub struct Summary {
     pub max_acceleration_mm_s2: BTreeMap<String, f64>,
     /// Largest |jerk| per axis, finite differences, mm/s³.
     pub max_jerk_mm_s3: BTreeMap<String, f64>,
+    /// The same per joint, where the joints are not the axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<BTreeMap<String, JointPeaks>>,
     /// Largest distance of a sample from the programmed path, mm.
     pub max_path_deviation_mm: f64,
     /// What the machine does with jerk: `limit` or `report`.

@@ -13,7 +13,15 @@ pub fn difference(rotary: bool, motion: &Motion) -> f64 {
 
 /// The limits of an axis, or those of a joint where `base`, its axis, gives what it does not state.
 pub fn limits(section: &Section<'_>, units: &Units, base: Option<&AxisLimits>, difference: f64) -> Option<AxisLimits> {
-    let read = Reader { section, base };
+    read(&Reader { section, base, endless: false }, units, difference)
+}
+
+/// The limits of a joint that belongs to no axis: without `travel` it has no end.
+pub fn limits_without_end(section: &Section<'_>, units: &Units, difference: f64) -> Option<AxisLimits> {
+    read(&Reader { section, base: None, endless: true }, units, difference)
+}
+
+fn read(read: &Reader<'_>, units: &Units, difference: f64) -> Option<AxisLimits> {
     let (scale, per_minute) = (units.scale, units.scale / 60.0);
     // Everything is read before the first failure ends it, so that all problems are told.
     let travel = read.travel(units);
@@ -36,12 +44,17 @@ pub fn limits(section: &Section<'_>, units: &Units, base: Option<&AxisLimits>, d
 struct Reader<'a> {
     section: &'a Section<'a>,
     base: Option<&'a AxisLimits>,
+    /// Without a travel of its own there is none.
+    endless: bool,
 }
 
 impl Reader<'_> {
     fn travel(&self, units: &Units) -> Option<(f64, f64)> {
         if let Some(base) = self.base.filter(|_| !self.section.has(units.travel)) {
             return Some((base.min_mm, base.max_mm));
+        }
+        if self.endless && !self.section.has(units.travel) {
+            return Some((f64::NEG_INFINITY, f64::INFINITY));
         }
         let (low, high) = self.section.required(units.travel, Section::range)?;
         Some((low * units.scale, high * units.scale))

@@ -45,8 +45,8 @@ pub struct Machine {
     pub axes: Axes,
     /// What each axis may do.
     pub limits: Limits,
-    /// Largest distance between command and feedback of each joint, mm or rad; infinite where none is stated. It is
-    /// stated for the axes, and is that of the joints where joints are axes.
+    /// Largest distance between command and feedback of each axis, mm or rad; infinite where none is stated. A joint that
+    /// moves an axis takes it from there.
     pub max_following_error_mm: AxisVector,
     /// Where a simulated machine stands at power-on, within the travel.
     pub start: AxisVector,
@@ -104,7 +104,8 @@ impl Machine {
         check(keys(), &mut Vec::new(), &root, &problems);
         let section = Section::new(Vec::new(), Origin::default(), &root, &problems);
         let tables = Tables::read(&section);
-        let moving = AxisSet::read(&section, &tables.motion).map(|axes| Moving::read(&section, axes, &problems));
+        let moving = AxisSet::read(&section, &tables.motion);
+        let moving = moving.map(|axes| Moving::read(&section, axes, &tables.motion, &problems));
         let effective = text(&section, "format", &root);
         let moving = problems.verdict(moving)?;
         Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
@@ -132,11 +133,11 @@ struct Moving {
 }
 
 impl Moving {
-    fn read(root: &Section<'_>, axes: AxisSet, problems: &Problems) -> Self {
+    fn read(root: &Section<'_>, axes: AxisSet, motion: &Motion, problems: &Problems) -> Self {
         let tools = Some(root.section("tools")).filter(Section::exists);
         let tools = tools.and_then(|section| ToolTable::read(&section, &axes.axes, problems));
         Self {
-            joints: joints::read(root, &axes),
+            joints: joints::read(root, &axes, motion),
             homing: homing::read(root, &axes),
             tools: tools.unwrap_or_default(),
             axes,

@@ -1,12 +1,12 @@
 //! Circular arcs and helices by path coordinate.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use tandem_sdk::{AxisVector, Block};
+use tandem_sdk::{AxisVector, Block, JointLanes};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arc {
-    plane: [usize; 2],
+    plane: [u8; 2],
     center_mm: [f64; 2],
     pub(crate) radius_mm: f64,
     start_angle_rad: f64,
@@ -14,6 +14,7 @@ pub(crate) struct Arc {
     pub(crate) rad_per_mm: f64,
     /// Change of the axes outside the plane per mm; zero in the plane.
     rise: AxisVector,
+    lanes: Option<&'static JointLanes>,
 }
 
 impl Arc {
@@ -23,14 +24,26 @@ impl Arc {
         rise[plane[0]] = 0.0;
         rise[plane[1]] = 0.0;
         Self {
-            plane,
+            plane: plane.map(|axis| axis as u8),
             center_mm: block.arc.center_mm,
             radius_mm: block.arc.radius_mm,
             start_angle_rad: block.arc.start_angle_rad,
             sweep_rad: block.arc.sweep_rad,
             rad_per_mm: block.arc.sweep_rad / block.length_mm,
             rise,
+            lanes: block.joint_lanes,
         }
+    }
+
+    /// Writes the components in the plane, and what the joint lanes make of them.
+    #[inline]
+    fn with_plane(&self, mut vector: AxisVector, components: [f64; 2]) -> AxisVector {
+        vector[usize::from(self.plane[0])] = components[0];
+        vector[usize::from(self.plane[1])] = components[1];
+        if let Some(lanes) = self.lanes {
+            lanes.fill(&mut vector);
+        }
+        vector
     }
 
     fn angle(&self, s_mm: f64) -> f64 {
@@ -39,10 +52,8 @@ impl Arc {
 
     pub(crate) fn position(&self, start: &AxisVector, s_mm: f64) -> AxisVector {
         let (sin, cos) = self.angle(s_mm).sin_cos();
-        let mut at = *start + self.rise * s_mm;
-        at[self.plane[0]] = self.center_mm[0] + self.radius_mm * cos;
-        at[self.plane[1]] = self.center_mm[1] + self.radius_mm * sin;
-        at
+        let at = [self.center_mm[0] + self.radius_mm * cos, self.center_mm[1] + self.radius_mm * sin];
+        self.with_plane(*start + self.rise * s_mm, at)
     }
 
     pub(crate) fn direction(&self, s_mm: f64) -> AxisVector {
@@ -51,10 +62,8 @@ impl Arc {
 
     pub(crate) fn direction_at(&self, angle: f64) -> AxisVector {
         let (sin, cos) = angle.sin_cos();
-        let mut at = self.rise;
-        at[self.plane[0]] = -self.radius_mm * self.rad_per_mm * sin;
-        at[self.plane[1]] = self.radius_mm * self.rad_per_mm * cos;
-        at
+        let at = [-self.radius_mm * self.rad_per_mm * sin, self.radius_mm * self.rad_per_mm * cos];
+        self.with_plane(self.rise, at)
     }
 
     pub(crate) fn curvature(&self, s_mm: f64) -> AxisVector {
@@ -63,14 +72,19 @@ impl Arc {
 
     pub(crate) fn curvature_at(&self, angle: f64) -> AxisVector {
         let (sin, cos) = angle.sin_cos();
-        let mut at = AxisVector::ZERO;
-        at[self.plane[0]] = -self.radius_mm * self.rad_per_mm.powi(2) * cos;
-        at[self.plane[1]] = -self.radius_mm * self.rad_per_mm.powi(2) * sin;
-        at
+        let at = [-self.radius_mm * self.rad_per_mm.powi(2) * cos, -self.radius_mm * self.rad_per_mm.powi(2) * sin];
+        self.with_plane(AxisVector::ZERO, at)
+    }
+
+    /// On a circle the direction turns evenly, and its axes do so alone.
+    pub(crate) fn third(&self, s_mm: f64) -> AxisVector {
+        let (direction, squared) = (self.direction(s_mm), self.rad_per_mm * self.rad_per_mm);
+        self.with_plane(AxisVector::ZERO, self.plane.map(|axis| -squared * direction[usize::from(axis)]))
     }
 
     /// Per axis the largest |value| of a function whose plane components go as the sine and cosine of the angle: they
-    /// peak at the ends of the arc or at a multiple of π/2 inside it.
+    /// peak at the ends of the arc or at a multiple of π/2 inside it, and those of a joint lane where its sine and cosine
+    /// are in phase.
     pub(crate) fn largest(&self, value: impl Fn(f64) -> AxisVector) -> AxisVector {
         let (from, to) = (self.start_angle_rad, self.start_angle_rad + self.sweep_rad);
         let (low, high) = (from.min(to), from.max(to));
@@ -89,12 +103,26 @@ impl Arc {
                 consider(angle);
             }
         }
+        if let Some(lanes) = self.lanes {
+            // A lane is p·sin φ + q·cos φ + r: it peaks where tan φ = p/q, half a turn apart.
+            let [east, north, west] = [0.0, FRAC_PI_2, PI].map(&value);
+            for lane in lanes.first()..lanes.first() + lanes.weights().len() {
+                let (q, r) = (0.5 * (east[lane] - west[lane]), 0.5 * (east[lane] + west[lane]));
+                let peak = (north[lane] - r).atan2(q);
+                let first = ((low - peak) / PI).ceil();
+                [first, first + 1.0]
+                    .map(|n| peak + n * PI)
+                    .into_iter()
+                    .filter(|angle| *angle <= high)
+                    .for_each(&mut consider);
+            }
+        }
         largest
     }
 
     /// Angle from the start, rad, of the point of the arc nearest to `point`; of several turns the one whose rise fits.
     pub(crate) fn nearest(&self, start: &AxisVector, point: &AxisVector) -> f64 {
-        let (x, y) = (point[self.plane[0]] - self.center_mm[0], point[self.plane[1]] - self.center_mm[1]);
+        let [x, y] = [0, 1].map(|i| point[usize::from(self.plane[i])] - self.center_mm[i]);
         let swept = self.sweep_rad.abs();
         let turn = ((y.atan2(x) - self.start_angle_rad) * self.sweep_rad.signum()).rem_euclid(TAU);
         // A point just before the start belongs to the start, not to the end of the turn.
@@ -117,6 +145,10 @@ mod tests {
     use tandem_sdk::{ArcGeometry, BlockKind};
 
     fn helix(radius: f64, start: f64, sweep: f64, rise: f64) -> Path {
+        Path::new(&helix_block(radius, start, sweep, rise)).unwrap()
+    }
+
+    fn helix_block(radius: f64, start: f64, sweep: f64, rise: f64) -> Block {
         let mut block = Block::at(AxisVector::from_slice(&[radius * start.cos(), radius * start.sin(), 1.0]));
         let to = start + sweep;
         block.kind = BlockKind::Arc;
@@ -129,7 +161,7 @@ mod tests {
             start_angle_rad: start,
             sweep_rad: sweep,
         };
-        Path::new(&block).unwrap()
+        block
     }
 
     proptest! {
@@ -142,9 +174,11 @@ mod tests {
             let (s, h) = (at * path.length_mm(), 1e-4 * path.length_mm().min(radius));
             let numeric = (path.position(s + h) - path.position(s - h)) * (0.5 / h);
             let bend = (path.direction(s + h) - path.direction(s - h)) * (0.5 / h);
+            let twist = (path.curvature(s + h) - path.curvature(s - h)) * (0.5 / h);
             for axis in 0..3 {
                 prop_assert!((numeric[axis] - path.direction(s)[axis]).abs() < 1e-6);
                 prop_assert!((bend[axis] - path.curvature(s)[axis]).abs() < 1e-5 / radius);
+                prop_assert!((twist[axis] - path.third(s)[axis]).abs() < 1e-4 / (radius * radius));
                 prop_assert!(path.direction(s)[axis].abs() <= path.max_direction()[axis] + 1e-12);
                 prop_assert!(path.curvature(s)[axis].abs() <= path.max_curvature()[axis] + 1e-12);
             }
@@ -156,6 +190,28 @@ mod tests {
         ) {
             let path = helix(radius, start, sweep, rise);
             prop_assert!(path.distance_mm(&path.position(at * path.length_mm())) < 1e-9);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn joint_lanes_are_sums_of_the_axes_and_bounded(
+            radius in 0.1..50.0f64, start in -3.0..3.0f64, sweep in -12.0..12.0f64, rise in -5.0..5.0f64,
+            weights in proptest::array::uniform3(-2.0..2.0f64), at in 0.0..1.0f64,
+        ) {
+            let mut block = helix_block(radius, start, sweep, rise);
+            let lanes = JointLanes::new(3, &[AxisVector::from_slice(&weights)]).unwrap();
+            block.joint_lanes = Some(Box::leak(Box::new(lanes)));
+            let path = Path::new(&block).unwrap();
+            let s_mm = at * path.length_mm();
+            for (vector, most) in [(path.direction(s_mm), path.max_direction()), (path.curvature(s_mm), path.max_curvature())] {
+                let mut filled = vector;
+                lanes.fill(&mut filled);
+                prop_assert_eq!(filled, vector);
+                prop_assert!(vector[3].abs() <= most[3] * (1.0 + 1e-12) + 1e-12, "{} > {}", vector[3], most[3]);
+            }
+            let seen = (0..=2000).map(|i| path.direction(f64::from(i) / 2000.0 * path.length_mm())[3].abs());
+            prop_assert!(path.max_direction()[3] <= seen.fold(0.0, f64::max) + 1e-3, "not more than it needs");
         }
     }
 

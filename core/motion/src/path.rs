@@ -105,6 +105,14 @@ impl Path {
         }
     }
 
+    /// Third derivative of the axes by path coordinate at `s_mm`, 1/mm².
+    pub fn third(&self, s_mm: f64) -> AxisVector {
+        match &self.shape {
+            Shape::Line(_) => AxisVector::ZERO,
+            Shape::Arc(arc) => arc.third(s_mm),
+        }
+    }
+
     /// Per axis the largest |direction| on the path.
     pub fn max_direction(&self) -> AxisVector {
         match &self.shape {

@@ -7,7 +7,8 @@ pub const MAX_AXES: usize = 8;
 
 /// One number per axis: a position (mm or rad), a velocity (mm/s or rad/s) or the like. One cache line.
 ///
-/// The index is the order of the axes in `machine.toml`; entries past the machine's last axis are zero.
+/// The index is the order of the axes in `machine.toml`; entries past the machine's last axis are zero, or joint lanes
+/// ([`crate::JointLanes`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(64))]
 pub struct AxisVector(pub [f64; MAX_AXES]);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{AxisVector, Edge, RawSlice, StopOn, size_of_contract};
+use crate::{AxisVector, Edge, JointLanes, RawSlice, StopOn, size_of_contract};
 
 /// What kind of path a block follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,6 +186,8 @@ pub struct Block {
     pub override_enabled: u32,
     /// Spindle speed commanded, rad/s; positive clockwise (M3), zero when stopped.
     pub spindle_rad_per_s: f64,
+    /// What the lanes behind the axes are; none where every joint is an axis of its own. It lives as long as the process.
+    pub joint_lanes: Option<&'static JointLanes>,
 }
 
 impl Block {
@@ -212,6 +214,7 @@ impl Block {
             tool: 0,
             override_enabled: 1,
             spindle_rad_per_s: 0.0,
+            joint_lanes: None,
         }
     }
 

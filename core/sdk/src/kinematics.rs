@@ -21,7 +21,9 @@ impl KinematicsContext {
 
 /// The map between axes (what the program speaks of) and joints (what the drives move).
 ///
-/// Called on the fine loop: no method allocates, blocks or panics.
+/// Called on the fine loop: no method allocates, blocks or panics. The host tries the map before a run. One that is linear
+/// in the axes (weights and an offset for each joint) has the limits of its joints kept by planning; of any other the axes'
+/// limits are planned and the joints' guarded.
 pub trait Kinematics: Send + Sync {
     /// Number of joints. Two joints may serve one axis (a gantry).
     fn joint_count(&self, axis_count: usize) -> usize {

@@ -20,6 +20,7 @@ mod driver;
 mod error;
 mod event;
 mod kinematics;
+mod lanes;
 mod limits;
 pub mod log;
 mod option_values;
@@ -39,6 +40,7 @@ pub use driver::{
 pub use error::PluginError;
 pub use event::{Event, EventKind};
 pub use kinematics::{Identity, Kinematics, KinematicsContext};
+pub use lanes::JointLanes;
 pub use limits::{AxisLimits, Limits, PathLimits};
 pub use options::{NoOptions, OptionDoc, PluginOptions, RawOptions, parse_options};
 pub use planner::{

@@ -36,15 +36,19 @@ pub struct PathLimits {
     pub jerk_mm_per_s3: f64,
 }
 
-/// The limits of a machine. The host makes it; planners ask [`Limits::along`] and never read joints themselves.
+/// The limits of a machine. The host makes it; planners ask [`Limits::along`], or keep what [`Limits::axes`] gives.
+///
+/// In what the host hands to a planner, kinematics are folded in. A joint that is a scaled axis has made the limits of that
+/// axis narrower. A joint that is a sum of axes is a lane of its own behind the axes ([`crate::JointLanes`]): a planner that
+/// keeps the limits of every entry keeps those of the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Limits {
     /// Size of this structure in bytes.
     pub size: u32,
-    /// Number of axes.
+    /// Number of axes, and of joint lanes behind them.
     pub count: u32,
-    /// Limits per axis, in the order of the machine.
+    /// Limits per axis, in the order of the machine, then per joint lane.
     pub axes: [AxisLimits; MAX_AXES],
 }
 
@@ -62,14 +66,14 @@ impl Limits {
         Ok(Self { size: crate::size_of_contract::<Self>(), count: axes.len() as u32, axes: all })
     }
 
-    /// The limits of the axes that exist.
+    /// The limits of the axes that exist, and behind them those of the joint lanes.
     pub fn axes(&self) -> &[AxisLimits] {
         &self.axes[..self.count as usize]
     }
 
     /// The limits along `direction` (change of the axes per mm of path) at `position`. Rough loop; does not allocate.
     ///
-    /// Axes that do not move do not limit; a direction of zero gives infinite limits.
+    /// Axes that do not move do not limit; a direction of zero gives infinite limits. Joint lanes count like axes.
     pub fn along(&self, _position: &AxisVector, direction: &AxisVector) -> PathLimits {
         let smallest = |of: fn(&AxisLimits) -> f64| -> f64 {
             let each = self.axes().iter().enumerate().filter(|(i, _)| direction[*i] != 0.0);

@@ -117,17 +117,27 @@ impl Entry {
         self.set_feed(block, rules, &direction);
     }
 
-    /// Slope and bend of an arc: over its whole circle, whatever part of it is driven.
+    /// Slope and bend of an arc: over its whole circle, whatever part of it is driven. A joint that is a sum of axes sways
+    /// with the circle and rises with the helix at once: for the rise it has what turning leaves, `√(0.6² + 0.8²)` being all.
     fn set_arc(&mut self, block: &Block, rules: &Rules) {
         let Some(path) = Path::new(block) else { return };
         self.length_mm = path.length_mm();
         self.directions = [path.direction(0.0), path.direction(self.length_mm)];
         let (turn, radius_mm) = (path.rad_per_mm(), path.radius_mm());
         let plane = block.arc.plane.map(|axis| axis as usize);
-        let weak = greater(rules.per_acceleration[plane[0]], rules.per_acceleration[plane[1]]);
+        let mut weak = greater(rules.per_acceleration[plane[0]], rules.per_acceleration[plane[1]]);
         let mut rise = self.directions[0];
         (rise[plane[0]], rise[plane[1]]) = (0.0, 0.0);
-        let in_plane = radius_mm * turn * weak / ARC_SHARE;
+        let mut rising = 0.0;
+        if let Some(lanes) = block.joint_lanes {
+            lanes.fill(&mut rise);
+            for (weights, lane) in lanes.weights().iter().zip(lanes.first()..) {
+                let per_acceleration = rules.per_acceleration[lane];
+                weak = greater(weak, per_acceleration * weights[plane[0]].hypot(weights[plane[1]]));
+                rising = greater(rising, per_acceleration * rise[lane].abs());
+            }
+        }
+        let in_plane = radius_mm * turn * weak / ARC_SHARE + rising / (1.0 - TURN_SHARE);
         self.slope_s2_per_mm = greater(in_plane, rules.largest(&rise));
         self.curvature_per_mm = radius_mm * turn * turn;
         self.bend = self.curvature_per_mm * weak;

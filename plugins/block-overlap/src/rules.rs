@@ -28,13 +28,13 @@ pub struct Rules {
     pub shorten: bool,
     /// Knots lie on ticks: the published rounding.
     pub grid: bool,
-    /// Number of axes.
+    /// Number of axes, and of joints that are limited behind them.
     pub axes: usize,
     /// Per axis 1/acceleration, s²/mm; zero where limits are off.
     pub per_acceleration: AxisVector,
     /// Highest axis speeds in feed and in rapid motion, mm/s.
     pub axis_mm_per_s: [AxisVector; 2],
-    /// Per axis what a unit counts in path deviation: mm as they are, rotary axes in degrees.
+    /// Per axis what a unit counts in path deviation: mm as they are, rotary axes in degrees, joints not at all.
     pub metric: AxisVector,
     /// Fine period, s.
     pub tick_s: f64,
@@ -58,7 +58,14 @@ impl Rules {
         let acceleration = |i: usize| AIM * axes[i].acceleration_mm_per_s2;
         let unlimited = options.limits == LimitMode::Off;
         let controlled = options.corner_control == CornerControl::On;
-        let metric = each(&|i| if context.axes.is_rotary(i) { 1f64.to_degrees() } else { 1.0 }, 0.0);
+        let metric = each(
+            &|i| match i {
+                joint if joint >= context.axes.count() => 0.0,
+                axis if context.axes.is_rotary(axis) => 1f64.to_degrees(),
+                _ => 1.0,
+            },
+            0.0,
+        );
         let squares = (0..axes.len().min(MAX_AXES)).map(|i| (acceleration(i) * metric[i]).powi(2));
         let tick_s = context.fine_period_s;
         Self {

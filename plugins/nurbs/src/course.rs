@@ -17,6 +17,8 @@ pub struct Course {
     shape: Shape,
     stretches: Vec<Stretch>,
     end: AxisVector,
+    /// Entries that are axes.
+    axes: usize,
 }
 
 /// A smooth part of a course.
@@ -43,11 +45,11 @@ impl Course {
     /// # Errors
     /// A curve that is none.
     pub fn new(axes: &Axes, block: &Block) -> Result<Option<Self>, NurbsError> {
-        let end = block.end;
+        let (end, count) = (block.end, axes.count());
         if block.kind != BlockKind::Nurbs {
             return Ok(Path::new(block).map(|path| {
                 let stretches = vec![Stretch { length_mm: path.length_mm(), table: None, knots_mm: Vec::new() }];
-                Self { shape: Shape::Path(Box::new(path)), stretches, end }
+                Self { shape: Shape::Path(Box::new(path)), stretches, end, axes: count }
             }));
         }
         let curve = curve_of(axes, block)?;
@@ -58,7 +60,7 @@ impl Course {
             Stretch { length_mm: table.length().mm, table: Some(table), knots_mm }
         };
         let stretches = curve.pieces().iter().map(stretch).collect();
-        Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end }))
+        Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end, axes: count }))
     }
 
     /// Its smooth stretches.
@@ -83,7 +85,7 @@ impl Course {
                 position: path.position(s_mm),
                 direction: path.direction(s_mm),
                 curvature: path.curvature(s_mm),
-                third: third(path, s_mm),
+                third: path.third(s_mm),
                 ..AlongPath::default()
             },
             (Shape::Curve(_), None) => AlongPath::default(),
@@ -104,16 +106,9 @@ impl Course {
             Shape::Curve(curve) => curve.counted_length(vector),
             // The derivatives of lines and arcs are by path length already.
             Shape::Path(path) if path.is_straight() => 0.0,
-            Shape::Path(_) => vector.0.iter().map(|v| v * v).sum::<f64>().sqrt(),
+            Shape::Path(_) => vector.0[..self.axes].iter().map(|v| v * v).sum::<f64>().sqrt(),
         }
     }
-}
-
-/// Third derivative of a line or arc: on a circle the direction turns evenly, and its axes do so alone.
-fn third(path: &Path, s_mm: f64) -> AxisVector {
-    let (direction, bends) = (path.direction(s_mm), path.max_curvature());
-    let squared = path.rad_per_mm() * path.rad_per_mm();
-    AxisVector(std::array::from_fn(|axis| if bends[axis] > 0.0 { -squared * direction[axis] } else { 0.0 }))
 }
 
 /// The curve of `block`, checked.

@@ -1,7 +1,7 @@
 //! The order of the judgements.
 
 use crate::{
-    Check, Finding, Kind, LETTERS, Machine, Maxima, Options, Position, Row, Trace, Verdict,
+    Check, Finding, Joints, Kind, LETTERS, Machine, Maxima, Options, Position, Row, Trace, Verdict,
     feed::judge_feed,
     follow::{Followed, follow},
     geometry::{distance, minus},
@@ -16,12 +16,15 @@ pub struct Report<'a> {
     rows: &'a [Row],
     pub findings: Vec<Finding>,
     pub maxima: Maxima,
+    /// The joint that is judged, where it is no axis.
+    pub joint: Option<String>,
 }
 
 impl Report<'_> {
     pub fn add(&mut self, kind: Kind, sample: usize, axis: Option<usize>, value: f64, limit: f64) {
         let Row { t_s, line, .. } = self.rows[sample];
-        self.findings.push(Finding { kind, sample, t_s, line, axis, value, limit });
+        let joint = self.joint.clone();
+        self.findings.push(Finding { kind, sample, t_s, line, axis, joint, value, limit });
     }
 }
 
@@ -32,8 +35,11 @@ pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options)
     if let Some(reason) = unfit(trace, machine, options) {
         return Verdict { not_judged: Some(reason), ..Verdict::default() }.settle();
     }
-    let mut report = Report { rows: &trace.rows, findings: Vec::new(), maxima: Maxima::default() };
-    let mut not_judged = None;
+    let mut report = Report { rows: &trace.rows, findings: Vec::new(), maxima: Maxima::default(), joint: None };
+    let mut not_judged = match &machine.joints {
+        Joints::Unknown(reason) if limits_asked(options) => Some(format!("the joints: {reason}")),
+        _ => None,
+    };
     judge_finite(trace, &mut report);
     // Differences of what is no number say nothing more.
     if report.findings.is_empty() {
@@ -41,12 +47,18 @@ pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options)
         if options.asks_program() {
             match program::read(program, machine, options, &trace.rows) {
                 Ok(path) => judge_program(&path, trace, machine, options, &mut report),
-                Err(unread) => not_judged = Some(unread.to_string()),
+                Err(unread) => {
+                    not_judged = Some(not_judged.map_or(unread.to_string(), |joints| format!("{joints}; {unread}")));
+                }
             }
         }
     }
     let Report { findings, maxima, .. } = report;
     Verdict { findings, not_judged, maxima, ..Verdict::default() }.settle()
+}
+
+fn limits_asked(options: &Options) -> bool {
+    [Check::Travel, Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().any(|check| options.asks(check))
 }
 
 /// Why a trace cannot be judged on a machine at all.

@@ -1,6 +1,6 @@
 //! Limits of the axes, as finite differences of the samples.
 
-use crate::{Axis, AxisMaxima, Check, Kind, Machine, Options, Row, judge::Report};
+use crate::{Axis, AxisMaxima, Check, Joint, Joints, Kind, Machine, Options, Row, judge::Report};
 
 /// Relative tolerance of speed and acceleration, and of jerk.
 const TOLERANCE: f64 = 1e-6;
@@ -22,6 +22,26 @@ pub fn judge_limits(rows: &[Row], machine: &Machine, options: &Options, report: 
         let differences = AxisJudge::new(axis, machine, options, &positions).judge(&positions, options, report);
         report.maxima.axes.push(differences);
     }
+    let Joints::Known(joints) = &machine.joints else { return };
+    for joint in joints {
+        judge_joint(rows, joint, machine, options, report);
+    }
+}
+
+/// The same of a joint, whose positions follow from those of the axes.
+fn judge_joint(rows: &[Row], joint: &Joint, machine: &Machine, options: &Options, report: &mut Report) {
+    let positions: Vec<f64> = rows.iter().map(|row| joint.position(&row.command)).collect();
+    report.joint = Some(joint.name.clone());
+    if options.asks(Check::Travel) {
+        judge_travel(&joint.limits, &positions, report);
+    }
+    let mut judge = AxisJudge::new(&joint.limits, machine, options, &positions);
+    // It is as rounded as the axes that it is a sum of.
+    let sums = rows.iter().map(|row| joint.weights.iter().zip(row.command).map(|(w, at)| (w * at).abs()).sum());
+    judge.rounding_mm_per_s = 2.0 * speed_rounding(sums.fold(0.0, f64::max), machine.fine_period_s);
+    let differences = judge.judge(&positions, options, report);
+    report.maxima.joints.push((joint.name.clone(), differences));
+    report.joint = None;
 }
 
 /// What rounding of positions up to a magnitude makes of a speed, mm/s.

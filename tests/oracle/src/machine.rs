@@ -1,9 +1,11 @@
 //! What the judge needs to know of a machine.
 
+mod joints;
 mod keys;
 
 use std::path::Path;
 
+pub use joints::{Joint, Joints};
 use keys::Keys;
 
 use crate::{Error, Position, axis::axis_of_name};
@@ -28,6 +30,8 @@ pub struct Machine {
     pub time_constant_s: f64,
     /// The axes, in the order of [`crate::LETTERS`].
     pub axes: Vec<Axis>,
+    /// What the drives move.
+    pub joints: Joints,
 }
 
 /// The limits of one axis; for a rotary axis read deg for mm.
@@ -87,6 +91,7 @@ impl Machine {
         let mut axes: Vec<Axis> =
             keys.names("axes").iter().map(|name| Axis::from_keys(keys, name)).collect::<Result<_, _>>()?;
         axes.sort_by_key(|axis| axis.index);
+        let joints = Joints::read(keys, &axes)?;
         Ok(Self {
             fine_period_s: keys.need("loops.fine_period_ms")? / 1000.0,
             planner: keys.text("planner.plugin").unwrap_or_else(|| DEFAULT_PLANNER.into()),
@@ -95,6 +100,7 @@ impl Machine {
             path_tolerance_mm: keys.need("motion.path_tolerance_mm")?,
             time_constant_s: keys.number("motion.time_constant_ms")?.unwrap_or(0.0) / 1000.0,
             axes,
+            joints,
         })
     }
 }

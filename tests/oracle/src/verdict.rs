@@ -74,6 +74,8 @@ pub struct Finding {
     pub line: u32,
     /// Index of the axis in [`crate::LETTERS`], where one axis is meant.
     pub axis: Option<usize>,
+    /// The joint that is meant, where it is no axis.
+    pub joint: Option<String>,
     /// The value met.
     pub value: f64,
     /// The value allowed.
@@ -85,6 +87,8 @@ pub struct Finding {
 pub struct Maxima {
     /// Per axis, in the order of the machine.
     pub axes: Vec<AxisMaxima>,
+    /// Per joint that has limits of its own.
+    pub joints: Vec<(String, AxisMaxima)>,
     /// Path speed over programmed feed.
     pub feed_ratio: f64,
     /// Distance of a sample from the path, mm.

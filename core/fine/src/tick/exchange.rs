@@ -7,12 +7,13 @@ use tandem_sdk::{AxisVector, JointState};
 
 use super::{FineLoop, Phase};
 use crate::answer::{self, Numbers};
+use crate::config::Joints;
 use crate::fault::FaultKind;
 use crate::state::Input;
 
 impl FineLoop {
     pub(super) fn exchange(&mut self, axes: &AxisVector) {
-        let joints = self.kinematics.as_ref().map_or(*axes, |k| k.to_joints(axes)) + self.offset;
+        let joints = self.joints_of(axes);
         let rate = 1.0 / self.config.period_s;
         let velocity =
             if self.setpoint.enable == 0 { AxisVector::ZERO } else { (joints - self.setpoint.position) * rate };
@@ -37,12 +38,37 @@ impl FineLoop {
         self.watch_edge();
     }
 
+    /// Where the joints are to be; kinematics that do not know fault the machine, and the drives stay where they are.
+    fn joints_of(&mut self, axes: &AxisVector) -> AxisVector {
+        let Some(kinematics) = &self.kinematics else { return *axes + self.offset };
+        let joints = kinematics.to_joints(&self.config.axes_alone(axes));
+        let Some(joint) = (0..self.joints).find(|joint| !joints[*joint].is_finite()) else {
+            return joints + self.offset;
+        };
+        if let Err(error) = kinematics.health() {
+            self.plugin_error.get_or_insert(error);
+        }
+        self.fail(FaultKind::Kinematics { joint });
+        self.setpoint.position
+    }
+
+    /// A sample on its way to the guard: with the joints behind the axes, where only the kinematics know them.
+    #[inline]
+    pub(super) fn with_joints(&self, mut position: AxisVector) -> AxisVector {
+        if let (Joints::Curved { axes }, Some(kinematics)) = (self.config.joints, &self.kinematics) {
+            position = self.config.axes_alone(&position);
+            let joints = kinematics.to_joints(&position);
+            position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
+        }
+        position
+    }
+
     /// Whether the exchange failed; the driver's first words about it are kept for the host.
     fn ask_driver(&mut self) -> bool {
         match self.driver.exchange(&self.setpoint, &mut self.feedback) {
             Ok(()) => false,
             Err(error) => {
-                self.driver_error.get_or_insert(error);
+                self.plugin_error.get_or_insert(error);
                 true
             }
         }
@@ -63,7 +89,7 @@ impl FineLoop {
         let (command, feedback) = if self.config.record_drives {
             (*command + self.offset, self.feedback.position)
         } else {
-            (*command, self.axes_of(&self.feedback.position))
+            (self.config.axes_alone(command), self.axes_of(&self.feedback.position))
         };
         let sample = Sample {
             tick: self.tick,

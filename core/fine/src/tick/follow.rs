@@ -50,7 +50,7 @@ impl FineLoop {
             self.outputs.stop_requested || homing
         });
         self.begin_edge();
-        let position = self.cursor.position();
+        let position = self.with_joints(self.cursor.position());
         let checked = self.guard.check(&position, self.outputs.unhomed);
         let position = self.let_pass(position, &checked);
         (position, self.input(ask, reached))

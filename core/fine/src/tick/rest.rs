@@ -89,7 +89,7 @@ impl FineLoop {
             block: self.cursor.segment().block,
             line: self.cursor.segment().line,
             stop_on: self.cursor.segment().stop_on,
-            position: *self.guard.position(),
+            position: self.config.axes_alone(self.guard.position()),
             latch: stop.latch.map(|joints| self.axes_of(&joints)),
             program_time_s: self.cursor.program_time_s(),
             path_mm: self.cursor.path_mm(),
@@ -97,7 +97,7 @@ impl FineLoop {
         if self.rests.push(rest).is_err() {
             return Input::Hold;
         }
-        self.cursor.part(&rest.position);
+        self.cursor.part(self.guard.position());
         self.edge.end();
         self.preview.clear();
         self.line_end.forget();

@@ -74,6 +74,7 @@ impl Bench {
         let config = FineConfig {
             period_s: PERIOD_S,
             limits: Limits::new(&[axis; 3]).unwrap(),
+            joints: tandem_fine::Joints::Axes,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 2,
             guard,

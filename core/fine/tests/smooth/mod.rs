@@ -172,6 +172,7 @@ impl Machine {
         let config = FineConfig {
             period_s: PERIOD_S,
             limits: Limits::new(&[axis; 2]).unwrap(),
+            joints: tandem_fine::Joints::Axes,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 3,
             dry_run: false,

@@ -20,6 +20,7 @@ use tandem_machine::Machine;
 use tandem_sdk::Driver;
 
 use crate::error::HostError;
+use crate::joints::JointSpace;
 use crate::rules::refusal;
 use entry::Refusal;
 use options::{Faults, Joints};
@@ -30,19 +31,11 @@ use wrapper::Wrapper;
 ///
 /// # Errors
 /// What `[faults]` says wrongly, with its place in the machine file.
-pub fn wrap(machine: &Machine, driver: Box<dyn Driver>, joint_count: usize) -> Result<Box<dyn Driver>, HostError> {
+pub fn wrap(machine: &Machine, driver: Box<dyn Driver>, joints: &JointSpace) -> Result<Box<dyn Driver>, HostError> {
     let Some(table) = &machine.faults else { return Ok(driver) };
-    let joints = Joints { rotary: rotary(machine), count: joint_count };
+    let joints = Joints { rotary: joints.rotary(), count: joints.count() };
     let faults = Faults::read(table, &joints).map_err(|Refusal { key, cause }| refusal(machine, &key, cause))?;
     let seed = faults.seed;
     let around = |inner, (index, plan)| Box::new(Wrapper::new(inner, plan, seed, index)) as Box<dyn Driver>;
     Ok((0..).zip(faults.wrap).fold(driver, around))
-}
-
-/// Which joints turn.
-fn rotary(machine: &Machine) -> [bool; tandem_sdk::MAX_AXES] {
-    std::array::from_fn(|joint| {
-        let axis = machine.joints.get(joint).map_or(joint, |joint| joint.axis);
-        axis < machine.axes.count() && machine.axes.is_rotary(axis)
-    })
 }

@@ -10,6 +10,7 @@ use tandem_sdk::AxisVector;
 
 use super::{JogRest, Jogs};
 use crate::error::HostError;
+use crate::joints::JointSpace;
 use crate::registry::Registry;
 use crate::run::{Run, Switches};
 use crate::setup;
@@ -52,7 +53,9 @@ impl<'a> JogSession<'a> {
         switches: Switches,
         hand: Box<dyn JogHand>,
     ) -> Result<Self, HostError> {
+        let mut machine = machine;
         let judge = setup::planner(&machine, registry)?;
+        machine.limits = JointSpace::of(&machine, registry)?.of_axes();
         let jogs = Arc::new(Jogs::new(&machine, judge));
         Ok(Self { machine, registry, switches, jogs, hand: Arc::new(Mutex::new(hand)) })
     }

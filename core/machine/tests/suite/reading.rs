@@ -92,12 +92,24 @@ fn the_fine_thread() {
 #[test]
 fn joints_take_from_their_axis_what_they_do_not_state() {
     let machine = full();
-    let [x1, x2, c1] = machine.joints.as_slice() else { panic!("three joints") };
-    assert_eq!((x1.name.as_str(), x1.axis, x1.limits, x1.home), ("x1", 0, machine.limits.axes()[0], 20.0));
+    let [x1, x2, c1, ..] = machine.joints.as_slice() else { panic!("three joints") };
+    assert_eq!((x1.name.as_str(), x1.axis, x1.limits, x1.home), ("x1", Some(0), machine.limits.axes()[0], 20.0));
     assert_eq!((x2.limits.max_mm, x2.limits.feed_mm_per_s, x2.limits.rapid_mm_per_s), (301.0, 100.0, 200.0));
     assert_eq!((x2.limits.acceleration_mm_per_s2, x2.limits.jerk_mm_per_s3, x2.home), (500.0, 5000.0, 2.5));
-    assert_eq!((c1.axis, c1.limits.max_mm), (2, PI / 2.0));
+    assert_eq!((c1.axis, c1.rotary, c1.limits.max_mm), (Some(2), true, PI / 2.0));
     assert!(close(c1.home, PI / 20.0) && close(c1.limits.jerk_mm_per_s3, 2.0 * PI));
+}
+
+#[test]
+fn a_joint_without_an_axis_is_its_own() {
+    let machine = full();
+    let [.., belt, table] = machine.joints.as_slice() else { panic!("joints") };
+    assert_eq!((belt.axis, belt.rotary, belt.home, belt.max_following_error_mm), (None, false, 0.0, f64::INFINITY));
+    assert_eq!((belt.limits.min_mm, belt.limits.max_mm), (f64::NEG_INFINITY, f64::INFINITY));
+    assert_eq!((belt.limits.rapid_mm_per_s, belt.limits.jerk_mm_per_s3), (150.0, f64::INFINITY));
+    assert_eq!((table.axis, table.rotary), (None, true));
+    assert!(close(table.limits.feed_mm_per_s, PI) && close(table.max_following_error_mm, PI / 360.0));
+    assert!(close(table.limits.speed_difference_mm_per_s, PI / 120.0));
 }
 
 #[test]
@@ -152,7 +164,7 @@ fn places() {
     let place = |key: &str| machine.place(key).to_string().replace(&format!("{}/", fixtures().display()), "");
     assert_eq!(place("axes.x.travel_mm"), "good/full.toml:26:1");
     assert_eq!(place("axes.x.max_jerk_mm_per_s3"), "good/shared/axes.toml:9:1");
-    assert_eq!(place("planner.options.gamma"), "good/full.toml:68:10", "the table, where the key is absent");
+    assert_eq!(place("planner.options.gamma"), "good/full.toml:78:10", "the table, where the key is absent");
     assert_eq!(place("guard.severity"), "good/shared/drives.toml:10:2");
     assert_eq!(place("coolant"), "good/full.toml:1:1");
     assert_eq!(machine.place("planner.options.zeta"), Place::Override("planner.options.zeta".to_owned()));

@@ -133,7 +133,7 @@ impl Scan {
     fn fill_points(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize) {
         self.points.clear();
         self.places_mm.clear();
-        let (mut cursor, lanes) = (Cursor::default(), bounds.context.axes.count());
+        let (mut cursor, lanes) = (Cursor::default(), bounds.context.limits.axes().len());
         for k in 0..intervals {
             let states = [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
             let knot = route.knot([states[0][0], states[2][0]], &mut cursor);

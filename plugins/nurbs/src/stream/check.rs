@@ -115,7 +115,7 @@ fn compare(
     here.speed = here.speed.max(state.speed_mm_per_s / (leg.feed_mm_per_s * (1.0 - 1e-9)));
     if before_mm < state.s_mm && !rapid {
         let curved = leg.course.counted_length(&at.curvature);
-        let chord = chord_error_mm(route, (before_mm, state.s_mm), samples, FAR * bounds.chord_error_mm, curved);
+        let chord = chord_error_mm(route, bounds, (before_mm, state.s_mm), samples, curved);
         // The chord error goes with the square of the speed.
         here.speed = here.speed.max((chord / (CHORD * bounds.chord_error_mm)).sqrt());
     }
@@ -138,16 +138,17 @@ fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Worst {
     here
 }
 
-/// How far the path between the last two samples stands off its chord, mm: looked at in its middle, and where that is
-/// more than `far_mm` at its quarters too.
+/// How far the path between the last two samples stands off its chord in the axes, mm: looked at in its middle, and where
+/// that is far at its quarters too.
 fn chord_error_mm(
     route: &Route,
+    bounds: &Bounds,
     (from_mm, to_mm): (f64, f64),
     samples: &[AxisVector],
-    far_mm: f64,
     curvature: f64,
 ) -> f64 {
-    let way_mm = to_mm - from_mm;
+    let (way_mm, far_mm, axes) = (to_mm - from_mm, FAR * bounds.chord_error_mm, bounds.context.axes.count());
+    let dot = |a: &AxisVector, b: &AxisVector| -> f64 { a.0[..axes].iter().zip(b.0).map(|(a, b)| a * b).sum() };
     // Half of that error would be no reason to look.
     if curvature * way_mm * way_mm < 1e-3 * far_mm {
         return 0.0;
@@ -166,10 +167,6 @@ fn chord_error_mm(
     };
     let middle = off(0.5);
     if middle < far_mm { middle } else { middle.max(off(0.25)).max(off(0.75)) }
-}
-
-fn dot(a: &AxisVector, b: &AxisVector) -> f64 {
-    a.0.iter().zip(b.0).map(|(a, b)| a * b).sum()
 }
 
 /// The largest jerk of an axis as a share of its limit, at a place passed with a speed and its derivatives.

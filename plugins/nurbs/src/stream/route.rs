@@ -148,7 +148,11 @@ impl Least {
             let at = course.at(stretch, share * length_mm, &mut place);
             for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
                 if at.direction[axis] != 0.0 {
-                    least = [least[0].min(limits.acceleration_mm_per_s2), least[1].min(limits.jerk_mm_per_s3)];
+                    // A joint that is a sum of axes may move further than the path.
+                    let joint = axis >= bounds.context.axes.count();
+                    let share = if joint { at.direction[axis].abs().max(1.0) } else { 1.0 };
+                    let (acceleration, jerk) = (limits.acceleration_mm_per_s2 / share, limits.jerk_mm_per_s3 / share);
+                    least = [least[0].min(acceleration), least[1].min(jerk)];
                 }
             }
         }

@@ -49,6 +49,16 @@ impl Keys {
         self.find(key).and_then(Value::as_str).map(str::to_owned)
     }
 
+    pub fn has(&self, key: &str) -> bool {
+        self.find(key).is_some()
+    }
+
+    pub fn texts(&self, key: &str) -> Option<Vec<String>> {
+        let each = self.find(key)?.as_array()?.iter().map(|value| value.as_str().map(str::to_owned));
+        each.collect()
+    }
+
+    /// In the order of the file.
     pub fn names(&self, key: &str) -> Vec<String> {
         self.find(key).and_then(Value::as_table).map(|table| table.keys().cloned().collect()).unwrap_or_default()
     }

@@ -1,0 +1,102 @@
+//! A planner on a machine whose joints are not its axes.
+
+use tandem_sdk::{
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, JointLanes, Planner, PlannerDescription,
+    PluginError, RawSlice, Segment, SegmentSink,
+};
+
+use super::travel::Travel;
+
+/// Hands blocks on with the lanes of the joints filled, refuses those in which a joint leaves its travel, and fills the
+/// lanes of every segment from its axes.
+pub struct Carrier {
+    planner: Box<dyn Planner>,
+    lanes: Option<&'static JointLanes>,
+    travel: Travel,
+    /// Control points with lanes; kept from curve to curve.
+    points: Vec<AxisVector>,
+}
+
+impl Carrier {
+    pub fn new(planner: Box<dyn Planner>, lanes: Option<&'static JointLanes>, travel: Travel) -> Self {
+        Self { planner, lanes, travel, points: Vec::new() }
+    }
+}
+
+/// `block` with its lanes filled; `points` holds the control points of a curve meanwhile.
+fn filled(block: &Block, lanes: &'static JointLanes, points: &mut Vec<AxisVector>) -> Block {
+    let mut block = Block { joint_lanes: Some(lanes), ..*block };
+    lanes.fill(&mut block.start);
+    lanes.fill(&mut block.end);
+    if block.kind == BlockKind::Nurbs {
+        // SAFETY: the block is handed over in this call, and its slices with it.
+        let given = unsafe { block.nurbs.control_points.as_slice() };
+        points.clear();
+        points.extend_from_slice(given);
+        for point in points.iter_mut() {
+            lanes.fill(point);
+        }
+        block.nurbs.control_points = RawSlice::new(points);
+    }
+    block
+}
+
+impl Planner for Carrier {
+    fn describe(&self) -> PlannerDescription {
+        self.planner.describe()
+    }
+
+    fn check(&self, block: &Block) -> Result<(), PluginError> {
+        let Some(lanes) = self.lanes else {
+            self.planner.check(block)?;
+            return self.travel.check(block);
+        };
+        let mut points = Vec::new();
+        self.planner.check(&filled(block, lanes, &mut points))?;
+        self.travel.check(block)
+    }
+
+    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+        let Some(lanes) = self.lanes else { return self.planner.accept(block) };
+        let block = filled(block, lanes, &mut self.points);
+        self.planner.accept(&block)
+    }
+
+    fn finish(&mut self) {
+        self.planner.finish();
+    }
+
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+        match self.lanes {
+            None => self.planner.advance(duration_s, sink),
+            Some(lanes) => self.planner.advance(duration_s, &mut Filling { sink, lanes }),
+        }
+    }
+
+    fn reset(&mut self, position: &AxisVector) {
+        let mut position = *position;
+        if let Some(lanes) = self.lanes {
+            lanes.fill(&mut position);
+        }
+        self.planner.reset(&position);
+    }
+}
+
+struct Filling<'a> {
+    sink: &'a mut dyn SegmentSink,
+    lanes: &'static JointLanes,
+}
+
+impl SegmentSink for Filling<'_> {
+    fn segment(&mut self, segment: &Segment) {
+        let mut segment = *segment;
+        self.lanes.fill_polynomials(&mut segment.coefficients);
+        self.lanes.fill(&mut segment.step_velocity);
+        self.lanes.fill(&mut segment.step_acceleration);
+        self.sink.segment(&segment);
+    }
+
+    fn block(&mut self, report: &BlockReport) {
+        self.sink.block(report);
+    }
+}

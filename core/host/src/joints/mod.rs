@@ -1,0 +1,222 @@
+//! What the drives move, and what that asks of everything before them: joints, their limits, their travel.
+//!
+//! Kinematics that are linear in the axes, which is found out here, are kept by planning. A joint that is a scaled axis
+//! makes the limits of that axis narrower. A joint that is a sum of axes becomes a lane behind the axes, which planners,
+//! governor and guard treat like an axis ([`tandem_sdk::JointLanes`]). Other kinematics are planned by the limits of the axes
+//! alone; the guard judges their joints.
+
+mod carrier;
+mod fold;
+mod linear;
+mod peaks;
+mod stated;
+mod travel;
+
+use tandem_machine::Machine;
+use tandem_sdk::{
+    AxisLimits, AxisVector, JointLanes, Kinematics, KinematicsContext, Limits, MAX_AXES, Planner, PlannerDescription,
+};
+
+use crate::error::HostError;
+use crate::registry::Registry;
+use crate::rules::refusal;
+use crate::setup;
+use carrier::Carrier;
+use linear::{Linear, positions};
+pub use peaks::JointPeaks;
+pub(crate) use peaks::JointWatch;
+use travel::Travel;
+
+/// One joint.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    /// Its name: that of the machine file, else the letter of its axis.
+    pub name: String,
+    /// Whether it turns.
+    pub rotary: bool,
+    /// The axis that the machine file says it moves.
+    pub axis: Option<usize>,
+    /// Its limits, mm or rad.
+    pub limits: AxisLimits,
+    /// Largest following error, mm or rad.
+    pub max_following_error_mm: f64,
+}
+
+/// How joints follow from axes.
+enum Map {
+    /// Each axis is its joint.
+    Axes,
+    /// Weights and offsets; joints that are sums of axes have lanes.
+    Linear(Linear, Option<&'static JointLanes>),
+    /// Only the plugin knows.
+    Curved(Box<dyn Kinematics>),
+}
+
+/// The joints of a machine.
+pub(crate) struct JointSpace {
+    pub joints: Vec<Joint>,
+    map: Map,
+    axes: usize,
+    /// Limits of the axes with the joints folded in, then of the lanes.
+    pub limits: Limits,
+    /// What each lane behind the axes is: index of a joint.
+    lanes: Vec<usize>,
+}
+
+impl JointSpace {
+    /// The joints of `machine`. Host; allocates.
+    ///
+    /// # Errors
+    /// Kinematics that are not there, refuse their options or do not lead back; joints that do not fit them; a travel that
+    /// leaves an axis none, or that the machine starts outside of.
+    pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
+        let axes = machine.axes.count();
+        let (joints, kinematics) = stated::joints(machine, registry)?;
+        let Some(kinematics) = kinematics else {
+            let mut limits = machine.limits;
+            for (axis, joint) in joints.iter().enumerate() {
+                fold::narrow(machine, &mut limits, axis, joint, (1.0, 0.0))?;
+            }
+            let this = Self { joints, map: Map::Axes, axes, limits, lanes: vec![] };
+            return this.check_start(machine);
+        };
+        let positions = positions(&machine.limits);
+        let sound = linear::check(kinematics.as_ref(), joints.len(), axes, &positions);
+        sound.map_err(|e| refusal(machine, "kinematics.plugin", format!("{}: {e}", machine.kinematics.plugin)))?;
+        let linear = Linear::of(kinematics.as_ref(), joints.len(), axes, &positions);
+        let this = if let Some((weights, offsets)) = linear {
+            let folded = fold::fold(machine, &joints, &weights, &offsets)?;
+            let map = Map::Linear(Linear::new(weights, offsets, kinematics), folded.carried);
+            Self { joints, map, axes, limits: folded.limits, lanes: folded.lanes }
+        } else {
+            let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
+            Self { joints, map: Map::Curved(kinematics), axes, limits, lanes }
+        };
+        this.check_start(machine)
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Whether each axis is its joint.
+    pub fn are_axes(&self) -> bool {
+        matches!(self.map, Map::Axes)
+    }
+
+    /// Whether joints are no linear function of the axes: their limits are guarded, not planned.
+    pub fn are_curved(&self) -> bool {
+        matches!(self.map, Map::Curved(_))
+    }
+
+    /// The limits as planners see them.
+    pub fn planned(&self) -> Limits {
+        if self.are_curved() { self.of_axes() } else { self.limits }
+    }
+
+    /// The limits of the axes alone, as narrow as joints make them.
+    pub fn of_axes(&self) -> Limits {
+        Limits { count: self.axes as u32, ..self.limits }
+    }
+
+    /// What the fine loop needs to know of the joints.
+    pub fn fine(&self) -> tandem_fine::Joints {
+        match &self.map {
+            Map::Axes | Map::Linear(_, None) => tandem_fine::Joints::Axes,
+            Map::Linear(_, Some(lanes)) => tandem_fine::Joints::Sums(lanes),
+            Map::Curved(_) => tandem_fine::Joints::Curved { axes: self.axes },
+        }
+    }
+
+    /// Joint positions at the axis positions `axes`, mm or rad.
+    pub fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        match &self.map {
+            Map::Axes => *axes,
+            Map::Linear(linear, _) => linear.to_joints(axes),
+            Map::Curved(kinematics) => kinematics.to_joints(axes),
+        }
+    }
+
+    /// `axes` with what lies behind them in the fine loop.
+    pub fn with_lanes(&self, axes: &AxisVector) -> AxisVector {
+        let mut all = *axes;
+        match &self.map {
+            Map::Linear(_, Some(lanes)) => lanes.fill(&mut all),
+            Map::Curved(kinematics) => {
+                let joints = kinematics.to_joints(axes);
+                all.0[self.axes..self.axes + self.count()].copy_from_slice(&joints.0[..self.count()]);
+            }
+            _ => {}
+        }
+        all
+    }
+
+    /// Largest following error of each joint.
+    pub fn max_following_error_mm(&self) -> AxisVector {
+        let each = |i: usize| self.joints.get(i).map_or(f64::INFINITY, |joint| joint.max_following_error_mm);
+        AxisVector(std::array::from_fn(each))
+    }
+
+    /// Velocity steps that `planner` makes use of: where it does on the axes, also in joints that only the guard sees.
+    pub fn speed_difference_mm_per_s(&self, planner: &PlannerDescription) -> [f64; MAX_AXES] {
+        let mut steps = planner.speed_difference_mm_per_s;
+        if self.are_curved() && steps.iter().any(|step| *step > 0.0) {
+            for (step, joint) in steps[self.axes..].iter_mut().zip(&self.joints) {
+                *step = joint.limits.speed_difference_mm_per_s;
+            }
+        }
+        steps
+    }
+
+    /// The joint that lies behind the axes at entry `entry` of the fine loop's vectors, if one does, and what its position
+    /// there lacks.
+    pub fn behind(&self, entry: usize) -> Option<(&Joint, f64)> {
+        let joint = *self.lanes.get(entry.checked_sub(self.axes)?)?;
+        let offset = if let Map::Linear(linear, _) = &self.map { linear.offset(joint) } else { 0.0 };
+        Some((&self.joints[joint], offset))
+    }
+
+    /// Which joints turn.
+    pub fn rotary(&self) -> [bool; MAX_AXES] {
+        std::array::from_fn(|i| self.joints.get(i).is_some_and(|joint| joint.rotary))
+    }
+
+    /// The map for the fine loop; none where the joints are the axes.
+    pub fn into_kinematics(self) -> Option<Box<dyn Kinematics>> {
+        match self.map {
+            Map::Axes => None,
+            Map::Linear(linear, _) => Some(Box::new(linear)),
+            Map::Curved(kinematics) => Some(kinematics),
+        }
+    }
+
+    /// `planner`, which then keeps the travel of the joints too, and carries their lanes.
+    pub fn carried(self, planner: Box<dyn Planner>, machine: &Machine) -> Box<dyn Planner> {
+        if self.are_axes() {
+            return planner;
+        }
+        let lanes = match &self.map {
+            Map::Linear(_, lanes) => *lanes,
+            _ => None,
+        };
+        Box::new(Carrier::new(planner, lanes, Travel::new(self, machine.axes)))
+    }
+
+    fn check_start(self, machine: &Machine) -> Result<Self, HostError> {
+        let at = self.to_joints(&machine.start);
+        for (i, joint) in self.joints.iter().enumerate() {
+            if let Some(words) = travel::beyond(joint, at[i]) {
+                let key = format!("joints.{}", joint.name);
+                return Err(refusal(machine, &key, format!("where the machine starts, {words}")));
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// The machine's kinematics, as its plugin makes it.
+fn plugin(machine: &Machine, registry: &Registry) -> Result<Box<dyn Kinematics>, HostError> {
+    let made = registry.kinematics(&machine.kinematics, &KinematicsContext::new(machine.axes));
+    made.map_err(|e| setup::refused(machine, "kinematics", e))
+}
