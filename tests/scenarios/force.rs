@@ -282,3 +282,40 @@ fn options_that_make_no_sense_are_refused_where_they_stand() {
     let errors = scenario("step", &[]).on(&path).run().errors();
     assert!(errors.contains("mine.toml:6:") && errors.contains("servo[0].lead_mm"), "{errors}");
 }
+
+/// What `tandem identify` writes for axis X.
+fn identified(friction: &str) -> toml::Table {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.toml");
+    let servo =
+        format!("driver.options.servo=[{{ encoder_counts = 8192, current_noise_ma = 5, friction = {friction} }}]");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
+        .args(["identify", "--axis", "x", "--set", &servo, "--machine"])
+        .arg(machine("step").with_file_name("force-demo.toml"))
+        .args(["--out".as_ref(), path.as_os_str()])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(&path).unwrap();
+    println!("{text}");
+    let table: toml::Table = text.parse().unwrap();
+    table["feed_strategy"]["options"]["axes"]["x"].as_table().unwrap().clone()
+}
+
+#[test]
+fn an_axis_is_identified_with_its_friction() {
+    for (coulomb_nm, viscous, stribeck_nm) in
+        [(0.0, 0.0, 0.0), (0.01, 5e-5, 0.0), (0.06, 6e-4, 0.0), (0.06, 6e-4, 0.02)]
+    {
+        let axis = identified(&format!(
+            "{{ coulomb_nm = {coulomb_nm:?}, viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?} }}"
+        ));
+        let number = |table: &str, key: &str| axis[table][key].as_float().unwrap();
+        let error = axis["inertia_kg_m2"].as_float().unwrap() / 1.842e-4 - 1.0;
+        assert!(error.abs() < 5e-3, "inertia off by {error}");
+        assert!((number("friction", "viscous_nm_s_per_rad") - viscous).abs() < 5e-5);
+        let at_rest = number("friction", "coulomb_nm") + number("friction", "stribeck_nm");
+        assert!((at_rest - coulomb_nm - stribeck_nm).abs() < 2e-3, "{at_rest}");
+        assert!(number("confidence", "inertia_percent") < 5.0 && number("confidence", "friction_rms_nm") < 1e-3);
+    }
+}

@@ -33,6 +33,8 @@ pub enum Command {
     Estimate(Estimate),
     /// Find out by an experiment how a control takes its time, for estimates
     Calibrate(Calibrate),
+    /// Find inertia and friction of an axis by air runs, for the feed strategy force-control
+    Identify(Identify),
     /// Look into traces: export, info, diff
     #[command(subcommand)]
     Trace(Trace),
@@ -211,6 +213,25 @@ pub struct Calibrate {
     /// Fit this form instead of the one that fits best
     #[arg(long)]
     pub model: Option<Form>,
+    /// The clock that drives the experiment
+    #[arg(long, default_value = "virtual")]
+    pub clock: Clock,
+}
+
+#[derive(Group)]
+pub struct Identify {
+    /// The machine file
+    #[arg(long = "machine", value_name = "M.toml")]
+    pub machine: PathBuf,
+    /// Override a key of the machine file
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    pub overrides: Vec<(String, String)>,
+    /// The axis, which moves through its travel without a cut
+    #[arg(long, value_name = "LETTER")]
+    pub axis: char,
+    /// The file to write, which the machine file includes; beside it and called after machine and axis where left out
+    #[arg(long, value_name = "F.toml")]
+    pub out: Option<PathBuf>,
     /// The clock that drives the experiment
     #[arg(long, default_value = "virtual")]
     pub clock: Clock,

@@ -15,6 +15,7 @@ mod check;
 mod corners;
 mod estimate;
 mod home;
+mod identify;
 mod jog;
 mod latency;
 mod mdi;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Home(options) => home::home(&options),
         Command::Estimate(options) => estimate::estimate(&options),
         Command::Calibrate(options) => calibrate::calibrate(&options),
+        Command::Identify(options) => identify::identify(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Script(command) => script::script(&command),
         Command::Plugin(command) => plugin::plugin(&command),

@@ -33,7 +33,7 @@ impl Collector {
             axes: (0..count).map(|i| axis(machine, i, steps_allowed)).collect(),
             fine_period_s: machine.fine_period_s,
             samples,
-            signals: signals.iter().map(|name| Signal { name: (*name).to_string(), ..Signal::default() }).collect(),
+            signals: signals.iter().map(|name| signal(name)).collect(),
             path_tolerance_mm: Some(machine.motion.path_tolerance_mm),
             jerk_is_judged: machine.motion.jerk == JerkMode::Limit,
             ..Report::default()
@@ -78,6 +78,14 @@ impl Collector {
         self.report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
         out.finish()
     }
+}
+
+/// A curve called after a signal; its unit stands at the end of the name.
+fn signal(name: &str) -> Signal {
+    let units =
+        [("_mm_per_min", "mm/min"), ("_mm_per_s", "mm/s"), ("_nm", "N·m"), ("_mm", "mm"), ("_n", "N"), ("_a", "A")];
+    let unit = units.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit);
+    Signal { name: name.to_string(), unit: unit.to_string(), ..Signal::default() }
 }
 
 fn push(columns: &mut [Vec<f64>], position: &AxisVector, axes: &Axes) {

@@ -84,10 +84,17 @@ function sigmaPlot() {
 }
 
 function signalPlots() {
-  return about.signals.map((signal, k) => {
-    const curve = new Curve(columns["signal" + k], null, { key: "signal " + k, label: signal.name, colour: main });
-    return new Plot({ title: signal.name, unit: () => signal.unit, curves: [curve] });
+  // Signals of one unit are compared in one plot, as many as there are colours.
+  const colours = [main, second, () => axisColour("Z")];
+  const groups = [];
+  about.signals.forEach((signal, k) => {
+    let group = groups.find((g) => signal.unit !== "" && g.unit === signal.unit && g.curves.length < colours.length);
+    if (!group) groups.push((group = { unit: signal.unit, names: [], curves: [] }));
+    const colour = colours[group.curves.length];
+    group.curves.push(new Curve(columns["signal" + k], null, { key: "signal " + k, label: signal.name, colour }));
+    group.names.push(signal.name);
   });
+  return groups.map((group) => new Plot({ title: group.names.join(", "), unit: () => group.unit, curves: group.curves }));
 }
 
 function allPlots() {
