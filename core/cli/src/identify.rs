@@ -44,10 +44,13 @@ struct Motor {
     torque_constant_nm_per_a: f64,
 }
 
-/// Samples of the axis: line, angle, speed, current.
+/// Line, place in mm, speed in mm/s and current in A of a sample.
+type Row = (u32, f64, f64, f64);
+
+/// The samples of the axis.
 struct Record {
     index: usize,
-    rows: Vec<(u32, f64, f64, f64)>,
+    rows: Vec<Row>,
 }
 
 impl RunObserver for Record {
@@ -64,7 +67,7 @@ pub fn identify(options: &args::Identify) -> Result<u8, Box<dyn Error>> {
     // What is to be identified is not there yet, and nothing may change the feed.
     (machine.feed_strategy, machine.policy) = (None, None);
     let (text, purposes) = program(&machine, &motor)?;
-    let rows = drive(machine.clone(), text, options, motor.index)?;
+    let rows = drive(machine.clone(), &text, options, motor.index)?;
     let points = air_runs(&rows, &purposes, &motor);
     let fit = stribeck(&points, true).ok_or("too few air runs fit into travel and feed of the axis")?;
     let inertia = inertia(&rows, &purposes, &motor, &fit, machine.fine_period_s)?;
@@ -103,7 +106,7 @@ impl Motor {
 /// The experiment, and what each of its lines is for.
 fn program(machine: &Machine, motor: &Motor) -> Result<(String, Vec<Purpose>), String> {
     let limits = &machine.limits.axes()[motor.index];
-    let (middle, room) = ((limits.min_mm + limits.max_mm) / 2.0, 0.9 * (limits.max_mm - limits.min_mm));
+    let (middle, room) = (f64::midpoint(limits.min_mm, limits.max_mm), 0.9 * (limits.max_mm - limits.min_mm));
     if !(middle.is_finite() && room > 0.0) {
         return Err(format!("axis {}: it states no travel to move in", motor.letter));
     }
@@ -144,12 +147,7 @@ fn stroke(feed_mm_per_s: f64, acceleration_mm_per_s2: f64, room_mm: f64, motor: 
     (mm_per_s, length(mm_per_s))
 }
 
-fn drive(
-    machine: Machine,
-    text: String,
-    options: &args::Identify,
-    index: usize,
-) -> Result<Vec<(u32, f64, f64, f64)>, Box<dyn Error>> {
+fn drive(machine: Machine, text: &str, options: &args::Identify, index: usize) -> Result<Vec<Row>, Box<dyn Error>> {
     let program = Program::spool("identify", text.as_bytes())?;
     let run = Run::prepare(machine, &built_in::registry()?, program, Switches::default())?;
     let mut record = Record { index, rows: vec![] };
@@ -165,7 +163,7 @@ fn purpose_of(purposes: &[Purpose], line: u32) -> Purpose {
 }
 
 /// The mean torque of each air run while its speed is steady.
-fn air_runs(rows: &[(u32, f64, f64, f64)], purposes: &[Purpose], motor: &Motor) -> Vec<Point> {
+fn air_runs(rows: &[Row], purposes: &[Purpose], motor: &Motor) -> Vec<Point> {
     let mean = |(line, purpose): (usize, &Purpose)| {
         let Purpose::AirRun(speed_rad_per_s) = *purpose else { return None };
         let of_line: Vec<f64> = rows.iter().filter(|row| row.0 as usize == line).map(|row| row.3).collect();
@@ -186,13 +184,7 @@ struct Inertia {
 }
 
 /// Least squares over the strokes, the friction taken out.
-fn inertia(
-    rows: &[(u32, f64, f64, f64)],
-    purposes: &[Purpose],
-    motor: &Motor,
-    fit: &Fit,
-    period_s: f64,
-) -> Result<Inertia, String> {
+fn inertia(rows: &[Row], purposes: &[Purpose], motor: &Motor, fit: &Fit, period_s: f64) -> Result<Inertia, String> {
     let strokes: Vec<_> = rows.iter().filter(|row| purpose_of(purposes, row.0) == Purpose::Stroke).collect();
     let fastest = strokes.iter().map(|row| (row.2 * motor.turns).abs()).fold(0.0, f64::max);
     let mut differences = Differences::new(SPAN, period_s, (NEAR_REVERSAL.0 * fastest).min(NEAR_REVERSAL.1));
