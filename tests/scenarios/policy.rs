@@ -87,6 +87,8 @@ fn what_a_script_asks_for_is_driven() {
     done.assert_within_limits();
     let policy = policy(&done);
     assert_eq!((policy["traps"].as_u64(), policy["windows"].as_u64()), (Some(0), Some(1)), "{policy}");
+    let nominal_s = Scenario::text(PROGRAM).run().number("nominal_time_s");
+    assert_eq!(done.number("nominal_time_s"), nominal_s, "the nominal time is that of the program");
     let fastest = done.column("feed_mm_s").into_iter().zip(done.column("line")).filter(|(_, line)| *line != 7.0);
     let fastest = fastest.fold(0.0, |most: f64, (feed, _)| most.max(feed));
     assert!((fastest - 20.0).abs() < 1e-6, "half of 2400 mm/min is 20 mm/s, {fastest} was driven");

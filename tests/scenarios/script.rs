@@ -77,6 +77,12 @@ fn a_new_script_builds_in_every_language_and_does_the_same() {
         let place = folder.path().join(lang).join("corners");
         let made = script(&["new", &place.to_string_lossy(), "--lang", lang]);
         assert!(made.status.success(), "{}", text(&made.stderr));
+        let named = if lang == "rust" { place.join("src/lib.rs") } else { place.join(source) };
+        assert!(
+            named.is_file() && text(&made.stderr).starts_with(&named.display().to_string()),
+            "{}",
+            text(&made.stderr)
+        );
         let out = folder.path().join(format!("{lang}.wasm"));
         if builds(&place.join(source), &out) {
             let checked = script(&["check", &out.to_string_lossy()]);

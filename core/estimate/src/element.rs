@@ -25,7 +25,8 @@ pub struct Element {
     pub tool: u32,
     /// Length of the path, mm.
     pub length_mm: f64,
-    /// Programmed feed, at most what the axes may drive along this path; of a rapid the machine's rapid feed, mm/s.
+    /// Programmed feed, at most a policy's cap and what the axes may drive along this path; of a rapid the machine's rapid
+    /// feed, mm/s.
     pub feed_mm_per_s: f64,
     /// Length over programmed feed; of a rapid over the rapid feed; of a dwell its duration, s.
     pub nominal_s: f64,
@@ -103,8 +104,8 @@ impl Element {
         self.acceleration_mm_per_s2 = moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
         let rapid = block.kind == BlockKind::Rapid;
         self.kind = if rapid { Kind::Rapid } else { Kind::Cut };
-        let programmed = if rapid { along.rapid_mm_per_s } else { block.command_feed_mm_per_s() };
-        self.feed_mm_per_s = if rapid { programmed } else { programmed.min(along.feed_mm_per_s) };
+        let programmed = if rapid { along.rapid_mm_per_s } else { block.feed_mm_per_s };
+        self.feed_mm_per_s = if rapid { programmed } else { block.command_feed_mm_per_s().min(along.feed_mm_per_s) };
         self.nominal_s = if self.length_mm > 0.0 { self.length_mm / programmed } else { 0.0 };
     }
 

@@ -71,7 +71,8 @@ impl Monitor {
         self.nominal_s += match block.kind {
             BlockKind::Dwell => block.dwell_s,
             BlockKind::Rapid => self.rapid_time_s(block),
-            _ => block.length_mm / block.command_feed_mm_per_s(),
+            // Of the program: what a policy takes away is seen in the time, not in what it is compared with.
+            _ => block.length_mm / block.feed_mm_per_s,
         };
     }
 

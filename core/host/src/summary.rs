@@ -32,7 +32,7 @@ pub struct Summary {
     pub blocks: u64,
     /// Path length of these blocks, mm.
     pub length_mm: f64,
-    /// Length / feed (rapids at the machine's rapid feed) and dwells, s.
+    /// Length / programmed feed (rapids at the machine's rapid feed) and dwells, s.
     pub nominal_time_s: f64,
     /// From the first to the last sample, s.
     pub motion_time_s: f64,

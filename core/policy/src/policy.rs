@@ -220,7 +220,7 @@ impl Policy {
         self.counters.count(trouble);
         self.strikes += 1;
         let then = if self.is_quarantined() {
-            "in quarantine until the file changes; the default policy goes on"
+            "in quarantine until the file changes or reload-policy is given; the default policy goes on"
         } else {
             "the default policy takes over, the script is made anew"
         };

@@ -6,6 +6,8 @@ use std::path::Path;
 use crate::args::Language;
 
 const SDK_AS: &str = include_str!("../../../../scripts/sdk/assemblyscript/tandem-policy.ts");
+/// What tells an editor the types of `AssemblyScript`; the compiler does not read it.
+const EDITOR_AS: &str = include_str!("../../../../scripts/sdk/templates/tsconfig.json");
 const SDK_C: &str = include_str!("../../../../scripts/sdk/c/tandem_policy.h");
 const SDK_RUST: &str = include_str!("../../../../scripts/sdk/rust/src/tandem_policy.rs");
 const SCRIPT_AS: &str = include_str!("../../../../scripts/sdk/templates/policy.ts");
@@ -24,7 +26,11 @@ pub fn new(name: &Path, language: Language) -> Result<u8, String> {
     }
     let manifest = MANIFEST.replace("NAME", &stem);
     let files: Vec<(String, &str)> = match language {
-        Language::As => vec![(format!("{stem}.ts"), SCRIPT_AS), ("tandem-policy.ts".to_string(), SDK_AS)],
+        Language::As => vec![
+            (format!("{stem}.ts"), SCRIPT_AS),
+            ("tandem-policy.ts".to_string(), SDK_AS),
+            ("tsconfig.json".to_string(), EDITOR_AS),
+        ],
         Language::C => vec![(format!("{stem}.c"), SCRIPT_C), ("tandem_policy.h".to_string(), SDK_C)],
         Language::Rust => vec![
             ("Cargo.toml".to_string(), manifest.as_str()),
@@ -38,8 +44,9 @@ pub fn new(name: &Path, language: Language) -> Result<u8, String> {
         fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    let first = name.join(&files[0].0);
-    let source = if language == Language::Rust { name } else { &first };
+    let rust = language == Language::Rust;
+    let first = name.join(if rust { "src/lib.rs" } else { &files[0].0 });
+    let source = if rust { name } else { &first };
     say!("{} is the script; tandem script build {} makes the module", first.display(), source.display());
     Ok(0)
 }

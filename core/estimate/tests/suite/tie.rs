@@ -80,8 +80,8 @@ fn the_look_ahead_machine_as_predicted() {
     }
 }
 
-/// The zig-zag, and the same in blocks of 1.2 mm in the mean, as coarse as those of the case, on the overlap machine of 30 ms: the
-/// closed forms against its time in whole ticks.
+/// The zig-zag, and the same in blocks of 1.2 mm in the mean, as coarse as those of the case, on the overlap machine of
+/// 30 ms: the closed forms against its time in whole ticks.
 #[test]
 fn coarser_programs_stay_within_the_spread_of_the_case() {
     let (spread, file) = (case("tie_spread"), case("tie_zigzag"));

@@ -1,4 +1,5 @@
-//! Modules that nobody wrote: valid WASM from random bytes, by `wasm-smith`.
+//! Modules that nobody wrote: valid WASM from random bytes, by `wasm-smith`. 60 of each kind; for a longer search
+//! `TANDEM_MODULES=20000 cargo test -p tandem-policy generated`.
 
 use arbitrary::Unstructured;
 use tandem_policy::MAX_STRIKES;
@@ -47,6 +48,11 @@ fn module(config: Config, random: &mut Random) -> Option<Vec<u8>> {
     Module::new(config, &mut Unstructured::new(&bytes)).ok().map(|module| module.to_bytes())
 }
 
+/// How many modules of a kind are made.
+fn wanted() -> usize {
+    std::env::var("TANDEM_MODULES").map_or(60, |count| count.parse().unwrap())
+}
+
 /// A module with the exports of a policy, and a layout that is right.
 fn policy(random: &mut Random) -> Option<String> {
     let exports = wat::parse_str(EXPORTS).unwrap();
@@ -81,7 +87,7 @@ fn try_out(name: &str, bytes: &[u8]) -> Option<String> {
 #[test]
 fn generated_policies_are_contained() {
     let mut random = Random::from_the_clock();
-    let made: Vec<_> = (0..60).filter_map(|_| policy(&mut random)).collect();
+    let made: Vec<_> = (0..wanted()).filter_map(|_| policy(&mut random)).collect();
     let refused: Vec<_> = made.iter().filter_map(|text| try_out(text, text.as_bytes())).collect();
     assert!(made.len() - refused.len() >= 10, "of {} generated policies too few start: {refused:#?}", made.len());
 }
@@ -89,7 +95,7 @@ fn generated_policies_are_contained() {
 #[test]
 fn generated_modules_of_every_kind_are_refused_or_contained() {
     let mut random = Random::from_the_clock();
-    let made: Vec<_> = (0..60).filter_map(|_| module(Config::default(), &mut random)).collect();
+    let made: Vec<_> = (0..wanted()).filter_map(|_| module(Config::default(), &mut random)).collect();
     assert!(made.len() >= 10, "{}", made.len());
     for bytes in made {
         try_out(&format!("{bytes:02x?}"), &bytes);
