@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use tandem_host::{Clock, Outcome, Registry, Run, RunObserver, Switches, Timed, TraceCsv};
+use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_oracle::{Options, Row, Trace, Verdict, judge};
 use tandem_rings::{MachineState, Sample};
@@ -57,14 +57,23 @@ impl Bench {
         if settings.iter().all(|(key, _)| key != "planner.plugin") {
             settings.push(("planner.plugin".to_string(), "watched".to_string()));
         }
-        let machine = Machine::read(&mill(), &settings).unwrap();
         let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
+        self.drive(&settings, &commands).unwrap()
+    }
+
+    /// Runs it with the built-in plugins and further settings of the machine, unless something refuses.
+    pub fn try_run(&self, settings: &[(String, String)]) -> Result<Ran, HostError> {
+        self.drive(settings, &[])
+    }
+
+    fn drive(&self, settings: &[(String, String)], commands: &[Timed]) -> Result<Ran, HostError> {
+        let machine = Machine::read(&mill(), settings).unwrap();
         let program = tandem_gcode::Program::open(&self.program).unwrap();
-        let run = Run::prepare(machine, &registry(), program, Switches::default()).unwrap();
+        let run = Run::prepare(machine, &registry(), program, Switches::default())?;
         let mut kept = Kept::default();
         EMITTED.take();
-        let outcome = run.drive(Clock::Virtual, &commands, &mut kept).unwrap();
-        Ran { samples: kept.0, outcome, segments: EMITTED.take() }
+        let outcome = run.drive(Clock::Virtual, commands, &mut kept)?;
+        Ok(Ran { samples: kept.0, outcome, segments: EMITTED.take() })
     }
 
     /// The oracle's verdict: samples on the path to 2 nm, corners cut by no more than a chord between two samples.
@@ -165,7 +174,7 @@ fn registry() -> Registry {
     let watched = local_plugin!(planner "watched" = watched);
     let boastful = local_plugin!(planner "boastful" = boastful);
     let mut registry = Registry::default();
-    for plugin in [tandem_sim::PLUGIN, watched, boastful] {
+    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, watched, boastful] {
         registry.register(plugin).unwrap();
     }
     registry

@@ -27,6 +27,7 @@ mod optimal_stop;
 mod overlap;
 mod overrides;
 mod plan;
+mod plugins;
 mod policy;
 mod probing;
 mod program_flow;

@@ -1,9 +1,13 @@
 //! The command line.
 
+mod plugin;
+
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+
+pub use plugin::{Kind, Plugin};
 
 /// Tandem, an open CNC motion controller.
 #[derive(Parser)]
@@ -333,18 +337,6 @@ pub enum Script {
     },
     /// Say which languages can be built on this computer, and what to install for the others
     Doctor,
-}
-
-#[derive(Subcommand)]
-pub enum Plugin {
-    /// Print the built-in plugins, or those of shared libraries
-    List {
-        /// The shared libraries
-        libraries: Vec<PathBuf>,
-        /// Print where each comes from and what its options are
-        #[arg(long, short)]
-        verbose: bool,
-    },
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -59,6 +59,9 @@ pub enum RoughError {
     },
 }
 
+/// How often in one rough period a planner may emit less than half of what it is asked for, though more is to come.
+const MOST_SHORT_ADVANCES: u32 = 1000;
+
 /// Rough periods that are queued beyond what the worst stop asks for.
 const MARGIN_PERIODS: f64 = 3.0;
 
@@ -130,6 +133,7 @@ impl RoughLoop {
 
     fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         let period_s = self.config.rough_period_s;
+        let mut short = 0;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
             self.feed(observer)?;
             let advanced = self
@@ -147,6 +151,10 @@ impl RoughLoop {
             self.queue.flush(false);
             if advanced.duration_s == 0.0 && !self.finished {
                 return Err(planner_error(self.line, "it is full, and advance emits nothing"));
+            }
+            short += u32::from(advanced.duration_s < period_s / 2.0);
+            if short > MOST_SHORT_ADVANCES {
+                return Err(planner_error(self.line, "advance emits a little at a time, and hardly gets on"));
             }
         }
         Ok(())

@@ -218,9 +218,10 @@ impl Block {
         }
     }
 
-    /// The feed that may be driven: the programmed feed under the policy's cap, mm/s.
+    /// The feed that may be driven: the programmed feed under the policy's cap, mm/s. A programmed feed that is not a
+    /// number stays none.
     pub fn command_feed_mm_per_s(&self) -> f64 {
-        self.feed_mm_per_s.min(self.feed_cap_mm_per_s)
+        if self.feed_cap_mm_per_s < self.feed_mm_per_s { self.feed_cap_mm_per_s } else { self.feed_mm_per_s }
     }
 
     /// Whether the machine must be at rest at the end of this block for the program's sake.

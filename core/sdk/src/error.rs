@@ -10,23 +10,34 @@ use crate::text::Text;
 pub struct PluginError {
     message: Text,
     option: Text,
+    panicked: bool,
 }
 
 impl PluginError {
     /// A message made up at run time. Allocates: not for the fine loop.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::fixed("") }
+        Self { message: Text::owned(message.into()), option: Text::fixed(""), panicked: false }
     }
 
     /// A fixed message. Does not allocate.
     pub const fn fixed(message: &'static str) -> Self {
-        Self { message: Text::fixed(message), option: Text::fixed("") }
+        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: false }
     }
 
     /// What is wrong with the option `key`, a dotted path below `options`: the host adds where in `machine.toml` it
     /// was written. Allocates.
     pub fn of_option(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::owned(key.into()) }
+        Self { message: Text::owned(message.into()), option: Text::owned(key.into()), panicked: false }
+    }
+
+    /// The words of a plugin that has panicked.
+    pub(crate) const fn of_panic(message: &'static str) -> Self {
+        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: true }
+    }
+
+    /// Whether the plugin has panicked, now or before.
+    pub fn is_panic(&self) -> bool {
+        self.panicked
     }
 
     /// The option that is wrong, where it is one: a dotted path below `options`.

@@ -80,7 +80,7 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn planner(&self, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-        abi::open_planner(self.table(PluginKind::Planner)?, options, context)
+        abi::open_planner(self.table(PluginKind::Planner)?, self.name(), options, context)
     }
 
     /// Opens a feed strategy. Host.
@@ -88,7 +88,7 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn feed_strategy(&self, options: &str, context: &StrategyContext) -> Made<dyn FeedStrategy> {
-        abi::open_strategy(self.table(PluginKind::FeedStrategy)?, options, context)
+        abi::open_strategy(self.table(PluginKind::FeedStrategy)?, self.name(), options, context)
     }
 
     /// Makes a driver, which is not open yet. Host.
@@ -96,7 +96,7 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn driver(&self, options: &str) -> Made<dyn Driver> {
-        abi::open_driver(self.table(PluginKind::Driver)?, options)
+        abi::open_driver(self.table(PluginKind::Driver)?, self.name(), options)
     }
 
     /// Makes a kinematics. Host.
@@ -104,7 +104,7 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn kinematics(&self, options: &str, context: &KinematicsContext) -> Made<dyn Kinematics> {
-        abi::open_kinematics(self.table(PluginKind::Kinematics)?, options, context)
+        abi::open_kinematics(self.table(PluginKind::Kinematics)?, self.name(), options, context)
     }
 
     fn table<T>(self, kind: PluginKind) -> Result<&'static T, PluginError> {

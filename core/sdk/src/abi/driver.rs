@@ -16,7 +16,7 @@ type Errors = *mut PluginError;
 #[repr(C)]
 pub struct Table {
     size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
     close: unsafe extern "C" fn(*mut c_void),
     describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
     claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
@@ -59,9 +59,14 @@ where
         stop: stop::<T>,
     };
 
-    unsafe extern "C" fn open(options: RawSlice<u8>, handle: *mut *mut c_void, error: Errors) -> u32 {
+    unsafe extern "C" fn open(
+        name: RawSlice<u8>,
+        options: RawSlice<u8>,
+        handle: *mut *mut c_void,
+        error: Errors,
+    ) -> u32 {
         // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options)) }
+        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options)) }
     }
 }
 
@@ -124,10 +129,10 @@ struct Linked {
 }
 
 /// Opens a driver behind its table.
-pub fn open(table: &'static Table, options: &str) -> Made<dyn Driver> {
-    let options = RawSlice::new(options.as_bytes());
+pub fn open(table: &'static Table, name: &'static str, options: &str) -> Made<dyn Driver> {
+    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call.
-    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, handle, error) })?;
+    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, handle, error) })?;
     Ok(Box::new(Linked { table, handle }))
 }
 

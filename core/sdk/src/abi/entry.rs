@@ -22,11 +22,18 @@ pub struct Instance<T> {
     pub fault: Fault,
 }
 
-/// The words of a plugin's panic. They are kept for good, so that repeating them needs no memory.
-#[derive(Debug, Default)]
-pub struct Fault(OnceLock<&'static str>);
+/// A plugin's name, and the words of its panic. They are kept for good, so that repeating them needs no memory.
+#[derive(Debug)]
+pub struct Fault {
+    name: &'static str,
+    words: OnceLock<&'static str>,
+}
 
 impl Fault {
+    fn new(name: &'static str) -> Self {
+        Self { name, words: OnceLock::new() }
+    }
+
     /// Calls `work`, unless the plugin has panicked before; writes what it answers.
     ///
     /// # Safety
@@ -38,8 +45,8 @@ impl Fault {
         error: *mut PluginError,
         work: impl FnOnce() -> Result<R, PluginError>,
     ) -> u32 {
-        let outcome = match self.0.get() {
-            Some(words) => Err(PluginError::fixed(words)),
+        let outcome = match self.words.get() {
+            Some(words) => Err(PluginError::of_panic(words)),
             None => catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(self.keep(method, panic))),
         };
         // SAFETY: the caller's promise; the place of an error or an answer holds nothing to drop.
@@ -55,21 +62,43 @@ impl Fault {
         DONE
     }
 
+    /// The same for a method that cannot fail; its answer is written where it belongs and copied nowhere.
+    ///
+    /// # Safety
+    /// `answer` and `error` can be written to.
+    #[inline]
+    pub unsafe fn write<R>(
+        &self,
+        method: &str,
+        answer: *mut R,
+        error: *mut PluginError,
+        work: impl FnOnce() -> R,
+    ) -> u32 {
+        let write = || {
+            // SAFETY: the caller's promise.
+            unsafe { answer.write(work()) };
+            Ok(())
+        };
+        // SAFETY: the caller's promise.
+        unsafe { self.guard(method, &mut (), error, write) }
+    }
+
     #[cold]
     fn keep(&self, method: &str, panic: Box<dyn Any + Send>) -> PluginError {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
         let place = PLACE.with_borrow_mut(std::mem::take);
-        let text: &'static str = Box::leak(format!("panicked in {method}{place}: {words}").into_boxed_str());
+        let text: &'static str =
+            Box::leak(format!("{} panicked in {method}{place}: {words}", self.name).into_boxed_str());
         // Dropping what the panic carries runs code of the plugin again, which may panic again.
         std::mem::forget(panic);
-        let _ = self.0.set(text);
-        PluginError::fixed(text)
+        let _ = self.words.set(text);
+        PluginError::of_panic(text)
     }
 
-    /// The words, if there was a panic.
-    pub fn words(&self) -> Option<&'static str> {
-        self.0.get().copied()
+    /// Whether there was a panic.
+    fn happened(&self) -> bool {
+        self.words.get().is_some()
     }
 }
 
@@ -98,21 +127,24 @@ pub fn function<F: Copy + 'static>() -> F {
 /// Opens a plugin from its options.
 ///
 /// # Safety
-/// `options` is a text that lives for the call; the other two can be written to.
+/// `options` is a text that lives for the call, the name one that lives as long as the program; the other two can be
+/// written to.
 pub unsafe fn open<T, O: PluginOptions>(
-    options: RawSlice<u8>,
+    [name, options]: [RawSlice<u8>; 2],
     handle: *mut *mut c_void,
     error: *mut PluginError,
     make: impl FnOnce(&O) -> Result<T, PluginError>,
 ) -> u32 {
+    // SAFETY: the caller's promise.
+    let name = unsafe { text(name) };
     let work = || {
         // SAFETY: the caller's promise.
         let text = unsafe { text(options) };
         let plugin = make(&O::read(text)?)?;
-        Ok(Box::into_raw(Box::new(Instance { plugin, fault: Fault::default() })).cast::<c_void>())
+        Ok(Box::into_raw(Box::new(Instance { plugin, fault: Fault::new(name) })).cast::<c_void>())
     };
     // SAFETY: the caller's promise.
-    unsafe { Fault::default().guard("its constructor", handle, error, work) }
+    unsafe { Fault::new(name).guard("its constructor", handle, error, work) }
 }
 
 /// Describes the options `O`, as TOML.
@@ -125,7 +157,7 @@ pub unsafe extern "C" fn describe<O: PluginOptions>(answer: *mut Text, error: *m
         toml::to_string(&docs).map(Text::owned).map_err(|e| PluginError::new(e.to_string()))
     };
     // SAFETY: the caller's promise.
-    unsafe { Fault::default().guard("the description of its options", answer, error, work) }
+    unsafe { Fault::new("it").guard("the description of its options", answer, error, work) }
 }
 
 /// Closes a plugin. One that has panicked is left as it is: what it would drop may be half made.
@@ -135,7 +167,7 @@ pub unsafe extern "C" fn describe<O: PluginOptions>(answer: *mut Text, error: *m
 pub unsafe extern "C" fn close<T>(handle: *mut c_void) {
     // SAFETY: the caller's promise.
     let instance = unsafe { Box::from_raw(handle.cast::<Instance<T>>()) };
-    if instance.fault.words().is_some() {
+    if instance.fault.happened() {
         std::mem::forget(instance);
         return;
     }

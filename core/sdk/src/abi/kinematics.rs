@@ -2,9 +2,10 @@
 
 use std::ffi::c_void;
 use std::marker::PhantomData;
+use std::mem::MaybeUninit;
 
 use super::Descriptor;
-use super::entry::{self, Handle, Instance, ask, function};
+use super::entry::{self, DONE, Handle, Instance, ask, function};
 use crate::{
     AxisVector, Kinematics, KinematicsContext, Made, PluginError, PluginKind, PluginOptions, RawSlice, size_of_contract,
 };
@@ -17,7 +18,7 @@ type Convert = unsafe extern "C" fn(*const c_void, *const AxisVector, *mut AxisV
 #[repr(C)]
 pub struct Table {
     size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, *const KinematicsContext, *mut *mut c_void, Errors) -> u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const KinematicsContext, *mut *mut c_void, Errors) -> u32,
     close: unsafe extern "C" fn(*mut c_void),
     joint_count: unsafe extern "C" fn(*const c_void, u32, *mut u32, Errors) -> u32,
     to_joints: Convert,
@@ -60,13 +61,14 @@ where
     };
 
     unsafe extern "C" fn open(
+        name: RawSlice<u8>,
         options: RawSlice<u8>,
         context: *const KinematicsContext,
         handle: *mut *mut c_void,
         error: Errors,
     ) -> u32 {
         // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options, &*context)) }
+        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options, &*context)) }
     }
 }
 
@@ -91,7 +93,7 @@ unsafe extern "C" fn to_joints<T: Kinematics>(
     error: Errors,
 ) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("to_joints", answer, error, || Ok(this.plugin.to_joints(&*axes))) }
+    unsafe { this.fault.write("to_joints", answer, error, || this.plugin.to_joints(&*axes)) }
 }
 
 unsafe extern "C" fn to_axes<T: Kinematics>(
@@ -101,7 +103,7 @@ unsafe extern "C" fn to_axes<T: Kinematics>(
     error: Errors,
 ) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("to_axes", answer, error, || Ok(this.plugin.to_axes(&*joints))) }
+    unsafe { this.fault.write("to_axes", answer, error, || this.plugin.to_axes(&*joints)) }
 }
 
 unsafe extern "C" fn joint_direction<T: Kinematics>(
@@ -112,8 +114,8 @@ unsafe extern "C" fn joint_direction<T: Kinematics>(
     error: Errors,
 ) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
-    let work = || Ok(unsafe { this.plugin.joint_direction(&*position, &*direction) });
-    unsafe { this.fault.guard("joint_direction", answer, error, work) }
+    let work = || unsafe { this.plugin.joint_direction(&*position, &*direction) };
+    unsafe { this.fault.write("joint_direction", answer, error, work) }
 }
 
 unsafe extern "C" fn health<T: Kinematics>(this: *const c_void, answer: *mut (), error: Errors) -> u32 {
@@ -128,15 +130,32 @@ struct Linked {
 }
 
 /// Opens a kinematics behind its table.
-pub fn open(table: &'static Table, options: &str, context: &KinematicsContext) -> Made<dyn Kinematics> {
-    let options = RawSlice::new(options.as_bytes());
+pub fn open(
+    table: &'static Table,
+    name: &'static str,
+    options: &str,
+    context: &KinematicsContext,
+) -> Made<dyn Kinematics> {
+    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call.
-    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, context, handle, error) })?;
+    let handle =
+        Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, context, handle, error) })?;
     Ok(Box::new(Linked { table, handle }))
 }
 
-/// What stands for the answer of one that has panicked: its caller sees that it is no position, and asks for its health.
-fn nowhere(_: PluginError) -> AxisVector {
+/// Makes a conversion. One that has panicked answers no position: its caller sees that, and asks for its health.
+#[inline]
+fn convert(call: impl FnOnce(*mut AxisVector, Errors) -> u32) -> AxisVector {
+    let mut answer = MaybeUninit::uninit();
+    let mut error = MaybeUninit::uninit();
+    let status = call(answer.as_mut_ptr(), error.as_mut_ptr());
+    // SAFETY: each status says which of the two was written.
+    unsafe {
+        if status == DONE {
+            return answer.assume_init();
+        }
+        error.assume_init_drop();
+    }
     AxisVector([f64::NAN; crate::MAX_AXES])
 }
 
@@ -150,20 +169,17 @@ impl Kinematics for Linked {
     }
 
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
-        ask(|answer, error| unsafe { (self.table.to_joints)(self.handle.instance, axes, answer, error) })
-            .unwrap_or_else(nowhere)
+        convert(|answer, error| unsafe { (self.table.to_joints)(self.handle.instance, axes, answer, error) })
     }
 
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        ask(|answer, error| unsafe { (self.table.to_axes)(self.handle.instance, joints, answer, error) })
-            .unwrap_or_else(nowhere)
+        convert(|answer, error| unsafe { (self.table.to_axes)(self.handle.instance, joints, answer, error) })
     }
 
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        ask(|answer, error| unsafe {
+        convert(|answer, error| unsafe {
             (self.table.joint_direction)(self.handle.instance, position, direction, answer, error)
         })
-        .unwrap_or_else(nowhere)
     }
 
     fn health(&self) -> Result<(), PluginError> {

@@ -7,8 +7,8 @@ use crate::log::{HostTable, LogRecord};
 use crate::text::Text;
 use crate::{
     ABI_VERSION, Advanced, Answer, Axes, Block, BlockReport, DriverContext, DriverDescription, Feedback, FineSample,
-    KinematicsContext, Limits, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind, RawSlice, Segment,
-    Setpoint, StrategyContext, Window, size_of_contract,
+    JointLanes, KinematicsContext, Limits, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind,
+    RawSlice, Segment, Setpoint, StrategyContext, Window, size_of_contract,
 };
 
 /// What the exported symbol is called before the name of the crate. The number is that of [`Library`] itself.
@@ -156,7 +156,7 @@ unsafe extern "C" fn prepare(host: *const HostTable) {
 }
 
 /// Sizes of what crosses the contract, folded into one number (FNV-1a): another revision of the SDK has another.
-const LAYOUT: u64 = {
+pub const LAYOUT: u64 = {
     let sizes = [
         size_of::<PlannerContext>(),
         size_of::<StrategyContext>(),
@@ -167,6 +167,7 @@ const LAYOUT: u64 = {
         size_of::<Axes>(),
         size_of::<Limits>(),
         size_of::<Block>(),
+        size_of::<JointLanes>(),
         size_of::<Segment>(),
         size_of::<BlockReport>(),
         size_of::<Advanced>(),

@@ -18,7 +18,7 @@ mod strategy;
 
 pub use driver::driver;
 pub use kinematics::kinematics;
-pub use library::{Descriptor, Library, SYMBOL_PREFIX};
+pub use library::{Descriptor, LAYOUT, Library, SYMBOL_PREFIX};
 pub use planner::planner;
 pub use strategy::feed_strategy;
 

@@ -18,7 +18,7 @@ type Errors = *mut PluginError;
 #[repr(C)]
 pub struct Table {
     size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, *const PlannerContext, *mut *mut c_void, Errors) -> u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const PlannerContext, *mut *mut c_void, Errors) -> u32,
     close: unsafe extern "C" fn(*mut c_void),
     describe: unsafe extern "C" fn(*const c_void, *mut PlannerDescription, Errors) -> u32,
     check: unsafe extern "C" fn(*const c_void, *const Block, *mut (), Errors) -> u32,
@@ -70,13 +70,14 @@ where
     };
 
     unsafe extern "C" fn open(
+        name: RawSlice<u8>,
         options: RawSlice<u8>,
         context: *const PlannerContext,
         handle: *mut *mut c_void,
         error: Errors,
     ) -> u32 {
         // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options, &*context)) }
+        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options, &*context)) }
     }
 }
 
@@ -201,10 +202,11 @@ struct Linked {
 }
 
 /// Opens a planner behind its table.
-pub fn open(table: &'static Table, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let options = RawSlice::new(options.as_bytes());
+pub fn open(table: &'static Table, name: &'static str, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call.
-    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, context, handle, error) })?;
+    let handle =
+        Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, context, handle, error) })?;
     Ok(Box::new(Linked { table, handle }))
 }
 

@@ -25,7 +25,7 @@ struct Description {
 #[repr(C)]
 pub struct Table {
     size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
+    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
     close: unsafe extern "C" fn(*mut c_void),
     describe: unsafe extern "C" fn(*const c_void, *mut Description, Errors) -> u32,
     update: unsafe extern "C" fn(*mut c_void, *const Window<'_>, *mut Answer, Errors) -> u32,
@@ -61,13 +61,14 @@ where
     };
 
     unsafe extern "C" fn open(
+        name: RawSlice<u8>,
         options: RawSlice<u8>,
         context: *const StrategyContext,
         handle: *mut *mut c_void,
         error: Errors,
     ) -> u32 {
         // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open(options, handle, error, |options: &O| function::<F>()(options, &*context)) }
+        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options, &*context)) }
     }
 }
 
@@ -111,10 +112,16 @@ struct Linked {
 }
 
 /// Opens a strategy behind its table.
-pub fn open(table: &'static Table, options: &str, context: &StrategyContext) -> Made<dyn FeedStrategy> {
-    let options = RawSlice::new(options.as_bytes());
+pub fn open(
+    table: &'static Table,
+    name: &'static str,
+    options: &str,
+    context: &StrategyContext,
+) -> Made<dyn FeedStrategy> {
+    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call; the handle is open; names live as long as their library, which stays.
-    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(options, context, handle, error) })?;
+    let handle =
+        Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, context, handle, error) })?;
     let described = ask(|answer, error| unsafe { (table.describe)(handle.instance, answer, error) })?;
     let names = &described.signals[..(described.signal_count as usize).min(MAX_SIGNALS)];
     // The contract hands names out for good, and few strategies are opened: their list is never freed.

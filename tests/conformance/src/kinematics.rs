@@ -1,0 +1,94 @@
+//! Kinematics: there and back, and the derivative that it gives.
+
+use tandem_sdk::{AxisVector, Kinematics, KinematicsContext, MAX_AXES, Plugin};
+
+use crate::machine::{REACH_MM, context};
+use crate::program::norm;
+use crate::random::Random;
+use crate::report::Report;
+use crate::timing::Timing;
+use crate::{Setup, heap};
+
+const PLACES: u64 = 5000;
+/// How far a place may be off after there and back, mm.
+const ROUND_TRIP_MM: f64 = 1e-9;
+/// Step of the difference that the derivative is compared with, mm, and how far they may be apart.
+const STEP_MM: f64 = 1e-4;
+const DERIVATIVE_TOLERANCE: f64 = 1e-5;
+
+/// Judges a kinematics.
+pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
+    let axes = context(AxisVector::ZERO).axes;
+    let open = |options: &str| plugin.kinematics(options, &KinematicsContext::new(axes));
+    let (Some(first), Ok(second)) = (crate::open(setup, report, open), open(&setup.options)) else { return };
+    report.judged("joints");
+    let joints = first.joint_count(axes.count());
+    if !(axes.count()..=MAX_AXES).contains(&joints) {
+        report.find("joints", format!("{joints} joints for {} axes", axes.count()));
+    }
+    let mut random = Random::new(setup.seed);
+    let mut timings = [Timing::new("to_joints"), Timing::new("to_axes")];
+    let checks = ["there and back", "derivative", "determinism"];
+    for check in checks {
+        report.judged(check);
+    }
+    let mut uses = 0;
+    for _ in 0..PLACES {
+        let place = AxisVector::from_slice(&[0; 3].map(|_| random.between(-REACH_MM, REACH_MM)));
+        let way = AxisVector::from_slice(&[0; 3].map(|_| random.between(-1.0, 1.0)));
+        let before = heap::uses();
+        let found = [
+            round_trip(first.as_ref(), &place, &mut timings),
+            derivative(first.as_ref(), &place, &way),
+            differs(first.as_ref(), second.as_ref(), &place),
+        ];
+        uses += heap::uses() - before;
+        for (check, words) in checks.iter().zip(found) {
+            if let Some(words) = words {
+                report.find(check, format!("at {:?}: {}", &place.0[..3], blamed(first.as_ref(), &words)));
+            }
+        }
+    }
+    judge_heap(uses, report);
+    report.time(timings);
+}
+
+fn judge_heap(uses: u64, report: &mut Report) {
+    if !heap::counts() {
+        report.skip("allocation", heap::NOT_COUNTED);
+    } else if uses > 0 && report.conforms() {
+        // What was found wrong is put into words, which takes memory of the kit's own.
+        report.find("allocation", format!("{uses} uses of the heap"));
+    } else {
+        report.judged("allocation");
+    }
+}
+
+/// What was found, with the plugin's own words where it has any.
+fn blamed(kinematics: &dyn Kinematics, words: &str) -> String {
+    kinematics.health().map_or_else(|error| format!("{words}: {error}"), |()| words.to_string())
+}
+
+fn round_trip(kinematics: &dyn Kinematics, place: &AxisVector, timings: &mut [Timing; 2]) -> Option<String> {
+    let joints = timings[0].of(|| kinematics.to_joints(place));
+    let back = timings[1].of(|| kinematics.to_axes(&joints));
+    let off_mm = norm(&(back - *place));
+    // A comparison with NaN is false.
+    let near = off_mm <= ROUND_TRIP_MM;
+    (!near).then(|| format!("to joints and back is {off_mm} mm off"))
+}
+
+fn derivative(kinematics: &dyn Kinematics, place: &AxisVector, way: &AxisVector) -> Option<String> {
+    let said = kinematics.joint_direction(place, way);
+    let ahead = kinematics.to_joints(&(*place + *way * STEP_MM));
+    let behind = kinematics.to_joints(&(*place + *way * -STEP_MM));
+    let found = (ahead - behind) * (0.5 / STEP_MM);
+    let off = norm(&(said - found));
+    let near = off <= DERIVATIVE_TOLERANCE * (1.0 + norm(&found));
+    (!near).then(|| format!("joint_direction is {off} off the difference of to_joints"))
+}
+
+fn differs(one: &dyn Kinematics, other: &dyn Kinematics, place: &AxisVector) -> Option<String> {
+    let bits = |k: &dyn Kinematics| k.to_joints(place).0.map(f64::to_bits);
+    (bits(one) != bits(other)).then(|| "two of it do not agree".to_string())
+}

@@ -1,0 +1,66 @@
+//! Shared libraries for the tests. Cargo builds them from what the workspace has fetched: no network is needed.
+
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, OnceLock};
+
+use crate::harness::root;
+
+/// The `target` folder of the workspace.
+fn target() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_tandem")).ancestors().nth(2).unwrap()
+}
+
+/// Where plugins outside the workspace are built, all with the same settings, so that they share what they depend on.
+pub fn third_party_target() -> PathBuf {
+    target().join("third-party")
+}
+
+fn plain_cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.env("CARGO_TERM_COLOR", "never");
+    cargo
+}
+
+/// Cargo for plugins outside the workspace.
+pub fn cargo() -> Command {
+    let mut cargo = plain_cargo();
+    cargo.env("CARGO_TARGET_DIR", third_party_target()).env("CARGO_INCREMENTAL", "0");
+    cargo.env("CARGO_PROFILE_DEV_DEBUG", "false").env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
+    cargo
+}
+
+/// Runs cargo, one at a time; what it prints goes into the failure.
+pub fn run(cargo: &mut Command) -> String {
+    static ONE: Mutex<()> = Mutex::new(());
+    let _one = ONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let output = cargo.output().unwrap();
+    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(output.status.success(), "{cargo:?}\n{text}");
+    text
+}
+
+fn file(crate_name: &str) -> String {
+    format!("{DLL_PREFIX}{}{DLL_SUFFIX}", crate_name.replace('-', "_"))
+}
+
+/// The plugin `name` of `tests/third-party`.
+pub fn third_party(name: &str) -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let manifest = root().join("tests/third-party/Cargo.toml");
+        run(cargo().args(["build", "--workspace", "--offline", "--locked", "--manifest-path"]).arg(manifest));
+        third_party_target().join("debug")
+    });
+    folder.join(file(name))
+}
+
+/// A built-in plugin as a shared library: its crate says nothing of one, and has no feature for it. What it depends on is
+/// built already.
+pub fn built_in(package: &str) -> PathBuf {
+    let mut command = plain_cargo();
+    command.current_dir(root()).env("CARGO_TARGET_DIR", target()).args(["rustc", "--offline", "--locked", "--lib"]);
+    run(command.args(["--crate-type", "cdylib", "-p", package]));
+    target().join("debug").join(file(package))
+}

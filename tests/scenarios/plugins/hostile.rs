@@ -1,0 +1,191 @@
+//! Plugins that misbehave on purpose: the host lives on, the fault names them, and no sample leaves the limits.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use tandem_host::HostError;
+
+use crate::bench::{Bench, Ran};
+use crate::plugins::built::third_party;
+
+const PROGRAM: &str = "G21 G90\nF3000\nG1 X40 Y10\nG1 X0 Y20\nG4 P0.1\nG1 X10 Y0\nM2\n";
+
+/// What a hostile plugin is told.
+struct Mischief {
+    section: &'static str,
+    misbehave: &'static str,
+    method: &'static str,
+    call: u32,
+}
+
+impl Mischief {
+    fn of(section: &'static str, misbehave: &'static str, method: &'static str, call: u32) -> Self {
+        Self { section, misbehave, method, call }
+    }
+
+    fn settings(&self, library: &Path) -> Vec<(String, String)> {
+        let key = |key: &str| format!("{}.{key}", self.section);
+        vec![
+            (key("plugin"), library.display().to_string()),
+            (key("options.misbehave"), self.misbehave.to_string()),
+            (key("options.method"), self.method.to_string()),
+            (key("options.call"), self.call.to_string()),
+        ]
+    }
+
+    /// Runs the program. Where it begins, everything that is sent is within limits, to standstill.
+    fn run(&self) -> Result<Ran, HostError> {
+        let settings = self.settings(&third_party("hostile"));
+        let bench = Bench::text(PROGRAM);
+        let ran = bench.try_run(&settings)?;
+        let verdict = bench.judge(&ran, |options| {
+            options.ends_early = true;
+            options.sample_tolerance_mm = Some(1e3);
+            options.vertex_tolerance_mm = Some(1e3);
+        });
+        assert!(verdict.passed(), "{self}: {verdict}");
+        Ok(ran)
+    }
+
+    /// What the run, or its refusal, says.
+    fn words(&self) -> String {
+        match self.run() {
+            Err(HostError::Check(report)) => report.diagnostics.iter().map(|found| found.message.as_str()).collect(),
+            Err(refusal) => refusal.to_string(),
+            Ok(ran) => ran.outcome.summary.fault.unwrap_or_default(),
+        }
+    }
+}
+
+impl std::fmt::Display for Mischief {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {} in call {} of {}", self.section, self.misbehave, self.call, self.method)
+    }
+}
+
+/// All methods of all kinds that are called in a run, with the calls that are tried.
+const METHODS: &[(&str, &str, &[u32])] = &[
+    ("planner", "new", &[1]),
+    ("planner", "describe", &[1]),
+    ("planner", "check", &[1, 2, 4]),
+    ("planner", "accept", &[1, 2, 3, 5]),
+    ("planner", "finish", &[1]),
+    ("planner", "advance", &[1, 2, 3, 4]),
+    ("feed_strategy", "new", &[1]),
+    ("feed_strategy", "signals", &[1]),
+    ("feed_strategy", "update", &[1, 2, 50]),
+    ("driver", "new", &[1]),
+    ("driver", "describe", &[1]),
+    ("driver", "open", &[1]),
+    ("driver", "start", &[1]),
+    ("driver", "exchange", &[1, 2, 100, 700]),
+    ("kinematics", "new", &[1]),
+];
+
+#[test]
+fn it_behaves_where_it_is_told_nothing() {
+    for section in ["planner", "feed_strategy", "driver", "kinematics"] {
+        let ran = Mischief::of(section, "never", "", 1).run().unwrap();
+        assert_eq!(ran.outcome.summary.fault, None, "{section}");
+    }
+}
+
+#[test]
+fn a_panic_in_any_call_of_any_method_ends_in_a_fault_that_names_it() {
+    for (section, method, calls) in METHODS {
+        for call in *calls {
+            for misbehave in ["panic", "panic-twice"] {
+                let mischief = Mischief::of(section, misbehave, method, *call);
+                let words = mischief.words();
+                let method = if *method == "new" { "its constructor" } else { method };
+                assert!(words.contains("hostile"), "{mischief}: {words:?}");
+                assert!(words.contains(&format!("panicked in {method}")), "{mischief}: {words:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
+    for (section, method, calls, words) in [
+        ("planner", "advance", [1, 2, 3], "advance emits a segment with a number that is not finite"),
+        ("feed_strategy", "update", [1, 2, 30], "update answers"),
+        ("driver", "exchange", [1, 20, 500], "the feedback of joint"),
+    ] {
+        for call in calls {
+            let mischief = Mischief::of(section, "not-a-number", method, call);
+            let said = mischief.words();
+            assert!(said.contains(words) && said.contains("hostile"), "{mischief}: {said:?}");
+        }
+    }
+    for call in [1, 2, 3] {
+        let ran = Mischief::of("planner", "beyond", "advance", call).run().unwrap();
+        let fault = ran.outcome.summary.fault.unwrap();
+        assert!(fault.contains("hostile") && fault.contains("guard"), "{fault}");
+    }
+    // A ratio of a million is a wish: what is driven is the programmed feed.
+    assert_eq!(Mischief::of("feed_strategy", "beyond", "update", 5).words(), "");
+}
+
+#[test]
+fn output_without_end_ends() {
+    for call in [1, 2] {
+        let words = Mischief::of("planner", "endless", "advance", call).words();
+        assert!(words.contains("hostile") && words.contains("emits without end"), "{words}");
+    }
+    for (method, words) in [("advance", "gets on"), ("accept", "it is full, and advance emits nothing")] {
+        for call in [1, 2] {
+            let mischief = Mischief::of("planner", "dawdle", method, call);
+            let said = mischief.words();
+            assert!(said.contains("hostile") && said.contains(words), "{mischief}: {said:?}");
+        }
+    }
+}
+
+#[test]
+fn the_wrong_order_and_failures_are_faults() {
+    let words = Mischief::of("planner", "order", "advance", 2).words();
+    assert!(words.contains("hostile") && words.contains("a report of a block that it was not given"), "{words}");
+    for (section, method) in [("planner", "advance"), ("feed_strategy", "update"), ("driver", "exchange")] {
+        let words = Mischief::of(section, "fail", method, 3).words();
+        assert!(words.contains("hostile") && words.contains("it fails as it was told"), "{section}: {words}");
+    }
+}
+
+fn check(mischief: &Mischief) -> (Option<i32>, String) {
+    let library: PathBuf = third_party("hostile");
+    let settings = mischief.settings(&library);
+    let options = settings.iter().filter_map(|(key, value)| Some((key.split_once(".options.")?.1, value)));
+    let options: Vec<String> = options.flat_map(|(key, value)| ["--set".into(), format!("{key}={value}")]).collect();
+    let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
+        .args(["plugin", "check", "--programs", "3"])
+        .arg(&library)
+        .args(options)
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+#[test]
+fn the_conformance_kit_finds_it_out() {
+    let (status, out) = check(&Mischief::of("any", "never", "", 1));
+    assert_eq!(status, Some(0), "{out}");
+    for (misbehave, method, words) in [
+        ("panic", "advance", "panicked in advance"),
+        ("panic", "exchange", "panicked in exchange"),
+        ("panic", "update", "panicked in update"),
+        ("panic", "to_joints", "panicked in to_joints"),
+        ("panic", "quick_stop", "panicked in quick_stop"),
+        ("not-a-number", "advance", "not finite"),
+        ("not-a-number", "update", "ratio in range"),
+        ("beyond", "update", "ratio in range"),
+        ("not-a-number", "exchange", "not finite"),
+        ("beyond", "to_axes", "to joints and back"),
+        ("endless", "advance", "emits without end"),
+        ("order", "advance", "FAILED reports"),
+    ] {
+        let mischief = Mischief::of("any", misbehave, method, if method == "quick_stop" { 1 } else { 7 });
+        let (status, out) = check(&mischief);
+        assert!(status == Some(1) && out.contains(words), "{mischief}: {status:?}\n{out}");
+    }
+}

@@ -1,0 +1,8 @@
+//! Plugins in shared libraries: built with cargo, loaded by the host, judged, and put to all kinds of mischief.
+
+mod built;
+mod examples;
+mod hostile;
+mod identical;
+mod made;
+mod refusals;

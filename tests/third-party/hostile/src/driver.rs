@@ -1,0 +1,46 @@
+//! A driver.
+
+use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError, Setpoint};
+
+use crate::mischief::{Mischief, Options};
+
+pub struct Hostile(Mischief, usize);
+
+impl Hostile {
+    pub fn open(options: &Options) -> Result<Self, PluginError> {
+        Ok(Self(Mischief::new(options)?, 0))
+    }
+}
+
+impl Driver for Hostile {
+    fn describe(&self) -> DriverDescription {
+        self.0.quietly("describe");
+        DriverDescription::simulated()
+    }
+
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        self.1 = context.joint_count as usize;
+        self.0.of("open").map(|_| ())
+    }
+
+    fn start(&mut self) -> Result<(), PluginError> {
+        self.0.of("start").map(|_| ())
+    }
+
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        let what = self.0.of("exchange")?;
+        (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
+        feedback.position[0] = Mischief::number(what, feedback.position[0]);
+        let state = if setpoint.enable != 0 { JointState::Enabled } else { JointState::Disabled };
+        feedback.state[..self.1].fill(state);
+        Ok(())
+    }
+
+    fn quick_stop(&mut self) {
+        self.0.quietly("quick_stop");
+    }
+
+    fn stop(&mut self) {
+        self.0.quietly("stop");
+    }
+}

@@ -1,0 +1,25 @@
+//! A feed strategy.
+
+use tandem_sdk::{Answer, FeedStrategy, PluginError, Request, StrategyContext, Window};
+
+use crate::mischief::{Mischief, Options};
+
+pub struct Hostile(Mischief);
+
+impl Hostile {
+    pub fn open(options: &Options, _context: &StrategyContext) -> Result<Self, PluginError> {
+        Mischief::new(options).map(Self)
+    }
+}
+
+impl FeedStrategy for Hostile {
+    fn signals(&self) -> &'static [&'static str] {
+        self.0.quietly("signals");
+        &["mood"]
+    }
+
+    fn update(&mut self, _window: &Window) -> Result<Answer, PluginError> {
+        let what = self.0.of("update")?;
+        Ok(Answer { ratio: Mischief::number(what, 0.9), request: Request::None, signals: [0.5; 8] })
+    }
+}
