@@ -14,7 +14,14 @@ fn the_counter_counts() {
 
 #[test]
 fn exchange_and_quick_stop_do_not_allocate() {
-    let options = "model = \"second-order\"\n[[switches]]\ninput = 0\njoint = 0\nabove_mm = 0.5";
+    let motors = "model = \"servo\"\n[[servo]]\nencoder_counts = 8192\ncurrent_noise_ma = 5\n\
+                  [cutting.workpiece]\nrandom = { sections = 9, section_mm = [1, 2], depth_mm = [1, 2] }\n";
+    for model in ["model = \"second-order\"\n", motors] {
+        nothing_is_allocated(&format!("{model}[[switches]]\ninput = 0\njoint = 0\nabove_mm = 0.5"));
+    }
+}
+
+fn nothing_is_allocated(options: &str) {
     let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();
     driver.open(&DriverContext::new(8, 0.001)).unwrap();
     let mut feedback = Feedback::default();
