@@ -17,6 +17,7 @@ use crate::harness::mill;
 /// A program on the mill.
 pub struct Bench {
     program: PathBuf,
+    machine: PathBuf,
     text: String,
     pub judging: tandem_oracle::Machine,
     _folder: Option<tempfile::TempDir>,
@@ -35,7 +36,7 @@ impl Bench {
     pub fn of(program: &Path) -> Self {
         let text = std::fs::read_to_string(program).unwrap();
         let judging = tandem_oracle::Machine::read(&mill()).unwrap();
-        Self { program: program.to_owned(), text, judging, _folder: None }
+        Self { program: program.to_owned(), machine: mill(), text, judging, _folder: None }
     }
 
     /// A program text.
@@ -46,6 +47,12 @@ impl Bench {
         Self { _folder: Some(folder), ..Self::of(&path) }
     }
 
+    /// On another machine, with the planner that it names.
+    pub fn on(self, machine: &Path) -> Self {
+        let judging = tandem_oracle::Machine::read(machine).unwrap();
+        Self { machine: machine.to_owned(), judging, ..self }
+    }
+
     /// Runs it with commands, a line each as in `--commands`, undisturbed otherwise.
     pub fn run(&self, commands: &str) -> Ran {
         self.run_with(commands, &[])
@@ -54,7 +61,7 @@ impl Bench {
     /// Runs it with further settings of the machine.
     pub fn run_with(&self, commands: &str, settings: &[(&str, &str)]) -> Ran {
         let mut settings: Vec<_> = settings.iter().map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect();
-        if settings.iter().all(|(key, _)| key != "planner.plugin") {
+        if self.machine == mill() && settings.iter().all(|(key, _)| key != "planner.plugin") {
             settings.push(("planner.plugin".to_string(), "watched".to_string()));
         }
         let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
@@ -67,7 +74,7 @@ impl Bench {
     }
 
     fn drive(&self, settings: &[(String, String)], commands: &[Timed]) -> Result<Ran, HostError> {
-        let machine = Machine::read(&mill(), settings).unwrap();
+        let machine = Machine::read(&self.machine, settings).unwrap();
         let program = tandem_gcode::Program::open(&self.program).unwrap();
         let run = Run::prepare(machine, &registry(), program, Switches::default())?;
         let mut kept = Kept::default();
@@ -174,7 +181,8 @@ fn registry() -> Registry {
     let watched = local_plugin!(planner "watched" = watched);
     let boastful = local_plugin!(planner "boastful" = boastful);
     let mut registry = Registry::default();
-    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, watched, boastful] {
+    let linked = [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, tandem_smooth::PLUGIN];
+    for plugin in linked.into_iter().chain([watched, boastful]) {
         registry.register(plugin).unwrap();
     }
     registry

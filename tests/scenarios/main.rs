@@ -36,6 +36,7 @@ mod replay;
 mod report;
 mod script;
 mod single_block;
+mod smooth;
 mod starvation;
 mod stopping_time;
 mod stops;

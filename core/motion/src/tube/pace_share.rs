@@ -16,6 +16,10 @@ pub struct Rows<const L: usize> {
     pub slack: [[Lanes<L>; 2]; GROUPS],
     pub multiplier: [[Lanes<L>; 2]; GROUPS],
     pub residual: [[Lanes<L>; 2]; GROUPS],
+    /// 1 over slack times multiplier: one division gives both their inverses.
+    pub inverse: [[Lanes<L>; 2]; GROUPS],
+    /// What multiplies b in the rows of each group, in the last pass.
+    pub weight: [f64; GROUPS],
     pub single_slack: [f64; SINGLES],
     pub single_multiplier: [f64; SINGLES],
     pub single_residual: [f64; SINGLES],
@@ -72,13 +76,16 @@ impl<const L: usize> Share<L> {
     ) {
         let value: Lanes<L> = each(|l| form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2]);
         let over = sides.common - sides.right;
+        rows.weight[group] = sides.weight;
         self.violation = each(|l| larger(self.violation[l], over + value[l].abs()));
         let [mut d, mut g] = [[[0.0; L]; 2]; 2];
         for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
             let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
             let residual: Lanes<L> = each(|l| over + sign * value[l] + slack[l]);
             rows.residual[group][n] = residual;
-            let per_slack: Lanes<L> = each(|l| 1.0 / slack[l]);
+            let inverse: Lanes<L> = each(|l| 1.0 / (slack[l] * multiplier[l]));
+            rows.inverse[group][n] = inverse;
+            let per_slack: Lanes<L> = each(|l| multiplier[l] * inverse[l]);
             d[n] = each(|l| multiplier[l] * per_slack[l]);
             g[n] = each(|l| (target + multiplier[l] * residual[l]) * per_slack[l]);
         }

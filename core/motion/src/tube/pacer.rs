@@ -4,6 +4,10 @@ use super::lanes::{Lanes, each, larger, largest, smaller};
 use super::pace_share::{Form, GROUPS, Rows, SINGLES, Share, Sides};
 use crate::retime::{End, Pentadiagonal, Rate, weights};
 
+/// Slack times multiplier at the start.
+const START: f64 = 0.05;
+/// Weights of b at the start, in the middle and at the end of an interval.
+const VALUES: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.125, 0.75, 0.125], [0.0, 0.5, 0.5]];
 /// Least rate squared.
 const LEAST: f64 = 0.01;
 /// Mean complementarity that no solvable problem comes to.
@@ -55,6 +59,8 @@ pub struct Pacer<const L: usize> {
     /// Which unknown a coefficient is; negative for one that is fixed.
     unknown: Vec<i32>,
     unknowns: usize,
+    /// Mean complementarity.
+    gap: f64,
     /// The result.
     pub rate: Rate,
 }
@@ -69,6 +75,7 @@ impl<const L: usize> Default for Pacer<L> {
             step: Vec::new(),
             unknown: Vec::new(),
             unknowns: 0,
+            gap: 0.0,
             rate: Rate::default(),
         }
     }
@@ -158,7 +165,7 @@ impl<const L: usize> Pacer<L> {
     fn solve_any(&mut self, ends: (End, End), asked: &Asked) -> PaceStatus {
         self.name_unknowns(ends);
         self.start();
-        let mut status = PaceStatus { iterations: 0, gap: self.gap(), violation: f64::INFINITY };
+        let mut status = PaceStatus { iterations: 0, gap: START, violation: f64::INFINITY };
         let mut shrink = 0.1;
         loop {
             let target = shrink * status.gap;
@@ -172,12 +179,12 @@ impl<const L: usize> Pacer<L> {
             self.matrix.solve(&mut self.step);
             let length = self.advance(target);
             shrink = match length {
-                l if l > 0.9 => 0.1,
+                l if l > 0.9 => 0.03,
                 l if l > 0.7 => 0.2,
                 l if l > 0.4 => 0.4,
                 _ => 0.8,
             };
-            status.gap = self.gap();
+            status.gap = self.gap;
             status.iterations += 1;
         }
     }
@@ -209,7 +216,7 @@ impl<const L: usize> Pacer<L> {
             for (group, form) in forms.iter().enumerate() {
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                     slack[group][n] = each(|l| larger(1.0 - sign * (form[0][l] + form[1][l] + form[2][l]), 0.1));
-                    multiplier[group][n] = each(|l| 0.05 / slack[group][n][l]);
+                    multiplier[group][n] = each(|l| START / slack[group][n][l]);
                 }
             }
             let single_slack = [larger(most[0] - 1.0, 0.1), larger(most[1] - 1.0, 0.1), 1.0 - LEAST];
@@ -217,8 +224,10 @@ impl<const L: usize> Pacer<L> {
                 slack,
                 multiplier,
                 residual: [[[0.0; L]; 2]; GROUPS],
+                inverse: [[[0.0; L]; 2]; GROUPS],
+                weight: [0.0; GROUPS],
                 single_slack,
-                single_multiplier: single_slack.map(|s| 0.05 / s),
+                single_multiplier: single_slack.map(|s| START / s),
                 single_residual: [0.0; SINGLES],
             });
         }
@@ -230,19 +239,7 @@ impl<const L: usize> Pacer<L> {
     }
 
     #[inline(always)]
-    fn gap(&self) -> f64 {
-        let (mut pairs, mut singles) = ([0.0; L], 0.0);
-        for rows in &self.rows {
-            for group in 0..GROUPS {
-                for n in 0..2 {
-                    let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
-                    pairs = each(|l| pairs[l] + slack[l] * multiplier[l]);
-                }
-            }
-            for n in 0..SINGLES {
-                singles += rows.single_slack[n] * rows.single_multiplier[n];
-            }
-        }
+    fn mean(&self, pairs: &Lanes<L>, singles: f64) -> f64 {
         (pairs.iter().sum::<f64>() + singles) / (self.rows.len() * (2 * GROUPS * L + SINGLES)) as f64
     }
 
@@ -307,14 +304,21 @@ impl<const L: usize> Pacer<L> {
     #[inline(always)]
     fn advance(&mut self, target: f64) -> f64 {
         let (length, back) = self.turn_into_changes(target);
+        let (mut pairs, mut singles) = ([0.0; L], 0.0);
         for rows in &mut self.rows {
             for group in 0..GROUPS {
                 for n in 0..2 {
                     let change = rows.residual[group][n];
                     let (slack, multiplier) = (rows.slack[group][n], rows.multiplier[group][n]);
                     rows.slack[group][n] = each(|l| slack[l] + length * change[l]);
-                    rows.multiplier[group][n] =
-                        each(|l| multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) / slack[l]);
+                    let inverse = &rows.inverse[group][n];
+                    // Δλ = (target − λ·(s + Δs))/s.
+                    rows.multiplier[group][n] = each(|l| {
+                        let per_slack = multiplier[l] * inverse[l];
+                        multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) * per_slack
+                    });
+                    let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
+                    pairs = each(|l| pairs[l] + slack[l] * multiplier[l]);
                 }
             }
             for n in 0..SINGLES {
@@ -322,8 +326,10 @@ impl<const L: usize> Pacer<L> {
                     (rows.single_slack[n], rows.single_multiplier[n], rows.single_residual[n]);
                 rows.single_slack[n] = slack + length * change;
                 rows.single_multiplier[n] = multiplier + back * (target - multiplier * (slack + change)) / slack;
+                singles += rows.single_slack[n] * rows.single_multiplier[n];
             }
         }
+        self.gap = self.mean(&pairs, singles);
         for (coefficient, unknown) in self.rate.coefficients.iter_mut().zip(&self.unknown) {
             if let Ok(unknown) = usize::try_from(*unknown) {
                 *coefficient += length * self.step[unknown];
@@ -338,29 +344,28 @@ impl<const L: usize> Pacer<L> {
         // The largest relative decrease of a slack and of a multiplier.
         let (mut most, mut most_back) = ([0.0; L], [0.0; L]);
         for k in 0..self.forms.len() {
-            let beta = self.beta(k);
             let change = |n: usize| usize::try_from(self.unknown[k + n]).map_or(0.0, |u| self.step[u]);
             let step = [change(0), change(1), change(2)];
             let (forms, rows) = (&self.forms[k], &mut self.rows[k]);
-            let places = places(&beta);
+            let along = [dot(&VALUES[0], &step), dot(&VALUES[1], &step), dot(&VALUES[2], &step), 0.0];
             for group in 0..GROUPS {
                 let form = &forms[group];
-                let common = places.get(group).map_or(0.0, |place| place.weight * dot(&place.w, &step));
+                let common = rows.weight[group] * along[group];
                 let value: Lanes<L> = each(|l| form[0][l] * step[0] + form[1][l] * step[1] + form[2][l] * step[2]);
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                     let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
                     let residual = rows.residual[group][n];
                     let change: Lanes<L> = each(|l| -residual[l] - common - sign * value[l]);
                     rows.residual[group][n] = change;
-                    most = each(|l| larger(most[l], -change[l] / slack[l]));
-                    // The multiplier's change over itself: (target/λ − s − Δs)/s.
-                    most_back =
-                        each(|l| larger(most_back[l], (slack[l] + change[l] - target / multiplier[l]) / slack[l]));
+                    // Changes over themselves: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
+                    let inverse = &rows.inverse[group][n];
+                    let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
+                    most = each(|l| larger(most[l], shrinking[l]));
+                    most_back = each(|l| larger(most_back[l], 1.0 - shrinking[l] - target * inverse[l]));
                 }
             }
             for n in 0..SINGLES {
-                let place = &places[usize::from(n > 0)];
-                let along = dot(&place.w, &step) * if n == 2 { -1.0 } else { 1.0 };
+                let along = along[usize::from(n > 0)] * if n == 2 { -1.0 } else { 1.0 };
                 let (slack, multiplier) = (rows.single_slack[n], rows.single_multiplier[n]);
                 let change = -rows.single_residual[n] - along;
                 rows.single_residual[n] = change;

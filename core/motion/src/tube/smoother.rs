@@ -51,6 +51,8 @@ struct Rows<const L: usize> {
     slack: [Lanes<L>; 2],
     multiplier: [Lanes<L>; 2],
     residual: [Lanes<L>; 2],
+    /// 1 over slack times multiplier: one division gives both their inverses.
+    inverse: [Lanes<L>; 2],
 }
 
 /// Smooths; keeps its memory from one time to the next.
@@ -112,7 +114,7 @@ impl<const L: usize> Smoother<L> {
             let free = 3..spline.points.len() - 3;
             banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
             let length = self.advance(spline, &target);
-            shrink = each(|l| if length[l] > 0.8 { 0.1 } else { 0.4 });
+            shrink = each(|l| if length[l] > 0.8 { 0.05 } else { 0.4 });
             gap = self.gap();
             status.iterations += 1;
         }
@@ -128,8 +130,9 @@ impl<const L: usize> Smoother<L> {
             let value: Lanes<L> = each(|l| (at[l] - site.point[l]) * per_half[l]);
             let slack = [each(|l| larger(1.0 - value[l], 0.2)), each(|l| larger(1.0 + value[l], 0.2))];
             let multiplier = [each(|l| 0.05 / slack[0][l]), each(|l| 0.05 / slack[1][l])];
-            let residual = [[0.0; L]; 2];
-            self.rows.push(Rows { interval, weights: w, point: site.point, per_half, slack, multiplier, residual });
+            let (residual, inverse) = ([[0.0; L]; 2], [[0.0; L]; 2]);
+            let point = site.point;
+            self.rows.push(Rows { interval, weights: w, point, per_half, slack, multiplier, residual, inverse });
         }
     }
 
@@ -165,7 +168,9 @@ impl<const L: usize> Smoother<L> {
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                 let (slack, multiplier) = (&row.slack[n], &row.multiplier[n]);
                 row.residual[n] = each(|l| sign * value[l] - 1.0 + slack[l]);
-                let per_slack: Lanes<L> = each(|l| 1.0 / slack[l]);
+                let inverse: Lanes<L> = each(|l| 1.0 / (slack[l] * multiplier[l]));
+                let per_slack: Lanes<L> = each(|l| multiplier[l] * inverse[l]);
+                row.inverse[n] = inverse;
                 weight = each(|l| weight[l] + multiplier[l] * per_slack[l]);
                 slope = each(|l| slope[l] + sign * (target[l] + multiplier[l] * row.residual[n][l]) * per_slack[l]);
             }
@@ -218,13 +223,14 @@ impl<const L: usize> Smoother<L> {
             let steps = self.step[row.interval..].first_chunk().expect("four control points");
             let along = combine(&row.weights, steps);
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                let (slack, multiplier) = (&row.slack[n], &row.multiplier[n]);
+                let multiplier = &row.multiplier[n];
                 row.residual[n] = each(|l| -row.residual[n][l] - sign * along[l] * row.per_half[l]);
                 let change = &row.residual[n];
-                most = each(|l| larger(most[l], -change[l] / slack[l]));
-                // The multiplier's change over itself: (target/λ − s − Δs)/s.
-                most_back =
-                    each(|l| larger(most_back[l], (slack[l] + change[l] - target[l] / multiplier[l]) / slack[l]));
+                // Changes over themselves: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
+                let inverse = &row.inverse[n];
+                let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
+                most = each(|l| larger(most[l], shrinking[l]));
+                most_back = each(|l| larger(most_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
             }
         }
         let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
@@ -233,8 +239,12 @@ impl<const L: usize> Smoother<L> {
             for n in 0..2 {
                 let (slack, multiplier, change) = (row.slack[n], row.multiplier[n], row.residual[n]);
                 row.slack[n] = each(|l| slack[l] + length[l] * change[l]);
-                row.multiplier[n] =
-                    each(|l| multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) / slack[l]);
+                let inverse = &row.inverse[n];
+                // Δλ = (target − λ·(s + Δs))/s.
+                row.multiplier[n] = each(|l| {
+                    let per_slack = multiplier[l] * inverse[l];
+                    multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) * per_slack
+                });
             }
         }
         for (point, step) in spline.points.iter_mut().zip(&self.step) {

@@ -7,6 +7,8 @@ use tandem_sdk::{
 };
 use tandem_smooth::{Effort, Options, SmoothPlanner};
 
+pub mod programs;
+
 pub type Point = [f64; 3];
 
 /// Three linear axes: 250 mm/s, 1000 mm/s², 20 000 mm/s³.
@@ -139,7 +141,7 @@ pub struct Peaks {
     pub deviation_mm: [f64; 2],
 }
 
-/// Judges samples; distances by brute force over every chord where that is affordable.
+/// Judges samples; distances by brute force over every chord.
 pub fn judge(samples: &[Point], points: &[Point]) -> Peaks {
     let mut padded = vec![samples[0]; 4];
     padded.extend(samples);
@@ -152,14 +154,13 @@ pub fn judge(samples: &[Point], points: &[Point]) -> Peaks {
     let acceleration = differences(&velocity);
     let jerk = differences(&acceleration);
     let size = |v: &Point| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let brute = points.len() * samples.len() < 30_000_000;
     Peaks {
         time_s: (samples.len() - 1) as f64 * 1e-3,
         speed: velocity.iter().map(size).fold(0.0, f64::max),
         axis_speed: most(&velocity),
         acceleration: most(&acceleration),
         jerk: most(&jerk),
-        deviation_mm: [deviation(samples, points, brute), deviation(points, samples, brute)],
+        deviation_mm: [deviation(samples, points), deviation(points, samples)],
     }
 }
 
@@ -172,20 +173,38 @@ fn distance(p: &Point, a: &Point, b: &Point) -> f64 {
     (0..3).map(|i| (w[i] - share * d[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The largest distance of `points` from the chain; not by brute force it is looked for near the last place.
-fn deviation(points: &[Point], chain: &[Point], brute: bool) -> f64 {
-    let (mut near, mut worst) = (0usize, 0.0f64);
+/// Chords whose box is looked at before they are.
+const BOXED: usize = 32;
+
+/// The largest distance of `points` from the chain: over every chord, but for those whose box is farther than the best.
+fn deviation(points: &[Point], chain: &[Point]) -> f64 {
+    let boxes: Vec<[Point; 2]> = (0..chain.len() - 1)
+        .step_by(BOXED)
+        .map(|from| {
+            let part = &chain[from..(from + BOXED + 1).min(chain.len())];
+            let bound = |of: fn(f64, f64) -> f64| -> Point {
+                std::array::from_fn(|i| part.iter().map(|p| p[i]).reduce(of).unwrap())
+            };
+            [bound(f64::min), bound(f64::max)]
+        })
+        .collect();
+    let (mut near, mut worst) = (0, 0.0f64);
     for point in points {
-        let last = chain.len() - 1;
-        let (from, to) = if brute { (0, last) } else { (near.saturating_sub(60), (near + 120).min(last)) };
-        let (mut best, mut found) = (f64::INFINITY, near);
-        for i in from..to {
-            let off = distance(point, &chain[i], &chain[i + 1]);
-            if off < best {
-                (best, found) = (off, i);
+        let mut best = f64::INFINITY;
+        // The box of the last point first: the others are then mostly out of reach.
+        for n in std::iter::once(near).chain(0..boxes.len()) {
+            let [low, high] = &boxes[n];
+            let way = |i: usize| (low[i] - point[i]).max(point[i] - high[i]).max(0.0);
+            if way(0).hypot(way(1)).hypot(way(2)) > best {
+                continue;
+            }
+            for i in n * BOXED..((n + 1) * BOXED).min(chain.len() - 1) {
+                let off = distance(point, &chain[i], &chain[i + 1]);
+                if off < best {
+                    (best, near) = (off, n);
+                }
             }
         }
-        near = found;
         worst = worst.max(best);
     }
     worst
