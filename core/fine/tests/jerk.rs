@@ -19,6 +19,23 @@ fn circle(radius_mm: f64, feed: f64, share: f64) -> Plan {
     Plan::new(pieces, feed, move |s| [radius_mm * (s / radius_mm).cos() - radius_mm, radius_mm * (s / radius_mm).sin()])
 }
 
+/// A line in X that uses the limits to 0.999, as planners aim at.
+fn line_at_the_limits() -> Plan {
+    let pieces = profile(60.0, 60.0, 0.999 * LIMITS.acceleration, 0.999 * LIMITS.jerk);
+    Plan::new(pieces, 60.0, |s| [s, 0.0])
+}
+
+#[test]
+fn a_hold_at_every_tick_of_a_plan_at_the_limits_ends() {
+    let plan = line_at_the_limits();
+    let unheld = Machine::new(&plan).run_to_end().speeds();
+    let ticks = (plan.duration_s() / PERIOD_S) as u64;
+    let relaxed: u64 = (1..ticks).map(|tick| hold_at(&plan, &unheld, tick, &format!("hold at {tick}"))).sum();
+    println!("{ticks} holds, {relaxed} relaxed samples");
+    // The plan leaves nothing for σ where it eases off: that is what the count is for.
+    assert!(relaxed * 5 < ticks, "{relaxed} of {ticks} holds needed a relaxed sample");
+}
+
 fn plans() -> [(&'static str, Plan); 3] {
     [("line", line()), ("large circle", circle(20.0, 60.0, 0.5)), ("small circle", circle(3.0, 25.0, 0.6))]
 }

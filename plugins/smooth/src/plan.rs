@@ -14,13 +14,20 @@ use crate::window::{Piece, State, Window};
 const JERK_SHARE: f64 = 0.995;
 const ACCELERATION_SHARE: f64 = 0.985;
 const FEED_SHARE: f64 = 0.9995;
+/// Gain of the last round that asks for another, and how many there may be.
+const MUCH: f64 = 0.01;
+const EXTRA: usize = 2;
+/// Violation of a row, as a share of its limit, beyond which there is no rate.
+const INFEASIBLE: f64 = 0.004;
+/// Intervals behind a start in motion in which smoothing holds jerk down.
+const FIRM_INTERVALS: usize = 12;
 /// Intervals of a window at least and at most.
 pub const INTERVALS: (usize, usize) = (7, 420);
 /// Largest rate squared.
 const MOST: f64 = 16.0;
 /// Mean complementarity asked of the last round, and of those before.
 const GAP: f64 = 1e-5;
-const LOOSE: f64 = 1e-3;
+const LOOSE: f64 = 3e-3;
 /// Gain of a round, as a share of the time, that is worth another.
 const GAIN: f64 = 2e-3;
 
@@ -33,7 +40,7 @@ pub struct Tuning {
     pub window_s: f64,
     /// Share of the boxes that is used.
     pub box_share: f64,
-    /// Rounds.
+    /// Rounds of a window in motion; one from rest has twice as many.
     pub rounds: usize,
     /// Rounds more where the window does not pass.
     pub repairs: usize,
@@ -56,6 +63,7 @@ pub struct Start<'a, const L: usize> {
 
 /// Part of what is left of the window before whose timing is taken over.
 const WARM: f64 = 0.55;
+
 
 /// Counts of what was done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,6 +99,8 @@ pub struct Planning<const L: usize> {
     marks: Vec<Mark>,
     times: Vec<f64>,
     checker: Checker<L>,
+    /// The last round found no rate that keeps all rows.
+    infeasible: bool,
 }
 
 /// What a round takes back.
@@ -100,6 +110,8 @@ struct Shares {
     acceleration: f64,
     boxes: f64,
     feed: f64,
+    /// What jerk counts behind a start in motion.
+    firm: f64,
 }
 
 impl<const L: usize> Planning<L> {
@@ -116,6 +128,7 @@ impl<const L: usize> Planning<L> {
             marks: Vec::new(),
             times: Vec::new(),
             checker: Checker::default(),
+            infeasible: false,
         }
     }
 
@@ -137,11 +150,14 @@ impl<const L: usize> Planning<L> {
             acceleration: ACCELERATION_SHARE,
             boxes: self.tuning.box_share,
             feed: FEED_SHARE,
+            firm: 1.0,
         };
         let mut before_s = self.marks[self.marks.len() - 1].t;
+        // Without the timing of a window before there is more to be found.
+        let rounds = if start.old.is_none() { 2 * self.tuning.rounds } else { self.tuning.rounds };
         let (mut round, mut repairs, mut settled) = (1, 0, false);
         loop {
-            let last = settled || round >= self.tuning.rounds;
+            let last = settled || round >= rounds;
             self.effort.rounds += 1;
             if !self.round(run, frame, start, &shares, &counted, last) {
                 return false;
@@ -149,7 +165,9 @@ impl<const L: usize> Planning<L> {
             let now_s = self.marks[self.marks.len() - 1].t;
             let gained = (before_s - now_s) / now_s;
             before_s = now_s;
-            if !last {
+            // Where a round still gains much, another is worth its time.
+            let promising = last && !settled && gained > MUCH && round < rounds + EXTRA;
+            if !last || promising {
                 settled = gained.abs() < GAIN;
                 round += 1;
                 continue;
@@ -164,9 +182,13 @@ impl<const L: usize> Planning<L> {
                 self.effort.rejected += 1;
                 return false;
             }
-            shares = take_back(shares, &checked);
+            shares = if self.infeasible && !start.resting {
+                Shares { firm: 10.0 * shares.firm, ..shares }
+            } else {
+                take_back(shares, &checked)
+            };
             repairs += 1;
-            round = self.tuning.rounds;
+            round = rounds;
             self.effort.repairs += 1;
         }
     }
@@ -204,15 +226,17 @@ impl<const L: usize> Planning<L> {
         let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
         self.lay_spline(run, start, &grid);
         self.sites.choose(run, &self.marks, grid, shares.boxes);
+        self.smoother.firm = if start.resting { (0, 1.0) } else { (FIRM_INTERVALS, shares.firm) };
         let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.chosen, &frame.jerk);
         self.fill_pacer(run, frame, shares, counted);
         let asked = if last {
-            Asked { gap: GAP, violation: 0.004, iterations: 25 }
+            Asked { gap: GAP, violation: INFEASIBLE, iterations: 25 }
         } else {
             Asked { gap: LOOSE, violation: 0.05, iterations: 25 }
         };
         let begin = if start.resting { End::Rest } else { End::Moving };
         let paced = self.pacer.solve((begin, End::Rest), &asked);
+        self.infeasible = paced.violation > INFEASIBLE;
         self.effort.intervals += intervals as u64;
         self.effort.smooth_iterations += smoothed.iterations as u64;
         self.effort.pace_iterations += paced.iterations as u64;
@@ -353,5 +377,6 @@ fn take_back(shares: Shares, checked: &Checked) -> Shares {
         acceleration: less(shares.acceleration, checked.acceleration, 0.998),
         boxes: less(shares.boxes, checked.deviation, 0.96),
         feed: less(shares.feed, checked.speed, 0.9995),
+        firm: shares.firm,
     }
 }

@@ -13,7 +13,7 @@ use crate::sites::Timer;
 use crate::window::{Bound, Piece, Stop, Window};
 
 /// Share of a limit that the motion may reach at an instant.
-const SPEED: f64 = 1.0;
+const SPEED: f64 = 0.999_97;
 const ACCELERATION: f64 = 0.9995;
 const JERK: f64 = 1.003;
 /// Share of the tolerance that samples at this phase may reach: at others it is a little more.
@@ -74,7 +74,7 @@ impl<const L: usize> Checker<L> {
             let feed = feeder.highest(window, n);
             let shares = derivatives(&window.pieces[n], frame, speed, counted, feed, &mut window.stop);
             window.pieces[n].bound = bound(&shares);
-            checked.speed = larger(checked.speed, larger(shares.feed, shares.speed));
+            checked.speed = larger(checked.speed, larger(shares.feed, shares.speed) / SPEED);
             checked.acceleration = larger(checked.acceleration, shares.acceleration / ACCELERATION);
             checked.jerk = larger(checked.jerk, shares.jerk / JERK);
         }
@@ -251,7 +251,7 @@ fn derivatives<const L: usize>(
         let mut squared = 0.0;
         for l in 0..L {
             squared += (counted[l] * v[l]).powi(2);
-            reached.speed = larger(reached.speed, v[l].abs() / (SPEED * speed[l]));
+            reached.speed = larger(reached.speed, v[l].abs() / speed[l]);
             reached.acceleration = larger(reached.acceleration, a[l].abs() / frame.acceleration[l]);
         }
         reached.feed = larger(reached.feed, squared.sqrt() / feed);

@@ -9,6 +9,9 @@ use crate::outlook::{Ahead3, Outlook};
 
 /// Share of the limits that is aimed at: the rest covers what changes within a period.
 const MARGIN: f64 = 0.995;
+/// Share of jerk and acceleration that σ is foreseen to have at least, where the plan uses all of them: without any it would
+/// never leave a rest there. The one tolerance on jerk covers it; what the acceleration really leaves counts later.
+const LEFT: f64 = 0.006;
 /// Least rate that is told from none.
 const SLOWEST: f64 = 1e-4;
 /// Least way to an aim that is told from none.
@@ -188,7 +191,7 @@ impl Governor {
             for (axis, (_, limit)) in outlook.limits() {
                 let planned = sigma * sigma * sigma * point.jerk[axis];
                 let turning = 3.0 * point.acceleration[axis] * sigma;
-                let most = (MARGIN * limit).max(planned.abs());
+                let most = (MARGIN * limit).max(planned.abs() + LEFT * limit);
                 interval.keep(planned + turning * rate, point.velocity[axis] + turning * part * h, most);
             }
         }
@@ -236,7 +239,7 @@ impl Governor {
             let speed = point.velocity[axis].abs();
             let turning = 3.0 * towards * point.acceleration[axis] * sigma;
             let planned = towards * point.jerk[axis] * sigma * sigma * sigma;
-            let room = (MARGIN * jerk_limit + direction * planned).max(0.0);
+            let room = (MARGIN * jerk_limit + direction * planned).max(LEFT * jerk_limit);
             let square = (speed + 2.0 * way.there_s * turning).max(0.0);
             let slope = 2.0 * (way.there_s * room - left * turning);
             let coming = outlook.share * root(square, slope, 2.0 * left * room);
@@ -244,7 +247,7 @@ impl Governor {
             let accelerated = towards * direction * point.acceleration[axis];
             // Speeding up adds to what the plan accelerates at the aim, slowing down to what it brakes at the present rate.
             let share = if direction > 0.0 { 1.0 } else { sigma * sigma };
-            let held = (MARGIN * limit - (share * accelerated).max(0.0)).max(0.0) / speed;
+            let held = (MARGIN * limit - (share * accelerated).max(0.0)).max(LEFT * limit) / speed;
             // Where the axis turns round, σ̈ is no help.
             let help = speed * outlook.rate_change_per_s2;
             let turned = (room + help) / (-turning).max(f64::MIN_POSITIVE);
