@@ -33,7 +33,7 @@ fn a_hold_at_every_tick_of_a_plan_at_the_limits_ends() {
     let relaxed: u64 = (1..ticks).map(|tick| hold_at(&plan, &unheld, tick, &format!("hold at {tick}"))).sum();
     println!("{ticks} holds, {relaxed} relaxed samples");
     // The plan leaves nothing for σ where it eases off: that is what the count is for.
-    assert!(relaxed * 5 < ticks, "{relaxed} of {ticks} holds needed a relaxed sample");
+    assert!(relaxed * 3 < ticks, "{relaxed} of {ticks} holds needed a relaxed sample");
 }
 
 fn plans() -> [(&'static str, Plan); 3] {

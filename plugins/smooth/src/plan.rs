@@ -64,7 +64,6 @@ pub struct Start<'a, const L: usize> {
 /// Part of what is left of the window before whose timing is taken over.
 const WARM: f64 = 0.55;
 
-
 /// Counts of what was done.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Effort {

@@ -12,6 +12,8 @@ use crate::plan::Effort;
 
 /// Most straight pieces that are held.
 pub const BUFFER_CHORDS: usize = 65_536;
+/// Time that is told from none, s.
+const LEAST_S: f64 = 1e-9;
 /// Least path tolerance of a block that does not end at rest, mm.
 const LEAST_TOLERANCE_MM: f64 = 2e-4;
 
@@ -100,7 +102,8 @@ impl Planner for SmoothPlanner {
 
     fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
-        while emitted_s < duration_s {
+        // What rounding leaves of the duration is no time to rest or move.
+        while duration_s - emitted_s > LEAST_S {
             match self.core.emit(duration_s - emitted_s, sink)? {
                 Some(part_s) => emitted_s += part_s,
                 None => break,

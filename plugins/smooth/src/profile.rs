@@ -92,7 +92,7 @@ pub fn drive<const L: usize>(
 fn stop<const L: usize>(frame: &Frame<L>, counted: &Lanes<L>, direction: &Lanes<L>, peak: f64) -> Stop {
     let per = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>().sqrt().max(1e-12);
     Stop {
-        deceleration: per * along(&frame.acceleration, direction),
+        time_s: peak / along(&frame.acceleration, direction),
         jerk: per * along(&frame.jerk, direction),
         speed: per * peak,
     }

@@ -6,16 +6,18 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, dot, minus};
+use crate::frame::{Frame, dot, largest, minus};
 use crate::plan::Start;
 use crate::route::Run;
 use crate::sites::Timer;
 use crate::window::{Bound, Piece, Stop, Window};
 
 /// Share of a limit that the motion may reach at an instant.
-const SPEED: f64 = 0.999_97;
+const SPEED: f64 = 1.0;
 const ACCELERATION: f64 = 0.9995;
 const JERK: f64 = 1.003;
+/// Share of the feed from which on a piece is looked at more closely.
+const NEAR_FEED: f64 = 0.9988;
 /// Share of the tolerance that samples at this phase may reach: at others it is a little more.
 const DEVIATION: f64 = 0.985;
 /// Below this share of the tolerance nothing nearer is looked for.
@@ -259,8 +261,25 @@ fn derivatives<const L: usize>(
             leave(stop, frame, &v, &a, squared.sqrt());
         }
     }
+    if reached.feed > NEAR_FEED {
+        reached.feed = peak_feed(piece, counted, feed, reached.jerk * largest(&frame.jerk));
+    }
     reached
 }
+
+/// The highest path speed of a piece as a share of its feed: at sixteenths, and what jerk can add between them.
+fn peak_feed<const L: usize>(piece: &Piece<L>, counted: &Lanes<L>, feed: f64, jerk: f64) -> f64 {
+    let step_s = piece.duration_s / 16.0;
+    let mut most = 0.0;
+    for n in 0..=16 {
+        let v = piece.velocity(f64::from(n) * step_s);
+        most = larger(most, (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum());
+    }
+    (most.sqrt() + jerk * step_s * step_s / 8.0) / feed
+}
+
+/// Share of an acceleration limit that counts as left at least, for the moment that turning takes all of it.
+const LEAST_LEFT: f64 = 0.02;
 
 /// Notes what is left for a stop: with d the direction and n what turns, `A − max(0, −sign(d)·n)` over |d|.
 fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &Lanes<L>, speed: f64) {
@@ -274,7 +293,7 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
         let d = v[l] / speed;
         let turning = (a[l] - along * v[l]) * d.signum();
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
-        stop.deceleration = stop.deceleration.min(left / d.abs().max(1e-9));
+        stop.time_s = stop.time_s.max(speed * d.abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
         stop.jerk = stop.jerk.min(frame.jerk[l] / d.abs().max(1e-9));
     }
 }

@@ -87,21 +87,32 @@ pub struct Window<const L: usize> {
     pub whole: bool,
     /// Until when it is to be driven, s.
     pub commit_s: f64,
-    /// What it leaves for a stop: path deceleration and path jerk; and its highest path speed.
+    /// What it leaves for a stop.
     pub stop: Stop,
 }
 
 /// What a window leaves for a stop, as path speed counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    pub deceleration: f64,
+    /// The longest time that a stop takes at the deceleration left where it begins, s. Where the path turns sharply little
+    /// is left, but speed is low there.
+    pub time_s: f64,
+    /// Least path jerk of the limits.
     pub jerk: f64,
+    /// Highest path speed.
     pub speed: f64,
+}
+
+impl Stop {
+    /// The deceleration that is left everywhere, in proportion to speed.
+    pub fn deceleration(&self) -> f64 {
+        if self.time_s > 0.0 { self.speed / self.time_s } else { f64::INFINITY }
+    }
 }
 
 impl Default for Stop {
     fn default() -> Self {
-        Self { deceleration: f64::INFINITY, jerk: f64::INFINITY, speed: 0.0 }
+        Self { time_s: 0.0, jerk: f64::INFINITY, speed: 0.0 }
     }
 }
 

@@ -28,8 +28,7 @@ fn random_programs_keep_all_limits() {
         assert!(peaks.deviation_mm.iter().all(|off| *off <= 0.01), "{what}");
         assert_eq!(collected.reports.len(), blocks.len(), "{what}");
         (stops, refused) = (stops + effort.stops, refused + effort.rejected);
-        let exact: Vec<Block> =
-            blocks.iter().map(|block| Block { path_mode: PathMode::ExactStop, ..*block }).collect();
+        let exact: Vec<Block> = blocks.iter().map(|block| Block { path_mode: PathMode::ExactStop, ..*block }).collect();
         let stopping = run(&exact, &Options::default(), &context).0;
         let stopping_s = samples(&stopping.segments).len() as f64 * 1e-3;
         let (sum, count) = &mut ratios[(seed % KINDS.len() as u64) as usize];

@@ -12,6 +12,8 @@ const MARGIN: f64 = 0.995;
 /// Share of jerk and acceleration that σ is foreseen to have at least, where the plan uses all of them: without any it would
 /// never leave a rest there. The one tolerance on jerk covers it; what the acceleration really leaves counts later.
 const LEFT: f64 = 0.006;
+/// By which share of the limit jerk goes beyond it where it must: the first that leaves a rate is taken.
+const EXCESSES: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
 /// Least rate that is told from none.
 const SLOWEST: f64 = 1e-4;
 /// Least way to an aim that is told from none.
@@ -112,13 +114,21 @@ impl Governor {
         let mut firm = Interval::ALL;
         self.accelerations(outlook, &mut firm);
         let mut all = firm;
-        self.jerks(outlook, &mut all);
+        self.jerks(outlook, 0.0, &mut all);
         // Where next to nothing moves the limits leave more than small steps; to come in they are there.
         let small = outlook.most_change_per_s2;
         let (down, up) = if self.rate_per_s < 0.0 { (small, 4.0 * small) } else { (4.0 * small, small) };
         let foreseen = early.nearest(wanted).clamp(-down, up);
         let relaxed = all.is_empty();
-        let chosen = if relaxed { firm.nearest(all.nearest(foreseen)) } else { all.nearest(foreseen) };
+        let mut least = all;
+        for excess in EXCESSES {
+            if !least.is_empty() {
+                break;
+            }
+            least = firm;
+            self.jerks(outlook, excess, &mut least);
+        }
+        let chosen = if least.is_empty() { firm.nearest(foreseen) } else { least.nearest(foreseen) };
         let before = self.rate_per_s;
         let delta_s = self.pass(chosen);
         // Where σ has met an end of its range, σ̇ ended there and not as chosen.
@@ -182,8 +192,8 @@ impl Governor {
         }
     }
 
-    /// Jerk at the points of the period.
-    fn jerks(&self, outlook: &Outlook, interval: &mut Interval) {
+    /// Jerk at the points of the period, up to `excess` of the limit beyond it.
+    fn jerks(&self, outlook: &Outlook, excess: f64, interval: &mut Interval) {
         let (h, rate) = (self.period_s, self.rate_per_s);
         for point in outlook.iter().take_while(|p| p.offset_s <= h) {
             let part = (point.offset_s / (h * self.sigma).max(f64::MIN_POSITIVE)).min(1.0);
@@ -191,7 +201,7 @@ impl Governor {
             for (axis, (_, limit)) in outlook.limits() {
                 let planned = sigma * sigma * sigma * point.jerk[axis];
                 let turning = 3.0 * point.acceleration[axis] * sigma;
-                let most = (MARGIN * limit).max(planned.abs() + LEFT * limit);
+                let most = (MARGIN * limit).max(planned.abs() + LEFT * limit) + excess * limit;
                 interval.keep(planned + turning * rate, point.velocity[axis] + turning * part * h, most);
             }
         }

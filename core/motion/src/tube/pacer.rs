@@ -353,7 +353,7 @@ impl<const L: usize> Pacer<L> {
                 let common = rows.weight[group] * along[group];
                 let value: Lanes<L> = each(|l| form[0][l] * step[0] + form[1][l] * step[1] + form[2][l] * step[2]);
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
+                    let multiplier = &rows.multiplier[group][n];
                     let residual = rows.residual[group][n];
                     let change: Lanes<L> = each(|l| -residual[l] - common - sign * value[l]);
                     rows.residual[group][n] = change;

@@ -200,7 +200,8 @@ impl<const L: usize> Smoother<L> {
         const D: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
         let scale = &self.scale;
         let jerk: Lanes<L> = each(|l| (c[3][l] - c[0][l] + 3.0 * (c[1][l] - c[2][l])) * scale[l]);
-        let bend: Lanes<L> = each(|l| (GENTLE + if jerk[l].abs() > CLOSING { weight } else { 0.0 }) * scale[l] * scale[l]);
+        let bend: Lanes<L> =
+            each(|l| (GENTLE + if jerk[l].abs() > CLOSING { weight } else { 0.0 }) * scale[l] * scale[l]);
         let slope: Lanes<L> = each(|l| {
             let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
             (GENTLE * jerk[l] + weight * over) * scale[l]
