@@ -1,5 +1,6 @@
 //! The planner inside the tolerance, end to end: times, jerk too, random programs, holds, stalls and overrides.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use tandem_oracle::{Check, Options};
@@ -161,10 +162,10 @@ fn override_steps_are_followed_smoothly() {
         let mut tick = 0;
         for _ in 0..6 {
             tick += 1 + random.below(400);
-            lines += &format!("{tick},feed-override,{:.3}\n", random.between(0.0, 1.0));
+            writeln!(lines, "{tick},feed-override,{:.3}", random.between(0.0, 1.0)).unwrap();
             tick += 150;
         }
-        lines += &format!("{tick},feed-override,1\n");
+        writeln!(lines, "{tick},feed-override,1").unwrap();
         check(&bench, &bench.run(&lines)).map(|_| ())
     });
 }
