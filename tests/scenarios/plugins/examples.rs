@@ -77,7 +77,9 @@ fn a_kinematics_moves_the_joints_of_a_corexy_machine() {
         set("driver.plugin", &third_party("csv-recorder")),
         set("driver.options.file", &file),
     ];
-    let done = with(Scenario::text("G21 G90\nF1000\nG1 X20 Y4\nM2\n"), &settings.concat()).run();
+    let machine = root().join("examples/machines/corexy.toml");
+    let scenario = Scenario::text("G21 G90\nF1000\nG1 X20 Y4\nM2\n").on(&machine);
+    let done = with(scenario, &settings.concat()).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     let recorded = std::fs::read_to_string(&file).unwrap();
     assert!(recorded.lines().last().unwrap().ends_with("[24.0, 16.0, 0.0]"), "{:?}", recorded.lines().last());

@@ -84,7 +84,7 @@ const METHODS: &[(&str, &str, &[u32])] = &[
 
 #[test]
 fn it_behaves_where_it_is_told_nothing() {
-    for section in ["planner", "feed_strategy", "driver", "kinematics"] {
+    for section in ["planner", "feed_strategy", "driver"] {
         let ran = Mischief::of(section, "never", "", 1).run().unwrap();
         assert_eq!(ran.outcome.summary.fault, None, "{section}");
     }
