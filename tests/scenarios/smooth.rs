@@ -75,6 +75,48 @@ fn everything_a_program_may_hold_keeps_limits_and_tolerance() {
     assert_strict(&done);
 }
 
+/// Linear and rotary axes together and each alone; a rapid, an arc with a rotary axis, short lines.
+const ROTARY: &str = "\
+G21 G90 G94 G17 G64 P0.01
+F2000
+G1 X10 A20 B5 C3
+G1 X20 Y5 A10 C8
+G1 X22 Y7
+G1 A40 B10
+G1 A10 B4 C1 F1000
+G1 X30 Y7 A30
+G2 X34 Y3 J-4 A35
+G1 X40 Y0 Z2 A0 B0 C0
+G0 A90
+G1 A45
+G1 X50 A46
+G1 X50.5 Y0.2 A46.5 B0.3
+G1 X51 Y0.1 A47
+M2
+";
+
+#[test]
+fn six_axes_keep_limits_and_tolerance() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("six-axes.toml");
+    let mut text = std::fs::read_to_string(machine()).unwrap();
+    for axis in ["a", "b", "c"] {
+        write!(
+            text,
+            "\n[axes.{axis}]\nkind = \"rotary\"\ntravel_deg = [-3600, 3600]\nmax_feed_deg_per_min = 10000\n\
+             max_rapid_deg_per_min = 10000\nmax_acceleration_deg_per_s2 = 2000\nmax_jerk_deg_per_s3 = 40000\n"
+        )
+        .unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    assert_strict(&Scenario::text(ROTARY).on(&path).run());
+}
+
+#[test]
+fn a_curve_is_driven_inside_the_tolerance() {
+    assert_strict(&Scenario::of(&root().join("tests/fixtures/programs/butterfly.ngc")).on(&machine()).run());
+}
+
 fn bench(text: &str) -> Bench {
     Bench::text(text).on(&machine())
 }
