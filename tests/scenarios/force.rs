@@ -247,6 +247,71 @@ fn a_lower_air_feed_keeps_the_torque_of_an_entry_low() {
     assert!(fast > 1.8 * slow && slow < 0.14);
 }
 
+#[test]
+fn a_diagonal_cut_over_xy_counts_as_one_torque() {
+    let xy = "driver.options.cutting.workpiece={ over = \"xy\", origin_mm = [4, 3], direction_deg = 36.869897645844, steps = \
+              [[8, 2], [18, 3], [34, 0]], entry_radius_mm = 5 }";
+    let program = Scenario::text("G21 G90\nS900 M3\nG1 X36 Y27 F150\nM5\nM2\n").on(&machine("demo"));
+    let done = with(program, &[xy]).run();
+    assert_within_limits(&done);
+    let cut = cut(&done, [12.0, 26.0]);
+    println!("rms error {:.2} mN·m, estimate {:.2} mN·m rms", 1e3 * cut.rms_error_nm, 1e3 * cut.estimate_rms_nm);
+    assert!(cut.rms_error_nm < 7e-3 && cut.estimate_rms_nm < 2e-3 && (cut.mean_nm - 0.1).abs() < 2e-3);
+}
+
+#[test]
+fn tooth_ripple_does_not_reach_the_feed() {
+    let ripple = "driver.options.cutting.tooth_ripple=0.5";
+    let rates = |settings: &[&str]| {
+        let feeds = cut(&scenario("step", settings).run(), STEP).feeds_mm_per_min;
+        println!("{settings:?}: {feeds:?} mm/min");
+        feeds
+    };
+    // Over 8 ms alone the published loop swings from 78 to 261 mm/min. 40 teeth: their period is below a rough one.
+    let (whole, rough) = (rates(&[ripple]), rates(&[ripple, "feed_strategy.options.teeth=40"]));
+    assert!(whole.0 > 110.0 && whole.1 < 230.0 && rough.0 < 80.0);
+}
+
+#[test]
+fn a_feed_programmed_above_the_bound_is_not_driven_and_a_hold_is_asked_for_once() {
+    // The rapid goes through the material.
+    let text = "G21 G90\nS900 M3\nG1 X20 F600\nG0 Y10\nG1 X0\nM5\nM2\n";
+    let done = Scenario::text(text).on(&machine("step")).run();
+    let errors = done.errors();
+    assert_eq!((done.status(), errors.matches("asks for a hold").count()), (3, 1), "{errors}");
+    let (lines, feeds) = (done.column("line"), done.column("feed_mm_s"));
+    // The first ratio acts in the third rough period.
+    let cutting = feeds.iter().zip(lines).skip(24).filter(|(_, line)| *line == 3.0).map(|(feed, _)| feed * 60.0);
+    let (fastest, most) = (cutting.fold(0.0, f64::max), 300.001);
+    let asked = done.column("sig_asked_feed_mm_per_min").into_iter().fold(0.0, f64::max);
+    assert!(fastest > 250.0 && fastest <= most && asked <= most, "{fastest} driven, {asked} asked");
+}
+
+#[test]
+fn where_joints_are_not_the_axes_nobody_guesses_whose_current_it_is() {
+    for name in ["corexy", "gantry"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        let [its, x] = [format!("{name}.toml"), "force-demo-x.toml".into()].map(|n| machine("step").with_file_name(n));
+        let text = format!(
+            "format = 1\ninclude = [{its:?}, {x:?}]\n[feed_strategy]\nplugin = \"force-control\"\n\
+             [feed_strategy.options.axes.x]\nlead_mm = 20\ntorque_constant_nm_per_a = 0.378\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let done = Scenario::text("G21 G90\nG1 X1 F150\nM2\n").on(&path).run();
+        let errors = done.errors();
+        assert!(done.status() == 1 && errors.contains("mine.toml:4:1: feed_strategy.plugin"), "{name}: {errors}");
+        assert!(errors.contains("each axis has one motor of its own"), "{name}: {errors}");
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
+            .args(["identify", "--axis", "x", "--machine"])
+            .arg(&path)
+            .output()
+            .unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && errors.contains("one motor of its own"), "{name}: {errors}");
+    }
+}
+
 fn refused(settings: &[&str], words: &[&str]) {
     let done = scenario("step", settings).run();
     let errors = done.errors();
@@ -304,16 +369,18 @@ fn identified(friction: &str) -> toml::Table {
 
 #[test]
 fn an_axis_is_identified_with_its_friction() {
-    for (coulomb_nm, viscous, stribeck_nm) in
-        [(0.0, 0.0, 0.0), (0.01, 5e-5, 0.0), (0.06, 6e-4, 0.0), (0.06, 6e-4, 0.02)]
+    for (coulomb_nm, viscous, stribeck_nm, constant_nm) in
+        [(0.0, 0.0, 0.0, 0.0), (0.01, 5e-5, 0.0, 0.0), (0.06, 6e-4, 0.0, -0.05), (0.06, 6e-4, 0.02, 0.0)]
     {
         let axis = identified(&format!(
-            "{{ coulomb_nm = {coulomb_nm:?}, viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?} }}"
+            "{{ coulomb_nm = {coulomb_nm:?}, viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?}, \
+             constant_nm = {constant_nm:?} }}"
         ));
         let number = |table: &str, key: &str| axis[table][key].as_float().unwrap();
         let error = axis["inertia_kg_m2"].as_float().unwrap() / 1.842e-4 - 1.0;
         assert!(error.abs() < 5e-3, "inertia off by {error}");
         assert!((number("friction", "viscous_nm_s_per_rad") - viscous).abs() < 5e-5);
+        assert!((number("friction", "constant_nm") - constant_nm).abs() < 5e-4, "weight");
         let at_rest = number("friction", "coulomb_nm") + number("friction", "stribeck_nm");
         assert!((at_rest - coulomb_nm - stribeck_nm).abs() < 2e-3, "{at_rest}");
         assert!(number("confidence", "inertia_percent") < 5.0 && number("confidence", "friction_rms_nm") < 1e-3);

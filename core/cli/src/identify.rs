@@ -84,8 +84,10 @@ impl Motor {
     fn of(machine: &Machine, letter: char) -> Result<Self, String> {
         let index =
             machine.axes.index(letter.to_ascii_uppercase()).ok_or(format!("the machine has no axis {letter}"))?;
-        if machine.axes.is_rotary(index) || machine.kinematics.plugin != "identity" {
-            return Err(format!("axis {letter}: only linear axes with a motor of their own are identified"));
+        if machine.axes.is_rotary(index) || !joints_are_axes(machine) {
+            return Err(format!(
+                "axis {letter}: only linear axes are identified, on machines where each axis has one motor of its own"
+            ));
         }
         let letter = letter.to_ascii_lowercase();
         let table = format!("feed_strategy.options.axes.{letter}");
@@ -101,6 +103,12 @@ impl Motor {
         let turns = TAU / number("lead_mm")?;
         Ok(Self { letter, index, turns, torque_constant_nm_per_a: number("torque_constant_nm_per_a")? })
     }
+}
+
+/// Whether current i is that of axis i: no kinematics, and no axis with two motors.
+fn joints_are_axes(machine: &Machine) -> bool {
+    let motors = |axis: usize| machine.joints.iter().filter(|joint| joint.axis == Some(axis)).count();
+    machine.kinematics.plugin == "identity" && (0..machine.axes.count()).all(|axis| motors(axis) <= 1)
 }
 
 /// The experiment, and what each of its lines is for.

@@ -19,6 +19,11 @@ impl Guard {
         self.above = if torque_nm > self.level_nm { self.above.saturating_add(1) } else { 0 };
         self.above == self.samples
     }
+
+    /// Counts from zero again.
+    pub fn restart(&mut self) {
+        self.above = 0;
+    }
 }
 
 #[cfg(test)]

@@ -116,9 +116,13 @@ impl ForceControl {
     /// One hold for one event: the torque swings while the axes stop.
     fn hold(&mut self, motion: &mut Motion) {
         let bounds = self.options.bounds();
-        if self.holding > 0 {
+        if motion.feed_mm_per_s == 0.0 {
+            // Nothing is left to be held; what moves next is guarded anew.
+            (motion.tripped, self.holding) = (false, 0);
+            self.guard.restart();
+        } else if self.holding > 0 {
             motion.tripped = false;
-            self.holding = if motion.feed_mm_per_s == 0.0 { 0 } else { self.holding - 1 };
+            self.holding -= 1;
         } else if motion.tripped {
             self.holding = LONGEST_HOLD;
             // Resumed in the same material, the torque is to be the reference.
@@ -142,12 +146,15 @@ impl ForceControl {
         let in_force = self.asked_mm_per_s[2];
         let moving = motion.feed_mm_per_s > 0.01 * in_force.min(programmed);
         let stated = |feed: Option<f64>| feed.map_or(programmed, |mm_per_min| mm_per_min / 60.0);
+        let bounds = self.options.bounds();
         let entry = stated(self.options.entry_feed_mm_per_min).min(self.entry_cap_mm_per_s);
+        let entry = entry.clamp(bounds.min_mm_per_s, bounds.max_mm_per_s);
         self.law.set_max(self.max_ratio * programmed);
         if self.engagement.update(moving, torque_nm) {
             let feed = entry.min(motion.feed_mm_per_s);
             self.law.restart(programmed, torque_nm, feed);
-            self.limit.restart(feed);
+            // The law keeps its bounds, also where the axes come from rest or from a faster block.
+            self.limit.restart(self.law.feed_mm_per_s());
             return self.law.feed_mm_per_s();
         }
         match self.engagement.tool {

@@ -112,6 +112,31 @@ mod tests {
     }
 
     #[test]
+    fn no_path_counts_above_the_workpiece() {
+        let mut cutting = Cutting::new(&options("[workpiece]\ntop_mm = -1\nsteps = [[2, 3.0]]"), 1);
+        let mut drive = |z: f64, from: f64| {
+            (0..10_000).for_each(|k| {
+                cutting.step([from + f64::from(k) * 1e-4, 0.0, z], [1.0, 0.0, 0.0], 15.0 * TAU, 1e-4);
+            });
+            cutting.depth_mm
+        };
+        let depths = [drive(-1.0, 0.0), drive(5.0, 1.0), drive(-0.99, 2.0), drive(-2.0, 3.0), drive(-2.0, 4.0)];
+        assert_eq!(depths, [0.0, 0.0, 0.0, 0.0, 3.0], "only 2 mm of the first 4 were below the top");
+    }
+
+    #[test]
+    fn a_workpiece_over_xy_lies_where_it_is_whatever_the_path() {
+        let text = "[workpiece]\nover = \"xy\"\norigin_mm = [10, 20]\ndirection_deg = 90\nsteps = [[5, 3.0], [8, 0]]";
+        let mut cutting = Cutting::new(&options(text), 1);
+        let mut depth_at = |x: f64, y: f64| {
+            cutting.step([x, y, 0.0], [1.0, 0.0, 0.0], 15.0 * TAU, 1e-4);
+            cutting.depth_mm
+        };
+        let places = [(0.0, 24.9), (0.0, 25.1), (99.0, 25.1), (10.0, 28.1), (15.0, 20.0), (-3.0, 27.9)];
+        assert_eq!(places.map(|(x, y)| depth_at(x, y)), [0.0, 3.0, 3.0, 0.0, 0.0, 3.0]);
+    }
+
+    #[test]
     fn ripple_has_the_tooth_frequency_and_keeps_the_mean() {
         let mut cutting = Cutting::new(&options("tooth_ripple = 0.5\n[workpiece]\nsteps = [[0.0, 3.0]]"), 1);
         force(&mut cutting, 150.0, 900.0);
