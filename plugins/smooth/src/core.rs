@@ -175,7 +175,8 @@ impl<const L: usize> Core<L> {
         window.commit_s = found;
     }
 
-    /// The next window, from the state where this one is left; where it is refused, this one is driven on for a while.
+    /// The next window, from the state where this one is left; where it is refused, or nothing more of the path is known,
+    /// this one is driven on for a while.
     fn go_on(&mut self, now_s: f64) {
         let window = &self.window;
         let period_s = self.context.fine_period_s;
@@ -199,22 +200,30 @@ impl<const L: usize> Core<L> {
             window_s,
             old: Some((&self.window, now_s)),
         };
-        if self.planning.plan(&run, &self.frame, &start, &mut self.next) {
+        let known = run.end() <= self.window.end() + 1e-9;
+        let closed = run.closed;
+        if !known && self.planning.plan(&run, &self.frame, &start, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driven_s = Some(0.0);
             self.emitter.begin_window();
             self.commit();
         } else {
-            let window = &mut self.window;
-            let whole_s = window.duration_s();
-            let later_s = now_s + LATER * whole_s;
-            let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
-            window.commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
-            if window.commit_s > 0.97 * whole_s {
-                window.commit_s = whole_s;
-            }
+            self.window.whole |= known && closed;
+            self.drive_on(now_s);
         }
         self.route.forget(s);
+    }
+
+    /// Drives the window on for a while, near its end to its rest.
+    fn drive_on(&mut self, now_s: f64) {
+        let window = &mut self.window;
+        let whole_s = window.duration_s();
+        let later_s = now_s + LATER * whole_s;
+        let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
+        window.commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
+        if window.commit_s > 0.97 * whole_s {
+            window.commit_s = whole_s;
+        }
     }
 }
 

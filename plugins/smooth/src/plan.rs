@@ -142,6 +142,11 @@ impl<const L: usize> Planning<L> {
         let counted = frame.counted(run.rotary);
         let reach = self.take_over(start);
         self.timing.make(run, frame, &counted, &reach, &mut self.marks);
+        if self.marks.len() < 2 {
+            // There is no path between the start and the end.
+            self.effort.rejected += 1;
+            return false;
+        }
         let end = self.marks[self.marks.len() - 1].s;
         self.sites.gather(run, start.s, end);
         let mut shares = Shares {
