@@ -117,6 +117,59 @@ fn a_curve_is_driven_inside_the_tolerance() {
     assert_strict(&Scenario::of(&root().join("tests/fixtures/programs/butterfly.ngc")).on(&machine()).run());
 }
 
+/// Corners, arcs, short lines and a rapid, with a tolerance that a policy lowers.
+const POLICY: &str = "\
+G21 G90 G94 G17 G64 P0.02
+F2400
+G1 X20
+Y20
+X12 Y14
+G2 X4 Y14 I-4
+G1 X0 Y0
+G0 X5
+G1 X30 Y3
+G3 X30 Y9 J3
+G1 X29.9
+X29.8 Y9.05
+X0 Y0
+M2
+";
+
+fn with_policy(script: &str, parameters: &[&str]) -> Done {
+    let script = format!("policy.script={}", root().join(script).display());
+    let settings = parameters.iter().flat_map(|setting| ["--set", setting]);
+    Scenario::text(POLICY).on(&machine()).with(&["--set", &script]).with(&settings.collect::<Vec<_>>()).run()
+}
+
+#[test]
+fn a_tolerance_that_a_policy_lowers_is_kept() {
+    let within_2_um = |options: &mut Options| {
+        strict(options);
+        (options.sample_tolerance_mm, options.vertex_tolerance_mm) = (Some(0.002), Some(0.002));
+    };
+    let plain = Scenario::text(POLICY).on(&machine()).run();
+    assert_strict(&plain);
+    assert!(!plain.judge(within_2_um).passed(), "without the policy the tolerance of the program is used");
+    let done = with_policy("tests/fixtures/policies/good/close.wat", &[]);
+    assert_strict(&done);
+    let verdict = done.judge(within_2_um);
+    assert!(verdict.passed(), "{verdict}");
+    assert!(done.number("motion_time_s") > plain.number("motion_time_s"));
+    assert!(done.errors().contains("policy: line 3: path tolerance 0.02 -> 0.002 mm"), "{}", done.errors());
+}
+
+#[test]
+fn a_feed_that_a_policy_caps_is_kept() {
+    let done = with_policy("scripts/policies/material-feed.wasm", &["policy.parameters.material=3"]);
+    assert_strict(&done);
+    let rows = done.column("feed_mm_s").into_iter().zip(done.column("line"));
+    let fastest = rows.filter(|(_, line)| *line != 8.0).fold(0.0, |most: f64, (feed, _)| most.max(feed));
+    let cap = 800.0 / 60.0;
+    assert!(fastest <= cap * (1.0 + 1e-6) && fastest > 0.99 * cap, "{fastest} mm/s of {cap}");
+    let blocks = std::fs::read_to_string(done.file("blocks.csv")).unwrap();
+    assert!(blocks.lines().any(|line| line.contains(",policy,")), "{blocks}");
+}
+
 fn bench(text: &str) -> Bench {
     Bench::text(text).on(&machine())
 }
