@@ -95,7 +95,7 @@ pub struct Policy {
     pub path_tolerance_mm: Option<(f64, f64)>,
     /// Least share of the programmed feed that it may ask for.
     pub lowest_feed_ratio: f64,
-    /// How fast it may change the feed ratio, 1/s; infinite where the machine states no limit.
+    /// How fast it may change the feed ratio, 1/s; 10 where the machine states no limit: from all to nothing in 0.1 s.
     pub ratio_change_per_s: f64,
     /// Its parameters, by name.
     pub parameters: toml::Table,
@@ -122,7 +122,7 @@ impl Policy {
             time_constant_s: time_constant_ms.map_or((0.001, 1.0), |(low, high)| (low / 1e3, high / 1e3)),
             path_tolerance_mm: tolerance_mm,
             lowest_feed_ratio: ratio,
-            ratio_change_per_s: policy.positive("ratio_change_per_s").unwrap_or(f64::INFINITY),
+            ratio_change_per_s: policy.positive("ratio_change_per_s").unwrap_or(10.0),
             parameters,
         })
     }
