@@ -148,8 +148,10 @@ impl AfterInterpolation {
     }
 
     fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let later_s = (rest.duration_s - left_s).max(0.0);
-        rest.duration_s -= later_s;
+        // What is left may be lost in rounding beside the dwell: the part comes from it, not from a difference.
+        let part_s = rest.duration_s.min(left_s);
+        let later_s = rest.duration_s - part_s;
+        rest.duration_s = part_s;
         if later_s > 0.0 {
             self.dwell = Some(Segment { duration_s: later_s, flags: without_begin(rest.flags), ..rest });
         } else {

@@ -149,6 +149,18 @@ fn machines_and_options_that_do_not_fit_are_refused() {
 }
 
 #[test]
+fn a_part_below_the_rounding_of_a_dwell_is_emitted_once() {
+    let mut planner = open("linear", 20.0, &context(0.001));
+    let mut dwell = Block::at(AxisVector::ZERO);
+    dwell.dwell_s = 1.0;
+    planner.accept(&dwell).unwrap();
+    planner.finish();
+    let mut recorder = Recorder::default();
+    assert_eq!(planner.advance(1e-18, &mut recorder).unwrap().duration_s, 1e-18);
+    assert_eq!(recorder.segments.len(), 1);
+}
+
+#[test]
 fn it_says_what_it_does_not_keep() {
     let description = open("bell", 50.0, &context(0.001)).describe();
     assert_eq!((description.order, description.breaks_limits, description.leaves_path), (2, 1, 1));
