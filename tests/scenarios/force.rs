@@ -349,13 +349,11 @@ fn options_that_make_no_sense_are_refused_where_they_stand() {
 }
 
 /// What `tandem identify` writes for axis X.
-fn identified(friction: &str) -> toml::Table {
+fn identified(servo: &str) -> toml::Table {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.toml");
-    let servo =
-        format!("driver.options.servo=[{{ encoder_counts = 8192, current_noise_ma = 5, friction = {friction} }}]");
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
-        .args(["identify", "--axis", "x", "--set", &servo, "--machine"])
+        .args(["identify", "--axis", "x", "--set", servo, "--machine"])
         .arg(machine("step").with_file_name("force-demo.toml"))
         .args(["--out".as_ref(), path.as_os_str()])
         .output()
@@ -368,14 +366,15 @@ fn identified(friction: &str) -> toml::Table {
 }
 
 #[test]
-fn an_axis_is_identified_with_its_friction() {
+fn an_axis_is_identified_with_its_friction_and_cuts_with_it() {
     for (coulomb_nm, viscous, stribeck_nm, constant_nm) in
         [(0.0, 0.0, 0.0, 0.0), (0.01, 5e-5, 0.0, 0.0), (0.06, 6e-4, 0.0, -0.05), (0.06, 6e-4, 0.02, 0.0)]
     {
-        let axis = identified(&format!(
-            "{{ coulomb_nm = {coulomb_nm:?}, viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?}, \
-             constant_nm = {constant_nm:?} }}"
-        ));
+        let servo = format!(
+            "driver.options.servo=[{{ encoder_counts = 8192, current_noise_ma = 5, friction = {{ coulomb_nm = {coulomb_nm:?}, \
+             viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?}, constant_nm = {constant_nm:?} }} }}]"
+        );
+        let mut axis = identified(&servo);
         let number = |table: &str, key: &str| axis[table][key].as_float().unwrap();
         let error = axis["inertia_kg_m2"].as_float().unwrap() / 1.842e-4 - 1.0;
         assert!(error.abs() < 5e-3, "inertia off by {error}");
@@ -384,5 +383,11 @@ fn an_axis_is_identified_with_its_friction() {
         let at_rest = number("friction", "coulomb_nm") + number("friction", "stribeck_nm");
         assert!((at_rest - coulomb_nm - stribeck_nm).abs() < 2e-3, "{at_rest}");
         assert!(number("confidence", "inertia_percent") < 5.0 && number("confidence", "friction_rms_nm") < 1e-3);
+        axis.insert("lead_mm".into(), 20.into());
+        axis.insert("torque_constant_nm_per_a".into(), 0.378.into());
+        let values = format!("feed_strategy.options.axes.x={}", toml::Value::Table(axis));
+        let cut = cut(&scenario("step", &[&servo, &values]).run(), STEP);
+        println!("estimate {:.2} mN·m rms", 1e3 * cut.estimate_rms_nm);
+        assert!(cut.estimate_rms_nm < 2e-3 && cut.rms_error_nm < 6e-3, "a cut with what was identified");
     }
 }
