@@ -113,6 +113,15 @@ fn six_axes_keep_limits_and_tolerance() {
 }
 
 #[test]
+fn feeds_that_alternate_hold_up_to_where_they_change() {
+    let mut program = "G21 G90 G94 G17 G64 P0.01\n".to_string();
+    for n in 1..20 {
+        writeln!(program, "G1 X{} F{}", 2 * n, if n % 2 == 1 { 600 } else { 9000 }).unwrap();
+    }
+    assert_strict(&Scenario::text(&(program + "M2\n")).on(&machine()).run());
+}
+
+#[test]
 fn a_curve_is_driven_inside_the_tolerance() {
     assert_strict(&Scenario::of(&root().join("tests/fixtures/programs/butterfly.ngc")).on(&machine()).run());
 }

@@ -343,7 +343,8 @@ impl<const L: usize> Planning<L> {
     }
 }
 
-/// The feed of intervals, asked for in order: the lowest of the chords whose sites lie in or next to one.
+/// The feed of intervals, asked for in order: the lowest of the chords whose sites lie in or next to one. A vertex has both
+/// of its chords: speed at the end of an interval is what the next one allows.
 struct Feeds<'a, const L: usize> {
     run: &'a Run<'a, L>,
     along: &'a [(f64, u32)],
@@ -359,8 +360,11 @@ impl<const L: usize> Feeds<'_, L> {
         let mut feed = f64::INFINITY;
         let mut n = self.at;
         while n < self.sites.len() {
-            let chord = self.along[n].1 as usize;
+            let (s, chord) = (self.along[n].0, self.along[n].1 as usize);
             feed = feed.min(self.run.chords[chord].feed);
+            if chord > 0 && s <= self.run.chords[chord].s {
+                feed = feed.min(self.run.chords[chord - 1].feed);
+            }
             if (self.sites[n].interval as usize) > k {
                 break;
             }

@@ -3,13 +3,15 @@
 use tandem_motion::tube::{Lanes, Site, each};
 
 use crate::frame::{dot, largest, minus};
-use crate::route::Run;
+use crate::route::{Chord, Run};
 use crate::timing::Mark;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
 /// A turn by more than this always has a site.
 const SHARP: f64 = 0.1;
+/// Share of a feed below which another is another feed.
+const OTHER_FEED: f64 = 0.99;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
 /// Vertices looked at on each side.
@@ -186,7 +188,13 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
     widen(each(|l| need[l] * (BOX_SHARE * tolerance / worst)))
 }
 
-/// How much every lane turns near `s`, and the way to the nearest sharp turn or end.
+/// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
+fn is_marked<const L: usize>(chords: &[Chord<L>], v: usize) -> bool {
+    let (last, feed) = (chords[v - 1].feed, chords[v].feed);
+    chords[v].turn > SHARP || last.min(feed) < OTHER_FEED * last.max(feed)
+}
+
+/// How much every lane turns near `s`, and the way to the nearest sharp turn, change of feed or end.
 fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) {
     let chords = run.chords;
     let (mut need, mut sharp_way) = ([0.0; L], f64::INFINITY);
@@ -203,7 +211,7 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) 
             break;
         }
         look(v);
-        if chords[v].turn > SHARP {
+        if is_marked(chords, v) {
             sharp_way = sharp_way.min(s - chords[v].s);
         }
         v -= 1;
@@ -213,7 +221,7 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) 
             break;
         }
         look(v);
-        if chords[v].turn > SHARP {
+        if is_marked(chords, v) {
             sharp_way = sharp_way.min(chords[v].s - s);
         }
     }
