@@ -55,6 +55,11 @@ pub enum FaultKind {
         /// Joint index.
         joint: usize,
     },
+    /// The kinematics give no finite number for an axis, where the drives report joints that are.
+    WayBack {
+        /// Axis index.
+        axis: usize,
+    },
     /// The driver failed to exchange.
     Driver,
     /// The operator's emergency stop.

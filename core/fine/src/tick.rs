@@ -3,6 +3,7 @@
 mod exchange;
 mod follow;
 mod govern;
+mod joints;
 mod keep_alive;
 mod request;
 mod rest;
@@ -104,6 +105,8 @@ pub struct FineLoop {
     tick: u64,
     setpoint: Setpoint,
     feedback: Feedback,
+    /// Where the axes are by the feedback, as far as the kinematics last knew.
+    axes: AxisVector,
     counters: Counters,
     fault: Option<Fault>,
     plugin_error: Option<PluginError>,
@@ -121,7 +124,7 @@ impl FineLoop {
         Self {
             config: *config,
             driver,
-            joints: kinematics.as_ref().map_or(config.axis_count(), |k| k.joint_count(config.axis_count())),
+            joints: joints::count(config, kinematics.as_deref()),
             kinematics,
             controls: end.controls,
             given: Given::default(),
@@ -152,8 +155,9 @@ impl FineLoop {
             starved: false,
             recovering: false,
             tick: 0,
-            setpoint: Setpoint::default(),
+            setpoint: joints::first_setpoint(config),
             feedback: Feedback::default(),
+            axes: config.axes_alone(&config.position),
             counters: Counters::default(),
             fault: None,
             plugin_error: None,
@@ -241,7 +245,8 @@ impl FineLoop {
             Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
-                let (position, over) = (ramp.next(), ramp.is_over());
+                let position = ramp.next();
+                let over = ramp.is_over() && joints::rest(self.fault.as_ref(), &self.setpoint);
                 let position = self.with_joints(position);
                 (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }

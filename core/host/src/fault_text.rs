@@ -42,6 +42,11 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
             format!("kinematics {plugin}: the position of {joint} is not a finite number{words}")
         }
+        FaultKind::WayBack { axis } => {
+            let (axis, plugin) = (machine.axes.letter(*axis), &machine.kinematics.plugin);
+            let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
+            format!("kinematics {plugin}: the position of axis {axis} is not a finite number{words}")
+        }
         FaultKind::Driver => {
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
             format!("driver {}: the exchange failed{words}", machine.driver.plugin)

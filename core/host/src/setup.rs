@@ -116,6 +116,8 @@ pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>,
 pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
     let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
     context.start_position = joints.to_joints(&machine.start);
+    let known = joints.health(&context.start_position);
+    known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
     let opened = driver.open(&context).and_then(|()| driver.start());
     opened.map_err(|e| {
         let cause = format!("driver {}: {}", machine.driver.plugin, e.message());

@@ -6,6 +6,7 @@ use std::process::Command;
 use tandem_host::HostError;
 
 use crate::bench::{Bench, Ran};
+use crate::harness::{mill, root};
 use crate::plugins::built::third_party;
 
 const PROGRAM: &str = "G21 G90\nF3000\nG1 X40 Y10\nG1 X0 Y20\nG4 P0.1\nG1 X10 Y0\nM2\n";
@@ -30,13 +31,13 @@ impl Mischief {
             (key("options.misbehave"), self.misbehave.to_string()),
             (key("options.method"), self.method.to_string()),
             (key("options.call"), self.call.to_string()),
+            (key("options.curved"), (self.section == "kinematics").to_string()),
         ]
     }
 
     /// Runs the program. Where it begins, everything that is sent is within limits, to standstill.
     fn run(&self) -> Result<Ran, HostError> {
-        let settings = self.settings(&third_party("hostile"));
-        let bench = Bench::text(PROGRAM);
+        let (settings, bench) = self.bench();
         let ran = bench.try_run(&settings)?;
         let verdict = bench.judge(&ran, |options| {
             options.ends_early = true;
@@ -45,6 +46,18 @@ impl Mischief {
         });
         assert!(verdict.passed(), "{self}: {verdict}");
         Ok(ran)
+    }
+
+    /// A kinematics runs on a machine that states its joints, and moves them along a curve. The oracle judges the axes.
+    fn bench(&self) -> (Vec<(String, String)>, Bench) {
+        let (mut settings, bench) = (self.settings(&third_party("hostile")), Bench::text(PROGRAM));
+        if self.section != "kinematics" {
+            return (settings, bench);
+        }
+        settings.push(("joints.a.max_acceleration_mm_per_s2".to_string(), "5000".to_string()));
+        let mut bench = bench.on(&root().join("examples/machines/corexy.toml"));
+        bench.judging.joints = tandem_oracle::Machine::read(&mill()).unwrap().joints;
+        (settings, bench)
     }
 
     /// What the run, or its refusal, says.
@@ -80,11 +93,14 @@ const METHODS: &[(&str, &str, &[u32])] = &[
     ("driver", "start", &[1]),
     ("driver", "exchange", &[1, 2, 100, 700]),
     ("kinematics", "new", &[1]),
+    ("kinematics", "joint_count", &[1]),
+    ("kinematics", "to_joints", &[1, 40, 75, 400, 1001, 2000]),
+    ("kinematics", "to_axes", &[1, 40, 75, 400, 1001]),
 ];
 
 #[test]
 fn it_behaves_where_it_is_told_nothing() {
-    for section in ["planner", "feed_strategy", "driver"] {
+    for section in ["planner", "feed_strategy", "driver", "kinematics"] {
         let ran = Mischief::of(section, "never", "", 1).run().unwrap();
         assert_eq!(ran.outcome.summary.fault, None, "{section}");
     }
@@ -122,6 +138,14 @@ fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
         let ran = Mischief::of("planner", "beyond", "advance", call).run().unwrap();
         let fault = ran.outcome.summary.fault.unwrap();
         assert!(fault.contains("hostile") && fault.contains("guard"), "{fault}");
+    }
+    for (method, words) in [("to_joints", "the position of joint 0 (a) is"), ("to_axes", "the position of axis X is")] {
+        for call in [400, 1001] {
+            let mischief = Mischief::of("kinematics", "not-a-number", method, call);
+            let said = mischief.words();
+            assert!(said.contains(&format!("kinematics {}", third_party("hostile").display())), "{mischief}: {said:?}");
+            assert!(said.contains(words), "{mischief}: {said:?}");
+        }
     }
     // A ratio of a million is a wish: what is driven is the programmed feed.
     assert_eq!(Mischief::of("feed_strategy", "beyond", "update", 5).words(), "");

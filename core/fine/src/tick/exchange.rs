@@ -7,7 +7,6 @@ use tandem_sdk::{AxisVector, JointState};
 
 use super::{FineLoop, Phase};
 use crate::answer::{self, Numbers};
-use crate::config::Joints;
 use crate::fault::FaultKind;
 use crate::state::Input;
 
@@ -38,31 +37,6 @@ impl FineLoop {
         self.watch_edge();
     }
 
-    /// Where the joints are to be; kinematics that do not know fault the machine, and the drives stay where they are.
-    fn joints_of(&mut self, axes: &AxisVector) -> AxisVector {
-        let Some(kinematics) = &self.kinematics else { return *axes + self.offset };
-        let joints = kinematics.to_joints(&self.config.axes_alone(axes));
-        let Some(joint) = (0..self.joints).find(|joint| !joints[*joint].is_finite()) else {
-            return joints + self.offset;
-        };
-        if let Err(error) = kinematics.health() {
-            self.plugin_error.get_or_insert(error);
-        }
-        self.fail(FaultKind::Kinematics { joint });
-        self.setpoint.position
-    }
-
-    /// A sample on its way to the guard: with the joints behind the axes, where only the kinematics know them.
-    #[inline]
-    pub(super) fn with_joints(&self, mut position: AxisVector) -> AxisVector {
-        if let (Joints::Curved { axes }, Some(kinematics)) = (self.config.joints, &self.kinematics) {
-            position = self.config.axes_alone(&position);
-            let joints = kinematics.to_joints(&position);
-            position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
-        }
-        position
-    }
-
     /// Whether the exchange failed; the driver's first words about it are kept for the host.
     fn ask_driver(&mut self) -> bool {
         match self.driver.exchange(&self.setpoint, &mut self.feedback) {
@@ -74,12 +48,6 @@ impl FineLoop {
         }
     }
 
-    /// Axis coordinates of what the drives report, mm or rad.
-    pub(super) fn axes_of(&self, joints: &AxisVector) -> AxisVector {
-        let joints = *joints - self.offset;
-        self.kinematics.as_ref().map_or(joints, |k| k.to_axes(&joints))
-    }
-
     pub(super) fn drives(&self) -> Input {
         let on = self.feedback.state[..self.joints].iter().all(|s| *s == JointState::Enabled);
         if on { Input::DrivesOn } else { Input::DrivesOff }
@@ -89,7 +57,8 @@ impl FineLoop {
         let (command, feedback) = if self.config.record_drives {
             (*command + self.offset, self.feedback.position)
         } else {
-            (self.config.axes_alone(command), self.axes_of(&self.feedback.position))
+            let reported = self.feedback.position;
+            (self.config.axes_alone(command), self.axes_of(&reported))
         };
         let sample = Sample {
             tick: self.tick,

@@ -82,6 +82,7 @@ impl FineLoop {
 
     /// At rest: reports it and ends the epoch. Where nobody has taken the reports before, it waits.
     pub(super) fn part(&mut self, stop: Stop) -> Input {
+        let latch = stop.latch.map(|joints| self.axes_of(&joints));
         let rest = Rest {
             epoch: self.cursor.epoch(),
             cause: stop.cause,
@@ -90,7 +91,7 @@ impl FineLoop {
             line: self.cursor.segment().line,
             stop_on: self.cursor.segment().stop_on,
             position: self.config.axes_alone(self.guard.position()),
-            latch: stop.latch.map(|joints| self.axes_of(&joints)),
+            latch,
             program_time_s: self.cursor.program_time_s(),
             path_mm: self.cursor.path_mm(),
         };

@@ -90,6 +90,7 @@ pub fn check(map: &dyn Kinematics, joints: usize, axes: usize, positions: &[Axis
         }
         let back = map.to_axes(&at);
         if let Some(axis) = (0..axes).find(|axis| !is_near(back[*axis], position[*axis])) {
+            map.health().map_err(|e| e.to_string())?;
             return Err(format!(
                 "axes at {place:?} (mm, rad) lead to joints that lead back to {} for axis {axis}",
                 back[axis]

@@ -15,6 +15,7 @@ mod travel;
 use tandem_machine::Machine;
 use tandem_sdk::{
     AxisLimits, AxisVector, JointLanes, Kinematics, KinematicsContext, Limits, MAX_AXES, Planner, PlannerDescription,
+    PluginError,
 };
 
 use crate::error::HostError;
@@ -138,6 +139,19 @@ impl JointSpace {
         }
     }
 
+    /// Why `joints` are not known, where they are not: the plugin's own words, if it has any.
+    ///
+    /// # Errors
+    /// The reason, where one of them is no finite number.
+    pub fn health(&self, joints: &AxisVector) -> Result<(), PluginError> {
+        match &self.map {
+            Map::Curved(kinematics) if joints.0[..self.count()].iter().any(|joint| !joint.is_finite()) => {
+                kinematics.health()
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// `axes` with what lies behind them in the fine loop.
     pub fn with_lanes(&self, axes: &AxisVector) -> AxisVector {
         let mut all = *axes;
@@ -205,6 +219,7 @@ impl JointSpace {
 
     fn check_start(self, machine: &Machine) -> Result<Self, HostError> {
         let at = self.to_joints(&machine.start);
+        self.health(&at).map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
         for (i, joint) in self.joints.iter().enumerate() {
             if let Some(words) = travel::beyond(joint, at[i]) {
                 let key = format!("joints.{}", joint.name);

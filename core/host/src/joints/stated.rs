@@ -46,7 +46,8 @@ fn of_plugin(machine: &Machine, registry: &Registry) -> Result<Stated, HostError
     let (made, name) = (plugin(machine, registry)?, &machine.kinematics.plugin);
     let (count, stands) = (made.joint_count(machine.axes.count()), machine.joints.len());
     if !(1..=MAX_AXES).contains(&count) {
-        let cause = format!("{name} has {count} joints: a machine has 1 to {MAX_AXES}");
+        let words = format!("{name} has {count} joints: a machine has 1 to {MAX_AXES}");
+        let cause = made.health().map_or_else(|error| format!("{name}: {error}"), |()| words);
         return Err(refusal(machine, "kinematics.plugin", cause));
     }
     if stands != count {

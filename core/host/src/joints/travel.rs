@@ -41,6 +41,7 @@ impl Travel {
 
     fn at(&self, position: &AxisVector) -> Result<(), PluginError> {
         let joints = self.space.to_joints(position);
+        self.space.health(&joints)?;
         let words = self.space.joints.iter().enumerate().find_map(|(i, joint)| beyond(joint, joints[i]));
         words.map_or(Ok(()), |words| Err(PluginError::new(words)))
     }

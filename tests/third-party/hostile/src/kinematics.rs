@@ -1,39 +1,42 @@
-//! A kinematics: the identity, until it is not.
+//! A kinematics: the identity, or joint 0 = x + y²/1000, until it is not.
 
 use tandem_sdk::{AxisVector, Kinematics, KinematicsContext, PluginError};
 
 use crate::mischief::{Mischief, Options};
 
-pub struct Hostile(Mischief);
+pub struct Hostile {
+    mischief: Mischief,
+    bend: f64,
+}
 
 impl Hostile {
     pub fn open(options: &Options, _context: &KinematicsContext) -> Result<Self, PluginError> {
-        Mischief::new(options).map(Self)
+        Ok(Self { mischief: Mischief::new(options)?, bend: if options.curved { 1e-3 } else { 0.0 } })
     }
 
-    fn same(&self, method: &str, vector: &AxisVector) -> AxisVector {
-        let what = self.0.quietly(method);
+    fn with_first(&self, method: &str, vector: &AxisVector, more: f64) -> AxisVector {
+        let what = self.mischief.quietly(method);
         let mut vector = *vector;
-        vector[0] = Mischief::number(what, vector[0]);
+        vector[0] = Mischief::number(what, vector[0] + more);
         vector
     }
 }
 
 impl Kinematics for Hostile {
     fn joint_count(&self, axis_count: usize) -> usize {
-        self.0.quietly("joint_count");
+        self.mischief.quietly("joint_count");
         axis_count
     }
 
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
-        self.same("to_joints", axes)
+        self.with_first("to_joints", axes, self.bend * axes[1] * axes[1])
     }
 
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        self.same("to_axes", joints)
+        self.with_first("to_axes", joints, -self.bend * joints[1] * joints[1])
     }
 
-    fn joint_direction(&self, _position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        self.same("joint_direction", direction)
+    fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
+        self.with_first("joint_direction", direction, 2.0 * self.bend * position[1] * direction[1])
     }
 }

@@ -37,6 +37,8 @@ tandem_sdk::options! {
         pub method: String = String::new(),
         /// The call of that method, from 1, with which it begins.
         pub call: u32 = 1,
+        /// Of a kinematics: its joints are no linear function of the axes.
+        pub curved: bool = false,
     }
 }
 

@@ -1,0 +1,11 @@
+//! The promises of the contract, judged by the conformance kit.
+
+use tandem_conformance::{CountingAllocator, Setup, judge};
+
+#[global_allocator]
+static COUNTING: CountingAllocator = CountingAllocator;
+
+#[test]
+fn it_conforms() {
+    judge(tandem_corexy::PLUGIN, &Setup::default()).assert_conforms();
+}
