@@ -7,7 +7,7 @@ fn example(name: &str) -> std::path::PathBuf {
 }
 
 /// The machine that an example is for.
-fn machine_of(program: &std::path::Path) -> std::path::PathBuf {
+pub fn machine_of(program: &std::path::Path) -> std::path::PathBuf {
     match program.file_stem().and_then(|stem| stem.to_str()) {
         Some("corexy") => root().join("examples/machines/corexy.toml"),
         Some("portal") => root().join("examples/machines/gantry.toml"),

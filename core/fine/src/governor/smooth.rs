@@ -201,7 +201,7 @@ impl Governor {
             for (axis, (_, limit)) in outlook.limits() {
                 let planned = sigma * sigma * sigma * point.jerk[axis];
                 let turning = 3.0 * point.acceleration[axis] * sigma;
-                let most = (MARGIN * limit).max(planned.abs() + LEFT * limit) + excess * limit;
+                let most = (MARGIN * limit).max(planned.abs() + self.left() * limit) + excess * limit;
                 interval.keep(planned + turning * rate, point.velocity[axis] + turning * part * h, most);
             }
         }
@@ -249,7 +249,7 @@ impl Governor {
             let speed = point.velocity[axis].abs();
             let turning = 3.0 * towards * point.acceleration[axis] * sigma;
             let planned = towards * point.jerk[axis] * sigma * sigma * sigma;
-            let room = (MARGIN * jerk_limit + direction * planned).max(LEFT * jerk_limit);
+            let room = (MARGIN * jerk_limit + direction * planned).max(self.left() * jerk_limit);
             let square = (speed + 2.0 * way.there_s * turning).max(0.0);
             let slope = 2.0 * (way.there_s * room - left * turning);
             let coming = outlook.share * root(square, slope, 2.0 * left * room);
@@ -257,7 +257,7 @@ impl Governor {
             let accelerated = towards * direction * point.acceleration[axis];
             // Speeding up adds to what the plan accelerates at the aim, slowing down to what it brakes at the present rate.
             let share = if direction > 0.0 { 1.0 } else { sigma * sigma };
-            let held = (MARGIN * limit - (share * accelerated).max(0.0)).max(LEFT * limit) / speed;
+            let held = (MARGIN * limit - (share * accelerated).max(0.0)).max(self.left() * limit) / speed;
             // Where the axis turns round, σ̈ is no help.
             let help = speed * outlook.rate_change_per_s2;
             let turned = (room + help) / (-turning).max(f64::MIN_POSITIVE);
@@ -268,6 +268,12 @@ impl Governor {
             reserve.change_per_s2 = reserve.change_per_s2.min(change);
         }
         reserve
+    }
+
+    /// What σ is foreseen to have at least. A plan that runs as it is has nothing to come back to: there a jerk that is
+    /// beyond the limit at single points, and not in the samples, is left alone.
+    fn left(&self) -> f64 {
+        if self.sigma >= 1.0 && self.rate_per_s == 0.0 { 0.0 } else { LEFT }
     }
 
     /// Takes σ̈ for this period; gives the program time that passes, s.
