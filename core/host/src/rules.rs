@@ -49,23 +49,6 @@ pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) 
     Ok(())
 }
 
-/// The strategy of this repository that takes the current of joint i for that of axis i.
-const READS_MOTORS: &str = "force-control";
-
-/// Checks that the feed strategy can tell which motor drives which axis.
-pub fn check_strategy(machine: &Machine, joints: &JointSpace) -> Result<(), HostError> {
-    match &machine.feed_strategy {
-        Some(strategy) if strategy.plugin == READS_MOTORS && !joints.are_axes() => {
-            let cause = format!(
-                "{READS_MOTORS} reads the current of each axis, and here currents are those of joints that are not the axes: it \
-                 runs where each axis has one motor of its own"
-            );
-            Err(refusal(machine, "feed_strategy.plugin", cause))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Checks that trace and report have room for all signals, and that each has its own name.
 pub fn check_signals(machine: &Machine, of_strategy: &[&str]) -> Result<(), HostError> {
     let count = of_strategy.len() + machine.analog.len();

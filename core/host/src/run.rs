@@ -202,8 +202,7 @@ impl Run {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let joints = Arc::new(JointSpace::of(&machine, registry)?);
-        rules::check_strategy(&machine, &joints)?;
-        let feed = setup::feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
+        let feed = setup::feed(&machine, registry, &joints, policy.as_ref(), checked.length_mm)?;
         rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
         driver = faults::wrap(&machine, driver, &joints)?;
         setup::open(&machine, driver.as_mut(), &joints)?;

@@ -129,10 +129,11 @@ pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> 
 pub fn feed(
     machine: &Machine,
     registry: &Registry,
+    joints: &JointSpace,
     policy: Option<&PolicyHost>,
     length_mm: f64,
 ) -> Result<Option<FeedRunner>, HostError> {
-    let strategy = strategy(machine, registry)?;
+    let strategy = strategy(machine, registry, joints)?;
     if strategy.is_none() && policy.is_none() {
         return Ok(None);
     }
@@ -145,7 +146,11 @@ pub fn feed(
 }
 
 /// Makes the machine's feed strategy, if it names one.
-fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
+fn strategy(
+    machine: &Machine,
+    registry: &Registry,
+    joints: &JointSpace,
+) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
     let Some(choice) = &machine.feed_strategy else { return Ok(None) };
     let context = StrategyContext {
         size: size_of_contract::<StrategyContext>(),
@@ -154,6 +159,7 @@ fn strategy(machine: &Machine, registry: &Registry) -> Result<Option<Box<dyn Fee
         fine_period_s: machine.fine_period_s,
         rough_period_s: machine.rough_period_s,
         max_feed_ratio: machine.motion.max_feed_ratio,
+        joints_are_axes: u32::from(joints.are_axes()),
     };
     let made = registry.strategy(choice, &context);
     made.map(Some).map_err(|e| refused(machine, "feed_strategy", e))

@@ -51,6 +51,8 @@ pub struct StrategyContext {
     pub rough_period_s: f64,
     /// Highest ratio that may be answered.
     pub max_feed_ratio: f64,
+    /// 1 where joint i is axis i, so that [`FineSample`]'s speed and current of a joint are those of the axis.
+    pub joints_are_axes: u32,
 }
 
 /// One rough period.

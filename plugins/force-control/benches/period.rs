@@ -24,6 +24,7 @@ fn fine_period_of_three_axes(bencher: Bencher<'_, '_>) {
         fine_period_s: 1e-3,
         rough_period_s: 8e-3,
         max_feed_ratio: 2.0,
+        joints_are_axes: 1,
     };
     let options =
         ["x", "y", "z"].iter().fold(OPTIONS.to_string(), |text, axis| text + &format!("[axes.{axis}]\n{AXIS}"));

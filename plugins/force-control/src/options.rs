@@ -145,8 +145,15 @@ impl Options {
     /// Checks what a type cannot say, and the stability of the loop that the options make.
     ///
     /// # Errors
-    /// A value that makes no sense or is missing, an axis that the machine does not have, a loop that is not stable.
+    /// A value that makes no sense or is missing, an axis that the machine does not have, a loop that is not stable, a
+    /// machine on which it cannot tell which motor drives which axis.
     pub fn check(&self, context: &StrategyContext) -> Result<(), PluginError> {
+        if context.joints_are_axes == 0 {
+            return Err(PluginError::new(
+                "it reads the current of each axis, and here currents are those of joints that are not the axes: it runs \
+                 where each axis has one motor of its own",
+            ));
+        }
         self.check_values(context)?;
         self.check_stability(context)
     }

@@ -19,6 +19,7 @@ fn updates_do_not_allocate() {
         fine_period_s: 1e-3,
         rough_period_s: 8e-3,
         max_feed_ratio: 2.0,
+        joints_are_axes: 1,
     };
     let mut strategy = tandem_force_control::PLUGIN.feed_strategy(OPTIONS, &context).unwrap();
     let sample = |tick: u64| FineSample {

@@ -43,6 +43,7 @@ fn context(max_feed_ratio: f64) -> StrategyContext {
         fine_period_s: FINE_PERIOD_S,
         rough_period_s: ROUGH_PERIOD_S,
         max_feed_ratio,
+        joints_are_axes: 1,
     }
 }
 
