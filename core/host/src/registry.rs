@@ -23,9 +23,10 @@ pub struct PluginRefusal {
 }
 
 impl Default for Registry {
-    /// No plugin, and a log for those to come.
+    /// No plugin, a log for those to come, and no word on standard error about their panics.
     fn default() -> Self {
         plugin_log::listen();
+        tandem_sdk::abi::quiet_linked_panics();
         Self { plugins: vec![] }
     }
 }

@@ -1,4 +1,5 @@
-//! What the border of a plugin costs: the same call on the type itself, through `dyn`, and through the plugin's table.
+//! What the border of a plugin costs: the same call as a function of the program, through `dyn`, and through the plugin's
+//! table. The method is compiled into that function, as it is into the plugin's entry.
 //! `cargo bench -p tandem-sdk --bench border`.
 
 use divan::{Bencher, black_box};
@@ -25,7 +26,7 @@ impl Driver for Counter {
     fn start(&mut self) -> Result<(), PluginError> {
         Ok(())
     }
-    #[inline(never)]
+    #[inline]
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         self.0 += setpoint.tick;
         feedback.inputs = self.0;
@@ -38,7 +39,7 @@ impl Driver for Counter {
 /// Calls of one measurement.
 const CALLS: u32 = 1000;
 
-fn exchange(bencher: Bencher, driver: &mut (impl Driver + ?Sized)) {
+fn exchange(bencher: Bencher, driver: &mut dyn Driver) {
     let (setpoint, mut feedback) = (Setpoint { tick: 1, ..Setpoint::default() }, Feedback::default());
     bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
         for _ in 0..CALLS {
@@ -47,9 +48,25 @@ fn exchange(bencher: Bencher, driver: &mut (impl Driver + ?Sized)) {
     });
 }
 
+/// The static call.
+struct Called<T>(T);
+
+impl Called<Counter> {
+    #[inline(never)]
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        self.0.exchange(setpoint, feedback)
+    }
+}
+
 #[divan::bench]
 fn exchange_static(bencher: Bencher) {
-    exchange(bencher, &mut Counter::default());
+    let (setpoint, mut feedback) = (Setpoint { tick: 1, ..Setpoint::default() }, Feedback::default());
+    let mut driver = Called(Counter::default());
+    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
+        for _ in 0..CALLS {
+            let _ = black_box(black_box(&mut driver).exchange(black_box(&setpoint), black_box(&mut feedback)));
+        }
+    });
 }
 
 #[divan::bench]
@@ -69,7 +86,7 @@ fn exchange_plugin(bencher: Bencher) {
 struct Swap;
 
 impl Kinematics for Swap {
-    #[inline(never)]
+    #[inline]
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
         let mut joints = *axes;
         joints.0.swap(0, 1);
@@ -80,7 +97,14 @@ impl Kinematics for Swap {
     }
 }
 
-fn to_joints(bencher: Bencher, kinematics: &(impl Kinematics + ?Sized)) {
+impl Called<Swap> {
+    #[inline(never)]
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        self.0.to_joints(axes)
+    }
+}
+
+fn to_joints(bencher: Bencher, kinematics: &dyn Kinematics) {
     let axes = AxisVector::from_slice(&[1.0, 2.0, 3.0]);
     bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
         for _ in 0..CALLS {
@@ -91,6 +115,16 @@ fn to_joints(bencher: Bencher, kinematics: &(impl Kinematics + ?Sized)) {
 
 #[divan::bench]
 fn to_joints_static(bencher: Bencher) {
+    let (kinematics, axes) = (Called(Swap), AxisVector::from_slice(&[1.0, 2.0, 3.0]));
+    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
+        for _ in 0..CALLS {
+            black_box(black_box(&kinematics).to_joints(black_box(&axes)));
+        }
+    });
+}
+
+#[divan::bench]
+fn to_joints_dyn(bencher: Bencher) {
     to_joints(bencher, &Swap);
 }
 

@@ -42,8 +42,8 @@ pub trait Kinematics: Send + Sync {
         self.to_joints(&(*position + *direction)) - self.to_joints(position)
     }
 
-    /// Why there is no joint position for a place that was asked for: asked where an answer is not finite, on the fine
-    /// loop too. A plugin that has panicked says so here.
+    /// Why there is no joint position for a place that was asked for: asked before a run, and where an answer is not
+    /// finite, on the fine loop too. A plugin that has panicked says so here.
     ///
     /// # Errors
     /// The reason. Use [`PluginError::fixed`], which does not allocate.

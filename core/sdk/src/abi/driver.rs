@@ -157,14 +157,17 @@ impl Driver for Linked {
     }
 
     fn quick_stop(&mut self) {
-        // It has panicked, and says so with the next exchange.
-        let _ = ask(|answer, error| unsafe { (self.table.quick_stop)(self.handle.instance, answer, error) });
+        // Nothing may be asked of it any more that could tell. The log is one for the fine loop.
+        if let Err(error) = ask(|answer, error| unsafe { (self.table.quick_stop)(self.handle.instance, answer, error) })
+        {
+            crate::log!(Error, "no quick stop: {error}");
+        }
     }
 
     fn stop(&mut self) {
         // Nothing is asked of it any more that could tell.
         if let Err(error) = ask(|answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) }) {
-            crate::log!(Error, "a driver did not stop: {error}");
+            crate::log!(Error, "the driver did not stop: {error}");
         }
     }
 }

@@ -1,11 +1,11 @@
 //! What every entry of a plugin has in common: it catches panics, and a plugin that has panicked is not called again.
 
 use std::any::Any;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::ffi::c_void;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::ptr::NonNull;
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use crate::options::OptionDocs;
 use crate::text::Text;
@@ -45,13 +45,9 @@ impl Fault {
         error: *mut PluginError,
         work: impl FnOnce() -> Result<R, PluginError>,
     ) -> u32 {
-        let outcome = match self.words.get() {
-            Some(words) => Err(PluginError::of_panic(words)),
-            None => catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(self.keep(method, panic))),
-        };
         // SAFETY: the caller's promise; the place of an error or an answer holds nothing to drop.
         unsafe {
-            match outcome {
+            match self.run(method, work).and_then(|outcome| outcome) {
                 Ok(value) => answer.write(value),
                 Err(words) => {
                     error.write(words);
@@ -62,25 +58,16 @@ impl Fault {
         DONE
     }
 
-    /// The same for a method that cannot fail; its answer is written where it belongs and copied nowhere.
+    /// Calls `work`, unless the plugin has panicked before.
     ///
-    /// # Safety
-    /// `answer` and `error` can be written to.
+    /// # Errors
+    /// It has panicked, now or before.
     #[inline]
-    pub unsafe fn write<R>(
-        &self,
-        method: &str,
-        answer: *mut R,
-        error: *mut PluginError,
-        work: impl FnOnce() -> R,
-    ) -> u32 {
-        let write = || {
-            // SAFETY: the caller's promise.
-            unsafe { answer.write(work()) };
-            Ok(())
-        };
-        // SAFETY: the caller's promise.
-        unsafe { self.guard(method, &mut (), error, write) }
+    pub fn run<R>(&self, method: &str, work: impl FnOnce() -> R) -> Result<R, PluginError> {
+        match self.words.get() {
+            Some(words) => Err(PluginError::of_panic(words)),
+            None => catch_unwind(AssertUnwindSafe(work)).map_err(|panic| self.keep(method, panic)),
+        }
     }
 
     #[cold]
@@ -104,15 +91,38 @@ impl Fault {
 
 thread_local! {
     static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+    /// Whether the host is in a call of a plugin on this thread.
+    static CALLING: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Keeps where a panic happened instead of printing it: a backtrace takes tens of milliseconds. A shared library has a
 /// hook of its own, so that this touches nobody else's.
 pub fn quiet_panics() {
-    std::panic::set_hook(Box::new(|info| {
-        let place = info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
-        PLACE.set(place);
-    }));
+    std::panic::set_hook(Box::new(keep_place));
+}
+
+/// The same for plugins that are linked into this program, whose hook is that of the program: panics while a host calls a
+/// plugin print nothing, because the error that the call gives has their place and words. All others go to the hook that was
+/// there before. Host, at start; the first call counts.
+pub fn quiet_linked_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| if CALLING.get() { keep_place(info) } else { before(info) }));
+    });
+}
+
+fn keep_place(info: &PanicHookInfo<'_>) {
+    PLACE.set(info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default());
+}
+
+/// Calls a plugin, or with `false` back from it into the host.
+#[inline]
+pub fn calling<R>(plugin: bool, call: impl FnOnce() -> R) -> R {
+    let before = CALLING.replace(plugin);
+    let answer = call();
+    CALLING.set(before);
+    answer
 }
 
 /// A function or closure that captures nothing, made from its type: it has no data.
@@ -166,13 +176,14 @@ pub unsafe extern "C" fn describe<O: PluginOptions>(answer: *mut Text, error: *m
 /// `handle` was given by [`open`] for the same type, and is not used again.
 pub unsafe extern "C" fn close<T>(handle: *mut c_void) {
     // SAFETY: the caller's promise.
-    let instance = unsafe { Box::from_raw(handle.cast::<Instance<T>>()) };
-    if instance.fault.happened() {
-        std::mem::forget(instance);
+    let Instance { plugin, fault } = unsafe { *Box::from_raw(handle.cast::<Instance<T>>()) };
+    if fault.happened() {
+        std::mem::forget(plugin);
         return;
     }
-    let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) else { return };
-    std::mem::forget(panic);
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(plugin))) {
+        crate::log!(Error, "{}", fault.keep("drop", panic));
+    }
 }
 
 /// A text of the other side.
@@ -209,7 +220,7 @@ impl Handle {
 impl Drop for Handle {
     fn drop(&mut self) {
         // SAFETY: it was opened, and is closed once.
-        unsafe { (self.close)(self.instance) };
+        calling(true, || unsafe { (self.close)(self.instance) });
     }
 }
 
@@ -218,7 +229,7 @@ impl Drop for Handle {
 pub fn ask<R>(call: impl FnOnce(*mut R, *mut PluginError) -> u32) -> Result<R, PluginError> {
     let mut answer = std::mem::MaybeUninit::<R>::uninit();
     let mut error = std::mem::MaybeUninit::<PluginError>::uninit();
-    let status = call(answer.as_mut_ptr(), error.as_mut_ptr());
+    let status = calling(true, || call(answer.as_mut_ptr(), error.as_mut_ptr()));
     // SAFETY: each status says which of the two was written.
     unsafe { if status == DONE { Ok(answer.assume_init()) } else { Err(error.assume_init()) } }
 }

@@ -5,16 +5,16 @@ use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
 use super::Descriptor;
-use super::entry::{self, DONE, Handle, Instance, ask, function};
+use super::entry::{self, Fault, Handle, Instance, ask, calling, function};
 use crate::{
     AxisVector, Kinematics, KinematicsContext, Made, PluginError, PluginKind, PluginOptions, RawSlice, size_of_contract,
 };
 
 type Errors = *mut PluginError;
-/// A conversion of one vector.
-type Convert = unsafe extern "C" fn(*const c_void, *const AxisVector, *mut AxisVector, Errors) -> u32;
+/// A conversion of one vector. One that fails gives numbers that are none, and `health` has the error.
+type Convert = unsafe extern "C" fn(*const c_void, *const AxisVector) -> AxisVector;
 
-/// The functions of a kinematics. Each that answers writes its answer, or an error.
+/// The functions of a kinematics. The conversions return what they answer; others write it, or an error.
 #[repr(C)]
 pub struct Table {
     size: u32,
@@ -23,8 +23,7 @@ pub struct Table {
     joint_count: unsafe extern "C" fn(*const c_void, u32, *mut u32, Errors) -> u32,
     to_joints: Convert,
     to_axes: Convert,
-    joint_direction:
-        unsafe extern "C" fn(*const c_void, *const AxisVector, *const AxisVector, *mut AxisVector, Errors) -> u32,
+    joint_direction: unsafe extern "C" fn(*const c_void, *const AxisVector, *const AxisVector) -> AxisVector,
     health: unsafe extern "C" fn(*const c_void, *mut (), Errors) -> u32,
 }
 
@@ -86,36 +85,41 @@ unsafe extern "C" fn joint_count<T: Kinematics>(
     unsafe { this.fault.guard("joint_count", answer, error, work) }
 }
 
-unsafe extern "C" fn to_joints<T: Kinematics>(
-    this: *const c_void,
-    axes: *const AxisVector,
-    answer: *mut AxisVector,
-    error: Errors,
-) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.write("to_joints", answer, error, || this.plugin.to_joints(&*axes)) }
+unsafe extern "C" fn to_joints<T: Kinematics>(this: *const c_void, axes: *const AxisVector) -> AxisVector {
+    let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
+    convert(fault, "to_joints", || plugin.to_joints(unsafe { &*axes }))
 }
 
-unsafe extern "C" fn to_axes<T: Kinematics>(
-    this: *const c_void,
-    joints: *const AxisVector,
-    answer: *mut AxisVector,
-    error: Errors,
-) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.write("to_axes", answer, error, || this.plugin.to_axes(&*joints)) }
+unsafe extern "C" fn to_axes<T: Kinematics>(this: *const c_void, joints: *const AxisVector) -> AxisVector {
+    let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
+    convert(fault, "to_axes", || plugin.to_axes(unsafe { &*joints }))
 }
 
 unsafe extern "C" fn joint_direction<T: Kinematics>(
     this: *const c_void,
     position: *const AxisVector,
     direction: *const AxisVector,
-    answer: *mut AxisVector,
-    error: Errors,
-) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    let work = || unsafe { this.plugin.joint_direction(&*position, &*direction) };
-    unsafe { this.fault.write("joint_direction", answer, error, work) }
+) -> AxisVector {
+    let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
+    convert(fault, "joint_direction", || unsafe { plugin.joint_direction(&*position, &*direction) })
+}
+
+/// No position at all.
+const NOWHERE: AxisVector = AxisVector([f64::NAN; crate::MAX_AXES]);
+
+/// Makes a conversion. One that has panicked answers no position: its caller sees that, and asks for its health. The answer
+/// is written where the host wants it: to copy it takes as long as the call.
+#[inline]
+fn convert(fault: &Fault, method: &str, work: impl FnOnce() -> AxisVector) -> AxisVector {
+    let mut answer = MaybeUninit::uninit();
+    let write = || {
+        answer.write(work());
+    };
+    match fault.run(method, write) {
+        // SAFETY: it was written.
+        Ok(()) => unsafe { answer.assume_init() },
+        Err(_) => NOWHERE,
+    }
 }
 
 unsafe extern "C" fn health<T: Kinematics>(this: *const c_void, answer: *mut (), error: Errors) -> u32 {
@@ -143,22 +147,6 @@ pub fn open(
     Ok(Box::new(Linked { table, handle }))
 }
 
-/// Makes a conversion. One that has panicked answers no position: its caller sees that, and asks for its health.
-#[inline]
-fn convert(call: impl FnOnce(*mut AxisVector, Errors) -> u32) -> AxisVector {
-    let mut answer = MaybeUninit::uninit();
-    let mut error = MaybeUninit::uninit();
-    let status = call(answer.as_mut_ptr(), error.as_mut_ptr());
-    // SAFETY: each status says which of the two was written.
-    unsafe {
-        if status == DONE {
-            return answer.assume_init();
-        }
-        error.assume_init_drop();
-    }
-    AxisVector([f64::NAN; crate::MAX_AXES])
-}
-
 // SAFETY of the calls: the handle is open, `ask` gives places to write to, references live for the call.
 impl Kinematics for Linked {
     fn joint_count(&self, axis_count: usize) -> usize {
@@ -169,17 +157,15 @@ impl Kinematics for Linked {
     }
 
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
-        convert(|answer, error| unsafe { (self.table.to_joints)(self.handle.instance, axes, answer, error) })
+        calling(true, || unsafe { (self.table.to_joints)(self.handle.instance, axes) })
     }
 
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        convert(|answer, error| unsafe { (self.table.to_axes)(self.handle.instance, joints, answer, error) })
+        calling(true, || unsafe { (self.table.to_axes)(self.handle.instance, joints) })
     }
 
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        convert(|answer, error| unsafe {
-            (self.table.joint_direction)(self.handle.instance, position, direction, answer, error)
-        })
+        calling(true, || unsafe { (self.table.joint_direction)(self.handle.instance, position, direction) })
     }
 
     fn health(&self) -> Result<(), PluginError> {

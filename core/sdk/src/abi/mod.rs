@@ -17,6 +17,7 @@ mod planner;
 mod strategy;
 
 pub use driver::driver;
+pub use entry::quiet_linked_panics;
 pub use kinematics::kinematics;
 pub use library::{Descriptor, LAYOUT, Library, SYMBOL_PREFIX};
 pub use planner::planner;

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use super::Descriptor;
-use super::entry::{self, DONE, FAILED, Handle, Instance, ask, function};
+use super::entry::{self, DONE, FAILED, Handle, Instance, ask, calling, function};
 use crate::{
     Accepted, Advanced, AxisVector, Block, BlockReport, Made, Planner, PlannerContext, PlannerDescription, PluginError,
     PluginKind, PluginOptions, RawSlice, Segment, SegmentSink, size_of_contract,
@@ -179,7 +179,7 @@ impl Inlet<'_> {
         if self.emitted > MOST_EMITTED || self.panic.is_some() {
             return FAILED;
         }
-        let taken = catch_unwind(AssertUnwindSafe(|| put(self.sink)));
+        let taken = calling(false, || catch_unwind(AssertUnwindSafe(|| put(self.sink))));
         self.panic = taken.err();
         if self.panic.is_none() { DONE } else { FAILED }
     }

@@ -77,11 +77,11 @@ where
 
 unsafe extern "C" fn describe<T: FeedStrategy>(this: *const c_void, answer: *mut Description, error: Errors) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("signals", answer, error, || description(&this.plugin)) }
+    unsafe { this.fault.guard("signals", answer, error, || description(this)) }
 }
 
-fn description(strategy: &impl FeedStrategy) -> Result<Description, PluginError> {
-    let names = strategy.signals();
+fn description(this: &Instance<impl FeedStrategy>) -> Result<Description, PluginError> {
+    let names = this.plugin.signals();
     if names.len() > MAX_SIGNALS {
         return Err(PluginError::new(format!("it names {} signals; {MAX_SIGNALS} are possible", names.len())));
     }
@@ -89,7 +89,8 @@ fn description(strategy: &impl FeedStrategy) -> Result<Description, PluginError>
     for (place, name) in signals.iter_mut().zip(names) {
         *place = RawSlice::new(name.as_bytes());
     }
-    let max_ratio_change_per_s = strategy.max_ratio_change_per_s();
+    let most = || this.plugin.max_ratio_change_per_s();
+    let max_ratio_change_per_s = this.fault.run("max_ratio_change_per_s", most)?;
     Ok(Description { max_ratio_change_per_s, signal_count: names.len() as u32, signals })
 }
 
