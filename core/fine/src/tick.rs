@@ -30,6 +30,7 @@ use crate::points::Points;
 use crate::preview::{LineEnd, Preview};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
+use joints::Lead;
 use keep_alive::KeepAlive;
 use rest::Stop;
 
@@ -107,6 +108,7 @@ pub struct FineLoop {
     feedback: Feedback,
     /// Where the axes are by the feedback, as far as the kinematics last knew.
     axes: AxisVector,
+    lead: Lead,
     counters: Counters,
     fault: Option<Fault>,
     plugin_error: Option<PluginError>,
@@ -155,9 +157,10 @@ impl FineLoop {
             starved: false,
             recovering: false,
             tick: 0,
-            setpoint: joints::first_setpoint(config),
+            setpoint: Setpoint::default(),
             feedback: Feedback::default(),
             axes: config.axes_alone(&config.position),
+            lead: Lead::Axes,
             counters: Counters::default(),
             fault: None,
             plugin_error: None,
@@ -220,11 +223,6 @@ impl FineLoop {
         self.plugin_error.as_ref()
     }
 
-    /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Host.
-    pub fn sent(&self) -> AxisVector {
-        self.config.axes_alone(self.guard.position()) + self.offset
-    }
-
     /// Whether the program has ended, or a fault has brought the machine to rest.
     pub fn is_over(&self) -> bool {
         self.outputs.ended || matches!(self.phase, Phase::Faulted)
@@ -245,9 +243,9 @@ impl FineLoop {
             Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
-                let position = ramp.next();
-                let over = ramp.is_over() && joints::rest(self.fault.as_ref(), &self.setpoint);
+                let (position, over) = (ramp.next(), ramp.is_over());
                 let position = self.with_joints(position);
+                let over = over && self.joints_rest();
                 (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }
             Phase::Faulted => {

@@ -95,6 +95,13 @@ impl Names<'_> {
             }
             Breach::Jerk => format!("jerk {value:.1} {unit}/s³, limit {limit:.1} {unit}/s³"),
         };
-        format!("guard: planner {} asks for {who} {what}; the sample was not sent", self.machine.planner.plugin)
+        let planner = &self.machine.planner.plugin;
+        if self.joints.are_curved() && entry >= axes.count() {
+            let kinematics = &self.machine.kinematics.plugin;
+            return format!(
+                "guard: kinematics {kinematics} asks for {who} {what}; the sample of planner {planner} was not sent"
+            );
+        }
+        format!("guard: planner {planner} asks for {who} {what}; the sample was not sent")
     }
 }

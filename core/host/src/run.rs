@@ -17,6 +17,7 @@ use crate::fault_text::describe;
 use crate::homing::Homing;
 use crate::joints::{JointSpace, JointWatch};
 use crate::monitor::Monitor;
+use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::registry::Registry;
@@ -300,8 +301,12 @@ impl Run {
             summary.page_faults = Some(page_faults);
         }
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
-        let position = if self.switches.home { fine.sent() } else { pump.monitor.position };
+        let sent = self.switches.home || fine.joints_went_alone();
+        let position = if sent { fine.sent() } else { pump.monitor.position };
         fine.into_driver().stop();
+        drop(pump);
+        // What plugins say when they are stopped and dropped.
+        drain_plugin_log(&mut |line| observer.note(line));
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault, position })
     }

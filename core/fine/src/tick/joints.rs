@@ -1,10 +1,25 @@
 //! Axes to joints and back, and what happens where the kinematics know neither.
 
-use tandem_sdk::{AxisVector, Kinematics, Setpoint};
+use tandem_sdk::{AxisVector, Kinematics};
 
 use super::FineLoop;
 use crate::config::{FineConfig, Joints};
-use crate::fault::{Fault, FaultKind};
+use crate::fault::FaultKind;
+
+/// Relative rounding of a speed that a limit forgives.
+const ROUNDING: f64 = 5e-7;
+
+/// How far from joints their way through the axes and back may end, mm or rad.
+const BACK: f64 = 1e-6;
+
+/// What leads the joints where the kinematics are not linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lead {
+    /// The axes, by the kinematics.
+    Axes,
+    /// Nothing, after a fault: each goes to rest on its own, and the kinematics are not asked.
+    Nothing,
+}
 
 /// Number of joints. Kinematics that are not linear have been asked: theirs lie behind the axes. Host.
 pub(super) fn count(config: &FineConfig, kinematics: Option<&dyn Kinematics>) -> usize {
@@ -14,45 +29,87 @@ pub(super) fn count(config: &FineConfig, kinematics: Option<&dyn Kinematics>) ->
     }
 }
 
-/// What is repeated to the drives where the kinematics fail in the first period. Host.
-pub(super) fn first_setpoint(config: &FineConfig) -> Setpoint {
-    let mut setpoint = Setpoint::default();
-    if let Joints::Curved { axes } = config.joints {
-        setpoint.position = AxisVector::from_slice(&config.position.0[axes..config.lane_count()]);
-    }
-    setpoint
-}
-
-/// Whether the joints rest when the axes do: where the kinematics have failed, they slow down on their own.
-pub(super) fn rest(fault: Option<&Fault>, setpoint: &Setpoint) -> bool {
-    let alone = fault.is_some_and(|f| matches!(f.kind, FaultKind::Kinematics { .. } | FaultKind::WayBack { .. }));
-    !alone || setpoint.velocity == AxisVector::ZERO
-}
-
 impl FineLoop {
-    /// Where the joints are to be. Kinematics that do not know fault the machine, and each joint slows down by its own limit.
-    pub(super) fn joints_of(&mut self, axes: &AxisVector) -> AxisVector {
-        let Some(kinematics) = &self.kinematics else { return *axes + self.offset };
-        let joints = kinematics.to_joints(&self.config.axes_alone(axes));
-        let Some(joint) = self.unknown_joint(&joints) else { return joints + self.offset };
-        self.lose_way(FaultKind::Kinematics { joint });
-        self.slower()
+    /// Where the joints are to be in the sample `position`. Kinematics that are not linear have been asked by
+    /// [`FineLoop::with_joints`], and the guard has seen what they answered: they are not asked again.
+    #[inline]
+    pub(super) fn joints_of(&self, position: &AxisVector) -> AxisVector {
+        let joints = match (self.config.joints, &self.kinematics) {
+            (Joints::Curved { axes }, _) => AxisVector::from_slice(&position.0[axes..self.config.lane_count()]),
+            (_, Some(kinematics)) => kinematics.to_joints(&self.config.axes_alone(position)),
+            (_, None) => *position,
+        };
+        joints + self.offset
     }
 
-    /// A sample on its way to the guard: with the joints behind the axes, where only the kinematics know them.
+    /// A sample on its way to the guard: with the joints behind the axes, where only the kinematics know them. Kinematics
+    /// that do not know either fault the machine, and each joint goes to rest by its own limit.
     #[inline]
-    pub(super) fn with_joints(&mut self, mut position: AxisVector) -> AxisVector {
-        if let (Joints::Curved { axes }, Some(kinematics)) = (self.config.joints, &self.kinematics) {
-            position = self.config.axes_alone(&position);
-            let joints = kinematics.to_joints(&position);
-            position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
-            if let Some(joint) =
-                self.unknown_joint(&joints).filter(|_| position.0[..axes].iter().all(|axis| axis.is_finite()))
-            {
-                self.lose_way(FaultKind::Kinematics { joint });
-            }
+    pub(super) fn with_joints(&mut self, position: AxisVector) -> AxisVector {
+        match self.config.joints {
+            Joints::Curved { axes } => self.with_curved(axes, self.config.axes_alone(&position)),
+            _ => position,
         }
+    }
+
+    fn with_curved(&mut self, axes: usize, mut position: AxisVector) -> AxisVector {
+        let asked = self.kinematics.as_ref().filter(|_| self.lead == Lead::Axes).map(|k| k.to_joints(&position));
+        let joints = match asked {
+            Some(joints) if self.accepts(axes, &position, &joints) => joints,
+            _ => self.slower(axes),
+        };
+        position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
         position
+    }
+
+    /// Whether the joints go where the kinematics want them. Before a fault the guard decides that; on the way to rest,
+    /// where every sample is sent, they do as long as each can follow.
+    fn accepts(&mut self, axes: usize, position: &AxisVector, joints: &AxisVector) -> bool {
+        if position.0[..axes].iter().any(|axis| !axis.is_finite()) {
+            // The plan is to blame, and the guard says so.
+            return true;
+        }
+        if let Some(joint) = (0..self.joints).find(|joint| !joints[*joint].is_finite()) {
+            self.lead = Lead::Nothing;
+            self.lose_way(FaultKind::Kinematics { joint });
+        } else if self.fault.is_some() && !(0..self.joints).all(|j| self.can_follow(axes + j, joints[j])) {
+            self.lead = Lead::Nothing;
+        }
+        self.lead == Lead::Axes
+    }
+
+    /// Whether the joint at `entry` reaches `next` within its limits of velocity and acceleration.
+    fn can_follow(&self, entry: usize, next: f64) -> bool {
+        let (limits, period_s) = (&self.config.limits.axes[entry], self.config.period_s);
+        let before = self.guard.velocity()[entry];
+        let velocity = (next - self.guard.position()[entry]) / period_s;
+        let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s).max(before.abs());
+        let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
+        let within = |value: f64, most: f64| value.abs() <= most * (1.0 + ROUNDING) + rounding;
+        within(velocity, fastest) && within(velocity - before, limits.acceleration_mm_per_s2 * period_s)
+    }
+
+    /// The joints a period later, each with less speed by its limit.
+    fn slower(&self, axes: usize) -> AxisVector {
+        let (period_s, mut joints) = (self.config.period_s, AxisVector::ZERO);
+        for joint in 0..self.joints {
+            let (entry, most) = (axes + joint, self.config.limits.axes[axes + joint].acceleration_mm_per_s2);
+            let speed = self.guard.velocity()[entry];
+            let slower = speed.signum() * (speed.abs() - most * period_s).max(0.0);
+            joints[joint] = self.guard.position()[entry] + slower * period_s;
+        }
+        joints
+    }
+
+    /// Whether the joints rest when the axes do: they may have been slowing down on their own.
+    pub(super) fn joints_rest(&self) -> bool {
+        let first = self.config.axis_count();
+        self.lead == Lead::Axes || self.guard.velocity().0[first..].iter().all(|speed| *speed == 0.0)
+    }
+
+    /// Whether the joints came to rest each on its own, away from where the axes were to be. Host.
+    pub fn joints_went_alone(&self) -> bool {
+        self.lead == Lead::Nothing
     }
 
     /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
@@ -68,8 +125,18 @@ impl FineLoop {
         self.axes
     }
 
-    fn unknown_joint(&self, joints: &AxisVector) -> Option<usize> {
-        (0..self.joints).find(|joint| !joints[*joint].is_finite())
+    /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Where the joints
+    /// came to rest on their own, it is what the kinematics make of them, if that leads back. Host.
+    pub fn sent(&self) -> AxisVector {
+        let axes = self.config.axes_alone(self.guard.position());
+        let Some(kinematics) = self.kinematics.as_ref().filter(|_| self.joints_went_alone()) else {
+            return axes + self.offset;
+        };
+        let joints = self.joints_of(self.guard.position());
+        let found = self.config.axes_alone(&kinematics.to_axes(&joints));
+        let again = kinematics.to_joints(&found);
+        let leads_back = (0..self.joints).all(|joint| (again[joint] - joints[joint]).abs() <= BACK);
+        if leads_back { found } else { axes }
     }
 
     /// Faults the machine; the plugin's own words about it are kept for the host.
@@ -79,17 +146,5 @@ impl FineLoop {
             self.plugin_error.get_or_insert(error);
         }
         self.fail(kind);
-    }
-
-    /// The joints a period later, each with less speed by its limit.
-    fn slower(&self) -> AxisVector {
-        let (period_s, first) = (self.config.period_s, self.config.axis_count());
-        let mut position = self.setpoint.position;
-        for joint in 0..self.joints {
-            let most = self.config.limits.axes.get(first + joint).map_or(0.0, |limits| limits.acceleration_mm_per_s2);
-            let speed = self.setpoint.velocity[joint];
-            position[joint] += speed.signum() * (speed.abs() - most * period_s).max(0.0) * period_s;
-        }
-        position
     }
 }

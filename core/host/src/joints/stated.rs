@@ -50,6 +50,7 @@ fn of_plugin(machine: &Machine, registry: &Registry) -> Result<Stated, HostError
         let cause = made.health().map_or_else(|error| format!("{name}: {error}"), |()| words);
         return Err(refusal(machine, "kinematics.plugin", cause));
     }
+    made.health().map_err(|e| refusal(machine, "kinematics.plugin", format!("{name}: {e}")))?;
     if stands != count {
         let cause = format!(
             "{name} has {count} joints on these axes, and {stands} are stated: every joint needs its limits, as \

@@ -1,5 +1,7 @@
 //! Kinematics of others: linear ones whose planner is defective, and ones that are not linear.
 
+mod failing;
+
 use std::path::{Path, PathBuf};
 
 use tandem_gcode::Program;
@@ -139,6 +141,7 @@ fn run(text: &str, settings: &[(&str, &str)]) -> Result<Outcome, HostError> {
         tandem_sdk::local_plugin!(kinematics "corexy" = belts),
         tandem_sdk::local_plugin!(kinematics "one-way" = one_way),
         tandem_sdk::local_plugin!(kinematics "astray" = astray),
+        failing::kinematics(),
     ];
     let planners = [
         tandem_sdk::local_plugin!(planner "too-fast" = too_fast),
@@ -149,6 +152,7 @@ fn run(text: &str, settings: &[(&str, &str)]) -> Result<Outcome, HostError> {
     }
     registry.register(tandem_look_ahead::PLUGIN).unwrap();
     registry.register(tandem_sim::PLUGIN).unwrap();
+    registry.register(failing::driver()).unwrap();
     let run = Run::prepare(machine, &registry, Program::open(&program).unwrap(), Switches::default())?;
     run.drive(Clock::Virtual, &[], &mut Nobody)
 }
