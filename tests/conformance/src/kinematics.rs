@@ -49,6 +49,9 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
             }
         }
     }
+    if let Err(error) = first.health() {
+        report.find("joints", format!("health of one that has not failed: {error}"));
+    }
     judge_heap(uses, report);
     report.time(timings);
 }

@@ -6,7 +6,7 @@ use std::process::Command;
 use tandem_host::HostError;
 
 use crate::bench::{Bench, Ran};
-use crate::harness::{mill, root};
+use crate::harness::{Done, Scenario, mill, root};
 use crate::plugins::built::third_party;
 
 const PROGRAM: &str = "G21 G90\nF3000\nG1 X40 Y10\nG1 X0 Y20\nG4 P0.1\nG1 X10 Y0\nM2\n";
@@ -76,7 +76,7 @@ impl std::fmt::Display for Mischief {
     }
 }
 
-/// All methods of all kinds that are called in a run, with the calls that are tried.
+/// All methods of all kinds that are called in a run and whose panic ends it, with the calls that are tried.
 const METHODS: &[(&str, &str, &[u32])] = &[
     ("planner", "new", &[1]),
     ("planner", "describe", &[1]),
@@ -86,6 +86,7 @@ const METHODS: &[(&str, &str, &[u32])] = &[
     ("planner", "advance", &[1, 2, 3, 4]),
     ("feed_strategy", "new", &[1]),
     ("feed_strategy", "signals", &[1]),
+    ("feed_strategy", "max_ratio_change_per_s", &[1]),
     ("feed_strategy", "update", &[1, 2, 50]),
     ("driver", "new", &[1]),
     ("driver", "describe", &[1]),
@@ -94,6 +95,7 @@ const METHODS: &[(&str, &str, &[u32])] = &[
     ("driver", "exchange", &[1, 2, 100, 700]),
     ("kinematics", "new", &[1]),
     ("kinematics", "joint_count", &[1]),
+    ("kinematics", "health", &[1]),
     ("kinematics", "to_joints", &[1, 40, 75, 400, 1001, 2000]),
     ("kinematics", "to_axes", &[1, 40, 75, 400, 1001]),
 ];
@@ -118,6 +120,63 @@ fn a_panic_in_any_call_of_any_method_ends_in_a_fault_that_names_it() {
                 assert!(words.contains(&format!("panicked in {method}")), "{mischief}: {words:?}");
             }
         }
+    }
+}
+
+/// Methods that are called where no fault can come of it any more, or only after a stop: through the command.
+fn command(mischief: &Mischief, program: &str, commands: &str, more: &[&str]) -> Done {
+    let settings = mischief.settings(&third_party("hostile"));
+    let settings: Vec<String> =
+        settings.iter().filter(|(key, _)| !key.ends_with("curved")).map(|(k, v)| format!("{k}={v}")).collect();
+    let arguments: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    Scenario::text(program).with(&arguments).with(more).commands(commands).run()
+}
+
+fn assert_within_limits_to_rest(done: &Done, mischief: &Mischief) {
+    let verdict = done.judge(|options| {
+        options.ends_early = true;
+        options.sample_tolerance_mm = Some(1e3);
+        options.vertex_tolerance_mm = Some(1e3);
+    });
+    assert!(verdict.passed(), "{mischief}: {verdict}");
+}
+
+#[test]
+fn a_panic_in_quick_stop_is_told_beside_the_fault() {
+    let mischief = Mischief::of("driver", "panic", "quick_stop", 1);
+    let done = command(&mischief, PROGRAM, "300,emergency-stop\n", &[]);
+    assert_eq!(done.status(), 3, "{}", done.errors());
+    assert!(done.summary()["fault"].as_str().unwrap().contains("emergency stop"), "{}", done.summary()["fault"]);
+    assert!(done.errors().contains("hostile panicked in quick_stop"), "{}", done.errors());
+    assert_within_limits_to_rest(&done, &mischief);
+}
+
+#[test]
+fn a_panic_behind_the_end_is_told() {
+    for (section, method) in
+        [("driver", "stop"), ("driver", "drop"), ("planner", "drop"), ("feed_strategy", "drop"), ("kinematics", "drop")]
+    {
+        let mischief = Mischief::of(section, "panic", method, 1);
+        let identity = ["--set", "joints={x={axis='x'},y={axis='y'},z={axis='z'}}"];
+        let done = command(&mischief, PROGRAM, "", if section == "kinematics" { &identity } else { &[] });
+        assert_eq!(done.status(), 0, "{mischief}: {}", done.errors());
+        assert!(done.errors().contains(&format!("hostile panicked in {method}")), "{mischief}: {}", done.errors());
+        assert_within_limits_to_rest(&done, &mischief);
+    }
+}
+
+/// A probe that touches nothing ends at rest, and the planner begins again from there.
+#[test]
+fn a_panic_in_reset_is_a_fault() {
+    let program = "G21 G90\nF3000\nG38.3 Z-10 F1500\nG1 X20\nM2\n";
+    for misbehave in ["never", "panic", "panic-twice"] {
+        let mischief = Mischief::of("planner", misbehave, "reset", 1);
+        let done = command(&mischief, program, "", &["--set", "probe.input=3"]);
+        let expected = if misbehave == "never" { 0 } else { 3 };
+        assert_eq!(done.status(), expected, "{mischief}: {}", done.errors());
+        let named = done.errors().contains("hostile panicked in reset");
+        assert_eq!(named, misbehave != "never", "{mischief}: {}", done.errors());
+        assert_within_limits_to_rest(&done, &mischief);
     }
 }
 
@@ -146,6 +205,10 @@ fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
             assert!(said.contains(&format!("kinematics {}", third_party("hostile").display())), "{mischief}: {said:?}");
             assert!(said.contains(words), "{mischief}: {said:?}");
         }
+    }
+    for call in [400, 1001] {
+        let said = Mischief::of("kinematics", "beyond", "to_joints", call).words();
+        assert!(said.starts_with("guard: kinematics") && said.contains("asks for joint a position 1000000"), "{said}");
     }
     // A ratio of a million is a wish: what is driven is the programmed feed.
     assert_eq!(Mischief::of("feed_strategy", "beyond", "update", 5).words(), "");
@@ -194,6 +257,18 @@ fn check(mischief: &Mischief) -> (Option<i32>, String) {
 fn the_conformance_kit_finds_it_out() {
     let (status, out) = check(&Mischief::of("any", "never", "", 1));
     assert_eq!(status, Some(0), "{out}");
+    let by_kind = [
+        ("planner", &["describe", "check", "accept", "finish", "advance", "reset"][..]),
+        ("feed strategy", &["signals", "max_ratio_change_per_s", "update"]),
+        ("driver", &["describe", "open", "start", "exchange", "quick_stop", "stop"]),
+        ("kinematics", &["joint_count", "to_joints", "to_axes", "joint_direction", "health"]),
+    ];
+    for (kind, method) in by_kind.iter().flat_map(|(kind, methods)| methods.iter().map(move |method| (kind, method))) {
+        let mischief = Mischief::of("any", "panic", method, 1);
+        let (status, out) = check(&mischief);
+        let words = format!("panicked in {method}");
+        assert!(status == Some(1) && out.contains(&words), "{kind}: {mischief}: {status:?}\n{out}");
+    }
     for (misbehave, method, words) in [
         ("panic", "advance", "panicked in advance"),
         ("panic", "exchange", "panicked in exchange"),

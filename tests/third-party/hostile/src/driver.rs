@@ -12,6 +12,12 @@ impl Hostile {
     }
 }
 
+impl Drop for Hostile {
+    fn drop(&mut self) {
+        self.0.quietly("drop");
+    }
+}
+
 impl Driver for Hostile {
     fn describe(&self) -> DriverDescription {
         self.0.quietly("describe");

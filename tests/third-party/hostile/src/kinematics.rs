@@ -22,6 +22,12 @@ impl Hostile {
     }
 }
 
+impl Drop for Hostile {
+    fn drop(&mut self) {
+        self.mischief.quietly("drop");
+    }
+}
+
 impl Kinematics for Hostile {
     fn joint_count(&self, axis_count: usize) -> usize {
         self.mischief.quietly("joint_count");
@@ -38,5 +44,9 @@ impl Kinematics for Hostile {
 
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
         self.with_first("joint_direction", direction, 2.0 * self.bend * position[1] * direction[1])
+    }
+
+    fn health(&self) -> Result<(), PluginError> {
+        self.mischief.of("health").map(|_| ())
     }
 }

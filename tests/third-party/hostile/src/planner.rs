@@ -73,6 +73,12 @@ impl Hostile {
     }
 }
 
+impl Drop for Hostile {
+    fn drop(&mut self) {
+        self.mischief.quietly("drop");
+    }
+}
+
 impl Planner for Hostile {
     fn describe(&self) -> PlannerDescription {
         self.mischief.quietly("describe");

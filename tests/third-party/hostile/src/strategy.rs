@@ -12,10 +12,21 @@ impl Hostile {
     }
 }
 
+impl Drop for Hostile {
+    fn drop(&mut self) {
+        self.0.quietly("drop");
+    }
+}
+
 impl FeedStrategy for Hostile {
     fn signals(&self) -> &'static [&'static str] {
         self.0.quietly("signals");
         &["mood"]
+    }
+
+    fn max_ratio_change_per_s(&self) -> f64 {
+        self.0.quietly("max_ratio_change_per_s");
+        f64::INFINITY
     }
 
     fn update(&mut self, _window: &Window) -> Result<Answer, PluginError> {
