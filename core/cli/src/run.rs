@@ -34,7 +34,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         other => other?,
     };
     let clock = options.clock.into();
-    let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock))?;
+    let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
     let outcome = run.drive(clock, &commands, &mut sinks)?;
@@ -86,7 +86,7 @@ fn resolved(path: &Path) -> PathBuf {
 }
 
 /// Reads a command file; lines that are empty or begin with # are left out.
-fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
+fn commands(path: &Path, clock: Clock, machine: &Machine) -> Result<Vec<Timed>, String> {
     if clock == Clock::Wall {
         return Err(
             "--commands goes with --clock virtual: on the wall clock ticks have no place in the operator's time"
@@ -98,7 +98,8 @@ fn commands(path: &Path, clock: Clock) -> Result<Vec<Timed>, String> {
     for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
     {
         let at = |cause: String| format!("{}:{number}: {cause}", path.display());
-        match (Timed::parse(line), commands.last()) {
+        let allowed = |timed: Timed| timed.command.check(machine.motion.max_feed_ratio).map(|()| timed);
+        match (Timed::parse(line).and_then(allowed), commands.last()) {
             (Err(cause), _) => errors.push(at(cause)),
             (Ok(now), Some(last)) if now.tick < last.tick => {
                 errors.push(at(format!("tick {} comes after tick {}", now.tick, last.tick)));

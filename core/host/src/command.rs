@@ -108,6 +108,23 @@ impl Command {
         }
     }
 
+    /// Refuses a ratio above what the machine plans for, `max_feed_ratio` (`motion.max_feed_ratio`), or above 1 for
+    /// rapids.
+    ///
+    /// # Errors
+    /// The ratio and what it may be.
+    pub fn check(self, max_feed_ratio: f64) -> Result<(), String> {
+        match self {
+            Self::FeedOverride(ratio) if ratio > max_feed_ratio => {
+                Err(format!("a feed override of {ratio} is above motion.max_feed_ratio, which is {max_feed_ratio}"))
+            }
+            Self::RapidOverride(ratio) if ratio > 1.0 => {
+                Err(format!("a rapid override of {ratio} is above 1: rapids run at the axes' rapid feeds"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The command called `name`, with its value as text.
     ///
     /// # Errors

@@ -111,15 +111,8 @@ impl Desk {
 
     fn check(&self, command: Command) -> Result<(), String> {
         match command {
-            Command::FeedOverride(ratio) if ratio > self.max_feed_ratio => Err(format!(
-                "a feed override of {ratio} is above motion.max_feed_ratio, which is {}",
-                self.max_feed_ratio
-            )),
-            Command::RapidOverride(ratio) if ratio > 1.0 => {
-                Err(format!("a rapid override of {ratio} is above 1: rapids run at the axes' rapid feeds"))
-            }
             Command::StallRough(_) => Err("stall-rough is for tests, from a command file".to_string()),
-            _ => Ok(()),
+            command => command.check(self.max_feed_ratio),
         }
     }
 
