@@ -124,10 +124,9 @@ fn a_hold_on_the_butterfly_stays_within_the_limits() {
     let commands = "300,hold\n420,resume\n700,feed-override,0.4\n900,feed-override,1\n";
     let done = Scenario::of(&butterfly).on(&machine).commands(commands).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in ["limit_violations", "guard_stops", "starvations"] {
+    for count in ["limit_violations", "guard_stops", "starvations", "jerk_relaxed_samples"] {
         assert_eq!(done.number(count), 0.0, "{count}");
     }
-    assert!(done.number("jerk_relaxed_samples") < 10.0, "{}", done.number("jerk_relaxed_samples"));
 }
 
 /// A script sees curves as one block each and lowers the feed of those it is asked to.

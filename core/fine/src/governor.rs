@@ -6,6 +6,7 @@
 //! admissible where the plan is, so the interval for σ̇ is never empty.
 
 mod smooth;
+mod steady;
 
 pub use smooth::Aim;
 

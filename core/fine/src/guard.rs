@@ -31,6 +31,8 @@ pub struct Checked {
     velocity: AxisVector,
     acceleration: AxisVector,
     buckets: [[f64; MAX_AXES]; 2],
+    /// Beyond the jerk limit, and not held against it.
+    pub relaxed: bool,
     /// The first limit broken, if any.
     pub breach: Option<FaultKind>,
 }
@@ -58,7 +60,7 @@ impl Guard {
         &self.acceleration
     }
 
-    /// No rate keeps the jerk limit with the next sample: it is counted, and not held against it.
+    /// No rate is known that keeps the jerk limit with the next sample: where it does not, that is not held against it.
     pub fn relax_jerk(&mut self) {
         self.relaxed = RELAXED_SAMPLES;
     }
@@ -71,7 +73,7 @@ impl Guard {
     /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
     pub fn check(&self, next: &AxisVector, unhomed: u32) -> Checked {
         let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
-        let mut checked = Checked { velocity, acceleration, buckets: self.buckets, breach: None };
+        let mut checked = Checked { velocity, acceleration, buckets: self.buckets, relaxed: false, breach: None };
         for axis in 0..self.config.lane_count() {
             let travels = unhomed >> axis & 1 == 0;
             let breach = self.check_axis(axis, next[axis], travels, &mut checked);
@@ -127,6 +129,7 @@ impl Guard {
         checked.acceleration[axis] = acceleration;
         let value = (acceleration - self.acceleration[axis]) / period_s;
         let beyond = value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
+        checked.relaxed |= beyond && self.relaxed > 0;
         (beyond && self.relaxed == 0).then_some(FaultKind::Guard { breach: Breach::Jerk, axis, value, limit })
     }
 }

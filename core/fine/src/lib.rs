@@ -5,6 +5,7 @@
 
 mod answer;
 mod config;
+mod course;
 mod cursor;
 mod edge;
 mod fault;

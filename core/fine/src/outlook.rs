@@ -38,8 +38,6 @@ pub struct Outlook {
     pub most_change_per_s2: f64,
     /// Bound on σ̈ that the jerk limits leave at the plan's speed, over the points, 1/s².
     pub rate_change_per_s2: f64,
-    /// Largest |jerk| / limit of the plan itself in the coming period.
-    pub jerk_ratio: f64,
     /// Share of the jerk that an approach may come in with: all of it where the plan goes straight on at constant speed,
     /// else what turning and the plan's own jerk, as they change on the way, leave.
     pub share: f64,
@@ -64,7 +62,6 @@ impl Outlook {
             most_change_per_s2: MOST_CHANGE / (period_s * period_s),
             path_jerk_mm_per_s3: f64::INFINITY,
             rate_change_per_s2: f64::INFINITY,
-            jerk_ratio: 0.0,
             share: 1.0,
         }
     }
@@ -73,7 +70,7 @@ impl Outlook {
     pub fn clear(&mut self) {
         self.count = 0;
         (self.path_jerk_mm_per_s3, self.rate_change_per_s2) = (f64::INFINITY, self.most_change_per_s2);
-        (self.jerk_ratio, self.share) = (0.0, 0.97);
+        self.share = 0.97;
     }
 
     /// Whether the points of a period have taken what room there is beside the grid.
@@ -90,10 +87,6 @@ impl Outlook {
     pub fn stretch(&mut self, segment: &Segment, from_s: f64, duration_s: f64, offset_s: f64) {
         for (t, offset) in [(from_s, offset_s), (from_s + duration_s, offset_s + duration_s)] {
             self.point(segment, t, offset);
-            let point = &self.list[self.count - 1];
-            for axis in 0..self.axes {
-                self.jerk_ratio = self.jerk_ratio.max(point.jerk[axis].abs() / self.jerk[axis]);
-            }
         }
     }
 

@@ -51,7 +51,7 @@ pub struct Counters {
     pub late_ratios: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
-    /// Samples that kept velocity and acceleration, but for which no rate kept the jerk limit.
+    /// Samples sent beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
     pub jerk_relaxed_samples: u64,
 }
 

@@ -4,8 +4,12 @@ use tandem_rings::Queued;
 use tandem_sdk::RingEntry;
 
 use super::{Cursor, ends};
+use crate::course::{Course, Place};
 use crate::outlook::{Outlook, derivatives};
 use crate::points::Points;
+
+/// Most entries that a course reaches over.
+const ON_COURSE: usize = 512;
 
 impl Cursor {
     /// Number, counted from the start, of the entry that comes next.
@@ -81,5 +85,18 @@ impl Cursor {
             start_s += segment.duration_s;
             grid_s <= outlook.horizon_s && !ends(segment)
         });
+    }
+
+    /// Shows the plan from here on to `look`, as far as it is queued.
+    pub fn on_course<T>(&mut self, axes: usize, look: impl FnOnce(Place<'_>) -> T) -> T {
+        let wanted = self.entries.slots().min(ON_COURSE);
+        let local_s = if self.resting { self.segment.duration_s } else { self.local_s };
+        match self.entries.read_chunk(wanted) {
+            Ok(chunk) => {
+                let (first, second) = chunk.as_slices();
+                look(Course::new(&self.segment, [first, second], axes).begin(local_s))
+            }
+            Err(_) => look(Course::new(&self.segment, [&[], &[]], axes).begin(local_s)),
+        }
     }
 }

@@ -52,6 +52,7 @@ impl FineLoop {
         self.begin_edge();
         let position = self.with_joints(self.cursor.position());
         let checked = self.guard.check(&position, self.outputs.unhomed);
+        self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
         let position = self.let_pass(position, &checked);
         (position, self.input(ask, reached))
     }

@@ -43,15 +43,14 @@ impl FineLoop {
         delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
     }
 
-    /// The highest rate at which the plan keeps its limits.
+    /// The highest rate at which the plan keeps velocity and acceleration. Jerk beyond the limit at single points need not be
+    /// in the samples; where it is, the guard sees it.
     fn plan_limit(&self) -> f64 {
         // Under `count` everything is sent: forms that break limits on purpose are not slowed.
         if self.config.guard == GuardMode::Count {
             return 1.0;
         }
-        let limit = Governor::plan_limit(&self.points);
-        let jerk = if self.config.order >= 3 { self.outlook.jerk_ratio } else { 0.0 };
-        if jerk > 1.0 + JERK_TOLERANCE { limit.min(jerk.cbrt().recip()) } else { limit }
+        Governor::plan_limit(&self.points)
     }
 
     /// Limits of velocity and acceleration: σ is linear in the period.
@@ -80,9 +79,9 @@ impl FineLoop {
             // Where the plan stands still, its path says nothing.
             _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, path },
         };
-        let chosen = self.governor.smooth(&aim, &self.outlook);
+        let (governor, outlook) = (&mut self.governor, &self.outlook);
+        let chosen = self.cursor.on_course(self.config.lane_count(), |place| governor.smooth(&aim, outlook, place));
         if chosen.relaxed {
-            self.counters.jerk_relaxed_samples += 1;
             self.guard.relax_jerk();
         }
         chosen.delta_s
@@ -184,5 +183,3 @@ fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
 
 /// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
 const FEED_TOLERANCE: f64 = 1e-7;
-/// Relative tolerance on jerk within which a plan is at its limit.
-const JERK_TOLERANCE: f64 = 1e-2;

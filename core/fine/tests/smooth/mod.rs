@@ -292,12 +292,6 @@ impl Machine {
 }
 
 impl Done {
-    /// As [`Done::assert_kept`], without jerk.
-    pub fn assert_kept_but_jerk(&self, what: &str) {
-        let [speed, acceleration, _] = self.worst();
-        assert!(speed.0 < 1.0 + 1e-6 && acceleration.0 < 1.0 + 1e-6, "{what}: {:?}", self.worst());
-    }
-
     /// Path speed of each sample, mm/s.
     pub fn speeds(&self) -> Vec<f64> {
         speeds(&self.sent)

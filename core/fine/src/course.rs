@@ -1,0 +1,94 @@
+//! The plan ahead as it is queued, at any place: what a way of σ is tried on before it is begun.
+
+use tandem_rings::Queued;
+use tandem_sdk::{MAX_AXES, RingEntry, Segment, SegmentFlags};
+
+use crate::outlook::derivatives;
+
+/// The plan from here on: the segment that moves, and what is queued behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct Course<'a> {
+    segment: &'a Segment,
+    queued: [&'a [Queued]; 2],
+    axes: usize,
+}
+
+/// Derivatives of the plan at a place by program time, per axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Motion {
+    /// Velocity, mm/s.
+    pub velocity: [f64; MAX_AXES],
+    /// Acceleration, mm/s².
+    pub acceleration: [f64; MAX_AXES],
+    /// Jerk, mm/s³.
+    pub jerk: [f64; MAX_AXES],
+}
+
+/// A place on a [`Course`].
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    course: Course<'a>,
+    /// The segment here; none behind a rest and behind what is queued, where nothing moves.
+    segment: Option<&'a Segment>,
+    /// Entries passed.
+    passed: usize,
+    local_s: f64,
+}
+
+impl<'a> Course<'a> {
+    /// `segment` moves, `queued` follows; `axes` axes are looked at.
+    pub fn new(segment: &'a Segment, queued: [&'a [Queued]; 2], axes: usize) -> Self {
+        Self { segment, queued, axes }
+    }
+
+    /// The place at local time `local_s` of the segment that moves.
+    pub fn begin(&self, local_s: f64) -> Place<'a> {
+        Place { course: *self, segment: Some(self.segment), passed: 0, local_s }
+    }
+
+    fn entry(&self, n: usize) -> Option<&'a RingEntry> {
+        let [first, second] = self.queued;
+        first.get(n).or_else(|| second.get(n - first.len())).map(|queued| &queued.entry)
+    }
+}
+
+impl Place<'_> {
+    /// How the plan moves here.
+    pub fn motion(&self) -> Motion {
+        let mut motion = Motion::default();
+        let Some(segment) = self.segment else { return motion };
+        for axis in 0..self.course.axes {
+            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], self.local_s);
+            (motion.velocity[axis], motion.acceleration[axis], motion.jerk[axis]) = (velocity, acceleration, jerk);
+        }
+        motion
+    }
+
+    /// Moves on to the end of the segment, and by no more than `most_s`; gives what is left of it.
+    pub fn advance(&mut self, most_s: f64) -> f64 {
+        let Some(segment) = self.segment else { return 0.0 };
+        let left_s = segment.duration_s - self.local_s;
+        self.local_s += left_s.min(most_s);
+        (most_s - left_s).max(0.0)
+    }
+
+    /// From the end of a segment to the start of the next one that moves.
+    pub fn step(&mut self) {
+        let mut rests = self.segment.is_none_or(ends);
+        self.segment = None;
+        while !rests && self.segment.is_none() {
+            match self.course.entry(self.passed) {
+                Some(RingEntry::Segment(segment)) if segment.duration_s == 0.0 => rests = ends(segment),
+                Some(RingEntry::Segment(segment)) => self.segment = Some(segment),
+                Some(RingEntry::Event(_)) => {}
+                None => rests = true,
+            }
+            self.passed += 1;
+        }
+        self.local_s = 0.0;
+    }
+}
+
+fn ends(segment: &Segment) -> bool {
+    segment.flags.contains(SegmentFlags::ENDS_AT_REST)
+}
