@@ -47,7 +47,7 @@ impl Monitor {
             nominal_s: 0.0,
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
-            watch: PathWatch::new(leaves_path),
+            watch: PathWatch::new(leaves_path, machine.motion.path_tolerance_mm, &machine.start),
             axes: machine.axes,
             joints: None,
         }

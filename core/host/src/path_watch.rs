@@ -9,8 +9,8 @@ use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 /// Blocks looked back over where a planner leaves the path: what its filters can still hold.
 const LOOK_BACK: usize = 256;
 
-/// The same where it stays on the path, within its tolerance: the blocks that may move beside the one named.
-const LOOK_BACK_ON_PATH: usize = 4;
+/// The same where it stays on the path, within its tolerance: so many blocks are shorter than the way searched at most.
+const LOOK_BACK_ON_PATH: usize = 512;
 
 /// Distances that are rounding of the segments, mm: not worth looking at the neighbours.
 const ON_PATH_MM: f64 = 1e-6;
@@ -51,22 +51,36 @@ impl Watched {
     }
 }
 
+/// A block that will move, moves, or has moved.
+#[derive(Debug)]
+struct Entry {
+    /// Index of the block.
+    index: u64,
+    length_mm: f64,
+    /// Path tolerance in force.
+    tolerance_mm: f64,
+    path: Watched,
+}
+
 /// Keeps the paths of the blocks that move now and measures samples against them.
 #[derive(Debug)]
 pub struct PathWatch {
-    /// Paths with the index of their block.
-    paths: VecDeque<(u64, Watched)>,
-    /// Blocks looked back over.
-    look_back: usize,
+    entries: VecDeque<Entry>,
+    /// The entry of the block that moves.
+    here: usize,
+    leaves_path: bool,
+    /// Path tolerance of blocks that state none, mm.
+    tolerance_mm: f64,
+    /// The last sample.
+    position: AxisVector,
     /// Largest distance so far, mm.
     pub max_mm: f64,
 }
 
 impl PathWatch {
-    /// Nothing seen yet; `leaves_path` as the planner describes itself.
-    pub fn new(leaves_path: bool) -> Self {
-        let look_back = if leaves_path { LOOK_BACK } else { LOOK_BACK_ON_PATH };
-        Self { paths: VecDeque::new(), look_back, max_mm: 0.0 }
+    /// Nothing seen yet, at rest at `position`; `leaves_path` as the planner describes itself, `tolerance_mm` the machine's.
+    pub fn new(leaves_path: bool, tolerance_mm: f64, position: &AxisVector) -> Self {
+        Self { entries: VecDeque::new(), here: 0, leaves_path, tolerance_mm, position: *position, max_mm: 0.0 }
     }
 
     /// A block that will be driven.
@@ -75,25 +89,79 @@ impl PathWatch {
             BlockKind::Nurbs => Watched::curve(axes, block),
             _ => Path::new(block).map(Watched::Path),
         };
-        self.paths.extend(watched.map(|watched| (block.index, watched)));
+        // A block that states none says NaN.
+        let tolerance_mm = self.tolerance_mm.max(block.path_tolerance_mm);
+        let entry = |path| Entry { index: block.index, length_mm: block.length_mm, tolerance_mm, path };
+        self.entries.extend(watched.map(entry));
     }
 
     /// Distance of `position`, sampled while block `block` moved, from the path, mm. Blocks far behind are forgotten.
     pub fn sample(&mut self, block: u64, position: &AxisVector) -> f64 {
-        while self.paths.len() > self.look_back && self.paths[self.look_back].0 < block {
-            self.paths.pop_front();
+        self.find(block);
+        let moved_mm = (*position - self.position).0.iter().map(|d| d * d).sum::<f64>().sqrt();
+        self.position = *position;
+        let nearest = if self.leaves_path { self.nearest_of_all(position) } else { self.nearest(position, moved_mm) };
+        let distance_mm = if nearest.is_finite() { nearest } else { 0.0 };
+        self.max_mm = self.max_mm.max(distance_mm);
+        distance_mm
+    }
+
+    /// Finds the entry of `block`, and forgets those too far behind it.
+    fn find(&mut self, block: u64) {
+        let look_back = if self.leaves_path { LOOK_BACK } else { LOOK_BACK_ON_PATH };
+        while self.here > 0 && self.entries[self.here - 1].index >= block {
+            self.here -= 1;
         }
-        let here = self.paths.partition_point(|(index, _)| *index < block);
+        while self.entries.get(self.here).is_some_and(|entry| entry.index < block) {
+            self.here += 1;
+            if self.here > look_back {
+                self.entries.pop_front();
+                self.here -= 1;
+            }
+        }
+    }
+
+    fn nearest_of_all(&mut self, position: &AxisVector) -> f64 {
         let mut nearest = f64::INFINITY;
-        let last = self.paths.len().min(here + 2);
-        for place in (here..last).chain((0..here).rev()) {
-            nearest = nearest.min(self.paths[place].1.distance_mm(position));
+        let last = self.entries.len().min(self.here + 2);
+        for place in (self.here..last).chain((0..self.here).rev()) {
+            nearest = nearest.min(self.entries[place].path.distance_mm(position));
             if nearest < ON_PATH_MM {
                 break;
             }
         }
-        let distance_mm = if nearest.is_finite() { nearest } else { 0.0 };
-        self.max_mm = self.max_mm.max(distance_mm);
-        distance_mm
+        nearest
+    }
+
+    /// Goes on from the block that moves, and back from it, as far as the blocks come nearer, and then by as much path as
+    /// the sample moved and the tolerance may have cut off: blocks shorter than a period are named by the last of them.
+    fn nearest(&mut self, position: &AxisVector, moved_mm: f64) -> f64 {
+        let neighbours = self.here.saturating_sub(1)..self.entries.len().min(self.here + 2);
+        let tolerance_mm = self.entries.range(neighbours).fold(0.0, |most: f64, entry| most.max(entry.tolerance_mm));
+        let patience_mm = moved_mm + 2.0 * tolerance_mm;
+        let on = self.here..self.entries.len().min(self.here + LOOK_BACK_ON_PATH);
+        let mut nearest = f64::INFINITY;
+        self.search(on, position, patience_mm, &mut nearest);
+        self.search((0..self.here).rev(), position, patience_mm, &mut nearest);
+        nearest
+    }
+
+    fn search(
+        &mut self,
+        places: impl Iterator<Item = usize>,
+        position: &AxisVector,
+        patience_mm: f64,
+        nearest: &mut f64,
+    ) {
+        let mut passed_mm = 0.0;
+        for place in places {
+            if *nearest < ON_PATH_MM || passed_mm > patience_mm {
+                return;
+            }
+            let entry = &mut self.entries[place];
+            let distance_mm = entry.path.distance_mm(position);
+            passed_mm = if distance_mm < *nearest { 0.0 } else { passed_mm + entry.length_mm };
+            *nearest = nearest.min(distance_mm);
+        }
     }
 }
