@@ -94,7 +94,9 @@ struct Together {
     acceleration: AxisVector,
     /// What is left of the velocity when the acceleration has run out.
     steady: AxisVector,
-    /// Periods until then, and from then until rest.
+    /// How long it takes to run out at the jerk limit, in periods.
+    runs_out: f64,
+    /// Whole periods until then, and from then until rest.
     periods: [f64; 2],
     /// The velocity falls with `1 − 3τ² + 2τ³` where there is a jerk limit, else with `1 − τ`.
     smooth: bool,
@@ -107,15 +109,16 @@ impl Together {
         let (period_s, velocity, acceleration) = (ramp.period_s, ramp.velocity, ramp.acceleration);
         let longest = |of: &dyn Fn(usize) -> f64| (0..count).map(of).fold(0.0, f64::max);
         let smooth = ramp.jerk[..count].iter().any(|jerk| jerk.is_finite());
-        let out = (longest(&|i| acceleration[i].abs() / ramp.jerk[i]) / period_s).ceil();
-        let steady = velocity + acceleration * (0.5 * out * period_s);
+        let runs_out = longest(&|i| acceleration[i].abs() / ramp.jerk[i]) / period_s;
+        let out = runs_out.ceil();
+        let steady = velocity + acceleration * (gained(out, runs_out) * period_s);
         // The falling law has its greatest slope 1.5 in the middle, its greatest bend 6 at the ends.
         let fall_s = longest(&|i| {
             let v = steady[i].abs();
             if smooth { (1.5 * v / ramp.most[i]).max((6.0 * v / ramp.jerk[i]).sqrt()) } else { v / ramp.most[i] }
         });
         let fall = (fall_s / period_s).ceil().max(1.0);
-        Self { velocity, acceleration, steady, periods: [out, fall], smooth, passed: 0.0 }
+        Self { velocity, acceleration, steady, runs_out, periods: [out, fall], smooth, passed: 0.0 }
     }
 
     /// The velocity in the next period.
@@ -123,8 +126,7 @@ impl Together {
         self.passed += 1.0;
         let [out, fall] = self.periods;
         if self.passed <= out {
-            let t_s = self.passed * period_s;
-            return self.velocity + self.acceleration * (t_s - 0.5 * t_s * self.passed / out);
+            return self.velocity + self.acceleration * (gained(self.passed, self.runs_out) * period_s);
         }
         let share = ((self.passed - out) / fall).min(1.0);
         if share >= 1.0 {
@@ -132,6 +134,13 @@ impl Together {
         }
         self.steady * if self.smooth { 1.0 - share * share * (3.0 - 2.0 * share) } else { 1.0 - share }
     }
+}
+
+/// How many periods of an acceleration are gained in the first `periods` periods of its running out, a period's share of
+/// `1/runs_out` after the other: never more than the plan would gain, so that no speed gets beyond what was planned.
+fn gained(periods: f64, runs_out: f64) -> f64 {
+    let periods = periods.min(runs_out.floor());
+    if periods > 0.0 { periods - periods * (periods + 1.0) / (2.0 * runs_out) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -163,6 +172,7 @@ mod tests {
             jerk in prop_oneof![Just(f64::INFINITY), 5_000.0..50_000.0f64],
         ) {
             let mut ramp = ramp(v, if jerk.is_finite() { a } else { [0.0; 2] }, jerk);
+            let start = ramp;
             let (mut velocity, mut acceleration) = (ramp.velocity, ramp.acceleration);
             for _ in 0..20_000 {
                 if ramp.is_over() { break; }
@@ -170,7 +180,11 @@ mod tests {
                 prop_assert!((at[2] - at[0] - at[1]).abs() < 1e-9 && (at[3] - at[0] + at[1]).abs() < 1e-9);
                 let next = (ramp.velocity - velocity) * 1e3;
                 let change = (next - acceleration) * 1e3;
+                // What the entry that needs longest gains while its acceleration runs out at its jerk limit.
+                let longest_s = (0..4).fold(0.0, |most: f64, i| most.max(start.acceleration[i].abs() / jerk));
                 for i in 0..4 {
+                    let gain = 0.5 * start.acceleration[i].abs() * longest_s;
+                    prop_assert!(ramp.velocity[i].abs() <= start.velocity[i].abs() + gain + 1e-9, "{i}");
                     prop_assert!(next[i].abs() <= ramp.most[i] * (1.0 + 1e-6), "{i}: {}", next[i]);
                     prop_assert!(change[i].abs() <= jerk * 1.01, "{i}: {}", change[i]);
                 }
