@@ -8,6 +8,7 @@ use crate::harness::{Done, Scenario, root};
 
 const NURBS: [&str; 4] = ["--set", "planner.plugin=nurbs", "--set", "motion.jerk=limit"];
 const OVERLAP: [&str; 2] = ["--set", "planner.plugin=block-overlap"];
+const SMOOTH: [&str; 4] = ["--set", "planner.plugin=smooth", "--set", "motion.jerk=limit"];
 
 /// From corner to corner of the table, where one motor of two does all the work.
 const DIAGONAL: &str = "G21 G90 G17 G64\nG0 X-60 Y-60\nF20000\nG1 X60 Y60\nG1 X60 Y-60\nG2 X60 Y-60 I-30 J30\nM2\n";
@@ -52,7 +53,34 @@ fn every_planner_keeps_the_limits_of_the_joints() {
         scenario().with(&OVERLAP).run().assert_within_tolerance();
         assert_within_jerk(&scenario().with(&NURBS).run());
         assert_within_jerk(&scenario().with(&NURBS).with(&["--set", "planner.options.form=windowed"]).run());
+        assert_smooth(&scenario().with(&SMOOTH).run());
     }
+}
+
+/// Within limits, jerk included, and within the tolerances of the program.
+fn assert_smooth(done: &Done) -> Verdict {
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples"] {
+        assert_eq!(done.number(count), 0.0, "{count}");
+    }
+    let verdict = done.judge(|options| {
+        options.checks.push(Check::Jerk);
+        (options.speed_difference_mm_per_s, options.speed_difference_deg_per_s) = (Some(0.0), Some(0.0));
+    });
+    assert!(verdict.passed(), "{verdict}");
+    verdict
+}
+
+/// A planner that looks at one axis at a time gets axes that are slow enough for the belts: on a diagonal one uses all of
+/// its speed, along an axis both use half.
+#[test]
+fn a_planner_that_goes_axis_by_axis_keeps_the_limits_of_the_joints() {
+    let verdict = assert_smooth(&on_corexy(DIAGONAL, &SMOOTH).run());
+    let (speed, acceleration) = most(&verdict, "a");
+    assert!((245.0..250.001).contains(&speed) && acceleration > 1300.0, "{speed} mm/s, {acceleration} mm/s²");
+    let verdict = assert_smooth(&on_corexy("G21 G90 G17 G64\nF20000\nG1 X100\nM2\n", &SMOOTH).run());
+    let speed = verdict.maxima.axes[0].velocity_mm_per_s;
+    assert!((120.0..125.001).contains(&speed), "{speed} mm/s");
 }
 
 #[test]
@@ -80,7 +108,7 @@ fn on_a_diagonal_the_joint_limits_and_along_an_axis_the_axis() {
 fn hold_and_override_keep_the_limits_of_the_joints() {
     let free = on_corexy(DIAGONAL, &[]).run();
     let ticks = free.number("samples") as u32;
-    for settings in [&[][..], &OVERLAP, &NURBS] {
+    for settings in [&[][..], &OVERLAP, &NURBS, &SMOOTH] {
         for tick in (100..ticks - 100).step_by(211) {
             let (back, again, on) = (tick + 150, tick + 300, tick + 400);
             let commands = format!("{tick},hold\n{back},resume\n{again},feed-override,0.3\n{on},feed-override,1\n");
@@ -99,7 +127,7 @@ fn hold_and_override_keep_the_limits_of_the_joints() {
 
 #[test]
 fn a_machine_that_ramps_out_keeps_the_limits_of_the_joints() {
-    for settings in [&[][..], &OVERLAP, &NURBS] {
+    for settings in [&[][..], &OVERLAP, &NURBS, &SMOOTH] {
         for tick in (150..1500).step_by(191) {
             let done = on_corexy(DIAGONAL, settings).commands(&format!("{tick},emergency-stop\n")).run();
             assert_eq!(done.status(), 3, "{}", done.errors());

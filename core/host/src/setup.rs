@@ -92,6 +92,7 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
         time_constant_s: machine.motion.time_constant_s,
         max_feed_ratio: machine.motion.max_feed_ratio,
         position: joints.with_lanes(&machine.start),
+        joint_lanes: joints.lanes(),
     };
     let choice = &machine.planner;
     let planner = registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))?;

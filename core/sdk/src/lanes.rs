@@ -1,6 +1,6 @@
 //! Joints that are sums of axes, as planners carry them along.
 
-use crate::{AxisVector, MAX_AXES, size_of_contract};
+use crate::{AxisLimits, AxisVector, Limits, MAX_AXES, size_of_contract};
 
 /// Joints that several axes move together (the belts of a `CoreXY`), each a *lane* behind the machine's axes: entry
 /// `first() + n` of every vector holds what lane n is of the axes, `Σ weight · axis`.
@@ -57,6 +57,22 @@ impl JointLanes {
         }
     }
 
+    /// The limits of the axes alone, narrowed until every lane keeps its own in whatever way the axes move:
+    /// `Σ |weight| · limit` of the axes is at most the limit of the lane, for each of them. Travel stays as it is.
+    pub(crate) fn narrowed(&self, limits: &Limits) -> Limits {
+        let mut narrow = Limits { count: self.first, ..*limits };
+        for (lane, weights) in self.weights().iter().enumerate() {
+            let (of, weights) = (&limits.axes[self.first() + lane], &weights.0[..self.first()]);
+            let axes = &mut narrow.axes[..self.first()];
+            share(axes, weights, of.feed_mm_per_s, |axis| &mut axis.feed_mm_per_s);
+            share(axes, weights, of.rapid_mm_per_s, |axis| &mut axis.rapid_mm_per_s);
+            share(axes, weights, of.acceleration_mm_per_s2, |axis| &mut axis.acceleration_mm_per_s2);
+            share(axes, weights, of.jerk_mm_per_s3, |axis| &mut axis.jerk_mm_per_s3);
+            share(axes, weights, of.speed_difference_mm_per_s, |axis| &mut axis.speed_difference_mm_per_s);
+        }
+        narrow
+    }
+
     /// The same for polynomials, one an entry. Any loop; does not allocate.
     pub fn fill_polynomials(&self, coefficients: &mut [[f64; 6]; MAX_AXES]) {
         for (lane, weights) in self.weights().iter().enumerate() {
@@ -68,6 +84,21 @@ impl JointLanes {
             }
             coefficients[self.first() + lane] = sum;
         }
+    }
+}
+
+/// Makes one limit of `axes` smaller, by the same factor, until together they ask no more of a lane than `most`.
+fn share(axes: &mut [AxisLimits], weights: &[f64], most: f64, limit: fn(&mut AxisLimits) -> &mut f64) {
+    let moving = || weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+    let asked: f64 = moving().map(|(axis, weight)| weight.abs() * *limit(&mut axes[axis])).sum();
+    if asked <= most {
+        return;
+    }
+    let count = moving().count() as f64;
+    for (axis, weight) in moving() {
+        let of = limit(&mut axes[axis]);
+        // Axes that state no jerk get equal parts of the joint's.
+        *of = if asked.is_finite() { *of * most / asked } else { of.min(most / (count * weight.abs())) };
     }
 }
 
@@ -90,6 +121,32 @@ mod tests {
         belts().fill_polynomials(&mut polynomials);
         assert_eq!(polynomials[3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(polynomials[4], [1.0, 0.0, -1.0, -2.0, -3.0, -4.0]);
+    }
+
+    fn limits(of: &[[f64; 2]]) -> Limits {
+        let each = |[most, jerk]: &[f64; 2]| AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: *most,
+            rapid_mm_per_s: *most,
+            acceleration_mm_per_s2: *most,
+            jerk_mm_per_s3: *jerk,
+            speed_difference_mm_per_s: 0.0,
+        };
+        Limits::new(&of.iter().map(each).collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn axes_share_what_a_lane_has() {
+        let none = f64::INFINITY;
+        let all = limits(&[[250.0, none], [125.0, none], [40.0, none], [250.0, 1000.0], [400.0, none]]);
+        let narrow = belts().narrowed(&all);
+        let feeds: Vec<f64> = narrow.axes().iter().map(|axis| axis.feed_mm_per_s).collect();
+        assert_eq!(narrow.count, 3);
+        assert!((feeds[0] - 500.0 / 3.0).abs() < 1e-9 && (feeds[1] - 250.0 / 3.0).abs() < 1e-9, "{feeds:?}");
+        assert_eq!(feeds[2], 40.0, "an axis that no lane has a part of");
+        let jerks: Vec<f64> = narrow.axes().iter().map(|axis| axis.jerk_mm_per_s3).collect();
+        assert_eq!(jerks, [500.0, 500.0, none]);
     }
 
     #[test]

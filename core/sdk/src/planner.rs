@@ -1,6 +1,6 @@
 //! The planner contract: blocks in, segments out.
 
-use crate::{Axes, AxisVector, Block, Limits, MAX_AXES, PluginError, Segment, size_of_contract};
+use crate::{Axes, AxisVector, Block, JointLanes, Limits, MAX_AXES, PluginError, Segment, size_of_contract};
 
 /// What a planner is told when it is opened.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,19 @@ pub struct PlannerContext {
     pub max_feed_ratio: f64,
     /// Where the machine stands.
     pub position: AxisVector,
+    /// The joints that are sums of axes, where there are any: what stands behind the axes in `limits` and in vectors.
+    pub joint_lanes: Option<&'static JointLanes>,
+}
+
+impl PlannerContext {
+    /// The same machine for a planner that looks at one axis at a time, and not at what stands behind the axes: the limits
+    /// of the axes alone, and so narrow that every joint keeps its own, in whatever way the axes move. Along one axis that
+    /// wastes what a joint has left: half of it on a `CoreXY` machine. Host and rough loop; does not allocate.
+    #[must_use]
+    pub fn axis_by_axis(&self) -> Self {
+        let limits = self.joint_lanes.map_or(self.limits, |lanes| lanes.narrowed(&self.limits));
+        Self { limits, joint_lanes: None, ..*self }
+    }
 }
 
 /// What a planner says of itself, once, after it is opened.

@@ -74,6 +74,7 @@ fn context(axes: Axes) -> PlannerContext {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::ZERO,
+        joint_lanes: None,
     }
 }
 

@@ -47,9 +47,9 @@ impl<const L: usize> Frame<L> {
         }
     }
 
-    /// `position` in lanes.
+    /// `position` in lanes, without what may stand behind the axes.
     pub fn lanes(&self, position: &AxisVector) -> Lanes<L> {
-        std::array::from_fn(|i| position[i] * self.scale[i])
+        std::array::from_fn(|i| if i < self.count { position[i] * self.scale[i] } else { 0.0 })
     }
 
     /// Lanes as axes.

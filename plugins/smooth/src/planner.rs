@@ -25,17 +25,14 @@ pub struct SmoothPlanner {
 }
 
 impl SmoothPlanner {
-    /// A planner at rest.
+    /// A planner at rest. Corners are rounded axis by axis, so joints that are sums of axes are kept by narrower limits of
+    /// the axes ([`PlannerContext::axis_by_axis`]).
     ///
     /// # Errors
     /// A machine with a limit that is no positive number.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
+        let context = &context.axis_by_axis();
         let axes = context.limits.axes();
-        if axes.len() > context.axes.count() {
-            return Err(PluginError::fixed(
-                "smooth rounds corners axis by axis: it keeps no limits of joints that are sums of axes",
-            ));
-        }
         let sound = |value: f64| value > 0.0 && value.is_finite();
         let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
         if !values.into_iter().all(sound) {

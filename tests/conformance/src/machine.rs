@@ -32,5 +32,6 @@ pub fn context(position: AxisVector) -> PlannerContext {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position,
+        joint_lanes: None,
     }
 }

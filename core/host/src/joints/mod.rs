@@ -205,15 +205,20 @@ impl JointSpace {
         }
     }
 
+    /// The joints that are sums of axes, as planners carry them.
+    pub fn lanes(&self) -> Option<&'static JointLanes> {
+        match &self.map {
+            Map::Linear(_, lanes) => *lanes,
+            _ => None,
+        }
+    }
+
     /// `planner`, which then keeps the travel of the joints too, and carries their lanes.
     pub fn carried(self, planner: Box<dyn Planner>, machine: &Machine) -> Box<dyn Planner> {
         if self.are_axes() {
             return planner;
         }
-        let lanes = match &self.map {
-            Map::Linear(_, lanes) => *lanes,
-            _ => None,
-        };
+        let lanes = self.lanes();
         Box::new(Carrier::new(planner, lanes, Travel::new(self, machine.axes)))
     }
 

@@ -221,6 +221,7 @@ fn planner(limits: &Limits) -> Box<LookAhead> {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::ZERO,
+        joint_lanes: None,
     };
     Box::new(LookAhead::new(&Options::default(), &context).unwrap())
 }

@@ -28,6 +28,7 @@ pub fn context(fine_period_s: f64) -> PlannerContext {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::ZERO,
+        joint_lanes: None,
     }
 }
 

@@ -89,6 +89,7 @@ pub fn context(accelerations: &[f64], fine_period_s: f64) -> PlannerContext {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::ZERO,
+        joint_lanes: None,
     }
 }
 

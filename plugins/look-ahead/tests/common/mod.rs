@@ -74,6 +74,7 @@ pub fn context(accelerations: &[f64], speed_difference_mm_per_min: f64, fine_per
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::ZERO,
+        joint_lanes: None,
     }
 }
 

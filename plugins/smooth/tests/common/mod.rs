@@ -32,6 +32,7 @@ pub fn context(position: &Point, tolerance_mm: f64) -> PlannerContext {
         time_constant_s: 0.05,
         max_feed_ratio: 1.0,
         position: AxisVector::from_slice(position),
+        joint_lanes: None,
     }
 }
 
