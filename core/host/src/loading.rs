@@ -20,6 +20,9 @@ const ANY_VERSION: &str = "tandem_plugin_v";
 pub fn load(path: &Path) -> Result<Vec<Plugin>, String> {
     // The system's loader looks for a bare name in folders of its own.
     let path = std::path::absolute(path).map_err(|e| e.to_string())?;
+    if path.is_dir() {
+        return Err("it is a folder: name the shared library that cargo built in it, under target/release".to_string());
+    }
     if !path.is_file() {
         return Err("there is no such file".to_string());
     }
@@ -90,6 +93,7 @@ mod tests {
     #[test]
     fn what_is_no_library_is_refused() {
         assert_eq!(load(Path::new("no/such/libx.so")).unwrap_err(), "there is no such file");
+        assert!(load(&std::env::temp_dir()).unwrap_err().starts_with("it is a folder: "));
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "not a library").unwrap();
         let refusal = load(file.path()).unwrap_err();

@@ -17,13 +17,13 @@ const WARM: u64 = 200;
 
 /// Judges a feed strategy.
 pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
+    let mut timing = Timing::new("update");
     for max_feed_ratio in [1.0, 1.5] {
         let open = |options: &str| plugin.feed_strategy(options, &context(max_feed_ratio));
         let (Some(mut first), Ok(mut second)) = (crate::open(setup, report, open), open(&setup.options)) else {
             return;
         };
         judge_signals(first.as_ref(), report);
-        let mut timing = Timing::new("update");
         let Some(answers) = answers(first.as_mut(), setup.seed, report, &mut timing) else { return };
         judge_answers(&answers, first.max_ratio_change_per_s(), max_feed_ratio, first.signals().len(), report);
         let again = self::answers(second.as_mut(), setup.seed, report, &mut Timing::new("update"));
@@ -31,8 +31,8 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
         if again.is_none_or(|again| bits(&again) != bits(&answers)) {
             report.find("determinism", "the same windows get other answers".to_string());
         }
-        report.time([timing]);
     }
+    report.time([timing]);
 }
 
 fn context(max_feed_ratio: f64) -> StrategyContext {

@@ -25,6 +25,8 @@ fn every_kind_builds_and_conforms_as_it_is_made() {
         let readme = std::fs::read_to_string(place.join("README.md")).unwrap();
         let left = ["NAME", "CRATE", "KIND", "SECTION", "OPTIONS"].iter().find(|word| readme.contains(**word));
         assert_eq!(left, None, "{readme}");
+        let source = std::fs::read_to_string(place.join("src/lib.rs")).unwrap();
+        assert!(source.contains(&format!("\"{name}\"")) && !source.contains("one-block"), "{source}");
     }
     let place = folder.path().join("made-planner");
     run(cargo().current_dir(&place).args(["build", "--offline"]));
@@ -36,6 +38,16 @@ fn every_kind_builds_and_conforms_as_it_is_made() {
     let setting = format!("planner.plugin={}", library.display());
     let done = Scenario::text("G21 G90\nF3000\nG1 X40 Y10\nM2\n").with(&["--set", &setting]).run();
     done.assert_within_limits();
+}
+
+#[test]
+fn one_that_would_abort_does_not_compile() {
+    let manifest = root().join("tests/third-party/current-limit/Cargo.toml");
+    let mut check = cargo();
+    check.env("CARGO_PROFILE_DEV_PANIC", "abort").args(["check", "--offline", "--locked", "--manifest-path"]);
+    let output = check.arg(manifest).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && text.contains("build it with panic = \"unwind\""), "{text}");
 }
 
 #[test]

@@ -14,12 +14,26 @@ const FEED_STRATEGY: &str = include_str!("templates/feed_strategy.rs.txt");
 const DRIVER: &str = include_str!("templates/driver.rs.txt");
 const KINEMATICS: &str = include_str!("../../../../tests/third-party/core-xy/src/lib.rs");
 
+/// Options of the kinematics, and the joints that go with them.
+const JOINTS: &str = "reversed = true
+
+# Every joint with what it may do, in the order of the drives. One that is an axis says so.
+[joints.a]
+max_feed_mm_per_min = 15000
+max_acceleration_mm_per_s2 = 1500
+[joints.b]
+max_feed_mm_per_min = 15000
+max_acceleration_mm_per_s2 = 1500
+[joints.z]
+axis = \"z\"";
+
 /// Makes a crate with a first plugin of `kind` in the folder `folder`; `sdk` is where Tandem's source is.
 pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
     let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(plain) {
-        return Err(format!("{}: the name of a plugin has the characters a-z, 0-9 and - only", folder.display()));
+        let rule = "the name of a plugin has the characters a-z, 0-9 and - only, and begins with a letter";
+        return Err(format!("{}: {rule}", folder.display()));
     }
     if folder.exists() {
         return Err(format!("{}: is there already", folder.display()));
@@ -29,8 +43,18 @@ pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
         let text = filled(text, &name, kind, &source);
         write(&folder.join(file), &text)?;
     }
-    say!("{} is the plugin; cargo test, in {}, judges it", folder.join("src/lib.rs").display(), folder.display());
+    say!("{} is the plugin. What comes next:", folder.join("src/lib.rs").display());
+    say!("  cd {}", folder.display());
+    say!("  cargo test                # the conformance kit judges it");
+    say!("  cargo build --release     # {}", library(&name));
+    say!("  tandem plugin check {}", library(&name));
     Ok(0)
+}
+
+/// Where cargo puts the shared library of the crate `name`.
+fn library(name: &str) -> String {
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    format!("target/release/{prefix}{}{suffix}", name.replace('-', "_"))
 }
 
 fn files(kind: Kind) -> Vec<(&'static str, &'static str)> {
@@ -55,10 +79,10 @@ fn filled(text: &str, name: &str, kind: Kind, source: &Source) -> String {
         Kind::Planner => ("planner", "planner", "acceleration_share = 0.8"),
         Kind::FeedStrategy => ("feed strategy", "feed_strategy", "most_current_a = 6"),
         Kind::Driver => ("driver", "driver", "# this one has none"),
-        Kind::Kinematics => ("kinematics", "kinematics", "reversed = true"),
+        Kind::Kinematics => ("kinematics", "kinematics", JOINTS),
     };
-    let named = text.replace("\"one-block\"", &format!("\"{name}\"")).replace("\"core-xy\"", &format!("\"{name}\""));
-    named
+    text.replace("one-block", name)
+        .replace("core-xy", name)
         .replace("NAME", name)
         .replace("CRATE", &name.replace('-', "_"))
         .replace("KIND", words)
