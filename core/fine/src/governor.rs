@@ -107,11 +107,13 @@ fn crossing(gap: f64, slope: f64, curve: f64) -> f64 {
         return f64::INFINITY;
     }
     let root = discriminant.sqrt();
-    // The form that does not cancel; it is 0/0 only where the curve starts at the level and falls first.
-    match slope + root {
-        sum if sum > 0.0 => 2.0 * gap / sum,
-        _ if curve > 0.0 => (root - slope) / (2.0 * curve),
-        _ => f64::INFINITY,
+    // In each case the form that does not cancel.
+    if slope > 0.0 {
+        2.0 * gap / (slope + root)
+    } else if curve > 0.0 {
+        (root - slope) / (2.0 * curve)
+    } else {
+        f64::INFINITY
     }
 }
 
