@@ -243,8 +243,8 @@ impl FineLoop {
             Phase::Parted => (*self.guard.position(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
-                let (position, over) = (ramp.next(), ramp.is_over());
-                let position = self.with_joints(position);
+                let (mut position, over) = (ramp.next(), ramp.is_over());
+                self.add_joints(&mut position);
                 let over = over && self.joints_rest();
                 (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
             }

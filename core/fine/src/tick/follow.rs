@@ -50,7 +50,8 @@ impl FineLoop {
             self.outputs.stop_requested || homing
         });
         self.begin_edge();
-        let position = self.with_joints(self.cursor.position());
+        let mut position = self.cursor.position();
+        self.add_joints(&mut position);
         let checked = self.guard.check(&position, self.outputs.unhomed);
         self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
         let position = self.let_pass(position, &checked);

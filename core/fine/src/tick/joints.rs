@@ -30,36 +30,44 @@ pub(super) fn count(config: &FineConfig, kinematics: Option<&dyn Kinematics>) ->
 }
 
 impl FineLoop {
-    /// Where the joints are to be in the sample `position`. Kinematics that are not linear have been asked by
-    /// [`FineLoop::with_joints`], and the guard has seen what they answered: they are not asked again.
+    /// Where the joints are to be in the sample `position`: where there are no kinematics, where the axes are.
     #[inline]
     pub(super) fn joints_of(&self, position: &AxisVector) -> AxisVector {
-        let joints = match (self.config.joints, &self.kinematics) {
-            (Joints::Curved { axes }, _) => AxisVector::from_slice(&position.0[axes..self.config.lane_count()]),
-            (_, Some(kinematics)) => kinematics.to_joints(&self.config.axes_alone(position)),
-            (_, None) => *position,
+        match &self.kinematics {
+            None => *position + self.offset,
+            Some(kinematics) => self.joints_by(kinematics.as_ref(), position),
+        }
+    }
+
+    /// Kinematics that are not linear have been asked by [`FineLoop::add_joints`], and the guard has seen what they
+    /// answered: they are not asked again.
+    #[inline(never)]
+    fn joints_by(&self, kinematics: &dyn Kinematics, position: &AxisVector) -> AxisVector {
+        let joints = match self.config.joints {
+            Joints::Curved { axes } => AxisVector::from_slice(&position.0[axes..self.config.lane_count()]),
+            _ => kinematics.to_joints(&self.config.axes_alone(position)),
         };
         joints + self.offset
     }
 
-    /// A sample on its way to the guard: with the joints behind the axes, where only the kinematics know them. Kinematics
+    /// A sample on its way to the guard gets the joints behind the axes, where only the kinematics know them. Kinematics
     /// that do not know either fault the machine, and each joint goes to rest by its own limit.
     #[inline]
-    pub(super) fn with_joints(&mut self, position: AxisVector) -> AxisVector {
-        match self.config.joints {
-            Joints::Curved { axes } => self.with_curved(axes, self.config.axes_alone(&position)),
-            _ => position,
+    pub(super) fn add_joints(&mut self, position: &mut AxisVector) {
+        if let Joints::Curved { axes } = self.config.joints {
+            self.add_curved(axes, position);
         }
     }
 
-    fn with_curved(&mut self, axes: usize, mut position: AxisVector) -> AxisVector {
-        let asked = self.kinematics.as_ref().filter(|_| self.lead == Lead::Axes).map(|k| k.to_joints(&position));
+    #[inline(never)]
+    fn add_curved(&mut self, axes: usize, position: &mut AxisVector) {
+        *position = self.config.axes_alone(position);
+        let asked = self.kinematics.as_ref().filter(|_| self.lead == Lead::Axes).map(|k| k.to_joints(position));
         let joints = match asked {
-            Some(joints) if self.accepts(axes, &position, &joints) => joints,
+            Some(joints) if self.accepts(axes, position, &joints) => joints,
             _ => self.slower(axes),
         };
         position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
-        position
     }
 
     /// Whether the joints go where the kinematics want them. Before a fault the guard decides that; on the way to rest,
@@ -113,10 +121,16 @@ impl FineLoop {
     }
 
     /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
+    #[inline]
     pub(super) fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
         let joints = *joints - self.offset;
-        let Some(kinematics) = &self.kinematics else { return joints };
-        let axes = kinematics.to_axes(&joints);
+        if self.kinematics.is_none() { joints } else { self.axes_by(&joints) }
+    }
+
+    #[inline(never)]
+    fn axes_by(&mut self, joints: &AxisVector) -> AxisVector {
+        let Some(kinematics) = &self.kinematics else { return *joints };
+        let axes = kinematics.to_axes(joints);
         if let Some(axis) = (0..self.config.axis_count()).find(|axis| !axes[*axis].is_finite()) {
             self.lose_way(FaultKind::WayBack { axis });
         } else {
