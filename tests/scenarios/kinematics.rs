@@ -272,3 +272,15 @@ fn the_oracle_judges_no_joints_of_kinematics_it_does_not_know() {
     let reason = verdict.not_judged.as_deref().unwrap_or_default();
     assert!(reason.contains("joints") && reason.contains("hexapod"), "{verdict}");
 }
+
+#[test]
+fn homing_is_refused_where_axes_have_no_drive_of_their_own() {
+    let home = "homing.z={input=12,search_mm_per_min=600,latch_mm_per_min=60,back_off_mm=2,switch_mm=50}";
+    for (name, key) in [("corexy.toml", "kinematics.plugin"), ("gantry.toml", "joints")] {
+        let scenario = Scenario::text("G21 G90\nG0 X1\nM2\n").on(&machine(name)).with(&["--set", home]);
+        let done = scenario.with(&["--home"]).run();
+        assert_eq!(done.status(), 1, "{}", done.errors());
+        let said = done.errors();
+        assert!(said.contains(name) && said.contains(&format!("{key}: --home is refused: each axis")), "{said}");
+    }
+}

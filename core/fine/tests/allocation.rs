@@ -4,13 +4,14 @@ mod common;
 #[path = "../../../tests/counting_allocator.rs"]
 mod counting_allocator;
 
+use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
 use counting_allocator::{HeapUse, heap_use_of};
 use tandem_fine::{FaultKind, GuardMode};
 use tandem_rings::{MachineState, Ratio};
-use tandem_sdk::EventKind;
+use tandem_sdk::{Axes, AxisVector, EventKind, Kinematics, KinematicsContext, NoOptions, local_plugin};
 
 /// Runs `periods` fine periods; none may allocate or free.
 fn tick(bench: &mut Bench, periods: u32) {
@@ -143,4 +144,42 @@ fn the_guard_stops_or_counts() {
         assert_eq!(guard, mode == GuardMode::Stop);
         assert_eq!(bench.fine.counters().limit_violations > 0, mode == GuardMode::Count);
     }
+}
+
+/// Joint 0 is x + x²/1000, until it is no number.
+struct Bent {
+    calls: AtomicU32,
+    fails_at: u32,
+}
+
+impl Kinematics for Bent {
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        let mut joints = *axes;
+        let fails = self.calls.fetch_add(1, Relaxed) >= self.fails_at;
+        joints[0] = if fails { f64::NAN } else { axes[0] + axes[0] * axes[0] / 1000.0 };
+        joints
+    }
+
+    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        let mut axes = *joints;
+        axes[0] = 500.0 * ((1.0 + joints[0] / 250.0).sqrt() - 1.0);
+        axes
+    }
+}
+
+/// Through the table of a plugin, as they are loaded; what a panic leaves is made once and is not judged.
+#[test]
+fn kinematics_that_are_asked_and_kinematics_that_fail() {
+    let plugin = local_plugin!(kinematics "bent" = |_: &NoOptions, _: &KinematicsContext| {
+        Ok(Bent { calls: AtomicU32::new(0), fails_at: 200 })
+    });
+    let context = KinematicsContext::new(Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap());
+    let mut bench = Bench::with_curved(plugin.kinematics("", &context).unwrap());
+    bench.accelerate();
+    bench.cruise(1.0);
+    tick_until(&mut bench, MachineState::Running);
+    tick(&mut bench, 150);
+    assert!(bench.host.status.feed_mm_per_s.load() > 10.0, "it moves");
+    tick_until(&mut bench, MachineState::Fault);
+    assert!(matches!(bench.fine.fault().unwrap().kind, FaultKind::Kinematics { joint: 0 }));
 }

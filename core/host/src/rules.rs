@@ -41,7 +41,8 @@ pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) 
     }
     if switches.home && !joints.are_axes() {
         let key = if machine.kinematics.plugin == "identity" { "joints" } else { "kinematics.plugin" };
-        return refuse(key, "homing is supported where the joints are the axes, and not with gantries");
+        let cause = "--home is refused: each axis is homed by a drive of its own, so not with kinematics or gantries";
+        return refuse(key, cause);
     }
     if machine.require_homing && !switches.home && !machine.homing.is_empty() {
         return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");

@@ -176,6 +176,7 @@ fn a_panic_in_reset_is_a_fault() {
         assert_eq!(done.status(), expected, "{mischief}: {}", done.errors());
         let named = done.errors().contains("hostile panicked in reset");
         assert_eq!(named, misbehave != "never", "{mischief}: {}", done.errors());
+        assert!(!done.errors().contains("thread '"), "the panic itself prints nothing: {}", done.errors());
         assert_within_limits_to_rest(&done, &mischief);
     }
 }

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState, Limits,
-    MAX_AXES, PluginError, RingEntry, Segment, SegmentFlags, Setpoint,
+    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
+    Kinematics, Limits, MAX_AXES, PluginError, RingEntry, Segment, SegmentFlags, Setpoint,
 };
 
 /// Fine period, s.
@@ -62,6 +62,16 @@ pub struct Bench {
 impl Bench {
     /// At rest at zero, nothing queued.
     pub fn new(guard: GuardMode) -> Self {
+        Self::of(guard, Joints::Axes, 3, None)
+    }
+
+    /// Three axes and as many joints behind them, as `kinematics` give them.
+    #[allow(dead_code)] // not every test that includes this has kinematics
+    pub fn with_curved(kinematics: Box<dyn Kinematics>) -> Self {
+        Self::of(GuardMode::Stop, Joints::Curved { axes: 3 }, 6, Some(kinematics))
+    }
+
+    fn of(guard: GuardMode, joints: Joints, entries: usize, kinematics: Option<Box<dyn Kinematics>>) -> Self {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,
@@ -73,8 +83,8 @@ impl Bench {
         };
         let config = FineConfig {
             period_s: PERIOD_S,
-            limits: Limits::new(&[axis; 3]).unwrap(),
-            joints: tandem_fine::Joints::Axes,
+            limits: Limits::new(&[axis; 6][..entries]).unwrap(),
+            joints,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 2,
             guard,
@@ -89,7 +99,7 @@ impl Bench {
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));
         let driver = Echo { failing: Arc::clone(&failing) };
-        let mut fine = FineLoop::new(&config, end, Box::new(driver), None);
+        let mut fine = FineLoop::new(&config, end, Box::new(driver), kinematics);
         fine.reset();
         Self { fine, host, rough, failing, queued_s: 0.0, x_mm: 0.0, epoch: 0 }
     }
