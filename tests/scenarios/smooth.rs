@@ -114,11 +114,13 @@ fn six_axes_keep_limits_and_tolerance() {
 
 #[test]
 fn feeds_that_alternate_hold_up_to_where_they_change() {
-    let mut program = "G21 G90 G94 G17 G64 P0.01\n".to_string();
-    for n in 1..20 {
-        writeln!(program, "G1 X{} F{}", 2 * n, if n % 2 == 1 { 600 } else { 9000 }).unwrap();
+    for (low, high, length_mm) in [(600, 9000, 2.0), (100, 9000, 0.4), (20, 9000, 0.4)] {
+        let mut program = "G21 G90 G94 G17 G64 P0.01\n".to_string();
+        for n in 1..20 {
+            writeln!(program, "G1 X{:.1} F{}", length_mm * f64::from(n), if n % 2 == 1 { low } else { high }).unwrap();
+        }
+        assert_strict(&Scenario::text(&(program + "M2\n")).on(&machine()).run());
     }
-    assert_strict(&Scenario::text(&(program + "M2\n")).on(&machine()).run());
 }
 
 #[test]

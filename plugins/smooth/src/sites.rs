@@ -12,6 +12,8 @@ pub const BOX_SHARE: f64 = 0.955;
 const SHARP: f64 = 0.1;
 /// Share of a feed below which another is another feed.
 const OTHER_FEED: f64 = 0.99;
+/// Time by which the motion may be early or late where the feed changes, s.
+const TIMELY_S: f64 = 3e-4;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
 /// Vertices looked at on each side.
@@ -68,7 +70,7 @@ impl<const L: usize> Sites<L> {
                     self.candidates.push(Candidate { s, chord: i as u32, vertex, firm, half: None });
                 }
             };
-            add(chord.s, true, chord.turn > SHARP);
+            add(chord.s, true, i > 0 && is_marked(run.chords, i));
             if sagitta > 0.05 * chord.tolerance {
                 add(chord.s + chord.length / 2.0, false, sagitta > 0.3 * chord.tolerance);
             }
@@ -163,7 +165,7 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
     let (i, s) = (candidate.chord as usize, candidate.s);
     let tolerance =
         if candidate.vertex && i > 0 { chords[i].tolerance.min(chords[i - 1].tolerance) } else { chords[i].tolerance };
-    let (mut need, sharp_way) = needs(run, i, s);
+    let Needs { mut need, sharp_way, timely } = needs(run, i, s);
     let most = largest(&need);
     if most > 0.0 {
         need = each(|l| (need[l] + 0.08 * most) / (1.08 * most));
@@ -172,11 +174,13 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
     }
     // Lanes without an axis take nothing of the tolerance.
     need[lanes..].fill(0.0);
-    let widen = |half: Lanes<L>| each(|l| if half[l] > 0.0 { half[l] } else { tolerance });
+    let widen = |half: Lanes<L>, along: Lanes<L>| {
+        each(|l| if half[l] > 0.0 { half[l].min(timely / along[l].abs().max(1e-9)) } else { tolerance })
+    };
     let Some(tangent) = tangent(run, candidate) else {
         // Round a sharp vertex the motion may be anywhere in a disc.
         let size = dot(&need, &need).sqrt();
-        return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)));
+        return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)), [1.0; L]);
     };
     let loose = (0.5 * sharp_way / tolerance).clamp(1.0, 10.0);
     for l in 0..lanes {
@@ -185,23 +189,44 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
         need[l] = need[l].max(t * (0.3 / across).min(loose));
     }
     let worst = farthest(&need, &tangent);
-    widen(each(|l| need[l] * (BOX_SHARE * tolerance / worst)))
+    widen(each(|l| need[l] * (BOX_SHARE * tolerance / worst)), tangent)
 }
 
 /// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
 fn is_marked<const L: usize>(chords: &[Chord<L>], v: usize) -> bool {
-    let (last, feed) = (chords[v - 1].feed, chords[v].feed);
-    chords[v].turn > SHARP || last.min(feed) < OTHER_FEED * last.max(feed)
+    chords[v].turn > SHARP || timely(chords, v).is_finite()
 }
 
-/// How much every lane turns near `s`, and the way to the nearest sharp turn, change of feed or end.
-fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) {
+/// How far along the path the motion may be off vertex `v` in its time, mm: where the feed changes, no more than the lower
+/// one covers in a fraction of a fine period. Infinite where it does not change.
+fn timely<const L: usize>(chords: &[Chord<L>], v: usize) -> f64 {
+    let (last, feed) = (chords[v - 1].feed, chords[v].feed);
+    if last.min(feed) < OTHER_FEED * last.max(feed) { TIMELY_S * last.min(feed) } else { f64::INFINITY }
+}
+
+/// What lies around a place.
+struct Needs<const L: usize> {
+    /// How much every lane turns.
+    need: Lanes<L>,
+    /// Way to the nearest sharp turn, change of feed or end, mm.
+    sharp_way: f64,
+    /// How far along the path the motion may be off, so that it is where the feed changes in its time, mm.
+    timely: f64,
+}
+
+/// What lies around `s`.
+fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
     let chords = run.chords;
-    let (mut need, mut sharp_way) = ([0.0; L], f64::INFINITY);
+    let (mut need, mut sharp_way, mut in_time) = ([0.0; L], f64::INFINITY, f64::INFINITY);
     let mut look = |v: usize| {
         let turn = minus(&chords[v].direction, &chords[v - 1].direction);
         for l in 0..L {
             need[l] = f64::max(need[l], turn[l].abs());
+        }
+        if is_marked(chords, v) {
+            let way = (s - chords[v].s).abs();
+            sharp_way = sharp_way.min(way);
+            in_time = in_time.min(timely(chords, v) + way / 2.0);
         }
     };
     // A chord behind a rest, or a turn back, has no turn.
@@ -211,9 +236,6 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) 
             break;
         }
         look(v);
-        if is_marked(chords, v) {
-            sharp_way = sharp_way.min(s - chords[v].s);
-        }
         v -= 1;
     }
     for v in i + 1..(i + 1 + LOOKS).min(chords.len()) {
@@ -221,11 +243,8 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> (Lanes<L>, f64) 
             break;
         }
         look(v);
-        if is_marked(chords, v) {
-            sharp_way = sharp_way.min(chords[v].s - s);
-        }
     }
-    (need, sharp_way.min(run.end() - s))
+    Needs { need, sharp_way: sharp_way.min(run.end() - s), timely: in_time }
 }
 
 /// The direction of the path; none at a sharp vertex.

@@ -73,8 +73,11 @@ impl<const L: usize> Checker<L> {
         let mut feeder = Feeder { run, timer_at: 0, chord: run.chord_at(start.s, 0) };
         let speed = &frame.speed[usize::from(run.rapid)];
         for n in 0..window.pieces.len() {
-            let feed = feeder.highest(window, n);
-            let shares = derivatives(&window.pieces[n], frame, speed, counted, feed, &mut window.stop);
+            let (least, feed) = feeder.range(window, n);
+            let mut shares = derivatives(&window.pieces[n], frame, speed, counted, feed, &mut window.stop);
+            if least < feed && shares.feed * feed > least {
+                shares.feed = larger(shares.feed, feeder.peak(&window.pieces[n], counted, frame.period_s));
+            }
             window.pieces[n].bound = bound(&shares);
             checked.speed = larger(checked.speed, larger(shares.feed, shares.speed) / SPEED);
             checked.acceleration = larger(checked.acceleration, shares.acceleration / ACCELERATION);
@@ -298,7 +301,7 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
     }
 }
 
-/// The highest feed of the chords that a piece touches.
+/// The feeds of the chords that a piece touches.
 struct Feeder<'a, const L: usize> {
     run: &'a Run<'a, L>,
     timer_at: usize,
@@ -306,14 +309,15 @@ struct Feeder<'a, const L: usize> {
 }
 
 impl<const L: usize> Feeder<'_, L> {
-    fn highest(&mut self, window: &Window<L>, n: usize) -> f64 {
+    /// The lowest and the highest.
+    fn range(&mut self, window: &Window<L>, n: usize) -> (f64, f64) {
         let piece = &window.pieces[n];
         let marks = &window.marks;
         while self.timer_at + 2 < marks.len() && marks[self.timer_at + 1].t <= piece.start_s {
             self.timer_at += 1;
         }
         self.chord = self.run.chord_at(marks[self.timer_at].s, self.chord);
-        let mut feed = self.run.chords[self.chord].feed;
+        let mut range = (self.run.chords[self.chord].feed, self.run.chords[self.chord].feed);
         let mut mark = self.timer_at;
         while mark + 1 < marks.len() && marks[mark].t < piece.end_s() {
             mark += 1;
@@ -321,9 +325,36 @@ impl<const L: usize> Feeder<'_, L> {
         let mut i = self.chord;
         while i + 1 < self.run.chords.len() && self.run.chords[i + 1].s < marks[mark].s {
             i += 1;
-            feed = feed.max(self.run.chords[i].feed);
+            let feed = self.run.chords[i].feed;
+            range = (range.0.min(feed), range.1.max(feed));
         }
-        feed
+        range
+    }
+
+    /// The highest path speed of a piece as a share of the feed where it is: that of the chord beside it, or of one that is
+    /// reached within half a fine period.
+    fn peak(&self, piece: &Piece<L>, counted: &Lanes<L>, period_s: f64) -> f64 {
+        let chords = self.run.chords;
+        let (mut most, mut i) = (0.0, self.chord);
+        for n in 0..=16 {
+            let t = f64::from(n) / 16.0 * piece.duration_s;
+            let (at, v) = (piece.position(t), piece.velocity(t));
+            let passed = |i: usize| dot(&minus(&at, &chords[i].start), &chords[i].direction);
+            while i + 1 < chords.len() && passed(i + 1) > 0.0 {
+                i += 1;
+            }
+            let soon = dot(&v, &v).sqrt() * period_s / 2.0;
+            let mut feed = chords[i].feed;
+            if i > 0 && passed(i) < soon {
+                feed = feed.max(chords[i - 1].feed);
+            }
+            if i + 1 < chords.len() && passed(i) > chords[i].length - soon {
+                feed = feed.max(chords[i + 1].feed);
+            }
+            let squared: f64 = (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum();
+            most = larger(most, squared.sqrt() / feed);
+        }
+        most
     }
 }
 
