@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use crate::latency::scale::Scale;
+use crate::template::{self, facts};
 use crate::text::{count, escape, number};
 
 const TEMPLATE: &str = include_str!("../assets/estimate.html");
-const STYLE: &str = include_str!("../assets/latency.css");
 const WIDTH: f64 = 920.0;
 const HEIGHT: f64 = 330.0;
 /// Where the drawing lies: left, right, top, bottom.
@@ -56,30 +56,12 @@ impl EstimateReport {
     /// # Errors
     /// Writing fails.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut pieces = TEMPLATE.split("{{");
-        out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
-        for piece in pieces {
-            let (gap, rest) = piece.split_once("}}").unwrap_or((piece, ""));
-            out.write_all(self.fill(gap).as_bytes())?;
-            out.write_all(rest.as_bytes())?;
-        }
-        out.flush()
-    }
-
-    fn fill(&self, gap: &str) -> String {
-        match gap {
-            "title" => escape(&self.title),
-            "style" => STYLE.into(),
-            "facts" => facts(&self.facts),
-            "programs" => self.programs.iter().map(program).collect(),
+        let programs = || self.programs.iter().map(program).collect();
+        template::write_plain((&self.title, &self.facts), TEMPLATE, out, |gap| match gap {
+            "programs" => programs(),
             unknown => unreachable!("the template has an unknown gap {unknown}"),
-        }
+        })
     }
-}
-
-fn facts(facts: &[(String, String)]) -> String {
-    let one = |(name, value): &(String, String)| format!("<span>{} <b>{}</b></span>", escape(name), escape(value));
-    facts.iter().map(one).collect()
 }
 
 fn program(program: &EstimatedProgram) -> String {

@@ -5,10 +5,10 @@ mod svg;
 
 use std::io::{self, Write};
 
+use crate::template;
 use crate::text::{count, escape, number};
 
 const TEMPLATE: &str = include_str!("../assets/latency.html");
-const STYLE: &str = include_str!("../assets/latency.css");
 
 /// A measurement of wake-ups to be drawn, alone or beside another.
 #[derive(Clone, Debug, Default)]
@@ -58,14 +58,7 @@ impl LatencyReport {
     /// # Errors
     /// Writing fails.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut pieces = TEMPLATE.split("{{");
-        out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
-        for piece in pieces {
-            let (gap, rest) = piece.split_once("}}").unwrap_or((piece, ""));
-            out.write_all(self.fill(gap).as_bytes())?;
-            out.write_all(rest.as_bytes())?;
-        }
-        out.flush()
+        template::write_plain((&self.title, &self.facts), TEMPLATE, out, |gap| self.fill(gap))
     }
 
     fn fill(&self, gap: &str) -> String {
@@ -73,11 +66,6 @@ impl LatencyReport {
             self.series.iter().enumerate().map(|(index, series)| text(index, series)).collect()
         };
         match gap {
-            "title" => escape(&self.title),
-            "style" => STYLE.into(),
-            "facts" => {
-                joined(&self.facts, |(name, value)| format!("<span>{} <b>{}</b></span>", escape(name), escape(value)))
-            }
             "notes" => joined(&self.notes, |note| format!("<p>{}</p>\n", escape(note))),
             "legend" => of_each(&|index, series| format!("<span class=\"s{index}\">{}</span>", escape(&series.name))),
             "histogram" => svg::histogram(&self.series),

@@ -38,6 +38,7 @@ mod model;
 mod page;
 mod sections;
 mod tables;
+mod template;
 mod text;
 mod thin;
 

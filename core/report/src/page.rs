@@ -8,6 +8,7 @@ use crate::columns::Derived;
 use crate::model::{Report, Unit};
 use crate::sections;
 use crate::tables;
+use crate::template;
 use crate::text::escape;
 
 /// Samples that a browser still draws fluently; more are thinned.
@@ -34,14 +35,7 @@ const SCRIPTS: [&str; 12] = [
 /// Writes the page with at most about `cap` points in each curve.
 pub(crate) fn write(report: &Report, out: &mut dyn Write, cap: usize) -> io::Result<()> {
     let derived = Derived::of(report, cap)?;
-    let mut pieces = TEMPLATE.split("{{");
-    out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
-    for piece in pieces {
-        let (gap, rest) = piece.split_once("}}").unwrap_or((piece, ""));
-        fill(gap, report, &derived, out)?;
-        out.write_all(rest.as_bytes())?;
-    }
-    out.flush()
+    template::write(TEMPLATE, out, |gap, out| fill(gap, report, &derived, out))
 }
 
 fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> io::Result<()> {
