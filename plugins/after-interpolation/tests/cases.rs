@@ -2,9 +2,10 @@
 
 mod common;
 
-use common::{FILTERS, arc, context, drive, norm, numbered, open, polyline};
+use common::{FILTERS, context, drive, norm, open, polyline};
 use serde_json::Value;
 use std::f64::consts::{FRAC_PI_2, TAU};
+use tandem_rig::{arc, numbered};
 use tandem_sdk::{AxisVector, Segment};
 
 fn fixture() -> Value {

@@ -2,8 +2,9 @@
 
 mod common;
 
-use common::{FILTERS, Recorder, arc, context, drive, line, norm, numbered, open, polyline};
+use common::{FILTERS, context, drive, line, norm, open, polyline};
 use tandem_after_interpolation::{AfterInterpolation, BUFFER_BLOCKS, Options};
+use tandem_rig::{Collected, arc, numbered};
 use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, LimitedBy, PathMode, Planner, SegmentFlags};
 
 /// Two lines with an exact stop between, an arc, a dwell, a rapid, a line of a rotary axis.
@@ -155,7 +156,7 @@ fn a_part_below_the_rounding_of_a_dwell_is_emitted_once() {
     dwell.dwell_s = 1.0;
     planner.accept(&dwell).unwrap();
     planner.finish();
-    let mut recorder = Recorder::default();
+    let mut recorder = Collected::default();
     assert_eq!(planner.advance(1e-18, &mut recorder).unwrap().duration_s, 1e-18);
     assert_eq!(recorder.segments.len(), 1);
 }
@@ -175,7 +176,7 @@ fn a_full_buffer_is_said_and_memory_is_bounded_by_the_filter() {
     let mut planner = AfterInterpolation::new(&Options::default(), &context(0.001)).unwrap();
     let full = blocks.iter().position(|b| planner.accept(b).unwrap() == Accepted::Full);
     assert_eq!(full, Some(BUFFER_BLOCKS));
-    let (mut next, mut most, mut recorder) = (BUFFER_BLOCKS, 0, Recorder::default());
+    let (mut next, mut most, mut recorder) = (BUFFER_BLOCKS, 0, Collected::default());
     while next < blocks.len() {
         planner.advance(0.008, &mut recorder).unwrap();
         while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
@@ -190,7 +191,7 @@ fn a_full_buffer_is_said_and_memory_is_bounded_by_the_filter() {
 fn without_finish_it_waits_before_the_block_whose_end_is_open() {
     let mut planner = open("linear", 20.0, &context(0.001));
     let blocks = polyline(&[[10.0, 0.0, 0.0], [20.0, 0.0, 0.0]], 50.0);
-    let mut recorder = Recorder::default();
+    let mut recorder = Collected::default();
     planner.accept(&blocks[0]).unwrap();
     assert_eq!(planner.advance(1.0, &mut recorder).unwrap().duration_s, 0.0);
     planner.accept(&blocks[1]).unwrap();
@@ -209,7 +210,7 @@ fn advance_is_cut_at_the_time_asked_for() {
         assert_eq!(planner.accept(block).unwrap(), Accepted::Accepted);
     }
     planner.finish();
-    let mut recorder = Recorder::default();
+    let mut recorder = Collected::default();
     for asked in [0.0, 0.0037, 1e-12, 0.008, 0.25, 0.000_4] {
         let emitted = planner.advance(asked, &mut recorder).unwrap().duration_s;
         assert!((emitted - asked).abs() <= 1e-9, "{emitted} s instead of {asked} s");
@@ -219,7 +220,7 @@ fn advance_is_cut_at_the_time_asked_for() {
 #[test]
 fn reset_forgets_and_begins_elsewhere() {
     let mut planner = open("exponential", 20.0, &context(0.001));
-    let mut recorder = Recorder::default();
+    let mut recorder = Collected::default();
     for block in &program() {
         assert_eq!(planner.accept(block).unwrap(), Accepted::Accepted);
     }

@@ -6,23 +6,7 @@ mod counting_allocator;
 
 use common::{FILTERS, context, open, polyline};
 use counting_allocator::heap_use_of;
-use tandem_sdk::{Accepted, Block, BlockReport, Planner, Segment, SegmentSink};
-
-struct Nowhere;
-
-impl SegmentSink for Nowhere {
-    fn segment(&mut self, _segment: &Segment) {}
-    fn block(&mut self, _report: &BlockReport) {}
-}
-
-/// Drives the blocks by rough periods; the planner need not come to an end.
-fn stream(planner: &mut dyn Planner, blocks: &[Block]) {
-    for block in blocks {
-        while planner.accept(block).unwrap() == Accepted::Full {
-            planner.advance(0.008, &mut Nowhere).unwrap();
-        }
-    }
-}
+use tandem_rig::feed;
 
 #[test]
 fn a_steady_stream_does_not_allocate() {
@@ -32,8 +16,8 @@ fn a_steady_stream_does_not_allocate() {
         let opening = heap_use_of(|| drop(open(filter, 50.0, &context(0.001))));
         assert!(opening.allocations > 0, "the counter counts");
         let mut planner = open(filter, 50.0, &context(0.001));
-        stream(&mut *planner, &blocks[..2000]);
-        let steady = heap_use_of(|| stream(&mut *planner, &blocks[2000..]));
+        feed(&mut *planner, &blocks[..2000]);
+        let steady = heap_use_of(|| feed(&mut *planner, &blocks[2000..]));
         assert_eq!(steady.allocations, 0, "{filter}");
     }
 }

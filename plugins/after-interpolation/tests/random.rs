@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{FILTERS, Recorder, arc, context, drive, line, norm, numbered, open};
+use common::{FILTERS, context, drive, line, norm, open};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 use tandem_motion::Path;
+use tandem_rig::{Collected, arc, numbered};
 use tandem_sdk::{AxisVector, Block, PathMode};
 
 /// Lines and arcs of very different length, feed and direction, some with an exact stop.
@@ -31,11 +32,11 @@ fn programs() -> impl Strategy<Value = Vec<Block>> {
     })
 }
 
-fn recorded(filter: &str, tau_ms: f64, blocks: &[Block]) -> Recorder {
+fn recorded(filter: &str, tau_ms: f64, blocks: &[Block]) -> Collected {
     recorded_at(0.001, filter, tau_ms, blocks)
 }
 
-fn recorded_at(fine_period_s: f64, filter: &str, tau_ms: f64, blocks: &[Block]) -> Recorder {
+fn recorded_at(fine_period_s: f64, filter: &str, tau_ms: f64, blocks: &[Block]) -> Collected {
     let mut machine = context(fine_period_s);
     machine.position = blocks.first().map_or(AxisVector::ZERO, |block| block.start);
     drive(&mut *open(filter, tau_ms, &machine), blocks)

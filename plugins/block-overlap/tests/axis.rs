@@ -4,8 +4,9 @@
 
 mod common;
 
-use common::{Collected, Random, context, lines, published, run};
+use common::{context, published, run};
 use tandem_block_overlap::{CornerControl, LimitMode, Options};
+use tandem_rig::{Collected, Random, lines};
 use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, PlannerContext, Segment, SegmentFlags};
 
 const PERIOD_S: f64 = 1e-3;

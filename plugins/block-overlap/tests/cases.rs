@@ -2,9 +2,10 @@
 
 mod common;
 
-use common::{Collected, assert_close, case, context, lines, numbers, published, run};
+use common::{context, published, run};
 use serde_json::Value;
 use tandem_block_overlap::{Options, corner_error_mm, tau_for_tolerance_s};
+use tandem_rig::{Collected, assert_close, case, lines, numbers};
 use tandem_sdk::{AxisVector, Block};
 
 const TICK_S: f64 = 1e-3;

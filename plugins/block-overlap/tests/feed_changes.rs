@@ -3,8 +3,9 @@
 
 mod common;
 
-use common::{Random, context, lines, run};
+use common::{context, run};
 use tandem_block_overlap::{LimitMode, Options};
+use tandem_rig::{Random, lines};
 use tandem_sdk::{AxisVector, Block, PathMode, PlannerContext};
 
 const PERIOD_S: f64 = 1e-3;

@@ -4,26 +4,11 @@ mod common;
 #[path = "../../../tests/counting_allocator.rs"]
 mod counting_allocator;
 
-use common::{context, lines, published};
+use common::{context, published};
 use counting_allocator::heap_use_of;
 use tandem_block_overlap::{BlockOverlap, Options};
-use tandem_sdk::{Accepted, AxisVector, Block, BlockReport, Planner, Segment, SegmentSink};
-
-struct Nowhere;
-
-impl SegmentSink for Nowhere {
-    fn segment(&mut self, _segment: &Segment) {}
-    fn block(&mut self, _report: &BlockReport) {}
-}
-
-/// Drives the blocks by rough periods; the planner need not come to an end.
-fn stream(planner: &mut dyn Planner, blocks: &[Block]) {
-    for block in blocks {
-        while planner.accept(block).unwrap() == Accepted::Full {
-            planner.advance(0.008, &mut Nowhere).unwrap();
-        }
-    }
-}
+use tandem_rig::{feed, lines};
+use tandem_sdk::AxisVector;
 
 #[test]
 fn a_steady_stream_does_not_allocate() {
@@ -33,8 +18,8 @@ fn a_steady_stream_does_not_allocate() {
         let opening = heap_use_of(|| drop(BlockOverlap::new(&options, &context(&[1000.0; 3], 0.001)).unwrap()));
         assert!(opening.allocations > 0, "the counter counts");
         let mut planner = BlockOverlap::new(&options, &context(&[1000.0; 3], 0.001)).unwrap();
-        stream(&mut planner, &blocks[..2000]);
-        let steady = heap_use_of(|| stream(&mut planner, &blocks[2000..]));
+        feed(&mut planner, &blocks[..2000]);
+        let steady = heap_use_of(|| feed(&mut planner, &blocks[2000..]));
         assert_eq!(steady.allocations, 0, "{options:?}");
     }
 }

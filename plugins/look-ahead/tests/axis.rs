@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{Collected, context, lines, run};
+use common::{context, run};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use tandem_look_ahead::Options;
+use tandem_rig::{Collected, lines};
 use tandem_sdk::{AxisVector, Block, BlockKind, PlannerContext};
 
 const PERIOD_S: f64 = 1e-3;

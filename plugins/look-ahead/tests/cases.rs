@@ -2,8 +2,10 @@
 
 mod common;
 
-use common::{Collected, assert_close, case, context, lines, numbers, points, run, tangent};
+use common::{context, run, tangent};
 use serde_json::Value;
+use tandem_rig::{Collected, assert_close, case, lines, numbers, points};
+use tandem_sdk::AxisVector;
 
 const STEP_S: f64 = 1e-4;
 
@@ -15,6 +17,12 @@ fn run_case(input: &Value, count: usize, buffer: usize) -> Collected {
     let allowed = input["V_allow_mm_min"].as_f64().unwrap();
     let context = context(&accelerations, allowed, input["Ts_s"].as_f64().unwrap());
     run(&context, &tangent(buffer), &lines(&points[..=count], feed), STEP_S)
+}
+
+/// Position and feed, mm/s, at program time `t_s`.
+fn at(collected: &Collected, t_s: f64) -> (AxisVector, f64) {
+    let (segment, since_s) = collected.place(t_s);
+    (segment.position(since_s), segment.path_speed_mm_per_s(since_s))
 }
 
 fn times(collected: &Collected) -> Vec<f64> {
@@ -33,7 +41,7 @@ fn square() {
         assert!((report.time_s - total).abs() < 1e-9);
     }
     for sample in case["expect"]["samples"].as_array().unwrap() {
-        let (position, feed) = collected.at(sample["t_s"].as_f64().unwrap());
+        let (position, feed) = at(&collected, sample["t_s"].as_f64().unwrap());
         assert_close(&position.0[..2], &numbers(&sample["pos_mm"]), 1e-6);
         assert!((feed * 60.0 - sample["feed_mm_min"].as_f64().unwrap()).abs() < 1e-6);
     }
@@ -96,14 +104,14 @@ fn mixed_feeds_and_random_paths() {
 #[test]
 fn rough_records_and_fine_increments() {
     let case = case("000_two_step");
-    let collected = run_case(&common::case("000_square")["input"], 4, 100);
+    let collected = run_case(&tandem_rig::case("000_square")["input"], 4, 100);
     let (rough_s, fine_s) = (0.005, 0.0005);
     let records = (collected.duration_s() / rough_s).ceil() as u64;
     assert_eq!(records, case["expect"]["n_rough"].as_u64().unwrap());
     for record in case["expect"]["rough"].as_array().unwrap() {
         let from_s = record["index"].as_f64().unwrap() * rough_s;
-        let (from, start_feed) = collected.at(from_s);
-        let (to, end_feed) = collected.at(from_s + rough_s);
+        let (from, start_feed) = at(&collected, from_s);
+        let (to, end_feed) = at(&collected, from_s + rough_s);
         assert_close(&(to - from).0[..2], &numbers(&record["dx_mm"]), 1e-9);
         let feeds = [record["fs_mm_min"].as_f64().unwrap(), record["fe_mm_min"].as_f64().unwrap()];
         assert_close(&[start_feed * 60.0, end_feed * 60.0], &feeds, 1e-6);
@@ -116,6 +124,6 @@ fn rough_records_and_fine_increments() {
     let end = collected.segments.last().unwrap();
     assert_eq!(
         end.position(end.duration_s),
-        *points(&common::case("000_square")["input"]["points_mm"]).last().unwrap()
+        *points(&tandem_rig::case("000_square")["input"]["points_mm"]).last().unwrap()
     );
 }

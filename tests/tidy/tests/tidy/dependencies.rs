@@ -41,6 +41,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("scripts", &[]),
     ("tests/conformance", &["tandem-sdk"]),
     ("tests/oracle", &[]),
+    ("tests/rig", &["tandem-sdk"]),
     ("tests/third-party", &["tandem-sdk"]),
     ("tests/tidy", &[]),
 ];
