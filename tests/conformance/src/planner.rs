@@ -184,8 +184,14 @@ fn missed(blocks: &[Block], segments: &[Segment]) -> Option<String> {
     Some(format!("block {}: no rest on its end {:?}", missed.index, &missed.end.0[..3]))
 }
 
-/// No faster between two samples than the highest feed that is programmed there.
+/// No faster between two samples than the highest feed that is programmed there, and that feed is one of the program's.
 fn too_fast(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> Option<String> {
+    let mut moving = segments.iter().filter(|segment| segment.path_mm(segment.duration_s) > segment.path_mm(0.0));
+    let too_high = |segment: &&Segment| segment.feed_mm_per_s > programmed(blocks, segment) * (1.0 + 1e-9);
+    if let Some(segment) = moving.find(too_high) {
+        let programmed = programmed(blocks, segment);
+        return Some(format!("block {}: {} mm/s, programmed {programmed}", segment.block, segment.feed_mm_per_s));
+    }
     samples.windows(2).find_map(|pair| {
         let speed = program::norm(&(pair[1].position - pair[0].position)) / FINE_PERIOD_S;
         let feeds = segments[pair[0].segment..=pair[1].segment].iter().map(|segment| segment.feed_mm_per_s);
@@ -195,6 +201,13 @@ fn too_fast(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> Optio
         let kind = blocks.get(block as usize).map(|block| block.kind);
         wrong.then(|| format!("block {block}, {kind:?}: {speed} mm/s, programmed {feed}"))
     })
+}
+
+/// The highest feed of the blocks that may move in a segment: its own, and a few beside it where blocks overlap.
+fn programmed(blocks: &[Block], segment: &Segment) -> f64 {
+    let index = segment.block as usize;
+    let near = blocks[index.saturating_sub(4).min(blocks.len())..blocks.len().min(index + 5)].iter();
+    near.map(Block::command_feed_mm_per_s).fold(0.0, f64::max)
 }
 
 fn off_the_path(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> Option<String> {

@@ -4,5 +4,6 @@ mod built;
 mod examples;
 mod hostile;
 mod identical;
+mod kit;
 mod made;
 mod refusals;

@@ -19,6 +19,11 @@ pub struct Hostile {
     finished: bool,
 }
 
+/// How long a block takes: half as fast again in its middle as in the mean.
+fn time_s(block: &Block) -> f64 {
+    (1.6 * block.length_mm / block.command_feed_mm_per_s()).max(4.0)
+}
+
 impl Hostile {
     pub fn open(options: &Options, _context: &PlannerContext) -> Result<Self, PluginError> {
         Ok(Self {
@@ -29,13 +34,15 @@ impl Hostile {
         })
     }
 
-    /// The whole block in 4 s, as 3t² − 2t³ of its way; a dwell as it is.
+    /// The whole block in 4 s or, at its feed, longer, as 3t² − 2t³ of its way; a dwell as it is.
     fn segment(&self, block: &Block) -> Segment {
-        let mut segment = Segment::rest(&block.start, if block.kind == BlockKind::Dwell { block.dwell_s } else { 4.0 });
-        (segment.block, segment.line, segment.feed_mm_per_s) = (block.index, block.line, f64::INFINITY);
+        let time_s = time_s(block);
+        let mut segment =
+            Segment::rest(&block.start, if block.kind == BlockKind::Dwell { block.dwell_s } else { time_s });
+        (segment.block, segment.line, segment.feed_mm_per_s) = (block.index, block.line, block.command_feed_mm_per_s());
         segment.flags = SegmentFlags::BLOCK_BEGINS;
         segment.stop_deceleration_mm_per_s2 = 100.0;
-        let (square, cube) = (3.0 / 16.0, -2.0 / 64.0);
+        let (square, cube) = (3.0 / time_s.powi(2), -2.0 / time_s.powi(3));
         let shape = |start: f64, way: f64| [start, 0.0, way * square, way * cube, 0.0, 0.0];
         segment.path = shape(self.path_mm, block.length_mm);
         for (axis, coefficients) in segment.coefficients.iter_mut().enumerate() {
@@ -50,9 +57,9 @@ impl Hostile {
             limited_by: LimitedBy::Feed,
             block: block.index,
             start_feed_mm_per_s: 0.0,
-            peak_feed_mm_per_s: block.length_mm / 4.0 * 1.5,
+            peak_feed_mm_per_s: block.length_mm / time_s(block) * 1.5,
             end_feed_mm_per_s: 0.0,
-            time_s: 4.0,
+            time_s: time_s(block),
             time_constant_s: f64::NAN,
         };
         report.block += if what == Misbehave::Order { 7 } else { 0 };
@@ -64,7 +71,7 @@ impl Hostile {
             sink.segment(&segment);
         }
         let mut rest = Segment::rest(&block.end, 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) = (block.index, block.line, f64::INFINITY);
+        (rest.block, rest.line, rest.feed_mm_per_s) = (block.index, block.line, block.command_feed_mm_per_s());
         rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
         self.path_mm += block.length_mm;
         rest.path[0] = self.path_mm;
