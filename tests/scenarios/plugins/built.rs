@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 
-use crate::harness::root;
+use crate::harness::{mill, root};
 
 /// The `target` folder of the workspace.
 fn target() -> &'static Path {
@@ -63,4 +63,15 @@ pub fn built_in(package: &str) -> PathBuf {
     command.current_dir(root()).env("CARGO_TARGET_DIR", target()).args(["rustc", "--offline", "--locked", "--lib"]);
     run(command.args(["--crate-type", "cdylib", "-p", package]));
     target().join("debug").join(file(package))
+}
+
+/// The mill's file without the table `section` and those below it.
+pub fn mill_without(section: &str) -> String {
+    let (text, table) = (std::fs::read_to_string(mill()).unwrap(), format!("[{section}"));
+    let mut inside = false;
+    let kept = text.lines().filter(|line| {
+        inside = if line.starts_with('[') { line.starts_with(&table) } else { inside };
+        !inside
+    });
+    kept.flat_map(|line| [line, "\n"]).collect()
 }

@@ -1,9 +1,10 @@
 //! `tandem plugin new`: what it makes builds, conforms and runs.
 
+use std::path::Path;
 use std::process::Command;
 
 use crate::harness::{Scenario, root};
-use crate::plugins::built::{cargo, run, third_party_target};
+use crate::plugins::built::{cargo, mill_without, run, third_party_target};
 
 fn make(arguments: &[&str]) -> (bool, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_tandem")).args(["plugin", "new"]).args(arguments).output().unwrap();
@@ -27,17 +28,44 @@ fn every_kind_builds_and_conforms_as_it_is_made() {
         assert_eq!(left, None, "{readme}");
         let source = std::fs::read_to_string(place.join("src/lib.rs")).unwrap();
         assert!(source.contains(&format!("\"{name}\"")) && !source.contains("one-block"), "{source}");
+        run(cargo().current_dir(&place).args(["build", "--offline"]));
+        drives_as_its_readme_says(&place, &readme, kind);
     }
-    let place = folder.path().join("made-planner");
-    run(cargo().current_dir(&place).args(["build", "--offline"]));
+}
+
+/// The mill with what the README says of the machine file.
+fn drives_as_its_readme_says(place: &Path, readme: &str, kind: &str) {
+    let (_, rest) = readme.split_once("```toml\n").unwrap();
+    let (block, _) = rest.split_once("```").unwrap();
     let library = third_party_target().join("debug").join(format!(
-        "{}made_planner{}",
+        "{}made_{}{}",
         std::env::consts::DLL_PREFIX,
+        kind.replace('-', "_"),
         std::env::consts::DLL_SUFFIX
     ));
-    let setting = format!("planner.plugin={}", library.display());
-    let done = Scenario::text("G21 G90\nF3000\nG1 X40 Y10\nM2\n").with(&["--set", &setting]).run();
-    done.assert_within_limits();
+    let (before, after) = block.split_once("path/to/").unwrap();
+    let (_, after) = after.split_once('"').unwrap();
+    let machine = place.join("machine.toml");
+    let text = format!("{}{before}{}\"{after}", mill_without(&kind.replace('-', "_")), library.display());
+    std::fs::write(&machine, text).unwrap();
+    let done = Scenario::text("G21 G90\nF3000\nG1 X40 Y10\nM2\n").on(&machine).run();
+    assert_eq!((done.status(), done.number("limit_violations")), (0, 0.0), "{kind}: {}", done.errors());
+    assert_eq!(done.column("x_cmd_mm").last(), Some(&40.0), "{kind}");
+}
+
+/// What docs/writing-a-plugin.md shows compiles, and conforms.
+#[test]
+fn the_plugin_on_the_page_conforms() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("load-guard");
+    let (made, words) = make(&[place.to_str().unwrap(), "--kind", "feed-strategy", "--sdk", root().to_str().unwrap()]);
+    assert!(made, "{words}");
+    let page = std::fs::read_to_string(root().join("docs/writing-a-plugin.md")).unwrap();
+    let (_, rest) = page.split_once("```rust\n").unwrap();
+    std::fs::write(place.join("src/lib.rs"), rest.split_once("```").unwrap().0).unwrap();
+    std::fs::copy(root().join("tests/third-party/Cargo.lock"), place.join("Cargo.lock")).unwrap();
+    let text = run(cargo().current_dir(&place).args(["test", "--offline"]));
+    assert!(text.contains("test it_conforms ... ok") && !text.contains("warning"), "{text}");
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use tandem_sdk::abi;
 
-use crate::harness::{Scenario, mill};
-use crate::plugins::built::{built_in, third_party};
+use crate::harness::Scenario;
+use crate::plugins::built::{built_in, mill_without, third_party};
 
 const PROGRAM: &str = "G21 G90\nF600\nG1 X1\nM2\n";
 
@@ -98,7 +98,7 @@ fn options_are_refused_where_they_are_written() {
     std::fs::copy(third_party("one-block"), folder.path().join("libone_block.so")).unwrap();
     let refused = |options: &str| {
         let plugin = "[planner]\nplugin = \"libone_block.so\"\n[planner.options]\n";
-        std::fs::write(&machine, format!("{}{plugin}{options}", without_planner())).unwrap();
+        std::fs::write(&machine, format!("{}{plugin}{options}", mill_without("planner"))).unwrap();
         let done = Scenario::text(PROGRAM).on(&machine).run();
         assert_eq!(done.status(), 1, "{}", done.errors());
         let line = std::fs::read_to_string(&machine).unwrap().lines().count();
@@ -112,15 +112,4 @@ fn options_are_refused_where_they_are_written() {
     assert!(wrong_type.contains("planner.options.buffer_blocks: planner one-block: invalid type"), "{wrong_type}");
     let range = refused("acceleration_share = 2.0\n");
     assert!(range.contains("planner.options.acceleration_share: planner one-block: must be 0.01 to 1"), "{range}");
-}
-
-/// The mill's file without its `[planner]`.
-fn without_planner() -> String {
-    let text = std::fs::read_to_string(mill()).unwrap();
-    let mut inside = false;
-    let kept = text.lines().filter(|line| {
-        inside = if line.starts_with('[') { line.starts_with("[planner") } else { inside };
-        !inside
-    });
-    kept.flat_map(|line| [line, "\n"]).collect()
 }

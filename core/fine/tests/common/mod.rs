@@ -66,7 +66,6 @@ impl Bench {
     }
 
     /// Three axes and as many joints behind them, as `kinematics` give them.
-    #[allow(dead_code)] // not every test that includes this has kinematics
     pub fn with_curved(kinematics: Box<dyn Kinematics>) -> Self {
         Self::of(GuardMode::Stop, Joints::Curved { axes: 3 }, 6, Some(kinematics))
     }
