@@ -35,6 +35,30 @@ fn the_report_opens_in_a_browser() {
 }
 
 #[test]
+fn report_and_summary_say_what_binds_and_what_planning_took() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let path = page.to_string_lossy().into_owned();
+    let machine = root().join("examples/machines/mill-3axis-smooth.toml");
+    let program = root().join("examples/programs/serpentine.ngc");
+    let done = Scenario::of(&program).on(&machine).with(&["--report", &path]).run();
+    let html = std::fs::read_to_string(&page).unwrap();
+    let words = html.split("what binds, of the time in motion<td>").nth(1).unwrap().split('<').next().unwrap();
+    let percent = |name: &str| {
+        let share = words.split(", ").find_map(|word| word.strip_prefix(name)).unwrap_or_else(|| panic!("{words}"));
+        share.trim_end_matches('%').trim().parse::<f64>().unwrap()
+    };
+    // The long straights and the wide arc are driven at the feed, the rest at the jerk limit.
+    assert!(percent("feed") > 60.0 && percent("jerk") > 10.0 && percent("tolerance") > 0.0, "{words}");
+    let seconds = |by: &str| done.summary()["limited_by_s"][by].as_f64().unwrap();
+    assert!(seconds("feed") > 1.5 && seconds("jerk") > 0.2, "{}", done.summary()["limited_by_s"]);
+    let rows = done.summary()["planning_us"]["histogram"].as_array().unwrap().clone();
+    let periods: u64 = rows.iter().map(|row| row["periods"].as_u64().unwrap()).sum();
+    let driven = done.number("motion_time_s") / done.number("rough_period_s");
+    assert!(periods as f64 >= driven, "{periods} periods are measured, {driven} were driven");
+}
+
+#[test]
 fn the_path_is_judged_by_the_tolerance_of_the_program() {
     let report = |text: &str| {
         let folder = tempfile::tempdir().unwrap();

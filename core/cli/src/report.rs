@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, Summary};
+use tandem_host::{Output, PlanningRow, Summary};
 use tandem_machine::{JerkMode, Machine};
 use tandem_report::{Axis, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
@@ -123,6 +123,28 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         ),
         fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
     ];
+    let total_s: f64 = summary.limited_by_s.values().sum();
+    let percent = |(by, time_s): (&String, &f64)| format!("{by} {:.1} %", 100.0 * time_s / total_s);
+    if total_s > 0.0 {
+        let each: Vec<_> = summary.limited_by_s.iter().map(percent).collect();
+        facts.push(fact("what limited most of each block, by the planner", each.join(", ")));
+    }
+    facts.push(fact("planning a rough period, µs: periods", planning(summary)));
     facts.extend(summary.fault.iter().map(|fault| fact("fault", fault.clone())));
     facts
+}
+
+/// The histogram of planning times, by doublings; short ones together.
+fn planning(summary: &Summary) -> String {
+    const SHORT_US: f64 = 100.0;
+    let rows = &summary.planning_us.histogram;
+    let first = rows.iter().position(|row| row.from_us >= SHORT_US).unwrap_or(rows.len());
+    let words = |rows: &[PlanningRow]| {
+        let below_us = rows.iter().map(|row| row.below_us).fold(0.0, f64::max);
+        let periods: u64 = rows.iter().map(|row| row.periods).sum();
+        (periods > 0).then(|| format!("below {below_us:.0}: {periods}"))
+    };
+    let (short, long) = rows.split_at(first);
+    let rows: Vec<_> = std::iter::once(short).chain(long.chunks(2)).filter_map(words).collect();
+    format!("{}; at most {:.0}", rows.join(", "), summary.planning_us.max)
 }

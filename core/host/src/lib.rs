@@ -52,4 +52,4 @@ pub use record::{BlocksCsv, Output, TraceCsv};
 pub use registry::{PluginRefusal, Registry};
 pub use run::{Clock, Outcome, Run, Switches, check_program, each_block};
 pub use stops::Stop;
-pub use summary::{LatenessUs, Summary};
+pub use summary::{LatenessUs, PlanningRow, PlanningUs, Summary};

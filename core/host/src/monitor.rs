@@ -1,11 +1,14 @@
 //! Peaks and totals of a run, from its samples and blocks.
 
+use std::collections::BTreeMap;
+
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
 
 use crate::joints::JointWatch;
 use crate::path_watch::PathWatch;
+use crate::record::limited_by;
 use crate::stops::StopWatch;
 
 /// Watches a run. Finite differences at the fine period, with rest before the first sample.
@@ -23,6 +26,8 @@ pub struct Monitor {
     pub length_mm: f64,
     /// Their nominal time, s.
     pub nominal_s: f64,
+    /// Their planned time by what held the feed down, s.
+    pub limited_by_s: BTreeMap<&'static str, f64>,
     /// The last position sent.
     pub position: AxisVector,
     /// What each stop took.
@@ -45,6 +50,7 @@ impl Monitor {
             blocks: 0,
             length_mm: 0.0,
             nominal_s: 0.0,
+            limited_by_s: BTreeMap::new(),
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::new(leaves_path, machine.motion.path_tolerance_mm, &machine.start),
@@ -64,9 +70,12 @@ impl Monitor {
     }
 
     /// A block is planned for good.
-    pub fn block(&mut self, block: &Block, _report: &BlockReport) {
+    pub fn block(&mut self, block: &Block, report: &BlockReport) {
         self.watch.block(&self.axes, block);
         self.blocks += 1;
+        if block.kind != BlockKind::Dwell {
+            *self.limited_by_s.entry(limited_by(report.limited_by)).or_default() += report.time_s;
+        }
         self.length_mm += block.length_mm;
         self.nominal_s += match block.kind {
             BlockKind::Dwell => block.dwell_s,

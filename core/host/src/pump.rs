@@ -9,6 +9,7 @@ use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
+use crate::lateness::Lateness;
 use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::{PolicySummary, Reloader};
@@ -81,6 +82,8 @@ pub struct Pump<'a> {
     /// How many analog inputs have a name.
     pub analog: usize,
     commands: CommandLog,
+    /// Time of each rough period, and of all of them, ns.
+    pub planning: Lateness,
     pub planning_ns: u128,
     /// Rough periods since the observer was told of the policy.
     untold: u32,
@@ -112,6 +115,7 @@ impl<'a> Pump<'a> {
             planner: String::new(),
             analog: 0,
             commands,
+            planning: Lateness::new(),
             planning_ns: 0,
             untold: TOLD_EVERY,
         }
@@ -134,7 +138,9 @@ impl<'a> Pump<'a> {
             };
             self.fail(words);
         }
-        self.planning_ns += started.elapsed().as_nanos();
+        let taken_ns = started.elapsed().as_nanos();
+        self.planning.record_many(taken_ns as u64, 1);
+        self.planning_ns += taken_ns;
     }
 
     /// Puts a new policy script in place, if there is one.

@@ -22,7 +22,7 @@ use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
-use crate::summary::{FORMAT, LatenessUs, Summary};
+use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
 use crate::wall_clock::Periods;
 use crate::{faults, rules, setup, virtual_clock, wall_clock};
 
@@ -370,6 +370,8 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         end_position_mm: each(&monitor.position),
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
+        planning_us: PlanningUs::from(&pump.planning),
+        limited_by_s: monitor.limited_by_s.iter().map(|(by, time_s)| ((*by).to_string(), *time_s)).collect(),
         policy: None,
         stops: monitor.stops.stops.clone(),
         stop_count: monitor.stops.count,

@@ -83,6 +83,10 @@ pub struct Summary {
     pub wall_time_s: f64,
     /// Time spent in the rough loop a block, ns.
     pub planning_ns_per_block: f64,
+    /// What the rough loop took of a rough period.
+    pub planning_us: PlanningUs,
+    /// Planned time of the blocks by what held the feed down, in the planner's words, s; dwells are left out.
+    pub limited_by_s: BTreeMap<String, f64>,
     /// The policy script, where the machine has one.
     pub policy: Option<PolicySummary>,
     /// The stops, the first thousand: holds, program stops, starvation, aborts and faults.
@@ -106,6 +110,45 @@ pub struct LatenessUs {
     pub p999: f64,
     /// All were.
     pub max: f64,
+}
+
+/// What the rough loop took of a period (program, policy, planner), µs: percentiles to a thirtieth, the maximum exactly.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlanningUs {
+    /// Half of the periods took at most so long.
+    pub p50: f64,
+    /// 99 % did.
+    pub p99: f64,
+    /// 99.9 % did.
+    pub p999: f64,
+    /// All did.
+    pub max: f64,
+    /// How many took how long, by half doublings.
+    pub histogram: Vec<PlanningRow>,
+}
+
+/// A row of the histogram.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PlanningRow {
+    /// Shortest time counted here, µs.
+    pub from_us: f64,
+    /// The time from which the next row counts, µs.
+    pub below_us: f64,
+    /// Rough periods.
+    pub periods: u64,
+}
+
+impl From<&Lateness> for PlanningUs {
+    fn from(times: &Lateness) -> Self {
+        let us = |ns: u64| ns as f64 / 1e3;
+        let LatenessUs { p50, p99, p999, max } = LatenessUs::from(times);
+        let row = |r: crate::lateness::Row| PlanningRow {
+            from_us: us(r.from_ns),
+            below_us: us(r.below_ns),
+            periods: r.count,
+        };
+        Self { p50, p99, p999, max, histogram: times.rows().into_iter().map(row).collect() }
+    }
 }
 
 impl From<&Lateness> for LatenessUs {

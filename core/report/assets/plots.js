@@ -99,7 +99,7 @@ function signalPlots() {
 
 function allPlots() {
   return [
-    feedPlot(), ...velocityPlots(), ...accelerationPlots(), ...jerkPlots(), ...deviationPlot(), ...followingPlots(),
+    feedPlot(), ...velocityPlots(), ...accelerationPlots(), ...jerkPlots(), ...bandPlot(), ...deviationPlot(), ...followingPlots(),
     ...sigmaPlot(), ...signalPlots(),
   ];
 }

@@ -2,6 +2,7 @@
 
 use std::io;
 
+use crate::binding::Binding;
 use crate::differences::steps_s;
 use crate::encode::Column;
 use crate::findings::Findings;
@@ -17,6 +18,8 @@ pub(crate) struct Derived {
     pub following: Vec<Vec<f64>>,
     /// 1 where a sample lies outside the path tolerance.
     pub off_path: Vec<u8>,
+    /// What keeps the motion from being faster.
+    pub binding: Binding,
     /// What exceeds a limit.
     pub findings: Findings,
     /// Middle of each axis' range: positions are embedded relative to it, so that single precision suffices.
@@ -36,6 +39,7 @@ impl Derived {
             axes.map(|(axis, position)| AxisMotion::of(axis, position, &steps, report.fine_period_s)).collect();
         let off_path = off_path(report);
         Ok(Self {
+            binding: Binding::of(report, &motions),
             findings: Findings::of(report, &motions, &off_path),
             following: (0..report.axes.len()).map(|axis| following(report, axis)).collect(),
             centres: samples.command.iter().map(|position| centre(position)).collect(),
@@ -62,6 +66,7 @@ impl Derived {
             self.curve("programmed", &samples.programmed_feed_mm_s),
             self.curve("sigma", &samples.sigma),
             samples.deviation_mm.as_ref().and_then(|values| self.curve("deviation", values)),
+            Some(Column::u8("binding", self.thinning.marks(&self.binding.marks))),
             (!self.off_path.is_empty()).then(|| Column::u8("offpath", self.thinning.marks(&self.off_path))),
         ]
     }

@@ -27,6 +27,7 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
+mod binding;
 mod columns;
 mod differences;
 mod encode;

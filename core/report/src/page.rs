@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use crate::binding;
 use crate::columns::Derived;
 use crate::model::{Report, Unit};
 use crate::sections;
@@ -17,13 +18,14 @@ pub(crate) const MAX_SAMPLES: usize = 2_000_000;
 const TEMPLATE: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/style.css");
 /// In the order in which they build on each other.
-const SCRIPTS: [&str; 12] = [
+const SCRIPTS: [&str; 13] = [
     include_str!("../assets/data.js"),
     include_str!("../assets/format.js"),
     include_str!("../assets/colour.js"),
     include_str!("../assets/state.js"),
     include_str!("../assets/curve.js"),
     include_str!("../assets/plot.js"),
+    include_str!("../assets/band.js"),
     include_str!("../assets/timeline.js"),
     include_str!("../assets/path.js"),
     include_str!("../assets/scene.js"),
@@ -44,7 +46,7 @@ fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> i
         "subtitle" => sections::subtitle(report),
         "verdict" => sections::verdict(report, derived),
         "notes" => sections::notes(report, derived),
-        "facts" => tables::facts(report),
+        "facts" => tables::facts(report, derived),
         "peaks-head" => tables::peaks_head(report),
         "peaks" => tables::peaks(report, derived),
         "findings" => tables::findings(derived),
@@ -64,6 +66,7 @@ struct About<'a> {
     signals: Vec<AboutSignal<'a>>,
     path_tolerance_mm: Option<f64>,
     jerk_is_judged: bool,
+    binding: [&'static str; 5],
 }
 
 #[derive(Serialize)]
@@ -103,6 +106,7 @@ fn about(report: &Report, derived: &Derived) -> io::Result<String> {
         // A line in the plot stands for one tolerance only.
         path_tolerance_mm: report.path_tolerance_mm.filter(|_| report.samples.tolerance_mm.is_none()),
         jerk_is_judged: report.jerk_is_judged,
+        binding: binding::NAMES,
     };
     Ok(serde_json::to_string(&about)?.replace('<', "\\u003c"))
 }

@@ -8,9 +8,10 @@ use crate::model::{Axis, Report};
 use crate::text::{count, escape, number};
 
 /// The summary as rows of a table.
-pub(crate) fn facts(report: &Report) -> String {
+pub(crate) fn facts(report: &Report, derived: &Derived) -> String {
     let row = |(name, value): &(String, String)| format!("<tr><th>{}<td>{}", escape(name), escape(value));
-    report.facts.iter().map(row).collect::<Vec<_>>().concat()
+    let binds = ("what binds, of the time in motion".to_string(), derived.binding.words());
+    report.facts.iter().chain([&binds]).map(row).collect::<Vec<_>>().concat()
 }
 
 /// Per axis the peaks, as rows of a table, with the part of the limit that they use.

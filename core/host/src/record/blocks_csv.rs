@@ -100,7 +100,8 @@ fn is_helix(block: &Block) -> bool {
     (0..block.end.0.len()).any(|axis| !plane.contains(&axis) && block.end[axis] != block.start[axis])
 }
 
-fn limited_by(reason: LimitedBy) -> &'static str {
+/// What held the feed down, as it is written.
+pub(crate) fn limited_by(reason: LimitedBy) -> &'static str {
     match reason {
         LimitedBy::Feed => "feed",
         LimitedBy::Acceleration => "acceleration",

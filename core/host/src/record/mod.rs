@@ -5,5 +5,6 @@ mod output;
 mod trace_csv;
 
 pub use blocks_csv::BlocksCsv;
+pub(crate) use blocks_csv::limited_by;
 pub use output::Output;
 pub use trace_csv::TraceCsv;
