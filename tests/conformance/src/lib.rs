@@ -23,6 +23,7 @@
 
 mod driver;
 mod heap;
+mod joints;
 mod kinematics;
 mod limits;
 mod machine;

@@ -7,7 +7,7 @@ use crate::machine::{FINE_PERIOD_S, context};
 use crate::motion::{Driven, Stuck, Timings, drive};
 use crate::random::Random;
 use crate::report::Report;
-use crate::{Setup, heap, nonsense, program};
+use crate::{Setup, heap, joints, nonsense, program};
 
 /// Blocks of a program.
 const BLOCKS: usize = 100;
@@ -30,6 +30,7 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
             break;
         }
     }
+    joints::judge(plugin, setup, report, &mut timings);
     report.time([timings.check, timings.accept, timings.advance]);
 }
 

@@ -48,6 +48,9 @@ impl Plans {
             let faster = if defect.is("velocity") { 1.01 } else { 1.0 };
             (axis.feed_mm_per_s, axis.rapid_mm_per_s) = (axis.feed_mm_per_s * faster, axis.rapid_mm_per_s * faster);
         }
+        for joint in &mut context.limits.axes[3..] {
+            joint.acceleration_mm_per_s2 *= if defect.is("joints") { 1.01 } else { 1.0 };
+        }
         Ok(Self { inner: tandem_look_ahead::PLUGIN.planner("", &context)?, defect, emitted: 0 })
     }
 }
@@ -210,6 +213,7 @@ fn defects_of_planners_are_found() {
         ("acceleration", "limits"),
         ("velocity", "limits"),
         ("feed", "feed"),
+        ("joints", "limits of joints"),
         ("gap", "segments"),
         ("no stop", "segments"),
         ("end", "end points"),
