@@ -23,11 +23,15 @@ impl FineLoop {
         // While slowing down no more program time passes than at the present rate: what lies beyond does not count.
         let most = if ask == Ask::Run || self.config.order >= 3 { 1.0 } else { self.governor.sigma() };
         self.cursor.scan(most * self.config.period_s, &mut self.points);
-        if self.config.order >= 3 {
-            self.cursor.look_out(self.config.period_s, &mut self.outlook);
-        }
         let ratios = self.ratios_in_force();
         let below = ratios.feed < self.config.max_feed_ratio;
+        if self.config.order >= 3 {
+            if self.runs_as_planned(ask, below, &ratios) {
+                self.recovering = false;
+                return self.covered(self.config.period_s);
+            }
+            self.cursor.look_out(self.config.period_s, &mut self.outlook);
+        }
         let end_mm = if ask == Ask::Run { self.line_end() } else { None };
         let way_speed = if ask == Ask::Run { self.speed_for_places(&ratios, end_mm) } else { 0.0 };
         let delta_s = if self.config.order >= 3 {
@@ -40,6 +44,18 @@ impl FineLoop {
         self.recovering = asked || (self.recovering && sigma < 1.0);
         self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
         self.stop_at_line_end(end_mm);
+        self.covered(delta_s)
+    }
+
+    /// Whether program time passes at its own rate and nothing asks for another: then nothing needs to be foreseen.
+    fn runs_as_planned(&self, ask: Ask, below: bool, ratios: &Ratios) -> bool {
+        let constant = self.governor.sigma() == 1.0 && self.governor.rate_per_s() == 0.0;
+        let unasked = ask == Ask::Run && !below && ratios.rapid >= 1.0 && !self.given.single_block;
+        constant && unasked && self.plan_limit() == 1.0
+    }
+
+    /// As much of `delta_s` as lies within what was looked at.
+    fn covered(&self, delta_s: f64) -> f64 {
         delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
     }
 
