@@ -73,7 +73,7 @@ impl Shape {
         let Ok(curve) = Nurbs::new(&data, axes) else { return Self::none() };
         let (from, to) = curve.range();
         let direction = |u: f64| {
-            let at = curve.along_path(&curve.derivatives(u))?;
+            let at = curve.along_path(u)?;
             linear.unit(&AxisVector::ZERO, &at.direction)
         };
         let place = |i: usize| from + (to - from) * i as f64 / CURVATURE_PLACES as f64;

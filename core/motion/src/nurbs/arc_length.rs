@@ -57,15 +57,17 @@ impl ArcLength {
         self.next_span += 1;
         let (from, to) = (curve.knots()[span], curve.knots()[span + 1]);
         if to > from {
-            self.add(curve, span, (from, to), MAX_HALVINGS);
+            let whole = curve.gauss(span, from, to);
+            self.add(curve, span, (from, to), whole, MAX_HALVINGS);
         }
         true
     }
 
-    fn add(&mut self, curve: &Nurbs, span: usize, (from, to): (f64, f64), halvings: u32) {
+    /// Adds a part of a span, whose length by the rule is `whole`.
+    fn add(&mut self, curve: &Nurbs, span: usize, (from, to): (f64, f64), whole: f64, halvings: u32) {
         let middle = 0.5 * (from + to);
-        let whole = curve.gauss(span, from, to);
-        let halves = curve.gauss(span, from, middle) + curve.gauss(span, middle, to);
+        let [left, right] = [curve.gauss(span, from, middle), curve.gauss(span, middle, to)];
+        let halves = left + right;
         let error_mm = (whole - halves).abs();
         let last = halvings == 0 || middle <= from || middle >= to;
         if last || error_mm <= 1e-13 * halves.max(1e-3) {
@@ -76,8 +78,8 @@ impl ArcLength {
                 return;
             }
         }
-        self.add(curve, span, (from, middle), halvings - 1);
-        self.add(curve, span, (middle, to), halvings - 1);
+        self.add(curve, span, (from, middle), left, halvings - 1);
+        self.add(curve, span, (middle, to), right, halvings - 1);
     }
 
     fn push(&mut self, fit: Fit, error_mm: f64) {
@@ -108,7 +110,7 @@ impl ArcLength {
     #[inline]
     pub fn along_path(&self, curve: &Nurbs, s_mm: f64, place: &mut Place) -> Option<AlongPath> {
         let (u, span) = self.parameter(s_mm, place);
-        curve.along_path(&curve.derivatives_in(span, u))
+        curve.along_path_in(span, u)
     }
 
     /// Position at `s_mm`. Does not allocate.

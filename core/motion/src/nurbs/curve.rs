@@ -1,8 +1,9 @@
 //! The curve and what must hold of its data.
 
-use tandem_sdk::{Axes, AxisVector, NurbsData};
+use tandem_sdk::{Axes, AxisVector, MAX_AXES, NurbsData};
 
 use super::NurbsError;
+use super::levels::{Lanes, Levels, Wide};
 
 /// Highest degree.
 pub const MAX_DEGREE: usize = 5;
@@ -10,13 +11,6 @@ pub const MAX_DEGREE: usize = 5;
 pub const MAX_WEIGHT_RATIO: f64 = 1e6;
 /// Knots closer than this share of the parameter range are an accident of rounding.
 const CLOSE: f64 = 1e-10;
-
-/// Control points of the homogeneous curve or of one of its derivatives: weighted coordinates and weights.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Level {
-    pub weighted: Vec<AxisVector>,
-    pub weights: Vec<f64>,
-}
 
 /// A NURBS curve of degree 1 to 5 over up to 8 axes, its data checked and owned.
 ///
@@ -26,8 +20,7 @@ pub(super) struct Level {
 pub struct Nurbs {
     pub(super) degree: usize,
     pub(super) knots: Vec<f64>,
-    /// The homogeneous curve and its first three derivatives (A3.3).
-    pub(super) levels: [Level; 4],
+    pub(super) levels: Levels,
     /// All weights are equal: the curve is a polynomial on each span.
     pub(super) plain: bool,
     /// 1 for the axes whose motion path speed counts, else 0.
@@ -41,15 +34,11 @@ impl Nurbs {
     /// # Errors
     /// What is wrong with degree, control points, weights or knots; a curve of no extent.
     pub fn new(data: &NurbsData, axes: &Axes) -> Result<Self, NurbsError> {
-        let points = data.control_points.len();
         check_points(data)?;
         check_knots(data)?;
-        let weighted = data.control_points.iter().zip(&data.weights).map(|(point, weight)| *point * *weight).collect();
-        let mut levels =
-            [Level { weighted, weights: data.weights.clone() }, Level::default(), Level::default(), Level::default()];
-        for order in 1..=data.degree.min(3) {
-            levels[order] = derived(&levels[order - 1], &data.knots, data.degree, order, points);
-        }
+        let homogeneous =
+            data.control_points.iter().zip(&data.weights).map(|(point, weight)| homogeneous(point, *weight));
+        let levels = Levels::new(homogeneous.collect(), &data.knots, data.degree);
         let plain = data.weights.iter().all(|weight| *weight == data.weights[0]);
         let counted = counted(data, axes)?;
         Ok(Self { degree: data.degree, knots: data.knots.clone(), levels, plain, counted })
@@ -67,13 +56,13 @@ impl Nurbs {
 
     /// Number of control points.
     pub fn points(&self) -> usize {
-        self.levels[0].weights.len()
+        self.levels.count()
     }
 
     /// Control point and weight `index`.
     pub fn control_point(&self, index: usize) -> (AxisVector, f64) {
-        let weight = self.levels[0].weights[index];
-        (self.levels[0].weighted[index] * (1.0 / weight), weight)
+        let point = self.levels.point(index);
+        (point.axes() * (1.0 / point[Wide::WEIGHT]), point[Wide::WEIGHT])
     }
 
     /// First and last parameter.
@@ -101,22 +90,18 @@ impl Nurbs {
         NurbsData {
             degree: self.degree,
             control_points: (0..self.points()).map(|index| self.control_point(index).0).collect(),
-            weights: self.levels[0].weights.clone(),
+            weights: (0..self.points()).map(|index| self.control_point(index).1).collect(),
             knots: self.knots.clone(),
         }
     }
 }
 
-/// Control points of derivative `order` of the homogeneous curve (A3.3). Where knots coincide they have no span to act on.
-pub(super) fn derived(before: &Level, knots: &[f64], degree: usize, order: usize, points: usize) -> Level {
-    let mut level = Level::default();
-    for index in 0..points - order {
-        let width = knots[index + degree + 1] - knots[index + order];
-        let factor = if width > 0.0 { (degree + 1 - order) as f64 / width } else { 0.0 };
-        level.weighted.push((before.weighted[index + 1] - before.weighted[index]) * factor);
-        level.weights.push((before.weights[index + 1] - before.weights[index]) * factor);
+fn homogeneous(point: &AxisVector, weight: f64) -> Wide {
+    let mut homogeneous = [weight; MAX_AXES + 1];
+    for (to, from) in homogeneous.iter_mut().zip(point.0) {
+        *to = from * weight;
     }
-    level
+    homogeneous
 }
 
 fn check_points(data: &NurbsData) -> Result<(), NurbsError> {

@@ -33,31 +33,6 @@ pub struct AlongPath {
 }
 
 impl Nurbs {
-    /// Derivatives by arc length from those by the parameter; `None` where the curve stands still in its parameter.
-    ///
-    /// `u_s = 1/σ`, `u_ss = −(C′·C″)/σ⁴`, `u_sss = u_s·(−(C″·C″ + C′·C‴)/σ⁴ + 4(C′·C″)²/σ⁶)` with σ = |C′|, and the chain
-    /// rule. Does not allocate.
-    #[inline]
-    pub fn along_path(&self, at: &Derivatives) -> Option<AlongPath> {
-        let squared = self.counted_product(&at.first, &at.first);
-        let u_s = 1.0 / squared.sqrt();
-        if !u_s.is_finite() {
-            return None;
-        }
-        let inverse = 1.0 / squared;
-        let mixed = self.counted_product(&at.first, &at.second);
-        let rate = self.counted_product(&at.second, &at.second) + self.counted_product(&at.first, &at.third);
-        let u_ss = -mixed * inverse * inverse;
-        let u_sss = u_s * inverse * inverse * (4.0 * mixed * mixed * inverse - rate);
-        Some(AlongPath {
-            position: at.position,
-            direction: at.first * u_s,
-            curvature: at.second * (u_s * u_s) + at.first * u_ss,
-            third: at.third * (u_s * u_s * u_s) + at.second * (3.0 * u_s * u_ss) + at.first * u_sss,
-            parameter: [u_s, u_ss, u_sss],
-        })
-    }
-
     /// Curvature at a point with these derivatives, 1/mm: `|C′ × C″|/|C′|³` by the part of C″ across C′, in any number of
     /// axes. `None` where the curve stands still in its parameter.
     #[inline]

@@ -1,6 +1,6 @@
 //! The parameter as a polynomial of the arc length, over a part of a span.
 
-use super::{Derivatives, Nurbs};
+use super::Nurbs;
 
 /// u(s) on `start_mm ≤ s ≤ start_mm + length_mm` as a polynomial of degree 7 in x = (s − start)/length.
 #[derive(Clone, Copy, Debug)]
@@ -28,11 +28,10 @@ impl Fit {
     pub fn new(curve: &Nurbs, span: usize, (from, to): (f64, f64), start_mm: f64, length_mm: f64) -> Option<Self> {
         let mut fit = Self { start_mm, length_mm, from, to, span, coefficients: [0.0; 8] };
         fit.coefficients[1] = to - from;
-        let ends = [curve.derivatives_in(span, from), curve.derivatives_in(span, to)];
         if length_mm <= SHORTEST_MM {
             return Some(fit);
         }
-        fit.coefficients = hermite(curve, &ends, to - from, length_mm)?;
+        fit.coefficients = hermite(curve, span, (from, to), length_mm)?;
         fit.holds(curve).then_some(fit)
     }
 
@@ -56,7 +55,7 @@ impl Fit {
         let most = RATE.min(4.0 * OFF_MM / self.length_mm);
         CHECKED.iter().all(|x| {
             let u = self.parameter(self.start_mm + x * self.length_mm);
-            let speed = curve.counted_length(&curve.derivatives_in(self.span, u).first);
+            let speed = curve.speed_in(self.span, u);
             (speed * self.rate(*x) / self.length_mm - 1.0).abs() <= most
         })
     }
@@ -68,8 +67,9 @@ impl Fit {
 }
 
 /// Coefficients of the polynomial that meets u and its three derivatives by s at both ends, without its constant term.
-fn hermite(curve: &Nurbs, ends: &[Derivatives; 2], width: f64, length: f64) -> Option<[f64; 8]> {
-    let [a, b] = [curve.along_path(&ends[0])?.parameter, curve.along_path(&ends[1])?.parameter];
+fn hermite(curve: &Nurbs, span: usize, (from, to): (f64, f64), length: f64) -> Option<[f64; 8]> {
+    let [a, b] = [curve.along_path_in(span, from)?.parameter, curve.along_path_in(span, to)?.parameter];
+    let width = to - from;
     let (l2, l3) = (length * length, length * length * length);
     let c = [a[0] * length, a[1] * l2 / 2.0, a[2] * l3 / 6.0];
     let r0 = width - (c[0] + c[1] + c[2]);

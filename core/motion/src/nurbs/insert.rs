@@ -1,6 +1,6 @@
 //! Knot insertion.
 
-use super::curve::Level;
+use super::levels::{Levels, mix};
 use super::{Nurbs, NurbsError};
 
 impl Nurbs {
@@ -15,16 +15,16 @@ impl Nurbs {
             return Err(NurbsError::Insert(u));
         }
         let span = self.span(u);
-        let level = &self.levels[0];
-        let mut next = Level::default();
-        for index in 0..=self.points() {
-            let share = self.share(span - count, index, u);
-            next.weighted.push(mix(&level.weighted, index, share, |a, b| a * (1.0 - share) + b * share));
-            next.weights.push(mix(&level.weights, index, share, |a, b| a * (1.0 - share) + b * share));
-        }
+        // At either end of the list only one of the two sources of a point exists.
+        let point = |index: usize| match self.share(span - count, index, u) {
+            1.0 => self.levels.point(index),
+            0.0 => self.levels.point(index - 1),
+            share => mix(1.0 - share, &self.levels.point(index - 1), share, &self.levels.point(index)),
+        };
         let mut knots = self.knots.clone();
         knots.insert(span + 1, u);
-        Ok(self.rebuilt(next, knots))
+        let levels = Levels::new((0..=self.points()).map(point).collect(), &knots, self.degree);
+        Ok(Self { degree: self.degree, knots, levels, plain: self.plain, counted: self.counted })
     }
 
     /// How much of the control point of the same index goes into the new one; the rest is of the one before.
@@ -36,28 +36,5 @@ impl Nurbs {
         } else {
             (u - self.knots[index]) / (self.knots[index + self.degree] - self.knots[index])
         }
-    }
-}
-
-/// The new control point `index`: at either end of the list only one of its two sources exists.
-fn mix<T: Copy>(of: &[T], index: usize, share: f64, both: impl Fn(T, T) -> T) -> T {
-    if share == 1.0 {
-        of[index]
-    } else if share == 0.0 {
-        of[index - 1]
-    } else {
-        both(of[index - 1], of[index])
-    }
-}
-
-impl Nurbs {
-    fn rebuilt(&self, level: Level, knots: Vec<f64>) -> Self {
-        let points = level.weights.len();
-        let mut levels = [level, Level::default(), Level::default(), Level::default()];
-        for order in 1..=self.degree.min(3) {
-            levels[order] = super::curve::derived(&levels[order - 1], &knots, self.degree, order, points);
-        }
-        let plain = self.plain;
-        Self { degree: self.degree, knots, levels, plain, counted: self.counted }
     }
 }

@@ -74,7 +74,7 @@ impl Nurbs {
     #[inline]
     pub(super) fn gauss(&self, span: usize, from: f64, to: f64) -> f64 {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let speed = |u: f64| self.counted_length(&self.derivatives_in(span, u).first);
+        let speed = |u: f64| self.speed_in(span, u);
         let sum: f64 = RULE.iter().map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x))).sum();
         sum * half
     }

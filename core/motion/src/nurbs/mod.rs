@@ -11,6 +11,7 @@ mod evaluate;
 mod fit;
 mod insert;
 mod length;
+mod levels;
 mod nearest;
 mod pieces;
 

@@ -26,7 +26,7 @@ mod solve;
 mod timing;
 
 pub use banded::Pentadiagonal;
-pub use solve::{Retimer, Status};
+pub use solve::{Retimer, Status, Task};
 pub use timing::{Rate, weights};
 
 /// Axes that a retiming takes.
@@ -49,13 +49,27 @@ pub struct Point {
     /// Share of the jerk limits that may be used here, beside that of the whole motion: less where the motion between the
     /// places takes more jerk than at them.
     pub jerk_share: f64,
+    /// Share of the acceleration limits that may be used here.
+    pub acceleration_share: f64,
 }
 
 impl Default for Point {
     fn default() -> Self {
         let zero = [0.0; MAX_LANES];
-        Self { first: zero, second: zero, third: zero, most: f64::INFINITY, jerk_share: 1.0 }
+        Self { first: zero, second: zero, third: zero, most: f64::INFINITY, jerk_share: 1.0, acceleration_share: 1.0 }
     }
+}
+
+/// Further places of an interval at which limits are asked for: where a derivative of the motion jumps both sides of that,
+/// where it turns much more places between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Between {
+    /// The interval.
+    pub interval: usize,
+    /// Where in it, 0 to 1.
+    pub z: [f64; PLACES],
+    /// The motion there.
+    pub points: [Point; PLACES],
 }
 
 /// What each axis may do.

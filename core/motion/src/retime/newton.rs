@@ -1,6 +1,6 @@
 //! One interval's share of the Newton system.
 
-use super::rows::{Form, Pair, Single, dot};
+use super::rows::{Form, LEAST, Pair, Single, dot};
 
 /// Hessian (upper triangle by rows) and gradient over the three coefficients, and the largest violation seen.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,6 +42,15 @@ impl Share {
         }
     }
 
+    /// The time that an interval takes, `b^(−1/2)` with `b = w·β`.
+    #[inline]
+    pub fn time(&mut self, w: &Form, beta: &Form) {
+        let b = dot(w, beta).max(LEAST);
+        let slope = -0.5 / (b * b.sqrt());
+        self.square(w, -1.5 * slope / b);
+        self.slope(w, slope);
+    }
+
     /// Rows `weight·w·β ± form·β ≤ right` of some lanes at one place, where `common` is `weight·w·β`.
     #[inline]
     pub fn pairs(&mut self, forms: &[Form], pairs: &mut [Pair], place: &Place, target: f64) {
@@ -50,8 +59,16 @@ impl Share {
         for (form, pair) in forms.iter().zip(pairs) {
             let value = dot(form, &place.beta);
             let (left, right) = (place.common + value, place.common - value);
-            let (d0, g0) = row(&mut pair.residual[0], pair.slack[0], pair.multiplier[0], left - place.right, target);
-            let (d1, g1) = row(&mut pair.residual[1], pair.slack[1], pair.multiplier[1], right - place.right, target);
+            let over = [left - place.right, right - place.right];
+            let mut rows = [[0.0; 2]; 2];
+            for n in 0..2 {
+                let per_slack = 1.0 / pair.slack[n];
+                let residual = over[n] + pair.slack[n];
+                rows[0][n] = pair.multiplier[n] * per_slack;
+                rows[1][n] = (target + pair.multiplier[n] * residual) * per_slack;
+                (pair.change[n], pair.answer[n]) = (residual, per_slack);
+            }
+            let [[d0, d1], [g0, g1]] = rows;
             let over = (place.common + value.abs() - place.right) / place.right;
             self.violation = if over > self.violation { over } else { self.violation };
             self.square(form, d0 + d1);
@@ -72,10 +89,12 @@ impl Share {
     /// The row `sign·w·β ≤ right`.
     #[inline]
     pub fn single(&mut self, w: &Form, sign: f64, over: f64, single: &mut Single, target: f64) {
-        let (d, g) = row(&mut single.residual, single.slack, single.multiplier, over, target);
+        let per_slack = 1.0 / single.slack;
+        let residual = over + single.slack;
+        (single.change, single.answer) = (residual, per_slack);
         self.violation = if over > self.violation { over } else { self.violation };
-        self.square(w, d);
-        self.slope(w, sign * g);
+        self.square(w, single.multiplier * per_slack);
+        self.slope(w, sign * (target + single.multiplier * residual) * per_slack);
     }
 }
 
@@ -94,10 +113,45 @@ pub struct Place {
     pub right: f64,
 }
 
-/// Weight in the Hessian and in the gradient of a row that is `over` its right side.
-#[inline]
-fn row(residual: &mut f64, slack: f64, multiplier: f64, over: f64, target: f64) -> (f64, f64) {
-    let per_slack = 1.0 / slack;
-    *residual = over + slack;
-    (multiplier * per_slack, (target + multiplier * *residual) * per_slack)
+/// How near to its bound a step may go.
+const BOUNDARY: f64 = 0.95;
+
+/// How far slacks and multipliers may go: the largest shares of them that a whole step would take, for both rows of pairs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reach {
+    slack: [f64; 2],
+    multiplier: [f64; 2],
+}
+
+impl Reach {
+    /// The changes of both rows of a pair, whose sides change by `common ± change`.
+    #[inline]
+    pub fn pair(&mut self, pair: &mut Pair, common: f64, change: f64, target: f64) {
+        for (n, side) in [common + change, common - change].into_iter().enumerate() {
+            let per_slack = pair.answer[n];
+            let change = -pair.change[n] - side;
+            let answer = (target - pair.multiplier[n] * (pair.slack[n] + change)) * per_slack;
+            (pair.change[n], pair.answer[n]) = (change, answer);
+            let shares = [-change * per_slack, -answer / pair.multiplier[n]];
+            self.slack[n] = if shares[0] > self.slack[n] { shares[0] } else { self.slack[n] };
+            self.multiplier[n] = if shares[1] > self.multiplier[n] { shares[1] } else { self.multiplier[n] };
+        }
+    }
+
+    /// The changes of a row whose side changes by `change`.
+    #[inline]
+    pub fn single(&mut self, single: &mut Single, change: f64, target: f64) {
+        let per_slack = single.answer;
+        let change = -single.change - change;
+        let answer = (target - single.multiplier * (single.slack + change)) * per_slack;
+        (single.change, single.answer) = (change, answer);
+        let shares = [-change * per_slack, -answer / single.multiplier];
+        self.slack[0] = if shares[0] > self.slack[0] { shares[0] } else { self.slack[0] };
+        self.multiplier[0] = if shares[1] > self.multiplier[0] { shares[1] } else { self.multiplier[0] };
+    }
+
+    /// Lengths of the step for slacks and for multipliers, 1 at most.
+    pub fn lengths(&self) -> [f64; 2] {
+        [self.slack, self.multiplier].map(|[a, b]| (BOUNDARY / a.max(b)).min(1.0))
+    }
 }

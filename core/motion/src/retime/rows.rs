@@ -1,7 +1,9 @@
 //! The limits as rows `c·β ≤ right` over three neighbouring coefficients, and what the interior point method keeps of them.
 
+use super::newton::Place;
+use super::solve::Task;
 use super::timing::weights;
-use super::{LaneLimits, PLACES, Point};
+use super::{PLACES, Point};
 
 /// Share of an acceleration limit that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
@@ -13,47 +15,66 @@ const MOST: f64 = 256.0;
 /// A linear form of an interval's three coefficients.
 pub type Form = [f64; 3];
 
-/// Two rows, `|form·β| ≤ right`: slack and multiplier of each, and its residual in the last pass.
+/// Two rows, `|form·β| ≤ right`: slack and multiplier of each. A pass leaves residual and 1/slack in `change` and `answer`,
+/// and turns them into the changes of slack and multiplier.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pair {
     pub slack: [f64; 2],
     pub multiplier: [f64; 2],
-    pub residual: [f64; 2],
+    pub change: [f64; 2],
+    pub answer: [f64; 2],
 }
 
-/// One row.
+/// One row, the same way.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Single {
     pub slack: f64,
     pub multiplier: f64,
-    pub residual: f64,
+    pub change: f64,
+    pub answer: f64,
 }
 
-/// Weights of b at the places.
-pub fn value_weights() -> [Form; PLACES] {
-    [0.0, 0.5, 1.0].map(|z| weights(z)[0])
-}
-
-/// Bounds on b of an interval: at its places, and from below in its middle.
+/// Places on an interval: weights of b there and bounds on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub struct Site {
+    pub interval: usize,
+    pub values: [Form; PLACES],
     pub most: [f64; PLACES],
+    z: [f64; PLACES],
 }
 
-impl Bounds {
-    pub fn new(points: &[Point; PLACES]) -> Self {
-        Self { most: points.map(|p| p.most.min(MOST)) }
+impl Site {
+    pub fn new(interval: usize, z: [f64; PLACES], points: &[Point; PLACES]) -> Self {
+        Self { interval, values: z.map(|z| weights(z)[0]), most: points.map(|p| p.most.min(MOST)), z }
+    }
+
+    /// The coefficients that count here.
+    #[inline]
+    pub fn beta(&self, coefficients: &[f64]) -> Form {
+        let c = &coefficients[self.interval..self.interval + 3];
+        [c[0], c[1], c[2]]
+    }
+
+    /// The places as a pass sees them.
+    #[inline]
+    pub fn places(&self, beta: &Form) -> [Place; PLACES] {
+        self.values.map(|w| {
+            let b = dot(&w, beta);
+            let (right, weight) = tangent(b);
+            Place { beta: *beta, w, weight, common: weight * b, right }
+        })
     }
 }
 
-/// Adds the forms of an interval in shares of their limits: jerk at each place per lane, then acceleration at its start and
-/// middle per lane.
-pub fn push_forms(forms: &mut Vec<Form>, points: &[Point; PLACES], limits: &LaneLimits, jerk_share: f64, step_s: f64) {
+/// Adds the forms of a site in shares of their limits: jerk at each place per lane, then acceleration at its first two
+/// places per lane.
+pub fn push_forms(forms: &mut Vec<Form>, site: &Site, points: &[Point; PLACES], task: &Task) {
+    let (limits, step_s) = (&task.limits, task.step_s);
     let scales = [1.0, 1.0 / step_s, 1.0 / (step_s * step_s)];
-    let places: [[Form; 3]; PLACES] = [0.0, 0.5, 1.0].map(weights);
+    let places: [[Form; 3]; PLACES] = site.z.map(weights);
     for (point, [value, slope, curve]) in points.iter().zip(&places) {
         for lane in 0..limits.lanes {
-            let per = 1.0 / (jerk_share * point.jerk_share * limits.jerk[lane]);
+            let per = 1.0 / (task.jerk_share * point.jerk_share * limits.jerk[lane]);
             let (x1, x2, x3) = (point.first[lane], point.second[lane], point.third[lane]);
             forms.push(std::array::from_fn(|n| {
                 per * (x3 * value[n] + 1.5 * x2 * slope[n] * scales[1] + 0.5 * x1 * curve[n] * scales[2])
@@ -62,7 +83,7 @@ pub fn push_forms(forms: &mut Vec<Form>, points: &[Point; PLACES], limits: &Lane
     }
     for (point, [value, slope, _]) in points.iter().zip(&places).take(2) {
         for lane in 0..limits.lanes {
-            let per = 1.0 / (ACCELERATION_SHARE * limits.acceleration[lane]);
+            let per = 1.0 / (ACCELERATION_SHARE * point.acceleration_share * limits.acceleration[lane]);
             let (x1, x2) = (point.first[lane], point.second[lane]);
             forms.push(std::array::from_fn(|n| per * (x2 * value[n] + 0.5 * x1 * slope[n] * scales[1])));
         }

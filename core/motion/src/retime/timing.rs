@@ -48,9 +48,11 @@ impl Rate {
 
     /// The place in interval `k` that is reached `time_s` after its start, 0 to 1. Does not allocate.
     pub fn place(&self, k: usize, time_s: f64, step_s: f64) -> f64 {
-        let mut z = time_s * self.at(k, 0.0, step_s)[0].sqrt() / step_s;
-        // The integral is smooth and monotone: three Newton steps leave rounding.
-        for _ in 0..3 {
+        let [b, slope, _] = self.at(k, 0.0, step_s);
+        let x = time_s * b.sqrt() / step_s;
+        // From the rate and its slope at the start: two Newton steps leave rounding.
+        let mut z = (x + slope * step_s / (4.0 * b) * x * x).clamp(0.0, 1.0);
+        for _ in 0..2 {
             let rate = self.at(k, z, step_s)[0].sqrt();
             z -= (self.time_s(k, z, step_s) - time_s) * rate / step_s;
         }

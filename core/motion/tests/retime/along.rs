@@ -1,6 +1,6 @@
 //! A motion along a path: the coordinate as a cubic B-spline of pseudo-time, retimed in rounds.
 
-use tandem_motion::retime::{End, LaneLimits, PLACES, Point, Retimer, Status};
+use tandem_motion::retime::{End, LaneLimits, PLACES, Point, Retimer, Status, Task};
 
 /// A path by its length: first to third derivative in two axes.
 pub struct Along {
@@ -36,7 +36,9 @@ pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -
         let spline = coefficients(&timing, h, count, along.length);
         let points: Vec<[Point; PLACES]> =
             (0..count).map(|k| [0.0, 0.5, 1.0].map(|z| point(along, value(&spline, k, z, h)))).collect();
-        let status = retimer.solve(&points, limits, 0.99, h, (End::Rest, End::Rest));
+        let ends = (End::Rest, End::Rest);
+        let status =
+            retimer.solve(&Task { points: &points, between: &[], limits: *limits, jerk_share: 0.99, step_s: h, ends });
         timing = vec![(0.0, 0.0)];
         let mut t = 0.0;
         for k in 0..count {

@@ -1,8 +1,9 @@
 //! The first timing of a window: ramps between corners, as the form `windowed` drives them.
 
+use super::motion::Driven;
 use super::timing::Timing;
 use crate::stream::relief::Reliefs;
-use crate::stream::{Bounds, Cursor, Route, State};
+use crate::stream::{Bounds, Cursor, Job, Route, State, window_s};
 use crate::windowed::{Care, Corner, Limit, Ramp, Rounds, Spot, Survey, Tangential};
 
 /// Multiples of acceleration and jerk that ramps take where the speed at the start is too high for less: in motion the
@@ -21,18 +22,18 @@ pub struct First {
     ramps: Vec<Ramp>,
     /// Where the speed at the start is too high for ramps.
     steps: Timing,
+    /// Time for which it follows the window before, s.
+    lead_s: f64,
 }
 
 impl First {
-    /// From `start` to rest at `end_mm`, or `window_s` later. Gives whether it goes to the end.
-    pub fn make(
-        &mut self,
-        route: &Route,
-        bounds: &Bounds,
-        reliefs: &Reliefs,
-        start: &State,
-        (end_mm, window_s): (f64, f64),
-    ) -> bool {
+    /// To rest at the end of the run or of the window. In motion it follows the window that is driven for the lead. Gives
+    /// whether it goes to the end.
+    pub fn make(&mut self, job: &Job<Driven>, reliefs: &Reliefs) -> bool {
+        let Job { route, bounds, start, end_mm, before } = *job;
+        self.lead_s = before.map_or(0.0, |(window, now_s)| window.motion.lead_s(&window.times, now_s));
+        let start = &before.map_or(start.state, |(window, now_s)| window.at(now_s + self.lead_s));
+        let window_s = window_s(bounds, start.speed_mm_per_s);
         let mut cursor = Cursor::default();
         let mut look = |at_mm: f64| spot(route, bounds, reliefs, at_mm, &mut cursor);
         let begin = Corner { at_mm: start.s_mm, speed_mm_per_s: start.speed_mm_per_s };
@@ -59,18 +60,22 @@ impl First {
     /// Its duration, s, and where it ends, mm.
     pub fn end(&self) -> (f64, f64) {
         if let Some((time_s, end_mm)) = self.steps.steps.last() {
-            return (*time_s, *end_mm);
+            return (self.lead_s + *time_s, *end_mm);
         }
         let end_mm = self.ramps.last().map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0]);
-        (self.ramps.iter().map(|ramp| ramp.duration_s).sum(), end_mm)
+        (self.lead_s + self.ramps.iter().map(|ramp| ramp.duration_s).sum::<f64>(), end_mm)
     }
 
     /// Path coordinate and acceleration over time, asked for in order.
-    pub fn motion(&self) -> impl FnMut(f64) -> [f64; 2] {
-        let (mut at, mut start_s) = (0, 0.0);
+    pub fn motion(&self, job: &Job<Driven>) -> impl FnMut(f64) -> [f64; 2] {
+        let (mut at, mut start_s) = (0, self.lead_s);
         move |t_s| {
+            if let Some((window, now_s)) = job.before.filter(|_| t_s < self.lead_s) {
+                let state = window.at((now_s + t_s).max(0.0));
+                return [state.s_mm, state.acceleration_mm_per_s2];
+            }
             if !self.steps.steps.is_empty() {
-                return [self.steps.at(t_s, &mut at), 0.0];
+                return [self.steps.at(t_s - self.lead_s, &mut at), 0.0];
             }
             while at + 1 < self.ramps.len() && start_s + self.ramps[at].duration_s < t_s {
                 start_s += self.ramps[at].duration_s;

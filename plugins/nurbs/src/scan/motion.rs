@@ -7,7 +7,10 @@ use crate::stream::{Motion, State};
 use crate::windowed::Ramps;
 
 /// Where the next window is planned: from this share of the latest time on.
-const EARLIEST: f64 = 0.55;
+const EARLIEST: f64 = 0.8;
+/// The next window begins so long before that, s, and follows this one as long: there its limits are kept, and in that time
+/// it builds up what another motion needs.
+const LEAD_S: f64 = 0.02;
 /// Where none was found: so much later at least, s, and up to this share of the window.
 const LATER_S: f64 = 0.02;
 const LAST: f64 = 0.93;
@@ -68,6 +71,14 @@ impl Rated {
     }
 }
 
+impl Driven {
+    /// How long a window that begins at `now_s` follows this one, s.
+    pub fn lead_s(&self, times: &[f64], now_s: f64) -> f64 {
+        let calm_s = if self.by_ramps { None } else { self.rated.calmest_s(times, (now_s, now_s + 1.1 * LEAD_S)) };
+        calm_s.map_or(0.0, |calm_s| calm_s - now_s)
+    }
+}
+
 impl Motion for Driven {
     fn at(&self, k: usize, t_s: f64) -> State {
         if self.by_ramps { self.ramps.at(k, t_s) } else { self.rated.at(k, t_s) }
@@ -81,7 +92,8 @@ impl Motion for Driven {
         if self.by_ramps {
             self.ramps.commit_s(times, latest_s)
         } else {
-            self.rated.calmest_s(times, (EARLIEST * latest_s, latest_s)).unwrap_or(latest_s)
+            let calm_s = self.rated.calmest_s(times, (EARLIEST * latest_s, latest_s)).unwrap_or(latest_s);
+            calm_s - LEAD_S.min(calm_s / 2.0)
         }
     }
 
@@ -90,7 +102,8 @@ impl Motion for Driven {
             self.ramps.later_s(times, now_s)
         } else {
             let whole_s = times[times.len() - 1];
-            self.rated.calmest_s(times, (now_s + LATER_S, LAST * whole_s)).unwrap_or(whole_s)
+            let from_s = now_s + LATER_S + LEAD_S;
+            self.rated.calmest_s(times, (from_s, LAST * whole_s)).map_or(whole_s, |calm_s| calm_s - LEAD_S)
         }
     }
 }

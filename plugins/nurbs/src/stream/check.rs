@@ -4,7 +4,7 @@ use tandem_motion::nurbs::AlongPath;
 use tandem_sdk::{AxisVector, BlockKind};
 
 use super::relief::{Relief, Reliefs};
-use super::{Bounds, Cursor, Leg, Motion, Route, Start, State, Window};
+use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
 
 /// Share of a limit that a sampled difference may reach.
 const AIM: f64 = 0.9995;
@@ -53,13 +53,8 @@ impl Worst {
 
 /// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
 /// `reliefs` get what would keep it.
-pub fn check<M: Motion>(
-    route: &Route,
-    bounds: &Bounds,
-    start: &Start,
-    window: &mut Window<M>,
-    reliefs: &mut Reliefs,
-) -> Worst {
+pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut Reliefs) -> Worst {
+    let Job { route, bounds, start, .. } = job;
     window.samples.clear();
     window.samples.extend(start.history);
     window.first_tick_s = start.first_tick_s;

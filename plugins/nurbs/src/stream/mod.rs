@@ -55,19 +55,31 @@ pub trait Motion: Debug + Default {
     fn later_s(&self, times: &[f64], now_s: f64) -> f64;
 }
 
+/// A window to be planned.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a, M> {
+    pub route: &'a Route,
+    pub bounds: &'a Bounds,
+    pub start: Start,
+    /// Where the run ends, as far as it is known, mm.
+    pub end_mm: f64,
+    /// In motion the window that is driven, and the time in it at which this one begins, s.
+    pub before: Option<(&'a Window<M>, f64)>,
+}
+
+impl<M> Job<'_, M> {
+    /// Whether it begins at rest.
+    pub fn rests(&self) -> bool {
+        self.start.state.speed_mm_per_s == 0.0
+    }
+}
+
 /// A form: how windows are planned. Keeps its memory.
 pub trait Planning: Debug + Default {
     /// What it plans.
     type Motion: Motion;
-    /// Plans from `start` towards `end_mm` into `window`, checked; false where no try keeps the limits.
-    fn plan(
-        &mut self,
-        route: &Route,
-        bounds: &Bounds,
-        start: &Start,
-        end_mm: f64,
-        window: &mut Window<Self::Motion>,
-    ) -> bool;
+    /// Plans `job` into `window`, checked; false where no try keeps the limits.
+    fn plan(&mut self, job: &Job<Self::Motion>, window: &mut Window<Self::Motion>) -> bool;
 }
 
 /// Time of a window, s: three stops from `speed_mm_per_s`.

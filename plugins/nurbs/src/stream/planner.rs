@@ -7,7 +7,7 @@ use tandem_sdk::{
 
 use super::draw::{Drawn, draw};
 use super::route::Item;
-use super::{Bounds, Cursor, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
+use super::{Bounds, Cursor, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
 
@@ -122,7 +122,8 @@ impl<P: Planning> Streamer<P> {
                 let first_tick_s = self.bounds.context.fine_period_s;
                 let start = Start { state, history: [self.position; 3], first_tick_s };
                 let (end_mm, closed) = self.route.run_end(self.finished);
-                if !self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.window) {
+                let job = Job { route: &self.route, bounds: &self.bounds, start, end_mm, before: None };
+                if !self.planning.plan(&job, &mut self.window) {
                     return Err(self.no_way());
                 }
                 self.driving = Some((0.0, self.commit_s(closed)));
@@ -150,7 +151,9 @@ impl<P: Planning> Streamer<P> {
         let first_tick_s = window.first_tick_s + count as f64 * period_s - now_s;
         let start = Start { state: window.at(now_s), history, first_tick_s };
         let (end_mm, closed) = self.route.run_end(self.finished);
-        if self.planning.plan(&self.route, &self.bounds, &start, end_mm, &mut self.next) {
+        let before = Some((&self.window, now_s));
+        let job = Job { route: &self.route, bounds: &self.bounds, start, end_mm, before };
+        if self.planning.plan(&job, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driving = Some((0.0, self.commit_s(closed)));
         } else {

@@ -21,11 +21,6 @@ impl Reliefs {
         self.0.len()
     }
 
-    /// Number of parts that lower the speed.
-    pub fn slowed(&self) -> usize {
-        self.0.iter().filter(|part| part.speed < 1.0).count()
-    }
-
     /// Forgets all but the first `count`.
     pub fn keep_first(&mut self, count: usize) {
         self.0.truncate(count);

@@ -5,8 +5,8 @@ use super::ripple::Corner;
 
 /// Places of a survey at most: what lies beyond belongs to the next window.
 const MAX_PLACES: usize = 40_000;
-/// Steps of a golden section: 1e-6 of the places around.
-const SECTIONS: usize = 30;
+/// Steps of a golden section for corners as published: 1e-6 of the places around.
+pub const SECTIONS: usize = 30;
 
 /// What holds at a place of the path.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +29,8 @@ pub struct Survey {
     pub feed_mm_per_s: f64,
     /// Least of what the axes leave anywhere.
     pub tangential: Option<Tangential>,
+    /// Steps in which a corner is sought between places.
+    pub sections: usize,
 }
 
 impl Survey {
@@ -80,7 +82,7 @@ impl Survey {
             let after = self.places.get(i + level).map_or(0.0, |c| c.speed_mm_per_s);
             if speed < self.feed_mm_per_s && self.places[i - 1].speed_mm_per_s > speed && after > speed {
                 let between = (self.places[i - 1].at_mm, self.places[i + level].at_mm);
-                self.corners.push(lowest(between, &mut |at_mm| look(at_mm).speed_mm_per_s));
+                self.corners.push(lowest(between, self.sections, &mut |at_mm| look(at_mm).speed_mm_per_s));
             }
             i += level;
         }
@@ -88,11 +90,11 @@ impl Survey {
 }
 
 /// The lowest place between two others, by golden section.
-fn lowest((mut from, mut to): (f64, f64), speed: &mut dyn FnMut(f64) -> f64) -> Corner {
+fn lowest((mut from, mut to): (f64, f64), sections: usize, speed: &mut dyn FnMut(f64) -> f64) -> Corner {
     let share = 0.5 * (5.0f64.sqrt() - 1.0);
     let mut inner = [to - share * (to - from), from + share * (to - from)];
     let mut speeds = inner.map(&mut *speed);
-    for _ in 0..SECTIONS {
+    for _ in 0..sections {
         if speeds[0] <= speeds[1] {
             to = inner[1];
             (inner[1], speeds[1]) = (inner[0], speeds[0]);

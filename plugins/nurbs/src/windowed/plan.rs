@@ -1,6 +1,6 @@
 //! Planning one window.
 
-use super::corners::{Limit, Spot, Survey};
+use super::corners::{Limit, SECTIONS, Spot, Survey};
 use super::motion::Ramps;
 use super::points::ease;
 use super::ramp::Tangential;
@@ -8,7 +8,7 @@ use super::ramps::{Care, Rounds};
 use super::ripple::Corner;
 use crate::stream::check::check;
 use crate::stream::relief::Reliefs;
-use crate::stream::{Bounds, Cursor, Planning, Route, Start, Window, lay_times, window_s};
+use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, window_s};
 
 /// Share of acceleration and jerk of the first try.
 const SHARE: f64 = 0.9995;
@@ -42,18 +42,19 @@ pub struct Windowed {
 impl Planning for Windowed {
     type Motion = Ramps;
 
-    fn plan(&mut self, route: &Route, bounds: &Bounds, start: &Start, end_mm: f64, window: &mut Window<Ramps>) -> bool {
-        let rests = start.state.speed_mm_per_s == 0.0;
+    fn plan(&mut self, job: &Job<Ramps>, window: &mut Window<Ramps>) -> bool {
+        let rests = job.rests();
         let mut slower = Slower { speed: 1.0, jerk: SHARE };
         self.reliefs.keep_first(0);
         let tries = TRIES[usize::from(rests)];
         for n in 1..=tries {
-            if !self.solve(route, bounds, &slower, start, end_mm, window) {
+            if !self.solve(job, &slower, window) {
                 return false;
             }
-            let worst = check(route, bounds, start, window, &mut self.reliefs);
+            let worst = check(job, window, &mut self.reliefs);
             // After some tries samples alone count.
-            if worst.is_kept() && (n > LOCAL_TRIES || !ease(route, bounds, &window.motion.0, &mut self.reliefs)) {
+            if worst.is_kept() && (n > LOCAL_TRIES || !ease(job.route, job.bounds, &window.motion.0, &mut self.reliefs))
+            {
                 return true;
             }
             let over = worst.acceleration.max(worst.jerk);
@@ -66,15 +67,8 @@ impl Planning for Windowed {
 
 impl Windowed {
     /// False where the speed at the start is too high for what follows.
-    fn solve(
-        &mut self,
-        route: &Route,
-        bounds: &Bounds,
-        slower: &Slower,
-        start: &Start,
-        end_mm: f64,
-        window: &mut Window<Ramps>,
-    ) -> bool {
+    fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
+        let Job { route, bounds, start, end_mm, .. } = *job;
         let mut cursor = Cursor::default();
         let reliefs = &self.reliefs;
         let mut look = |at_mm: f64| {
@@ -84,6 +78,7 @@ impl Windowed {
         };
         let speed = start.state.speed_mm_per_s;
         let begin = Corner { at_mm: start.state.s_mm, speed_mm_per_s: speed };
+        self.survey.sections = SECTIONS;
         window.whole = self.survey.make(begin, end_mm, window_s(bounds, speed), &mut look);
         let Some(tangential) = self.survey.tangential else { return false };
         let corners = &mut self.survey.corners;

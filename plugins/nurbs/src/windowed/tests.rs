@@ -4,7 +4,7 @@ use serde_json::Value;
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
 use tandem_sdk::{Axes, AxisVector, NurbsData};
 
-use super::corners::{Limit, Spot, Survey};
+use super::corners::{Limit, SECTIONS, Spot, Survey};
 use super::plan::CARE;
 use super::ramp::{Ramp, Tangential, cubic};
 use super::ramps::Rounds;
@@ -62,7 +62,7 @@ fn spot(curve: &Nurbs, table: &ArcLength, s_mm: f64) -> Spot {
 }
 
 fn survey(curve: &Nurbs, table: &ArcLength) -> Survey {
-    let mut survey = Survey::default();
+    let mut survey = Survey { sections: SECTIONS, ..Survey::default() };
     let start = Corner { at_mm: 0.0, speed_mm_per_s: 0.0 };
     assert!(survey.make(start, table.length().mm, 100.0, &mut |s_mm| spot(curve, table, s_mm)));
     survey

@@ -1,0 +1,179 @@
+//! The motion at the places of the grid, and between them where the path turns much or its third derivative jumps.
+
+use tandem_motion::nurbs::AlongPath;
+use tandem_motion::retime::{Between, PLACES, Point};
+
+use super::motion::Rated;
+use super::spline::evaluate;
+use crate::stream::relief::Reliefs;
+use crate::stream::{Bounds, Cursor, Leg, Route};
+
+/// Turns of the path in an interval that ask for more places, rad, and where these are.
+const MORE: [(f64, &[[f64; PLACES]]); 2] =
+    [(0.15, &[[0.125, 0.25, 0.375], [0.625, 0.75, 0.875]]), (0.06, &[[0.22, 0.36, 0.78]])];
+/// Knots of an interval that are looked at.
+const KNOTS: usize = 2;
+/// A try that lowers the speed to less than this share needs another motion: a rate on the present one would be found too,
+/// but on a grid that is too coarse for it.
+const SLOWER: f64 = 0.85;
+
+/// Intervals at the start of a window in motion with a little more of rate squared, acceleration and jerk.
+const YIELDING: usize = 3;
+const YIELDED: [f64; 3] = [1.0008, 1.006, 1.02];
+
+/// What a place had when the grid was laid.
+#[derive(Clone, Copy, Debug, Default)]
+struct Place {
+    s_mm: f64,
+    /// Bound on the rate squared without reliefs.
+    most: f64,
+    /// Factor of the speed by reliefs.
+    speed: f64,
+    /// At the start of a window in motion.
+    yields: bool,
+}
+
+/// The places; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Grid {
+    pub points: Vec<[Point; PLACES]>,
+    pub between: Vec<Between>,
+    places: Vec<[Place; PLACES]>,
+    more: Vec<[Place; PLACES]>,
+}
+
+impl Grid {
+    /// Lays the grid of `intervals` along `motion`.
+    pub fn lay(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize, reliefs: &Reliefs) {
+        self.points.clear();
+        self.between.clear();
+        self.places.clear();
+        self.more.clear();
+        let mut cursor = Cursor::default();
+        // The end of an interval is the start of the next, but for the third derivative of the motion.
+        let mut start: Option<(f64, AlongPath)> = None;
+        for k in 0..intervals {
+            let states = [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
+            let mut turn = 0.0;
+            let mut laid = [(Point::default(), Place::default()); PLACES];
+            for (n, state) in states.iter().enumerate() {
+                let at = match start {
+                    Some((s_mm, at)) if n == 0 && s_mm == state[0] => at,
+                    _ => route.at(state[0], &mut cursor).0,
+                };
+                let leg = route.find(state[0], &mut cursor);
+                laid[n] = place(leg, bounds, reliefs, state, &at);
+                if n == 1 {
+                    turn = leg.course.counted_length(&at.curvature) * (states[2][0] - states[0][0]);
+                }
+                start = Some((state[0], at));
+            }
+            self.points.push(laid.map(|(point, _)| point));
+            self.places.push(laid.map(|(_, place)| place));
+            let more = MORE.iter().find(|(much, _)| turn > *much).map_or(&[][..], |(_, more)| more);
+            for z in more {
+                self.look(route, bounds, motion, reliefs, (k, *z), &mut cursor);
+            }
+            self.look_at_knots(route, bounds, motion, reliefs, (k, [states[0][0], states[2][0]]));
+        }
+    }
+
+    /// Three more places of an interval.
+    fn look(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        motion: &Rated,
+        reliefs: &Reliefs,
+        (interval, z): (usize, [f64; PLACES]),
+        cursor: &mut Cursor,
+    ) {
+        let laid = z.map(|z| {
+            let state = evaluate(&motion.coefficients, interval, z, motion.step_s);
+            let (at, leg) = route.at(state[0], cursor);
+            place(leg, bounds, reliefs, &state, &at)
+        });
+        self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
+        self.more.push(laid.map(|(_, place)| place));
+    }
+
+    /// Both sides of the first knots in an interval, and a place in its larger part.
+    fn look_at_knots(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        motion: &Rated,
+        reliefs: &Reliefs,
+        (interval, [from_mm, to_mm]): (usize, [f64; 2]),
+    ) {
+        let (mut cursor, mut from_mm) = (Cursor::default(), from_mm);
+        for _ in 0..KNOTS {
+            let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) else { return };
+            from_mm = knot_mm;
+            let at = motion.place(interval, knot_mm);
+            let z = [at, at, if at < 0.5 { f64::midpoint(at, 1.0) } else { at / 2.0 }];
+            let last = evaluate(&motion.coefficients, interval, z[2], motion.step_s);
+            let state = evaluate(&motion.coefficients, interval, at, motion.step_s);
+            let (other, _) = route.at(last[0], &mut cursor);
+            let leg = route.find(knot_mm, &mut cursor);
+            let [before, behind] = sides;
+            let laid = [(state, before), (state, behind), (last, other)];
+            let laid = laid.map(|(state, at)| place(leg, bounds, reliefs, &state, &at));
+            self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
+            self.more.push(laid.map(|(_, place)| place));
+        }
+    }
+
+    /// Leaves a little more at the start: what the window before does there cannot be changed, and it was asked for at other
+    /// places.
+    pub fn yield_at_start(&mut self) {
+        let count = YIELDING.min(self.points.len());
+        let more = self.between.iter_mut().zip(&mut self.more).take_while(|(more, _)| more.interval < count);
+        let more = more.map(|(more, places)| (&mut more.points, places));
+        for (points, places) in self.points[..count].iter_mut().zip(&mut self.places).chain(more) {
+            for (point, place) in points.iter_mut().zip(places) {
+                place.yields = true;
+                place.most *= YIELDED[0];
+                point.most *= YIELDED[0];
+                point.acceleration_share = YIELDED[1];
+                point.jerk_share *= YIELDED[2];
+            }
+        }
+    }
+
+    /// What reliefs leave of jerk and speed; false where the speed becomes so much less that the grid is to be laid anew.
+    pub fn ease(&mut self, reliefs: &Reliefs) -> bool {
+        let points = self.points.iter_mut().chain(self.between.iter_mut().map(|more| &mut more.points));
+        let mut least = 1.0f64;
+        for (points, places) in points.zip(self.places.iter().chain(&self.more)) {
+            for (point, place) in points.iter_mut().zip(places) {
+                let [speed, jerk] = reliefs.at(place.s_mm);
+                point.jerk_share = if place.yields { YIELDED[2] * jerk } else { jerk };
+                point.most = place.most * speed * speed;
+                least = least.min(speed / place.speed);
+            }
+        }
+        least > SLOWER
+    }
+}
+
+/// The motion at a place, by the chain rule.
+fn place(
+    leg: &Leg,
+    bounds: &Bounds,
+    reliefs: &Reliefs,
+    [s_mm, s1, s2, s3]: &[f64; 4],
+    at: &AlongPath,
+) -> (Point, Place) {
+    let [speed, jerk_share] = reliefs.at(*s_mm);
+    let mut point = Point { jerk_share, ..Point::default() };
+    for lane in 0..bounds.context.limits.axes().len() {
+        let (x1, x2, x3) = (at.direction[lane], at.curvature[lane], at.third[lane]);
+        point.first[lane] = x1 * s1;
+        point.second[lane] = x2 * s1 * s1 + x1 * s2;
+        point.third[lane] = x3 * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;
+    }
+    let most = if *s1 > 1e-9 { (leg.cap_mm_per_s(at, bounds) / s1).powi(2) } else { f64::INFINITY };
+    point.most = speed * speed * most;
+    (point, Place { s_mm: *s_mm, most, speed, yields: false })
+}
