@@ -4,7 +4,7 @@ use super::motion::Driven;
 use super::timing::Timing;
 use crate::stream::relief::Reliefs;
 use crate::stream::{Bounds, Cursor, Job, Route, State, window_s};
-use crate::windowed::{Care, Corner, Limit, Ramp, Rounds, Spot, Survey, Tangential};
+use crate::windowed::{Care, Corner, Grade, Limit, Ramp, Rounds, Spot, Survey, Tangential};
 
 /// Multiples of acceleration and jerk that ramps take where the speed at the start is too high for less: in motion the
 /// window before may brake in less way than a cubic ramp.
@@ -53,7 +53,8 @@ impl First {
         let tangential = Tangential { acceleration_mm_per_s2: haste * a, jerk_mm_per_s3: haste * j };
         self.corners.clone_from(&self.survey.corners);
         let mut limit = Limit::new(&self.survey.places);
-        self.rounds.make(&mut self.corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &CARE, &mut self.ramps);
+        let grade = Grade::even(tangential);
+        self.rounds.make(&mut self.corners, self.survey.feed_mm_per_s, &grade, &mut limit, &CARE, &mut self.ramps);
         self.corners[0].speed_mm_per_s >= start.speed_mm_per_s && !self.ramps.is_empty()
     }
 

@@ -107,7 +107,8 @@ fn compare(
 ) -> Worst {
     let rapid = leg.block.kind == BlockKind::Rapid;
     let mut here = differences(bounds, samples, rapid);
-    here.speed = here.speed.max(state.speed_mm_per_s / (leg.feed_mm_per_s * (1.0 - 1e-9)));
+    let mean_mm_per_s = (state.s_mm - before_mm) / bounds.context.fine_period_s;
+    here.speed = here.speed.max(state.speed_mm_per_s.max(mean_mm_per_s) / (leg.feed_mm_per_s * (1.0 - 1e-9)));
     if before_mm < state.s_mm && !rapid {
         let curved = leg.course.counted_length(&at.curvature);
         let chord = chord_error_mm(route, bounds, (before_mm, state.s_mm), samples, curved);

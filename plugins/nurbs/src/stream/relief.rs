@@ -37,6 +37,11 @@ impl Reliefs {
         }
     }
 
+    /// The parts, as they were found.
+    pub fn parts(&self) -> &[Relief] {
+        &self.0
+    }
+
     /// Factors at `s_mm` of the speed caps and of the jerk limits.
     pub fn at(&self, s_mm: f64) -> [f64; 2] {
         let here = self.0.iter().filter(|part| part.from_mm <= s_mm && s_mm <= part.to_mm);

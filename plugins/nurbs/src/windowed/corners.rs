@@ -31,6 +31,8 @@ pub struct Survey {
     pub tangential: Option<Tangential>,
     /// Steps in which a corner is sought between places.
     pub sections: usize,
+    /// Places and corners as they were found.
+    found: [Vec<Corner>; 2],
 }
 
 impl Survey {
@@ -46,6 +48,35 @@ impl Survey {
             self.corners.push(Corner { speed_mm_per_s: 0.0, ..*last });
         }
         whole
+    }
+
+    /// Keeps what was found, to be slowed again and again.
+    pub fn keep(&mut self) {
+        self.found[0].clone_from(&self.places);
+        self.found[1].clone_from(&self.corners);
+    }
+
+    /// What was kept, with the speed in a share everywhere and, of parts between two path coordinates, in shares of that.
+    /// The speed at the start stays.
+    pub fn slow(&mut self, share: f64, parts: impl Iterator<Item = ([f64; 2], f64)>) {
+        self.places.clone_from(&self.found[0]);
+        self.corners.clone_from(&self.found[1]);
+        let start = self.corners.first().copied();
+        let everywhere = ([f64::NEG_INFINITY, f64::INFINITY], share);
+        for ([from_mm, to_mm], share) in std::iter::once(everywhere).chain(parts) {
+            let first = self.corners.partition_point(|corner| corner.at_mm < from_mm);
+            let inside = self.corners[first..].iter_mut().take_while(|corner| corner.at_mm <= to_mm);
+            inside.for_each(|corner| corner.speed_mm_per_s *= share);
+            // The part may be shorter than the way from one place to the next: those around it count too.
+            let first = self.places.partition_point(|place| place.at_mm < from_mm);
+            let behind = self.places.partition_point(|place| place.at_mm <= to_mm);
+            let around = first.saturating_sub(1)..(behind + 1).min(self.places.len());
+            self.places[around].iter_mut().for_each(|place| place.speed_mm_per_s *= share);
+        }
+        if let (Some(first), Some(start)) = (self.corners.first_mut(), start) {
+            *first = start;
+        }
+        self.feed_mm_per_s = self.places.iter().map(|place| place.speed_mm_per_s).fold(0.0, f64::max);
     }
 
     fn look_around(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {

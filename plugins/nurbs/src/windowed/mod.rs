@@ -9,6 +9,7 @@
 //! A window that the check refuses is planned again with less acceleration, less jerk or lower caps.
 
 mod corners;
+mod grade;
 mod motion;
 mod plan;
 mod points;
@@ -19,6 +20,7 @@ mod ripple;
 mod tests;
 
 pub use corners::{Limit, Spot, Survey};
+pub use grade::Grade;
 pub use motion::Ramps;
 pub use plan::Windowed;
 pub use ramp::{Ramp, Tangential};

@@ -1,6 +1,7 @@
 //! Planning one window.
 
 use super::corners::{Limit, SECTIONS, Spot, Survey};
+use super::grade::Grade;
 use super::motion::Ramps;
 use super::points::ease;
 use super::ramp::Tangential;
@@ -13,11 +14,11 @@ use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, win
 /// Share of acceleration and jerk of the first try.
 const SHARE: f64 = 0.9995;
 
-/// Tries that also lower the speed where single points exceed the jerk.
-const LOCAL_TRIES: usize = 4;
+/// Tries that also take back jerk or speed where single points exceed the jerk.
+const LOCAL_TRIES: usize = 10;
 
 /// Tries of a window in motion; and from rest, where each later one is slower.
-const TRIES: [usize; 2] = [6, 24];
+const TRIES: [usize; 2] = [12, 30];
 
 /// As published.
 pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
@@ -37,6 +38,7 @@ pub struct Windowed {
     survey: Survey,
     rounds: Rounds,
     reliefs: Reliefs,
+    grade: Option<Grade>,
 }
 
 impl Planning for Windowed {
@@ -46,6 +48,8 @@ impl Planning for Windowed {
         let rests = job.rests();
         let mut slower = Slower { speed: 1.0, jerk: SHARE };
         self.reliefs.keep_first(0);
+        self.look_around(job, window);
+        self.grade.iter_mut().for_each(Grade::level);
         let tries = TRIES[usize::from(rests)];
         for n in 1..=tries {
             if !self.solve(job, &slower, window) {
@@ -53,8 +57,7 @@ impl Planning for Windowed {
             }
             let worst = check(job, window, &mut self.reliefs);
             // After some tries samples alone count.
-            if worst.is_kept() && (n > LOCAL_TRIES || !ease(job.route, job.bounds, &window.motion.0, &mut self.reliefs))
-            {
+            if worst.is_kept() && (n > LOCAL_TRIES || !self.ease(job, window)) {
                 return true;
             }
             let over = worst.acceleration.max(worst.jerk);
@@ -66,38 +69,53 @@ impl Planning for Windowed {
 }
 
 impl Windowed {
-    /// False where the speed at the start is too high for what follows.
-    fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
+    /// The path of the window: no try changes what it allows.
+    fn look_around(&mut self, job: &Job<Ramps>, window: &mut Window<Ramps>) {
         let Job { route, bounds, start, end_mm, .. } = *job;
         let mut cursor = Cursor::default();
-        let reliefs = &self.reliefs;
-        let mut look = |at_mm: f64| {
-            let mut spot = spot(route, bounds, slower, at_mm, &mut cursor);
-            spot.speed_mm_per_s *= reliefs.at(at_mm)[0];
-            spot
-        };
         let speed = start.state.speed_mm_per_s;
         let begin = Corner { at_mm: start.state.s_mm, speed_mm_per_s: speed };
+        let mut look = |at_mm: f64| spot(route, bounds, at_mm, &mut cursor);
         self.survey.sections = SECTIONS;
         window.whole = self.survey.make(begin, end_mm, window_s(bounds, speed), &mut look);
-        let Some(tangential) = self.survey.tangential else { return false };
+        self.survey.keep();
+    }
+
+    /// Less where single points exceed the jerk; false where none does.
+    fn ease(&mut self, job: &Job<Ramps>, window: &Window<Ramps>) -> bool {
+        let mut limit = Limit::new(&self.survey.places);
+        let grade = self.grade.as_mut();
+        grade.is_some_and(|grade| ease(job, &window.motion.0, &mut limit, grade, &mut self.reliefs))
+    }
+
+    /// False where the speed at the start is too high for what follows.
+    fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
+        let parts = self.reliefs.parts().iter().map(|part| ([part.from_mm, part.to_mm], part.speed));
+        self.survey.slow(slower.speed, parts);
+        let Some(least) = self.survey.tangential else { return false };
+        let least = Tangential {
+            acceleration_mm_per_s2: slower.jerk * least.acceleration_mm_per_s2,
+            jerk_mm_per_s3: slower.jerk * least.jerk_mm_per_s3,
+        };
+        let grade = self.grade.get_or_insert_with(|| Grade::even(least));
+        grade.least = least;
         let corners = &mut self.survey.corners;
         let mut limit = Limit::new(&self.survey.places);
         let ramps = &mut window.motion.0;
-        self.rounds.make(corners, self.survey.feed_mm_per_s, &tangential, &mut limit, &CARE, ramps);
+        self.rounds.make(corners, self.survey.feed_mm_per_s, grade, &mut limit, &CARE, ramps);
         lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
-        corners[0].speed_mm_per_s >= speed && window.times.len() > 1
+        corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s && window.times.len() > 1
     }
 }
 
-fn spot(route: &Route, bounds: &Bounds, slower: &Slower, at_mm: f64, cursor: &mut Cursor) -> Spot {
+fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot {
     let (at, leg) = route.at(at_mm, cursor);
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
     Spot {
-        speed_mm_per_s: slower.speed * leg.cap_mm_per_s(&at, bounds),
+        speed_mm_per_s: leg.cap_mm_per_s(&at, bounds),
         tangential: Tangential {
-            acceleration_mm_per_s2: slower.jerk * leg.least.acceleration_mm_per_s2,
-            jerk_mm_per_s3: slower.jerk * leg.least.jerk_mm_per_s3,
+            acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
+            jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
         step_mm: (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(3e-4, 0.05),
     }

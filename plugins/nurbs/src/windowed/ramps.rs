@@ -1,6 +1,7 @@
 //! Corners and the ramps between them, until no ramp is faster than the limit.
 
 use super::corners::Limit;
+use super::grade::Grade;
 use super::ramp::{LEAST_S, Ramp, Tangential};
 use super::ripple::{Corner, propagate, ramps};
 
@@ -27,6 +28,7 @@ struct Pair {
 pub struct Rounds {
     pairs: Vec<Pair>,
     before: Vec<Pair>,
+    limits: Vec<[Tangential; 2]>,
 }
 
 impl Rounds {
@@ -36,20 +38,22 @@ impl Rounds {
         &mut self,
         corners: &mut Vec<Corner>,
         feed_mm_per_s: f64,
-        tangential: &Tangential,
+        grade: &Grade,
         limit: &mut Limit,
         care: &Care,
         into: &mut Vec<Ramp>,
     ) {
         self.pairs.clear();
         for _ in 0..care.rounds {
-            propagate(corners, tangential);
+            self.limits.clear();
+            self.limits.extend(corners.windows(2).map(|ends| grade.between([ends[0].at_mm, ends[1].at_mm])));
+            propagate(corners, &self.limits);
             std::mem::swap(&mut self.pairs, &mut self.before);
             self.pairs.clear();
             into.clear();
             let mut known = self.before.iter().peekable();
-            for ends in corners.windows(2) {
-                let parts = ramps(&ends[0], &ends[1], feed_mm_per_s, tangential);
+            for (ends, limits) in corners.windows(2).zip(&self.limits) {
+                let parts = ramps(&ends[0], &ends[1], feed_mm_per_s, limits);
                 while known.next_if(|pair| pair.ends[0].at_mm < ends[0].at_mm).is_some() {}
                 // A pair looked at before, with the same speeds, has nothing new.
                 let found = match known.peek() {

@@ -5,6 +5,7 @@ use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
 use tandem_sdk::{Axes, AxisVector, NurbsData};
 
 use super::corners::{Limit, SECTIONS, Spot, Survey};
+use super::grade::Grade;
 use super::plan::CARE;
 use super::ramp::{Ramp, Tangential, cubic};
 use super::ramps::Rounds;
@@ -62,7 +63,8 @@ fn spot(curve: &Nurbs, table: &ArcLength, s_mm: f64) -> Spot {
 }
 
 fn survey(curve: &Nurbs, table: &ArcLength) -> Survey {
-    let mut survey = Survey { sections: SECTIONS, ..Survey::default() };
+    let mut survey = Survey::default();
+    survey.sections = SECTIONS;
     let start = Corner { at_mm: 0.0, speed_mm_per_s: 0.0 };
     assert!(survey.make(start, table.length().mm, 100.0, &mut |s_mm| spot(curve, table, s_mm)));
     survey
@@ -103,12 +105,13 @@ fn a_corner_lowers_those_before_it() {
         let ends = [(0.0, 0.0), (number(&row["L_mm"]), 0.0)];
         let all = std::iter::once(ends[0]).chain(inner).chain([ends[1]]);
         let mut corners: Vec<Corner> = all.map(|(at_mm, speed)| Corner { at_mm, speed_mm_per_s: speed }).collect();
-        propagate(&mut corners, &LIMITS);
+        let limits = vec![[LIMITS; 2]; corners.len()];
+        propagate(&mut corners, &limits);
         let expected = &row["ripple_aware"];
         for (corner, speed) in corners[1..].iter().zip(numbers(&expected["v_after"])) {
             close(corner.speed_mm_per_s, speed, 1e-6, 0.0);
         }
-        let pairs: Vec<_> = corners.windows(2).map(|pair| ramps(&pair[0], &pair[1], FEED, &LIMITS)).collect();
+        let pairs: Vec<_> = corners.windows(2).map(|pair| ramps(&pair[0], &pair[1], FEED, &[LIMITS; 2])).collect();
         for (parts, peak) in pairs.iter().zip(numbers(&expected["peaks"])) {
             close(parts[1].speed[0], peak, 1e-6, 0.0);
         }
@@ -159,7 +162,14 @@ fn windows_are_as_published() {
         }
         let (curve, table) = canonical(name);
         let (mut found, mut plan) = (survey(&curve, &table), Vec::new());
-        Rounds::default().make(&mut found.corners, FEED, &LIMITS, &mut Limit::new(&found.places), &CARE, &mut plan);
+        Rounds::default().make(
+            &mut found.corners,
+            FEED,
+            &Grade::even(LIMITS),
+            &mut Limit::new(&found.places),
+            &CARE,
+            &mut plan,
+        );
         close(plan.iter().map(|ramp| ramp.duration_s).sum(), published_s, 0.02, 0.0);
         for pair in plan.windows(2) {
             let [end_mm, end, acceleration, _] = pair[0].at(pair[0].duration_s);
