@@ -37,6 +37,19 @@ impl Planning for Scan {
     type Motion = Driven;
 
     fn plan(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
+        let found = self.plan_rate(job, window);
+        let slow_s = if found { window.duration_s() } else { f64::INFINITY };
+        // Slower than the timing it began with: a path so short and sharp that limits between samples count most.
+        if job.rests() && slow_s > self.first.end().0 {
+            return self.plan_ramps(job, window, slow_s) || found;
+        }
+        found
+    }
+}
+
+impl Scan {
+    /// The window at the rate that the limits allow; false where no try keeps them.
+    fn plan_rate(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         self.reliefs.keep_first(0);
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
@@ -60,19 +73,20 @@ impl Planning for Scan {
             self.solve(job, false, window);
             return check(job, window, &mut self.reliefs).is_kept();
         }
-        job.rests() && self.plan_ramps(job, window)
+        false
     }
-}
 
-impl Scan {
-    /// The window as the form `windowed` plans it.
-    fn plan_ramps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
+    /// The window as the form `windowed` plans it, where that takes less than `below_s`.
+    fn plan_ramps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, below_s: f64) -> bool {
         let Job { route, bounds, start, end_mm, .. } = *job;
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
         let found = self.windowed.plan(&Job { route, bounds, start, end_mm, before: None }, &mut self.window);
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
-        window.take_all_but_motion(&mut self.window);
-        window.motion.by_ramps = true;
+        let found = found && self.window.duration_s() < below_s;
+        if found {
+            window.take_all_but_motion(&mut self.window);
+            window.motion.by_ramps = true;
+        }
         found
     }
 

@@ -45,7 +45,7 @@ impl Worst {
         Relief {
             from_mm,
             to_mm,
-            speed: if self.speed > 1.0 { (0.998 / self.speed).max(0.8) } else { 1.0 },
+            speed: if self.speed > 1.0 { (0.9985 / self.speed).max(0.8) } else { 1.0 },
             jerk: if over > 1.0 { (0.995 / over).max(0.5) } else { 1.0 },
         }
     }
@@ -77,7 +77,9 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
         let first = if count == 0 { state.s_mm } else { before_mm[2] };
         let here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
         if !here.is_kept() {
-            reliefs.add(known, here.relief(before_mm[0], state.s_mm));
+            // Where the speed is taken back it becomes higher beside that: a period more on both sides.
+            let beside_mm = if here.speed > 1.0 { state.s_mm - first } else { 0.0 };
+            reliefs.add(known, here.relief(before_mm[0] - beside_mm, state.s_mm + beside_mm));
         }
         worst.join(&here);
         before_mm = [before_mm[1], before_mm[2], state.s_mm];

@@ -14,7 +14,7 @@ const LEAST_OFF_MM: f64 = 1.5e-9;
 /// Halvings of an interval until a segment follows the path.
 const MAX_HALVINGS: u32 = 30;
 /// A leg is over this near to its end, mm: rounding of path coordinates.
-const OVER_MM: f64 = 1e-9;
+pub const OVER_MM: f64 = 1e-9;
 
 /// Least duration of a segment through both its ends, s: the derivatives of a shorter one are rounding.
 const LEAST_S: f64 = 5e-5;

@@ -20,7 +20,7 @@ use std::fmt::Debug;
 use tandem_sdk::AxisVector;
 
 pub use planner::Streamer;
-pub use route::{Bounds, Cursor, Leg, Route};
+pub use route::{Bounds, Cursor, Leg, PAST_MM, Route};
 pub use window::{Window, interval, lay_times};
 
 /// Time of a window at least, s.

@@ -5,7 +5,7 @@ use tandem_sdk::{
     SegmentSink,
 };
 
-use super::draw::{Drawn, draw};
+use super::draw::{Drawn, OVER_MM, draw};
 use super::route::Item;
 use super::{Bounds, Cursor, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
@@ -224,7 +224,8 @@ impl<P: Planning> Streamer<P> {
     /// Rest where the window ends: exactly at the end of the block, where that is there.
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
         let end_mm = self.window.motion.end_mm();
-        if end_mm > self.at_mm && self.route.front().is_some_and(|leg| end_mm > leg.start_mm) {
+        // The end of a window is that of its leg but for rounding: then the position is that of the leg already.
+        if end_mm > self.at_mm + OVER_MM && self.route.front().is_some_and(|leg| end_mm > leg.start_mm) {
             self.position = self.route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
         }

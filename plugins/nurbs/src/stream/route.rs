@@ -10,7 +10,7 @@ use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
 
 /// Share of a limit that a speed may reach.
-const AIM: f64 = 0.9995;
+const AIM: f64 = 0.999;
 /// Share of an axis's acceleration that turning may take.
 const TURNING: f64 = 0.8;
 /// Share of an axis's jerk that the third derivative of the path may take.
@@ -49,6 +49,8 @@ pub struct Least {
 
 /// How far beside a knot derivatives are taken, mm.
 const BESIDE_MM: f64 = 1e-7;
+/// So far behind a knot the next one is looked for, mm: path coordinates round.
+pub const PAST_MM: f64 = 2.0 * BESIDE_MM;
 
 /// What comes next.
 #[derive(Clone, Debug)]
@@ -237,7 +239,7 @@ impl Route {
     pub fn knot(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> Option<(f64, [AlongPath; 2])> {
         let break_mm = self.find(from_mm, cursor).next_break_mm(from_mm);
         let sides = || [-BESIDE_MM, BESIDE_MM].map(|off| self.at(break_mm + off, cursor).0);
-        (break_mm < to_mm).then(sides).map(|sides| (break_mm, sides))
+        (from_mm < break_mm && break_mm < to_mm).then(sides).map(|sides| (break_mm, sides))
     }
 
     /// Where the run from the front ends, mm, and whether it is known to end there.
