@@ -1,6 +1,6 @@
 //! Planning: a curve in, segments out, streaming, one core. `cargo bench -p tandem-nurbs`. After the table each run prints
-//! the fastest of some batches of runs of each curve as motion time by processor time of planning (what else the computer does is not
-//! counted), the time against the best known, and the longest single call.
+//! the fastest of some batches of runs of each curve as motion time by processor time of planning (what else the computer
+//! does is not counted), the time against the best known, and the longest single call.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -6,6 +6,7 @@ mod counting_allocator;
 
 use common::{context, curve_block};
 use counting_allocator::heap_use_of;
+use tandem_motion::nurbs::{ArcLength, Nurbs};
 use tandem_nurbs::{NurbsPlanner, Options};
 use tandem_sdk::{AxisVector, BlockReport, NurbsData, Planner, Segment, SegmentSink};
 
@@ -19,9 +20,9 @@ impl SegmentSink for Duration {
     fn block(&mut self, _report: &BlockReport) {}
 }
 
-/// Ten thousand spans of a wave.
-fn wave() -> NurbsData {
-    let count = 10_003;
+/// A wave of so many spans.
+fn wave(spans: u32) -> NurbsData {
+    let count = spans + 3;
     let point = |n: u32| AxisVector::from_slice(&[0.05 * f64::from(n), 2.0 * (0.05 * f64::from(n)).sin()]);
     let mut knots = vec![0.0; 3];
     knots.extend((0..=count - 3).map(f64::from));
@@ -40,7 +41,7 @@ fn drive(planner: &mut NurbsPlanner) -> f64 {
 #[test]
 fn a_long_curve_is_driven_in_memory_that_is_there() {
     for form in ["adaptive", "windowed", "scan"] {
-        let block = curve_block(wave(), 1.0, 100.0);
+        let block = curve_block(wave(10_000), 1.0, 100.0);
         let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
         let start = block.facts().start;
         let mut planner = NurbsPlanner::new(&options, &context(start)).unwrap();
@@ -60,4 +61,17 @@ fn a_long_curve_is_driven_in_memory_that_is_there() {
         assert_eq!(steady.allocations, 0, "{form}");
         assert!((first_s - again_s).abs() < 1e-9 && first_s > 7.0, "{form}: {first_s} s, {again_s} s");
     }
+}
+
+/// What a curve takes goes with its spans and with nothing else.
+#[test]
+fn the_table_takes_the_same_for_every_span() {
+    let axes = context(AxisVector::ZERO).axes;
+    let bytes = [1_000, 10_000].map(|spans| {
+        let curve = Nurbs::new(&wave(spans), &axes).unwrap();
+        let tables = curve.pieces().iter().map(|piece| ArcLength::of_piece(&curve, piece).bytes()).sum::<usize>();
+        tables as f64 / f64::from(spans)
+    });
+    println!("{bytes:?} bytes a span");
+    assert!((bytes[0] / bytes[1] - 1.0).abs() < 0.02 && bytes[1] < 600.0, "{bytes:?} bytes a span");
 }

@@ -45,6 +45,7 @@ impl ArcLength {
         while table.next_span < curve.points() && curve.knots()[table.next_span] < piece.range.1 {
             table.add_span(curve);
         }
+        table.fits.shrink_to_fit();
         table
     }
 
@@ -91,6 +92,11 @@ impl ArcLength {
     /// Length of what the table holds, with its error bound.
     pub fn length(&self) -> Length {
         self.built
+    }
+
+    /// Memory that the table takes, bytes.
+    pub fn bytes(&self) -> usize {
+        self.fits.capacity() * size_of::<Fit>()
     }
 
     /// Number of parts in the table.

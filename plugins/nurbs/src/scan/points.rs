@@ -1,4 +1,4 @@
-//! Jerk between the places of the grid: the fine loop looks at single points of a period.
+//! Jerk and feed between the places of the grid: the fine loop looks at single points of a period.
 
 use super::motion::Rated;
 use crate::stream::check::{POINT, jerk_share};
@@ -15,17 +15,23 @@ const PLACES: [&[f64]; 2] =
 /// Turn of the path in an interval that is much, rad.
 const TURN: f64 = 0.05;
 
-/// Adds the intervals in which the jerk exceeds its limit. Gives whether there was one.
+/// What the next try aims at where the feed is exceeded, and what of it is rounding.
+const SLOWER: f64 = 0.9985;
+const FASTER: f64 = 1.0 + 1e-7;
+
+/// Adds the intervals in which the jerk exceeds its limit, or the speed the feed. Gives whether there was one.
 pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, reliefs: &mut Reliefs) -> bool {
     let (mut cursor, known, mut over) = (Cursor::default(), reliefs.count(), false);
     for k in 0..motion.rate.intervals() {
-        let mut worst = 0.0f64;
+        let (mut worst, mut faster) = (0.0f64, 0.0f64);
         let [from_mm, to_mm] = [0.0, 1.0].map(|z| motion.derivatives(k, z)[0]);
         let (at, leg) = route.at(f64::midpoint(from_mm, to_mm), &mut cursor);
         let turn = leg.course.counted_length(&at.curvature) * (to_mm - from_mm);
         for z in PLACES[usize::from(turn > TURN)] {
             let [s_mm, rest @ ..] = motion.derivatives(k, *z);
-            worst = worst.max(jerk_share(bounds, &route.at(s_mm, &mut cursor).0, rest));
+            let (at, leg) = route.at(s_mm, &mut cursor);
+            worst = worst.max(jerk_share(bounds, &at, rest));
+            faster = faster.max(rest[0] / leg.feed_mm_per_s);
         }
         let knot = route.knot([from_mm, to_mm], &mut cursor);
         if let Some((knot_mm, sides)) = &knot {
@@ -34,13 +40,14 @@ pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, reliefs: &mut Relief
         }
         // What is near the limit here would be the next to exceed it. At a knot the rows of the grid see too little of it:
         // there the speed is lowered, with whose third power it goes.
-        if worst > NEAR {
+        if worst > NEAR || faster > FASTER {
             let [from_mm, to_mm] = [-0.3, 1.3].map(|z| motion.derivatives(k, z)[0]);
-            let jerk = (AIM / worst).max(0.5);
+            let jerk = if worst > NEAR { (AIM / worst).max(0.5) } else { 1.0 };
             let speed = if knot.is_some() && worst > POINT { jerk.cbrt() } else { 1.0 };
+            let speed = if faster > FASTER { speed.min(SLOWER / faster) } else { speed };
             reliefs.add(known, Relief { from_mm, to_mm, speed, jerk });
         }
-        over |= worst > POINT;
+        over |= worst > POINT || faster > FASTER;
     }
     if !over {
         reliefs.keep_first(known);

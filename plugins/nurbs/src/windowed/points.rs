@@ -57,7 +57,9 @@ fn look(job: &Job<Ramps>, ramp: &Ramp, step_s: f64, mut of: impl FnMut(&AlongPat
             // Near enough: the path is known on both sides of the knot, and the ramp hardly changes on the way.
             let late_s = if state[1] > 0.0 { (state[0] - knot_mm) / state[1] } else { 0.0 };
             let at_knot = ramp.at((t_s - late_s).max(0.0));
-            sides.iter().for_each(|side| of(side, at_knot));
+            for side in &sides {
+                of(side, at_knot);
+            }
             from_mm = knot_mm + PAST_MM;
         }
         of(&job.route.at(state[0], &mut cursor).0, state);
