@@ -37,6 +37,7 @@ mod report;
 mod script;
 mod single_block;
 mod smooth;
+mod smooth_peers;
 mod starvation;
 mod stopping_time;
 mod stops;
