@@ -182,7 +182,8 @@ fn missed(blocks: &[Block], segments: &[Segment]) -> Option<String> {
     };
     let asked = blocks.iter().enumerate().filter(|(index, block)| block.ends_at_rest() || index + 1 == blocks.len());
     let missed = asked.map(|(_, block)| block).find(|block| !rests(block))?;
-    Some(format!("block {}: no rest on its end {:?}", missed.index, &missed.end.0[..3]))
+    let (index, kind, length_mm) = (missed.index, missed.kind, missed.length_mm);
+    Some(format!("block {index}, {kind:?} of {length_mm} mm: no rest on its end {:?}", &missed.end.0[..3]))
 }
 
 /// No faster between two samples than the highest feed that is programmed there, and that feed is one of the program's.

@@ -118,8 +118,42 @@ fn from_arc(block: &Block, place: &AxisVector) -> f64 {
     // The turn from the start, taken a little before it as zero so that rounding there is no whole turn.
     let turned = (angle + 0.1).rem_euclid(std::f64::consts::TAU) - 0.1;
     let share = (turned / arc.sweep_rad.abs()).clamp(0.0, 1.0);
-    let (sin, cos) = (arc.start_angle_rad + share * arc.sweep_rad).sin_cos();
-    let (near_x, near_y) = (arc.radius_mm * cos, arc.radius_mm * sin);
-    let near_z = block.start[2] + share * (block.end[2] - block.start[2]);
-    (x - near_x).hypot(y - near_y).hypot(place[2] - near_z)
+    let rise_mm = block.end[2] - block.start[2];
+    let distance = |share: f64| {
+        let (sin, cos) = (arc.start_angle_rad + share * arc.sweep_rad).sin_cos();
+        let across = (x - arc.radius_mm * cos).hypot(y - arc.radius_mm * sin);
+        across.hypot(place[2] - block.start[2] - share * rise_mm)
+    };
+    if rise_mm == 0.0 { distance(share) } else { distance(share).min(least(distance)) }
+}
+
+/// The least value of `of` between 0 and 1, where it has few minima: the nearest place on a helix is not at the same angle.
+fn least(of: impl Fn(f64) -> f64) -> f64 {
+    const PLACES: u32 = 64;
+    let at = |place: u32| f64::from(place) / f64::from(PLACES);
+    let best = (0..=PLACES).min_by(|a, b| of(at(*a)).total_cmp(&of(at(*b)))).unwrap_or(0);
+    let (mut from, mut to) = (at(best.saturating_sub(1)), at((best + 1).min(PLACES)));
+    for _ in 0..40 {
+        let (low, high) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
+        (from, to) = if of(low) < of(high) { (from, high) } else { (low, to) };
+    }
+    of(f64::midpoint(from, to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beside_a_steep_helix_the_nearest_place_counts() {
+        let arc =
+            ArcGeometry { plane: [0, 1], center_mm: [0.0; 2], radius_mm: 0.5, start_angle_rad: -0.05, sweep_rad: 0.1 };
+        let at = |angle: f64, z: f64| AxisVector::from_slice(&[0.5 * angle.cos(), 0.5 * angle.sin(), z]);
+        let helix = Block { kind: BlockKind::Arc, end: at(0.05, 3.0), arc, ..Block::at(at(-0.05, 0.0)) };
+        let beside = |offset: [f64; 3]| distance_mm(&helix, &(at(0.0, 1.5) + AxisVector::from_slice(&offset)));
+        assert!(beside([0.0; 3]) < 1e-9);
+        assert!((beside([0.01, 0.0, 0.0]) - 0.01).abs() < 1e-6, "outwards: {}", beside([0.01, 0.0, 0.0]));
+        assert!((beside([0.0, 0.01, 0.0]) - 0.01).abs() < 1e-5, "across: {}", beside([0.0, 0.01, 0.0]));
+        assert!(beside([0.0, 0.0, 0.01]) < 2e-4, "along: {}", beside([0.0, 0.0, 0.01]));
+    }
 }
