@@ -153,3 +153,27 @@ fn a_policy_script_slows_curves() {
     });
     assert!(verdict.passed(), "{verdict}");
 }
+
+/// The report shows curvature, chord error and what binds along a curve.
+#[test]
+fn the_report_shows_what_binds_along_a_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
+    let path = page.to_string_lossy().into_owned();
+    let done = Scenario::of(&butterfly).on(&machine).with(&["--report", &path]).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains("curvature of the curve") && html.contains("chord error on the curve"));
+    let words = html.split("what binds, of the time in motion<td>").nth(1).unwrap().split('<').next().unwrap();
+    let share = |name: &str| {
+        let found = words.split(", ").find_map(|word| word.strip_prefix(name)).unwrap_or_else(|| panic!("{words}"));
+        found.trim_end_matches('%').trim().parse::<f64>().unwrap()
+    };
+    // The chord error holds the feed down along most of it; something binds nearly everywhere.
+    assert!(share("chord error") > 15.0 && share("acceleration") > 10.0 && share("none of these") < 30.0, "{words}");
+    let plain = Scenario::text("F600 G1 X1\n").on(&machine).with(&["--report", &path]).run();
+    assert_eq!(plain.status(), 0, "{}", plain.errors());
+    assert!(!std::fs::read_to_string(&page).unwrap().contains("curvature of the curve"));
+}

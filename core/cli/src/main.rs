@@ -13,6 +13,7 @@ mod built_in;
 mod calibrate;
 mod check;
 mod corners;
+mod curves;
 mod estimate;
 mod home;
 mod identify;

@@ -9,6 +9,7 @@ use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport};
 
 use crate::corners::Corners;
+use crate::curves::Curves;
 use crate::tolerances::Tolerances;
 
 /// Keeps every sample in memory: about 150 bytes a sample for three axes.
@@ -17,6 +18,7 @@ pub struct Collector {
     axes: Axes,
     deviation_mm: Vec<f64>,
     corners: Corners,
+    curves: Curves,
     tolerances: Tolerances,
 }
 
@@ -39,12 +41,20 @@ impl Collector {
             ..Report::default()
         };
         let tolerances = Tolerances::new(machine.motion.path_tolerance_mm);
-        Self { report, axes: machine.axes, deviation_mm: vec![], corners: Corners::default(), tolerances }
+        Self {
+            report,
+            axes: machine.axes,
+            deviation_mm: vec![],
+            corners: Corners::default(),
+            curves: Curves::new(machine),
+            tolerances,
+        }
     }
 
     /// A block is planned for good.
     pub fn block(&mut self, block: &Block, report: &BlockReport) {
         self.corners.block(block, report);
+        self.curves.block(block);
         self.tolerances.block(block);
     }
 
@@ -59,6 +69,7 @@ impl Collector {
         samples.programmed_feed_mm_s.push(if programmed.is_finite() { programmed } else { f64::NAN });
         self.deviation_mm.push(deviation_mm);
         self.corners.sample(sample);
+        self.curves.sample(sample);
         self.tolerances.sample(sample);
         push(&mut samples.command, &sample.command, &self.axes);
         push(&mut samples.feedback, &sample.feedback, &self.axes);
@@ -72,6 +83,9 @@ impl Collector {
         self.report.samples.deviation_mm = Some(self.deviation_mm);
         self.report.facts = facts(summary);
         self.report.signals.extend(self.corners.signals());
+        let (curves, chord_share) = self.curves.signals();
+        self.report.signals.extend(curves);
+        self.report.samples.chord_share = chord_share;
         let (most_mm, each_mm) = self.tolerances.of_run_mm();
         (self.report.path_tolerance_mm, self.report.samples.tolerance_mm) = (Some(most_mm), each_mm);
         let mut out = Output::create(path)?;

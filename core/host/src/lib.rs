@@ -5,6 +5,7 @@
 
 mod command;
 mod command_log;
+mod curve_watch;
 mod dry_run;
 mod error;
 mod fault_text;
@@ -36,6 +37,7 @@ mod virtual_clock;
 mod wall_clock;
 
 pub use command::{Command, Timed};
+pub use curve_watch::{CurveWatch, OnCurve};
 pub use error::HostError;
 pub use joints::JointPeaks;
 pub use lateness::{Lateness, Row};

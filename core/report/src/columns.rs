@@ -123,6 +123,7 @@ fn check(report: &Report) -> io::Result<()> {
     }
     let needed = samples.command.iter().chain([&samples.feed_mm_s]).chain(report.signals.iter().map(|s| &s.values));
     let optional = samples.feedback.iter().chain([&samples.sigma, &samples.programmed_feed_mm_s]);
+    let optional = optional.chain(&samples.chord_share);
     let optional = optional.filter(|column| !column.is_empty());
     let lengths = needed.chain(optional).chain(&samples.deviation_mm).chain(&samples.tolerance_mm).map(Vec::len);
     match lengths.chain([samples.line.len()]).find(|&length| length != n) {

@@ -113,6 +113,9 @@ pub struct Samples {
     pub programmed_feed_mm_s: Vec<f64>,
     /// Distance from the programmed path, in mm; `None` where nobody measured it.
     pub deviation_mm: Option<Vec<f64>>,
+    /// Path speed as a share of what the chord error of a fine period allows, on curves; NaN elsewhere, `None` where there are
+    /// none.
+    pub chord_share: Option<Vec<f64>>,
     /// How far each sample may lie from the path, mm; `None` where it is the same for all.
     pub tolerance_mm: Option<Vec<f64>>,
 }

@@ -66,7 +66,7 @@ struct About<'a> {
     signals: Vec<AboutSignal<'a>>,
     path_tolerance_mm: Option<f64>,
     jerk_is_judged: bool,
-    binding: [&'static str; 5],
+    binding: [&'static str; binding::LIMITS],
 }
 
 #[derive(Serialize)]

@@ -1,7 +1,7 @@
 //! Every limit on the samples of the fine period.
 
 use tandem_motion::nurbs::AlongPath;
-use tandem_sdk::{AxisVector, BlockKind};
+use tandem_sdk::{AxisVector, BlockKind, LimitedBy};
 
 use super::relief::{Relief, Reliefs};
 use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
@@ -16,6 +16,15 @@ const CHORD: f64 = 1.005;
 /// Share of the jerk limit that a motion may reach at any point: the fine loop looks at single points of a period.
 pub const POINT: f64 = 1.004;
 
+/// What may bind, in the order in which it is asked for, and the share of what is allowed from which on it does.
+pub const BINDS: [(LimitedBy, f64); 5] = [
+    (LimitedBy::Feed, 0.99),
+    (LimitedBy::Velocity, 0.985),
+    (LimitedBy::Acceleration, 0.95),
+    (LimitedBy::Jerk, 0.9),
+    (LimitedBy::Tolerance, 0.98),
+];
+
 /// Where a motion has no value the speed is lowered on so much of the path, mm.
 const LOST_MM: f64 = 0.05;
 
@@ -25,6 +34,8 @@ pub struct Worst {
     pub speed: f64,
     pub acceleration: f64,
     pub jerk: f64,
+    /// Of one sample: what is used up there.
+    pub bound: Option<LimitedBy>,
 }
 
 impl Worst {
@@ -57,6 +68,7 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
     let Job { route, bounds, start, .. } = job;
     window.samples.clear();
     window.samples.extend(start.history);
+    window.bounds.clear();
     window.first_tick_s = start.first_tick_s;
     (window.stop_mm_per_s2, window.stop_mm_per_s3, window.most_mm_per_s) = (f64::INFINITY, f64::INFINITY, 0.0);
     let (period_s, duration_s, known) = (bounds.context.fine_period_s, window.duration_s(), reliefs.count());
@@ -76,6 +88,7 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
         window.samples.push(at.position);
         let first = if count == 0 { state.s_mm } else { before_mm[2] };
         let here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
+        window.bounds.push(here.bound);
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.
             let beside_mm = if here.speed > 1.0 { state.s_mm - first } else { 0.0 };
@@ -109,14 +122,18 @@ fn compare(
 ) -> Worst {
     let rapid = leg.block.kind == BlockKind::Rapid;
     let mut here = differences(bounds, samples, rapid);
+    let (velocity, feed, mut chord_share) = (here.speed, state.speed_mm_per_s / leg.feed_mm_per_s, 0.0);
     let mean_mm_per_s = (state.s_mm - before_mm) / bounds.context.fine_period_s;
     here.speed = here.speed.max(state.speed_mm_per_s.max(mean_mm_per_s) / (leg.feed_mm_per_s * (1.0 - 1e-9)));
     if before_mm < state.s_mm && !rapid {
         let curved = leg.course.counted_length(&at.curvature);
         let chord = chord_error_mm(route, bounds, (before_mm, state.s_mm), samples, curved);
         // The chord error goes with the square of the speed.
-        here.speed = here.speed.max((chord / (CHORD * bounds.chord_error_mm)).sqrt());
+        chord_share = (chord / (CHORD * bounds.chord_error_mm)).sqrt();
+        here.speed = here.speed.max(chord_share);
     }
+    let shares = [feed, velocity, here.acceleration, here.jerk, chord_share];
+    here.bound = BINDS.iter().zip(shares).find(|((_, from), share)| share > from).map(|((bound, _), _)| *bound);
     here
 }
 

@@ -266,12 +266,10 @@ impl<P: Planning> Streamer<P> {
         let driven_mm = end.s_mm - state.s_mm;
         let beyond_mm = (end_mm - end.s_mm).max(0.0);
         let time_s = (until_s - from_s) * if beyond_mm > 1e-9 { (driven_mm + beyond_mm) / driven_mm } else { 1.0 };
-        let limited_by = match peak {
-            v if v > 0.995 * leg.feed_mm_per_s && leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s => {
-                LimitedBy::Policy
-            }
-            v if v > 0.995 * leg.feed_mm_per_s => LimitedBy::Feed,
-            _ => LimitedBy::Jerk,
+        let capped = leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s;
+        let limited_by = match window.bound((from_s, until_s), self.bounds.context.fine_period_s) {
+            Some(LimitedBy::Feed) if capped => LimitedBy::Policy,
+            bound => bound.unwrap_or(LimitedBy::Jerk),
         };
         report(&leg.block, limited_by, [state.speed_mm_per_s, peak, end.speed_mm_per_s], time_s)
     }

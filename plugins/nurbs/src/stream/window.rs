@@ -1,7 +1,8 @@
 //! A planned window: the path coordinate over time, from a state to rest.
 
-use tandem_sdk::AxisVector;
+use tandem_sdk::{AxisVector, LimitedBy};
 
+use super::check::BINDS;
 use super::{Motion, State};
 
 /// Sums up the durations of intervals into the times at their ends.
@@ -32,6 +33,8 @@ pub struct Window<M> {
     /// Positions at the ticks of the fine period: three before its start, then from `first_tick_s` on.
     pub samples: Vec<AxisVector>,
     pub first_tick_s: f64,
+    /// What binds at the ticks from that one on.
+    pub bounds: Vec<Option<LimitedBy>>,
     /// Path deceleration and path jerk that are left everywhere in it, mm/s² and mm/s³, and its highest speed.
     pub stop_mm_per_s2: f64,
     pub stop_mm_per_s3: f64,
@@ -43,8 +46,19 @@ impl<M: Motion> Window<M> {
     pub fn take_all_but_motion<N>(&mut self, other: &mut Window<N>) {
         std::mem::swap(&mut self.times, &mut other.times);
         std::mem::swap(&mut self.samples, &mut other.samples);
+        std::mem::swap(&mut self.bounds, &mut other.bounds);
         (self.whole, self.first_tick_s, self.most_mm_per_s) = (other.whole, other.first_tick_s, other.most_mm_per_s);
         (self.stop_mm_per_s2, self.stop_mm_per_s3) = (other.stop_mm_per_s2, other.stop_mm_per_s3);
+    }
+
+    /// What binds most of the ticks between two times; none where nothing does.
+    pub fn bound(&self, (from_s, to_s): (f64, f64), period_s: f64) -> Option<LimitedBy> {
+        let tick = |t_s: f64| ((t_s - self.first_tick_s) / period_s).ceil().max(0.0) as usize;
+        let to = tick(to_s).min(self.bounds.len());
+        let inside = &self.bounds[tick(from_s).min(to)..to];
+        let count = |bound: &LimitedBy| inside.iter().filter(|each| **each == Some(*bound)).count();
+        let kinds = BINDS.iter().map(|(bound, _)| *bound).filter(|bound| count(bound) > 0);
+        kinds.max_by_key(count)
     }
 
     pub fn duration_s(&self) -> f64 {
