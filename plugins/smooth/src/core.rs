@@ -23,7 +23,7 @@ const BEFORE: usize = 16;
 /// A turn by more than this ends a window that is cut short.
 const CUT: f64 = 0.25;
 /// Time at the programmed feed that is held, in windows and beyond that, s.
-const HELD: (f64, f64) = (2.0, 0.5);
+const HELD: (f64, f64) = (1.2, 0.3);
 
 /// The planner for machines of at most `L` axes. Rough loop; allocates while its memory grows to the size of a window.
 #[derive(Debug)]
