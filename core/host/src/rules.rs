@@ -73,3 +73,26 @@ pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostEr
     };
     HostError::Setup { place, cause: cause.into() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A planner that breaks limits, such as the published feed of `nurbs`, runs on simulated drives that count only.
+    #[test]
+    fn a_planner_that_breaks_limits_moves_no_metal() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let planner = PlannerDescription { breaks_limits: 1, ..PlannerDescription::order_2() };
+        for (guard, driver, runs) in [
+            ("count", DriverDescription::simulated(), true),
+            ("stop", DriverDescription::simulated(), false),
+            ("count", DriverDescription::real(), false),
+            ("stop", DriverDescription::real(), false),
+        ] {
+            let set = ("guard.mode".to_string(), guard.to_string());
+            let machine = Machine::read(&path, &[set]).unwrap();
+            let answer = check(&machine, &planner, driver);
+            assert_eq!(answer.is_ok(), runs, "{guard} {driver:?}: {:?}", answer.err().map(|e| e.to_string()));
+        }
+    }
+}
