@@ -2,12 +2,12 @@
 
 use proptest::prelude::*;
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
-use tandem_sdk::AxisVector;
+use tandem_sdk::{Axes, AxisVector, NurbsData};
 
 use crate::common::{axes, circle, curve, distance};
 use crate::independent::any_curve;
 
-fn made(data: &tandem_sdk::NurbsData) -> Option<Nurbs> {
+fn made(data: &NurbsData) -> Option<Nurbs> {
     Nurbs::new(data, &axes()).ok()
 }
 
@@ -107,6 +107,25 @@ proptest! {
         prop_assert!((size(&at.direction) - 1.0).abs() < 1e-12);
         let curvature = curve.curvature(&curve.derivatives_in(span, u)).unwrap();
         prop_assert!((curvature - size(&at.curvature)).abs() <= 1e-9 * (1.0 + size(&at.curvature)));
+    }
+
+    /// Curves in the first three axes are evaluated with half the lanes of others.
+    #[test]
+    fn other_axes_have_the_same_curve(data in any_curve(), share in 0.0..1.0f64) {
+        let Some(curve) = made(&data) else { return Ok(()) };
+        let away = |v: &AxisVector| AxisVector::from_slice(&[0.0, 0.0, 0.0, v[0], v[1], v[2]]);
+        let moved = NurbsData { control_points: data.control_points.iter().map(away).collect(), ..data.clone() };
+        let letters = ['X', 'Y', 'Z', 'U', 'V', 'W'].map(|letter| (letter, false));
+        let moved = Nurbs::new(&moved, &Axes::new(&letters).unwrap()).unwrap();
+        let (span, u, _) = inside(&curve, share);
+        let [here, there] = [&curve, &moved].map(|curve| curve.derivatives_in(span, u));
+        prop_assert_eq!(away(&here.position), there.position);
+        prop_assert_eq!(away(&here.third), there.third);
+        prop_assert_eq!(curve.speed_in(span, u), moved.speed_in(span, u));
+        let along = [&curve, &moved].map(|curve| curve.along_path_in(span, u).map(|at| (at.third, at.parameter)));
+        prop_assert_eq!(along[0].map(|(third, parameter)| (away(&third), parameter)), along[1]);
+        let speed = curve.speed_in(span, u);
+        prop_assert!((speed - curve.counted_length(&here.first)).abs() <= 1e-9 * (1.0 + speed));
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod along;
 
 use along::{Along, retimed};
 use proptest::prelude::*;
-use tandem_motion::retime::LaneLimits;
+use tandem_motion::retime::{Between, End, LaneLimits, PLACES, Point, Retimer, Task};
 
 const FEED: f64 = 250.0;
 
@@ -53,6 +53,27 @@ fn a_tight_turn_uses_the_jerk_that_there_is() {
     let speeds = done.speeds();
     let middle = speeds[speeds.len() / 2];
     assert!(middle <= 2f64.sqrt() * steady && middle > 0.9 * steady, "{middle} {steady}");
+}
+
+/// What is asked for between the places of the grid is kept there, and changes nothing far from it.
+#[test]
+fn places_between_those_of_the_grid_count() {
+    let mut steady = Point { most: 1.5, ..Point::default() };
+    steady.first[0] = 100.0;
+    let points = vec![[steady; PLACES]; 80];
+    let ends = (End::Moving, End::Moving);
+    let mut retimer = Retimer::default();
+    let mut solve = |between: &[Between]| {
+        let task = Task { points: &points, between, limits: limits(1), jerk_share: 1.0, step_s: 2e-3, ends };
+        let status = retimer.solve(&task);
+        assert!(status.is_feasible(), "{status:?}");
+        [0.2, 0.5, 0.9].map(|z| retimer.rate.at(40, z, 2e-3)[0])
+    };
+    let free = solve(&[]);
+    assert!(free.iter().all(|b| *b > 1.45), "{free:?}");
+    let slow = Point { most: 0.8, ..steady };
+    let held = solve(&[Between { interval: 40, z: [0.2, 0.5, 0.9], points: [slow; PLACES] }]);
+    assert!(held.iter().all(|b| *b < 0.8 * 1.002 && *b > 0.78), "{held:?}");
 }
 
 proptest! {
