@@ -1,5 +1,7 @@
 //! Plugins from shared libraries.
 
+mod whole;
+
 use std::ffi::{CString, OsStr};
 use std::path::Path;
 
@@ -16,7 +18,7 @@ const ANY_VERSION: &str = "tandem_plugin_v";
 /// anywhere. Host, outside the loops.
 ///
 /// # Errors
-/// There is no such file; it is no library, or none with plugins; it was built against another contract.
+/// There is no such file; it is no library, cut off, or none with plugins; it was built against another contract.
 pub fn load(path: &Path) -> Result<Vec<Plugin>, String> {
     // The system's loader looks for a bare name in folders of its own.
     let path = std::path::absolute(path).map_err(|e| e.to_string())?;
@@ -26,6 +28,7 @@ pub fn load(path: &Path) -> Result<Vec<Plugin>, String> {
     if !path.is_file() {
         return Err("there is no such file".to_string());
     }
+    whole::check(&path)?;
     // SAFETY: loading runs the library's initialisers; who names a plugin in machine.toml trusts it with the machine.
     let library = unsafe { Library::new(&path) }.map_err(|e| format!("it cannot be loaded: {}", cause(&e)))?;
     let library: &'static Library = Box::leak(Box::new(library));

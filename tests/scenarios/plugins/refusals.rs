@@ -54,6 +54,9 @@ fn what_is_no_plugin() {
     let text = folder.path().join("libtext.so");
     std::fs::write(&text, "not a library").unwrap();
     expect("driver.plugin", &text, "it cannot be loaded: ");
+    let cut = folder.path().join("libcut.so");
+    std::fs::write(&cut, &std::fs::read(third_party("one-block")).unwrap()[..20_000]).unwrap();
+    expect("planner.plugin", &cut, "it is cut off: 20000 bytes, of at least ");
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
     let library = maps.lines().find_map(|line| line.split_whitespace().last().filter(|path| path.contains("libc.so")));
     expect("planner.plugin", Path::new(library.unwrap()), "it is no Tandem plugin: it does not export");
