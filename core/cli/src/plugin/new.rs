@@ -27,6 +27,13 @@ max_acceleration_mm_per_s2 = 1500
 [joints.z]
 axis = \"z\"";
 
+/// Names with which a crate or its test does not compile: Rust's keywords, its own crates, and those of Tandem that a plugin
+/// uses.
+const TAKEN: &str = "\
+    abstract alloc as async await become box break const continue core crate do dyn else enum extern false final fn for gen \
+    if impl in let loop macro match mod move mut override priv proc-macro pub ref return self static std struct super \
+    tandem-conformance tandem-sdk test trait true try type typeof unsafe unsized use virtual where while yield";
+
 /// Makes a crate with a first plugin of `kind` in the folder `folder`; `sdk` is where Tandem's source is.
 pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
     let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -34,6 +41,12 @@ pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(plain) {
         let rule = "the name of a plugin has the characters a-z, 0-9 and - only, and begins with a letter";
         return Err(format!("{}: {rule}", folder.display()));
+    }
+    if TAKEN.split_whitespace().any(|taken| taken == name) {
+        return Err(format!(
+            "{}: no crate with a test can be called {name}: the name is Rust's or Tandem's",
+            folder.display()
+        ));
     }
     if folder.exists() {
         return Err(format!("{}: is there already", folder.display()));
@@ -73,16 +86,16 @@ fn files(kind: Kind) -> Vec<(&'static str, &'static str)> {
     files
 }
 
-/// A template with everything in its place. The planner and the kinematics are the examples of the tests.
+/// A template with everything in its place. The planner and the kinematics are the examples of the tests, whose name gives
+/// way too.
 fn filled(text: &str, name: &str, kind: Kind, source: &Source) -> String {
-    let (words, section, options) = match kind {
-        Kind::Planner => ("planner", "planner", "acceleration_share = 0.8"),
-        Kind::FeedStrategy => ("feed strategy", "feed_strategy", "most_current_a = 6"),
-        Kind::Driver => ("driver", "driver", "# this one has none"),
-        Kind::Kinematics => ("kinematics", "kinematics", JOINTS),
+    let (words, section, example, options) = match kind {
+        Kind::Planner => ("planner", "planner", "one-block", "acceleration_share = 0.8"),
+        Kind::FeedStrategy => ("feed strategy", "feed_strategy", "NAME", "most_current_a = 6"),
+        Kind::Driver => ("driver", "driver", "NAME", "# this one has none"),
+        Kind::Kinematics => ("kinematics", "kinematics", "core-xy", JOINTS),
     };
-    text.replace("one-block", name)
-        .replace("core-xy", name)
+    text.replace(example, "NAME")
         .replace("NAME", name)
         .replace("CRATE", &name.replace('-', "_"))
         .replace("KIND", words)
@@ -144,6 +157,26 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_with_which_nothing_compiles_is_refused() {
+        for name in ["fn", "test", "core", "tandem-sdk"] {
+            let refusal = new(&std::env::temp_dir().join("no-such-folder").join(name), Kind::Driver, None).unwrap_err();
+            assert!(refusal.ends_with("the name is Rust's or Tandem's"), "{refusal}");
+        }
+    }
+
+    #[test]
+    fn a_name_that_holds_that_of_an_example_stays() {
+        let source = Source::Git("https://example.org/tandem.git".to_string());
+        for (kind, name) in
+            [(Kind::Planner, "core-xy-2"), (Kind::Planner, "one-block-2"), (Kind::Kinematics, "core-xy-2")]
+        {
+            let (_, text) = files(kind).into_iter().find(|(file, _)| *file == "src/lib.rs").unwrap();
+            let text = filled(text, name, kind, &source);
+            assert!(text.contains(&format!(" \"{name}\" =")) && !text.contains("NAME"), "{text}");
+        }
+    }
 
     #[test]
     fn the_sdk_is_found_by_folder_or_by_url() {
