@@ -56,6 +56,8 @@ fn main() -> ExitCode {
         Command::Plugin(command) => plugin::plugin(&command),
         Command::Latency(options) => latency::latency(&options),
     };
+    // What plugins said before something was refused, or after the last run.
+    tandem_host::drain_plugin_log(&mut |line| say!("{line}"));
     ExitCode::from(status.unwrap_or_else(|error| {
         say!("{error}");
         REFUSED

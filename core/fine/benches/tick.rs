@@ -37,7 +37,9 @@ impl Driver for Echo {
         Ok(())
     }
     fn quick_stop(&mut self) {}
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// A fine loop with a queue that lasts for [`TICKS`] ticks and a few more.

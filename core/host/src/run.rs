@@ -9,7 +9,7 @@ use tandem_gcode::{CheckReport, Program, Stream, check};
 use tandem_machine::{JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
-use tandem_sdk::{AxisVector, Block, Driver, Planner};
+use tandem_sdk::{AxisVector, Block, Driver, Planner, PluginError};
 
 use crate::command::Timed;
 use crate::error::HostError;
@@ -303,12 +303,24 @@ impl Run {
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = self.switches.home || fine.joints_went_alone();
         let position = if sent { fine.sent() } else { pump.monitor.position };
-        fine.into_driver().stop();
+        let stopped = fine.into_driver().stop();
         drop(pump);
+        if let Err(error) = stopped {
+            not_let_go(&machine, &error, &mut summary, observer);
+        }
         // What plugins say when they are stopped and dropped.
         drain_plugin_log(&mut |line| observer.note(line));
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault, position })
+    }
+}
+
+/// The driver could not release the drives: that is the fault of a run that has no other, and is told beside any other.
+fn not_let_go(machine: &Machine, error: &PluginError, summary: &mut Summary, observer: &mut dyn RunObserver) {
+    let words = format!("driver {}: the drives were not let go of: {error}", machine.driver.plugin);
+    match &summary.fault {
+        None => summary.fault = Some(words),
+        Some(_) => observer.note(&format!("error: {words}")),
     }
 }
 

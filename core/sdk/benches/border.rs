@@ -33,7 +33,9 @@ impl Driver for Counter {
         Ok(())
     }
     fn quick_stop(&mut self) {}
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// Calls of one measurement.

@@ -30,7 +30,9 @@
 //!
 //!     fn quick_stop(&mut self) {}
 //!
-//!     fn stop(&mut self) {}
+//!     fn stop(&mut self) -> Result<(), PluginError> {
+//!         Ok(())
+//!     }
 //! }
 //!
 //! let mut driver = Echo { joints: 0 };
@@ -249,6 +251,9 @@ pub trait Driver: Send {
     /// Bring the drives to rest by their own means, now. Fine loop: no allocation.
     fn quick_stop(&mut self);
 
-    /// The loops have ended: release the hardware. Host.
-    fn stop(&mut self);
+    /// The loops have ended: release the hardware. Host; may allocate.
+    ///
+    /// # Errors
+    /// What could not be released or written: a run that was good so far ends with this as its fault.
+    fn stop(&mut self) -> Result<(), PluginError>;
 }

@@ -289,8 +289,9 @@ impl Driver for SimulatedDrives {
         self.quick_stopping = self.life == Life::Running;
     }
 
-    fn stop(&mut self) {
+    fn stop(&mut self) -> Result<(), PluginError> {
         self.life = Life::Closed;
         self.quick_stopping = false;
+        Ok(())
     }
 }

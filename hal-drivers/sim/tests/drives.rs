@@ -138,7 +138,7 @@ fn calls_out_of_order_are_refused_with_the_state() {
     driver.start().unwrap();
     assert!(driver.start().unwrap_err().to_string().contains("running"));
     exchange(&mut *driver, &Setpoint::default());
-    driver.stop();
+    driver.stop().unwrap();
     assert!(refused(&mut *driver).contains("closed"));
     driver.open(&DriverContext::new(2, PERIOD_S)).unwrap();
     driver.start().unwrap();

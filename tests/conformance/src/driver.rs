@@ -50,11 +50,11 @@ fn judge_order(plugin: Plugin, setup: &Setup, report: &mut Report) {
         ("open", driver.open(&context())),
         ("exchange before start", driver.exchange(&Setpoint::default(), &mut feedback)),
         ("start", driver.start()),
+        ("stop", driver.stop()),
+        ("stop once more", driver.stop()),
+        ("exchange after stop", driver.exchange(&Setpoint::default(), &mut feedback)),
     ];
-    driver.stop();
-    driver.stop();
-    let after = ("exchange after stop", driver.exchange(&Setpoint::default(), &mut feedback));
-    for (what, answer) in answers.into_iter().chain([after]) {
+    for (what, answer) in answers {
         if let Err(error) = answer
             && error.is_panic()
         {
@@ -92,7 +92,7 @@ fn live(driver: &mut dyn Driver, report: &mut Report, timing: &mut Timing) -> Op
         answer.map_err(|error| fail(&format!("exchange, period {tick}"), error)).ok()?;
         life.look(tick);
     }
-    driver.stop();
+    driver.stop().map_err(|error| fail("stop", error)).ok()?;
     life.judge(report);
     Some(life.bits)
 }

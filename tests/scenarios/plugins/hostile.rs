@@ -151,10 +151,26 @@ fn a_panic_in_quick_stop_is_told_beside_the_fault() {
     assert_within_limits_to_rest(&done, &mischief);
 }
 
+/// A run that is good so far has not ended well where the drives are not let go of.
+#[test]
+fn drives_that_are_not_let_go_of_are_a_fault() {
+    for (misbehave, words) in [("panic", "hostile panicked in stop"), ("fail", "it fails as it was told")] {
+        let mischief = Mischief::of("driver", misbehave, "stop", 1);
+        let done = command(&mischief, PROGRAM, "", &[]);
+        assert_eq!(done.status(), 3, "{mischief}: {}", done.errors());
+        let fault = done.summary()["fault"].as_str().unwrap().to_string();
+        assert!(fault.contains("not let go of") && fault.contains(words), "{mischief}: {fault}");
+        assert_within_limits_to_rest(&done, &mischief);
+        let done = command(&mischief, PROGRAM, "300,emergency-stop\n", &[]);
+        assert!(done.summary()["fault"].as_str().unwrap().contains("emergency stop"), "{}", done.summary()["fault"]);
+        assert!(done.errors().contains(words), "{mischief}: {}", done.errors());
+    }
+}
+
 #[test]
 fn a_panic_behind_the_end_is_told() {
     for (section, method) in
-        [("driver", "stop"), ("driver", "drop"), ("planner", "drop"), ("feed_strategy", "drop"), ("kinematics", "drop")]
+        [("driver", "drop"), ("planner", "drop"), ("feed_strategy", "drop"), ("kinematics", "drop")]
     {
         let mischief = Mischief::of(section, "panic", method, 1);
         let identity = ["--set", "joints={x={axis='x'},y={axis='y'},z={axis='z'}}"];
@@ -162,6 +178,17 @@ fn a_panic_behind_the_end_is_told() {
         assert_eq!(done.status(), 0, "{mischief}: {}", done.errors());
         assert!(done.errors().contains(&format!("hostile panicked in {method}")), "{mischief}: {}", done.errors());
         assert_within_limits_to_rest(&done, &mischief);
+    }
+}
+
+/// Nothing is driven, and what plugins say is told all the same.
+#[test]
+fn a_panic_before_a_refusal_is_told() {
+    let mischief = Mischief::of("driver", "panic", "drop", 1);
+    let done = command(&mischief, PROGRAM, "", &["--set", "feed_strategy.plugin=none"]);
+    assert_eq!(done.status(), 1, "{}", done.errors());
+    for words in ["no feed strategy is called", "hostile panicked in drop"] {
+        assert!(done.errors().contains(words), "{words}: {}", done.errors());
     }
 }
 
@@ -276,6 +303,7 @@ fn the_conformance_kit_finds_it_out() {
         ("panic", "update", "panicked in update"),
         ("panic", "to_joints", "panicked in to_joints"),
         ("panic", "quick_stop", "panicked in quick_stop"),
+        ("fail", "stop", "FAILED lifecycle"),
         ("not-a-number", "advance", "not finite"),
         ("not-a-number", "update", "ratio in range"),
         ("beyond", "update", "ratio in range"),
@@ -284,7 +312,7 @@ fn the_conformance_kit_finds_it_out() {
         ("endless", "advance", "emits without end"),
         ("order", "advance", "FAILED reports"),
     ] {
-        let mischief = Mischief::of("any", misbehave, method, if method == "quick_stop" { 1 } else { 7 });
+        let mischief = Mischief::of("any", misbehave, method, if method.ends_with("stop") { 1 } else { 7 });
         let (status, out) = check(&mischief);
         assert!(status == Some(1) && out.contains(words), "{mischief}: {status:?}\n{out}");
     }

@@ -166,7 +166,9 @@ impl Driver for Drives {
         Ok(())
     }
     fn quick_stop(&mut self) {}
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// Joint 0 is x + y²/1000.

@@ -20,7 +20,6 @@ pub fn check(library: &Path, options: &[(String, String)], setup: &Setup) -> Res
             status = REFUSED;
         }
     }
-    tandem_host::drain_plugin_log(&mut |line| say!("{line}"));
     Ok(status)
 }
 

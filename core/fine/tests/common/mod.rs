@@ -45,7 +45,9 @@ impl Driver for Echo {
 
     fn quick_stop(&mut self) {}
 
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// The fine loop under test.

@@ -138,7 +138,9 @@ impl Driver for Echo {
         Ok(())
     }
     fn quick_stop(&mut self) {}
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// The fine loop with the whole plan queued.

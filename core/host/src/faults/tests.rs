@@ -34,8 +34,9 @@ impl Driver for Scribe {
     fn quick_stop(&mut self) {
         self.0.lock().unwrap().push(1000);
     }
-    fn stop(&mut self) {
+    fn stop(&mut self) -> Result<(), PluginError> {
         self.0.lock().unwrap().push(2000);
+        Err(PluginError::fixed("the brake is not on"))
     }
 }
 
@@ -130,7 +131,7 @@ fn the_rest_passes_through_and_starting_again_starts_again() {
     let (mut driver, ticks) = wrapped("[[wrap]]\nkind = \"fail\"\nat_call = 1\n");
     assert_eq!(driver.describe(), DriverDescription::real());
     driver.quick_stop();
-    driver.stop();
+    assert_eq!(driver.stop().unwrap_err().to_string(), "the brake is not on");
     assert_eq!(*ticks.lock().unwrap(), [1000, 2000]);
     for _ in 0..2 {
         driver.start().unwrap();

@@ -101,7 +101,7 @@ impl Driver for Wrapper {
         self.inner.quick_stop();
     }
 
-    fn stop(&mut self) {
-        self.inner.stop();
+    fn stop(&mut self) -> Result<(), PluginError> {
+        self.inner.stop()
     }
 }

@@ -101,7 +101,9 @@ impl Driver for Recorder {
         if exchanges == self.0.fails_at { Err(PluginError::fixed("the wire is cut")) } else { Ok(()) }
     }
     fn quick_stop(&mut self) {}
-    fn stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
 }
 
 /// Velocity and acceleration of the drives of [`ARM`], mm or rad.

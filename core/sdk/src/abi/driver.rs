@@ -115,11 +115,7 @@ unsafe extern "C" fn quick_stop<T: Driver>(this: *mut c_void, answer: *mut (), e
 
 unsafe extern "C" fn stop<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
     let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    let work = || {
-        plugin.stop();
-        Ok(())
-    };
-    unsafe { fault.guard("stop", answer, error, work) }
+    unsafe { fault.guard("stop", answer, error, || plugin.stop()) }
 }
 
 /// The host's side: a driver behind its table.
@@ -164,10 +160,7 @@ impl Driver for Linked {
         }
     }
 
-    fn stop(&mut self) {
-        // Nothing is asked of it any more that could tell.
-        if let Err(error) = ask(|answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) }) {
-            crate::log!(Error, "the driver did not stop: {error}");
-        }
+    fn stop(&mut self) -> Result<(), PluginError> {
+        ask(|answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) })
     }
 }

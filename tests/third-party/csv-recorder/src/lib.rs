@@ -39,10 +39,9 @@ impl Driver for Recorder {
 
     fn quick_stop(&mut self) {}
 
-    fn stop(&mut self) {
+    fn stop(&mut self) -> Result<(), PluginError> {
         let row = |s: &Setpoint| format!("{},{:?}\n", s.tick, &s.position.0[..self.1.joint_count as usize]);
-        if let Err(error) = std::fs::write(&self.0.file, self.2.iter().map(row).collect::<String>()) {
-            tandem_sdk::log!(Error, "{}: {error}", self.0.file);
-        }
+        let written = std::fs::write(&self.0.file, self.2.iter().map(row).collect::<String>());
+        written.map_err(|error| PluginError::new(format!("{}: {error}", self.0.file)))
     }
 }

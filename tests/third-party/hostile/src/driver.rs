@@ -46,7 +46,7 @@ impl Driver for Hostile {
         self.0.quietly("quick_stop");
     }
 
-    fn stop(&mut self) {
-        self.0.quietly("stop");
+    fn stop(&mut self) -> Result<(), PluginError> {
+        self.0.of("stop").map(|_| ())
     }
 }
