@@ -241,6 +241,16 @@ fn smooth_holds_in_zigzags() {
     });
 }
 
+/// Corners of 90 degrees at the end of long lines, where resuming takes as long as the plan has jerk to spare.
+#[test]
+fn smooth_holds_on_the_square() {
+    let bench = Bench::of(&root().join("examples/programs/square.ngc")).on(&machine());
+    let free = bench.run("");
+    for_each_tick("smooth_holds_on_the_square", (2..free.samples.len() - 1).step_by(3), |tick| {
+        check(&bench, &bench.run(&format!("{tick},hold\n{},resume", tick + 400)))
+    });
+}
+
 /// The largest jerk of the samples as a share of the limit.
 fn jerk_share(ran: &Ran) -> f64 {
     let third = |w: &[Sample], axis: usize| {

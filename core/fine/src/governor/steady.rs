@@ -15,6 +15,8 @@ const JERK_MARGIN: f64 = 0.997;
 const BEGUN: f64 = -0.003;
 /// What a way that goes on may use more.
 const GOES_ON: f64 = 5e-4;
+/// Shares with which a way that was begun is tried again.
+const GOING_ON: [f64; 4] = [BEGUN, BEGUN + 2e-4, 0.0, GOES_ON];
 /// Program time that is none, s.
 const NONE_S: f64 = 1e-9;
 /// Tries between the σ̈ wanted and the one that makes σ constant.
@@ -72,7 +74,12 @@ impl Governor {
                 bad = between;
             }
         }
-        found.or_else(|| steadies(good, GOES_ON).then_some(good))
+        // The way that was begun goes on: with other shares it would be another, and meet the plan at other places.
+        let goes_on = |more: f64| {
+            let change = self.range(&here, more, outlook)?.nearest(-self.rate_per_s / h);
+            steadies(change, more).then_some(change)
+        };
+        found.or_else(|| GOING_ON.into_iter().find_map(goes_on))
     }
 
     /// Whether σ becomes constant.
