@@ -160,6 +160,7 @@ impl<const L: usize> Core<L> {
 
     /// Chooses until when the window is driven: to its end where that is a rest of the program, else to where it is fastest.
     fn commit(&mut self) {
+        self.next.match_room(&self.window);
         let window = &mut self.window;
         let whole_s = window.duration_s();
         let (mut most, mut found) = (0.0, whole_s);

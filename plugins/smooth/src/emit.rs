@@ -95,14 +95,14 @@ impl Emitter {
     }
 
     /// Segments of `block` from here on.
-    fn begin_block(&mut self, block: &Block, merged_feed: f64) {
+    fn begin_block(&mut self, block: &Block) {
         self.blank = Segment::rest(&block.start, 0.0);
         (self.blank.block, self.blank.line, self.blank.order) = (block.index, block.line, 3);
         self.blank.flags = SegmentFlags::BLOCK_BEGINS;
         if block.kind == BlockKind::Rapid {
             self.blank.flags = self.blank.flags.with(SegmentFlags::RAPID);
         } else {
-            self.blank.feed_mm_per_s = block.command_feed_mm_per_s().max(merged_feed);
+            self.blank.feed_mm_per_s = block.command_feed_mm_per_s();
         }
     }
 }
@@ -127,8 +127,9 @@ impl<const L: usize> Core<L> {
         let mut ends = false;
         while let Some(leg) = self.route.front() {
             let end_s = if leg.end < self.window.end() - 1e-9 { self.window.time_of(leg.end) } else { f64::INFINITY };
-            self.begin_leg(from_s, end_s, merged_feed, sink);
-            // Blocks shorter than a fine period share a segment: it is named by the last of them.
+            self.begin_leg(from_s, end_s, sink);
+            // Blocks of which less than a fine period is left share a segment: it is named by the last of them, and has the
+            // highest of their feeds.
             let another = self.route.items.len() > 1;
             if end_s < from_s + period_s && another {
                 merged_feed = merged_feed.max(self.emitter.blank.feed_mm_per_s);
@@ -142,6 +143,7 @@ impl<const L: usize> Core<L> {
             break;
         }
         let mut segment = self.draw(k, from_s, until_s);
+        segment.feed_mm_per_s = segment.feed_mm_per_s.max(merged_feed);
         if ends {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
             self.pop_leg();
@@ -155,7 +157,7 @@ impl<const L: usize> Core<L> {
     }
 
     /// Gives the report of the leg in front, where that was not done.
-    fn begin_leg(&mut self, from_s: f64, end_s: f64, merged_feed: f64, sink: &mut dyn SegmentSink) {
+    fn begin_leg(&mut self, from_s: f64, end_s: f64, sink: &mut dyn SegmentSink) {
         let Some(leg) = self.route.front() else { return };
         if self.emitter.knows(&leg.block) {
             return;
@@ -165,7 +167,7 @@ impl<const L: usize> Core<L> {
         sink.block(&of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (start_s, to_s)));
         let block = leg.block;
         self.emitter.reported = Some(block.index);
-        self.emitter.begin_block(&block, merged_feed);
+        self.emitter.begin_block(&block);
     }
 
     fn pop_leg(&mut self) {

@@ -115,3 +115,9 @@ pub fn minus<const L: usize>(a: &Lanes<L>, b: &Lanes<L>) -> Lanes<L> {
 pub fn largest<const L: usize>(a: &Lanes<L>) -> f64 {
     a.iter().fold(0.0, |most, v| if v.abs() > most { v.abs() } else { most })
 }
+
+/// The smallest.
+#[inline(always)]
+pub fn smallest<const L: usize>(a: &Lanes<L>) -> f64 {
+    a.iter().fold(f64::INFINITY, |least, v| if *v < least { *v } else { least })
+}

@@ -6,7 +6,7 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, dot, largest, minus};
+use crate::frame::{Frame, dot, largest, minus, smallest};
 use crate::plan::Start;
 use crate::route::Run;
 use crate::sites::Timer;
@@ -16,8 +16,8 @@ use crate::window::{Bound, Piece, Stop, Window};
 const SPEED: f64 = 1.0;
 const ACCELERATION: f64 = 0.9995;
 const JERK: f64 = 1.003;
-/// Share of the feed from which on a piece is looked at more closely.
-const NEAR_FEED: f64 = 0.9988;
+/// Share of an acceleration limit from which on a piece is looked at between its quarters.
+const NEAR_ACCELERATION: f64 = 0.9;
 /// Share of the tolerance that samples at this phase may reach: at others it is a little more.
 const DEVIATION: f64 = 0.985;
 /// Below this share of the tolerance nothing nearer is looked for.
@@ -264,21 +264,53 @@ fn derivatives<const L: usize>(
             leave(stop, frame, &v, &a, squared.sqrt());
         }
     }
-    if reached.feed > NEAR_FEED {
-        reached.feed = peak_feed(piece, counted, feed, reached.jerk * largest(&frame.jerk));
+    if reached.acceleration > NEAR_ACCELERATION {
+        reached.acceleration = larger(reached.acceleration, peak_acceleration(piece, frame));
+    }
+    // What jerk can add to a speed between quarters.
+    let jerk = reached.jerk * largest(&frame.jerk);
+    let between = jerk * (t / 4.0).powi(2) / 8.0;
+    if reached.feed + between / feed > 1.0 || reached.speed + between / smallest(speed) > 1.0 {
+        (reached.feed, reached.speed) = peak_speeds(piece, counted, (feed, speed), jerk);
     }
     reached
 }
 
-/// The highest path speed of a piece as a share of its feed: at sixteenths, and what jerk can add between them.
-fn peak_feed<const L: usize>(piece: &Piece<L>, counted: &Lanes<L>, feed: f64, jerk: f64) -> f64 {
-    let step_s = piece.duration_s / 16.0;
+/// The highest acceleration inside a piece, as a share of the limit: where the jerk of a lane is zero.
+fn peak_acceleration<const L: usize>(piece: &Piece<L>, frame: &Frame<L>) -> f64 {
     let mut most = 0.0;
+    for l in 0..L {
+        let (a, half_b, c) = (60.0 * piece.c[5][l], 12.0 * piece.c[4][l], 6.0 * piece.c[3][l]);
+        let root = half_b * half_b - a * c;
+        if root < 0.0 {
+            continue;
+        }
+        // Of the two the one that loses no digits, and the other from the product of both.
+        let sum = -(half_b + root.sqrt().copysign(half_b));
+        for t in [sum / a, c / sum].into_iter().filter(|t| *t > 0.0 && *t < piece.duration_s) {
+            most = larger(most, piece.acceleration(t)[l].abs() / frame.acceleration[l]);
+        }
+    }
+    most
+}
+
+/// The highest path speed of a piece as a share of its feed, and the highest of a lane as a share of its limit: at
+/// sixteenths, and what jerk can add between them.
+fn peak_speeds<const L: usize>(
+    piece: &Piece<L>,
+    counted: &Lanes<L>,
+    (feed, speed): (f64, &Lanes<L>),
+    jerk: f64,
+) -> (f64, f64) {
+    let step_s = piece.duration_s / 16.0;
+    let between = jerk * step_s * step_s / 8.0;
+    let mut most = (0.0, 0.0);
     for n in 0..=16 {
         let v = piece.velocity(f64::from(n) * step_s);
-        most = larger(most, (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum());
+        most.0 = larger(most.0, (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum());
+        most.1 = (0..L).fold(most.1, |most, l| larger(most, (v[l].abs() + between) / speed[l]));
     }
-    (most.sqrt() + jerk * step_s * step_s / 8.0) / feed
+    ((most.0.sqrt() + between) / feed, most.1)
 }
 
 /// Share of an acceleration limit that counts as left at least, for the moment that turning takes all of it.

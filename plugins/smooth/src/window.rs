@@ -123,6 +123,12 @@ impl<const L: usize> Default for Window<L> {
 }
 
 impl<const L: usize> Window<L> {
+    /// Grows its memory to that of `other`: they take turns, and either may be the larger in the next program.
+    pub fn match_room(&mut self, other: &Self) {
+        self.pieces.reserve(other.pieces.capacity().saturating_sub(self.pieces.len()));
+        self.marks.reserve(other.marks.capacity().saturating_sub(self.marks.len()));
+    }
+
     /// How long it takes to its end.
     pub fn duration_s(&self) -> f64 {
         self.pieces.last().map_or(0.0, Piece::end_s)
