@@ -37,7 +37,7 @@ pub trait Kinematics: Send + Sync {
     fn to_axes(&self, joints: &AxisVector) -> AxisVector;
 
     /// Change of the joints for a small change `direction` of the axes at `position`. The default takes a difference
-    /// of [`Kinematics::to_joints`], exact for linear maps.
+    /// of [`Kinematics::to_joints`], exact for linear maps. No loop asks for it; the conformance kit does.
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
         self.to_joints(&(*position + *direction)) - self.to_joints(position)
     }

@@ -15,8 +15,8 @@ pub enum Plugin {
         /// What kind of plugin
         #[arg(long)]
         kind: Kind,
-        /// Where the source of Tandem is: a folder, or the URL of a git repository. Without it, the source that this
-        /// program was built from
+        /// Where the source of Tandem is: a folder, or the URL of a git repository. Without it, the
+        /// source around the current folder, else around this program, else that this program was built from
         #[arg(long, value_name = "PATH|URL")]
         sdk: Option<String>,
     },

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Most bytes that the headers are looked for in.
-const HEAD: u64 = 65_536;
+const HEAD: u64 = 4096;
 /// A part of the file that is loaded; the kind of a program header, as the ELF specification numbers them.
 const LOADED: u64 = 1;
 
