@@ -181,6 +181,15 @@ fn a_panic_behind_the_end_is_told() {
     }
 }
 
+#[test]
+fn a_panic_in_a_thread_of_a_plugin_is_told() {
+    let mischief = Mischief::of("driver", "panic", "thread", 1);
+    let done = command(&mischief, PROGRAM, "", &[]);
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let words = "error: a thread of a plugin panicked (hostile/src/mischief.rs:";
+    assert!(done.errors().contains(words) && done.errors().contains("as it was told"), "{}", done.errors());
+}
+
 /// Nothing is driven, and what plugins say is told all the same.
 #[test]
 fn a_panic_before_a_refusal_is_told() {

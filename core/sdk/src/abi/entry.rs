@@ -74,7 +74,7 @@ impl Fault {
     fn keep(&self, method: &str, panic: Box<dyn Any + Send>) -> PluginError {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
-        let place = PLACE.with_borrow_mut(std::mem::take);
+        let place = PANICKED.with(|panicked| panicked.0.take().place);
         let text: &'static str =
             Box::leak(format!("{} panicked in {method}{place}: {words}", self.name).into_boxed_str());
         // Dropping what the panic carries runs code of the plugin again, which may panic again.
@@ -90,9 +90,28 @@ impl Fault {
 }
 
 thread_local! {
-    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+    static PANICKED: Panicked = const { Panicked(RefCell::new(Told { place: String::new(), words: String::new() })) };
     /// Whether the host is in a call of a plugin on this thread.
     static CALLING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The last panic of this thread, until the error of a call has it.
+struct Panicked(RefCell<Told>);
+
+#[derive(Default)]
+struct Told {
+    place: String,
+    words: String,
+}
+
+impl Drop for Panicked {
+    /// No call has it: it is the end of a thread that a plugin has started, and nothing else tells of that.
+    fn drop(&mut self) {
+        let Told { place, words } = self.0.get_mut();
+        if !place.is_empty() {
+            crate::log!(Error, "a thread of a plugin panicked{place}: {words}");
+        }
+    }
 }
 
 /// Keeps where a panic happened instead of printing it: a backtrace takes tens of milliseconds. A shared library has a
@@ -113,7 +132,10 @@ pub fn quiet_linked_panics() {
 }
 
 fn keep_place(info: &PanicHookInfo<'_>) {
-    PLACE.set(info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default());
+    let place = info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+    let words = info.payload_as_str().unwrap_or("without words").to_string();
+    // At the very end of a thread there is no place for it any more.
+    let _ = PANICKED.try_with(|panicked| panicked.0.replace(Told { place, words }));
 }
 
 /// Calls a plugin, or with `false` back from it into the host.

@@ -26,7 +26,10 @@ impl Driver for Hostile {
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         self.1 = context.joint_count as usize;
-        self.0.of("open").map(|_| ())
+        self.0.of("open")?;
+        // A thread of its own that goes wrong, where it is told so.
+        let _ = std::thread::scope(|scope| scope.spawn(|| self.0.quietly("thread")).join());
+        Ok(())
     }
 
     fn start(&mut self) -> Result<(), PluginError> {
