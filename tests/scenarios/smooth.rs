@@ -92,14 +92,25 @@ G1 A45
 G1 X50 A46
 G1 X50.5 Y0.2 A46.5 B0.3
 G1 X51 Y0.1 A47
+G1 X40 Y6 Z-3 U5 V-2 A20 B4 C9
+G1 U-3 V4
+G1 X38 Z1 U0 V1 A22 C5
 M2
 ";
 
 #[test]
-fn six_axes_keep_limits_and_tolerance() {
+fn eight_axes_keep_limits_and_tolerance() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("six-axes.toml");
+    let path = folder.path().join("eight-axes.toml");
     let mut text = std::fs::read_to_string(machine()).unwrap();
+    for axis in ["u", "v"] {
+        write!(
+            text,
+            "\n[axes.{axis}]\ntravel_mm = [-50, 50]\nmax_feed_mm_per_min = 6000\nmax_rapid_mm_per_min = 6000\n\
+             max_acceleration_mm_per_s2 = 700\nmax_jerk_mm_per_s3 = 20000\n"
+        )
+        .unwrap();
+    }
     for axis in ["a", "b", "c"] {
         write!(
             text,
