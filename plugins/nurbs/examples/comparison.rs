@@ -87,7 +87,7 @@ fn draw(name: &str, driven: &[Collected], top: f64, jerk_too: bool) -> String {
         text += &jerks.frame(&format!("{name}: jerk of X, mm/s³; adaptive lies up to a hundred times outside"));
     }
     for (collected, (form, colour)) in driven.iter().zip(FORMS) {
-        let samples = collected.samples(PERIOD_S);
+        let samples = collected.path_samples(PERIOD_S);
         text += &feeds.line(&difference(&samples.iter().map(|s| s.1).collect::<Vec<_>>()), colour);
         if jerk_too && form != "adaptive" {
             let x: Vec<f64> = samples.iter().map(|s| s.0[0]).collect();

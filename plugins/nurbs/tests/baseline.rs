@@ -45,7 +45,7 @@ fn reference_figures() {
         close(collected.duration_s(), "total_time_s", 1e-5);
         close(collected.reports[0].time_s, "total_time_s", 1e-5);
         close(collected.reports[0].peak_feed_mm_per_s, "feed_max", 1e-6);
-        let samples = collected.samples(PERIOD_S);
+        let samples = collected.path_samples(PERIOD_S);
         assert!(samples.len().abs_diff(row["steps"].as_u64().unwrap() as usize + 1) <= 1, "{name}: {}", samples.len());
         let whole = &samples[..samples.len() - 1];
         let feeds: Vec<f64> = whole.windows(2).map(|pair| (pair[1].1 - pair[0].1) / PERIOD_S).collect();
@@ -105,7 +105,7 @@ fn the_feed_does_not_fluctuate() {
             }
             sum
         };
-        let samples = collected.samples(PERIOD_S);
+        let samples = collected.path_samples(PERIOD_S);
         for pair in samples[..samples.len() - 1].windows(2) {
             let span = curve.span(at);
             let next = curve.nearest(&pair[1].0, span, span + 3).u;

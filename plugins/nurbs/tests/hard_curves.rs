@@ -29,7 +29,7 @@ fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
         if segment.duration_s > 0.0 {
             continue;
         }
-        let mut positions: Vec<AxisVector> = motion.samples(period_s).into_iter().map(|sample| sample.0).collect();
+        let mut positions: Vec<AxisVector> = motion.path_samples(period_s).into_iter().map(|sample| sample.0).collect();
         positions.splice(0..0, [positions[0]; 3]);
         positions.extend([positions[positions.len() - 1]; 3]);
         for axis in 0..2 {

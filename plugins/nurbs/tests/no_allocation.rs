@@ -8,17 +8,8 @@ use common::{context, curve_block};
 use counting_allocator::heap_use_of;
 use tandem_motion::nurbs::{ArcLength, Nurbs};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_sdk::{AxisVector, BlockReport, NurbsData, Planner, Segment, SegmentSink};
-
-#[derive(Default)]
-struct Duration(f64);
-
-impl SegmentSink for Duration {
-    fn segment(&mut self, segment: &Segment) {
-        self.0 += segment.duration_s;
-    }
-    fn block(&mut self, _report: &BlockReport) {}
-}
+use tandem_rig::Away;
+use tandem_sdk::{AxisVector, NurbsData, Planner};
 
 /// A wave of so many spans.
 fn wave(spans: u32) -> NurbsData {
@@ -32,10 +23,10 @@ fn wave(spans: u32) -> NurbsData {
 }
 
 fn drive(planner: &mut NurbsPlanner) -> f64 {
-    let mut driven = Duration::default();
+    let mut driven = Away::default();
     planner.finish();
     while planner.advance(0.008, &mut driven).unwrap().done == 0 {}
-    driven.0
+    driven.duration_s
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn the_feed_is_reached_and_never_exceeded() {
             let blocks = [OwnedBlock::new(block, None)];
             let driven = run(&format!("form = \"{form}\""), &context(AxisVector::ZERO), &blocks);
             // Looked at much closer than the fine period.
-            let path: Vec<f64> = driven.samples(1e-4).into_iter().map(|sample| sample.1).collect();
+            let path: Vec<f64> = driven.path_samples(1e-4).into_iter().map(|sample| sample.1).collect();
             let most = path.windows(2).map(|pair| (pair[1] - pair[0]) / 1e-4).fold(0.0, f64::max);
             assert!(most <= feed * (1.0 + 1e-6) + 1e-9 && most > 0.99 * feed, "{form}, {feed} mm/s: {most}");
             let rests = driven.segments.iter().filter(|s| s.flags.contains(SegmentFlags::ENDS_AT_REST)).count();

@@ -7,30 +7,13 @@ mod common;
 
 use common::{context, lines, read};
 use counting_allocator::heap_use_of;
-use tandem_sdk::{Accepted, AxisVector, Block, BlockReport, Planner, Segment, SegmentSink};
+use tandem_rig::{Away, stream};
+use tandem_sdk::{AxisVector, Block, Planner};
 use tandem_smooth::{Options, SmoothPlanner};
 
-struct Nowhere;
-
-impl SegmentSink for Nowhere {
-    fn segment(&mut self, _: &Segment) {}
-    fn block(&mut self, _: &BlockReport) {}
-}
-
 fn drive(planner: &mut SmoothPlanner, blocks: &[Block]) {
-    let mut next = 0;
     planner.reset(&AxisVector::ZERO);
-    loop {
-        while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
-            next += 1;
-        }
-        if next == blocks.len() {
-            planner.finish();
-        }
-        if planner.advance(0.008, &mut Nowhere).unwrap().done != 0 {
-            return;
-        }
-    }
+    stream(planner, blocks, 0.008, &mut Away::default());
 }
 
 #[test]

@@ -79,6 +79,20 @@ impl Collected {
         (0..count).map(&mut at).collect()
     }
 
+    /// Positions and path coordinates, mm, at multiples of `period_s`, and at the end.
+    pub fn path_samples(&self, period_s: f64) -> Vec<(AxisVector, f64)> {
+        let mut samples = Vec::new();
+        for (start_s, segment) in self.timed() {
+            while samples.len() as f64 * period_s < start_s + segment.duration_s {
+                let t_s = samples.len() as f64 * period_s - start_s;
+                samples.push((segment.position(t_s), segment.path_mm(t_s)));
+            }
+        }
+        let (last, end_s) = self.place(f64::INFINITY);
+        samples.push((last.position(end_s), last.path_mm(end_s)));
+        samples
+    }
+
     /// Program times at which the blocks start, s.
     pub fn starts_s(&self) -> Vec<f64> {
         let sum = |at: &mut f64, report: &BlockReport| Some(std::mem::replace(at, *at + report.time_s));

@@ -44,7 +44,7 @@ pub fn figures(collected: &Collected, data: &NurbsData, context: &PlannerContext
     let curve = Nurbs::new(data, &xy()).unwrap();
     let table = ArcLength::new(&curve);
     let period_s = context.fine_period_s;
-    let samples = collected.samples(period_s);
+    let samples = collected.path_samples(period_s);
     let of = |value: &dyn Fn(&(AxisVector, f64)) -> f64| differences(samples.iter().map(value).collect(), period_s);
     let [x, y] = [of(&|sample| sample.0[0]), of(&|sample| sample.0[1])];
     let chords = samples.windows(2).map(|pair| chord_error_mm(&curve, &table, pair[0].1, pair[1].1));

@@ -1,10 +1,8 @@
 //! Programs as blocks, a planner run as the rough loop runs it, and its samples judged by brute force.
 #![allow(dead_code, reason = "each user takes its own part")]
 
-use tandem_sdk::{
-    Accepted, Axes, AxisLimits, AxisVector, Block, BlockKind, BlockReport, Limits, Planner, PlannerContext, Segment,
-    SegmentSink, size_of_contract,
-};
+pub use tandem_rig::Collected;
+use tandem_sdk::{AxisLimits, AxisVector, Block, PlannerContext, Segment};
 use tandem_smooth::{Effort, Options, SmoothPlanner};
 
 pub mod programs;
@@ -13,58 +11,16 @@ pub type Point = [f64; 3];
 
 /// Three linear axes: 250 mm/s, 1000 mm/s², 20 000 mm/s³.
 pub fn context(position: &Point, tolerance_mm: f64) -> PlannerContext {
-    let axis = AxisLimits {
-        min_mm: -1e4,
-        max_mm: 1e4,
-        feed_mm_per_s: 250.0,
-        rapid_mm_per_s: 250.0,
-        acceleration_mm_per_s2: 1000.0,
-        jerk_mm_per_s3: 20000.0,
-        speed_difference_mm_per_s: 0.0,
-    };
-    PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
-        axes: Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap(),
-        limits: Limits::new(&[axis; 3]).unwrap(),
-        fine_period_s: 0.001,
-        rough_period_s: 0.008,
-        path_tolerance_mm: tolerance_mm,
-        time_constant_s: 0.05,
-        max_feed_ratio: 1.0,
-        position: AxisVector::from_slice(position),
-        joint_lanes: None,
-    }
-}
-
-/// What a planner emitted.
-#[derive(Default)]
-pub struct Collected {
-    pub segments: Vec<Segment>,
-    pub reports: Vec<BlockReport>,
-}
-
-impl SegmentSink for Collected {
-    fn segment(&mut self, segment: &Segment) {
-        self.segments.push(*segment);
-    }
-    fn block(&mut self, report: &BlockReport) {
-        self.reports.push(*report);
-    }
+    let axis = AxisLimits { jerk_mm_per_s3: 20000.0, ..tandem_rig::axis(1000.0) };
+    let context = tandem_rig::context(&[axis; 3], 0.001);
+    PlannerContext { path_tolerance_mm: tolerance_mm, position: AxisVector::from_slice(position), ..context }
 }
 
 /// Lines through `points`.
 pub fn lines(points: &[Point], feed_mm_per_s: f64) -> Vec<Block> {
-    let pairs = points.windows(2).filter(|pair| pair[0] != pair[1]).enumerate();
-    pairs
-        .map(|(index, pair)| {
-            let mut block = Block::at(AxisVector::from_slice(&pair[0]));
-            block.end = AxisVector::from_slice(&pair[1]);
-            (block.kind, block.index, block.line) = (BlockKind::Line, index as u64, index as u32 + 1);
-            block.length_mm = (0..3).map(|i| (pair[1][i] - pair[0][i]).powi(2)).sum::<f64>().sqrt();
-            block.feed_mm_per_s = feed_mm_per_s;
-            block
-        })
-        .collect()
+    let vectors: Vec<AxisVector> = points.iter().map(|point| AxisVector::from_slice(point)).collect();
+    let pairs = vectors.windows(2).filter(|pair| pair[0] != pair[1]);
+    tandem_rig::numbered(pairs.map(|pair| tandem_rig::line(&pair[0], &pair[1], feed_mm_per_s)).collect())
 }
 
 /// A part program of G1 lines with all axes, or a case with `points` and `limits`: points and feed, mm/s.
@@ -95,18 +51,8 @@ pub fn read(path: &str) -> (Vec<Point>, f64) {
 /// Drives `blocks` from the first one's start.
 pub fn run(blocks: &[Block], options: &Options, context: &PlannerContext) -> (Collected, Effort) {
     let mut planner = SmoothPlanner::new(options, context).unwrap();
-    let (mut collected, mut next) = (Collected::default(), 0);
-    loop {
-        while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
-            next += 1;
-        }
-        if next == blocks.len() {
-            planner.finish();
-        }
-        if planner.advance(0.008, &mut collected).unwrap().done != 0 {
-            return (collected, planner.effort());
-        }
-    }
+    let collected = tandem_rig::drive(&mut planner, blocks, 0.008);
+    (collected, planner.effort())
 }
 
 /// The samples of a fine period of 1 ms: a rest ends its period.
