@@ -147,4 +147,9 @@ fn travel() {
     assert!(messages("F60\nG5.2\nX240 Y100\nX0 Y251\nX-240 Y100\nG5.3").is_empty());
     let refused = messages("F60\nG5.2\nX240 Y100\nX0 Y600\nX-240 Y100\nG5.3");
     assert!(refused[0].starts_with("6:1 [travel] Y would reach 433.3333 mm"), "{refused:?}");
+    // Weights that rise a hundredfold: the curve goes out and back in a small part of its parameter.
+    let uneven =
+        "F60\nG6.2 P5 K0\nK0 X1200 R100\nK0 X-1200 R10000\nK0 X0 Y30 R1000000\nK0 X10 R1000000\nK1\nK1\nK1\nK1\nK1";
+    let refused = messages(uneven);
+    assert!(refused[0].starts_with("11:1 [travel] X would reach 32"), "{refused:?}");
 }

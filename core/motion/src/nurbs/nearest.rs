@@ -3,6 +3,7 @@
 use tandem_sdk::AxisVector;
 
 use super::Nurbs;
+use super::hull::Hull;
 
 /// The foot of a point on a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,11 +18,19 @@ pub struct Nearest {
 const TRIED: usize = 24;
 /// Improvements at most.
 const ROUNDS: usize = 24;
+/// Halvings of a span at most.
+const HALVINGS: u32 = 60;
+/// What no part is halved for, mm or rad.
+const ROUNDING: f64 = 1e-9;
+/// A foot this near is the nearest one, mm; a further one is proved by bounds of the parts, to a share of its distance.
+const ON_CURVE_MM: f64 = 1e-7;
+const PROVED: f64 = 0.99;
 
 impl Nurbs {
-    /// The point nearest to `point` on the spans `from_span` to `to_span` (clipped to the curve): each span is sampled, and
-    /// each sample nearer than its neighbours is improved by Gauss-Newton steps, halved where they do not help. Does not
-    /// allocate.
+    /// The point nearest to `point` on the spans `from_span` to `to_span` (clipped to the curve), to 1 % of its distance: each
+    /// span is sampled, and each sample nearer than its neighbours is improved by Gauss-Newton steps, halved where they do
+    /// not help. Where that gives a point off the curve, parts that may come nearer are halved and tried: weights far apart
+    /// put most of a span between two samples. Does not allocate.
     pub fn nearest(&self, point: &AxisVector, from_span: usize, to_span: usize) -> Nearest {
         let mut best = Nearest { u: self.range().0, distance_mm: f64::INFINITY };
         for span in from_span.max(self.degree)..=to_span.min(self.points() - 1) {
@@ -29,7 +38,34 @@ impl Nurbs {
                 self.nearest_in(span, point, &mut best);
             }
         }
+        for span in from_span.max(self.degree)..=to_span.min(self.points() - 1) {
+            if best.distance_mm > ON_CURVE_MM && self.knots[span + 1] > self.knots[span] {
+                self.prove(span, &Hull::of_span(self, span), point, HALVINGS, &mut best);
+            }
+        }
         best
+    }
+
+    /// Looks for a nearer point on a part of `span`, in the nearer half first.
+    fn prove(&self, span: usize, part: &Hull, point: &AxisVector, halvings: u32, best: &mut Nearest) {
+        if part.least_distance_mm(point) >= PROVED * best.distance_mm - ROUNDING {
+            return;
+        }
+        for (u, end) in [part.range.0, part.range.1].into_iter().zip(part.ends()) {
+            let distance_mm = distance(point, &end);
+            if distance_mm < best.distance_mm {
+                *best = self.improve(span, point, Nearest { u, distance_mm });
+            }
+        }
+        if halvings > 0 {
+            let mut halves = part.halves();
+            if halves[1].least_distance_mm(point) < halves[0].least_distance_mm(point) {
+                halves.swap(0, 1);
+            }
+            for half in &halves {
+                self.prove(span, half, point, halvings - 1, best);
+            }
+        }
     }
 
     fn nearest_in(&self, span: usize, point: &AxisVector, best: &mut Nearest) {
@@ -72,37 +108,26 @@ impl Nurbs {
 }
 
 impl Nurbs {
-    /// Lowest and highest position of `axis` on the curve, mm or rad: at the ends of spans and where the axis turns.
-    /// Does not allocate.
+    /// Lowest and highest position of `axis` on the curve, mm or rad, to 1e-9: parts that may reach further than what is
+    /// found are halved, however uneven the parameter is. Does not allocate.
     pub fn extent(&self, axis: usize) -> (f64, f64) {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut extent = (f64::INFINITY, f64::NEG_INFINITY);
         for span in self.degree..self.points() {
-            let (from, to) = (self.knots[span], self.knots[span + 1]);
-            let mut before = from;
-            for step in 0..=if to > from { TRIED } else { 0 } {
-                let u = (from + (to - from) * step as f64 / TRIED as f64).min(to);
-                for at in [u, self.turn(span, axis, before, u)] {
-                    let value = self.derivatives_in(span, at).position[axis];
-                    (low, high) = (low.min(value), high.max(value));
-                }
-                before = u;
+            if self.knots[span + 1] > self.knots[span] {
+                widen(&Hull::of_span(self, span), axis, HALVINGS, &mut extent);
             }
         }
-        (low, high)
+        extent
     }
+}
 
-    /// Where `axis` turns between two parameters, by halving; the first of them where it does not.
-    fn turn(&self, span: usize, axis: usize, mut from: f64, mut to: f64) -> f64 {
-        let rate = |u: f64| self.derivatives_in(span, u).first[axis];
-        let first = rate(from);
-        if first * rate(to) >= 0.0 {
-            return from;
-        }
-        for _ in 0..40 {
-            let middle = 0.5 * (from + to);
-            if rate(middle) * first > 0.0 { from = middle } else { to = middle }
-        }
-        from
+fn widen(part: &Hull, axis: usize, halvings: u32, extent: &mut (f64, f64)) {
+    for end in part.ends() {
+        *extent = (extent.0.min(end[axis]), extent.1.max(end[axis]));
+    }
+    let (low, high) = part.bounds(axis);
+    if halvings > 0 && (low < extent.0 - ROUNDING || high > extent.1 + ROUNDING) {
+        part.halves().iter().for_each(|half| widen(half, axis, halvings - 1, extent));
     }
 }
 

@@ -49,6 +49,40 @@ fn weights_far_apart() {
     assert!(refused.to_string().contains("1.0e7"), "{refused}");
 }
 
+/// With weights that rise or fall a hundredfold most of the curve lies in a small part of the parameter, turns with it.
+#[test]
+fn bounds_and_feet_where_the_parameter_is_uneven() {
+    let rising = [[0.0, 0.0, 0.0], [130.0, 1.0, 5.0], [-130.0, 2.0, -5.0], [0.0, 3.0, 0.0], [1.0, 4.0, 0.0]];
+    let bends = [[77.0, 58.0, 0.0], [33.0, -21.0, 0.0], [-66.0, -88.0, 0.0], [86.0, -43.0, 0.0], [-71.0, 83.0, 1.0]];
+    for (degree, points, weights) in [
+        (4, &rising, [1.0, 1e2, 1e4, 1e6, 1e6]),
+        (4, &rising, [1e6, 1e6, 1e4, 1e2, 1.0]),
+        (2, &bends, [1.0, 73.0, 1.8, 0.13, 0.04]),
+        (3, &bends, [0.04, 86.0, 0.04, 3.0, 300.0]),
+    ] {
+        let curve = curve(&clamped(degree, points, &weights));
+        let table = ArcLength::new(&curve);
+        let step_mm = table.length().mm / 3000.0;
+        let (mut place, mut least, mut most) = (Place::default(), [f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for step in 0..=3000 {
+            let at = table.position(&curve, f64::from(step) * step_mm, &mut place);
+            let nearest = curve.nearest(&at, 0, curve.points());
+            assert!(nearest.distance_mm < 1e-6, "degree {degree}, {weights:?}: {nearest:?} at {at:?}");
+            let mut beside = at;
+            beside[2] += 20.0;
+            assert!(curve.nearest(&beside, 0, curve.points()).distance_mm <= 20.0 / 0.99);
+            for axis in 0..3 {
+                (least[axis], most[axis]) = (least[axis].min(at[axis]), most[axis].max(at[axis]));
+            }
+        }
+        for axis in 0..3 {
+            let (low, high) = curve.extent(axis);
+            assert!(low <= least[axis] + 1e-8 && high >= most[axis] - 1e-8, "{axis}: {low} {high} {least:?} {most:?}");
+            assert!(low > least[axis] - 0.1 && high < most[axis] + 0.1, "{axis}: {low} {high} {least:?} {most:?}");
+        }
+    }
+}
+
 #[test]
 fn a_corner_inside_cuts_the_curve() {
     let mut data = clamped(3, &ZIGZAG, &[1.0; 6]);

@@ -133,7 +133,7 @@ proptest! {
         let Some(curve) = made(&data) else { return Ok(()) };
         let (span, u, _) = inside(&curve, share);
         let nearest = curve.nearest(&curve.position(u), span, span);
-        prop_assert!(nearest.distance_mm < 1e-4, "{nearest:?}");
+        prop_assert!(nearest.distance_mm < 1e-6, "{nearest:?}");
     }
 }
 

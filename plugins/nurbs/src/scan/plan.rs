@@ -134,7 +134,7 @@ impl Scan {
     }
 }
 
-/// Grid of pseudo-time, s: a fifth of the time in which an acceleration is built up.
+/// Grid of pseudo-time, s: a quarter of the time in which an acceleration is built up.
 fn grid_s(bounds: &Bounds) -> f64 {
     let axes = bounds.context.limits.axes().iter();
     let build_up_s = axes.map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3).fold(f64::INFINITY, f64::min);
