@@ -70,7 +70,7 @@ impl Watched {
         let (before, span) = (self.u, self.curve.span(self.u));
         let mut foot = self.curve.nearest(position, span.saturating_sub(SPANS_AROUND), span + SPANS_AROUND);
         if foot.distance_mm > FAR_MM {
-            foot = self.curve.nearest(position, 0, self.curve.points());
+            foot = self.curve.nearer(position, foot);
         }
         self.u = foot.u;
         let off = |share: f64| off_chord_mm(&self.curve.position(before + share * (foot.u - before)), last, position);

@@ -42,7 +42,7 @@ impl Watched {
             Self::Curve(curve, span) => {
                 let mut nearest = curve.nearest(position, span.saturating_sub(SPANS_AROUND), *span + SPANS_AROUND);
                 if nearest.distance_mm > ON_PATH_MM {
-                    nearest = curve.nearest(position, 0, curve.points());
+                    nearest = curve.nearer(position, nearest);
                 }
                 *span = curve.span(nearest.u);
                 nearest.distance_mm

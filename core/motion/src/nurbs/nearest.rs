@@ -1,6 +1,8 @@
 //! The point of a curve nearest to a given one.
 
-use tandem_sdk::AxisVector;
+use std::ops::RangeInclusive;
+
+use tandem_sdk::{AxisVector, MAX_AXES};
 
 use super::Nurbs;
 use super::hull::Hull;
@@ -32,18 +34,39 @@ impl Nurbs {
     /// not help. Where that gives a point off the curve, parts that may come nearer are halved and tried: weights far apart
     /// put most of a span between two samples. Does not allocate.
     pub fn nearest(&self, point: &AxisVector, from_span: usize, to_span: usize) -> Nearest {
-        let mut best = Nearest { u: self.range().0, distance_mm: f64::INFINITY };
-        for span in from_span.max(self.degree)..=to_span.min(self.points() - 1) {
-            if self.knots[span + 1] > self.knots[span] {
+        let spans = from_span.max(self.degree)..=to_span.min(self.points() - 1);
+        self.nearer_on(spans, point, Nearest { u: self.range().0, distance_mm: f64::INFINITY })
+    }
+
+    /// The point of the whole curve nearest to `point`, where `best` is one known before: spans further away than that cost
+    /// a look at their control points only. Does not allocate.
+    pub fn nearer(&self, point: &AxisVector, best: Nearest) -> Nearest {
+        self.nearer_on(self.degree..=self.points() - 1, point, best)
+    }
+
+    fn nearer_on(&self, spans: RangeInclusive<usize>, point: &AxisVector, mut best: Nearest) -> Nearest {
+        for span in spans {
+            if self.knots[span + 1] > self.knots[span] && self.least_distance_mm(span, point) < best.distance_mm {
                 self.nearest_in(span, point, &mut best);
-            }
-        }
-        for span in from_span.max(self.degree)..=to_span.min(self.points() - 1) {
-            if best.distance_mm > ON_CURVE_MM && self.knots[span + 1] > self.knots[span] {
-                self.prove(span, &Hull::of_span(self, span), point, HALVINGS, &mut best);
+                if best.distance_mm > ON_CURVE_MM {
+                    self.prove(span, &Hull::of_span(self, span), point, HALVINGS, &mut best);
+                }
             }
         }
         best
+    }
+
+    /// No point of `span` is nearer to `point` than this, mm: it stays between its control points.
+    fn least_distance_mm(&self, span: usize, point: &AxisVector) -> f64 {
+        let (mut low, mut high) = (AxisVector([f64::INFINITY; MAX_AXES]), AxisVector([f64::NEG_INFINITY; MAX_AXES]));
+        for index in span - self.degree..=span {
+            let (at, _) = self.control_point(index);
+            for axis in 0..MAX_AXES {
+                (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]));
+            }
+        }
+        let off = |axis: usize| (low[axis] - point[axis]).max(point[axis] - high[axis]).max(0.0);
+        (0..MAX_AXES).map(|axis| off(axis).powi(2)).sum::<f64>().sqrt()
     }
 
     /// Looks for a nearer point on a part of `span`, in the nearer half first.
