@@ -18,6 +18,7 @@ mod emit;
 mod flatten;
 mod frame;
 mod options;
+mod peaks;
 mod plan;
 mod planner;
 mod profile;
