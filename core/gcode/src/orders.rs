@@ -106,6 +106,11 @@ impl Orders {
     fn settle_motion(&mut self, words: &Words, modal: Motion, claims: &mut Claims) -> Checked<()> {
         let non_modal = self.get(Group::NonModal);
         self.axes_taken |= matches!(non_modal, Some(100 | 280 | 300 | 920));
+        // The lines of an open curve do not come here.
+        if self.get(Group::Motion) == Some(53) {
+            let message = "G5.3 ends a curve, and none is open: G5.2 opens one".to_string();
+            return Err(self.fault(Group::Motion, "nurbs", message));
+        }
         let word = self.get(Group::Motion).map(motion_of).or(self.motion.filter(|m| *m == Motion::Refused));
         let axes = words.present & AXIS_MASK != 0;
         let arc_words = words.present & ARC_LETTERS != 0;

@@ -120,6 +120,10 @@ fn what_is_missing_is_named() {
         "F60\nG5.2\nX1\nX2\nG1 X9",
         &["5:1 [nurbs] the curve that line 2 opens is not complete: G5.3, which ends it, is missing before this line"],
     );
+    for stray in ["F60\nG1 X1\nG5.3\nG1 X2", "F60\nG5.2 L2\nX2\nG5.3 (over)\n\nG5.3"] {
+        let line = stray.lines().count() - usize::from(stray.starts_with("F60\nG1"));
+        assert_messages(stray, &[&format!("{line}:1 [nurbs] G5.3 ends a curve, and none is open: G5.2 opens one")]);
+    }
     assert_messages("F60\nG5.2\nX1", &["3:1 [nurbs] the program ends within the curve that line 2 opens"]);
     assert_messages("F60\nG5.2\nX1 S300\nX2\nG5.3", &["3:4 [unused-word] S has no place in this line of a curve"]);
     assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [unused-word] B has no place in this line of a curve"]);
