@@ -1,14 +1,11 @@
 //! Peaks and totals of a run, from its samples and blocks.
 
-use std::collections::BTreeMap;
-
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, MAX_AXES};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, MAX_AXES};
 
 use crate::joints::JointWatch;
 use crate::path_watch::PathWatch;
-use crate::record::limited_by;
 use crate::stops::StopWatch;
 
 /// Watches a run. Finite differences at the fine period, with rest before the first sample.
@@ -27,7 +24,7 @@ pub struct Monitor {
     /// Their nominal time, s.
     pub nominal_s: f64,
     /// Their planned time by what held the feed down, s.
-    pub limited_by_s: BTreeMap<&'static str, f64>,
+    pub limited_by_s: Vec<(LimitedBy, f64)>,
     /// The last position sent.
     pub position: AxisVector,
     /// What each stop took.
@@ -50,7 +47,7 @@ impl Monitor {
             blocks: 0,
             length_mm: 0.0,
             nominal_s: 0.0,
-            limited_by_s: BTreeMap::new(),
+            limited_by_s: Vec::new(),
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::new(leaves_path, machine.motion.path_tolerance_mm, &machine.start),
@@ -74,7 +71,11 @@ impl Monitor {
         self.watch.block(&self.axes, block);
         self.blocks += 1;
         if block.kind != BlockKind::Dwell {
-            *self.limited_by_s.entry(limited_by(report.limited_by)).or_default() += report.time_s;
+            // A handful of reasons: looking through them is the quickest, and this is done for every block.
+            match self.limited_by_s.iter_mut().find(|(by, _)| *by == report.limited_by) {
+                Some((_, time_s)) => *time_s += report.time_s,
+                None => self.limited_by_s.push((report.limited_by, report.time_s)),
+            }
         }
         self.length_mm += block.length_mm;
         self.nominal_s += match block.kind {

@@ -20,6 +20,7 @@ use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
+use crate::record::limited_by;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
@@ -383,7 +384,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
         planning_us: PlanningUs::from(&pump.planning),
-        limited_by_s: monitor.limited_by_s.iter().map(|(by, time_s)| ((*by).to_string(), *time_s)).collect(),
+        limited_by_s: monitor.limited_by_s.iter().map(|(by, time_s)| (limited_by(*by).to_string(), *time_s)).collect(),
         policy: None,
         stops: monitor.stops.stops.clone(),
         stop_count: monitor.stops.count,
