@@ -4,27 +4,14 @@ use serde_json::Value;
 use tandem_estimate::{Element, Estimate, Model, Spent};
 use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, Limits};
 
-pub const MM_PER_MIN: f64 = 60.0;
-
-pub fn case(name: &str) -> Value {
-    let path = format!("{}/../../tests/fixtures/cases/{name}.json", env!("CARGO_MANIFEST_DIR"));
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
+pub use tandem_rig::{MM_PER_MIN, case, numbers, points};
 
 pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-pub fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(number).collect()
-}
-
 pub fn array<const N: usize>(value: &Value) -> [f64; N] {
     numbers(value).try_into().unwrap()
-}
-
-pub fn points(value: &Value) -> Vec<AxisVector> {
-    value.as_array().unwrap().iter().map(|p| AxisVector::from_slice(&numbers(p))).collect()
 }
 
 /// The program of the tie test.
@@ -36,15 +23,7 @@ pub fn zigzag() -> Vec<AxisVector> {
 }
 
 pub fn limits(acceleration_mm_per_s2: f64) -> Limits {
-    let axis = AxisLimits {
-        min_mm: -1e6,
-        max_mm: 1e6,
-        feed_mm_per_s: 250.0,
-        rapid_mm_per_s: 250.0,
-        acceleration_mm_per_s2,
-        jerk_mm_per_s3: f64::INFINITY,
-        speed_difference_mm_per_s: 100.0 / MM_PER_MIN,
-    };
+    let axis = AxisLimits { speed_difference_mm_per_s: 100.0 / MM_PER_MIN, ..tandem_rig::axis(acceleration_mm_per_s2) };
     Limits::new(&[axis; 3]).unwrap()
 }
 

@@ -1,37 +1,9 @@
 //! Random programs: the same for the same seed everywhere.
 
+use tandem_rig::Random;
 use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 
 use super::{Point, lines};
-
-/// A small generator (xorshift64*).
-pub struct Random(u64);
-
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    pub fn below(&mut self, count: u64) -> u64 {
-        (self.next() >> 33) % count
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Between two lengths, every order of magnitude alike.
-    fn length(&mut self, low: f64, high: f64) -> f64 {
-        (self.between(low.ln(), high.ln())).exp()
-    }
-}
 
 /// Kinds of programs.
 pub const KINDS: [&str; 8] =
@@ -40,7 +12,7 @@ pub const KINDS: [&str; 8] =
 /// Blocks of a program, and points along its path near enough to stand for it.
 pub fn program(seed: u64) -> (&'static str, Vec<Block>, Vec<Point>) {
     let kind = (seed % KINDS.len() as u64) as usize;
-    let mut random = Random::new(seed);
+    let mut random = Random::new(seed.wrapping_add(1));
     let feed = random.between(15.0, 200.0);
     let points = match kind {
         0 => walk(&mut random, 25, (0.3, 8.0), 3.2, false),
