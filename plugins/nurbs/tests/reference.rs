@@ -2,12 +2,9 @@
 
 mod common;
 
-use common::measure::{BEST_S, Figures, chord_error_mm, differences, figures, xy};
-use common::{canonical, case, context, curve_block, numbers, run};
+use common::measure::{BEST_S, Figures, figures};
+use common::{canonical, case, context, curve_block, run};
 use serde_json::Value;
-use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
-
-const PERIOD_S: f64 = 0.002;
 
 fn drive(form: &str, name: &str) -> Figures {
     let (data, length_mm) = canonical(name);
@@ -60,27 +57,5 @@ fn the_forms_are_the_published_methods() {
         assert!(windowed.chord_um <= accepted("chord_err_um_max"), "{windowed:?}");
         let published_ratio = number(&baseline["max_abs_j_tan"]) / number(&published["max_abs_j_tan"]);
         assert!(adaptive.path[2] / windowed.path[2] > 0.95 * published_ratio, "{name}: jerk {windowed:?}");
-    }
-}
-
-/// The published near-optimal motions, sampled along our curves, measure as published.
-#[test]
-fn reference_motions_measure_as_published() {
-    let jerks = case("002_jerk");
-    for (name, ..) in BEST_S {
-        let (data, _) = canonical(name);
-        let curve = Nurbs::new(&data, &xy()).unwrap();
-        let table = ArcLength::new(&curve);
-        let along = numbers(&case(&format!("002_traj_{name}_M4a"))["s_mm"]);
-        let mut place = Place::default();
-        let positions: Vec<_> = along.iter().map(|s| table.position(&curve, *s, &mut place)).collect();
-        let published = row(&jerks, name, "M4a");
-        for axis in 0..2 {
-            let [_, acceleration, jerk] = differences(positions.iter().map(|p| p[axis]).collect(), PERIOD_S);
-            close(acceleration, number(&published["max_axis_a"][axis]), 0.002, name);
-            close(jerk, number(&published["max_axis_j"][axis]), 0.002, name);
-        }
-        let chords = along.windows(2).map(|pair| 1e3 * chord_error_mm(&curve, &table, pair[0], pair[1]));
-        close(chords.fold(0.0, f64::max), number(&published["max_chord_err_um"]), 0.005, name);
     }
 }

@@ -79,26 +79,32 @@ pub fn distance(a: &AxisVector, b: &AxisVector) -> f64 {
     (*a - *b).0.iter().map(|d| d * d).sum::<f64>().sqrt()
 }
 
-fn fluctuation(curve: &Nurbs, samples: &[(AxisVector, f64)], period_s: f64) -> f64 {
-    let arc = |from: f64, to: f64| {
-        let borders = curve.inner_knots().filter(|knot| *knot > from && *knot < to).chain([to]);
-        let (mut sum, mut start) = (0.0, from);
-        for border in borders {
-            sum += curve.length_in(curve.span(start), start, border).mm;
-            start = border;
-        }
-        sum
-    };
-    let mut at = curve.nearest(&samples[0].0, 0, curve.points()).u;
-    let mut most = 0.0f64;
-    for pair in samples[..samples.len() - 1].windows(2) {
+/// Arc that the curve has between samples, by quadrature from foot to foot and not by the table that drove them, mm.
+pub fn realised_mm(curve: &Nurbs, positions: impl IntoIterator<Item = AxisVector>) -> Vec<f64> {
+    let mut positions = positions.into_iter();
+    let mut at = positions.next().map_or(0.0, |first| curve.nearest(&first, 0, curve.points()).u);
+    let arc = |position: AxisVector| {
         let span = curve.span(at);
-        let next = curve.nearest(&pair[1].0, span, span + 3).u;
-        let commanded = pair[1].1 - pair[0].1;
-        if commanded >= period_s {
-            most = most.max((arc(at, next) - commanded).abs() / commanded);
-        }
-        at = next;
+        let from = std::mem::replace(&mut at, curve.nearest(&position, span, span + 3).u);
+        arc_mm(curve, from, at)
+    };
+    positions.map(arc).collect()
+}
+
+fn arc_mm(curve: &Nurbs, from: f64, to: f64) -> f64 {
+    let borders = curve.inner_knots().filter(|knot| *knot > from && *knot < to).chain([to]);
+    let (mut sum, mut start) = (0.0, from);
+    for border in borders {
+        sum += curve.length_in(curve.span(start), start, border).mm;
+        start = border;
     }
-    most
+    sum
+}
+
+fn fluctuation(curve: &Nurbs, samples: &[(AxisVector, f64)], period_s: f64) -> f64 {
+    let samples = &samples[..samples.len() - 1];
+    let realised = realised_mm(curve, samples.iter().map(|sample| sample.0));
+    let commanded = samples.windows(2).map(|pair| pair[1].1 - pair[0].1);
+    let moving = realised.into_iter().zip(commanded).filter(|(_, commanded)| *commanded >= period_s);
+    moving.map(|(arc, commanded)| (arc - commanded).abs() / commanded).fold(0.0, f64::max)
 }
