@@ -154,6 +154,18 @@ fn a_policy_script_slows_curves() {
     assert!(verdict.passed(), "{verdict}");
 }
 
+/// The butterfly alone, from where it begins, beside the best time known under limits of the axes: by the samples sent.
+#[test]
+fn the_butterfly_takes_little_more_than_the_best_time_known() {
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
+    let begin = ["--set", "axes.x.start_mm=54.493", "--set", "axes.y.start_mm=52.139"];
+    let done = Scenario::of(&butterfly).on(&machine).with(&begin).with(&["--reference-time-s", "2.75293"]).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let ratio = done.number("time_ratio");
+    assert!((0.999..1.02).contains(&ratio), "{ratio}");
+}
+
 /// The report shows curvature, chord error and what binds along a curve.
 #[test]
 fn the_report_shows_what_binds_along_a_curve() {

@@ -73,3 +73,38 @@ fn the_path_is_judged_by_the_tolerance_of_the_program() {
     let both = report("G21 G90 G64 P0.05\nF5000\nG1 X20\nG1 Y20\nG64 P0.002\nG1 X0\nG1 Y0\nM2\n");
     assert!(both.contains("of 0.002 to 0.05 mm allowed") && !both.contains("<li class=\"bad\">"));
 }
+
+#[test]
+fn the_time_is_compared_with_a_known_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("report.html");
+    let path = page.to_string_lossy().into_owned();
+    let program = "F6000\nG1 X20\nM2\n";
+    let done = Scenario::text(program).with(&["--report", &path, "--reference-time-s", "0.25"]).run();
+    let ratio = done.number("motion_time_s") / 0.25;
+    assert_eq!((done.number("reference_time_s"), done.number("time_ratio")), (0.25, ratio));
+    let words = format!("T/T_ref {ratio:.4}");
+    assert!(String::from_utf8_lossy(&done.output.stdout).lines().next().unwrap().contains(&words), "{words}");
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains(&format!("T/T_ref<td>{ratio:.4} of 0.25 s")), "{words}");
+
+    let without = Scenario::text(program).run();
+    assert!(!String::from_utf8_lossy(&without.output.stdout).contains("T_ref"));
+    for key in ["reference_time_s", "time_ratio"] {
+        assert!(without.summary().get(key).is_some_and(serde_json::Value::is_null), "{key}");
+    }
+    let aborted = Scenario::text(program).commands("40,abort\n").with(&["--reference-time-s=0.25"]).run();
+    assert_eq!((aborted.status(), aborted.number("reference_time_s")), (3, 0.25), "{}", aborted.errors());
+    assert!(aborted.summary()["time_ratio"].is_null(), "it did not come to the end of the program");
+}
+
+#[test]
+fn a_time_that_cannot_be_is_a_wrong_command_line() {
+    for time in ["0", "-1", "nan", "inf", "1e7", "soon"] {
+        let done = Scenario::text("M2\n").with(&["--reference-time-s", time]).run();
+        let errors = done.errors();
+        assert_eq!(done.status(), 2, "{time}: {errors}");
+        assert!(errors.contains("--reference-time-s") && errors.contains("from 0.001 to 1000000"), "{errors}");
+        assert!(!done.file("summary.json").exists(), "{time}");
+    }
+}

@@ -126,6 +126,9 @@ pub struct Run {
     /// Write every block as it was driven
     #[arg(long, value_name = "F.csv")]
     pub blocks: Option<PathBuf>,
+    /// Say how the time of the run compares with the best known time of this program
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub reference_time_s: Option<f64>,
 }
 
 #[derive(Group)]

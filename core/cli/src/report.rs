@@ -137,6 +137,9 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         ),
         fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
     ];
+    if let (Some(ratio), Some(reference_time_s)) = (summary.time_ratio, summary.reference_time_s) {
+        facts.insert(1, fact("T/T_ref", format!("{ratio:.4} of {reference_time_s} s")));
+    }
     let total_s: f64 = summary.limited_by_s.values().sum();
     let percent = |(by, time_s): (&String, &f64)| format!("{by} {:.1} %", 100.0 * time_s / total_s);
     if total_s > 0.0 {

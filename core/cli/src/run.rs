@@ -37,7 +37,10 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
-    let outcome = run.drive(clock, &commands, &mut sinks)?;
+    let mut outcome = run.drive(clock, &commands, &mut sinks)?;
+    if let Some(reference_time_s) = options.reference_time_s {
+        outcome.summary.compare(reference_time_s);
+    }
     sinks.operator.end(&outcome.summary);
     sinks.finish(options, &outcome.summary)?;
     Ok(conclude(options, &outcome))
@@ -298,9 +301,10 @@ fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> std::io::
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {
     let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
     let dry = if summary.dry_run { "dry run of " } else { "" };
+    let ratio = summary.time_ratio.map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
     writeln!(
         out,
-        "{dry}{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s) \
+        "{dry}{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s{ratio}) \
          with {planner} on {machine}"
     )?;
     let Summary { limit_violations, guard_stops, governed_samples, starvations, .. } = summary;

@@ -360,6 +360,8 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         length_mm: monitor.length_mm,
         nominal_time_s: monitor.nominal_s,
         motion_time_s: monitor.samples.saturating_sub(1) as f64 * machine.fine_period_s,
+        reference_time_s: None,
+        time_ratio: None,
         fine_period_s: machine.fine_period_s,
         rough_period_s: machine.rough_period_s,
         samples: counters.samples,

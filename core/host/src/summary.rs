@@ -36,6 +36,10 @@ pub struct Summary {
     pub nominal_time_s: f64,
     /// From the first to the last sample, s.
     pub motion_time_s: f64,
+    /// Best known time of this program, s, where one is stated ([`Summary::compare`]).
+    pub reference_time_s: Option<f64>,
+    /// `T/T_ref`: [`Summary::motion_time_s`] over that. Absent too where the run ended before its program.
+    pub time_ratio: Option<f64>,
     /// Fine period, s.
     pub fine_period_s: f64,
     /// Rough period, s.
@@ -97,6 +101,16 @@ pub struct Summary {
     pub fault: Option<String>,
     /// What ended the run before its program was over, without a fault: the operator's abort, in words.
     pub stopped: Option<String>,
+}
+
+impl Summary {
+    /// Puts the run beside the best known time of its program, s. One that did not come to the end of the program keeps
+    /// no ratio.
+    pub fn compare(&mut self, reference_time_s: f64) {
+        let whole = self.fault.is_none() && self.stopped.is_none();
+        self.reference_time_s = Some(reference_time_s);
+        self.time_ratio = whole.then_some(self.motion_time_s / reference_time_s);
+    }
 }
 
 /// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.
