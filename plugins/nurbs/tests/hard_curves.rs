@@ -108,3 +108,24 @@ fn hard_curves_keep_their_limits() {
     let long: Vec<[f64; 2]> = (0..10_000).map(|n| [0.02 * f64::from(n), (0.05 * f64::from(n)).sin()]).collect();
     drive("10 000 points", &even(&long, 3));
 }
+
+/// Curves that turn back, on their line and ever less sharply beside it: each is driven about as fast as the others, because
+/// it is slow at the turn only.
+#[test]
+fn turns_back_are_slow_at_the_turn_only() {
+    for form in ["scan", "windowed"] {
+        for (degree, points) in [(3, [0.0, 10.0, 0.0, 5.0, 6.0]), (2, [0.0, 10.0, 0.0, 5.0, 6.0])] {
+            let time_s = |off: f64| {
+                let points: Vec<[f64; 2]> =
+                    points.iter().zip([0.0, 1.0, 1.0, 0.0, 0.0]).map(|(x, y)| [*x, y * off]).collect();
+                let name = format!("turns back, degree {degree}, beside by {off:e} mm");
+                drive_in(form, &name, even(&points, degree)).expect("driven")
+            };
+            let on_line_s = time_s(0.0);
+            for off in [1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
+                let beside_s = time_s(off);
+                assert!(beside_s < 1.25 * on_line_s, "{form} {degree} {off}: {beside_s} s, {on_line_s} s");
+            }
+        }
+    }
+}

@@ -4,6 +4,7 @@ use tandem_sdk::AxisVector;
 
 use super::fit::Fit;
 use super::length::Length;
+use super::straight::Line;
 use super::{AlongPath, Nurbs, Piece};
 
 /// A place in an [`ArcLength`] table, kept between look-ups so that marching costs nothing to search.
@@ -18,6 +19,8 @@ pub struct Place(usize);
 #[derive(Clone, Debug)]
 pub struct ArcLength {
     fits: Vec<Fit>,
+    /// Straight spans, whose derivatives by arc length are known without the parameter.
+    lines: Vec<Line>,
     /// The span to be added next.
     next_span: usize,
     built: Length,
@@ -26,10 +29,13 @@ pub struct ArcLength {
 /// Halvings of a knot span at most. At a cusp parts shrink by half each, down to 1e-9 mm.
 const MAX_HALVINGS: u32 = 60;
 
+/// So far behind the end of a straight span a place is still on it, mm: path coordinates round.
+const ROUNDING_MM: f64 = 1e-9;
+
 impl ArcLength {
     /// An empty table at the start of `curve`.
     pub fn empty(curve: &Nurbs) -> Self {
-        Self { fits: Vec::new(), next_span: curve.degree(), built: Length::default() }
+        Self { fits: Vec::new(), lines: Vec::new(), next_span: curve.degree(), built: Length::default() }
     }
 
     /// The table of the whole `curve`. Allocates.
@@ -43,25 +49,32 @@ impl ArcLength {
     pub fn of_piece(curve: &Nurbs, piece: &Piece) -> Self {
         let mut table = Self { next_span: curve.span(piece.range.0), ..Self::empty(curve) };
         while table.next_span < curve.points() && curve.knots()[table.next_span] < piece.range.1 {
-            table.add_span(curve);
+            table.add_part(curve, piece.range);
         }
         table.fits.shrink_to_fit();
+        table.lines.shrink_to_fit();
         table
     }
 
     /// Adds the next knot span of `curve`; false where there is none. Allocates.
     pub fn add_span(&mut self, curve: &Nurbs) -> bool {
-        if self.next_span == curve.points() {
-            return false;
+        let more = self.next_span < curve.points();
+        if more {
+            self.add_part(curve, curve.range());
         }
+        more
+    }
+
+    /// Adds the next knot span as far as it lies within `range`.
+    fn add_part(&mut self, curve: &Nurbs, range: (f64, f64)) {
         let span = self.next_span;
         self.next_span += 1;
-        let (from, to) = (curve.knots()[span], curve.knots()[span + 1]);
+        let (from, to) = (curve.knots()[span].max(range.0), curve.knots()[span + 1].min(range.1));
         if to > from {
-            let whole = curve.gauss(span, from, to);
+            let (whole, start_mm) = (curve.gauss(span, from, to), self.built.mm);
             self.add(curve, span, (from, to), whole, MAX_HALVINGS);
+            self.lines.extend(Line::new(curve, span, (from, to), [start_mm, self.built.mm]));
         }
-        true
     }
 
     /// Adds a part of a span, whose length by the rule is `whole`.
@@ -69,7 +82,7 @@ impl ArcLength {
         let middle = 0.5 * (from + to);
         let [left, right] = [curve.gauss(span, from, middle), curve.gauss(span, middle, to)];
         let halves = left + right;
-        let error_mm = (whole - halves).abs();
+        let error_mm = (whole - halves).abs() + curve.hidden_mm(span, (from, to), halves);
         let last = halvings == 0 || middle <= from || middle >= to;
         if last || error_mm <= 1e-13 * halves.max(1e-3) {
             if let Some(fit) = Fit::new(curve, span, (from, to), self.built.mm, halves) {
@@ -96,7 +109,7 @@ impl ArcLength {
 
     /// Memory that the table takes, bytes.
     pub fn bytes(&self) -> usize {
-        self.fits.capacity() * size_of::<Fit>()
+        self.fits.capacity() * size_of::<Fit>() + self.lines.capacity() * size_of::<Line>()
     }
 
     /// Number of parts in the table.
@@ -112,15 +125,22 @@ impl ArcLength {
         (fit.parameter(s_mm), fit.span)
     }
 
-    /// Position and derivatives by arc length at `s_mm`; `None` where the curve has a cusp. Does not allocate.
+    /// Position and derivatives by arc length at `s_mm`, on a straight span without those of the parameter; `None` where the
+    /// curve has a cusp. Does not allocate.
     #[inline]
     pub fn along_path(&self, curve: &Nurbs, s_mm: f64, place: &mut Place) -> Option<AlongPath> {
+        if let Some(line) = self.line(s_mm) {
+            return Some(line.at(s_mm));
+        }
         let (u, span) = self.parameter(s_mm, place);
         curve.along_path_in(span, u)
     }
 
     /// Position at `s_mm`. Does not allocate.
     pub fn position(&self, curve: &Nurbs, s_mm: f64, place: &mut Place) -> AxisVector {
+        if let Some(line) = self.line(s_mm) {
+            return line.at(s_mm).position;
+        }
         let (u, span) = self.parameter(s_mm, place);
         curve.derivatives_in(span, u).position
     }
@@ -135,8 +155,21 @@ impl ArcLength {
     /// Length of the part of the table that holds `s_mm`, and where it ends, mm: the curve is smooth on this scale, and
     /// sharp features have parts of their own. Does not allocate.
     pub fn part(&self, s_mm: f64, place: &mut Place) -> (f64, f64) {
+        if let Some(line) = self.line(s_mm) {
+            return (line.end_mm - line.start_mm, line.end_mm);
+        }
         let fit = &self.fits[self.find(s_mm, place)];
         (fit.length_mm, fit.start_mm + fit.length_mm)
+    }
+
+    /// The straight span that holds `s_mm`, the one behind it at a border.
+    #[inline]
+    fn line(&self, s_mm: f64) -> Option<&Line> {
+        if self.lines.is_empty() {
+            return None;
+        }
+        let behind = self.lines.partition_point(|line| line.start_mm <= s_mm);
+        self.lines[..behind].last().filter(|line| s_mm <= line.end_mm + ROUNDING_MM)
     }
 
     /// The part that holds `s_mm`, sought a few parts around `place`, then by halving.

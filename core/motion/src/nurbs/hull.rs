@@ -40,9 +40,20 @@ impl Hull {
         [first, second]
     }
 
+    /// Degree of the curve.
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// Control point `index`, mm or rad.
+    pub fn position(&self, index: usize) -> AxisVector {
+        let point = &self.points[index];
+        point.axes() * (1.0 / point[Wide::WEIGHT])
+    }
+
     /// Where it begins and ends, mm or rad.
     pub fn ends(&self) -> [AxisVector; 2] {
-        [0, self.degree].map(|index| position(&self.points[index]))
+        [0, self.degree].map(|index| self.position(index))
     }
 
     /// Between what `axis` stays, mm or rad.
@@ -77,8 +88,4 @@ fn blossom(curve: &Nurbs, span: usize, parameter: impl Fn(usize) -> f64) -> Wide
 
 fn between(a: &Wide, b: &Wide, share: f64) -> Wide {
     std::array::from_fn(|n| a[n] * (1.0 - share) + b[n] * share)
-}
-
-fn position(point: &Wide) -> AxisVector {
-    point.axes() * (1.0 / point[Wide::WEIGHT])
 }

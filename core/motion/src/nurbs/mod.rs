@@ -15,6 +15,7 @@ mod length;
 mod levels;
 mod nearest;
 mod pieces;
+mod straight;
 
 pub use arc_length::{ArcLength, Place};
 pub use curve::{MAX_DEGREE, MAX_WEIGHT_RATIO, Nurbs};

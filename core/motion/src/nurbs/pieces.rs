@@ -23,17 +23,21 @@ pub struct Piece {
 
 impl Nurbs {
     /// The smooth parts of the curve, in order: it is cut at knots where the direction turns by more than
-    /// [`CORNER_RAD`] (only a knot that stands as often as the degree, or coinciding control points, can do that) and where
-    /// the curve stands still in its parameter at a knot. Allocates.
+    /// [`CORNER_RAD`] (only a knot that stands as often as the degree, or coinciding control points, can do that), where
+    /// the curve stands still in its parameter at a knot, and where it turns back on a straight span. Allocates.
     pub fn pieces(&self) -> Vec<Piece> {
         let (from, to) = self.range();
         let mut pieces = Vec::new();
         let mut start = (from, self.direction_behind(from));
-        for knot in self.inner_knots() {
-            let (before, behind) = (self.direction_before(knot), self.direction_behind(knot));
-            if half_angle_turn_rad(&before, &behind) > CORNER_RAD || self.stands_still(knot) {
-                pieces.push(Piece { range: (start.0, knot), start_direction: start.1, end_direction: before });
-                start = (knot, behind);
+        let turns = self.turning_points();
+        let mut places: Vec<f64> = self.inner_knots().chain(turns.iter().copied()).collect();
+        places.sort_unstable_by(f64::total_cmp);
+        places.dedup();
+        for u in places {
+            let (before, behind) = (self.direction_before(u), self.direction_behind(u));
+            if half_angle_turn_rad(&before, &behind) > CORNER_RAD || self.stands_still(u) || turns.contains(&u) {
+                pieces.push(Piece { range: (start.0, u), start_direction: start.1, end_direction: before });
+                start = (u, behind);
             }
         }
         let end_direction = self.direction_before(to);
@@ -55,19 +59,19 @@ impl Nurbs {
         speed * width <= STANDS_STILL * self.gauss(span, knot, self.knots[span + 1])
     }
 
-    /// Direction just behind `knot`.
-    fn direction_behind(&self, knot: f64) -> AxisVector {
-        let span = self.span(knot);
-        self.direction(&self.derivatives_in(span, knot), self.knots[span + 1] - knot)
+    /// Direction just behind `u`.
+    fn direction_behind(&self, u: f64) -> AxisVector {
+        let span = self.span(u);
+        self.direction(&self.derivatives_in(span, u), self.knots[span + 1] - u)
     }
 
-    /// Direction just before `knot`.
-    fn direction_before(&self, knot: f64) -> AxisVector {
-        let mut span = self.span(knot);
-        while self.knots[span] >= knot {
+    /// Direction just before `u`.
+    fn direction_before(&self, u: f64) -> AxisVector {
+        let mut span = self.span(u);
+        while self.knots[span] >= u {
             span -= 1;
         }
-        self.direction(&self.derivatives_in(span, knot), self.knots[span] - knot)
+        self.direction(&self.derivatives_in(span, u), self.knots[span] - u)
     }
 
     /// The direction in which the curve leaves a point, by the first derivative that is not zero: `step` is signed.

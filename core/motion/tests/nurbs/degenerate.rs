@@ -116,6 +116,48 @@ fn the_foot_of_a_point_before_a_corner() {
     }
 }
 
+/// 10·(1 − u)² − 20·u·(1 − u) + 5·u² = 0, the derivative of the cubic with these points over 3.
+#[test]
+fn turns_back_on_a_line_cut_the_curve() {
+    let way = [0.6, 0.0, 0.8];
+    let points = [0.0, 10.0, 0.0, 5.0].map(|x: f64| way.map(|w| w * x));
+    for weights in [[1.0; 4], [2.0; 4]] {
+        let curve = curve(&clamped(3, &points, &weights));
+        let turns = [(20.0 - 50.0f64.sqrt()) / 35.0, (20.0 + 50.0f64.sqrt()) / 35.0];
+        let pieces = curve.pieces();
+        let ranges: Vec<_> = pieces.iter().map(|p| p.range).collect();
+        assert_eq!(ranges.len(), 3, "{ranges:?}");
+        for (piece, (from, to)) in pieces.iter().zip([(0.0, turns[0]), (turns[0], turns[1]), (turns[1], 1.0)]) {
+            assert!((piece.range.0 - from).abs() < 1e-12 && (piece.range.1 - to).abs() < 1e-12, "{ranges:?}");
+        }
+        let lengths = pieces.iter().map(|piece| {
+            let table = ArcLength::of_piece(&curve, piece);
+            let length_mm = table.length().mm;
+            let [from, to] = [piece.range.0, piece.range.1].map(|u| curve.position(u));
+            assert!((distance(&from, &to) - length_mm).abs() < 1e-9);
+            // The derivatives are those of the line up to both ends, where the parameter stands still.
+            for share in [0.0, 1e-12, 0.3, 1.0] {
+                let at = table.along_path(&curve, share * length_mm, &mut Place::default()).unwrap();
+                assert!(distance(&at.direction, &piece.start_direction) < 1e-12 && at.curvature == AxisVector::ZERO);
+                assert!(distance(&at.position, &(from + (to - from) * share)) < 1e-9);
+            }
+            length_mm
+        });
+        let (sum_mm, whole) = (lengths.sum::<f64>(), curve.length());
+        assert!((sum_mm - whole.mm).abs() < 1e-9 + whole.error_mm, "{sum_mm} {whole:?}");
+    }
+}
+
+#[test]
+fn a_straight_span_without_a_turn_is_not_cut() {
+    // It slows down to a stand in the middle of its parameter, and goes on the same way.
+    let still = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [6.0, 0.0, 0.0]];
+    assert_eq!(curve(&clamped(3, &still, &[1.0; 4])).pieces().len(), 1);
+    // Off the line by more than rounding it is a hairpin, no turn.
+    let hairpin = [[0.0, 0.0, 0.0], [10.0, 1e-7, 0.0], [0.0, 1e-7, 0.0], [5.0, 0.0, 0.0]];
+    assert_eq!(curve(&clamped(3, &hairpin, &[1.0; 4])).pieces().len(), 1);
+}
+
 #[test]
 fn control_points_on_a_corner_cut_the_curve() {
     let points = [

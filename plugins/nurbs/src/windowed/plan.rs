@@ -117,6 +117,6 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(3e-4, 0.05),
+        step_mm: (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(1e-7, 0.05),
     }
 }
