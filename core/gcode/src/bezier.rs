@@ -2,6 +2,7 @@
 
 use tandem_sdk::{AxisVector, NurbsData};
 
+use crate::curve_places::Origin;
 use crate::fault::Checked;
 use crate::interpreter::Interpreter;
 use crate::item::Item;
@@ -82,6 +83,6 @@ impl Interpreter {
         let knots = (0..2 * points.len()).map(|index| if index > degree { 1.0 } else { 0.0 }).collect();
         let weights = vec![1.0; points.len()];
         let data = NurbsData { degree, control_points: points.to_vec(), weights, knots };
-        self.push_curve(self.state.line, None, data, out)
+        self.push_curve(&Origin::line(self.state.line), data, out)
     }
 }

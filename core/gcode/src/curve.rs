@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tandem_motion::nurbs::{Nurbs, NurbsError};
 use tandem_sdk::{AxisVector, Block, BlockKind, NurbsData, OwnedBlock};
 
+use crate::curve_places::{Origin, Places};
 use crate::fault::{Checked, Fault, Span};
 use crate::interpreter::Interpreter;
 use crate::item::Item;
@@ -31,6 +32,7 @@ pub(crate) struct Curve {
     pub points: Vec<AxisVector>,
     pub weights: Vec<f64>,
     pub knots: Vec<f64>,
+    pub places: Places,
     /// F of the opening line under G93, 1/min.
     pub inverse_time: Option<f64>,
     /// A line was wrong, or the machine's position is not known: read to the end, but make no block.
@@ -66,13 +68,24 @@ impl Interpreter {
             points: Vec::new(),
             weights: Vec::new(),
             knots: Vec::new(),
+            places: Places::default(),
             inverse_time: self.words.get(b'F').filter(|_| self.state.feed.inverse_time),
             broken: uncertain != 0,
         });
         if self.orders.get(Group::NonModal) == Some(530) {
             return Err(self.orders.fault(Group::NonModal, "conflict", "G53 goes with G0 and G1 only"));
         }
-        Ok(())
+        // The lines of the curve have no F: what holds here holds for all of it.
+        self.feed(1.0, true).map(|_| ())
+    }
+
+    /// Keeps the line of a curve that has just been read.
+    #[inline]
+    pub(crate) fn note_curve_line(&mut self, text: &[u8]) {
+        if let Some(curve) = &mut self.curve {
+            let count = curve.points.len().max(curve.knots.len());
+            curve.places.note(self.state.line, text, count);
+        }
     }
 
     /// Whether this line belongs to the curve that is open.
@@ -87,6 +100,12 @@ impl Interpreter {
         };
         let foreign = self.words.g.as_slice().iter().find(|code| !own(code.tenths));
         let Some(code) = foreign.or(self.words.m.as_slice().first()) else { return Ok(true) };
+        if curve.dialect == Dialect::LinuxCnc && self.ends_curve() {
+            let (span, broken) = (code.span, curve.broken);
+            self.curve = None;
+            let alone = || Fault::new(span, "nurbs", "G5.3 ends a curve: no other G or M word stands in its line");
+            return if broken { Ok(false) } else { Err(alone()) };
+        }
         let missing = match curve.dialect {
             Dialect::LinuxCnc => "G5.3, which ends it, is missing before this line".to_string(),
             Dialect::Fanuc => curve.missing_knots(),
@@ -140,26 +159,24 @@ impl Interpreter {
         if curve.broken {
             return Ok(());
         }
-        let (line, inverse) = (curve.line, curve.inverse_time);
         let order = curve.order.unwrap_or(0);
+        let weight = if curve.dialect == Dialect::LinuxCnc { b'P' } else { b'R' };
         if curve.dialect == Dialect::LinuxCnc {
             curve.knots = uniform_knots(order, curve.points.len());
         }
-        self.push_curve(line, inverse, curve.data(order - 1), out)
+        let places = std::mem::take(&mut curve.places);
+        let origin = Origin { line: curve.line, inverse_time: curve.inverse_time, places, weight };
+        self.push_curve(&origin, curve.data(order - 1), out)
     }
 
     /// Makes the block of a whole curve that begins at the programmed position.
-    pub(crate) fn push_curve(
-        &mut self,
-        line: u32,
-        inverse: Option<f64>,
-        data: NurbsData,
-        out: &mut Vec<Item>,
-    ) -> Checked<()> {
-        let curve = Nurbs::new(&data, &self.config.axes).map_err(|error| self.curve_fault(line, &error))?;
-        self.check_curve_travel(&curve)?;
+    pub(crate) fn push_curve(&mut self, origin: &Origin, data: NurbsData, out: &mut Vec<Item>) -> Checked<()> {
+        let made = Nurbs::new(&data, &self.config.axes);
+        let curve = made.map_err(|error| origin.blame(self.curve_fault(origin.line, &error), &error, &data))?;
+        self.check_curve_travel(&curve, origin)?;
         let length_mm = curve.length().mm;
-        let feed_mm_per_s = match inverse {
+        let line = origin.line;
+        let feed_mm_per_s = match origin.inverse_time {
             Some(per_min) if per_min > 0.0 => length_mm * per_min / 60.0,
             _ => self.feed(length_mm, self.slides(&data))?,
         };
@@ -187,11 +204,15 @@ impl Interpreter {
         data.control_points.iter().any(|point| self.moves_linear(&(*point - data.control_points[0])))
     }
 
-    fn check_curve_travel(&self, curve: &Nurbs) -> Checked<()> {
+    fn check_curve_travel(&self, curve: &Nurbs, origin: &Origin) -> Checked<()> {
         for axis in 0..self.letters.count() {
-            let (low, high) = curve.extent(axis);
+            let ((low, high), (min, max)) = (curve.extent(axis), self.config.travel_mm[axis]);
+            let beyond = |fault| {
+                let (limit, above) = if high > max { (max, true) } else { (min, false) };
+                origin.blame_travel(fault, curve, (axis, self.letters.letter(axis)), limit, above)
+            };
             if high > low {
-                self.check_travel(axis, low, high)?;
+                self.check_travel(axis, low, high).map_err(beyond)?;
             }
         }
         Ok(())

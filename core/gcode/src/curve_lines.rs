@@ -1,6 +1,6 @@
 //! The lines of a curve: LinuxCNC's G5.2 … G5.3 and Fanuc's G06.2.
 
-use tandem_motion::nurbs::MAX_DEGREE;
+use tandem_motion::nurbs::{MAX_DEGREE, NurbsError};
 use tandem_sdk::AxisVector;
 
 use crate::curve::{Curve, Dialect};
@@ -161,9 +161,27 @@ impl Interpreter {
         if index < order && curve.knots.first().is_some_and(|first| *first != knot) {
             return fault(format!("the first {order} knots are equal: the curve begins at its first control point"));
         }
-        let alone = index + 1 > curve.points.len();
-        if alone && index > curve.points.len() && curve.knots.last() != Some(&knot) {
+        let (points, degree) = (curve.points.len(), order - 1);
+        if index > points && curve.knots.last() != Some(&knot) {
             return fault(format!("the last {order} knots are equal: the curve ends at its last control point"));
+        }
+        if index < order {
+            curve.knots.push(knot);
+            return Ok(());
+        }
+        let alike = curve.knots.iter().rev().take_while(|before| **before == knot).count();
+        if index == points && alike > 0 {
+            return fault(if alike == index {
+                NurbsError::Empty(knot).to_string()
+            } else {
+                NurbsError::End { value: knot, count: alike + order, degree }.to_string()
+            });
+        }
+        if index < points && alike == index {
+            return fault(NurbsError::End { value: knot, count: alike + 1, degree }.to_string());
+        }
+        if index < points && alike == degree {
+            return fault(NurbsError::Multiplicity { value: knot, count: order, degree }.to_string());
         }
         curve.knots.push(knot);
         Ok(())

@@ -32,10 +32,12 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// An error that concerns `line` of `file` as a whole.
     pub fn whole_line(file: &Arc<str>, line: u32, text: &[u8], code: &'static str, message: String) -> Self {
-        Self::new(file, line, text, Fault { span: Span::new(0, text.len()), code, message })
+        Self::new(file, line, text, Fault::new(Span::new(0, text.len()), code, message))
     }
 
+    /// The error in `line`, or in the line before it that `fault` names.
     pub(crate) fn new(file: &Arc<str>, line: u32, text: &[u8], fault: Fault) -> Self {
+        let (line, text) = fault.line.as_ref().map_or((line, text), |before| (before.number, &before.text));
         let start = text.len().min(fault.span.start as usize);
         let end = text.len().min(fault.span.end as usize).max(start);
         let column = 1 + characters(&text[..start]);

@@ -19,11 +19,20 @@ pub(crate) struct Fault {
     pub span: Span,
     pub code: &'static str,
     pub message: String,
+    /// The line, where it is not the one that is read.
+    pub line: Option<Box<Line>>,
+}
+
+/// A line that was read before.
+#[derive(Debug)]
+pub(crate) struct Line {
+    pub number: u32,
+    pub text: Vec<u8>,
 }
 
 impl Fault {
     pub fn new(span: Span, code: &'static str, message: impl Into<String>) -> Self {
-        Self { span, code, message: message.into() }
+        Self { span, code, message: message.into(), line: None }
     }
 }
 

@@ -200,6 +200,7 @@ impl Interpreter {
         let goes_on = self.goes_on();
         if let Ok(true) = goes_on {
             let done = parsed.and_then(|()| self.assign()).and_then(|()| self.curve_line(out));
+            self.note_curve_line(text);
             if let (Err(_), Some(curve)) = (&done, &mut self.curve) {
                 curve.broken = true;
             }
@@ -208,6 +209,7 @@ impl Interpreter {
         let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
         let complete = parsed.is_ok();
         let done = parsed.and(goes_on).and(sorted).and_then(|()| self.obey(out));
+        self.note_curve_line(text);
         if done.is_err() {
             self.recover(complete);
         }

@@ -43,6 +43,7 @@ mod check;
 mod config;
 mod curve;
 mod curve_lines;
+mod curve_places;
 mod diagnostic;
 mod execute;
 mod expression;

@@ -128,7 +128,7 @@ impl Interpreter {
         if feed.inverse_time {
             return match self.words.get(b'F') {
                 Some(inverse) if inverse > 0.0 => Ok(length_mm * inverse / 60.0),
-                _ => Err(self.motion_fault("feed-missing", "with G93 every line with G1, G2 or G3 needs its F")),
+                _ => Err(self.no_inverse_time()),
             };
         }
         let feed = if linear { feed.linear_mm_per_s } else { feed.rotary_rad_per_s };
@@ -136,10 +136,19 @@ impl Interpreter {
     }
 
     #[cold]
+    fn no_inverse_time(&self) -> Fault {
+        let why = match self.orders.motion {
+            Some(Motion::Curve(_)) => "with G93 every curve needs its F, in its first line",
+            _ => "with G93 every line with G1, G2 or G3 needs its F",
+        };
+        self.motion_fault("feed-missing", why)
+    }
+
+    #[cold]
     fn no_feed(&self) -> Fault {
         let why = if self.words.has(b'F') { "the feed is zero" } else { "the feed is missing: no F has been set" };
         let who = match self.orders.motion {
-            Some(Motion::Probe(tenths)) => written('G', tenths) + " needs",
+            Some(Motion::Probe(tenths) | Motion::Curve(tenths)) => written('G', tenths) + " needs",
             _ => "G1, G2 and G3 need".into(),
         };
         self.motion_fault("feed-missing", format!("{why}; {who} one"))

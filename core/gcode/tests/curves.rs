@@ -129,7 +129,15 @@ fn what_is_missing_is_named() {
     assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [unused-word] B has no place in this line of a curve"]);
     assert_messages(
         "G5.2\nX1\nX2\nG5.3",
-        &["4:1 [feed-missing] the feed is missing: no F has been set; G1, G2 and G3 need one"],
+        &["1:1 [feed-missing] the feed is missing: no F has been set; G5.2 needs one"],
+    );
+    assert_messages(
+        "G93\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1\nK1\nK1",
+        &["2:1 [feed-missing] with G93 every curve needs its F, in its first line"],
+    );
+    assert_messages(
+        "F60\nG5.2\nX1\nX2\nG5.3 M8\nG1 X9",
+        &["5:6 [nurbs] G5.3 ends a curve: no other G or M word stands in its line"],
     );
     assert_messages("F60 G5 X1 I1 J1", &["1:5 [nurbs] G5 needs P and Q, the third control point from the end"]);
     assert_messages(
@@ -145,15 +153,67 @@ fn what_is_missing_is_named() {
     );
 }
 
+/// What shows only when the curve is complete is told where it stands.
+#[test]
+fn what_is_wrong_with_the_whole_points_at_the_word() {
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1 R1000 (heavy)\nN9 K0 (R) x[1+1] R.0001\nK1 X3\nK2\nK2\nK2\nG1 X9",
+        &["4:18 [nurbs] the curve that line 2 opens: the largest weight is 1.0e7 times the smallest: at most 1e6 is \
+           evaluated to its digits"],
+    );
+    assert_messages(
+        "F60\nG5.2\nX1 P1000\nX2\nX3 Y1 P0.000001\nX4\nG5.3",
+        &["5:7 [nurbs] the curve that line 2 opens: the largest weight is 1.0e9 times the smallest: at most 1e6 is \
+           evaluated to its digits"],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nX3 K0.00000000001\nK1\nK1\nK1",
+        &[
+            "5:4 [nurbs] the curve that line 2 opens: knots 2 and 3 differ by 1e-11 only: make them equal or keep them apart",
+        ],
+    );
+    assert_messages(
+        "F60\nG5.2 L3\nX1 A1\nX1 A2\nX1 A3\nX2\nG5.3",
+        &[
+            "4:1 [nurbs] the curve that line 2 opens: between the knots 1 and 2 only rotary axes move: a feed in mm says \
+           nothing about them",
+        ],
+    );
+    let excerpt = run_on(mill(), "F60\nG5.2\nX1 P1000\nX2 P0.0001\nX3\nG5.3").1[0].to_string();
+    assert!(excerpt.ends_with("\n  X2 P0.0001\n     ^^^^^^^"), "{excerpt}");
+}
+
+/// Knots that stand too often: the curve would not pass its ends, or falls apart.
+#[test]
+fn knots_that_stand_too_often() {
+    let end = |line: u32, knot: &str, count: u32| {
+        format!(
+            "{line}:1 [nurbs] knot {knot} stands {count} times at an end of a curve of degree 2, 3 are the most: the \
+             curve would not reach its control point there"
+        )
+    };
+    assert_messages("F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK0 X3\nK1\nK1\nK1\nG1 X9", &[&end(5, "0", 4)]);
+    assert_messages("F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1 X3\nK1\nK1\nK1\nG1 X9", &[&end(6, "1", 4)]);
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1 X3\nK1 X4\nK1 X5\nK2\nK2\nK2",
+        &["7:1 [nurbs] knot 1 stands 3 times inside a curve of degree 2: the curve breaks in two there"],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK0\nK0\nK0",
+        &["5:1 [nurbs] all knots that bound the curve are 0: the curve has no extent"],
+    );
+}
+
 /// Only the curve itself has to stay within the travel, not its control points.
 #[test]
 fn travel() {
     assert!(messages("F60\nG5.2\nX240 Y100\nX0 Y251\nX-240 Y100\nG5.3").is_empty());
     let refused = messages("F60\nG5.2\nX240 Y100\nX0 Y600\nX-240 Y100\nG5.3");
-    assert!(refused[0].starts_with("6:1 [travel] Y would reach 433.3333 mm"), "{refused:?}");
+    assert!(refused[0].starts_with("4:4 [travel] Y would reach 433.3333 mm"), "{refused:?}");
+    assert!(refused[0].ends_with("(machine coordinates); this control point draws the curve there"), "{refused:?}");
     // Weights that rise a hundredfold: the curve goes out and back in a small part of its parameter.
     let uneven =
         "F60\nG6.2 P5 K0\nK0 X1200 R100\nK0 X-1200 R10000\nK0 X0 Y30 R1000000\nK0 X10 R1000000\nK1\nK1\nK1\nK1\nK1";
     let refused = messages(uneven);
-    assert!(refused[0].starts_with("11:1 [travel] X would reach 32"), "{refused:?}");
+    assert!(refused[0].starts_with("3:4 [travel] X would reach 32"), "{refused:?}");
 }

@@ -86,6 +86,31 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
     Some(collected.duration_s())
 }
 
+/// Corners of control points that coincide are rests: between them the curves are lines, driven as fast as lines are.
+#[test]
+fn corners_of_coinciding_points_are_rests() {
+    let rests = |form: &str, data: &NurbsData| {
+        let block = curve_block(data.clone(), 1.0, 100.0);
+        let collected = common::run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
+        let rests: Vec<AxisVector> =
+            collected.segments.iter().filter(|s| s.duration_s == 0.0).map(|s| s.position(0.0)).collect();
+        (rests, collected.duration_s())
+    };
+    let (start, corner, end) = ([0.0, 0.0], [10.0, 0.0], [20.0, 10.0]);
+    let straight = (10.0 + 200f64.sqrt()) / 100.0;
+    for form in ["scan", "windowed"] {
+        for (degree, count) in [(2, 2), (2, 3), (2, 5), (3, 3), (3, 4), (3, 6)] {
+            // As often as the degree; and so often that the curve waits there.
+            let points: Vec<_> =
+                std::iter::once(start).chain(std::iter::repeat_n(corner, count)).chain([end]).collect();
+            let (rests, time_s) = rests(form, &even(&points, degree));
+            let what = format!("{form}, degree {degree}, {count} points: {rests:?}, {time_s} s");
+            assert_eq!(rests, [AxisVector::from_slice(&corner), AxisVector::from_slice(&end)], "{what}");
+            assert!(time_s > straight && time_s < straight + 0.15, "{what}");
+        }
+    }
+}
+
 #[test]
 fn hard_curves_keep_their_limits() {
     let zigzag: Vec<[f64; 2]> = (0..12).map(|n| [f64::from(n), f64::from(n % 2) * 3.0]).collect();

@@ -41,6 +41,7 @@ impl Nurbs {
         let levels = Levels::new(homogeneous.collect(), &data.knots, data.degree);
         let plain = data.weights.iter().all(|weight| *weight == data.weights[0]);
         let counted = counted(data, axes)?;
+        check_spans(data, &counted)?;
         Ok(Self { degree: data.degree, knots: data.knots.clone(), levels, plain, counted })
     }
 
@@ -145,6 +146,12 @@ fn check_knots(data: &NurbsData) -> Result<(), NurbsError> {
     if last <= first {
         return Err(NurbsError::Empty(first));
     }
+    for value in [first, last] {
+        let count = knots.iter().filter(|knot| **knot == value).count();
+        if count > degree + 1 {
+            return Err(NurbsError::End { value, count, degree });
+        }
+    }
     check_spacing(data, first, last)
 }
 
@@ -160,6 +167,20 @@ fn check_spacing(data: &NurbsData, first: f64, last: f64) -> Result<(), NurbsErr
         let difference = data.knots[index + 1] - data.knots[index];
         if difference > 0.0 && difference < CLOSE * (last - first) {
             return Err(NurbsError::Close { index, difference });
+        }
+    }
+    Ok(())
+}
+
+/// No span moves only axes that path speed does not count.
+fn check_spans(data: &NurbsData, counted: &AxisVector) -> Result<(), NurbsError> {
+    for span in data.degree..data.control_points.len() {
+        let (from, to) = (data.knots[span], data.knots[span + 1]);
+        let points = &data.control_points[span - data.degree..=span];
+        let same = |axis: usize| points.iter().all(|point| point[axis] == points[0][axis]);
+        let stands = (0..MAX_AXES).all(|axis| counted[axis] == 0.0 || same(axis));
+        if to > from && stands && !(0..MAX_AXES).all(same) {
+            return Err(NurbsError::NotCounted { from, to });
         }
     }
     Ok(())

@@ -69,6 +69,20 @@ pub enum NurbsError {
         /// The degree.
         degree: usize,
     },
+    /// A knot at an end that stands so often that the control point there has no part in the curve.
+    #[error(
+        "knot {value} stands {count} times at an end of a curve of degree {degree}, {} are the most: the curve would not \
+         reach its control point there",
+        degree + 1
+    )]
+    End {
+        /// The knot.
+        value: f64,
+        /// How often it stands.
+        count: usize,
+        /// The degree.
+        degree: usize,
+    },
     /// Two knots that differ by no more than rounding.
     #[error("knots {index} and {} differ by {difference:e} only: make them equal or keep them apart", index + 1)]
     Close {

@@ -10,6 +10,9 @@ pub const CORNER_RAD: f64 = 1e-6;
 /// Share of the mean parameter speed below which the curve stands still in its parameter: a cusp.
 const STANDS_STILL: f64 = 1e-7;
 
+/// Control points no further apart are one, mm or rad: what rounding leaves of a coordinate and its weight.
+const SAME_MM: f64 = 1e-12;
+
 /// A smooth part of a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
@@ -24,25 +27,48 @@ pub struct Piece {
 impl Nurbs {
     /// The smooth parts of the curve, in order: it is cut at knots where the direction turns by more than
     /// [`CORNER_RAD`] (only a knot that stands as often as the degree, or coinciding control points, can do that), where
-    /// the curve stands still in its parameter at a knot, and where it turns back on a straight span. Allocates.
+    /// the curve stands still in its parameter at a knot, and where it turns back on a straight span. Spans in which it
+    /// stays at a point are left out. Allocates.
     pub fn pieces(&self) -> Vec<Piece> {
         let (from, to) = self.range();
         let mut pieces = Vec::new();
-        let mut start = (from, self.direction_behind(from));
+        let mut start = (!self.stays(from)).then(|| (from, self.direction_behind(from)));
         let turns = self.turning_points();
         let mut places: Vec<f64> = self.inner_knots().chain(turns.iter().copied()).collect();
         places.sort_unstable_by(f64::total_cmp);
         places.dedup();
         for u in places {
-            let (before, behind) = (self.direction_before(u), self.direction_behind(u));
-            if half_angle_turn_rad(&before, &behind) > CORNER_RAD || self.stands_still(u) || turns.contains(&u) {
-                pieces.push(Piece { range: (start.0, u), start_direction: start.1, end_direction: before });
-                start = (u, behind);
+            let stays = self.stays(u);
+            if let Some((from, start_direction)) = start {
+                let end_direction = self.direction_before(u);
+                let goes_on = !stays
+                    && half_angle_turn_rad(&end_direction, &self.direction_behind(u)) <= CORNER_RAD
+                    && !self.stands_still(u)
+                    && !turns.contains(&u);
+                if goes_on {
+                    continue;
+                }
+                pieces.push(Piece { range: (from, u), start_direction, end_direction });
             }
+            start = (!stays).then(|| (u, self.direction_behind(u)));
         }
-        let end_direction = self.direction_before(to);
-        pieces.push(Piece { range: (start.0, to), start_direction: start.1, end_direction });
+        let end = |(from, start_direction)| Piece {
+            range: (from, to),
+            start_direction,
+            end_direction: self.direction_before(to),
+        };
+        pieces.extend(start.map(end));
         pieces
+    }
+
+    /// Whether the curve stays at a point in the span behind `u`: its control points coincide.
+    fn stays(&self, u: f64) -> bool {
+        let span = self.span(u);
+        let (first, _) = self.control_point(span - self.degree);
+        (span - self.degree..=span).all(|index| {
+            let off = self.control_point(index).0 - first;
+            off.0.iter().all(|off| off.abs() <= SAME_MM)
+        })
     }
 
     /// The distinct knots inside the curve.

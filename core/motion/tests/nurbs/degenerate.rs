@@ -174,6 +174,35 @@ fn control_points_on_a_corner_cut_the_curve() {
     assert!((pieces[0].end_direction[0] - 1.0).abs() < 1e-12 && (pieces[1].start_direction[1] - 1.0).abs() < 1e-12);
 }
 
+/// Where more control points coincide than the degree the curve waits at a point: that span is no piece.
+#[test]
+fn a_span_without_length_is_left_out() {
+    let corner = [10.0, 0.0, 0.0];
+    let points = [[0.0; 3], [0.0; 3], [0.0; 3], corner, corner, corner, [20.0, 10.0, 0.0]];
+    let pieces = curve(&clamped(2, &points, &[1.0, 1.0, 3.0, 1.0, 7.0, 1.0, 1.0])).pieces();
+    assert_eq!(pieces.iter().map(|p| p.range).collect::<Vec<_>>(), [(1.0, 3.0), (4.0, 5.0)]);
+    assert!((pieces[0].end_direction[0] - 1.0).abs() < 1e-12);
+    assert!((pieces[1].start_direction[1] - 0.5f64.sqrt()).abs() < 1e-12);
+}
+
+#[test]
+fn knots_that_leave_out_an_end_are_refused() {
+    let mut data = clamped(2, &ZIGZAG[..4], &[1.0; 4]);
+    for knots in [[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]] {
+        data.knots = knots.to_vec();
+        assert!(matches!(Nurbs::new(&data, &axes()).unwrap_err(), NurbsError::End { count: 4, degree: 2, .. }));
+    }
+}
+
+#[test]
+fn a_span_that_only_turns_is_refused() {
+    let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.0, 0.2], [1.0, 0.0, 0.3], [2.0, 0.0, 0.3]];
+    let refused = Nurbs::new(&clamped(2, &points, &[1.0; 5]), &axes).unwrap_err();
+    assert_eq!(refused, NurbsError::NotCounted { from: 1.0, to: 2.0 });
+    assert!(Nurbs::new(&clamped(3, &points, &[1.0; 5]), &axes).is_ok());
+}
+
 /// On this curve an 8-point rule over a quarter of a span and its halves agree to 1e-13 by chance, 4e-9 mm off.
 #[test]
 fn a_chance_agreement_is_not_taken_for_accuracy() {

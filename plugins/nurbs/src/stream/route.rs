@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tandem_motion::nurbs::{AlongPath, Place};
-use tandem_sdk::{Block, BlockKind, PlannerContext};
+use tandem_sdk::{AxisVector, Block, BlockKind, PlannerContext};
 
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
@@ -127,10 +127,17 @@ impl Leg {
         cap
     }
 
+    /// The path at its end `s_mm`, or just inside where it stands still in its parameter; `None` where it has no
+    /// direction there either.
+    fn beside(&self, s_mm: f64, inward_mm: f64) -> Option<AlongPath> {
+        let places = [s_mm, s_mm + inward_mm].map(|s| self.at(s, &mut Place::default()));
+        places.into_iter().find(|at| at.direction != AxisVector::ZERO)
+    }
+
     /// Whether `next` goes on in the same direction, with a step of the acceleration too small to matter.
     fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
-        let (mut place, mut next_place) = (Place::default(), Place::default());
-        let (before, after) = (self.at(self.end_mm, &mut place), next.at(next.start_mm, &mut next_place));
+        let ends = self.beside(self.end_mm, -BESIDE_MM).zip(next.beside(next.start_mm, BESIDE_MM));
+        let Some((before, after)) = ends else { return false };
         let speed = self.feed_mm_per_s.min(next.feed_mm_per_s);
         let period_s = bounds.context.fine_period_s;
         bounds.context.limits.axes().iter().enumerate().all(|(axis, limits)| {
