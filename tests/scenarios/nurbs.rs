@@ -73,6 +73,26 @@ fn planners_that_drive_no_curves_say_so() {
         let errors = refused.errors();
         assert!(errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"), "{errors}");
     }
+    // Also where they could not drive this machine at all: it is the curve that asks for another planner.
+    let jerk_limited = root().join("examples/machines/mill-3axis-smooth.toml");
+    for planner in ["look-ahead", "block-overlap", "after-interpolation"] {
+        let set = format!("planner.plugin={planner}");
+        let on = |text: &str| Scenario::text(text).on(&jerk_limited).with(&["--set", &set]).run().errors();
+        let errors = on("F600 G1 X1\nG5.2\nX2\nX2 Y2\nG5.3\n");
+        assert!(errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"), "{errors}");
+        let errors = on("F600 G1 X1\n");
+        assert!(errors.starts_with("--set planner.plugin: "), "{errors}");
+    }
+}
+
+/// The place of an error is that of the word, with its line, though it shows only where the curve is complete.
+#[test]
+fn what_is_wrong_with_a_curve_is_shown_where_it_stands() {
+    let refused = Scenario::text("F600\nG5.2 P1 L3\nX20 Y10\nX25 (far) Y900\nX-20\nG5.3\n").run();
+    assert_eq!(refused.status(), 1);
+    let errors = refused.errors();
+    assert!(errors.contains("program.ngc:4:11: error: Y would reach "), "{errors}");
+    assert!(errors.contains("\n  X25 (far) Y900\n            ^^^^"), "{errors}");
 }
 
 #[test]
@@ -200,10 +220,11 @@ fn degenerate_curves_are_driven_to_their_ends() {
     let knots = "F6000\nG6.2 P3 K0 X0 Y0 R1\nK0 X5 Y5\nK0 X10 Y0\nK1 X15 Y5\nK1 X20 Y0\nK1.5 X25 Y5\nK3\nK3\nK3\n";
     let spread = "F6000\nG5.2 P1 L3\nX-40 Y-80 P73\nX-140 Y-146 P1.8\nX10 Y-100 P0.13\nX-148 Y26 P0.04\nX-140 Y25 P3\n\
                   X-135 Y-115 P86\nX-90 Y-71 P0.04\nG5.3\n";
+    let corner = "F6000\nG5.2 P1 L3\nX10 Y0\nX10 Y0\nX10 Y0\nX20 Y10\nX0 Y0\nX0 Y0\nG5.3\nG1 X3\n";
     let wave: Vec<String> =
         (1..10_000).map(|n| format!("X{:.4} Y{:.6}\n", 0.02 * f64::from(n), (0.05 * f64::from(n)).sin())).collect();
     let wave = format!("F6000\nG5.2 P1 L4\n{}G5.3\n", wave.concat());
-    for program in [coincident, weights, spread, knots, &wave] {
+    for program in [coincident, weights, spread, knots, corner, &wave] {
         let shown = &program[..program.len().min(120)];
         for form in ["scan", "windowed"] {
             let form = format!("planner.options.form={form}");

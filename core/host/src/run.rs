@@ -146,12 +146,13 @@ impl Run {
     ) -> Result<Self, HostError> {
         let planner = setup::planner(&machine, registry)?;
         let driver = setup::driver(&machine, registry)?;
-        rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
+        // The program first: where it needs another planner, what is wrong with this one does not matter.
         let checked = first_pass(&machine, planner.as_ref(), &mut program, switches)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
         }
+        rules::check(&machine, &planner.describe(), driver.describe())?;
+        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
         let name = program.name().to_string();
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
         let policy = PolicyHost::open(&machine)?;
