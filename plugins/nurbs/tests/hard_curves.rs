@@ -105,7 +105,9 @@ fn corners_of_coinciding_points_are_rests() {
                 std::iter::once(start).chain(std::iter::repeat_n(corner, count)).chain([end]).collect();
             let (rests, time_s) = rests(form, &even(&points, degree));
             let what = format!("{form}, degree {degree}, {count} points: {rests:?}, {time_s} s");
-            assert_eq!(rests, [AxisVector::from_slice(&corner), AxisVector::from_slice(&end)], "{what}");
+            let near =
+                |(at, programmed): (&AxisVector, &[f64; 2])| (0..2).all(|n| (at[n] - programmed[n]).abs() < 1e-9);
+            assert!(rests.len() == 2 && rests.iter().zip([&corner, &end]).all(near), "{what}");
             assert!(time_s > straight && time_s < straight + 0.15, "{what}");
         }
     }
