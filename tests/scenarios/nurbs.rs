@@ -85,6 +85,21 @@ fn planners_that_drive_no_curves_say_so() {
     }
 }
 
+/// A rotary axis that goes on where the others stand still has no path by its length: said before anything moves.
+#[test]
+fn a_curve_that_turns_alone_is_refused_by_the_check() {
+    let machine = root().join("examples/machines/mill-4axis.toml");
+    let run = |text: &str| Scenario::text(text).on(&machine).with(&ADAPTIVE).run();
+    let instant = run("F600\nG5.2 L3\nX10 A10\nX10 A20\nX20 Y9 A30\nG5.3\n");
+    assert_eq!(instant.status(), 1);
+    let errors = instant.errors();
+    assert!(errors.contains("program.ngc:2:1:") && errors.contains("planner smooth drives it"), "{errors}");
+    let span = run("F600\nG5.2 L3\nX10\nX10 A10\nX10 A20\nX20 Y9 A30\nG5.3\n").errors();
+    assert!(span.contains("program.ngc:4:1: error: ") && span.contains("only rotary axes move"), "{span}");
+    let done = run("F600\nG5.2 L3\nX10 A10\nX12 A20\nX20 Y9 A30\nG5.3\n");
+    assert_eq!(done.status(), 0, "{}", done.errors());
+}
+
 /// The place of an error is that of the word, with its line, though it shows only where the curve is complete.
 #[test]
 fn what_is_wrong_with_a_curve_is_shown_where_it_stands() {

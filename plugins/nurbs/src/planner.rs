@@ -1,8 +1,8 @@
 //! The planner: its form, and what all forms have in common.
 
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, NurbsGeometry, Planner, PlannerContext,
-    PlannerDescription, PluginError, SegmentSink, size_of_contract,
+    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, NurbsGeometry, Planner,
+    PlannerContext, PlannerDescription, PluginError, SegmentSink, size_of_contract,
 };
 
 use crate::baseline::Baseline;
@@ -84,6 +84,18 @@ pub(crate) fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time
     }
 }
 
+/// Whether the curve of `block` can be driven by its length.
+fn check_curve(axes: &Axes, block: &Block) -> Result<(), PluginError> {
+    let curve = curve_of(axes, block).map_err(|error| PluginError::new(error.to_string()))?;
+    match curve.turns_alone() {
+        None => Ok(()),
+        Some(knot) => Err(PluginError::new(format!(
+            "at the knot {knot} of this curve rotary axes move and no other: nurbs drives curves by their length, which \
+             stands still there; planner smooth drives it in chords"
+        ))),
+    }
+}
+
 impl Planner for NurbsPlanner {
     fn describe(&self) -> PlannerDescription {
         match self.form {
@@ -104,9 +116,7 @@ impl Planner for NurbsPlanner {
             _ if !(block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0) => {
                 refuse("a block needs a feed above zero")
             }
-            BlockKind::Nurbs => {
-                curve_of(&self.context.axes, block).map(|_| ()).map_err(|error| PluginError::new(error.to_string()))
-            }
+            BlockKind::Nurbs => check_curve(&self.context.axes, block),
             _ => Ok(()),
         }
     }

@@ -13,6 +13,9 @@ const STANDS_STILL: f64 = 1e-7;
 /// Control points no further apart are one, mm or rad: what rounding leaves of a coordinate and its weight.
 const SAME_MM: f64 = 1e-12;
 
+/// Axes that path speed does not count move where they would go further in a span, rad.
+const MOVES_RAD: f64 = 1e-9;
+
 /// A smooth part of a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
@@ -80,9 +83,31 @@ impl Nurbs {
 
     fn stands_still(&self, knot: f64) -> bool {
         let span = self.span(knot);
-        let speed = self.counted_length(&self.derivatives_in(span, knot).first);
-        let width = self.knots[span + 1] - self.knots[span];
-        speed * width <= STANDS_STILL * self.gauss(span, knot, self.knots[span + 1])
+        self.stands_still_in(span, &self.derivatives_in(span, knot).first)
+    }
+
+    fn stands_still_in(&self, span: usize, first: &AxisVector) -> bool {
+        let (from, to) = (self.knots[span], self.knots[span + 1]);
+        self.counted_length(first) * (to - from) <= STANDS_STILL * self.gauss(span, from, to)
+    }
+
+    /// The first knot at which only axes move that path speed does not count: beside it they move any distance in no length.
+    /// Does not allocate.
+    pub fn turns_alone(&self) -> Option<f64> {
+        let (start, _) = self.control_point(0);
+        let uncounted = |vector: AxisVector, least: f64| {
+            vector.0.iter().zip(self.counted.0).any(|(v, counted)| counted == 0.0 && v.abs() > least)
+        };
+        if !(1..self.points()).any(|index| uncounted(self.control_point(index).0 - start, SAME_MM)) {
+            return None;
+        }
+        let spans = (self.degree..self.points()).filter(|span| self.knots[span + 1] > self.knots[*span]);
+        let mut knots = spans.flat_map(|span| [(span, self.knots[span]), (span, self.knots[span + 1])]);
+        let alone = knots.find(|(span, knot)| {
+            let (first, width) = (self.derivatives_in(*span, *knot).first, self.knots[span + 1] - self.knots[*span]);
+            uncounted(first * width, MOVES_RAD) && self.stands_still_in(*span, &first)
+        });
+        alone.map(|(_, knot)| knot)
     }
 
     /// Direction just behind `u`.

@@ -200,7 +200,23 @@ fn a_span_that_only_turns_is_refused() {
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.0, 0.2], [1.0, 0.0, 0.3], [2.0, 0.0, 0.3]];
     let refused = Nurbs::new(&clamped(2, &points, &[1.0; 5]), &axes).unwrap_err();
     assert_eq!(refused, NurbsError::NotCounted { from: 1.0, to: 2.0 });
-    assert!(Nurbs::new(&clamped(3, &points, &[1.0; 5]), &axes).is_ok());
+}
+
+/// For an instant, at a knot inside, at the start or at the end: beside it A would turn any angle in no length.
+#[test]
+fn instants_that_only_turn_are_found() {
+    let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
+    let at = |degree: usize, points: &[[f64; 3]]| {
+        Nurbs::new(&clamped(degree, points, &vec![1.0; points.len()]), &axes).unwrap().turns_alone()
+    };
+    assert_eq!(at(2, &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.0, 0.2], [2.0, 1.0, 0.3]]), Some(1.0));
+    assert_eq!(at(3, &[[0.0; 3], [1.0, 0.0, 0.1], [1.0, 0.0, 0.2], [1.0, 0.0, 0.3], [2.0, 0.0, 0.3]]), Some(1.0));
+    assert_eq!(at(2, &[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.2]]), Some(0.0));
+    assert_eq!(at(2, &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 0.0, 0.2]]), Some(1.0));
+    // All stand still; and A alone, which then counts.
+    assert_eq!(at(2, &[[0.0; 3], [0.0; 3], [1.0, 0.0, 0.2]]), None);
+    assert_eq!(at(2, &[[0.0; 3], [0.0, 0.0, 0.1], [0.0, 0.0, 0.3]]), None);
+    assert_eq!(at(2, &[[0.0; 3], [1.0, 0.0, 0.1], [2.0, 3.0, 0.3]]), None);
 }
 
 /// On this curve an 8-point rule over a quarter of a span and its halves agree to 1e-13 by chance, 4e-9 mm off.

@@ -23,6 +23,9 @@ const TRIES: [usize; 2] = [12, 30];
 /// As published.
 pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
 
+/// Samples of a window at most: slower than that is no motion.
+const MOST_SAMPLES: f64 = 1e6;
+
 /// What a try takes back.
 #[derive(Clone, Copy, Debug)]
 struct Slower {
@@ -88,7 +91,7 @@ impl Windowed {
         grade.is_some_and(|grade| ease(job, &window.motion.0, &mut limit, grade, &mut self.reliefs))
     }
 
-    /// False where the speed at the start is too high for what follows.
+    /// False where the speed at the start is too high for what follows, or a speed so low that the window has no end.
     fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
         let parts = self.reliefs.parts().iter().map(|part| ([part.from_mm, part.to_mm], part.speed));
         self.survey.slow(slower.speed, parts);
@@ -104,7 +107,10 @@ impl Windowed {
         let ramps = &mut window.motion.0;
         self.rounds.make(corners, self.survey.feed_mm_per_s, grade, &mut limit, &CARE, ramps);
         lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
-        corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s && window.times.len() > 1
+        let most_s = MOST_SAMPLES * job.bounds.context.fine_period_s;
+        corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
+            && window.times.len() > 1
+            && window.duration_s() <= most_s
     }
 }
 
