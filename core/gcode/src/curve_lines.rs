@@ -6,7 +6,8 @@ use tandem_sdk::AxisVector;
 use crate::curve::{Curve, Dialect};
 use crate::fault::{Checked, Fault, show};
 use crate::interpreter::Interpreter;
-use crate::letters::AXIS_MASK;
+use crate::letters::{AXIS_MASK, index};
+use crate::orders::no_axis;
 
 /// Orders (degree + 1) that can be asked for.
 const ORDERS: std::ops::RangeInclusive<u32> = 2..=MAX_DEGREE as u32 + 1;
@@ -203,7 +204,10 @@ impl Interpreter {
         let axes = AXIS_MASK & !self.letters.mask;
         let foreign = !crate::letters::mask(letters) | axes;
         let Some((letter, span)) = self.words.first_of(foreign) else { return Ok(()) };
-        let message = format!("{} has no place in this line of a curve", letter as char);
+        if axes >> index(letter) & 1 != 0 {
+            return Err(no_axis(letter, span, &self.letters));
+        }
+        let message = format!("{} has no place in this line of a curve{}", letter as char, self.words.exponent(letter));
         Err(Fault::new(span, "unused-word", message))
     }
 

@@ -1,6 +1,6 @@
 //! The G and M words of a line, sorted by group and checked against each other and against the other words.
 
-use crate::fault::{Checked, Fault};
+use crate::fault::{Checked, Fault, Span};
 use crate::letters::{AXIS_MASK, Letters, index, mask};
 use crate::state::Motion;
 use crate::table::{self, GROUPS, Group, Row, written};
@@ -220,14 +220,20 @@ fn misplaced(words: &Words, claimed: u32, letters: &Letters) -> Fault {
     let (letter, span) = words.first_of(useless).unwrap_or_default();
     let name = letter as char;
     if letter.is_ascii_uppercase() && foreign >> index(letter) & 1 != 0 {
-        let message = format!("this machine has no axis {name}; it has {}", letters.list());
-        return Fault::new(span, "axis", message);
+        return no_axis(letter, span, letters);
     }
     let takers = takers(letter);
     if takers.is_empty() {
         return Fault::new(span, "unknown-word", format!("the word {name} is not known"));
     }
-    Fault::new(span, "unused-word", format!("nothing in this line takes the word {name} ({takers} would)"))
+    let exponent = words.exponent(letter);
+    Fault::new(span, "unused-word", format!("nothing in this line takes the word {name} ({takers} would){exponent}"))
+}
+
+/// An axis that the machine lacks.
+#[cold]
+pub(crate) fn no_axis(letter: u8, span: Span, letters: &Letters) -> Fault {
+    Fault::new(span, "axis", format!("this machine has no axis {}; it has {}", letter as char, letters.list()))
 }
 
 /// The supported words that take `letter`.

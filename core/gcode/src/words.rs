@@ -112,6 +112,13 @@ impl Words {
         Fault::new(self.span(letter), code, message)
     }
 
+    /// What is to be said of a word `letter` out of place where it is E right behind a number: X1e-5.
+    #[cold]
+    pub fn exponent(&self, letter: u8) -> &'static str {
+        let behind = |other: u8| self.has(other) && self.span(other).end == self.span(letter).start;
+        if letter == b'E' && (b'A'..=b'Z').any(behind) { "; numbers have no exponent" } else { "" }
+    }
+
     /// The place of the first (leftmost) letter of `mask`.
     pub fn first_of(&self, mask: u32) -> Option<(u8, Span)> {
         let present = self.present & mask;

@@ -126,7 +126,11 @@ fn what_is_missing_is_named() {
     }
     assert_messages("F60\nG5.2\nX1", &["3:1 [nurbs] the program ends within the curve that line 2 opens"]);
     assert_messages("F60\nG5.2\nX1 S300\nX2\nG5.3", &["3:4 [unused-word] S has no place in this line of a curve"]);
-    assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [unused-word] B has no place in this line of a curve"]);
+    assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [axis] this machine has no axis B; it has X Y Z A"]);
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1 R1e-3\nK0 X2\nK1\nK1\nK1",
+        &["3:9 [unused-word] E has no place in this line of a curve; numbers have no exponent"],
+    );
     assert_messages(
         "G5.2\nX1\nX2\nG5.3",
         &["1:1 [feed-missing] the feed is missing: no F has been set; G5.2 needs one"],

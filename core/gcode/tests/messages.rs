@@ -121,6 +121,10 @@ unknown-word.ngc:5:4: error: nothing in this line takes the word E (M66 would)
      ^^
 ";
     assert_eq!(checked("unknown-word.ngc") + "\n", expected);
+    assert_messages(
+        "G0 X1e-5",
+        &["1:6 [unused-word] nothing in this line takes the word E (M66 would); numbers have no exponent"],
+    );
     assert_messages("G0 D3", &["1:4 [unknown-word] the word D is not known"]);
 }
 
