@@ -4,6 +4,9 @@ use tandem_motion::Path;
 use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Place};
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
+/// A stretch no longer than this is rounding, mm.
+const LEAST_MM: f64 = 1e-9;
+
 /// What a block moves along: a curve, or a line or arc.
 #[derive(Clone, Debug)]
 enum Shape {
@@ -59,7 +62,8 @@ impl Course {
             let knots_mm = inside.map(|knot| table.length_at(&curve, knot)).collect();
             Stretch { length_mm: table.length().mm, table: Some(table), knots_mm }
         };
-        let stretches = curve.pieces().iter().map(stretch).collect();
+        // Between points of a polygon that coincide there is nothing to drive.
+        let stretches = curve.pieces().iter().map(stretch).filter(|stretch| stretch.length_mm > LEAST_MM).collect();
         Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end, axes: count }))
     }
 

@@ -2,9 +2,12 @@
 
 mod common;
 
-use common::{Collected, context, curve_block};
+use std::f64::consts::FRAC_PI_2;
+
+use common::{Collected, context, curve_block, run};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_sdk::{AxisVector, NurbsData, Planner, PlannerContext};
+use tandem_rig::{arc, line, numbered};
+use tandem_sdk::{AxisVector, NurbsData, OwnedBlock, Planner, PlannerContext};
 
 fn clamped(points: &[[f64; 2]], weights: Vec<f64>, degree: usize) -> NurbsData {
     let spans = points.len() - degree;
@@ -78,6 +81,10 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
             }
         }
     }
+    let numbers = |segment: &tandem_sdk::Segment| {
+        segment.coefficients.iter().flatten().chain(&segment.path).all(|v| v.is_finite())
+    };
+    assert!(collected.segments.iter().all(numbers), "{name}: a number that is not finite");
     let [acceleration, jerk] = shares(&collected, &context);
     println!("{name}: {:.3} s, acceleration {acceleration:.3}, jerk {jerk:.3}", collected.duration_s());
     assert!(acceleration <= 1.0 && jerk <= 1.0, "{name}: {acceleration} {jerk}");
@@ -91,7 +98,7 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
 fn corners_of_coinciding_points_are_rests() {
     let rests = |form: &str, data: &NurbsData| {
         let block = curve_block(data.clone(), 1.0, 100.0);
-        let collected = common::run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
+        let collected = run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
         let rests: Vec<AxisVector> =
             collected.segments.iter().filter(|s| s.duration_s == 0.0).map(|s| s.position(0.0)).collect();
         (rests, collected.duration_s())
@@ -155,4 +162,34 @@ fn turns_back_are_slow_at_the_turn_only() {
             }
         }
     }
+}
+
+/// A rounded square; with arcs that turn a little less, as programs round their ends.
+#[test]
+fn lines_run_into_arcs_without_rest() {
+    for form in ["scan", "windowed"] {
+        for short_rad in [0.0, 4e-4] {
+            let context = context(AxisVector::ZERO);
+            let collected = run(&format!("form = \"{form}\""), &context, &rounded(40.0, 10.0, short_rad));
+            let rests = collected.segments.iter().filter(|segment| segment.duration_s == 0.0).count();
+            assert_eq!(rests, 1, "{form} {short_rad}: at the end only");
+            let [acceleration, jerk] = shares(&collected, &context);
+            assert!(acceleration <= 1.0 && jerk <= 1.0, "{form} {short_rad}: {acceleration} {jerk}");
+        }
+    }
+}
+
+/// Four lines and arcs anticlockwise.
+fn rounded(side_mm: f64, radius_mm: f64, short_rad: f64) -> Vec<OwnedBlock> {
+    let (mut at, mut along, mut blocks) = (AxisVector::ZERO, [1.0, 0.0], Vec::new());
+    for _ in 0..4 {
+        let side = [-along[1], along[0]];
+        let to = AxisVector::from_slice(&[at[0] + along[0] * side_mm, at[1] + along[1] * side_mm]);
+        blocks.push(line(&at, &to, 100.0));
+        let center_mm = [to[0] + side[0] * radius_mm, to[1] + side[1] * radius_mm];
+        let corner = arc(&to, center_mm, FRAC_PI_2 - short_rad, 100.0);
+        (at, along) = (corner.end, side);
+        blocks.push(corner);
+    }
+    numbered(blocks).into_iter().map(|block| OwnedBlock::new(block, None)).collect()
 }

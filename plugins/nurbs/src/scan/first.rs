@@ -91,13 +91,15 @@ impl First {
 
 fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &mut Cursor) -> Spot {
     let (at, leg) = route.at(at_mm, cursor);
+    let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
     Spot {
-        speed_mm_per_s: reliefs.at(at_mm)[0] * leg.smooth_cap_mm_per_s(&at, bounds),
+        speed_mm_per_s: reliefs.at(at_mm)[0] * leg.smooth_cap_mm_per_s(&at, bounds).min(step_cap),
         tangential: Tangential {
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
         step_mm: (0.15 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.3),
+        knot_mm,
     }
 }

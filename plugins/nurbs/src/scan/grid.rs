@@ -62,7 +62,7 @@ impl Grid {
                     _ => route.at(state[0], &mut cursor).0,
                 };
                 let leg = route.find(state[0], &mut cursor);
-                laid[n] = place(leg, bounds, reliefs, state, &at);
+                laid[n] = place(leg, bounds, reliefs, (state, f64::INFINITY), &at);
                 if n == 1 {
                     turn = leg.course.counted_length(&at.curvature) * (states[2][0] - states[0][0]);
                 }
@@ -78,6 +78,19 @@ impl Grid {
         }
     }
 
+    /// Further places of an interval: around `z`.
+    pub fn look_closer(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        motion: &Rated,
+        reliefs: &Reliefs,
+        (interval, z): (usize, f64),
+    ) {
+        let around = [z / 2.0, z, f64::midpoint(z, 1.0)];
+        self.look(route, bounds, motion, reliefs, (interval, around), &mut Cursor::default());
+    }
+
     /// Three more places of an interval.
     fn look(
         &mut self,
@@ -91,7 +104,7 @@ impl Grid {
         let laid = z.map(|z| {
             let state = evaluate(&motion.coefficients, interval, z, motion.step_s);
             let (at, leg) = route.at(state[0], cursor);
-            place(leg, bounds, reliefs, &state, &at)
+            place(leg, bounds, reliefs, (&state, f64::INFINITY), &at)
         });
         self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
         self.more.push(laid.map(|(_, place)| place));
@@ -116,9 +129,10 @@ impl Grid {
             let state = evaluate(&motion.coefficients, interval, at, motion.step_s);
             let (other, _) = route.at(last[0], &mut cursor);
             let leg = route.find(knot_mm, &mut cursor);
+            let step_cap = Leg::step_cap_mm_per_s(&sides, bounds);
             let [before, behind] = sides;
-            let laid = [(state, before), (state, behind), (last, other)];
-            let laid = laid.map(|(state, at)| place(leg, bounds, reliefs, &state, &at));
+            let laid = [(state, before, step_cap), (state, behind, step_cap), (last, other, f64::INFINITY)];
+            let laid = laid.map(|(state, at, cap)| place(leg, bounds, reliefs, (&state, cap), &at));
             self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
             self.more.push(laid.map(|(_, place)| place));
         }
@@ -162,7 +176,7 @@ fn place(
     leg: &Leg,
     bounds: &Bounds,
     reliefs: &Reliefs,
-    [s_mm, s1, s2, s3]: &[f64; 4],
+    ([s_mm, s1, s2, s3], cap): (&[f64; 4], f64),
     at: &AlongPath,
 ) -> (Point, Place) {
     let [speed, jerk_share] = reliefs.at(*s_mm);
@@ -173,7 +187,7 @@ fn place(
         point.second[lane] = x2 * s1 * s1 + x1 * s2;
         point.third[lane] = x3 * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;
     }
-    let most = if *s1 > 1e-9 { (leg.cap_mm_per_s(at, bounds) / s1).powi(2) } else { f64::INFINITY };
+    let most = if *s1 > 1e-9 { (leg.cap_mm_per_s(at, bounds).min(cap) / s1).powi(2) } else { f64::INFINITY };
     point.most = speed * speed * most;
     (point, Place { s_mm: *s_mm, most, speed, yields: false })
 }

@@ -18,6 +18,10 @@ const JERK_SHARE: f64 = 0.975;
 const TRIES: usize = 8;
 /// Tries after which limits of samples are to be kept, or never will.
 const HOPELESS: usize = 6;
+/// A solution so short, or that takes more than this share of the ramps it began with, is compared with ramps that keep
+/// every limit.
+const SHORT_S: f64 = 0.15;
+const RAMPS_SHARE: f64 = 0.95;
 /// Intervals of the grid at least.
 const MIN_INTERVALS: usize = 40;
 
@@ -39,8 +43,9 @@ impl Planning for Scan {
     fn plan(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         let found = self.plan_rate(job, window);
         let slow_s = if found { window.duration_s() } else { f64::INFINITY };
-        // Slower than the timing it began with: a path so short and sharp that limits between samples count most.
-        if job.rests() && slow_s > self.first.end().0 {
+        // A path so short and sharp that limits between samples count most.
+        let doubtful = slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.first.end().0;
+        if job.rests() && doubtful {
             return self.plan_ramps(job, window, slow_s) || found;
         }
         found
@@ -56,8 +61,8 @@ impl Scan {
         for n in 1..=TRIES {
             let known = self.reliefs.count();
             self.solve(job, n > 1, window);
-            let worst = check(job, window, &mut self.reliefs);
-            if !worst.is_kept() {
+            let kept_all = !self.dips(job, window) && check(job, window, &mut self.reliefs).is_kept();
+            if !kept_all {
                 if n >= HOPELESS && kept.is_none() {
                     break;
                 }
@@ -71,9 +76,23 @@ impl Scan {
         if let Some(known) = kept {
             self.reliefs.keep_first(known);
             self.solve(job, false, window);
-            return check(job, window, &mut self.reliefs).is_kept();
+            return !self.dips(job, window) && check(job, window, &mut self.reliefs).is_kept();
         }
         false
+    }
+
+    /// Whether the rate falls to zero somewhere, which it may between the places of the grid: then there are more of them.
+    fn dips(&mut self, job: &Job<Driven>, window: &Window<Driven>) -> bool {
+        let rated = &window.motion.rated;
+        let mut found = false;
+        for k in 0..rated.rate.intervals() {
+            let (z, least) = rated.rate.least(k);
+            if least <= 0.0 {
+                self.grid.look_closer(job.route, job.bounds, rated, &self.reliefs, (k, z));
+                found = true;
+            }
+        }
+        found
     }
 
     /// The window as the form `windowed` plans it, where that takes less than `below_s`.

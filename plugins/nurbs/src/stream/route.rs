@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tandem_motion::nurbs::{AlongPath, Place};
-use tandem_sdk::{AxisVector, Block, BlockKind, PlannerContext};
+use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, PlannerContext};
 
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
@@ -15,10 +15,12 @@ const AIM: f64 = 0.999;
 const TURNING: f64 = 0.8;
 /// Share of an axis's jerk that the third derivative of the path may take.
 const THIRD: f64 = 0.9;
-/// Share of the jerk limit that a step of the centripetal acceleration may take in a fine period.
-const STEP: f64 = 0.1;
-/// Largest turn where stretches join without rest, rad.
-const STRAIGHT: f64 = 1e-6;
+/// Share of the jerk limit that steps of velocity and acceleration may take in a fine period.
+const STEP: f64 = 0.7;
+/// Share of the feed below which a junction is not passed but rested at.
+const WORTH: f64 = 0.05;
+/// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
+const STRAIGHT: f64 = 1e-3;
 
 /// A smooth stretch of a block.
 #[derive(Clone, Debug)]
@@ -115,6 +117,20 @@ impl Leg {
         AIM * cap
     }
 
+    /// Highest speed where the derivatives jump between two sides: the steps of velocity and acceleration as jerk of one
+    /// period T, so that v·|Δx′|/T² + v²·|Δx″|/T is a share of the jerk limit.
+    pub fn step_cap_mm_per_s([before, behind]: &[AlongPath; 2], bounds: &Bounds) -> f64 {
+        let period_s = bounds.context.fine_period_s;
+        let axes = bounds.context.limits.axes().iter().enumerate();
+        let caps = axes.map(|(axis, limits)| {
+            let turn = (behind.direction[axis] - before.direction[axis]).abs() / (period_s * period_s);
+            let bend = (behind.curvature[axis] - before.curvature[axis]).abs() / period_s;
+            let jerk = STEP * limits.jerk_mm_per_s3;
+            2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
+        });
+        caps.fold(f64::INFINITY, f64::min)
+    }
+
     /// The same, and the jerk of the curve at that speed.
     pub fn smooth_cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
         let mut cap = self.cap_mm_per_s(at, bounds);
@@ -134,17 +150,13 @@ impl Leg {
         places.into_iter().find(|at| at.direction != AxisVector::ZERO)
     }
 
-    /// Whether `next` goes on in the same direction, with a step of the acceleration too small to matter.
+    /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
     fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
         let ends = self.beside(self.end_mm, -BESIDE_MM).zip(next.beside(next.start_mm, BESIDE_MM));
         let Some((before, after)) = ends else { return false };
-        let speed = self.feed_mm_per_s.min(next.feed_mm_per_s);
-        let period_s = bounds.context.fine_period_s;
-        bounds.context.limits.axes().iter().enumerate().all(|(axis, limits)| {
-            let turn = (after.direction[axis] - before.direction[axis]).abs();
-            let step = (after.curvature[axis] - before.curvature[axis]).abs();
-            turn <= STRAIGHT && speed * speed * step <= STEP * limits.jerk_mm_per_s3 * period_s
-        })
+        let straight = (0..MAX_AXES).all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
+        let feed_mm_per_s = self.feed_mm_per_s.min(next.feed_mm_per_s);
+        straight && Self::step_cap_mm_per_s(&[before, after], bounds) >= WORTH * feed_mm_per_s
     }
 }
 
@@ -247,6 +259,16 @@ impl Route {
         let break_mm = self.find(from_mm, cursor).next_break_mm(from_mm);
         let sides = || [-BESIDE_MM, BESIDE_MM].map(|off| self.at(break_mm + off, cursor).0);
         (from_mm < break_mm && break_mm < to_mm).then(sides).map(|sides| (break_mm, sides))
+    }
+
+    /// Highest speed at `s_mm` for a jump of the derivatives there, infinite where there is none, and how far the next place
+    /// is where there may be one, mm.
+    pub fn step_cap_mm_per_s(&self, s_mm: f64, bounds: &Bounds, cursor: &mut Cursor) -> (f64, f64) {
+        let around = [s_mm - PAST_MM, s_mm + PAST_MM];
+        let knot = self.knot(around, cursor);
+        let next_mm = self.find(s_mm, cursor).next_break_mm(s_mm + PAST_MM) - s_mm;
+        let cap = knot.map_or(f64::INFINITY, |(_, sides)| Leg::step_cap_mm_per_s(&sides, bounds));
+        (cap, next_mm)
     }
 
     /// Where the run from the front ends, mm, and whether it is known to end there.

@@ -17,6 +17,8 @@ pub struct Spot {
     pub tangential: Tangential,
     /// Distance to the next place to be looked at, mm.
     pub step_mm: f64,
+    /// Distance to the next place where the derivatives of the path may jump, mm: that is one to be looked at.
+    pub knot_mm: f64,
 }
 
 /// The places of a window; keeps its memory.
@@ -94,11 +96,14 @@ impl Survey {
             if time_s > window_s || self.places.len() >= MAX_PLACES {
                 return false;
             }
-            // No sliver before the end.
-            let step_mm = if ahead_mm < 1.5 * spot.step_mm { ahead_mm } else { spot.step_mm };
+            // No sliver before the end or a knot.
+            let near_mm = ahead_mm.min(spot.knot_mm);
+            let step_mm = if near_mm < 1.5 * spot.step_mm { near_mm } else { spot.step_mm };
             let faster = (speed * speed + 2.0 * spot.tangential.acceleration_mm_per_s2 * step_mm).sqrt();
             let next = faster.min(spot.speed_mm_per_s);
-            time_s += 2.0 * step_mm / (speed + next);
+            // Beside a cusp both are next to nothing, though the way is driven in the time from rest to rest.
+            let rests_s = 4.0 * (step_mm / (2.0 * spot.tangential.jerk_mm_per_s3)).cbrt();
+            time_s += rests_s.min(2.0 * step_mm / (speed + next));
             speed = next;
             at_mm = if step_mm == ahead_mm { end_mm } else { at_mm + step_mm };
         }
@@ -113,7 +118,10 @@ impl Survey {
             let after = self.places.get(i + level).map_or(0.0, |c| c.speed_mm_per_s);
             if speed < self.feed_mm_per_s && self.places[i - 1].speed_mm_per_s > speed && after > speed {
                 let between = (self.places[i - 1].at_mm, self.places[i + level].at_mm);
-                self.corners.push(lowest(between, self.sections, &mut |at_mm| look(at_mm).speed_mm_per_s));
+                let corner = lowest(between, self.sections, &mut |at_mm| look(at_mm).speed_mm_per_s);
+                // At a knot the speed may be lower than anywhere beside it.
+                let place = self.places[i];
+                self.corners.push(if place.speed_mm_per_s < corner.speed_mm_per_s { place } else { corner });
             }
             i += level;
         }

@@ -25,6 +25,8 @@ pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Gra
     for ramp in ramps {
         let mut left = 1.0f64;
         look(job, ramp, step_s, |at, [s_mm, v, a, j]| {
+            // Below zero it is the rounding of a ramp to rest.
+            let v = v.max(0.0);
             let worst = jerk_share(job.bounds, at, [v, a, j]);
             if worst <= POINT {
                 return;

@@ -59,7 +59,7 @@ fn curvature(curve: &Nurbs, table: &ArcLength, s_mm: f64) -> f64 {
 fn spot(curve: &Nurbs, table: &ArcLength, s_mm: f64) -> Spot {
     let bend = curvature(curve, table, s_mm);
     let speed_mm_per_s = FEED.min(chord_feed_mm_per_s(bend, 0.001, 0.002));
-    Spot { speed_mm_per_s, tangential: LIMITS, step_mm: (0.03 / bend).clamp(3e-4, 0.05) }
+    Spot { speed_mm_per_s, tangential: LIMITS, step_mm: (0.03 / bend).clamp(3e-4, 0.05), knot_mm: f64::INFINITY }
 }
 
 fn survey(curve: &Nurbs, table: &ArcLength) -> Survey {
