@@ -28,11 +28,11 @@ pub(crate) fn starts_here(scanner: &Scanner) -> bool {
 pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
     let text = scanner.rest();
     let signed = usize::from(matches!(text.first(), Some(b'+' | b'-')));
-    let whole = digits(&text[signed..]);
+    let (mut mantissa, whole) = digits(&text[signed..], 0);
     let mut length = signed + whole;
     let mut fraction = 0;
     if text.get(length) == Some(&b'.') {
-        fraction = digits(&text[length + 1..]);
+        (mantissa, fraction) = digits(&text[length + 1..], mantissa);
         length += 1 + fraction;
     }
     let start = scanner.at();
@@ -40,23 +40,27 @@ pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
     if whole + fraction == 0 || length > MAX_LENGTH || scanner.peek() == b'.' {
         return Err(refuse(scanner, start, whole + fraction, length));
     }
-    Ok(value(&text[..length], signed, whole + fraction, fraction))
-}
-
-#[inline]
-fn digits(text: &[u8]) -> usize {
-    text.iter().take_while(|b| b.is_ascii_digit()).count()
-}
-
-#[inline]
-fn value(text: &[u8], signed: usize, count: usize, fraction: usize) -> f64 {
-    if count > EXACT_DIGITS {
+    if whole + fraction > EXACT_DIGITS {
         // The bytes are ASCII digits, a sign and a point, which `parse` always understands.
-        return std::str::from_utf8(text).ok().and_then(|t| t.parse().ok()).unwrap_or(f64::NAN);
+        return Ok(std::str::from_utf8(&text[..length]).ok().and_then(|t| t.parse().ok()).unwrap_or(f64::NAN));
     }
-    let mantissa = text[signed..].iter().filter(|b| **b != b'.').fold(0, |m, b| m * 10 + u64::from(b - b'0'));
     let magnitude = mantissa as f64 / POWERS_OF_TEN[fraction];
-    if text[0] == b'-' { -magnitude } else { magnitude }
+    Ok(if text[0] == b'-' { -magnitude } else { magnitude })
+}
+
+/// The digits at the start of `text`, set behind `mantissa` (which wraps where they are too many), and how many they are.
+#[inline]
+fn digits(text: &[u8], mut mantissa: u64) -> (u64, usize) {
+    let mut count = 0;
+    for byte in text {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            break;
+        }
+        mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+        count += 1;
+    }
+    (mantissa, count)
 }
 
 #[cold]

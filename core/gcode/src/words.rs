@@ -122,6 +122,9 @@ impl Words {
     /// The place of the first (leftmost) letter of `mask`.
     pub fn first_of(&self, mask: u32) -> Option<(u8, Span)> {
         let present = self.present & mask;
+        if present == 0 {
+            return None;
+        }
         let letters = (b'A'..=b'Z').filter(|l| present >> index(*l) & 1 != 0);
         letters.map(|l| (l, self.span(l))).min_by_key(|(_, span)| span.start)
     }

@@ -2,7 +2,7 @@
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, MAX_AXES};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy};
 
 use crate::joints::JointWatch;
 use crate::path_watch::PathWatch;
@@ -102,9 +102,7 @@ impl Monitor {
         let acceleration = (velocity - self.last[1]) * (1.0 / self.period_s);
         let jerk = (acceleration - self.last[2]) * (1.0 / self.period_s);
         for (peak, now) in self.peaks.iter_mut().zip([&velocity, &acceleration, &jerk]) {
-            for axis in 0..MAX_AXES {
-                peak[axis] = peak[axis].max(now[axis].abs());
-            }
+            raise(peak, now);
         }
         self.last = [sample.command, velocity, acceleration];
         if let Some(joints) = &mut self.joints {
@@ -112,5 +110,12 @@ impl Monitor {
         }
         self.position = sample.command;
         self.watch.sample(sample.block, &sample.command)
+    }
+}
+
+/// Raises every entry of `peak` to the magnitude of the entry of `now`, where that is a larger number.
+pub(crate) fn raise(peak: &mut AxisVector, now: &AxisVector) {
+    for (peak, now) in peak.0.iter_mut().zip(now.0) {
+        *peak = if now.abs() > *peak { now.abs() } else { *peak };
     }
 }

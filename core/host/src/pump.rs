@@ -183,32 +183,25 @@ impl<'a> Pump<'a> {
         }
     }
 
-    /// Takes the samples that have come.
+    /// Takes the samples that have come. They are looked at where they lie: a sample is large.
     pub fn drain(&mut self) {
-        while let Ok(sample) = self.host.samples.pop() {
-            for command in self.commands.sample(&sample) {
+        let HostEnd { samples, ratios, requests, .. } = &mut self.host;
+        let Ok(come) = samples.read_chunk(samples.slots()) else { return };
+        let (first, second) = come.as_slices();
+        for sample in first.iter().chain(second) {
+            for command in self.commands.sample(sample) {
                 self.observer.command(&command);
             }
-            let deviation_mm = self.monitor.sample(&sample);
-            let (signals, count) = self.signals(&sample);
-            self.observer.sample(&sample, deviation_mm, &signals[..count]);
+            let deviation_mm = self.monitor.sample(sample);
+            let (signals, count) = signals(self.feed.as_ref(), self.analog, sample);
+            self.observer.sample(sample, deviation_mm, &signals[..count]);
             if let (Some(feed), None) = (&mut self.feed, &self.soft_error)
-                && let Some(note) = feed.sample(&sample, &mut self.host)
+                && let Some(note) = feed.sample(sample, ratios, requests)
             {
                 self.observer.note(&note);
             }
         }
-    }
-
-    /// The strategy's last signals, and after them the named analog inputs.
-    fn signals(&self, sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
-        let mut signals = self.feed.as_ref().and_then(|s| s.answer).map_or([0.0; MAX_SIGNALS], |a| a.signals);
-        let own = self.feed.as_ref().map_or(0, |s| s.signals().len());
-        let count = (own + self.analog).min(MAX_SIGNALS);
-        for (to, from) in signals[own..count].iter_mut().zip(sample.analog) {
-            *to = from;
-        }
-        (signals, count)
+        come.commit_all();
     }
 
     /// Asks the operator where the program has stopped for one, then goes on.
@@ -258,6 +251,17 @@ impl<'a> Pump<'a> {
         self.soft_error.get_or_insert(cause);
         self.host.controls.soft_fault.store(true, Relaxed);
     }
+}
+
+/// The strategy's last signals, and after them the `analog` named inputs.
+fn signals(feed: Option<&FeedRunner>, analog: usize, sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
+    let mut signals = feed.and_then(|s| s.answer).map_or([0.0; MAX_SIGNALS], |a| a.signals);
+    let own = feed.map_or(0, |s| s.signals().len());
+    let count = (own + analog).min(MAX_SIGNALS);
+    for (to, from) in signals[own..count].iter_mut().zip(sample.analog) {
+        *to = from;
+    }
+    (signals, count)
 }
 
 struct Both<'a> {

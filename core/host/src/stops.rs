@@ -34,8 +34,10 @@ pub struct Stop {
 pub struct StopWatch {
     axes: Axes,
     period_s: f64,
-    last: Option<Sample>,
-    speed_mm_per_s: f64,
+    /// Position and rate of program time of the last sample.
+    last: Option<(AxisVector, f64)>,
+    /// What it moved by.
+    way: AxisVector,
     cause: StopCause,
     /// The last stop has not come to rest.
     open: bool,
@@ -52,13 +54,12 @@ impl StopWatch {
     pub fn new(axes: Axes, period_s: f64) -> Self {
         let (stops, before) = (vec![], (1.0, 0.0));
         let cause = StopCause::None;
-        Self { axes, period_s, last: None, speed_mm_per_s: 0.0, cause, open: false, before, stops, count: 0 }
+        Self { axes, period_s, last: None, way: AxisVector::ZERO, cause, open: false, before, stops, count: 0 }
     }
 
     /// A sample was sent.
     pub fn sample(&mut self, sample: &Sample) {
-        let way = self.last.map_or(AxisVector::ZERO, |last| sample.command - last.command);
-        let way_mm = self.length_mm(&way);
+        let way = self.last.map_or(AxisVector::ZERO, |(last, _)| sample.command - last);
         if sample.cause != self.cause {
             self.open = false;
             if sample.cause != StopCause::None {
@@ -66,9 +67,9 @@ impl StopWatch {
             }
         }
         if self.open {
-            self.go_on(sample, way_mm);
+            self.go_on(sample, self.length_mm(&way));
         }
-        (self.cause, self.speed_mm_per_s, self.last) = (sample.cause, way_mm / self.period_s, Some(*sample));
+        (self.cause, self.way, self.last) = (sample.cause, way, Some((sample.command, sample.sigma)));
     }
 
     fn begin(&mut self, sample: &Sample) {
@@ -77,7 +78,8 @@ impl StopWatch {
             return;
         }
         self.open = true;
-        self.before = (self.last.map_or(1.0, |last| last.sigma), self.speed_mm_per_s);
+        let speed_mm_per_s = self.length_mm(&self.way) / self.period_s;
+        self.before = (self.last.map_or(1.0, |(_, sigma)| sigma), speed_mm_per_s);
         let (cause, reaction_periods) = (sample.cause.name(), None);
         let (tick, line) = (sample.tick, sample.line);
         self.stops.push(Stop { tick, line, cause, reaction_periods, time_s: 0.0, distance_mm: 0.0, rest: false });

@@ -1,6 +1,7 @@
 //! Feed strategy and policy between the sample ring and the ratio ring.
 
-use tandem_rings::{HostEnd, Ratio, RequestKind, Sample, StrategyRequest};
+use rtrb::Producer;
+use tandem_rings::{Ratio, RequestKind, Sample, StrategyRequest};
 use tandem_sdk::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, Window};
 
 use crate::policy::{Means, PolicyHost};
@@ -40,7 +41,12 @@ impl FeedRunner {
     /// Takes a sample; where it completes a rough period k, the lesser of the ratios that strategy and policy ask for goes
     /// out for the first tick of period k + 2, and what else the strategy asks for with it.
     /// Gives what is to be logged of it.
-    pub fn sample(&mut self, sample: &Sample, host: &mut HostEnd) -> Option<String> {
+    pub fn sample(
+        &mut self,
+        sample: &Sample,
+        ratios: &mut Producer<Ratio>,
+        requests: &mut Producer<StrategyRequest>,
+    ) -> Option<String> {
         if self.fault.is_some() {
             return None;
         }
@@ -60,7 +66,7 @@ impl FeedRunner {
                     (strategy, policy) => strategy.or(policy).unwrap_or(1.0),
                 };
                 // A full ring means that 64 ratios wait for their tick: the fine loop has stopped, and the last one stands.
-                let _ = host.ratios.push(Ratio { tick, ratio: ratio.clamp(0.0, self.max_ratio) });
+                let _ = ratios.push(Ratio { tick, ratio: ratio.clamp(0.0, self.max_ratio) });
                 match answer.map_or(Request::None, |answer| answer.request) {
                     Request::None => None,
                     Request::Hold => Some(RequestKind::Hold),
@@ -72,7 +78,7 @@ impl FeedRunner {
         self.window.clear();
         let kind = kind?;
         // Where the ring is full the same was asked for eight times, and has not acted yet.
-        let _ = host.requests.push(StrategyRequest { tick, kind });
+        let _ = requests.push(StrategyRequest { tick, kind });
         (kind == RequestKind::Hold).then(|| self.words_of_hold(sample, tick))
     }
 

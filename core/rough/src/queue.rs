@@ -17,7 +17,7 @@ pub struct Queue {
     /// Path coordinate at the start of the epoch, mm: planners begin each at zero.
     path_start_mm: f64,
     /// Emitted, not yet in the ring.
-    staged: VecDeque<Queued>,
+    staged: Vec<Queued>,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported.
@@ -42,7 +42,7 @@ impl Queue {
             depth,
             epoch: 0,
             path_start_mm: 0.0,
-            staged: VecDeque::new(),
+            staged: Vec::new(),
             events: VecDeque::new(),
             blocks: VecDeque::new(),
             stops: VecDeque::new(),
@@ -140,16 +140,17 @@ impl Queue {
 
     /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
     pub fn flush(&mut self, over: bool) {
-        let count = self.staged.len().min(self.end.segments.slots());
-        for queued in self.staged.iter().take(count) {
-            if let RingEntry::Segment(segment) = &queued.entry {
-                self.queued_s = queued.start_s + segment.duration_s;
-                self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
-            }
+        let (moved, _) = self.end.segments.push_partial_slice(&self.staged);
+        let segments = moved.iter().filter_map(|queued| match &queued.entry {
+            RingEntry::Segment(segment) => Some((queued.start_s, segment)),
+            RingEntry::Event(_) => None,
+        });
+        if let Some((start_s, last)) = segments.last() {
+            self.queued_s = start_s + last.duration_s;
+            self.ends_at_rest = last.flags.contains(SegmentFlags::ENDS_AT_REST);
         }
-        if let Ok(slots) = self.end.segments.write_chunk_uninit(count) {
-            slots.fill_from_iter(self.staged.drain(..count));
-        }
+        let count = moved.len();
+        self.staged.drain(..count);
         self.tell(over);
     }
 
@@ -167,7 +168,7 @@ impl Queue {
 
     fn stage_event(&mut self, mut event: Event) {
         (event.program_time_s, event.epoch) = (self.emitted_s, self.epoch);
-        self.staged.push_back(Queued { entry: RingEntry::Event(event), start_s: self.emitted_s });
+        self.staged.push(Queued { entry: RingEntry::Event(event), start_s: self.emitted_s });
     }
 }
 
@@ -181,10 +182,13 @@ impl SegmentSink for Queue {
             let event = self.events.pop_front().unwrap_or_else(|| unreachable!("looked at above"));
             self.stage_event(event);
         }
-        let mut marked = *segment;
-        (marked.epoch, marked.stop_on) = (self.epoch, self.stop_on(segment.block));
-        marked.path[0] += self.path_start_mm;
-        self.staged.push_back(Queued { entry: RingEntry::Segment(marked), start_s: self.emitted_s });
+        let stop_on = self.stop_on(segment.block);
+        // A segment is large: it is copied to its place, and marked there.
+        let staged = self.staged.push_mut(Queued { entry: RingEntry::Segment(*segment), start_s: self.emitted_s });
+        if let RingEntry::Segment(marked) = &mut staged.entry {
+            (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
+            marked.path[0] += self.path_start_mm;
+        }
         self.emitted_s += segment.duration_s;
         self.depth.push(segment, self.emitted_s);
     }

@@ -60,14 +60,18 @@ impl Add for AxisVector {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+        let mut sum = self;
+        sum += other;
+        sum
     }
 }
 
 impl AddAssign for AxisVector {
     #[inline]
     fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
+        for (to, by) in self.0.iter_mut().zip(&other.0) {
+            *to += by;
+        }
     }
 }
 
@@ -75,7 +79,11 @@ impl Sub for AxisVector {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] - other.0[i]))
+        let mut difference = self;
+        for (to, by) in difference.0.iter_mut().zip(&other.0) {
+            *to -= by;
+        }
+        difference
     }
 }
 
@@ -83,7 +91,11 @@ impl Mul<f64> for AxisVector {
     type Output = Self;
     #[inline]
     fn mul(self, factor: f64) -> Self {
-        Self(self.0.map(|v| v * factor))
+        let mut product = self;
+        for to in &mut product.0 {
+            *to *= factor;
+        }
+        product
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES, MAX_LATCHES,
+    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_AXES,
     PluginError, Setpoint,
 };
 
@@ -167,25 +167,24 @@ impl SimulatedDrives {
         self.followed = Some(*to);
     }
 
+    /// Writes every field of the joints and every input; latches of the period before are over.
     fn report(&mut self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
-        *feedback = Feedback::default();
         for (index, joint) in self.joints[..self.joint_count].iter().enumerate() {
             let seen = self.motors.as_ref().map_or(*joint, |motors| motors.measured(index));
             feedback.position[index] = seen.position;
             feedback.speed[index] = seen.speed;
-            let change = CURRENT_A_PER_MM_PER_S2 * (joint.speed - before[index].speed) / self.period_s;
+            let change = || CURRENT_A_PER_MM_PER_S2 * (joint.speed - before[index].speed) / self.period_s;
             feedback.current_a[index] = match (self.options.model, &mut self.motors) {
-                (Model::SecondOrder, _) => change,
+                (Model::SecondOrder, _) => change(),
                 (_, Some(motors)) => motors.current_a(index),
                 _ => 0.0,
             };
             feedback.state[index] = self.state(enable, joint);
             feedback.fault_code[index] = if self.watchdog.is_tripped() { WATCHDOG_FAULT } else { 0 };
         }
-        if let Some(motors) = &self.motors {
-            feedback.analog[..2].copy_from_slice(&[motors.truth.cutting_torque_nm, motors.truth.depth_mm]);
-        }
-        (feedback.inputs, feedback.latches) = self.switch(before);
+        let truth = self.motors.as_ref().map(|motors| &motors.truth);
+        feedback.analog = truth.map_or([0.0; MAX_ANALOG], |truth| [truth.cutting_torque_nm, truth.depth_mm, 0.0, 0.0]);
+        self.switch(before, feedback);
         feedback.spindle_rad_per_s = self.spindle.speed;
         feedback.spindle_angle_rad = self.spindle.angle;
     }
@@ -199,12 +198,17 @@ impl SimulatedDrives {
     }
 
     /// The inputs after a period, and the positions caught in it, as the drives see them.
-    fn switch(&mut self, before: &[Motion; MAX_AXES]) -> (u64, [Latch; MAX_LATCHES]) {
-        let (inputs, mut latches) = self.switches.step(&self.real(before), &self.real(&self.joints));
-        for latch in latches.iter_mut().filter(|latch| latch.edge != 0) {
+    fn switch(&mut self, before: &[Motion; MAX_AXES], feedback: &mut Feedback) {
+        feedback.inputs = 0;
+        feedback.latches.iter_mut().filter(|latch| latch.edge != 0).for_each(|latch| *latch = Latch::default());
+        if self.switches.are_none() {
+            return;
+        }
+        let (from, to) = (self.real(before), self.real(&self.joints));
+        feedback.inputs = self.switches.step(&from, &to, &mut feedback.latches);
+        for latch in feedback.latches.iter_mut().filter(|latch| latch.edge != 0) {
             latch.position = latch.position - self.shift;
         }
-        (inputs, latches)
     }
 
     /// Where the joints really stand.

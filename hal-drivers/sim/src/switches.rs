@@ -50,9 +50,15 @@ impl Switches {
         }
     }
 
-    /// The joints went from one position to the other in a period: the inputs, and the positions caught. Fine loop.
-    pub fn step(&mut self, from: &AxisVector, to: &AxisVector) -> (u64, [Latch; MAX_LATCHES]) {
-        let (mut inputs, mut latches) = (0, [Latch::default(); MAX_LATCHES]);
+    /// Whether no input has a switch: all stay 0.
+    pub fn are_none(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// The joints went from one position to the other in a period: the inputs. `latches`, empty before, take the positions
+    /// caught. Fine loop.
+    pub fn step(&mut self, from: &AxisVector, to: &AxisVector, latches: &mut [Latch; MAX_LATCHES]) -> u64 {
+        let mut inputs = 0;
         let mut free = latches.iter_mut();
         for line in &mut self.lines {
             let shapes = &line.shapes;
@@ -68,7 +74,7 @@ impl Switches {
             line.bouncing = line.bouncing.saturating_sub(1);
             inputs |= u64::from(shown) << line.input;
         }
-        (inputs, latches)
+        inputs
     }
 }
 

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::Serialize;
-use tandem_sdk::{AxisVector, MAX_AXES};
+use tandem_sdk::AxisVector;
 
 use super::JointSpace;
+use crate::monitor::raise;
 
 /// What one joint did, as finite differences of the samples; deg for mm where it turns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -42,9 +43,7 @@ impl JointWatch {
         let change = (speed - velocity) * self.rate;
         let jerk = (change - acceleration) * self.rate;
         for (peak, now) in self.peaks.iter_mut().zip([&speed, &change, &jerk]) {
-            for joint in 0..MAX_AXES {
-                peak[joint] = peak[joint].max(now[joint].abs());
-            }
+            raise(peak, now);
         }
         self.last = Some([joints, speed, change]);
     }
