@@ -7,7 +7,7 @@ use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, PluginError,
-    RingEntry, Segment, SegmentFlags, Setpoint,
+    Segment, SegmentFlags, Setpoint,
 };
 
 const TICKS: usize = 1000;
@@ -108,7 +108,7 @@ fn segment(at: &mut AxisVector, number: f64, duration_s: f64, turn_rad: f64) -> 
         segment.coefficients[axis][1] = FEED_MM_PER_S * direction[axis];
     }
     *at += direction * (FEED_MM_PER_S * duration_s);
-    Queued { entry: RingEntry::Segment(segment), start_s: number * duration_s }
+    Queued::Segment { start_s: number * duration_s, segment }
 }
 
 fn config(order: u32) -> FineConfig {

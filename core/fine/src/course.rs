@@ -1,7 +1,7 @@
 //! The plan ahead as it is queued, at any place: what a way of σ is tried on before it is begun.
 
 use tandem_rings::Queued;
-use tandem_sdk::{MAX_AXES, RingEntry, Segment, SegmentFlags};
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
 
 use crate::outlook::derivatives;
 
@@ -46,9 +46,9 @@ impl<'a> Course<'a> {
         Place { course: *self, segment: Some(self.segment), passed: 0, local_s }
     }
 
-    fn entry(&self, n: usize) -> Option<&'a RingEntry> {
+    fn entry(&self, n: usize) -> Option<&'a Queued> {
         let [first, second] = self.queued;
-        first.get(n).or_else(|| second.get(n - first.len())).map(|queued| &queued.entry)
+        first.get(n).or_else(|| second.get(n - first.len()))
     }
 }
 
@@ -78,9 +78,9 @@ impl Place<'_> {
         self.segment = None;
         while !rests && self.segment.is_none() {
             match self.course.entry(self.passed) {
-                Some(RingEntry::Segment(segment)) if segment.duration_s == 0.0 => rests = ends(segment),
-                Some(RingEntry::Segment(segment)) => self.segment = Some(segment),
-                Some(RingEntry::Event(_)) => {}
+                Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => rests = ends(segment),
+                Some(Queued::Segment { segment, .. }) => self.segment = Some(segment),
+                Some(Queued::Event(_)) => {}
                 None => rests = true,
             }
             self.passed += 1;

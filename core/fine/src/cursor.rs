@@ -4,7 +4,7 @@ mod look;
 
 use rtrb::Consumer;
 use tandem_rings::Queued;
-use tandem_sdk::{AxisVector, Event, RingEntry, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, Event, Segment, SegmentFlags};
 
 use crate::points::Points;
 
@@ -18,6 +18,9 @@ pub struct Cursor {
     segment: Segment,
     start_s: f64,
     local_s: f64,
+    /// Path coordinate here, mm, and path speed, mm/s of program time: asked for more often than the place moves.
+    path_mm: f64,
+    path_speed_mm_per_s: f64,
     epoch: u32,
     /// Entries taken out of the queue since the start.
     taken: u64,
@@ -44,6 +47,8 @@ impl Cursor {
             segment: Segment::rest(position, 0.0),
             start_s: 0.0,
             local_s: 0.0,
+            path_mm: 0.0,
+            path_speed_mm_per_s: 0.0,
             epoch: 0,
             taken: 0,
             resting: true,
@@ -67,12 +72,12 @@ impl Cursor {
 
     /// Planned path speed here, mm/s of program time.
     pub fn path_speed_mm_per_s(&self) -> f64 {
-        if self.resting { 0.0 } else { self.segment.path_speed_mm_per_s(self.local_s) }
+        self.path_speed_mm_per_s
     }
 
     /// Path coordinate here, mm.
     pub fn path_mm(&self) -> f64 {
-        self.segment.path_mm(self.local_s)
+        self.path_mm
     }
 
     /// Whether the place is a rest of the plan.
@@ -90,20 +95,27 @@ impl Cursor {
         let mut rest = Segment::rest(position, 0.0);
         (rest.block, rest.line, rest.feed_mm_per_s) =
             (self.segment.block, self.segment.line, self.segment.feed_mm_per_s);
-        rest.path[0] = self.path_mm();
+        rest.path[0] = self.path_mm;
         (self.start_s, self.local_s) = (self.program_time_s(), 0.0);
         self.segment = rest;
         self.resting = true;
         self.epoch += 1;
+        self.look_at_path();
+    }
+
+    /// Behind every move: where the place is on the path.
+    fn look_at_path(&mut self) {
+        self.path_mm = self.segment.path_mm(self.local_s);
+        self.path_speed_mm_per_s = if self.resting { 0.0 } else { self.segment.path_speed_mm_per_s(self.local_s) };
     }
 
     /// Drops entries of older epochs from the front of the queue, a bounded number; whether one that counts is in front.
     pub fn drop_older(&mut self) -> bool {
         for _ in 0..DROPS {
             let Ok(queued) = self.entries.peek() else { return false };
-            let epoch = match &queued.entry {
-                RingEntry::Event(event) => event.epoch,
-                RingEntry::Segment(segment) => segment.epoch,
+            let epoch = match queued {
+                Queued::Event(event) => event.epoch,
+                Queued::Segment { segment, .. } => segment.epoch,
             };
             if epoch >= self.epoch {
                 return true;
@@ -137,7 +149,7 @@ impl Cursor {
             if left_s <= 0.0 || points.is_full() {
                 return;
             }
-            let RingEntry::Segment(segment) = &queued.entry else { continue };
+            let Queued::Segment { segment, .. } = queued else { continue };
             points.add(segment, 0.0, segment.duration_s.min(left_s));
             left_s -= segment.duration_s;
             if ends(segment) {
@@ -162,7 +174,7 @@ impl Cursor {
         let Ok(chunk) = self.entries.read_chunk(waiting) else { return last };
         let (first, second) = chunk.as_slices();
         for queued in first.iter().chain(second) {
-            let RingEntry::Segment(segment) = &queued.entry else { continue };
+            let Queued::Segment { segment, .. } = queued else { continue };
             most = segment.feed_mm_per_s.max(most);
             last = Ahead { most_feed_mm_per_s: most, ..Ahead::at(segment, left_s.min(segment.duration_s)) };
             if left_s < segment.duration_s || ends(segment) {
@@ -175,11 +187,16 @@ impl Cursor {
 
     /// Moves on by `delta_s` of program time. Events on the way are given to `event`, which says whether the machine is to
     /// stay at the rest where it met one.
-    pub fn advance(&mut self, delta_s: f64, mut event: impl FnMut(&Event) -> bool) -> Reached {
-        let mut left_s = delta_s;
+    pub fn advance(&mut self, delta_s: f64, event: impl FnMut(&Event) -> bool) -> Reached {
         if delta_s == 0.0 {
             return if self.resting { Reached::Rest } else { Reached::Inside };
         }
+        let reached = self.go(delta_s, event);
+        self.look_at_path();
+        reached
+    }
+
+    fn go(&mut self, mut left_s: f64, mut event: impl FnMut(&Event) -> bool) -> Reached {
         loop {
             let here_s = if self.resting { 0.0 } else { self.segment.duration_s - self.local_s };
             if !self.resting && left_s < here_s {
@@ -204,11 +221,11 @@ impl Cursor {
         while !found && !stay {
             // Looked at in its slot: a segment is large, and is copied once.
             let Ok(queued) = self.entries.peek() else { break };
-            match &queued.entry {
-                RingEntry::Event(it) if it.epoch >= self.epoch => stay = event(it) && self.resting,
-                RingEntry::Segment(segment) if segment.epoch >= self.epoch => {
+            match queued {
+                Queued::Event(it) if it.epoch >= self.epoch => stay = event(it) && self.resting,
+                Queued::Segment { start_s, segment } if segment.epoch >= self.epoch => {
                     self.epoch = segment.epoch;
-                    (self.start_s, self.local_s) = (queued.start_s, 0.0);
+                    (self.start_s, self.local_s) = (*start_s, 0.0);
                     self.segment.clone_from(segment);
                     self.resting = false;
                     found = true;

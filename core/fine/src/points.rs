@@ -77,17 +77,23 @@ impl Points {
     fn point(&mut self, segment: &Segment, t: f64) {
         let per_speed = &self.per_speed[usize::from(segment.flags.contains(SegmentFlags::RAPID))];
         let point = &mut self.list[self.count];
-        for (axis, per_speed) in per_speed.iter().enumerate().take(self.axes) {
-            let c = &segment.coefficients[axis];
+        let (mut speed_ratio, mut acceleration_ratio) = (self.speed_ratio, self.acceleration_ratio);
+        for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
             let velocity = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
             let acceleration = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
             let takeback = segment.step_acceleration[axis];
             let smooth = acceleration + takeback;
             point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
             point.acceleration[axis] = smooth;
-            self.speed_ratio = self.speed_ratio.max(velocity.abs() * per_speed);
-            self.acceleration_ratio = self.acceleration_ratio.max(smooth.abs() * self.per_acceleration[axis]);
+            speed_ratio = larger(speed_ratio, velocity.abs() * per_speed[axis]);
+            acceleration_ratio = larger(acceleration_ratio, smooth.abs() * self.per_acceleration[axis]);
         }
+        (self.speed_ratio, self.acceleration_ratio) = (speed_ratio, acceleration_ratio);
         self.count += 1;
     }
+}
+
+/// The larger of two numbers of which the first is one: one instruction, where `f64::max` also looks for NaN there.
+fn larger(most: f64, value: f64) -> f64 {
+    if value > most { value } else { most }
 }

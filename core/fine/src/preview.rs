@@ -3,7 +3,8 @@
 //!
 //! The queue is looked at once, a bounded number of entries in a period, ahead of the place that moves.
 
-use tandem_sdk::{RingEntry, Segment, SegmentFlags};
+use tandem_rings::Queued;
+use tandem_sdk::{Segment, SegmentFlags};
 
 use crate::cursor::Cursor;
 
@@ -50,8 +51,8 @@ impl Preview {
             self.count -= 1;
         }
         self.next = cursor.walk(self.next, ENTRIES, |queued| {
-            if let RingEntry::Segment(segment) = &queued.entry {
-                if queued.start_s > until_s {
+            if let Queued::Segment { start_s, segment } = queued {
+                if *start_s > until_s {
                     return false;
                 }
                 self.see(segment);
@@ -122,7 +123,7 @@ impl LineEnd {
             let nearest_mm = here_mm + way_mm;
             let (line, rests, chosen) = (&mut self.line, &mut self.rests, &mut self.chosen_mm);
             self.next = cursor.walk(self.next, ENTRIES, |queued| {
-                let RingEntry::Segment(segment) = &queued.entry else { return true };
+                let Queued::Segment { segment, .. } = queued else { return true };
                 let ended = segment.line != *line && !*rests && segment.path[0] >= nearest_mm;
                 (*line, *rests) = (segment.line, segment.flags.contains(SegmentFlags::ENDS_AT_REST));
                 *chosen = ended.then_some(segment.path[0]);

@@ -18,22 +18,28 @@ impl CommandLog {
 
     /// The commands that acted in the period of `sample`. Given again as a command file they have the same effect.
     pub fn sample(&mut self, sample: &Sample) -> impl Iterator<Item = Timed> + use<> {
-        let (last, now) = (std::mem::replace(&mut self.last, sample.given), sample.given);
-        // An abort ends the hold by itself.
-        let resumed = last.hold && !now.hold && !last.abort;
-        let changes = [
-            (now.feed_override != last.feed_override).then_some(Command::FeedOverride(now.feed_override)),
-            (now.rapid_override != last.rapid_override).then_some(Command::RapidOverride(now.rapid_override)),
-            (now.optional_stop != last.optional_stop).then_some(Command::OptionalStop(now.optional_stop)),
-            (now.single_block != last.single_block).then_some(Command::SingleBlock(now.single_block)),
-            (now.hold && !last.hold).then_some(Command::Hold),
-            resumed.then_some(Command::Resume),
-            (now.abort && !last.abort).then_some(Command::Abort),
-            (now.emergency_stop && !last.emergency_stop).then_some(Command::EmergencyStop),
-        ];
-        let tick = sample.tick;
-        changes.into_iter().flatten().map(move |command| Timed { tick, command })
+        let (tick, last, now) = (sample.tick, self.last, sample.given);
+        self.last = now;
+        let changed = (now != last).then(|| changes(&last, &now));
+        changed.into_iter().flatten().map(move |command| Timed { tick, command })
     }
+}
+
+/// The commands that make `now` of `last`.
+fn changes(last: &Given, now: &Given) -> impl Iterator<Item = Command> + use<> {
+    // An abort ends the hold by itself.
+    let resumed = last.hold && !now.hold && !last.abort;
+    let changes = [
+        (now.feed_override != last.feed_override).then_some(Command::FeedOverride(now.feed_override)),
+        (now.rapid_override != last.rapid_override).then_some(Command::RapidOverride(now.rapid_override)),
+        (now.optional_stop != last.optional_stop).then_some(Command::OptionalStop(now.optional_stop)),
+        (now.single_block != last.single_block).then_some(Command::SingleBlock(now.single_block)),
+        (now.hold && !last.hold).then_some(Command::Hold),
+        resumed.then_some(Command::Resume),
+        (now.abort && !last.abort).then_some(Command::Abort),
+        (now.emergency_stop && !last.emergency_stop).then_some(Command::EmergencyStop),
+    ];
+    changes.into_iter().flatten()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use divan::{Bencher, black_box};
 use tandem_rings::{Queued, Sample, Sizes, bridge};
-use tandem_sdk::{AxisVector, RingEntry, Segment};
+use tandem_sdk::{AxisVector, Segment};
 
 fn main() {
     divan::main();
@@ -23,8 +23,7 @@ fn sample(bencher: Bencher) {
 #[divan::bench]
 fn segment(bencher: Bencher) {
     let (mut rough, mut fine, _host) = bridge(Sizes::default());
-    let entry = RingEntry::Segment(Segment::rest(&AxisVector::ZERO, 0.001));
-    let queued = Queued { entry, start_s: 0.0 };
+    let queued = Queued::Segment { start_s: 0.0, segment: Segment::rest(&AxisVector::ZERO, 0.001) };
     bencher.bench_local(|| {
         rough.segments.push(black_box(queued)).unwrap();
         fine.segments.pop().unwrap()

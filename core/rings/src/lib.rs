@@ -23,15 +23,21 @@ pub use sample::{MachineState, Sample, StopCause};
 use std::sync::Arc;
 
 use rtrb::{Consumer, Producer, RingBuffer};
-use tandem_sdk::RingEntry;
+use tandem_sdk::{Event, Segment};
 
-/// An entry of the segment ring with its place in program time.
+/// An entry of the segment ring: what travels from the rough to the fine loop, in the order of the path.
 #[derive(Clone, Copy, Debug)]
-pub struct Queued {
-    /// The segment or event.
-    pub entry: RingEntry,
-    /// Program time at which it starts, s, from the start of the run.
-    pub start_s: f64,
+#[allow(clippy::large_enum_variant)] // one slot of a pre-allocated ring; boxing would allocate for every segment
+pub enum Queued {
+    /// A piece of motion.
+    Segment {
+        /// Program time at which it starts, s, from the start of the run.
+        start_s: f64,
+        /// The motion.
+        segment: Segment,
+    },
+    /// Something that happens between two pieces.
+    Event(Event),
 }
 
 /// A feed ratio asked for by the strategy and the policy, with the tick from which it counts.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{Queued, Rest, RoughEnd};
-use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, RingEntry, Segment, SegmentFlags, SegmentSink, StopOn};
+use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, Segment, SegmentFlags, SegmentSink, StopOn};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
@@ -141,13 +141,10 @@ impl Queue {
     /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
     pub fn flush(&mut self, over: bool) {
         let (moved, _) = self.end.segments.push_partial_slice(&self.staged);
-        let segments = moved.iter().filter_map(|queued| match &queued.entry {
-            RingEntry::Segment(segment) => Some((queued.start_s, segment)),
-            RingEntry::Event(_) => None,
-        });
-        if let Some((start_s, last)) = segments.last() {
-            self.queued_s = start_s + last.duration_s;
-            self.ends_at_rest = last.flags.contains(SegmentFlags::ENDS_AT_REST);
+        let last = moved.iter().rfind(|queued| matches!(queued, Queued::Segment { .. }));
+        if let Some(Queued::Segment { start_s, segment }) = last {
+            self.queued_s = start_s + segment.duration_s;
+            self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
         }
         let count = moved.len();
         self.staged.drain(..count);
@@ -168,7 +165,7 @@ impl Queue {
 
     fn stage_event(&mut self, mut event: Event) {
         (event.program_time_s, event.epoch) = (self.emitted_s, self.epoch);
-        self.staged.push(Queued { entry: RingEntry::Event(event), start_s: self.emitted_s });
+        self.staged.push(Queued::Event(event));
     }
 }
 
@@ -184,8 +181,8 @@ impl SegmentSink for Queue {
         }
         let stop_on = self.stop_on(segment.block);
         // A segment is large: it is copied to its place, and marked there.
-        let staged = self.staged.push_mut(Queued { entry: RingEntry::Segment(*segment), start_s: self.emitted_s });
-        if let RingEntry::Segment(marked) = &mut staged.entry {
+        let staged = self.staged.push_mut(Queued::Segment { start_s: self.emitted_s, segment: *segment });
+        if let Queued::Segment { segment: marked, .. } = staged {
             (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
             marked.path[0] += self.path_start_mm;
         }

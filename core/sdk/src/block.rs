@@ -112,8 +112,9 @@ pub struct OwnedBlock {
 
 impl OwnedBlock {
     /// `block` with the data of its curve, where it has one.
-    pub fn new(block: Block, curve: Option<Arc<NurbsData>>) -> Self {
-        Self { block: Block { nurbs: NurbsGeometry::default(), ..block }, curve }
+    pub fn new(mut block: Block, curve: Option<Arc<NurbsData>>) -> Self {
+        block.nurbs = NurbsGeometry::default();
+        Self { block, curve }
     }
 
     /// Hands the block to `call`; the slices of its curve are valid there and no longer.

@@ -47,7 +47,7 @@ pub use planner::{
     Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription, SegmentSink,
 };
 pub use plugin::{Made, Plugin, PluginKind};
-pub use segment::{Edge, RingEntry, Segment, SegmentFlags, StopOn};
+pub use segment::{Edge, Segment, SegmentFlags, StopOn};
 pub use slice::RawSlice;
 pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
 

@@ -1,6 +1,6 @@
 //! What the rough loop hands to the fine loop.
 
-use crate::{AxisVector, Event, MAX_AXES, size_of_contract};
+use crate::{AxisVector, MAX_AXES, size_of_contract};
 
 /// Facts about a [`Segment`], as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -177,17 +177,6 @@ fn polynomial(c: &[f64; 6], t: f64) -> f64 {
 #[inline]
 fn polynomial_rate(c: &[f64; 6], t: f64) -> f64 {
     c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])))
-}
-
-/// What travels from the rough to the fine loop, in the order of the path.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-#[allow(clippy::large_enum_variant)] // one slot of a pre-allocated ring; boxing would allocate for every segment
-pub enum RingEntry {
-    /// A piece of motion.
-    Segment(Segment),
-    /// Something that happens between two pieces.
-    Event(Event),
 }
 
 #[cfg(test)]

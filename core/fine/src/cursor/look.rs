@@ -1,7 +1,6 @@
 //! Looking ahead in the queue without moving.
 
 use tandem_rings::Queued;
-use tandem_sdk::RingEntry;
 
 use super::{Cursor, ends};
 use crate::course::{Course, Place};
@@ -21,7 +20,7 @@ impl Cursor {
     pub fn next_line(&mut self) -> Option<u32> {
         let mut line = None;
         self.walk(self.taken, Points::SEGMENTS, |queued| {
-            if let RingEntry::Segment(segment) = &queued.entry {
+            if let Queued::Segment { segment, .. } = queued {
                 line = Some(segment.line);
             }
             line.is_none()
@@ -71,7 +70,7 @@ impl Cursor {
         }
         let next = self.taken;
         self.walk(next, Points::SEGMENTS, |queued| {
-            let RingEntry::Segment(segment) = &queued.entry else { return true };
+            let Queued::Segment { segment, .. } = queued else { return true };
             if start_s < period_s {
                 if outlook.is_full() {
                     return false;

@@ -8,7 +8,7 @@ use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
-    Kinematics, Limits, MAX_AXES, PluginError, RingEntry, Segment, SegmentFlags, Setpoint,
+    Kinematics, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint,
 };
 
 /// Fine period, s.
@@ -145,7 +145,7 @@ impl Bench {
     /// Queues an event.
     pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
         let event = Event { program_time_s: self.queued_s, epoch: self.epoch, ..Event::new(kind, 1, 0, index, value) };
-        self.push(&RingEntry::Event(event));
+        self.rough.segments.push(Queued::Event(event)).unwrap();
     }
 
     fn piece(&mut self, speed_mm_per_s: f64, acceleration_mm_per_s2: f64, duration_s: f64, last: bool) {
@@ -156,16 +156,12 @@ impl Bench {
         segment.epoch = self.epoch;
         segment.feed_mm_per_s = FEED_MM_PER_S;
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
-        self.push(&RingEntry::Segment(segment));
+        self.rough.segments.push(Queued::Segment { start_s: self.queued_s, segment }).unwrap();
         self.x_mm = segment.position(duration_s)[0];
         self.queued_s += duration_s;
         let depth = &self.rough.depth;
         depth.stop_deceleration_mm_per_s2.store(PLANNED_MM_PER_S2);
         depth.wall_s.store(if last { f64::INFINITY } else { self.queued_s });
         depth.required_s.store(if last { 0.0 } else { 0.2 });
-    }
-
-    fn push(&mut self, entry: &RingEntry) {
-        self.rough.segments.push(Queued { entry: *entry, start_s: self.queued_s }).unwrap();
     }
 }

@@ -6,7 +6,7 @@ use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
-    PluginError, RingEntry, Segment, SegmentFlags, Setpoint,
+    PluginError, Segment, SegmentFlags, Setpoint,
 };
 
 pub const PERIOD_S: f64 = 1e-3;
@@ -190,14 +190,14 @@ impl Machine {
         let mut from = 0.0;
         let cuts = plan.cuts();
         for &to in &cuts {
-            rough.segments.push(Queued { entry: RingEntry::Segment(plan.segment(from, to)), start_s: from }).unwrap();
+            rough.segments.push(Queued::Segment { start_s: from, segment: plan.segment(from, to) }).unwrap();
             from = to;
         }
         let end_mm = (plan.path)(plan.along(from)[0]);
         let mut rest = Segment::rest(&AxisVector::from_slice(&end_mm), 0.0);
         rest.order = 3;
         rest.path[0] = plan.along(from)[0];
-        rough.segments.push(Queued { entry: RingEntry::Segment(rest), start_s: from }).unwrap();
+        rough.segments.push(Queued::Segment { start_s: from, segment: rest }).unwrap();
         rough.depth.stop_deceleration_mm_per_s2.store(500.0);
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
