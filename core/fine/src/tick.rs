@@ -198,6 +198,11 @@ impl FineLoop {
         }
     }
 
+    /// Hands samples out through another ring from here on. Host, before the first tick.
+    pub fn hand_out_through(&mut self, samples: Producer<Sample>) {
+        self.samples = samples;
+    }
+
     /// Acknowledges a fault: the drives may be enabled. A machine starts faulted. Host, between runs.
     pub fn reset(&mut self) {
         self.state = state::next(self.state, Input::Reset);

@@ -85,14 +85,15 @@ impl PathWatch {
 
     /// A block that will be driven.
     pub fn block(&mut self, axes: &Axes, block: &Block) {
-        let watched = match block.kind {
+        let path = match block.kind {
             BlockKind::Nurbs => Watched::curve(axes, block),
             _ => Path::new(block).map(Watched::Path),
         };
         // A block that states none says NaN.
         let tolerance_mm = self.tolerance_mm.max(block.path_tolerance_mm);
-        let entry = |path| Entry { index: block.index, length_mm: block.length_mm, tolerance_mm, path };
-        self.entries.extend(watched.map(entry));
+        if let Some(path) = path {
+            self.entries.push_back(Entry { index: block.index, length_mm: block.length_mm, tolerance_mm, path });
+        }
     }
 
     /// Distance of `position`, sampled while block `block` moved, from the path, mm. Blocks far behind are forgotten.

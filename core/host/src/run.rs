@@ -209,7 +209,9 @@ impl Run {
         rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
         driver = faults::wrap(&machine, driver, &joints)?;
         setup::open(&machine, driver.as_mut(), &joints)?;
-        let (rough_end, fine_end, host) = bridge(Sizes::default());
+        // As lockstep needs it: the samples of each rough period are taken behind it.
+        let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, ..Sizes::default() };
+        let (rough_end, fine_end, host) = bridge(sizes);
         let description = planner.describe();
         let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
         fine_config.record_drives = program.is_none();

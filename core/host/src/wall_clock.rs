@@ -10,6 +10,7 @@ use rustix::thread::{ClockId, clock_nanosleep_absolute};
 use rustix::time::{Timespec, clock_gettime};
 use tandem_fine::FineLoop;
 use tandem_machine::FineThread;
+use tandem_rings::{Sizes, sample_ring};
 
 use crate::error::HostError;
 use crate::pump::Pump;
@@ -42,7 +43,11 @@ pub struct Ended<B> {
 }
 
 /// Drives the run to its end in real time; gives the fine loop back.
-pub fn drive(pump: &mut Pump<'_>, fine: FineLoop, periods: Periods) -> Result<Ended<FineLoop>, HostError> {
+pub fn drive(pump: &mut Pump<'_>, mut fine: FineLoop, periods: Periods) -> Result<Ended<FineLoop>, HostError> {
+    // Here the recorder may look away for seconds.
+    let (to_host, from_fine) = sample_ring(Sizes::default().samples);
+    fine.hand_out_through(to_host);
+    pump.host.samples = from_fine;
     fill_first(pump);
     let thread =
         TimedThread::start(Fine { fine, max_missed: periods.max_missed }, periods.fine_ns, periods.fine_thread)?;

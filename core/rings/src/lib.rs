@@ -127,11 +127,16 @@ fn touched<T: Copy + Default>(size: usize) -> (Producer<T>, Consumer<T>) {
     (input, output)
 }
 
+/// A ring of `size` samples. Allocates for good.
+pub fn sample_ring(size: usize) -> (Producer<Sample>, Consumer<Sample>) {
+    touched(size)
+}
+
 /// Makes the bridge between the loops. Allocates for good.
 pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
-    let (samples_in, samples_out) = touched(sizes.samples);
+    let (samples_in, samples_out) = sample_ring(sizes.samples);
     let (requests_in, requests_out) = RingBuffer::new(8);
     let (rests_in, rests_out) = RingBuffer::new(8);
     let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());

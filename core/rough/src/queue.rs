@@ -204,7 +204,9 @@ impl SegmentSink for Queue {
 
 /// Whether all numbers are finite and time goes forward; without a branch for each number.
 fn is_sound(segment: &Segment) -> bool {
-    let finite = |numbers: &[f64; 6]| numbers.iter().fold(true, |all, v| all & v.is_finite());
-    let polynomials = segment.coefficients.iter().fold(finite(&segment.path), |all, c| all & finite(c));
-    polynomials && segment.duration_s.is_finite() && segment.duration_s >= 0.0
+    let finite = |numbers: &[f64]| numbers.iter().fold(true, |all, v| all & v.is_finite());
+    finite(segment.coefficients.as_flattened())
+        && finite(&segment.path)
+        && segment.duration_s.is_finite()
+        && segment.duration_s >= 0.0
 }
