@@ -39,9 +39,9 @@ pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, 
     let asked_s = to_s.max(from_s + LEAST_S);
     let mut until_s = if border_s - asked_s < LEAST_S { border_s } else { asked_s };
     let mut cursor = Cursor::default();
-    let leg_end_mm = route.front().map_or(f64::INFINITY, |leg| leg.end_mm);
+    let leg_end_mm = route.front().end_mm;
     let start = window.at_in(k, from_s);
-    let break_mm = route.front().map_or(f64::INFINITY, |leg| leg.next_break_mm(start.s_mm + OVER_MM));
+    let break_mm = route.front().next_break_mm(start.s_mm + OVER_MM);
     if window.at_in(k, until_s).s_mm > break_mm + OVER_MM {
         let break_s = window.time_at(break_mm, (from_s, until_s));
         if until_s - break_s > SLIVER_S && break_s - from_s > SLIVER_S {
@@ -54,7 +54,7 @@ pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, 
         return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - OVER_MM };
     }
     let mut end = window.at_in(k, until_s);
-    let jerk_mm_per_s3 = route.front().map_or(f64::INFINITY, |leg| leg.least.jerk_mm_per_s3);
+    let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
     for _ in 0..MAX_HALVINGS {
         fill(route, &mut cursor, [&start, &end], until_s - from_s, segment);
         if follows(route, &mut cursor, jerk_mm_per_s3, segment) {

@@ -10,7 +10,9 @@
 
 pub mod check;
 mod draw;
+mod leg;
 mod planner;
+mod queue;
 pub mod relief;
 mod route;
 mod window;
@@ -19,8 +21,9 @@ use std::fmt::Debug;
 
 use tandem_sdk::AxisVector;
 
+pub use leg::{Bounds, Leg};
 pub use planner::Streamer;
-pub use route::{Bounds, Cursor, Leg, PAST_MM, Route};
+pub use route::{Cursor, PAST_MM, Route};
 pub use window::{Window, interval, lay_times};
 
 /// Time of a window at least, s.
@@ -58,7 +61,7 @@ pub trait Motion: Debug + Default {
 /// A window to be planned.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a, M> {
-    pub route: &'a Route,
+    pub route: &'a Route<'a>,
     pub bounds: &'a Bounds,
     pub start: Start,
     /// Where the run ends, as far as it is known, mm.

@@ -6,7 +6,7 @@ use tandem_sdk::{
 };
 
 use super::draw::{Drawn, OVER_MM, draw};
-use super::route::Item;
+use super::queue::{Item, Queue};
 use super::{Bounds, Cursor, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
@@ -22,7 +22,7 @@ const SHORT_S: f64 = 0.15;
 #[derive(Debug)]
 pub struct Streamer<P: Planning> {
     bounds: Bounds,
-    route: Route,
+    queue: Queue,
     planning: P,
     window: Window<P::Motion>,
     next: Window<P::Motion>,
@@ -42,7 +42,7 @@ impl<P: Planning> Streamer<P> {
     pub fn new(context: &PlannerContext, chord_error_mm: f64) -> Self {
         Self {
             bounds: Bounds { context: *context, chord_error_mm },
-            route: Route::default(),
+            queue: Queue::default(),
             planning: P::default(),
             window: Window::default(),
             next: Window::default(),
@@ -58,12 +58,12 @@ impl<P: Planning> Streamer<P> {
     /// Number of blocks that have not ended.
     pub fn blocks(&self) -> usize {
         let ends = |item: &&Item| matches!(item, Item::Dwell(_)) || matches!(item, Item::Leg(leg) if leg.ends);
-        self.route.items.iter().filter(ends).count()
+        self.queue.items.iter().filter(ends).count()
     }
 
     /// Takes a block. Allocates.
     pub fn accept(&mut self, block: &Block, course: Option<Course>) {
-        self.route.push(block, course, &self.bounds);
+        self.queue.push(block, course, &self.bounds);
         self.finished = false;
     }
 
@@ -74,13 +74,13 @@ impl<P: Planning> Streamer<P> {
 
     /// Whether all is emitted.
     pub fn is_done(&self) -> bool {
-        self.finished && self.route.items.is_empty() && self.driving.is_none() && self.dwell.is_none()
+        self.finished && self.queue.items.is_empty() && self.driving.is_none() && self.dwell.is_none()
     }
 
     /// Forgets everything.
     pub fn reset(&mut self, position: &AxisVector) {
         let Bounds { context, chord_error_mm } = self.bounds;
-        self.route = Route::default();
+        self.queue = Queue::default();
         (self.driving, self.dwell, self.finished, self.at_mm) = (None, None, false, 0.0);
         self.position = *position;
         self.bounds = Bounds { context: PlannerContext { position: *position, ..context }, chord_error_mm };
@@ -105,7 +105,7 @@ impl<P: Planning> Streamer<P> {
     }
 
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
-        match self.route.items.front() {
+        match self.queue.items.front() {
             None => return Ok(None),
             Some(Item::Dwell(block)) => {
                 let mut rest = Segment::rest(&block.end, block.dwell_s);
@@ -115,14 +115,15 @@ impl<P: Planning> Streamer<P> {
                 self.position = block.end;
                 sink.block(&dwell_report(block));
                 self.dwell = Some(rest);
-                self.route.items.pop_front();
+                self.queue.items.pop_front();
             }
-            Some(Item::Leg(_)) => {
+            Some(Item::Leg(leg)) => {
+                let route = Route::new(leg, &self.queue.items);
                 let state = State { s_mm: self.at_mm, ..State::default() };
                 let first_tick_s = self.bounds.context.fine_period_s;
                 let start = Start { state, history: [self.position; 3], first_tick_s };
-                let (end_mm, closed) = self.route.run_end(self.finished);
-                let job = Job { route: &self.route, bounds: &self.bounds, start, end_mm, before: None };
+                let (end_mm, closed) = self.queue.run_end(self.finished);
+                let job = Job { route: &route, bounds: &self.bounds, start, end_mm, before: None };
                 if !self.planning.plan(&job, &mut self.window) {
                     return Err(self.no_way());
                 }
@@ -142,6 +143,10 @@ impl<P: Planning> Streamer<P> {
 
     /// The next window, from the state in motion; where none keeps the limits, this one to its end.
     fn go_on(&mut self, now_s: f64) {
+        let Some(route) = self.queue.route() else {
+            self.driving = Some((now_s, self.window.duration_s()));
+            return;
+        };
         let window = &self.window;
         let period_s = self.bounds.context.fine_period_s;
         let ticks = ((now_s - window.first_tick_s) / period_s).floor();
@@ -149,9 +154,9 @@ impl<P: Planning> Streamer<P> {
         let history = [0, 1, 2].map(|n| window.samples[count + n]);
         let first_tick_s = window.first_tick_s + count as f64 * period_s - now_s;
         let start = Start { state: window.at(now_s), history, first_tick_s };
-        let (end_mm, closed) = self.route.run_end(self.finished);
+        let (end_mm, closed) = self.queue.run_end(self.finished);
         let before = Some((&self.window, now_s));
-        let job = Job { route: &self.route, bounds: &self.bounds, start, end_mm, before };
+        let job = Job { route: &route, bounds: &self.bounds, start, end_mm, before };
         if self.planning.plan(&job, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driving = Some((0.0, self.commit_s(closed)));
@@ -172,10 +177,11 @@ impl<P: Planning> Streamer<P> {
     }
 
     fn emit_motion(&mut self, (from_s, to_s): (f64, f64), left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let Some(leg) = self.route.front() else {
+        let Some(route) = self.queue.route() else {
             self.driving = Some((to_s, to_s));
             return 0.0;
         };
+        let leg = route.front();
         let begins = leg.begins && self.blank.flags.contains(SegmentFlags::BLOCK_ENDS);
         if begins || from_s == 0.0 && self.is_new(leg) {
             sink.block(&self.block_report(leg, from_s));
@@ -183,8 +189,7 @@ impl<P: Planning> Streamer<P> {
         }
         let mut segment = self.blank;
         self.declare(&mut segment);
-        let Drawn { until_s, leg_over } =
-            draw(&self.route, &self.window, (from_s, to_s.min(from_s + left_s)), &mut segment);
+        let Drawn { until_s, leg_over } = draw(&route, &self.window, (from_s, to_s.min(from_s + left_s)), &mut segment);
         if leg_over {
             self.leg_over(&mut segment);
         }
@@ -202,7 +207,7 @@ impl<P: Planning> Streamer<P> {
     }
 
     fn leg_over(&mut self, segment: &mut Segment) {
-        if let Some(Item::Leg(leg)) = self.route.items.pop_front() {
+        if let Some(Item::Leg(leg)) = self.queue.items.pop_front() {
             self.position = if leg.ends { *leg.course.end() } else { segment.position(segment.duration_s) };
             self.at_mm = leg.end_mm;
             if leg.ends {
@@ -224,8 +229,10 @@ impl<P: Planning> Streamer<P> {
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
         let end_mm = self.window.motion.end_mm();
         // The end of a window is that of its leg but for rounding: then the position is that of the leg already.
-        if end_mm > self.at_mm + OVER_MM && self.route.front().is_some_and(|leg| end_mm > leg.start_mm) {
-            self.position = self.route.at(end_mm, &mut Cursor::default()).0.position;
+        if let Some(route) = self.queue.route()
+            && end_mm > (self.at_mm + OVER_MM).max(route.front().start_mm)
+        {
+            self.position = route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
         }
         let mut rest = Segment::rest(&self.position, 0.0);

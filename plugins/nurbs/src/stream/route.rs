@@ -1,72 +1,16 @@
-//! The path ahead: stretches with what holds on them, and dwells.
+//! The path ahead, by its coordinate.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 use tandem_motion::nurbs::{AlongPath, Place};
-use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, PlannerContext};
 
-use crate::course::Course;
-use crate::limit::chord_feed_mm_per_s;
-
-/// Share of a limit that a speed may reach.
-const AIM: f64 = 0.999;
-/// Share of an axis's acceleration that turning may take.
-const TURNING: f64 = 0.8;
-/// Share of an axis's jerk that the third derivative of the path may take.
-const THIRD: f64 = 0.9;
-/// Share of the jerk limit that steps of velocity and acceleration may take in a fine period.
-const STEP: f64 = 0.7;
-/// Share of the feed below which a junction is not passed but rested at.
-const WORTH: f64 = 0.05;
-/// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
-const STRAIGHT: f64 = 1e-3;
-
-/// A smooth stretch of a block.
-#[derive(Clone, Debug)]
-pub struct Leg {
-    pub block: Block,
-    pub course: Arc<Course>,
-    pub stretch: usize,
-    /// Path coordinates of its ends, mm.
-    pub start_mm: f64,
-    pub end_mm: f64,
-    /// First and last stretch of its block.
-    pub begins: bool,
-    pub ends: bool,
-    /// The next leg goes on without rest.
-    pub joined: bool,
-    /// Highest speed that is to be driven, mm/s.
-    pub feed_mm_per_s: f64,
-    /// The least of acceleration and of jerk of the axes that move in it.
-    pub least: Least,
-}
-
-/// The least that any of some axes may do.
-#[derive(Clone, Copy, Debug)]
-pub struct Least {
-    pub acceleration_mm_per_s2: f64,
-    pub jerk_mm_per_s3: f64,
-}
+use super::{Bounds, Leg};
+use super::queue::Item;
 
 /// How far beside a knot derivatives are taken, mm.
-const BESIDE_MM: f64 = 1e-7;
+pub const BESIDE_MM: f64 = 1e-7;
 /// So far behind a knot the next one is looked for, mm: path coordinates round.
 pub const PAST_MM: f64 = 2.0 * BESIDE_MM;
-
-/// What comes next.
-#[derive(Clone, Debug)]
-pub enum Item {
-    Leg(Leg),
-    Dwell(Block),
-}
-
-/// The limits that count here.
-#[derive(Clone, Copy, Debug)]
-pub struct Bounds {
-    pub context: PlannerContext,
-    pub chord_error_mm: f64,
-}
 
 /// Where a look-up was.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,149 +19,26 @@ pub struct Cursor {
     place: Place,
 }
 
-/// The queue of stretches and dwells.
-#[derive(Debug, Default)]
-pub struct Route {
-    pub items: VecDeque<Item>,
-    /// Path coordinate where the next leg begins, mm.
-    pub end_mm: f64,
+/// The path from a leg on, over those that join it.
+#[derive(Clone, Copy, Debug)]
+pub struct Route<'a> {
+    front: &'a Leg,
+    /// The leg at the front, and what comes behind it.
+    items: &'a VecDeque<Item>,
 }
 
-impl Leg {
-    /// Position and derivatives at the path coordinate `s_mm`, which is moved into the leg.
-    pub fn at(&self, s_mm: f64, place: &mut Place) -> AlongPath {
-        let s = (s_mm - self.start_mm).clamp(0.0, self.end_mm - self.start_mm);
-        self.course.at(self.stretch, s, place)
-    }
-
-    /// How far the path goes on from `s_mm` without a feature of its own, mm.
-    pub fn smooth_for_mm(&self, s_mm: f64, place: &mut Place) -> f64 {
-        self.course.smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
-    }
-
-    /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
-    pub fn next_break_mm(&self, s_mm: f64) -> f64 {
-        let stretch = &self.course.stretches()[self.stretch];
-        (self.start_mm + stretch.next_knot_mm(s_mm - self.start_mm)).min(self.end_mm)
-    }
-
-    /// Highest speed at a point: feed, chord error, axis speeds and turning.
-    pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
-        let curvature = self.course.counted_length(&at.curvature);
-        let chord = chord_feed_mm_per_s(curvature, bounds.chord_error_mm, bounds.context.fine_period_s);
-        let along = bounds.context.limits.along(&at.position, &at.direction);
-        let axes = if self.block.kind == BlockKind::Rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s };
-        let mut cap = self.feed_mm_per_s.min(chord).min(axes);
-        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-            let bend = at.curvature[axis].abs();
-            if bend > 0.0 {
-                cap = cap.min((TURNING * limits.acceleration_mm_per_s2 / bend).sqrt());
-            }
-        }
-        AIM * cap
-    }
-
-    /// Highest speed where the derivatives jump between two sides: the steps of velocity and acceleration as jerk of one
-    /// period T, so that v·|Δx′|/T² + v²·|Δx″|/T is a share of the jerk limit.
-    pub fn step_cap_mm_per_s([before, behind]: &[AlongPath; 2], bounds: &Bounds) -> f64 {
-        let period_s = bounds.context.fine_period_s;
-        let axes = bounds.context.limits.axes().iter().enumerate();
-        let caps = axes.map(|(axis, limits)| {
-            let turn = (behind.direction[axis] - before.direction[axis]).abs() / (period_s * period_s);
-            let bend = (behind.curvature[axis] - before.curvature[axis]).abs() / period_s;
-            let jerk = STEP * limits.jerk_mm_per_s3;
-            2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
-        });
-        caps.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The same, and the jerk of the curve at that speed.
-    pub fn smooth_cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
-        let mut cap = self.cap_mm_per_s(at, bounds);
-        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-            let third = at.third[axis].abs();
-            if third > 0.0 {
-                cap = cap.min((THIRD * limits.jerk_mm_per_s3 / third).cbrt());
-            }
-        }
-        cap
-    }
-
-    /// The path at its end `s_mm`, or just inside where it stands still in its parameter; `None` where it has no
-    /// direction there either.
-    fn beside(&self, s_mm: f64, inward_mm: f64) -> Option<AlongPath> {
-        let places = [s_mm, s_mm + inward_mm].map(|s| self.at(s, &mut Place::default()));
-        places.into_iter().find(|at| at.direction != AxisVector::ZERO)
-    }
-
-    /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
-    fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
-        let ends = self.beside(self.end_mm, -BESIDE_MM).zip(next.beside(next.start_mm, BESIDE_MM));
-        let Some((before, after)) = ends else { return false };
-        let straight = (0..MAX_AXES).all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
-        let feed_mm_per_s = self.feed_mm_per_s.min(next.feed_mm_per_s);
-        straight && Self::step_cap_mm_per_s(&[before, after], bounds) >= WORTH * feed_mm_per_s
-    }
-}
-
-impl Least {
-    /// Of the axes that move at some of a few places of a stretch.
-    fn on(course: &Course, stretch: usize, bounds: &Bounds) -> Self {
-        let length_mm = course.stretches()[stretch].length_mm;
-        let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
-        for share in [0.0, 0.23, 0.47, 0.71, 1.0] {
-            let at = course.at(stretch, share * length_mm, &mut place);
-            for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-                if at.direction[axis] != 0.0 {
-                    // A joint that is a sum of axes may move further than the path.
-                    let joint = axis >= bounds.context.axes.count();
-                    let share = if joint { at.direction[axis].abs().max(1.0) } else { 1.0 };
-                    let (acceleration, jerk) = (limits.acceleration_mm_per_s2 / share, limits.jerk_mm_per_s3 / share);
-                    least = [least[0].min(acceleration), least[1].min(jerk)];
-                }
-            }
-        }
-        Self { acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
-    }
-}
-
-impl Route {
-    /// Appends the stretches of `block`, or the dwell. Allocates.
-    pub fn push(&mut self, block: &Block, course: Option<Course>, bounds: &Bounds) {
-        let Some(course) = course.map(Arc::new) else {
-            self.items.push_back(Item::Dwell(*block));
-            return;
-        };
-        let count = course.stretches().len();
-        for stretch in 0..count {
-            let length_mm = course.stretches()[stretch].length_mm;
-            let leg = Leg {
-                block: *block,
-                course: Arc::clone(&course),
-                stretch,
-                start_mm: self.end_mm,
-                end_mm: self.end_mm + length_mm,
-                begins: stretch == 0,
-                ends: stretch + 1 == count,
-                joined: false,
-                feed_mm_per_s: feed_mm_per_s(block, &course, bounds),
-                least: Least::on(&course, stretch, bounds),
-            };
-            self.end_mm = leg.end_mm;
-            if let Some(Item::Leg(before)) = self.items.back_mut() {
-                let rests = leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
-                before.joined = !rests && before.runs_into(&leg, bounds);
-            }
-            self.items.push_back(Item::Leg(leg));
-        }
+impl<'a> Route<'a> {
+    /// Of `items`, which begin with the leg `front`.
+    pub fn new(front: &'a Leg, items: &'a VecDeque<Item>) -> Self {
+        Self { front, items }
     }
 
     /// The leg at the front.
-    pub fn front(&self) -> Option<&Leg> {
-        self.leg(0)
+    pub fn front(&self) -> &'a Leg {
+        self.front
     }
 
-    pub fn leg(&self, index: usize) -> Option<&Leg> {
+    fn leg(&self, index: usize) -> Option<&'a Leg> {
         match self.items.get(index) {
             Some(Item::Leg(leg)) => Some(leg),
             _ => None,
@@ -225,25 +46,27 @@ impl Route {
     }
 
     /// The leg on which `s_mm` lies, from the front over joined legs.
-    pub fn find(&self, s_mm: f64, cursor: &mut Cursor) -> &Leg {
+    pub fn find(&self, s_mm: f64, cursor: &mut Cursor) -> &'a Leg {
+        let mut leg = self.leg(cursor.leg).unwrap_or_else(|| {
+            // Only a cursor kept over the end of a leg: it starts again at the front.
+            *cursor = Cursor::default();
+            self.front
+        });
         loop {
-            let Some(leg) = self.leg(cursor.leg) else {
-                // Only a cursor kept over the end of a leg: it starts again at the front.
-                *cursor = Cursor::default();
-                continue;
-            };
-            if s_mm > leg.end_mm && leg.joined && self.leg(cursor.leg + 1).is_some() {
-                *cursor = Cursor { leg: cursor.leg + 1, place: Place::default() };
+            let way = if s_mm > leg.end_mm && leg.joined {
+                cursor.leg + 1
             } else if s_mm < leg.start_mm && cursor.leg > 0 {
-                *cursor = Cursor { leg: cursor.leg - 1, place: Place::default() };
+                cursor.leg - 1
             } else {
                 return leg;
-            }
+            };
+            let Some(next) = self.leg(way) else { return leg };
+            (leg, *cursor) = (next, Cursor { leg: way, place: Place::default() });
         }
     }
 
     /// Position and derivatives at `s_mm`, and the leg.
-    pub fn at(&self, s_mm: f64, cursor: &mut Cursor) -> (AlongPath, &Leg) {
+    pub fn at(&self, s_mm: f64, cursor: &mut Cursor) -> (AlongPath, &'a Leg) {
         let leg = self.find(s_mm, cursor);
         (leg.at(s_mm, &mut cursor.place), leg)
     }
@@ -270,26 +93,4 @@ impl Route {
         let cap = knot.map_or(f64::INFINITY, |(_, sides)| Leg::step_cap_mm_per_s(&sides, bounds));
         (cap, next_mm)
     }
-
-    /// Where the run from the front ends, mm, and whether it is known to end there.
-    pub fn run_end(&self, finished: bool) -> (f64, bool) {
-        let (mut end_mm, mut index) = (0.0, 0);
-        while let Some(leg) = self.leg(index) {
-            end_mm = leg.end_mm;
-            index += 1;
-            if !leg.joined {
-                break;
-            }
-        }
-        (end_mm, finished || index < self.items.len())
-    }
-}
-
-/// The speed to be driven where no other limit counts, mm/s.
-fn feed_mm_per_s(block: &Block, course: &Course, bounds: &Bounds) -> f64 {
-    if block.kind == BlockKind::Rapid {
-        let direction = course.at(0, 0.0, &mut Place::default()).direction;
-        return bounds.context.limits.along(&block.start, &direction).rapid_mm_per_s;
-    }
-    block.command_feed_mm_per_s() * bounds.context.max_feed_ratio
 }

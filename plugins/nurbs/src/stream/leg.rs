@@ -1,0 +1,155 @@
+//! A smooth stretch of a block, and what holds on it.
+
+use std::sync::Arc;
+
+use tandem_motion::nurbs::{AlongPath, Place};
+use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, PlannerContext};
+
+use super::route::BESIDE_MM;
+use crate::course::Course;
+use crate::limit::chord_feed_mm_per_s;
+
+/// Share of a limit that a speed may reach.
+const AIM: f64 = 0.999;
+/// Share of an axis's acceleration that turning may take.
+const TURNING: f64 = 0.8;
+/// Share of an axis's jerk that the third derivative of the path may take.
+const THIRD: f64 = 0.9;
+/// Share of the jerk limit that steps of velocity and acceleration may take in a fine period.
+const STEP: f64 = 0.7;
+/// Share of the feed below which a junction is not passed but rested at.
+const WORTH: f64 = 0.05;
+/// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
+const STRAIGHT: f64 = 1e-3;
+
+/// The limits that count here.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub context: PlannerContext,
+    pub chord_error_mm: f64,
+}
+
+/// A smooth stretch of a block.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    pub block: Block,
+    pub course: Arc<Course>,
+    pub stretch: usize,
+    /// Path coordinates of its ends, mm.
+    pub start_mm: f64,
+    pub end_mm: f64,
+    /// First and last stretch of its block.
+    pub begins: bool,
+    pub ends: bool,
+    /// The next leg goes on without rest.
+    pub joined: bool,
+    /// Highest speed that is to be driven, mm/s.
+    pub feed_mm_per_s: f64,
+    /// The least of acceleration and of jerk of the axes that move in it.
+    pub least: Least,
+}
+
+/// The least that any of some axes may do.
+#[derive(Clone, Copy, Debug)]
+pub struct Least {
+    pub acceleration_mm_per_s2: f64,
+    pub jerk_mm_per_s3: f64,
+}
+
+impl Leg {
+    /// Position and derivatives at the path coordinate `s_mm`, which is moved into the leg.
+    pub fn at(&self, s_mm: f64, place: &mut Place) -> AlongPath {
+        let s = (s_mm - self.start_mm).clamp(0.0, self.end_mm - self.start_mm);
+        self.course.at(self.stretch, s, place)
+    }
+
+    /// How far the path goes on from `s_mm` without a feature of its own, mm.
+    pub fn smooth_for_mm(&self, s_mm: f64, place: &mut Place) -> f64 {
+        self.course.smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
+    }
+
+    /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
+    pub fn next_break_mm(&self, s_mm: f64) -> f64 {
+        let stretch = &self.course.stretches()[self.stretch];
+        (self.start_mm + stretch.next_knot_mm(s_mm - self.start_mm)).min(self.end_mm)
+    }
+
+    /// Highest speed at a point: feed, chord error, axis speeds and turning.
+    pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
+        let curvature = self.course.counted_length(&at.curvature);
+        let chord = chord_feed_mm_per_s(curvature, bounds.chord_error_mm, bounds.context.fine_period_s);
+        let along = bounds.context.limits.along(&at.position, &at.direction);
+        let axes = if self.block.kind == BlockKind::Rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s };
+        let mut cap = self.feed_mm_per_s.min(chord).min(axes);
+        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let bend = at.curvature[axis].abs();
+            if bend > 0.0 {
+                cap = cap.min((TURNING * limits.acceleration_mm_per_s2 / bend).sqrt());
+            }
+        }
+        AIM * cap
+    }
+
+    /// Highest speed where the derivatives jump between two sides: the steps of velocity and acceleration as jerk of one
+    /// period T, so that v·|Δx′|/T² + v²·|Δx″|/T is a share of the jerk limit.
+    pub fn step_cap_mm_per_s([before, behind]: &[AlongPath; 2], bounds: &Bounds) -> f64 {
+        let period_s = bounds.context.fine_period_s;
+        let axes = bounds.context.limits.axes().iter().enumerate();
+        let caps = axes.map(|(axis, limits)| {
+            let turn = (behind.direction[axis] - before.direction[axis]).abs() / (period_s * period_s);
+            let bend = (behind.curvature[axis] - before.curvature[axis]).abs() / period_s;
+            let jerk = STEP * limits.jerk_mm_per_s3;
+            2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
+        });
+        caps.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same, and the jerk of the curve at that speed.
+    pub fn smooth_cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
+        let mut cap = self.cap_mm_per_s(at, bounds);
+        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let third = at.third[axis].abs();
+            if third > 0.0 {
+                cap = cap.min((THIRD * limits.jerk_mm_per_s3 / third).cbrt());
+            }
+        }
+        cap
+    }
+
+    /// The path at its end `s_mm`, or just inside where it stands still in its parameter; `None` where it has no
+    /// direction there either.
+    fn beside(&self, s_mm: f64, inward_mm: f64) -> Option<AlongPath> {
+        let places = [s_mm, s_mm + inward_mm].map(|s| self.at(s, &mut Place::default()));
+        places.into_iter().find(|at| at.direction != AxisVector::ZERO)
+    }
+
+    /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
+    pub fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
+        let ends = self.beside(self.end_mm, -BESIDE_MM).zip(next.beside(next.start_mm, BESIDE_MM));
+        let Some((before, after)) = ends else { return false };
+        let straight = (0..MAX_AXES).all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
+        let feed_mm_per_s = self.feed_mm_per_s.min(next.feed_mm_per_s);
+        straight && Self::step_cap_mm_per_s(&[before, after], bounds) >= WORTH * feed_mm_per_s
+    }
+}
+
+impl Least {
+    /// Of the axes that move at some of a few places of a stretch.
+    pub fn on(course: &Course, stretch: usize, bounds: &Bounds) -> Self {
+        let length_mm = course.stretches()[stretch].length_mm;
+        let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
+        for share in [0.0, 0.23, 0.47, 0.71, 1.0] {
+            let at = course.at(stretch, share * length_mm, &mut place);
+            for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+                if at.direction[axis] != 0.0 {
+                    // A joint that is a sum of axes may move further than the path.
+                    let joint = axis >= bounds.context.axes.count();
+                    let share = if joint { at.direction[axis].abs().max(1.0) } else { 1.0 };
+                    let (acceleration, jerk) = (limits.acceleration_mm_per_s2 / share, limits.jerk_mm_per_s3 / share);
+                    least = [least[0].min(acceleration), least[1].min(jerk)];
+                }
+            }
+        }
+        Self { acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
+    }
+}
