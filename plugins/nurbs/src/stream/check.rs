@@ -3,6 +3,7 @@
 use tandem_motion::nurbs::AlongPath;
 use tandem_sdk::{AxisVector, BlockKind, LimitedBy};
 
+use super::between::{Between, Seen};
 use super::relief::{Relief, Reliefs};
 use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
 
@@ -44,7 +45,7 @@ impl Worst {
         self.speed <= 1.0 && self.acceleration <= 1.0 && self.jerk <= 1.0
     }
 
-    fn join(&mut self, other: &Self) {
+    pub fn join(&mut self, other: &Self) {
         self.speed = self.speed.max(other.speed);
         self.acceleration = self.acceleration.max(other.acceleration);
         self.jerk = self.jerk.max(other.jerk);
@@ -56,7 +57,7 @@ impl Worst {
         Relief {
             from_mm,
             to_mm,
-            speed: if self.speed > 1.0 { (0.9985 / self.speed).max(0.8) } else { 1.0 },
+            speed: if self.speed > 1.0 { (0.9985 / self.speed).max(0.3) } else { 1.0 },
             jerk: if over > 1.0 { (0.995 / over).max(0.5) } else { 1.0 },
         }
     }
@@ -72,8 +73,13 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
     window.first_tick_s = start.first_tick_s;
     (window.stop_mm_per_s2, window.stop_mm_per_s3, window.most_mm_per_s) = (f64::INFINITY, f64::INFINITY, 0.0);
     let (period_s, duration_s, known) = (bounds.context.fine_period_s, window.duration_s(), reliefs.count());
+    if let Some(lost) = window.times.windows(2).position(|ends| !ends[1].is_finite()) {
+        let from_mm = window.motion.at(lost, 0.0).s_mm;
+        reliefs.add(known, Relief { from_mm, to_mm: from_mm + LOST_MM, speed: 0.5, jerk: 1.0 });
+        return Worst { speed: f64::NAN, ..Worst::default() };
+    }
     let (mut cursor, mut worst, mut before_mm) = (Cursor::default(), Worst::default(), [start.state.s_mm; 3]);
-    let mut rests = 0;
+    let (mut seen, mut rests) = (Seen::new(job.rests().then_some(start.history[2])), 0);
     while rests < 4 {
         let count = window.samples.len() - start.history.len();
         let t = start.first_tick_s + count as f64 * period_s;
@@ -87,7 +93,8 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
         note_reserve(window, bounds, &at, state.speed_mm_per_s);
         window.samples.push(at.position);
         let first = if count == 0 { state.s_mm } else { before_mm[2] };
-        let here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
+        let mut here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
+        here.join(&Between { route, bounds, window }.worst(t, &mut seen, &mut cursor));
         window.bounds.push(here.bound);
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.
@@ -138,13 +145,13 @@ fn compare(
 }
 
 /// The differences that end at the last sample.
-fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Worst {
+pub fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Worst {
     let &[p0, p1, p2, p3] = samples.last_chunk().expect("three samples stand in front");
     let (rate, mut here) = (1.0 / bounds.context.fine_period_s, Worst::default());
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
         let [d0, d1, d2] = [p1[axis] - p0[axis], p2[axis] - p1[axis], p3[axis] - p2[axis]];
         let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
-        here.speed = here.speed.max((d2 * rate).abs() / (AIM * most) - 1e-3);
+        here.speed = here.speed.max((d2 * rate).abs() / most);
         let acceleration = (d2 - d1).abs() * rate * rate;
         here.acceleration = here.acceleration.max(acceleration / (AIM * limits.acceleration_mm_per_s2));
         let jerk = (d2 - 2.0 * d1 + d0).abs() * rate * rate * rate;

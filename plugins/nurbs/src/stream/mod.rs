@@ -8,6 +8,7 @@
 //!
 //! Where no next window is found in motion, the one before is driven on, at last to its end, which is checked already.
 
+mod between;
 pub mod check;
 mod draw;
 mod leg;
