@@ -3,6 +3,7 @@
 use tandem_motion::hermite;
 use tandem_sdk::{MAX_AXES, Segment};
 
+use super::route::{BESIDE_MM, SAME_MM};
 use super::{Cursor, Motion, Route, State, Window};
 
 /// Most that a segment may stand off its path, mm.
@@ -13,8 +14,6 @@ const JERK_OFF: f64 = 0.004;
 const LEAST_OFF_MM: f64 = 1.5e-9;
 /// Halvings of an interval until a segment follows the path.
 const MAX_HALVINGS: u32 = 30;
-/// A leg is over this near to its end, mm: rounding of path coordinates.
-pub const OVER_MM: f64 = 1e-9;
 
 /// Least duration of a segment through both its ends, s: the derivatives of a shorter one are rounding.
 const LEAST_S: f64 = 5e-5;
@@ -41,8 +40,8 @@ pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, 
     let mut cursor = Cursor::default();
     let leg_end_mm = route.front().end_mm;
     let start = window.at_in(k, from_s);
-    let break_mm = route.front().next_break_mm(start.s_mm + OVER_MM);
-    if window.at_in(k, until_s).s_mm > break_mm + OVER_MM {
+    let break_mm = route.front().next_break_mm(start.s_mm + SAME_MM);
+    if window.at_in(k, until_s).s_mm > break_mm + SAME_MM {
         let break_s = window.time_at(break_mm, (from_s, until_s));
         if until_s - break_s > SLIVER_S && break_s - from_s > SLIVER_S {
             until_s = break_s;
@@ -51,7 +50,7 @@ pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, 
     if until_s - from_s < LEAST_S {
         let end = window.at_in(k, until_s);
         fill_sliver(route, [&start, &end], until_s - from_s, segment);
-        return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - OVER_MM };
+        return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - SAME_MM };
     }
     let mut end = window.at_in(k, until_s);
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
@@ -66,12 +65,13 @@ pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, 
         until_s = f64::midpoint(from_s, until_s);
         end = window.at_in(k, until_s);
     }
-    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - OVER_MM }
+    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - SAME_MM }
 }
 
 fn fill(route: &Route, cursor: &mut Cursor, ends: [&State; 2], duration_s: f64, segment: &mut Segment) {
-    let states = ends.map(|end| {
-        let (at, _) = route.at(end.s_mm, cursor);
+    let [from, to] = ends;
+    let states = [(from, BESIDE_MM), (to, -BESIDE_MM)].map(|(end, beside_mm)| {
+        let at = route.at_side(end.s_mm, beside_mm, cursor);
         let (v, a) = (end.speed_mm_per_s, end.acceleration_mm_per_s2);
         [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
     });
@@ -86,7 +86,7 @@ fn fill(route: &Route, cursor: &mut Cursor, ends: [&State; 2], duration_s: f64, 
 
 /// A segment by the derivatives at its start: so short that its end is met to 2e-8 mm.
 fn fill_sliver(route: &Route, [from, to]: [&State; 2], duration_s: f64, segment: &mut Segment) {
-    let (at, _) = route.at(from.s_mm, &mut Cursor::default());
+    let at = route.at_side(from.s_mm, BESIDE_MM, &mut Cursor::default());
     let (v, a) = (from.speed_mm_per_s, from.acceleration_mm_per_s2);
     let jerk = (to.acceleration_mm_per_s2 - a) / duration_s;
     let second = at.direction * a + at.curvature * (v * v);

@@ -5,8 +5,9 @@ use tandem_sdk::{
     SegmentSink,
 };
 
-use super::draw::{Drawn, OVER_MM, draw};
+use super::draw::{Drawn, draw};
 use super::queue::{Item, Queue};
+use super::route::SAME_MM;
 use super::{Bounds, Cursor, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
@@ -230,7 +231,7 @@ impl<P: Planning> Streamer<P> {
         let end_mm = self.window.motion.end_mm();
         // The end of a window is that of its leg but for rounding: then the position is that of the leg already.
         if let Some(route) = self.queue.route()
-            && end_mm > (self.at_mm + OVER_MM).max(route.front().start_mm)
+            && end_mm > (self.at_mm + SAME_MM).max(route.front().start_mm)
         {
             self.position = route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;

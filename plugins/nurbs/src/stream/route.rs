@@ -7,6 +7,8 @@ use tandem_motion::nurbs::{AlongPath, Place};
 use super::{Bounds, Leg};
 use super::queue::Item;
 
+/// Path coordinates that are the same but for rounding, mm.
+pub const SAME_MM: f64 = 1e-9;
 /// How far beside a knot derivatives are taken, mm.
 pub const BESIDE_MM: f64 = 1e-7;
 /// So far behind a knot the next one is looked for, mm: path coordinates round.
@@ -69,6 +71,18 @@ impl<'a> Route<'a> {
     pub fn at(&self, s_mm: f64, cursor: &mut Cursor) -> (AlongPath, &'a Leg) {
         let leg = self.find(s_mm, cursor);
         (leg.at(s_mm, &mut cursor.place), leg)
+    }
+
+    /// Position and derivatives at `s_mm` as they are towards `beside_mm`, which is signed: at a knot the curvature may jump,
+    /// and where legs join the direction too.
+    pub fn at_side(&self, s_mm: f64, beside_mm: f64, cursor: &mut Cursor) -> AlongPath {
+        let (at, leg) = self.at(s_mm, cursor);
+        if leg.next_break_mm(s_mm - SAME_MM) > s_mm + SAME_MM {
+            return at;
+        }
+        let beside = self.at(s_mm + beside_mm, cursor).0;
+        let direction = if s_mm > leg.end_mm - SAME_MM { beside.direction } else { at.direction };
+        AlongPath { position: at.position, direction, ..beside }
     }
 
     /// How far the path goes on from `s_mm` without a feature of its own, mm.
