@@ -32,6 +32,7 @@ mod policy;
 mod probing;
 mod program_flow;
 mod random;
+mod random_curves;
 mod replay;
 mod report;
 mod script;

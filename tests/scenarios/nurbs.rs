@@ -245,7 +245,8 @@ fn degenerate_curves_are_driven_to_their_ends() {
             let form = format!("planner.options.form={form}");
             let done = Scenario::text(program).on(&machine).with(&["--set", &form]).run();
             assert_eq!(done.status(), 0, "{shown}: {}", done.errors());
-            for count in ["limit_violations", "guard_stops", "starvations"] {
+            for count in ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
+            {
                 assert_eq!(done.number(count), 0.0, "{form} {count}: {shown}");
             }
             assert!(done.number("max_path_deviation_mm") < 1e-6, "{form} {shown}");

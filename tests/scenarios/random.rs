@@ -102,7 +102,7 @@ fn chords(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
 }
 
 /// What panics in `attempt` is told with the seed.
-fn attempted(attempt: impl FnOnce() + std::panic::UnwindSafe) -> Result<(), String> {
+pub fn attempted(attempt: impl FnOnce() + std::panic::UnwindSafe) -> Result<(), String> {
     std::panic::catch_unwind(attempt).map_err(|_| "see above".to_string())
 }
 

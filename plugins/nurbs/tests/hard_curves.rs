@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 use common::{Collected, context, curve_block, run};
 use tandem_nurbs::{NurbsPlanner, Options};
 use tandem_rig::{arc, line, numbered};
-use tandem_sdk::{AxisVector, NurbsData, OwnedBlock, Planner, PlannerContext};
+use tandem_sdk::{AxisVector, NurbsData, OwnedBlock, Planner, PlannerContext, Segment};
 
 fn clamped(points: &[[f64; 2]], weights: Vec<f64>, degree: usize) -> NurbsData {
     let spans = points.len() - degree;
@@ -22,10 +22,12 @@ fn even(points: &[[f64; 2]], degree: usize) -> NurbsData {
     clamped(points, vec![1.0; points.len()], degree)
 }
 
+/// Largest acceleration and jerk as shares of their limits: of differences of samples, the acceleration also of the points
+/// at which the governor of the fine loop looks.
 fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
     let period_s = context.fine_period_s;
     // A rest restarts the ticks, so each motion from rest to rest is looked at by itself.
-    let mut worst = [0.0f64; 2];
+    let mut worst = [at_points(&collected.segments), 0.0f64];
     let mut motion = Collected::default();
     for segment in &collected.segments {
         motion.segments.push(*segment);
@@ -47,6 +49,13 @@ fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
         motion.segments.clear();
     }
     worst
+}
+
+/// Of both ends, the middle and between.
+fn at_points(segments: &[Segment]) -> f64 {
+    let at = |segment: &Segment, n: i32| segment.acceleration(f64::from(n) / 8.0 * segment.duration_s);
+    let all = segments.iter().flat_map(|segment| (0..=8).map(move |n| at(segment, n)));
+    all.flat_map(|a| a.0).fold(0.0, |most, a| most.max(a.abs() / 5000.0))
 }
 
 /// In both forms; where both find a motion `scan` is no slower.
