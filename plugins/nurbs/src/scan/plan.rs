@@ -29,6 +29,8 @@ const MIN_INTERVALS: usize = 40;
 #[derive(Debug, Default)]
 pub struct Scan {
     first: First,
+    /// Time of the first timing of a window without reliefs, s.
+    begun_s: f64,
     retimer: Retimer,
     grid: Grid,
     reliefs: Reliefs,
@@ -44,7 +46,7 @@ impl Planning for Scan {
         let found = self.plan_rate(job, window);
         let slow_s = if found { window.duration_s() } else { f64::INFINITY };
         // A path so short and sharp that limits between samples count most.
-        let doubtful = slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.first.end().0;
+        let doubtful = slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.begun_s;
         if job.rests() && doubtful {
             return self.plan_ramps(job, window, slow_s) || found;
         }
@@ -61,6 +63,9 @@ impl Scan {
         for n in 1..=TRIES {
             let known = self.reliefs.count();
             self.solve(job, n > 1, window);
+            if n == 1 {
+                self.begun_s = self.first.end().0;
+            }
             let kept_all = !self.dips(job, window) && check(job, window, &mut self.reliefs).is_kept();
             if !kept_all {
                 if n >= HOPELESS && kept.is_none() {

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use tandem_motion::nurbs::{AlongPath, Place};
 
-use super::{Bounds, Leg};
 use super::queue::Item;
+use super::{Bounds, Leg};
 
 /// Path coordinates that are the same but for rounding, mm.
 pub const SAME_MM: f64 = 1e-9;
