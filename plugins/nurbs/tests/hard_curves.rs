@@ -90,9 +90,7 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
             }
         }
     }
-    let numbers = |segment: &tandem_sdk::Segment| {
-        segment.coefficients.iter().flatten().chain(&segment.path).all(|v| v.is_finite())
-    };
+    let numbers = |segment: &Segment| segment.coefficients.iter().flatten().chain(&segment.path).all(|v| v.is_finite());
     assert!(collected.segments.iter().all(numbers), "{name}: a number that is not finite");
     let [acceleration, jerk] = shares(&collected, &context);
     println!("{name}: {:.3} s, acceleration {acceleration:.3}, jerk {jerk:.3}", collected.duration_s());
