@@ -12,8 +12,11 @@ use super::{AlongPath, Nurbs};
 const ON_LINE: f64 = 1e-9;
 /// Halvings of a span at most.
 const HALVINGS: u32 = 60;
-/// Share of the way of a span that is rounding.
+/// Share of the coordinates of a span that is rounding.
 const ROUNDING: f64 = 1e-13;
+/// Parts of a span that are looked at: more are needed only where rounding, of coordinates and of weights far apart, looks
+/// like turns.
+const MOST_PARTS: u32 = 2000;
 /// Most that the length along a line may differ from the distance of its ends, as a share.
 const OFF_LENGTH: f64 = 1e-9;
 
@@ -54,9 +57,14 @@ impl Nurbs {
             if self.knots[span + 1] > self.knots[span] {
                 let hull = Hull::of_span(self, span);
                 if let Some(line) = hull.line() {
-                    let least = ROUNDING * hull.along(&line).fold(0.0, |most, v| f64::max(most, v.abs()));
-                    let mut last = None;
-                    self.turns(span, &hull, (&line, least), HALVINGS, &mut last, &mut found);
+                    let far = hull.position(0).0.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
+                    let least = ROUNDING * hull.along(&line).fold(far, |most, v| f64::max(most, v.abs()));
+                    let (mut last, mut parts) = (None, MOST_PARTS);
+                    let before = found.len();
+                    self.turns(span, &hull, (&line, least), (HALVINGS, &mut parts), &mut last, &mut found);
+                    if parts == 0 {
+                        found.truncate(before);
+                    }
                 }
             }
         }
@@ -69,18 +77,20 @@ impl Nurbs {
         span: usize,
         part: &Hull,
         (line, least): (&AxisVector, f64),
-        halvings: u32,
+        (halvings, parts): (u32, &mut u32),
         last: &mut Option<(f64, f64)>,
         found: &mut Vec<f64>,
     ) {
         let steps = || part.along(line).zip(part.along(line).skip(1)).map(|(from, to)| to - from);
-        if steps().map(f64::abs).sum::<f64>() <= least || halvings == 0 {
+        if steps().map(f64::abs).sum::<f64>() <= least || halvings == 0 || *parts == 0 {
             return;
         }
+        *parts -= 1;
         let (forth, back) = (steps().all(|step| step >= 0.0), steps().all(|step| step <= 0.0));
         if !forth && !back {
             let halves = part.halves();
-            return halves.iter().for_each(|half| self.turns(span, half, (line, least), halvings - 1, last, found));
+            let look = |half| self.turns(span, half, (line, least), (halvings - 1, parts), last, found);
+            return halves.iter().for_each(look);
         }
         let (middle, way) = (f64::midpoint(part.range.0, part.range.1), if forth { 1.0 } else { -1.0 });
         if let Some((before, other)) = *last

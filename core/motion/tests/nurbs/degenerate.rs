@@ -174,6 +174,27 @@ fn control_points_on_a_corner_cut_the_curve() {
     assert!((pieces[0].end_direction[0] - 1.0).abs() < 1e-12 && (pieces[1].start_direction[1] - 1.0).abs() < 1e-12);
 }
 
+/// The span from 0.3 to 0.5 is straight and lies within some hundredths of a millimetre, far from zero: what rounding leaves
+/// of coordinates is more than 1e-13 of that, and looked like turn after turn.
+#[test]
+fn a_turn_beside_a_heavy_control_point_is_found() {
+    let near = [-0.0009, 0.0, 0.0];
+    let points = [
+        [-27.05, -7.8378, 0.0],
+        near,
+        near,
+        [17.49, 4.0, -17.0],
+        near,
+        near,
+        [-0.0009, -3.0, -2.0],
+        [-26.0, 33.09, 7.118],
+    ];
+    let mut data = clamped(4, &points, &[1.0, 1.0, 1.0, 1000.0, 2.0, 0.5, 1.0, 1.0]);
+    data.knots = [vec![0.0; 5], vec![0.3, 0.5, 0.9], vec![1.0; 5]].concat();
+    let turns = curve(&data).turning_points();
+    assert!(turns.len() == 1 && turns[0] > 0.3 && turns[0] < 0.5, "{turns:?}");
+}
+
 /// Where more control points coincide than the degree the curve waits at a point: that span is no piece.
 #[test]
 fn a_span_without_length_is_left_out() {

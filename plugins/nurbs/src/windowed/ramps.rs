@@ -5,6 +5,11 @@ use super::grade::Grade;
 use super::ramp::{LEAST_S, Ramp, Tangential};
 use super::ripple::{Corner, propagate, ramps};
 
+/// Corners nearer to each other are one, mm: beside a cusp speeds fall to nothing, and the least time says nothing.
+const APART_MM: f64 = 1e-9;
+/// Corners of a window at most: ramps that exceed the limit with so many are left to the check of the samples.
+const MOST_CORNERS: usize = 40_000;
+
 /// How closely ramps are compared with the limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Care {
@@ -66,7 +71,7 @@ impl Rounds {
             let found = self.pairs.iter().flat_map(|pair| pair.found.into_iter().flatten());
             let count = corners.len();
             corners.extend(found);
-            if corners.len() == count {
+            if corners.len() == count || corners.len() > MOST_CORNERS {
                 return;
             }
             corners.sort_unstable_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
@@ -75,11 +80,12 @@ impl Rounds {
     }
 }
 
-/// Corners that a ramp would pass in less than its least time are one, at the lower speed. Both ends stay where they are.
+/// Corners that a ramp would pass in less than its least time, or that only rounding tells apart, are one, at the lower speed. Both ends stay where they are.
 fn merge(corners: &mut Vec<Corner>) {
     let end = corners[corners.len() - 1];
     corners.dedup_by(|next, kept| {
-        let near = next.at_mm - kept.at_mm < LEAST_S * f64::midpoint(next.speed_mm_per_s, kept.speed_mm_per_s);
+        let mean = f64::midpoint(next.speed_mm_per_s, kept.speed_mm_per_s);
+        let near = next.at_mm - kept.at_mm < (LEAST_S * mean).max(APART_MM);
         if near {
             kept.speed_mm_per_s = kept.speed_mm_per_s.min(next.speed_mm_per_s);
         }
