@@ -135,7 +135,7 @@ impl<P: Planning> Streamer<P> {
     }
 
     fn no_way(&self) -> PluginError {
-        let line = self.route.front().map_or(0, |leg| leg.block.line);
+        let line = self.queue.front().map_or(0, |leg| leg.block.line);
         PluginError::new(format!(
             "line {line}: no motion from rest at path coordinate {:.6} mm keeps velocity, acceleration, jerk and chord \
              error; the path turns too sharply there",

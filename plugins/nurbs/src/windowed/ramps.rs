@@ -80,7 +80,8 @@ impl Rounds {
     }
 }
 
-/// Corners that a ramp would pass in less than its least time, or that only rounding tells apart, are one, at the lower speed. Both ends stay where they are.
+/// Corners that a ramp would pass in less than its least time, or that only rounding tells apart, are one, at the lower
+/// speed. Both ends stay where they are.
 fn merge(corners: &mut Vec<Corner>) {
     let end = corners[corners.len() - 1];
     corners.dedup_by(|next, kept| {
