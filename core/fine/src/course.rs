@@ -72,6 +72,14 @@ impl Place<'_> {
         (most_s - left_s).max(0.0)
     }
 
+    /// The same as [`Self::step`]; gives the step of the acceleration of each axis, mm/s². Where the plan rests there is none.
+    pub fn cross(&mut self) -> [f64; MAX_AXES] {
+        let before = self.motion().acceleration;
+        self.step();
+        let after = if self.segment.is_some() { self.motion().acceleration } else { before };
+        std::array::from_fn(|axis| after[axis] - before[axis])
+    }
+
     /// From the end of a segment to the start of the next one that moves.
     pub fn step(&mut self) {
         let mut rests = self.segment.is_none_or(ends);

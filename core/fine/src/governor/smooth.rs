@@ -3,6 +3,8 @@
 //! With q the plan in program time an axis jerks by `q‴σ³ + 3q″σσ̇ + q′σ̈`. What is chosen for a period is σ̈: as near to
 //! what two laws ask for as leaves a way on which σ̇ comes to zero within the limits (`steady.rs`).
 
+use tandem_sdk::MAX_AXES;
+
 use super::Governor;
 use crate::course::Place;
 use crate::law::to_rest;
@@ -78,7 +80,13 @@ impl Governor {
     pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>) -> Chosen {
         let wanted = self.wanted(aim, outlook);
         if wanted == 0.0 && self.rate_per_s == 0.0 {
-            return Chosen { delta_s: self.sigma * self.period_s, relaxed: false };
+            let delta_s = self.sigma * self.period_s;
+            self.leave_behind(place, delta_s);
+            return Chosen { delta_s, relaxed: false };
+        }
+        if self.sigma == 1.0 && self.rate_per_s == 0.0 {
+            // Program time has passed at its own rate, and nothing was looked at.
+            self.behind = [0.0; MAX_AXES];
         }
         // Where next to nothing moves the limits leave more than small steps; to come in they are there.
         let small = outlook.most_change_per_s2;
@@ -87,6 +95,7 @@ impl Governor {
             Some(change) => Chosen { delta_s: self.pass(change), relaxed: false },
             None => self.relaxed(outlook),
         };
+        self.leave_behind(place, chosen.delta_s);
         self.settle(aim, outlook);
         chosen
     }
