@@ -31,7 +31,9 @@ pub struct Between<'a, M> {
 #[derive(Clone, Debug)]
 pub struct Seen {
     /// Per phase the last positions, and how many of them there are.
-    phases: [([AxisVector; 4], usize); PHASES - 1],
+    phases: [([AxisVector; 4], usize); PHASES],
+    /// Jerk of the last third differences, as shares of the limits, and how many of them there are.
+    jerks: ([Shares; 3], usize),
     /// The last even looks, and how many of them had none between them.
     shares: [Shares; 3],
     even: usize,
@@ -41,7 +43,8 @@ impl Seen {
     /// At rest at a position, or in motion, where nothing was seen yet.
     pub fn new(rest: Option<AxisVector>) -> Self {
         let phase = rest.map_or(([AxisVector::ZERO; 4], 0), |position| ([position; 4], 4));
-        Self { phases: [phase; PHASES - 1], shares: [[0.0; MAX_AXES]; 3], even: 0 }
+        let none = [[0.0; MAX_AXES]; 3];
+        Self { phases: [phase; PHASES], jerks: (none, 0), shares: none, even: 0 }
     }
 }
 
@@ -62,12 +65,16 @@ impl<M: Motion> Between<'_, M> {
                 self.approach([from_s, to_s], seen, cursor, &mut worst);
             }
             let (at, leg) = self.route.at(self.window.at(to_s).s_mm, cursor);
-            if let Some((positions, count)) = seen.phases.get_mut(n - 1) {
-                *positions = [positions[1], positions[2], positions[3], at.position];
+            let (positions, count) = &mut seen.phases[n - 1];
+            *positions = [positions[1], positions[2], positions[3], at.position];
+            *count += 1;
+            if *count >= positions.len() {
+                worst.join(&differences(self.bounds, positions, leg.block.kind == BlockKind::Rapid));
+                let (jerks, count) = &mut seen.jerks;
+                *jerks = [jerks[1], jerks[2], jerk_shares(self.bounds, positions)];
                 *count += 1;
-                if *count >= positions.len() {
-                    worst.join(&differences(self.bounds, positions, leg.block.kind == BlockKind::Rapid));
-                }
+                // What it comes to at phases between.
+                worst.jerk = worst.jerk.max(if *count >= jerks.len() { peak(jerks) / AIM } else { 0.0 });
             }
             from_s = to_s;
         }
@@ -138,6 +145,16 @@ fn judge(bounds: &Bounds, leg: &Leg, state: &State, at: &AlongPath, worst: &mut 
             worst.acceleration = worst.acceleration.max(share.abs() / AIM);
         }
         shares[axis] = share;
+    }
+    shares
+}
+
+/// Third differences of four samples as shares of the jerk limits.
+fn jerk_shares(bounds: &Bounds, [p0, p1, p2, p3]: &[AxisVector; 4]) -> Shares {
+    let (cube, mut shares) = (bounds.context.fine_period_s.powi(3), [0.0; MAX_AXES]);
+    for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+        let difference = p3[axis] - p0[axis] - 3.0 * (p2[axis] - p1[axis]);
+        shares[axis] = difference / (cube * limits.jerk_mm_per_s3);
     }
     shares
 }
