@@ -210,3 +210,35 @@ fn random_curves_run_within_limits() {
         });
     }
 }
+
+/// Once program time does not pass at its own rate, samples lie at other places of the plan.
+#[test]
+fn random_curves_are_held_and_overridden_within_limits() {
+    for form in ["scan", "windowed"] {
+        for_each_seed("random_curves_are_held_and_overridden_within_limits", 2, |seed| {
+            attempted(|| {
+                let mut random = Random::new(seed);
+                let mut commands = String::new();
+                for n in 0..60 {
+                    let tick = 750 * n + random.below(500);
+                    match random.below(3) {
+                        0 => writeln!(commands, "{tick},hold\n{},resume", tick + 150).unwrap(),
+                        _ => writeln!(commands, "{tick},feed-override,{:.2}", random.between(0.3, 1.0)).unwrap(),
+                    }
+                }
+                let done = on_the_demo_machine(&program(seed, 200), form).commands(&commands).run();
+                assert_eq!(done.status(), 0, "{}", done.errors());
+                for count in
+                    ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
+                {
+                    assert_eq!(done.number(count), 0.0, "{count}");
+                }
+                let verdict = done.judge(|options| {
+                    options.sample_tolerance_mm = Some(2e-6);
+                    options.vertex_tolerance_mm = Some(0.3);
+                });
+                assert!(verdict.passed(), "{verdict}");
+            })
+        });
+    }
+}
