@@ -164,6 +164,25 @@ fn a_hold_on_the_butterfly_stays_within_the_limits() {
     }
 }
 
+/// Lines run into arcs that turn a little less, without rest: the steps of velocity and acceleration there are in the samples
+/// beside what the rate of program time does. Held at any tick around them nothing exceeds a limit.
+#[test]
+fn holds_around_a_line_that_runs_into_an_arc() {
+    let machine = root().join("examples/machines/nurbs-demo.toml");
+    let contour =
+        "F9000 G1 X20\nG3 X27.0708 Y2.9282 J10\nG1 X35 Y10.8579\nG2 X42.0687 Y13.788 I7.0711 J-7.0711\nG1 X60\n";
+    for tick in (60..260).step_by(5) {
+        let commands = format!("{tick},hold\n{},resume\n{},feed-override,0.5\n", tick + 120, tick + 170);
+        let done = Scenario::text(contour).on(&machine).commands(&commands).run();
+        assert_eq!(done.status(), 0, "hold at {tick}: {}", done.errors());
+        for count in ["limit_violations", "guard_stops", "starvations", "jerk_relaxed_samples"] {
+            assert_eq!(done.number(count), 0.0, "hold at {tick}: {count}");
+        }
+    }
+    let done = Scenario::text(contour).on(&machine).run();
+    assert!(done.number("motion_time_s") < 0.65, "{} s: it rested", done.number("motion_time_s"));
+}
+
 /// A script sees curves as one block each and lowers the feed of those it is asked to.
 #[test]
 fn a_policy_script_slows_curves() {

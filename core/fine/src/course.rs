@@ -4,6 +4,7 @@ use tandem_rings::Queued;
 use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
 
 use crate::outlook::derivatives;
+use crate::steps::Steps;
 
 /// The plan from here on: the segment that moves, and what is queued behind it.
 #[derive(Clone, Copy, Debug)]
@@ -72,16 +73,9 @@ impl Place<'_> {
         (most_s - left_s).max(0.0)
     }
 
-    /// The same as [`Self::step`]; gives the step of the acceleration of each axis, mm/s². Where the plan rests there is none.
-    pub fn cross(&mut self) -> [f64; MAX_AXES] {
-        let before = self.motion().acceleration;
-        self.step();
-        let after = if self.segment.is_some() { self.motion().acceleration } else { before };
-        std::array::from_fn(|axis| after[axis] - before[axis])
-    }
-
-    /// From the end of a segment to the start of the next one that moves.
-    pub fn step(&mut self) {
+    /// From the end of a segment to the start of the next one that moves; gives what steps there.
+    pub fn step(&mut self) -> Option<Steps> {
+        let before = self.segment;
         let mut rests = self.segment.is_none_or(ends);
         self.segment = None;
         while !rests && self.segment.is_none() {
@@ -94,6 +88,20 @@ impl Place<'_> {
             self.passed += 1;
         }
         self.local_s = 0.0;
+        let stepping = self.segment.filter(|segment| segment.flags.contains(SegmentFlags::STEPS));
+        before.zip(stepping).map(|(before, behind)| Steps::between(before, behind))
+    }
+
+    /// What steps within `horizon_s` from here.
+    pub fn steps_within(mut self, horizon_s: f64) -> Steps {
+        let (mut steps, mut left_s) = (Steps::default(), self.advance(horizon_s));
+        while left_s > 0.0 && self.segment.is_some() {
+            if let Some(more) = self.step() {
+                steps.join(&more);
+            }
+            left_s = self.advance(left_s);
+        }
+        steps
     }
 }
 

@@ -7,6 +7,7 @@ use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, Event, Segment, SegmentFlags};
 
 use crate::points::Points;
+use crate::steps::{Recent, Steps};
 
 /// Entries of older epochs that are dropped in one fine period: each may be a cache miss.
 const DROPS: usize = 256;
@@ -21,6 +22,9 @@ pub struct Cursor {
     /// Path coordinate here, mm, and path speed, mm/s of program time: asked for more often than the place moves.
     path_mm: f64,
     path_speed_mm_per_s: f64,
+    /// Steps met on the way of this period, and those that samples still show.
+    crossed: Option<Steps>,
+    recent: Recent,
     epoch: u32,
     /// Entries taken out of the queue since the start.
     taken: u64,
@@ -49,6 +53,8 @@ impl Cursor {
             local_s: 0.0,
             path_mm: 0.0,
             path_speed_mm_per_s: 0.0,
+            crossed: None,
+            recent: Recent::default(),
             epoch: 0,
             taken: 0,
             resting: true,
@@ -130,6 +136,11 @@ impl Cursor {
         self.entries.is_empty()
     }
 
+    /// Steps of the plan that the coming samples still show.
+    pub fn recent_steps(&self) -> Recent {
+        self.recent
+    }
+
     /// Collects where the plan goes within `horizon_s` from here, without moving.
     pub fn scan(&mut self, horizon_s: f64, points: &mut Points) {
         points.clear();
@@ -189,9 +200,12 @@ impl Cursor {
     /// stay at the rest where it met one.
     pub fn advance(&mut self, delta_s: f64, event: impl FnMut(&Event) -> bool) -> Reached {
         if delta_s == 0.0 {
+            self.recent.pass(None);
             return if self.resting { Reached::Rest } else { Reached::Inside };
         }
         let reached = self.go(delta_s, event);
+        let crossed = self.crossed.take();
+        self.recent.pass(crossed.as_ref());
         self.look_at_path();
         reached
     }
@@ -226,6 +240,9 @@ impl Cursor {
                 Queued::Segment { start_s, segment } if segment.epoch >= self.epoch => {
                     self.epoch = segment.epoch;
                     (self.start_s, self.local_s) = (*start_s, 0.0);
+                    if segment.flags.contains(SegmentFlags::STEPS) && !self.resting {
+                        self.crossed.get_or_insert_default().join(&Steps::between(&self.segment, segment));
+                    }
                     self.segment.clone_from(segment);
                     self.resting = false;
                     found = true;

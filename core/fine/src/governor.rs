@@ -29,15 +29,12 @@ pub struct Governor {
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
-    /// What steps of the plan's acceleration in the last period count for in this one, mm/s².
-    behind: [f64; MAX_AXES],
 }
 
 impl Governor {
     /// A governor at σ = 1: where nothing moves, program time passes at its own rate.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
-        let acceleration = limits.map(|l| l.acceleration_mm_per_s2);
-        Self { sigma: 1.0, rate_per_s: 0.0, period_s, acceleration, axes, behind: [0.0; MAX_AXES] }
+        Self { sigma: 1.0, rate_per_s: 0.0, period_s, acceleration: limits.map(|l| l.acceleration_mm_per_s2), axes }
     }
 
     /// The rate at the end of the last period.

@@ -18,6 +18,7 @@ mod points;
 mod preview;
 mod ramp;
 mod state;
+mod steps;
 mod tick;
 
 pub use config::{FineConfig, GuardMode, Joints};

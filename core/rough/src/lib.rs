@@ -6,6 +6,7 @@ mod policy;
 mod queue;
 mod rest;
 mod rough;
+mod seams;
 mod source;
 mod window;
 

@@ -8,6 +8,7 @@ use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, Segment, SegmentFlags, Se
 
 use crate::Observer;
 use crate::depth::QueueDepth;
+use crate::seams::Seams;
 
 /// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
 pub struct Queue {
@@ -31,6 +32,7 @@ pub struct Queue {
     /// Program time at the end of what is in the ring, s.
     queued_s: f64,
     ends_at_rest: bool,
+    seams: Seams,
     defect: Option<&'static str>,
 }
 
@@ -50,6 +52,7 @@ impl Queue {
             emitted_s: 0.0,
             queued_s: 0.0,
             ends_at_rest: true,
+            seams: Seams::default(),
             defect: None,
         }
     }
@@ -71,6 +74,7 @@ impl Queue {
     /// Forgets all that was queued behind `rest`, and begins the next epoch there.
     pub fn restart(&mut self, rest: &Rest) {
         self.epoch = rest.epoch + 1;
+        self.seams = Seams::default();
         self.path_start_mm = rest.path_mm;
         (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
         self.staged.clear();
@@ -185,6 +189,9 @@ impl SegmentSink for Queue {
         if let Queued::Segment { segment: marked, .. } = staged {
             (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
             marked.path[0] += self.path_start_mm;
+            if self.seams.steps_at(segment) {
+                marked.flags = marked.flags.with(SegmentFlags::STEPS);
+            }
         }
         self.emitted_s += segment.duration_s;
         self.depth.push(segment, self.emitted_s);

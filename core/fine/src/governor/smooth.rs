@@ -3,12 +3,12 @@
 //! With q the plan in program time an axis jerks by `q‴σ³ + 3q″σσ̇ + q′σ̈`. What is chosen for a period is σ̈: as near to
 //! what two laws ask for as leaves a way on which σ̇ comes to zero within the limits (`steady.rs`).
 
-use tandem_sdk::MAX_AXES;
-
 use super::Governor;
+use super::steady::Way;
 use crate::course::Place;
 use crate::law::to_rest;
 use crate::outlook::Outlook;
+use crate::steps::{Recent, Steps};
 
 /// Share of the limits that is aimed at: the rest covers what changes within a period.
 const MARGIN: f64 = 0.995;
@@ -76,43 +76,38 @@ impl Interval {
 }
 
 impl Governor {
-    /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is.
-    pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>) -> Chosen {
+    /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is, `recent` what of
+    /// its steps the next samples show.
+    pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>, recent: Recent) -> Chosen {
         let wanted = self.wanted(aim, outlook);
         if wanted == 0.0 && self.rate_per_s == 0.0 {
-            let delta_s = self.sigma * self.period_s;
-            self.leave_behind(place, delta_s);
-            return Chosen { delta_s, relaxed: false };
-        }
-        if self.sigma == 1.0 && self.rate_per_s == 0.0 {
-            // Program time has passed at its own rate, and nothing was looked at.
-            self.behind = [0.0; MAX_AXES];
+            return Chosen { delta_s: self.sigma * self.period_s, relaxed: false };
         }
         // Where next to nothing moves the limits leave more than small steps; to come in they are there.
         let small = outlook.most_change_per_s2;
         let (down, up) = if self.rate_per_s < 0.0 { (small, 4.0 * small) } else { (4.0 * small, small) };
-        let chosen = match self.steadied(wanted.clamp(-down, up), place, outlook) {
+        let here = Way { sigma: self.sigma, rate_per_s: self.rate_per_s, place, recent };
+        let chosen = match self.steadied(wanted.clamp(-down, up), here, outlook) {
             Some(change) => Chosen { delta_s: self.pass(change), relaxed: false },
-            None => self.relaxed(outlook),
+            None => self.relaxed(outlook, &self.reserve(&here)),
         };
-        self.leave_behind(place, chosen.delta_s);
         self.settle(aim, outlook);
         chosen
     }
 
     /// Makes σ constant as soon as velocity and acceleration allow it, with no more jerk than that takes.
-    fn relaxed(&mut self, outlook: &Outlook) -> Chosen {
+    fn relaxed(&mut self, outlook: &Outlook, reserve: &Steps) -> Chosen {
         let mut firm = Interval::ALL;
-        self.accelerations(outlook, &mut firm);
+        self.accelerations(outlook, reserve, &mut firm);
         let mut all = firm;
-        self.jerks(outlook, 0.0, &mut all);
+        self.jerks(outlook, reserve, 0.0, &mut all);
         let mut least = all;
         for excess in EXCESSES {
             if !least.is_empty() {
                 break;
             }
             least = firm;
-            self.jerks(outlook, excess, &mut least);
+            self.jerks(outlook, reserve, excess, &mut least);
         }
         let steady = -self.rate_per_s / self.period_s;
         let chosen = if least.is_empty() { firm.nearest(steady) } else { least.nearest(steady) };
@@ -165,20 +160,21 @@ impl Governor {
     }
 
     /// Acceleration at the points of the period, at the rate with which it ends.
-    fn accelerations(&self, outlook: &Outlook, interval: &mut Interval) {
+    fn accelerations(&self, outlook: &Outlook, reserve: &Steps, interval: &mut Interval) {
         let h = self.period_s;
         let end = (self.sigma + h * self.rate_per_s).clamp(0.0, 1.0);
         for point in outlook.iter().take_while(|p| p.offset_s <= h) {
             for (axis, (limit, _)) in outlook.limits() {
                 let planned = end * end * point.acceleration[axis];
-                let most = (MARGIN * limit).max(planned.abs());
+                let left = MARGIN * limit - reserve.acceleration_mm_per_s2(axis, end, h);
+                let most = left.max(planned.abs());
                 interval.keep(planned + point.velocity[axis] * self.rate_per_s, point.velocity[axis] * h, most);
             }
         }
     }
 
     /// Jerk at the points of the period, up to `excess` of the limit beyond it.
-    fn jerks(&self, outlook: &Outlook, excess: f64, interval: &mut Interval) {
+    fn jerks(&self, outlook: &Outlook, reserve: &Steps, excess: f64, interval: &mut Interval) {
         let (h, rate) = (self.period_s, self.rate_per_s);
         for point in outlook.iter().take_while(|p| p.offset_s <= h) {
             let part = (point.offset_s / (h * self.sigma).max(f64::MIN_POSITIVE)).min(1.0);
@@ -186,7 +182,8 @@ impl Governor {
             for (axis, (_, limit)) in outlook.limits() {
                 let planned = sigma * sigma * sigma * point.jerk[axis];
                 let turning = 3.0 * point.acceleration[axis] * sigma;
-                let most = (MARGIN * limit).max(planned.abs() + LEFT * limit) + excess * limit;
+                let left = MARGIN * limit - reserve.jerk_mm_per_s3(axis, sigma, h);
+                let most = left.max(planned.abs() + LEFT * limit) + excess * limit;
                 interval.keep(planned + turning * rate, point.velocity[axis] + turning * part * h, most);
             }
         }

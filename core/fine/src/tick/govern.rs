@@ -96,7 +96,9 @@ impl FineLoop {
             _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, path },
         };
         let (governor, outlook) = (&mut self.governor, &self.outlook);
-        let chosen = self.cursor.on_course(self.config.lane_count(), |place| governor.smooth(&aim, outlook, place));
+        let recent = self.cursor.recent_steps();
+        let lanes = self.config.lane_count();
+        let chosen = self.cursor.on_course(lanes, |place| governor.smooth(&aim, outlook, place, recent));
         if chosen.relaxed {
             self.guard.relax_jerk();
         }

@@ -111,7 +111,8 @@ impl<M: Motion> Between<'_, M> {
         if way_mm.is_finite() { way_mm / (v + (way_mm * a).sqrt()) } else { f64::INFINITY }
     }
 
-    /// Both sides of the knots between two states; what the motion does there lies between them.
+    /// Both sides of the knots between two states; what the motion does there lies between them. Where the direction steps,
+    /// samples show that as acceleration of one period beside what it is there.
     fn look_at_knots(&self, [from, to]: [&State; 2], worst: &mut Worst) {
         let (mut cursor, mut from_mm, way_mm) = (Cursor::default(), from.s_mm, to.s_mm - from.s_mm);
         while let Some((knot_mm, sides)) = self.route.knot([from_mm, to.s_mm], &mut cursor) {
@@ -122,8 +123,16 @@ impl<M: Motion> Between<'_, M> {
             let acceleration_mm_per_s2 = mix(from.acceleration_mm_per_s2, to.acceleration_mm_per_s2);
             let state = State { s_mm: knot_mm, speed_mm_per_s, acceleration_mm_per_s2 };
             let leg = self.route.find(knot_mm, &mut cursor);
+            let turn = sides[1].direction - sides[0].direction;
             for at in &sides {
-                judge(self.bounds, leg, &state, at, worst);
+                let shares = judge(self.bounds, leg, &state, at, worst);
+                for (axis, limits) in
+                    self.bounds.context.limits.axes().iter().enumerate().filter(|(n, _)| turn[*n] != 0.0)
+                {
+                    let step = turn[axis].abs() * speed_mm_per_s / self.bounds.context.fine_period_s;
+                    let share = shares[axis].abs() + step / limits.acceleration_mm_per_s2;
+                    worst.acceleration = worst.acceleration.max(share / AIM);
+                }
             }
         }
     }

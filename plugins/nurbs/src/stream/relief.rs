@@ -37,6 +37,11 @@ impl Reliefs {
         }
     }
 
+    /// The parts that were found after the first `known`.
+    pub fn since(&mut self, known: usize) -> impl Iterator<Item = &mut Relief> {
+        self.0.iter_mut().skip(known)
+    }
+
     /// The parts, as they were found.
     pub fn parts(&self) -> &[Relief] {
         &self.0

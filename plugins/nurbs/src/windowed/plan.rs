@@ -17,6 +17,9 @@ const SHARE: f64 = 0.9995;
 /// Tries that also take back jerk or speed where single points exceed the jerk.
 const LOCAL_TRIES: usize = 10;
 
+/// Tries after which what exceeds limits is slowed where it does, and not by less jerk everywhere.
+const EVERYWHERE: usize = 2;
+
 /// Tries of a window in motion; and from rest, where each later one is slower.
 const TRIES: [usize; 2] = [12, 30];
 
@@ -58,13 +61,18 @@ impl Planning for Windowed {
             if !self.solve(job, &slower, window) {
                 return false;
             }
+            let known = self.reliefs.count();
             let worst = check(job, window, &mut self.reliefs);
             // After some tries samples alone count.
             if worst.is_kept() && (n > LOCAL_TRIES || !self.ease(job, window)) {
                 return true;
             }
             let over = worst.acceleration.max(worst.jerk);
-            slower.jerk *= if over > 1.0 { (0.995 / over).max(0.8) } else { 1.0 };
+            if over > 1.0 && n > EVERYWHERE {
+                self.slow_there(known, window);
+            } else if over > 1.0 {
+                slower.jerk *= (0.995 / over).max(0.8);
+            }
             slower.speed *= if rests && !worst.is_kept() && n >= TRIES[0] { 0.7 } else { 1.0 };
         }
         false
@@ -82,6 +90,17 @@ impl Windowed {
         self.survey.sections = SECTIONS;
         window.whole = self.survey.make(begin, end_mm, window_s(bounds, speed), &mut look);
         self.survey.keep();
+    }
+
+    /// Lowers the speed where samples exceed acceleration or jerk: what ramps with less jerk do not mend is of the path.
+    fn slow_there(&mut self, known: usize, window: &Window<Ramps>) {
+        let mut limit = Limit::new(&self.survey.places);
+        for part in self.reliefs.since(known).filter(|part| part.jerk < 1.0) {
+            let middle_mm = f64::midpoint(part.from_mm, part.to_mm);
+            let driven = window.at(window.time_at(middle_mm, (0.0, window.duration_s()))).speed_mm_per_s;
+            // It may be slower there than the limit, which is what becomes lower.
+            part.speed = part.speed.min(part.jerk.cbrt() * (driven / limit.at(middle_mm)).min(1.0));
+        }
     }
 
     /// Less where single points exceed the jerk; false where none does.

@@ -1,0 +1,79 @@
+//! Steps of velocity and acceleration where segments of order 3 meet, and what they take of the limits around them.
+//!
+//! A plan may pass a jump of its curvature or a turn too small to rest at. The differences of samples show such a step for
+//! three samples, beside what the rate of program time does meanwhile: in the periods around it that has the less.
+
+use tandem_sdk::{MAX_AXES, Segment};
+
+use crate::outlook::derivatives;
+
+/// Share of its step by which acceleration is in the worst third difference of four samples, times the period.
+const WORST: f64 = 0.75;
+/// Periods behind the one with the step whose samples show it, and as many before it in which what is begun lasts.
+pub const AROUND: u8 = 2;
+
+/// Steps per axis, summed up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Steps {
+    velocity: [f64; MAX_AXES],
+    acceleration: [f64; MAX_AXES],
+}
+
+impl Steps {
+    /// From the end of `before` to the start of `behind`.
+    pub fn between(before: &Segment, behind: &Segment) -> Self {
+        let mut steps = Self::default();
+        for axis in 0..MAX_AXES {
+            let [velocity, acceleration, _] = derivatives(&before.coefficients[axis], before.duration_s);
+            let [next_velocity, next_acceleration, _] = derivatives(&behind.coefficients[axis], 0.0);
+            steps.velocity[axis] = (next_velocity - velocity).abs();
+            steps.acceleration[axis] = (next_acceleration - acceleration).abs();
+        }
+        steps
+    }
+
+    /// Both, as if they came together.
+    pub fn join(&mut self, other: &Self) {
+        for axis in 0..MAX_AXES {
+            self.velocity[axis] += other.velocity[axis];
+            self.acceleration[axis] += other.acceleration[axis];
+        }
+    }
+
+    /// Acceleration of `axis` that samples show for them at the rate `sigma`, mm/s².
+    pub fn acceleration_mm_per_s2(&self, axis: usize, sigma: f64, period_s: f64) -> f64 {
+        sigma * self.velocity[axis] / period_s
+    }
+
+    /// Jerk of `axis` that samples show for them at the rate `sigma`, mm/s³.
+    pub fn jerk_mm_per_s3(&self, axis: usize, sigma: f64, period_s: f64) -> f64 {
+        sigma * (self.velocity[axis] / period_s + WORST * sigma * self.acceleration[axis]) / period_s
+    }
+}
+
+/// Steps that the next samples still show.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Recent {
+    steps: Steps,
+    periods: u8,
+}
+
+impl Recent {
+    /// The steps; none after some periods without.
+    pub fn steps(&self) -> Steps {
+        self.steps
+    }
+
+    /// A period with these steps has passed.
+    pub fn pass(&mut self, crossed: Option<&Steps>) {
+        if let Some(steps) = crossed {
+            self.steps.join(steps);
+            self.periods = AROUND;
+        } else if self.periods > 0 {
+            self.periods -= 1;
+            if self.periods == 0 {
+                self.steps = Steps::default();
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Where segments of order 3 meet: whether velocity or acceleration step there.
+
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
+
+/// Steps below these are rounding: of velocity, mm/s, and of acceleration, mm/s².
+const ROUNDING: [f64; 2] = [1e-4, 0.1];
+
+/// How the last segment ended.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seams {
+    /// Velocity and acceleration; none at a rest, and of plans that keep no jerk.
+    end: Option<[[f64; MAX_AXES]; 2]>,
+}
+
+impl Seams {
+    /// Whether velocity or acceleration step where `segment` begins, which follows the last one.
+    pub fn steps_at(&mut self, segment: &Segment) -> bool {
+        let before = self.end.take();
+        if segment.order < 3 || segment.duration_s == 0.0 {
+            return false;
+        }
+        if !segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
+            self.end = Some(derivatives(segment, segment.duration_s));
+        }
+        let start = derivatives(segment, 0.0);
+        before.is_some_and(|end| {
+            let off = |n: usize| (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > ROUNDING[n]);
+            off(0) || off(1)
+        })
+    }
+}
+
+fn derivatives(segment: &Segment, t: f64) -> [[f64; MAX_AXES]; 2] {
+    let velocity = |c: &[f64; 6]| c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
+    let acceleration = |c: &[f64; 6]| 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
+    [segment.coefficients.each_ref().map(velocity), segment.coefficients.each_ref().map(acceleration)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::AxisVector;
+
+    fn segment(coefficients: [f64; 6]) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
+        (segment.order, segment.flags) = (3, SegmentFlags::default());
+        segment.coefficients[1] = coefficients;
+        segment
+    }
+
+    #[test]
+    fn steps_are_found_where_segments_meet() {
+        let mut seams = Seams::default();
+        // At its end the velocity is 4, the acceleration 8.
+        assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "after a rest nothing steps");
+        assert!(!seams.steps_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])), "it goes on");
+        let end = derivatives(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
+        assert!(seams.steps_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])), "acceleration steps");
+        let end = derivatives(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
+        assert!(seams.steps_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])), "velocity steps");
+        assert!(!seams.steps_at(&Segment::rest(&AxisVector::ZERO, 0.0)));
+        assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "nor behind a rest");
+    }
+}
