@@ -49,7 +49,12 @@ impl ArcLength {
     pub fn of_piece(curve: &Nurbs, piece: &Piece) -> Self {
         let mut table = Self { next_span: curve.span(piece.range.0), ..Self::empty(curve) };
         while table.next_span < curve.points() && curve.knots()[table.next_span] < piece.range.1 {
-            table.add_part(curve, piece.range);
+            // What a turn leaves of a span may be rounding: there is nothing to drive, and no direction.
+            table.add_part(curve, piece.range, ROUNDING_MM);
+        }
+        if table.fits.is_empty() {
+            table.next_span = curve.span(piece.range.0);
+            table.add_part(curve, piece.range, 0.0);
         }
         table.fits.shrink_to_fit();
         table.lines.shrink_to_fit();
@@ -60,18 +65,19 @@ impl ArcLength {
     pub fn add_span(&mut self, curve: &Nurbs) -> bool {
         let more = self.next_span < curve.points();
         if more {
-            self.add_part(curve, curve.range());
+            self.add_part(curve, curve.range(), 0.0);
         }
         more
     }
 
-    /// Adds the next knot span as far as it lies within `range`.
-    fn add_part(&mut self, curve: &Nurbs, range: (f64, f64)) {
+    /// Adds the next knot span as far as it lies within `range`, unless that is shorter than `least_mm`.
+    fn add_part(&mut self, curve: &Nurbs, range: (f64, f64), least_mm: f64) {
         let span = self.next_span;
         self.next_span += 1;
         let (from, to) = (curve.knots()[span].max(range.0), curve.knots()[span + 1].min(range.1));
-        if to > from {
-            let (whole, start_mm) = (curve.gauss(span, from, to), self.built.mm);
+        let whole = if to > from { curve.gauss(span, from, to) } else { 0.0 };
+        if to > from && whole >= least_mm {
+            let start_mm = self.built.mm;
             self.add(curve, span, (from, to), whole, MAX_HALVINGS);
             self.lines.extend(Line::new(curve, span, (from, to), [start_mm, self.built.mm]));
         }

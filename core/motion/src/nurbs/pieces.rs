@@ -2,6 +2,7 @@
 
 use tandem_sdk::AxisVector;
 
+use super::hull::Hull;
 use super::{Derivatives, Nurbs};
 use crate::half_angle_turn_rad;
 
@@ -9,6 +10,8 @@ use crate::half_angle_turn_rad;
 pub const CORNER_RAD: f64 = 1e-6;
 /// Share of the mean parameter speed below which the curve stands still in its parameter: a cusp.
 const STANDS_STILL: f64 = 1e-7;
+/// Share of the coordinates below which Bezier points coincide.
+const COINCIDES: f64 = 1e-12;
 
 /// Control points no further apart are one, mm or rad: what rounding leaves of a coordinate and its weight.
 const SAME_MM: f64 = 1e-12;
@@ -113,6 +116,9 @@ impl Nurbs {
     /// Direction just behind `u`.
     fn direction_behind(&self, u: f64) -> AxisVector {
         let span = self.span(u);
+        if self.knots[span] == u {
+            return self.leaving(&Hull::of_span(self, span), false);
+        }
         self.direction(&self.derivatives_in(span, u), self.knots[span + 1] - u)
     }
 
@@ -122,7 +128,23 @@ impl Nurbs {
         while self.knots[span] >= u {
             span -= 1;
         }
+        if self.knots[span + 1] == u {
+            return self.leaving(&Hull::of_span(self, span), true);
+        }
         self.direction(&self.derivatives_in(span, u), self.knots[span] - u)
+    }
+
+    /// The direction at the start of a span, or at its end: towards the first Bezier point that is another one. Derivatives
+    /// do not tell where weights are far apart, because the first one holds for the smallest part of the span only.
+    fn leaving(&self, hull: &Hull, backward: bool) -> AxisVector {
+        let last = hull.degree();
+        let point = |n: usize| hull.position(if backward { last - n } else { n });
+        let start = point(0);
+        let far = start.0.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let extent = (1..=last).map(|n| self.counted_length(&(point(n) - start))).fold(far, f64::max);
+        let other = (1..=last).map(|n| point(n) - start).find(|way| self.counted_length(way) > COINCIDES * extent);
+        let sign = if backward { -1.0 } else { 1.0 };
+        other.map_or(AxisVector::ZERO, |way| way * (sign / self.counted_length(&way)))
     }
 
     /// The direction in which the curve leaves a point, by the first derivative that is not zero: `step` is signed.

@@ -8,8 +8,10 @@ use tandem_sdk::AxisVector;
 use super::hull::Hull;
 use super::{AlongPath, Nurbs};
 
-/// Control points this near to a line are on it, mm or rad: less than segments may stand off the curve.
-const ON_LINE: f64 = 1e-9;
+/// Control points this near to a line are on it, mm or rad: programs round them to six decimals.
+const ON_LINE: f64 = 1e-6;
+/// Most that the direction of a line may be off, rad: of a short span rounding is a turn.
+const TURN_RAD: f64 = 1e-5;
 /// Halvings of a span at most.
 const HALVINGS: u32 = 60;
 /// Share of the coordinates of a span that is rounding.
@@ -19,6 +21,8 @@ const ROUNDING: f64 = 1e-13;
 const MOST_PARTS: u32 = 2000;
 /// Most that the length along a line may differ from the distance of its ends, as a share.
 const OFF_LENGTH: f64 = 1e-9;
+/// The same of rounding of positions, mm.
+const OFF_MM: f64 = 1e-12;
 
 /// A straight span that runs one way.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +43,7 @@ impl Line {
         Hull::of_span(curve, span).line()?;
         let [start, end] = [from, to].map(|u| curve.derivatives_in(span, u).position);
         let (way, length_mm) = (end - start, end_mm - start_mm);
-        let runs_one_way = (curve.counted_length(&way) - length_mm).abs() <= OFF_LENGTH * length_mm;
+        let runs_one_way = (curve.counted_length(&way) - length_mm).abs() <= OFF_LENGTH * length_mm + OFF_MM;
         runs_one_way.then(|| Self { start_mm, end_mm, position: start, direction: way * (1.0 / length_mm) })
     }
 
@@ -129,7 +133,8 @@ impl Hull {
             let along: f64 = way.0.iter().zip(line.0).map(|(a, b)| a * b).sum();
             far(&(*way - line * along)).sqrt()
         };
-        ways().all(|way| off(&way) <= ON_LINE).then_some(line)
+        let most = ON_LINE.min(TURN_RAD * length);
+        ways().all(|way| off(&way) <= most).then_some(line)
     }
 
     /// The control points along `line`, from the first one on.

@@ -148,13 +148,21 @@ fn turns_back_on_a_line_cut_the_curve() {
     }
 }
 
+/// With weights far apart the first derivative holds for the smallest part of a span only: it does not tell the direction.
+#[test]
+fn corners_between_heavy_and_light_points_cut_the_curve() {
+    let points = [[0.0, 0.0, 0.0], [0.77, 1.55, 0.0], [-0.86, -1.72, 0.0], [-0.48, -0.97, 0.0], [-0.5, -1.0, 0.0]];
+    let pieces = curve(&clamped(1, &points, &[0.032, 0.0078, 0.0024, 28.8, 0.0013])).pieces();
+    assert_eq!(pieces.iter().map(|p| p.range).collect::<Vec<_>>(), [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0)]);
+}
+
 #[test]
 fn a_straight_span_without_a_turn_is_not_cut() {
     // It slows down to a stand in the middle of its parameter, and goes on the same way.
     let still = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [6.0, 0.0, 0.0]];
     assert_eq!(curve(&clamped(3, &still, &[1.0; 4])).pieces().len(), 1);
     // Off the line by more than rounding it is a hairpin, no turn.
-    let hairpin = [[0.0, 0.0, 0.0], [10.0, 1e-7, 0.0], [0.0, 1e-7, 0.0], [5.0, 0.0, 0.0]];
+    let hairpin = [[0.0, 0.0, 0.0], [10.0, 1e-5, 0.0], [0.0, 1e-5, 0.0], [5.0, 0.0, 0.0]];
     assert_eq!(curve(&clamped(3, &hairpin, &[1.0; 4])).pieces().len(), 1);
 }
 

@@ -22,8 +22,9 @@ const HOPELESS: usize = 6;
 /// every limit.
 const SHORT_S: f64 = 0.15;
 const RAMPS_SHARE: f64 = 0.95;
-/// Intervals of the grid at least.
+/// Intervals of the grid at least, and at most: a motion slower than that is planned on a coarser one.
 const MIN_INTERVALS: usize = 40;
+const MAX_INTERVALS: usize = 20_000;
 
 /// The planning of windows; keeps its memory.
 #[derive(Debug, Default)]
@@ -146,7 +147,7 @@ impl Scan {
     fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
         let whole = self.first.make(job, &self.reliefs);
         let (total_s, end_mm) = self.first.end();
-        let intervals = ((total_s / grid_s(job.bounds)).ceil() as usize).max(MIN_INTERVALS);
+        let intervals = ((total_s / grid_s(job.bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
         fill(&mut motion.coefficients, self.first.motion(job), grid, &job.start.state, end_mm);
