@@ -2,29 +2,12 @@
 
 mod common;
 
+use common::measure::{chord_error_mm, distance, realised_mm};
 use common::{canonical, case, context, curve_block, run};
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
-use tandem_sdk::{Axes, AxisVector, SegmentFlags};
+use tandem_sdk::{Axes, SegmentFlags};
 
 const PERIOD_S: f64 = 0.002;
-
-fn distance(a: &AxisVector, b: &AxisVector) -> f64 {
-    (*a - *b).0.iter().map(|d| d * d).sum::<f64>().sqrt()
-}
-
-/// Largest distance between the chord of a period and the curve between its ends, mm.
-fn chord_error_mm(curve: &Nurbs, table: &ArcLength, from: f64, to: f64) -> f64 {
-    let mut place = Place::default();
-    let ends = [from, to].map(|s| table.position(curve, s, &mut place));
-    let along = ends[1] - ends[0];
-    let squared: f64 = along.0.iter().map(|v| v * v).sum();
-    let off = |share: f64| {
-        let point = table.position(curve, from + share * (to - from), &mut Place::default()) - ends[0];
-        let foot: f64 = point.0.iter().zip(along.0).map(|(a, b)| a * b).sum::<f64>() / squared;
-        distance(&point, &(along * foot))
-    };
-    (1..100).map(|step| off(f64::from(step) / 100.0)).fold(0.0, f64::max)
-}
 
 #[test]
 fn reference_figures() {
@@ -95,24 +78,13 @@ fn the_feed_does_not_fluctuate() {
         let curve = Nurbs::new(&data, &Axes::new(&[('X', false), ('Y', false)]).unwrap()).unwrap();
         let block = curve_block(data, length_mm, 250.0);
         let collected = run("form = \"adaptive\"", &context(block.facts().start), &[block]);
-        let mut at = curve.nearest(&collected.segments[0].position(0.0), 0, curve.points()).u;
-        let arc = |from: f64, to: f64| {
-            let borders = curve.inner_knots().filter(|knot| *knot > from && *knot < to).chain([to]);
-            let (mut sum, mut start) = (0.0, from);
-            for border in borders {
-                sum += curve.length_in(curve.span(start), start, border).mm;
-                start = border;
-            }
-            sum
-        };
         let samples = collected.path_samples(PERIOD_S);
-        for pair in samples[..samples.len() - 1].windows(2) {
-            let span = curve.span(at);
-            let next = curve.nearest(&pair[1].0, span, span + 3).u;
-            let commanded = pair[1].1 - pair[0].1;
-            let realised = arc(at, next);
-            assert!((realised - commanded).abs() < 1e-5 * commanded, "{name} at {at}: {realised} not {commanded}");
-            at = next;
+        let samples = &samples[..samples.len() - 1];
+        let realised = realised_mm(&curve, samples.iter().map(|(position, _)| *position));
+        for (pair, realised_mm) in samples.windows(2).zip(realised) {
+            let commanded_mm = pair[1].1 - pair[0].1;
+            let off_mm = (realised_mm - commanded_mm).abs();
+            assert!(off_mm < 1e-5 * commanded_mm, "{name}: {realised_mm} mm, not {commanded_mm}");
         }
     }
 }
