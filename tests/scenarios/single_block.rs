@@ -1,6 +1,6 @@
 //! Single-block operation: the machine rests at the end of every line, and goes on at the operator's word.
 
-use crate::harness::{Done, Scenario};
+use crate::harness::{Done, Scenario, root};
 
 /// Lines that the plan drives through without a rest, and one that follows a rest.
 const TEXT: &str = "G21 G90 G64\nF3000\nG1 X10\nX20\nX30 Y1\nG2 X40 Y11 J10\nG0 X0 Y0\nG1 X5\nM2\n";
@@ -51,4 +51,36 @@ fn short_lines_are_passed_until_one_can_be_met() {
     let x = done.column("x_cmd_mm")[900];
     let from_end = (x / 0.05 - (x / 0.05).round()).abs() * 0.05;
     assert!(from_end < 0.011 && x < 19.0, "{x}");
+}
+
+/// Lines, arcs and curves that run into each other without a corner, and where each ends.
+const TANGENT: &str = "F6000\nG1 X20\nG2 X30 Y-10 R10\nG1 Y-30\nG3 X40 Y-40 R10\nG1 X60\nG5 I5 J0 P0 Q-5 X80 Y-30\nG1 Y-10\n\
+    G5.2 P1 L4\nY0\nX90 Y10\nX100 Y10\nG5.3\nG1 X120\nM2\n";
+const TANGENT_ENDS: [(f64, f64); 8] = [
+    (20.0, 0.0),
+    (30.0, -10.0),
+    (30.0, -30.0),
+    (40.0, -40.0),
+    (60.0, -40.0),
+    (80.0, -30.0),
+    (80.0, -10.0),
+    (100.0, 10.0),
+];
+
+#[test]
+fn with_a_jerk_limit_it_rests_at_every_line_too() {
+    let resumes: Vec<String> = (1..12).map(|n| format!("{},resume", 500 * n)).collect();
+    let commands = format!("0,single-block,1\n{}\n", resumes.join("\n"));
+    for form in ["scan", "windowed"] {
+        let machine = root().join("examples/machines/nurbs-demo.toml");
+        let form = format!("planner.options.form={form}");
+        let done = Scenario::text(TANGENT).on(&machine).with(&["--set", &form]).commands(&commands).run();
+        done.assert_within_limits();
+        let (x, y) = (done.column("x_cmd_mm"), done.column("y_cmd_mm"));
+        for (n, (end_x, end_y)) in TANGENT_ENDS.iter().enumerate() {
+            // Just before it goes on.
+            let off = (x[500 * (n + 1) - 5] - end_x).hypot(y[500 * (n + 1) - 5] - end_y);
+            assert!(off < 0.05, "{form}: rest {n} is {off} mm off the end of its line");
+        }
+    }
 }

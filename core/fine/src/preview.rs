@@ -111,6 +111,11 @@ impl LineEnd {
         self.chosen_mm = None;
     }
 
+    /// Whether the end chosen lies behind the machine, which did not come to rest there.
+    pub fn is_passed(&self, cursor: &Cursor) -> bool {
+        self.chosen_mm.is_some_and(|end_mm| end_mm < cursor.path_mm())
+    }
+
     /// The nearest end of a line at which the plan goes on and the machine can stop when it needs `way_mm` for it.
     pub fn look(&mut self, cursor: &mut Cursor, way_mm: f64) -> Option<f64> {
         let here_mm = cursor.path_mm();

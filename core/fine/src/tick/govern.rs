@@ -4,6 +4,7 @@ use tandem_rings::STOP_SHARE;
 
 use super::FineLoop;
 use super::follow::Ask;
+use super::single_block::LINE_END_MM;
 use crate::config::GuardMode;
 use crate::governor::{Aim, Governor};
 use crate::law::Along;
@@ -160,7 +161,9 @@ impl FineLoop {
         if self.config.order >= 3 {
             let soon_mm = 2.0 * period_s * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
             let later = Along { speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s), ..along };
-            return if later.way_to_mm(end_mm_per_s) + soon_mm < left_mm { f64::INFINITY } else { end_mm_per_s };
+            // So near there is no way to get faster again: the place would be passed.
+            let waits = left_mm > LINE_END_MM && later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
+            return if waits { f64::INFINITY } else { end_mm_per_s };
         }
         let step = along.most_mm_per_s2 * period_s;
         let way = 2.0 * along.most_mm_per_s2 * left_mm - step * (along.speed_mm_per_s + step);

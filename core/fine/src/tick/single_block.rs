@@ -5,12 +5,22 @@ use std::sync::atomic::Ordering::Relaxed;
 use super::FineLoop;
 
 /// How near to the end of its line the machine comes to rest, mm.
-const LINE_END_MM: f64 = 0.01;
+pub(super) const LINE_END_MM: f64 = 0.01;
 
 impl FineLoop {
     /// In single-block operation: where to come to rest, as a path coordinate, mm.
     pub(super) fn line_end(&mut self) -> Option<f64> {
-        if !self.given.single_block || self.cursor.is_resting() {
+        if !self.given.single_block {
+            self.line_end.forget();
+            return None;
+        }
+        if self.cursor.is_resting() {
+            return None;
+        }
+        if self.line_end.is_passed(&self.cursor) {
+            // What a turn behind the end takes of the jerk may not have been left for braking: it rests a little behind.
+            self.controls.hold.store(true, Relaxed);
+            self.line_end.forget();
             return None;
         }
         let along = self.along();
