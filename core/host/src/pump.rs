@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
-use tandem_rough::{Observer, RoughError, RoughLoop};
+use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
 use crate::command::{Command, Timed};
@@ -132,10 +132,7 @@ impl<'a> Pump<'a> {
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
         let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
         if let Err(error) = self.rough.step(&mut both) {
-            let words = match &error {
-                RoughError::Planner { line, cause } => format!("planner {}: line {line}: {cause}", self.planner),
-                _ => error.to_string(),
-            };
+            let words = error.with_planner(&self.planner);
             self.fail(words);
         }
         let taken_ns = started.elapsed().as_nanos();

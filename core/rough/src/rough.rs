@@ -50,13 +50,23 @@ pub enum RoughError {
         cause: String,
     },
     /// The planner failed or refused what it had checked.
-    #[error("planner: line {line}: {cause}")]
+    #[error("planner: {}{cause}", at_line(*line))]
     Planner {
-        /// Program line of the block.
-        line: u32,
+        /// Program line of the block that it was offered; none where it advances, which is about blocks before the last one.
+        line: Option<u32>,
         /// The planner's words.
         cause: String,
     },
+}
+
+impl RoughError {
+    /// The message, with the planner by its name.
+    pub fn with_planner(&self, name: &str) -> String {
+        match self {
+            Self::Planner { line, cause } => format!("planner {name}: {}{cause}", at_line(*line)),
+            _ => self.to_string(),
+        }
+    }
 }
 
 /// How often in one rough period a planner may emit less than half of what it is asked for, though more is to come.
@@ -136,12 +146,10 @@ impl RoughLoop {
         let mut short = 0;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
             self.feed(observer)?;
-            let advanced = self
-                .planner
-                .advance(period_s, &mut self.queue)
-                .map_err(|e| planner_error(self.line, &e.to_string()))?;
+            let advanced =
+                self.planner.advance(period_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
             if let Some(defect) = self.queue.defect() {
-                return Err(planner_error(self.line, defect));
+                return Err(planner_error(None, defect));
             }
             self.stretch_over = advanced.done != 0;
             if self.stretch_over {
@@ -150,11 +158,11 @@ impl RoughLoop {
             }
             self.queue.flush(false);
             if advanced.duration_s == 0.0 && !self.finished {
-                return Err(planner_error(self.line, "it is full, and advance emits nothing"));
+                return Err(planner_error(Some(self.line), "it is full, and advance emits nothing"));
             }
             short += u32::from(advanced.duration_s < period_s / 2.0);
             if short > MOST_SHORT_ADVANCES {
-                return Err(planner_error(self.line, "advance emits a little at a time, and hardly gets on"));
+                return Err(planner_error(None, "advance emits a little at a time, and hardly gets on"));
             }
         }
         Ok(())
@@ -176,7 +184,8 @@ impl RoughLoop {
             match &self.items[self.next] {
                 Item::Block(block) => {
                     (self.line, self.last_block) = (block.line, block.index);
-                    let accepted = self.planner.accept(block).map_err(|e| planner_error(block.line, &e.to_string()))?;
+                    let accepted =
+                        self.planner.accept(block).map_err(|e| planner_error(Some(block.line), &e.to_string()))?;
                     if accepted == Accepted::Full {
                         return Ok(());
                     }
@@ -187,7 +196,7 @@ impl RoughLoop {
                     let line = curve.facts().line;
                     (self.line, self.last_block) = (line, curve.facts().index);
                     let accepted = curve.with(|block| self.planner.accept(block));
-                    if accepted.map_err(|e| planner_error(line, &e.to_string()))? == Accepted::Full {
+                    if accepted.map_err(|e| planner_error(Some(line), &e.to_string()))? == Accepted::Full {
                         return Ok(());
                     }
                     self.queue.accepted(curve.clone());
@@ -248,7 +257,12 @@ impl RoughLoop {
     }
 }
 
-fn planner_error(line: u32, cause: &str) -> RoughError {
+/// The line as it stands in a message, with what divides it from the cause.
+fn at_line(line: Option<u32>) -> String {
+    line.map_or_else(String::new, |line| format!("line {line}: "))
+}
+
+fn planner_error(line: Option<u32>, cause: &str) -> RoughError {
     RoughError::Planner { line, cause: cause.to_string() }
 }
 
