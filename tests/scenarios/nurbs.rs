@@ -275,3 +275,40 @@ fn degenerate_curves_are_driven_to_their_ends() {
         }
     }
 }
+
+/// A rotary axis as fast as the linear ones of the demo.
+const ROTARY: [&str; 12] = [
+    "--set",
+    "axes.a.kind=rotary",
+    "--set",
+    "axes.a.travel_deg=[-3600,3600]",
+    "--set",
+    "axes.a.max_feed_deg_per_min=18000",
+    "--set",
+    "axes.a.max_rapid_deg_per_min=18000",
+    "--set",
+    "axes.a.max_acceleration_deg_per_s2=5000",
+    "--set",
+    "axes.a.max_jerk_deg_per_s3=400000",
+];
+
+#[test]
+fn where_linear_axes_nearly_stand_still_the_others_are_driven_at_their_limits() {
+    // Per mm of path the axis A turns 360 000°: little path deceleration is left, and little is needed.
+    let line = "F1000\nG1 X0.001 A360\nG1 X100 A361\nG1 X100.001 A0\nG1 X0 A1\n";
+    let curve = "F600\nG5.2 P1 L3\nY-38.24 Z-17.64 A-18.52 P2\nX0 Y0 Z0.0003 P2\nX-10 Y2 Z21.6715 P100\nX37 P0.01\n\
+        X0 Y0 Z-0.0227 P0.5\nX0.0727 Y0 A-0.0549\nX0 Y0.0002\nX-24.27 Y-15.9502 Z20.32 A0 P2\nX1\nG5.3\n";
+    for (text, most_s) in [(line, 16.0), (curve, 30.0)] {
+        for form in ["scan", "windowed"] {
+            let machine = root().join("examples/machines/nurbs-demo.toml");
+            let form = format!("planner.options.form={form}");
+            let done = Scenario::text(text).on(&machine).with(&ROTARY).with(&["--set", &form]).run();
+            // The judge knows the machine of the file alone, which has no axis A.
+            assert_eq!(done.status(), 0, "{}", done.errors());
+            for count in ["limit_violations", "guard_stops", "governed_samples", "starvations"] {
+                assert_eq!(done.number(count), 0.0, "{form}: {count}");
+            }
+            assert!(done.number("motion_time_s") < most_s, "{form}: {} s", done.number("motion_time_s"));
+        }
+    }
+}

@@ -38,6 +38,9 @@ pub const STOP_JERK_SHARE: f64 = 0.8;
 pub struct Depth {
     /// Smallest path deceleration that the queued segments leave, mm/s².
     pub stop_deceleration_mm_per_s2: AtomicF64,
+    /// Longest stop of any queued segment from its own speed with its own deceleration, s of program time: a bound on every
+    /// stop where speeds and decelerations of the queue differ by much; infinite where nothing moves.
+    pub stop_s: AtomicF64,
     /// Longest time in which that deceleration can be built up, s; zero where no jerk limit is kept.
     pub stop_ramp_s: AtomicF64,
     /// Program time at which the queue ends; infinite where it ends at rest.
@@ -54,6 +57,7 @@ impl Depth {
     pub fn begin(&self, epoch: u32, now_s: f64) {
         self.required_s.store(f64::INFINITY);
         self.stop_deceleration_mm_per_s2.store(f64::INFINITY);
+        self.stop_s.store(f64::INFINITY);
         self.stop_ramp_s.store(0.0);
         self.wall_s.store(now_s);
         self.epoch.store(epoch, Ordering::Release);
@@ -76,6 +80,7 @@ impl Default for Depth {
     fn default() -> Self {
         Self {
             stop_deceleration_mm_per_s2: AtomicF64::new(f64::INFINITY),
+            stop_s: AtomicF64::new(f64::INFINITY),
             stop_ramp_s: AtomicF64::new(0.0),
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),

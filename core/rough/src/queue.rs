@@ -160,6 +160,7 @@ impl Queue {
         self.depth.passed(now_s);
         let shared = &self.end.depth;
         shared.stop_deceleration_mm_per_s2.store(self.depth.stop_deceleration_mm_per_s2());
+        shared.stop_s.store(self.depth.stop_s());
         shared.stop_ramp_s.store(self.depth.stop_ramp_s());
         shared.wall_s.store(if self.ends_at_rest { f64::INFINITY } else { self.queued_s });
         // What is staged waits for room: the ring is full, and deeper it does not get.

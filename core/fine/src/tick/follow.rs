@@ -113,7 +113,8 @@ impl FineLoop {
         let deceleration = self.depth.stop_deceleration_mm_per_s2.load();
         // The declared deceleration is kept within the governor's margin and from the next period on.
         let ramp_s = self.depth.stop_ramp_s.load() / STOP_JERK_SHARE;
-        let stop_s = speed / (STOP_SHARE * deceleration) + ramp_s + 3.0 * self.config.period_s;
+        let stop_s = (speed / deceleration).min(self.governor.sigma() * self.depth.stop_s.load()) / STOP_SHARE;
+        let stop_s = stop_s + ramp_s + 3.0 * self.config.period_s;
         if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s {
             self.starved = true;
             self.counters.starvations += 1;

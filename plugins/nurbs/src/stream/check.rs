@@ -5,6 +5,7 @@ use tandem_sdk::{AxisVector, BlockKind, LimitedBy};
 
 use super::between::{Between, Seen};
 use super::relief::{Relief, Reliefs};
+use super::window::Reserve;
 use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
 
 /// Share of a limit that a sampled difference may reach.
@@ -71,7 +72,8 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
     window.samples.extend(start.history);
     window.bounds.clear();
     window.first_tick_s = start.first_tick_s;
-    (window.stop_mm_per_s2, window.stop_mm_per_s3, window.most_mm_per_s) = (f64::INFINITY, f64::INFINITY, 0.0);
+    window.reserves.clear();
+    window.most_mm_per_s = 0.0;
     let (period_s, duration_s, known) = (bounds.context.fine_period_s, window.duration_s(), reliefs.count());
     if let Some(lost) = window.times.windows(2).position(|ends| !ends[1].is_finite()) {
         let from_mm = window.motion.at(lost, 0.0).s_mm;
@@ -110,13 +112,15 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
 /// What a sample leaves for a stop.
 fn note_reserve<M>(window: &mut Window<M>, bounds: &Bounds, at: &AlongPath, speed: f64) {
     window.most_mm_per_s = window.most_mm_per_s.max(speed);
+    let mut reserve = Reserve { stop_mm_per_s2: f64::INFINITY, stop_mm_per_s3: f64::INFINITY };
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
         let along = at.direction[axis].abs();
         let turning = at.direction[axis].signum() * at.curvature[axis] * speed * speed;
         let left = limits.acceleration_mm_per_s2 + turning.min(0.0);
-        window.stop_mm_per_s2 = window.stop_mm_per_s2.min(left / along);
-        window.stop_mm_per_s3 = window.stop_mm_per_s3.min(limits.jerk_mm_per_s3 / along);
+        reserve.stop_mm_per_s2 = reserve.stop_mm_per_s2.min(left / along);
+        reserve.stop_mm_per_s3 = reserve.stop_mm_per_s3.min(limits.jerk_mm_per_s3 / along);
     }
+    window.reserves.push(reserve);
 }
 
 /// Feed, chord and differences at a sample; `before_mm` is where the one before was.

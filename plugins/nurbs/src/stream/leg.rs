@@ -138,18 +138,22 @@ impl Least {
     pub fn on(course: &Course, stretch: usize, bounds: &Bounds) -> Self {
         let length_mm = course.stretches()[stretch].length_mm;
         let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
-        for share in [0.0, 0.23, 0.47, 0.71, 1.0] {
-            let at = course.at(stretch, share * length_mm, &mut place);
-            for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-                if at.direction[axis] != 0.0 {
-                    // A joint that is a sum of axes may move further than the path.
-                    let joint = axis >= bounds.context.axes.count();
-                    let share = if joint { at.direction[axis].abs().max(1.0) } else { 1.0 };
-                    let (acceleration, jerk) = (limits.acceleration_mm_per_s2 / share, limits.jerk_mm_per_s3 / share);
-                    least = [least[0].min(acceleration), least[1].min(jerk)];
-                }
+        let directions = [0.0, 0.23, 0.47, 0.71, 1.0].map(|s| course.at(stretch, s * length_mm, &mut place).direction);
+        for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let along = directions.map(|direction| direction[axis].abs());
+            if along.iter().all(|along| *along == 0.0) {
+                continue;
             }
+            // A joint that is a sum of axes may move further than the path; so may a rotary axis, where a place at which the
+            // linear ones nearly stand still says nothing of the others.
+            let joint = axis >= bounds.context.axes.count();
+            let share = if joint { along.iter().copied().fold(1.0, f64::max) } else { least_of(&along).max(1.0) };
+            least = [least[0].min(limits.acceleration_mm_per_s2 / share), least[1].min(limits.jerk_mm_per_s3 / share)];
         }
         Self { acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
     }
+}
+
+fn least_of(numbers: &[f64]) -> f64 {
+    numbers.iter().copied().fold(f64::INFINITY, f64::min)
 }

@@ -190,8 +190,8 @@ impl<P: Planning> Streamer<P> {
             self.blank = blank(leg);
         }
         let mut segment = self.blank;
-        self.declare(&mut segment);
         let Drawn { until_s, leg_over } = draw(&route, &self.window, (from_s, to_s.min(from_s + left_s)), &mut segment);
+        self.declare((from_s, until_s), &mut segment);
         if leg_over {
             self.leg_over(&mut segment);
         }
@@ -219,10 +219,12 @@ impl<P: Planning> Streamer<P> {
         }
     }
 
-    /// What the window leaves for a stop.
-    fn declare(&self, segment: &mut Segment) {
-        let (a, j) = (self.window.stop_mm_per_s2, STOP_JERK * self.window.stop_mm_per_s3);
-        let v = self.window.most_mm_per_s.max(1e-9);
+    /// What the window leaves for a stop there.
+    fn declare(&self, (from_s, until_s): (f64, f64), segment: &mut Segment) {
+        let reserve = self.window.reserve((from_s, until_s), self.bounds.context.fine_period_s);
+        let (a, j) = (reserve.stop_mm_per_s2, STOP_JERK * reserve.stop_mm_per_s3);
+        let speeds = [from_s, until_s].map(|t_s| self.window.at(t_s).speed_mm_per_s);
+        let v = speeds[0].max(speeds[1]).max(1e-9);
         segment.stop_deceleration_mm_per_s2 = a;
         (segment.max_sigma_rate_per_s, segment.max_sigma_acceleration_per_s2) = (a / v, j / v);
     }

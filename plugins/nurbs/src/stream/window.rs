@@ -22,6 +22,13 @@ pub fn interval(times: &[f64], t_s: f64) -> usize {
     behind.clamp(1, times.len() - 1) - 1
 }
 
+/// Path deceleration and path jerk that are left for a stop, mm/s² and mm/s³.
+#[derive(Clone, Copy, Debug)]
+pub struct Reserve {
+    pub stop_mm_per_s2: f64,
+    pub stop_mm_per_s3: f64,
+}
+
 /// A window.
 #[derive(Debug, Default)]
 pub struct Window<M> {
@@ -35,9 +42,9 @@ pub struct Window<M> {
     pub first_tick_s: f64,
     /// What binds at the ticks from that one on.
     pub bounds: Vec<Option<LimitedBy>>,
-    /// Path deceleration and path jerk that are left everywhere in it, mm/s² and mm/s³, and its highest speed.
-    pub stop_mm_per_s2: f64,
-    pub stop_mm_per_s3: f64,
+    /// What is left for a stop at the ticks from that one on.
+    pub reserves: Vec<Reserve>,
+    /// Its highest speed.
     pub most_mm_per_s: f64,
 }
 
@@ -47,8 +54,18 @@ impl<M: Motion> Window<M> {
         std::mem::swap(&mut self.times, &mut other.times);
         std::mem::swap(&mut self.samples, &mut other.samples);
         std::mem::swap(&mut self.bounds, &mut other.bounds);
+        std::mem::swap(&mut self.reserves, &mut other.reserves);
         (self.whole, self.first_tick_s, self.most_mm_per_s) = (other.whole, other.first_tick_s, other.most_mm_per_s);
-        (self.stop_mm_per_s2, self.stop_mm_per_s3) = (other.stop_mm_per_s2, other.stop_mm_per_s3);
+    }
+
+    /// What is left everywhere between two times: the least of the ticks there and of those around.
+    pub fn reserve(&self, (from_s, to_s): (f64, f64), period_s: f64) -> Reserve {
+        let tick = |t_s: f64| (t_s - self.first_tick_s) / period_s;
+        let last = self.reserves.len().saturating_sub(1);
+        let [from, to] = [tick(from_s).floor().max(0.0) as usize, tick(to_s).ceil().max(0.0) as usize];
+        let around = &self.reserves[from.min(last)..(to + 1).min(self.reserves.len())];
+        let least = |of: fn(&Reserve) -> f64| around.iter().map(of).fold(f64::INFINITY, f64::min);
+        Reserve { stop_mm_per_s2: least(|at| at.stop_mm_per_s2), stop_mm_per_s3: least(|at| at.stop_mm_per_s3) }
     }
 
     /// What binds most of the ticks between two times; none where nothing does.
