@@ -243,9 +243,7 @@ impl<const L: usize> AnyCore for Core<L> {
         }
         let stated = block.path_tolerance_mm;
         let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
-        self.flat
-            .lay(&self.context.axes, &self.frame, block, tolerance_mm)
-            .map_err(|error| PluginError::new(error.to_string()))?;
+        self.flat.lay(&self.context.axes, &self.frame, block, tolerance_mm)?;
         self.held_s += self.route.push(block, &self.flat, &self.frame, self.context.max_feed_ratio, tolerance_mm);
         Ok(())
     }

@@ -11,8 +11,8 @@ use crate::frame::Frame;
 pub const SAGITTA_SHARE: f64 = 0.015;
 /// Longest chord of a curved block, mm.
 const LONGEST_MM: f64 = 1.0;
-/// Most chords of one block.
-pub const MAX_CHORDS: usize = 100_000;
+/// Most chords of one block: what takes more is refused.
+pub const MAX_CHORDS: usize = 2_000_000;
 
 /// The ends of the chords of a block; keeps its memory.
 #[derive(Debug, Default)]
@@ -26,15 +26,24 @@ impl<const L: usize> Flat<L> {
     /// Lays the chords of `block`, which stand off it by at most [`SAGITTA_SHARE`] of the tolerance. Allocates.
     ///
     /// # Errors
-    /// A curve that is none.
-    pub fn lay(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, tolerance_mm: f64) -> Result<(), NurbsError> {
+    /// A curve that is none, and an arc or a curve that takes more than [`MAX_CHORDS`].
+    pub fn lay(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, tolerance_mm: f64) -> Result<(), PluginError> {
         self.points.clear();
         self.curved = matches!(block.kind, BlockKind::Arc | BlockKind::Nurbs);
         let sagitta_mm = SAGITTA_SHARE * tolerance_mm;
         match block.kind {
             BlockKind::Arc => self.lay_arc(frame, block, sagitta_mm),
-            BlockKind::Nurbs => return self.lay_curve(axes, frame, block, sagitta_mm),
+            BlockKind::Nurbs => {
+                let laid = self.lay_curve(axes, frame, block, sagitta_mm);
+                laid.map_err(|error| PluginError::new(error.to_string()))?;
+            }
             _ => self.points.push(frame.lanes(&block.end)),
+        }
+        if self.points.len() > MAX_CHORDS {
+            return Err(PluginError::new(format!(
+                "line {}: within its tolerance the path takes more than {MAX_CHORDS} chords; nurbs drives it as it is",
+                block.line
+            )));
         }
         Ok(())
     }
@@ -92,7 +101,7 @@ pub fn check(axes: &Axes, block: &Block) -> Result<(), PluginError> {
 /// Chords of a circle.
 pub fn count(radius: f64, sweep_rad: f64, sagitta: f64) -> usize {
     let angle = (8.0 * sagitta / radius).sqrt().min(LONGEST_MM / radius).min(0.3);
-    ((sweep_rad.abs() / angle).ceil() as usize).clamp(1, MAX_CHORDS)
+    ((sweep_rad.abs() / angle).ceil() as usize).clamp(1, MAX_CHORDS + 1)
 }
 
 /// Length of a chord that stands off the curve by `sagitta` where it bends as at `s`.
