@@ -7,7 +7,7 @@ use super::grid::Grid;
 use super::motion::{Driven, Rated};
 use super::points::ease;
 use super::spline::fill;
-use crate::stream::check::check;
+use crate::stream::check::{Look, check};
 use crate::stream::relief::Reliefs;
 use crate::stream::{Bounds, Job, Planning, Window, lay_times};
 use crate::windowed::{Ramps, Windowed};
@@ -67,7 +67,7 @@ impl Scan {
             if n == 1 {
                 self.begun_s = self.first.end().0;
             }
-            let kept_all = !self.dips(job, window) && check(job, window, &mut self.reliefs).is_kept();
+            let kept_all = !self.dips(job, window) && check(job, window, Look::Between, &mut self.reliefs).is_kept();
             if !kept_all {
                 if n >= HOPELESS && kept.is_none() {
                     break;
@@ -82,7 +82,7 @@ impl Scan {
         if let Some(known) = kept {
             self.reliefs.keep_first(known);
             self.solve(job, false, window);
-            return !self.dips(job, window) && check(job, window, &mut self.reliefs).is_kept();
+            return !self.dips(job, window) && check(job, window, Look::Between, &mut self.reliefs).is_kept();
         }
         false
     }

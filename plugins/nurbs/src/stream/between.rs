@@ -12,7 +12,7 @@ const AIM: f64 = 0.9997;
 /// Share of the acceleration beyond which turning is to blame, whose acceleration goes with the square of the speed.
 const TURNING: f64 = 0.85;
 /// Looks in a period, evenly; the last one is the sample.
-const PHASES: usize = 4;
+const PHASES: usize = 2;
 /// Looks between two of them at most: a sharp feature of the path has some hundred parts.
 const LOOKS: usize = 400;
 
@@ -50,7 +50,7 @@ impl Seen {
 
 impl<M: Motion> Between<'_, M> {
     /// The worst of the period that ends at `tick_s`: velocity and acceleration of the axes at points, and the differences
-    /// of samples with other phases. Looks at the quarters, on both sides of knots, and where the path has features closer
+    /// of samples with another phase. Looks at the middle, on both sides of knots, and where the path has features closer
     /// to each other, at each of them. What lies before the window or behind its end is not looked at.
     pub fn worst(&self, tick_s: f64, seen: &mut Seen, cursor: &mut Cursor) -> Worst {
         let (mut worst, period_s) = (Worst::default(), self.bounds.context.fine_period_s);

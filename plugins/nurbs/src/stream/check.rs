@@ -64,9 +64,18 @@ impl Worst {
     }
 }
 
+/// How closely a window is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// At its samples: enough for a try that will not do.
+    Samples,
+    /// Between them and at other phases too.
+    Between,
+}
+
 /// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
 /// `reliefs` get what would keep it.
-pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut Reliefs) -> Worst {
+pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, reliefs: &mut Reliefs) -> Worst {
     let Job { route, bounds, start, .. } = job;
     window.samples.clear();
     window.samples.extend(start.history);
@@ -96,7 +105,9 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, reliefs: &mut R
         window.samples.push(at.position);
         let first = if count == 0 { state.s_mm } else { before_mm[2] };
         let mut here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
-        here.join(&Between { route, bounds, window }.worst(t, &mut seen, &mut cursor));
+        if look == Look::Between {
+            here.join(&Between { route, bounds, window }.worst(t, &mut seen, &mut cursor));
+        }
         window.bounds.push(here.bound);
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.

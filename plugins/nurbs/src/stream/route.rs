@@ -101,8 +101,11 @@ impl<'a> Route<'a> {
     /// Highest speed at `s_mm` for a jump of the derivatives there, infinite where there is none, and how far the next place
     /// is where there may be one, mm.
     pub fn step_cap_mm_per_s(&self, s_mm: f64, bounds: &Bounds, cursor: &mut Cursor) -> (f64, f64) {
-        let around = [s_mm - PAST_MM, s_mm + PAST_MM];
-        let knot = self.knot(around, cursor);
+        let break_mm = self.find(s_mm, cursor).next_break_mm(s_mm - PAST_MM);
+        if break_mm >= s_mm + PAST_MM {
+            return (f64::INFINITY, break_mm - s_mm);
+        }
+        let knot = self.knot([s_mm - PAST_MM, s_mm + PAST_MM], cursor);
         let next_mm = self.find(s_mm, cursor).next_break_mm(s_mm + PAST_MM) - s_mm;
         let cap = knot.map_or(f64::INFINITY, |(_, sides)| Leg::step_cap_mm_per_s(&sides, bounds));
         (cap, next_mm)

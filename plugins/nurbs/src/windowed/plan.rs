@@ -7,7 +7,7 @@ use super::points::ease;
 use super::ramp::Tangential;
 use super::ramps::{Care, Rounds};
 use super::ripple::Corner;
-use crate::stream::check::check;
+use crate::stream::check::{Look, check};
 use crate::stream::relief::Reliefs;
 use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, window_s};
 
@@ -62,10 +62,13 @@ impl Planning for Windowed {
                 return false;
             }
             let known = self.reliefs.count();
-            let worst = check(job, window, &mut self.reliefs);
+            let mut worst = check(job, window, Look::Samples, &mut self.reliefs);
             // After some tries samples alone count.
             if worst.is_kept() && (n > LOCAL_TRIES || !self.ease(job, window)) {
-                return true;
+                worst = check(job, window, Look::Between, &mut self.reliefs);
+                if worst.is_kept() {
+                    return true;
+                }
             }
             let over = worst.acceleration.max(worst.jerk);
             if over > 1.0 && n > EVERYWHERE {
