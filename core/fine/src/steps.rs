@@ -5,8 +5,6 @@
 
 use tandem_sdk::{MAX_AXES, Segment};
 
-use crate::outlook::derivatives;
-
 /// Share of its step by which acceleration is in the worst third difference of four samples, times the period.
 const WORST: f64 = 0.75;
 /// Periods behind the one with the step whose samples show it, and as many before it in which what is begun lasts.
@@ -22,14 +20,9 @@ pub struct Steps {
 impl Steps {
     /// From the end of `before` to the start of `behind`.
     pub fn between(before: &Segment, behind: &Segment) -> Self {
-        let mut steps = Self::default();
-        for axis in 0..MAX_AXES {
-            let [velocity, acceleration, _] = derivatives(&before.coefficients[axis], before.duration_s);
-            let [next_velocity, next_acceleration, _] = derivatives(&behind.coefficients[axis], 0.0);
-            steps.velocity[axis] = (next_velocity - velocity).abs();
-            steps.acceleration[axis] = (next_acceleration - acceleration).abs();
-        }
-        steps
+        let velocity = behind.velocity(0.0) - before.velocity(before.duration_s);
+        let acceleration = behind.acceleration(0.0) - before.acceleration(before.duration_s);
+        Self { velocity: velocity.0.map(f64::abs), acceleration: acceleration.0.map(f64::abs) }
     }
 
     /// Both, as if they came together.

@@ -1,6 +1,6 @@
 //! Where segments of order 3 meet: whether velocity or acceleration step there.
 
-use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags};
 
 /// Steps below these are rounding: of velocity, mm/s, and of acceleration, mm/s².
 const ROUNDING: [f64; 2] = [1e-4, 0.1];
@@ -9,7 +9,7 @@ const ROUNDING: [f64; 2] = [1e-4, 0.1];
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seams {
     /// Velocity and acceleration; none at a rest, and of plans that keep no jerk.
-    end: Option<[[f64; MAX_AXES]; 2]>,
+    end: Option<[AxisVector; 2]>,
 }
 
 impl Seams {
@@ -30,16 +30,13 @@ impl Seams {
     }
 }
 
-fn derivatives(segment: &Segment, t: f64) -> [[f64; MAX_AXES]; 2] {
-    let velocity = |c: &[f64; 6]| c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
-    let acceleration = |c: &[f64; 6]| 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
-    [segment.coefficients.each_ref().map(velocity), segment.coefficients.each_ref().map(acceleration)]
+fn derivatives(segment: &Segment, t_s: f64) -> [AxisVector; 2] {
+    [segment.velocity(t_s), segment.acceleration(t_s)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tandem_sdk::AxisVector;
 
     fn segment(coefficients: [f64; 6]) -> Segment {
         let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
