@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tandem_host::{
     BlocksCsv, Clock, HostError, Outcome, Output, PolicySummary, Run, RunObserver, Stop, StopAnswer, Summary, Switches,
-    Timed,
+    Timed, parse_commands,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
@@ -97,33 +97,8 @@ fn commands(path: &Path, clock: Clock, machine: &Machine) -> Result<Vec<Timed>, 
         );
     }
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let (mut commands, mut errors): (Vec<Timed>, Vec<String>) = (vec![], vec![]);
-    for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
-    {
-        let at = |cause: String| format!("{}:{number}: {cause}", path.display());
-        let allowed = |timed: Timed| timed.command.check(machine.motion.max_feed_ratio).map(|()| timed);
-        match (Timed::parse(line).and_then(allowed), commands.last()) {
-            (Err(cause), _) => errors.push(at(cause)),
-            (Ok(now), Some(last)) if now.tick < last.tick => {
-                errors.push(at(format!("tick {} comes after tick {}", now.tick, last.tick)));
-            }
-            (Ok(now), _) => commands.push(now),
-        }
-    }
-    if errors.is_empty() { Ok(commands) } else { Err(listed(&errors)) }
+    parse_commands(&path.display().to_string(), &text, machine.motion.max_feed_ratio)
 }
-
-/// The first errors, a line each, and how many more there are.
-fn listed(errors: &[String]) -> String {
-    let first = errors[..errors.len().min(MOST_ERRORS)].join("\n");
-    match errors.len() - errors.len().min(MOST_ERRORS) {
-        0 => first,
-        more => format!("{first}\nand {more} more"),
-    }
-}
-
-/// Errors of a command file that are told one by one.
-const MOST_ERRORS: usize = 100;
 
 /// Everything that a run is written to.
 struct Sinks {

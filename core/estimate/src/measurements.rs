@@ -22,9 +22,17 @@ struct Row {
 /// # Errors
 /// What cannot be read, with file, line and cause.
 pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
-    let name = path.display();
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_path(path);
-    let reader = reader.as_mut().map_err(|e| format!("{name}: {e}"))?;
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    parse(&name, &bytes)
+}
+
+/// Reads measurements from `bytes`; `name` is for refusals.
+///
+/// # Errors
+/// What is no measurement, with file, line and cause.
+pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(bytes);
     let headers = reader.headers().map_err(|e| format!("{name}: {e}"))?.clone();
     let mut all = vec![];
     for record in reader.records() {

@@ -4,6 +4,7 @@
 //! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
 
 mod command;
+mod command_file;
 mod command_log;
 mod curve_watch;
 mod dry_run;
@@ -37,6 +38,7 @@ mod virtual_clock;
 mod wall_clock;
 
 pub use command::{Command, Timed};
+pub use command_file::parse_commands;
 pub use curve_watch::{CurveWatch, OnCurve};
 pub use error::HostError;
 pub use joints::JointPeaks;
