@@ -85,7 +85,7 @@ static MACHINE: &[Key] = &[
     key("policy.memory_pages", "pages of 64 KiB", "32", "Memory that the script may use"),
     key("policy.time_constant_ms", "ms", "[1, 1000]", "Shortest and longest time constant that the script may ask for"),
     key("policy.path_tolerance_mm", "mm", "up to the one in force", "Smallest and largest path tolerance that the script may ask for"),
-    key("policy.lowest_feed_ratio", "ratio", "0.05", "Share of the programmed feed below which the script cannot go, by cap or by ratio"),
+    key("policy.lowest_feed_ratio", "ratio", "0.05", "Share of the programmed feed below which the script cannot go, by cap, by ratio or by both"),
     key("policy.ratio_change_per_s", "1/s", "10", "How fast the script may change the feed ratio"),
     key("policy.parameters.<parameter>", "script's", "none", "Parameters of the policy script"),
     key("spindle.max_rpm", "rpm", "no limit", "Highest spindle speed"),

@@ -11,7 +11,8 @@ pub struct Bounds {
     pub time_constant_s: (f64, f64),
     /// Smallest and largest path tolerance, mm; without a largest the tolerance in force is the largest.
     pub path_tolerance_mm: (f64, Option<f64>),
-    /// Smallest share of the programmed feed.
+    /// Smallest share of the programmed feed that a script can bring a block to, whatever it answers: by a cap, by a
+    /// ratio, or by both at once.
     pub lowest_feed_ratio: f64,
     /// Highest feed ratio.
     pub max_feed_ratio: f64,
@@ -62,6 +63,13 @@ pub struct InForce {
 }
 
 impl Bounds {
+    /// The bounds of each answer. A cap is fixed when a block is planned and a ratio when it is driven, so that neither
+    /// knows the other: where a script gives both, each keeps to the root of the share that they have together.
+    pub(crate) fn for_each_answer(self, gives_both: bool) -> Self {
+        let lowest = if gives_both { self.lowest_feed_ratio.sqrt() } else { self.lowest_feed_ratio };
+        Self { lowest_feed_ratio: lowest, ..self }
+    }
+
     /// What a script gets that asks for `asks`; the second says which of the three were changed on the way.
     pub(crate) fn apply(&self, asks: &Asks, block: &InForce) -> (Tuning, [bool; 3]) {
         let [time_constant, tolerance, cap] = *asks;
@@ -132,6 +140,21 @@ mod tests {
         let (tuning, changed) = Bounds::default().apply(&[0.02, 0.005, 50.0], &LINE);
         let given = (tuning.time_constant_s, tuning.path_tolerance_mm, tuning.feed_cap_mm_per_s);
         assert_eq!((given, changed), ((Some(0.02), Some(0.005), Some(50.0)), [false; 3]));
+    }
+
+    #[test]
+    fn a_cap_never_exceeds_the_cap_in_force() {
+        let capped = InForce { feed_cap_mm_per_s: 30.0, ..LINE };
+        for asked in [30.000_001, 60.0, 100.0, 1e308] {
+            let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, asked], &capped);
+            assert_eq!((tuning.feed_cap_mm_per_s, changed), (None, [false, false, true]), "{asked}");
+        }
+        let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, 29.0], &capped);
+        assert_eq!((tuning.feed_cap_mm_per_s, changed[2]), (Some(29.0), false));
+        // A cap below the floor that somebody else has set stays.
+        let slow = InForce { feed_cap_mm_per_s: 2.0, ..LINE };
+        let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, 1.0], &slow);
+        assert_eq!((tuning.feed_cap_mm_per_s, changed[2]), (None, true));
     }
 
     #[test]

@@ -22,7 +22,10 @@ pub struct Policy {
     script: Script,
     values: Values,
     budget: Budget,
+    /// Of each answer.
     bounds: Bounds,
+    /// Whether the first script tunes blocks, and whether it answers periods: the bounds are made for that.
+    answers: (bool, bool),
     instance: Option<Instance>,
     strikes: u32,
     window: Window,
@@ -40,11 +43,13 @@ impl Policy {
     /// It does not start, its layout is wrong, or the parameters do not fit.
     pub fn new(script: Script, values: Values, budget: Budget, bounds: Bounds, facts: &Facts) -> Result<Self, Refusal> {
         let instance = Instance::new(&script, &budget, &values)?;
+        let answers = (script.tunes_blocks, script.answers_periods);
         Ok(Self {
             script,
             values,
             budget,
-            bounds,
+            bounds: bounds.for_each_answer(answers == (true, true)),
+            answers,
             instance: Some(instance),
             strikes: 0,
             window: Window::new(facts),
@@ -122,8 +127,17 @@ impl Policy {
     /// any. Strikes and quarantine are forgotten. Not to be called between [`Self::offer`] and [`Self::decide`].
     ///
     /// # Errors
-    /// The new script does not take over the state: the old one goes on.
+    /// The new script gives an answer that the first did not give, or does not take over the state: the old one goes on.
     pub fn swap(&mut self, script: Script, mut instance: Instance) -> Result<(), Refusal> {
+        let (tunes_blocks, answers_periods) = self.answers;
+        let calls =
+            [(script.tunes_blocks, tunes_blocks, "on_blocks"), (script.answers_periods, answers_periods, "on_period")];
+        // Blocks that are planned already have caps down to a floor that was made for the first script alone.
+        if let Some((_, _, call)) = calls.into_iter().find(|(has, had, _)| *has && !had) {
+            return Err(Refusal::Exports(vec![format!(
+                "it exports {call}, which the script that the run began with did not: that takes a new run"
+            )]));
+        }
         if let Some(old) = &mut self.instance
             && script.keeps_state
         {

@@ -81,6 +81,34 @@ fn requests_beyond_the_machine_are_limited_and_counted() {
     assert!(notes.contains("line 7: time constant 50 -> 1000 ms, 1.798e308 was asked for"), "{notes}");
 }
 
+/// A script that asks for the least, as often as it is asked, with these calls.
+fn greedy(calls: &str) -> String {
+    let module = String::from_utf8(read("tests/fixtures/policies/hostile/most-negative-numbers.wat")).unwrap();
+    let kept = |line: &&str| {
+        [("on_blocks", "(func (export \"on_blocks\")"), ("on_period", "(func (export \"on_period\")")]
+            .iter()
+            .all(|(call, start)| !line.trim_start().starts_with(start) || calls.contains(call))
+    };
+    module.lines().filter(kept).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn cap_and_ratio_together_never_go_below_the_lowest_feed_ratio() {
+    let lowest = Bounds::default().lowest_feed_ratio;
+    for calls in ["on_blocks on_period", "on_blocks", "on_period"] {
+        let mut policy = start(greedy(calls).as_bytes(), &[]).unwrap();
+        decide(&mut policy, &chain(&[0.0; 64]));
+        let caps = (0..64).map(|index| policy.tuning(index).feed_cap_mm_per_s.map_or(1.0, |cap| cap / 50.0));
+        let cap = caps.fold(1.0, f64::min);
+        let ratios = (0..60)
+            .map(|period| policy.period(&Period { period, duration_s: 0.008, ..Period::default() }).unwrap_or(1.0));
+        let ratio = ratios.fold(1.0, f64::min);
+        let product = cap * ratio;
+        assert!(product >= lowest * (1.0 - 1e-12), "{calls}: {cap} x {ratio} = {product}");
+        assert!(product < lowest * (1.0 + 1e-12), "{calls}: what is allowed can be had: {product}");
+    }
+}
+
 #[test]
 fn truncated_and_random_bytes_are_refused_or_run_within_their_budget() {
     let whole = read("scripts/policies/corner-time-constant.wasm");

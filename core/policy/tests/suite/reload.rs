@@ -58,6 +58,15 @@ fn a_new_script_ends_the_quarantine() {
 }
 
 #[test]
+fn a_script_that_gives_another_answer_than_the_first_is_refused_within_a_run() {
+    // Caps of blocks that are planned already were made without a ratio in mind.
+    let mut policy = start(&read("scripts/policies/gentle-start.wasm"), &[]).unwrap();
+    let why = swap(&mut policy, &read("tests/fixtures/policies/good/half-feed.wat")).unwrap_err();
+    assert!(why.contains("it exports on_period") && why.contains("a new run"), "{why}");
+    assert_eq!(policy.counters().reloads, 0);
+}
+
+#[test]
 fn parameters_of_the_machine_file_reach_the_new_script() {
     let bytes = read("scripts/policies/material-feed.wasm");
     let mut policy = start(&bytes, &[("material", 3.0)]).unwrap();
