@@ -36,6 +36,7 @@ mod random_curves;
 mod replay;
 mod report;
 mod script;
+mod signals;
 mod single_block;
 mod smooth;
 mod smooth_peers;

@@ -1,15 +1,39 @@
 //! Signals that end a program: they stop the machine first.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::{self, JoinHandle};
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use rustix::process::Signal;
 use signal_hook::iterator::{Handle, Signals as Received};
 use tandem_host::Command;
 use tandem_host::operator::Desk;
 
 use super::tell;
+
+/// Signals whose default is to end the process, and that may be sent to one that is whole. In the middle of motion each
+/// is a stop.
+const STOPS: [Signal; 13] = [
+    Signal::INT,
+    Signal::TERM,
+    Signal::HUP,
+    Signal::QUIT,
+    Signal::USR1,
+    Signal::USR2,
+    Signal::ALARM,
+    Signal::VTALARM,
+    Signal::PROF,
+    Signal::XCPU,
+    Signal::IO,
+    Signal::POWER,
+    Signal::STKFLT,
+];
+/// The real-time signals that the C library leaves to programs: their default is to end the process as well.
+const REAL_TIME: RangeInclusive<i32> = 34..=64;
+/// Signals that change nothing: those of the terminal would put the process to sleep while the machine moves, and what a
+/// write says that fails is enough.
+const IGNORED: [Signal; 5] = [Signal::TSTP, Signal::TTIN, Signal::TTOU, Signal::PIPE, Signal::XFSZ];
 
 /// How to stop: the first time on the path, then at once.
 #[derive(Clone, Default)]
@@ -40,7 +64,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// From now on SIGINT, SIGTERM and SIGHUP stop the machine.
+    /// From now on signals that would end the process stop the machine.
     ///
     /// # Errors
     /// The system's words.
@@ -53,11 +77,13 @@ impl Signals {
     /// # Errors
     /// The system's words.
     pub fn catch_with(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
-        let mut received = Received::new([SIGINT, SIGTERM, SIGHUP]).map_err(|e| format!("signals: {e}"))?;
+        let named = STOPS.iter().chain(&IGNORED).map(|signal| signal.as_raw());
+        let mut received = Received::new(named.chain(REAL_TIME)).map_err(|e| format!("signals: {e}"))?;
         let handle = received.handle();
         let asked = stops.clone();
         let thread = thread::spawn(move || {
-            for _ in received.forever() {
+            let is_ignored = |signal: &i32| IGNORED.iter().any(|ignored| ignored.as_raw() == *signal);
+            for _ in received.forever().filter(|signal| !is_ignored(signal)) {
                 tell(&asked.ask(&desk));
             }
         });
