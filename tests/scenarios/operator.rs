@@ -63,7 +63,7 @@ impl Running {
     }
 
     /// The trace is within limits and on the path, to where it was ended.
-    fn assert_sound(&self) {
+    pub fn assert_sound(&self) {
         let verdict =
             judge_trace(&self.at("trace.csv"), &self.at("p.ngc"), &mill(), |options| options.ends_early = true);
         assert!(verdict.passed(), "{verdict}");
@@ -189,6 +189,15 @@ fn one_client_commands_and_every_client_may_stop() {
     assert!(b.command("hold")["ok"].is_object());
     b.wait("held", is_held);
     assert_eq!(b.command("resume")["error"]["what"], "refused");
+    // Who hangs cannot keep it, nor can it know that it has lost it before it looks.
+    assert!(b.ask(r#"{"lease":"take-over"}"#)["ok"].is_object());
+    assert!(b.command("resume")["ok"].is_object());
+    assert_eq!(a.hear()["lease"]["asked_by"], 2);
+    assert_eq!(a.hear()["lease"]["lost_to"], 2);
+    assert!(a.ask(r#"{"lease":"take-over"}"#)["ok"].is_object());
+    assert_eq!(b.hear()["lease"]["lost_to"], 1);
+    b.command("hold");
+    b.wait("held", is_held);
     // The lease ends with its connection.
     drop(a);
     b.wait("the lease", |_| true);

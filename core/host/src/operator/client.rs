@@ -7,19 +7,35 @@ use rustix::event::PollFlags;
 
 use super::desk::Desk;
 use super::lease::Lease;
-use super::listen::Stream;
+use super::listen::{Comer, Stream};
 use super::outbox::Outbox;
-use super::reply;
+use super::reply::{self, Problem};
 use super::session::{Answer, Session};
 
 /// Longest line of a client, bytes.
 pub const MAX_LINE: usize = 4096;
-/// How long a client may take to say who it is, and to read its last line.
+/// How long a client may take to read its last line.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// How long a client may take to say who it is.
+const TOKEN_WITHIN: Duration = Duration::from_secs(2);
+
+/// Who a client is, as far as that is known: each kind has places of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// Runs as the same user as this program, or as root, or has named the token.
+    Owner,
+    /// Another user, let in by the mode of the socket's file.
+    Guest,
+    /// Has not said who it is.
+    Stranger,
+}
 
 /// One client.
 pub struct Client {
     stream: Box<dyn Stream>,
+    /// The door it came through.
+    pub door: usize,
+    is_guest: bool,
     incoming: Vec<u8>,
     outbox: Outbox,
     session: Session,
@@ -40,8 +56,25 @@ enum Phase {
 
 impl Client {
     /// A client that has just come.
-    pub fn new(stream: Box<dyn Stream>, session: Session, now: Instant) -> Self {
-        Self { stream, incoming: vec![], outbox: Outbox::default(), session, phase: Phase::Talking, since: now }
+    pub fn new(comer: Comer, door: usize, number: u64, now: Instant) -> Self {
+        let Comer { stream, token, is_guest } = comer;
+        let session = Session::new(number, token);
+        let outbox = Outbox::default();
+        Self { stream, door, is_guest, incoming: vec![], outbox, session, phase: Phase::Talking, since: now }
+    }
+
+    /// Who it is.
+    pub fn standing(&self) -> Standing {
+        match (self.is_guest, self.session.is_known()) {
+            (true, _) => Standing::Guest,
+            (false, true) => Standing::Owner,
+            (false, false) => Standing::Stranger,
+        }
+    }
+
+    /// How long it has been what it is.
+    pub fn age(&self, now: Instant) -> Duration {
+        now.duration_since(self.since)
     }
 
     /// The client's number.
@@ -73,15 +106,17 @@ impl Client {
         self.session.due().filter(|_| self.phase == Phase::Talking)
     }
 
-    /// Reads, answers, sends: whatever can be done without waiting.
-    pub fn serve(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+    /// Reads, answers, sends: whatever can be done without waiting. A stranger that names the token becomes an owner
+    /// where its door `has_place` for one.
+    pub fn serve(&mut self, desk: &Desk, lease: &mut Lease, has_place: bool, now: Instant) {
+        self.session.has_place = has_place;
         self.read(desk, lease, now);
         if self.phase == Phase::Talking && self.session.is_due(now) {
             self.outbox.telemetry(|lost| reply::telemetry(&desk.status(), lost));
         }
         self.send(now);
-        let late = now.duration_since(self.since) > PATIENCE;
-        if late && (self.phase != Phase::Talking || !self.session.is_known()) {
+        let most = if self.phase == Phase::Talking { TOKEN_WITHIN } else { PATIENCE };
+        if self.age(now) > most && (self.phase != Phase::Talking || !self.session.is_known()) {
             self.phase = Phase::Gone;
         }
         if self.phase != Phase::Talking {
@@ -97,9 +132,32 @@ impl Client {
         self.leave(now);
     }
 
-    /// Sends `answer` and closes.
-    pub fn turn_away(&mut self, answer: &Answer, now: Instant) {
-        self.take(answer, now);
+    /// Says why, as far as its socket takes that now, and closes: it gets no more of the others' time.
+    pub fn turn_away(&mut self, problem: &Problem, now: Instant) {
+        let answer = self.session.close(problem);
+        self.take(&answer, now);
+        self.send(now);
+    }
+
+    /// Nothing more is done for it.
+    pub fn drop_now(&mut self) {
+        self.phase = Phase::Gone;
+    }
+
+    /// Something went wrong in its handling: it is told so, if it can be, and closes.
+    pub fn fail(&mut self, lease: &mut Lease, now: Instant) {
+        lease.release(self.number());
+        if self.phase == Phase::Talking {
+            self.turn_away(&Problem::defect(), now);
+        } else {
+            self.phase = Phase::Gone;
+        }
+    }
+
+    /// A line that it has not asked for.
+    pub fn tell(&mut self, line: &str, now: Instant) {
+        self.take(&Answer { line: line.to_string(), last: false }, now);
+        self.send(now);
     }
 
     fn read(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {

@@ -1,23 +1,63 @@
 //! Who may give commands.
 
+use std::time::{Duration, Instant};
+
+/// How long a holder may say nothing after another client has asked for the lease.
+pub const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+
 /// The control lease: at most one client holds it.
 #[derive(Debug, Default)]
 pub struct Lease {
     holder: Option<u64>,
+    /// Until when the holder must say something, since another client has asked for the lease.
+    answer_by: Option<Instant>,
+    news: Vec<(u64, News)>,
+}
+
+/// What a holder is told without having asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum News {
+    /// This client asks for the lease: whoever holds it loses it unless it says something.
+    AskedBy(u64),
+    /// This client holds it now.
+    LostTo(u64),
 }
 
 impl Lease {
-    /// Takes the lease for `client`; taking it twice is no error.
+    /// Takes the lease for `client`; taking it twice is no error. A holder that has said nothing for [`ANSWER_WITHIN`]
+    /// since the first refusal loses it: it hangs, or nobody is there.
     ///
     /// # Errors
-    /// The client that holds it.
-    pub fn take(&mut self, client: u64) -> Result<(), u64> {
-        match self.holder {
-            Some(other) if other != client => Err(other),
-            _ => {
-                self.holder = Some(client);
-                Ok(())
+    /// The client that holds it, which is told that it is asked for.
+    pub fn take(&mut self, client: u64, now: Instant) -> Result<(), u64> {
+        let Some(other) = self.holder.filter(|holder| *holder != client) else {
+            self.holder = Some(client);
+            return Ok(());
+        };
+        match self.answer_by {
+            Some(answer_by) if answer_by <= now => self.take_over(client),
+            Some(_) => return Err(other),
+            None => {
+                self.answer_by = Some(now + ANSWER_WITHIN);
+                self.news.push((other, News::AskedBy(client)));
+                return Err(other);
             }
+        }
+        Ok(())
+    }
+
+    /// Takes the lease for `client` whoever holds it; who held it is told.
+    pub fn take_over(&mut self, client: u64) {
+        if let Some(other) = self.holder.filter(|holder| *holder != client) {
+            self.news.push((other, News::LostTo(client)));
+        }
+        (self.holder, self.answer_by) = (Some(client), None);
+    }
+
+    /// `client` has said something: it is there.
+    pub fn hears(&mut self, client: u64) {
+        if self.is_held_by(client) {
+            self.answer_by = None;
         }
     }
 
@@ -25,9 +65,14 @@ impl Lease {
     pub fn release(&mut self, client: u64) -> bool {
         let held = self.is_held_by(client);
         if held {
-            self.holder = None;
+            (self.holder, self.answer_by) = (None, None);
         }
         held
+    }
+
+    /// What clients have to be told, with their numbers.
+    pub fn news(&mut self) -> Vec<(u64, News)> {
+        std::mem::take(&mut self.news)
     }
 
     /// Whether `client` may give commands.

@@ -1,6 +1,6 @@
 //! Where clients can reach a run.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -37,6 +37,16 @@ pub trait Stream: Read + Write + Send {
 
     /// Nothing more will be written. What fails here is broken anyway.
     fn end_writing(&self);
+}
+
+/// A client that has just come.
+pub struct Comer {
+    /// Its end.
+    pub stream: Box<dyn Stream>,
+    /// The token that its first line must name.
+    pub token: Option<String>,
+    /// Whether it runs as another user.
+    pub is_guest: bool,
 }
 
 macro_rules! stream {
@@ -82,24 +92,33 @@ impl Door {
         Ok(doors)
     }
 
-    /// The next client that waits, with the token that it must name.
-    pub fn accept(&self) -> Option<(Box<dyn Stream>, Option<String>)> {
+    /// The next client that waits.
+    ///
+    /// # Errors
+    /// None waits ([`ErrorKind::WouldBlock`](io::ErrorKind::WouldBlock)), or the system refuses.
+    pub fn accept(&self) -> io::Result<Comer> {
         match self {
             Self::Unix(listener, _) => {
-                let stream = listener.accept().ok()?.0;
-                stream.set_nonblocking(true).ok()?;
+                let stream = listener.accept()?.0;
+                stream.set_nonblocking(true)?;
                 bound_buffer(&stream);
-                Some((Box::new(stream), None))
+                let is_guest = !is_owner(&stream);
+                Ok(Comer { stream: Box::new(stream), token: None, is_guest })
             }
             Self::Tcp(listener, token) => {
-                let stream = listener.accept().ok()?.0;
-                stream.set_nonblocking(true).ok()?;
+                let stream = listener.accept()?.0;
+                stream.set_nonblocking(true)?;
                 // Answers are short and wait for nothing.
                 let _ = stream.set_nodelay(true);
                 bound_buffer(&stream);
-                Some((Box::new(stream), Some(token.clone())))
+                Ok(Comer { stream: Box::new(stream), token: Some(token.clone()), is_guest: false })
             }
         }
+    }
+
+    /// Whether clients must say who they are.
+    pub fn asks_for_token(&self) -> bool {
+        matches!(self, Self::Tcp(..))
     }
 
     /// For waiting until a client comes.
@@ -117,6 +136,12 @@ impl Door {
             Self::Tcp(listener, _) => listener.local_addr().ok(),
         }
     }
+}
+
+/// Whether the process at the other end runs as the same user, or as root, whom no mode of a file keeps out.
+fn is_owner(stream: &UnixStream) -> bool {
+    let owners = [rustix::process::geteuid(), rustix::process::Uid::ROOT];
+    rustix::net::sockopt::socket_peercred(stream).is_ok_and(|peer| owners.contains(&peer.uid))
 }
 
 /// Where the system keeps its own size, telemetry only gets older.

@@ -8,6 +8,7 @@ mod desk;
 mod lease;
 mod listen;
 mod outbox;
+mod places;
 mod reply;
 mod request;
 mod server;

@@ -3,7 +3,11 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::lease::{ANSWER_WITHIN, News};
 use super::status::StatusLine;
+
+/// What [`Problem::what`] says where the connection stays.
+const REFUSED: &str = "refused";
 
 /// What is wrong with a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -31,9 +35,25 @@ impl Problem {
         Self::malformed(&format!("column {}", error.column()), why)
     }
 
+    /// A request in whose handling the host failed: the connection closes.
+    pub fn defect() -> Self {
+        let why = "a defect of tandem: this connection ends, everything else goes on; standard error has the words";
+        Self { what: "failed", place: "the whole line".to_string(), why: why.to_string() }
+    }
+
+    /// There is no place for one more of a client's kind, of which there may be `most`.
+    pub fn crowded(most: usize) -> Self {
+        Self::refused("the connection", format!("{most} clients are here already"))
+    }
+
+    /// Whether the client cannot be understood any further.
+    pub fn ends_connection(&self) -> bool {
+        self.what != REFUSED
+    }
+
     /// A request that is understood and not granted: the connection stays.
     pub fn refused(place: &str, why: String) -> Self {
-        Self { what: "refused", place: place.to_string(), why }
+        Self { what: REFUSED, place: place.to_string(), why }
     }
 }
 
@@ -69,6 +89,15 @@ pub fn telemetry(status: &StatusLine, lost: u64) -> String {
         lost: u64,
     }
     line(&Telemetry { status, lost })
+}
+
+/// What becomes of the lease, to the client that holds it or held it; it is no answer.
+pub fn lease(news: News) -> String {
+    let words = match news {
+        News::AskedBy(client) => json!({ "asked_by": client, "answer_within_s": ANSWER_WITHIN.as_secs_f64() }),
+        News::LostTo(client) => json!({ "lost_to": client }),
+    };
+    line(&json!({ "lease": words }))
 }
 
 /// The last line of a run.

@@ -1,12 +1,16 @@
 //! What a client may ask, line by line.
 
+use std::fmt;
+
 use serde::Deserialize;
-use serde_json::Value;
+use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::reply::Problem;
 use crate::command::Command;
 use crate::jog::{JogWords, ReachWords};
 
+/// Lowest rate of a subscription, Hz: a line in a minute and a half. What is slower asks for a status when it wants one.
+pub const MIN_RATE_HZ: f64 = 0.01;
 /// Highest rate of a subscription, Hz: the status is made once in a rough period.
 pub const MAX_RATE_HZ: f64 = 100.0;
 
@@ -15,8 +19,8 @@ pub const MAX_RATE_HZ: f64 = 100.0;
 pub enum Request {
     /// A command for the machine.
     Command(Command),
-    /// Status lines at this rate, Hz; 0 ends them.
-    Subscribe(f64),
+    /// Status lines at this rate, Hz, [`MIN_RATE_HZ`] to [`MAX_RATE_HZ`]; none ends them.
+    Subscribe(Option<f64>),
     /// One status line.
     Status,
     /// The control lease.
@@ -31,8 +35,11 @@ pub enum Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LeaseWord {
-    /// To have it.
+    /// To have it, where nobody holds it or its holder says nothing any more.
     Take,
+    /// To have it, whoever holds it.
+    #[serde(rename = "take-over")]
+    TakeOver,
     /// To give it back.
     Release,
 }
@@ -41,7 +48,7 @@ pub enum LeaseWord {
 #[serde(deny_unknown_fields)]
 struct Line {
     command: Option<String>,
-    value: Option<Value>,
+    value: Option<Scalar>,
     subscribe: Option<Subscribe>,
     status: Option<Empty>,
     lease: Option<LeaseWord>,
@@ -71,6 +78,56 @@ struct JogLine {
 #[serde(deny_unknown_fields)]
 struct Empty {}
 
+/// The value of a command as text. Lists and objects are skipped without recursion: how deep they nest is the client's
+/// choice, how deep the stack is, is not.
+struct Scalar(String);
+
+impl<'de> Deserialize<'de> for Scalar {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ScalarVisitor)
+    }
+}
+
+struct ScalarVisitor;
+
+impl<'de> Visitor<'de> for ScalarVisitor {
+    type Value = Scalar;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, true, false or text")
+    }
+
+    fn visit_bool<E>(self, on: bool) -> Result<Scalar, E> {
+        Ok(Scalar(u8::from(on).to_string()))
+    }
+
+    fn visit_u64<E>(self, number: u64) -> Result<Scalar, E> {
+        Ok(Scalar(number.to_string()))
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Scalar, E> {
+        Ok(Scalar(number.to_string()))
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<Scalar, E> {
+        Ok(Scalar(number.to_string()))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Scalar, E> {
+        Ok(Scalar(text.to_string()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Scalar, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Scalar("[…]".to_string()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Scalar, A::Error> {
+        while object.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(Scalar("{…}".to_string()))
+    }
+}
+
 /// Understands a line.
 ///
 /// # Errors
@@ -98,14 +155,10 @@ pub fn parse(text: &str) -> Result<Request, Problem> {
     }
 }
 
-fn to_command(name: &str, value: Option<&Value>) -> Result<Request, Problem> {
-    let text = value.map(|value| match value {
-        Value::String(text) => text.clone(),
-        Value::Bool(on) => u8::from(*on).to_string(),
-        other => other.to_string(),
-    });
+fn to_command(name: &str, value: Option<&Scalar>) -> Result<Request, Problem> {
+    let text = value.map(|Scalar(text)| text.as_str());
     let place = if value.is_some() { "keys \"command\" and \"value\"" } else { "key \"command\"" };
-    Command::parse(name, text.as_deref()).map(Request::Command).map_err(|why| Problem::malformed(place, &why))
+    Command::parse(name, text).map(Request::Command).map_err(|why| Problem::malformed(place, &why))
 }
 
 impl JogLine {
@@ -139,10 +192,14 @@ impl JogLine {
 }
 
 fn rate(Subscribe { rate_hz }: Subscribe) -> Result<Request, Problem> {
-    if (0.0..=MAX_RATE_HZ).contains(&rate_hz) {
-        return Ok(Request::Subscribe(rate_hz));
+    if rate_hz == 0.0 {
+        return Ok(Request::Subscribe(None));
     }
-    Err(Problem::malformed("key \"rate_hz\"", &format!("{rate_hz} is not within 0 to {MAX_RATE_HZ}")))
+    if (MIN_RATE_HZ..=MAX_RATE_HZ).contains(&rate_hz) {
+        return Ok(Request::Subscribe(Some(rate_hz)));
+    }
+    let why = format!("{rate_hz} is neither 0 nor within {MIN_RATE_HZ} to {MAX_RATE_HZ}");
+    Err(Problem::refused("key \"rate_hz\"", why))
 }
 
 #[cfg(test)]
@@ -161,9 +218,11 @@ mod tests {
             (r#"{"command":"single-block","value":true}"#, Request::Command(Command::SingleBlock(true))),
             (r#"{"command":"optional-stop","value":0}"#, Request::Command(Command::OptionalStop(false))),
             (r#"{"command":"emergency-stop"}"#, Request::Command(Command::EmergencyStop)),
-            (r#"{"subscribe":{"rate_hz":20}}"#, Request::Subscribe(20.0)),
+            (r#"{"subscribe":{"rate_hz":20}}"#, Request::Subscribe(Some(20.0))),
+            (r#"{"subscribe":{"rate_hz":-0.0}}"#, Request::Subscribe(None)),
             (r#"{"status":{}}"#, Request::Status),
             (r#"{"lease":"take"}"#, Request::Lease(LeaseWord::Take)),
+            (r#"{"lease":"take-over"}"#, Request::Lease(LeaseWord::TakeOver)),
             (r#" { "lease" : "release" } "#, Request::Lease(LeaseWord::Release)),
             (r#"{"jog":{"stop":true}}"#, Request::Jog(None)),
             (
@@ -175,6 +234,14 @@ mod tests {
         ] {
             assert_eq!(parse(text), Ok(request), "{text}");
         }
+    }
+
+    #[test]
+    fn a_value_that_nests_deeper_than_a_stack_is_refused_like_any_other() {
+        let deep = format!(r#"{{"command":"feed-override","value":{}1{}}}"#, "[".repeat(120), "]".repeat(120));
+        assert!(parse(&deep).unwrap_err().why.contains("not a number"));
+        let deeper = format!(r#"{{"command":"feed-override","value":{}"#, "{\"a\":".repeat(800));
+        assert!(parse(&deeper).is_err());
     }
 
     #[test]
@@ -194,7 +261,9 @@ mod tests {
             (r#"{"value":1,"status":{}}"#, "\"value\"", "goes with"),
             (r#"{"status":{},"lease":"take"}"#, "the whole line", "more than one"),
             (r#"{"lease":"steal"}"#, "column", "unknown variant"),
-            (r#"{"subscribe":{"rate_hz":1000}}"#, "\"rate_hz\"", "within 0 to 100"),
+            (r#"{"subscribe":{"rate_hz":1000}}"#, "\"rate_hz\"", "within 0.01 to 100"),
+            (r#"{"subscribe":{"rate_hz":1e-21}}"#, "\"rate_hz\"", "within 0.01 to 100"),
+            (r#"{"subscribe":{"rate_hz":-1}}"#, "\"rate_hz\"", "within 0.01 to 100"),
             (r#"{"jog":{}}"#, "\"jog\"", "feed_mm_per_min"),
             (r#"{"jog":{"axis":"xy","feed_mm_per_min":1,"direction":1}}"#, "column", "character"),
             (r#"{"jog":{"feed_mm_per_min":1,"direction":1}}"#, "\"jog\"", "an axis"),

@@ -1,6 +1,8 @@
 //! The thread that serves clients: one for all of them, of ordinary priority.
 
+use std::io::ErrorKind;
 use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
@@ -8,15 +10,17 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::client::Client;
+use super::client::{Client, Standing};
 use super::desk::Desk;
 use super::lease::Lease;
 use super::listen::{Door, Listen};
-use super::reply::Problem;
-use super::session::Session;
+use super::places::{crowded, has_place, make_place_for_stranger};
+use super::reply;
 
-/// Most clients at a time.
-const MAX_CLIENTS: usize = 16;
+/// Most clients that are let in at a door before those who are there are served again.
+const MAX_COMERS: usize = 64;
+/// How long a door at which nobody can be let in is not looked at.
+const DOOR_REST: Duration = Duration::from_millis(10);
 /// Longest sleep: how soon the end of the run is seen.
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
 /// How long clients have to read their last line when the run is over.
@@ -42,7 +46,7 @@ impl Server {
         let doors = Door::open(listen)?;
         let address = doors.iter().find_map(Door::address);
         let over = Arc::new(AtomicBool::new(false));
-        let mut room = Room { desk, doors, clients: vec![], lease: Lease::default(), comers: 0 };
+        let mut room = Room::new(desk, doors);
         let seen = Arc::clone(&over);
         let builder = thread::Builder::new().name("tandem-operator".to_string()).stack_size(STACK_BYTES);
         let handle = builder.spawn(move || room.serve(&seen));
@@ -65,6 +69,8 @@ impl Drop for Server {
 struct Room {
     desk: Arc<Desk>,
     doors: Vec<Door>,
+    /// Until when nobody is let in at each door: the system refuses to.
+    shut_until: Vec<Option<Instant>>,
     clients: Vec<Client>,
     lease: Lease,
     /// Clients that ever came.
@@ -72,41 +78,78 @@ struct Room {
 }
 
 impl Room {
+    fn new(desk: Arc<Desk>, doors: Vec<Door>) -> Self {
+        let shut_until = doors.iter().map(|_| None).collect();
+        Self { desk, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
+    }
+
     fn serve(&mut self, over: &AtomicBool) {
         while !over.load(Ordering::Acquire) {
-            self.sleep(LONGEST_SLEEP);
-            let now = Instant::now();
-            self.let_in(now);
-            self.round(now);
+            let turn = catch_unwind(AssertUnwindSafe(|| {
+                self.sleep(LONGEST_SLEEP);
+                let now = Instant::now();
+                self.let_in(now);
+                self.round(now);
+            }));
+            // Whatever it was, the doors stay open: somebody may need to stop the machine.
+            if turn.is_err() {
+                thread::sleep(LONGEST_SLEEP);
+            }
         }
         self.farewell();
     }
 
-    /// Serves each client once.
+    /// Serves each client once. A panic costs the client in whose handling it happened.
     fn round(&mut self, now: Instant) {
-        for client in &mut self.clients {
-            client.serve(&self.desk, &mut self.lease, now);
+        for at in 0..self.clients.len() {
+            let has_place = has_place(&self.clients, self.clients[at].door, Standing::Owner);
+            let (desk, lease, client) = (&self.desk, &mut self.lease, &mut self.clients[at]);
+            let served = catch_unwind(AssertUnwindSafe(|| client.serve(desk, lease, has_place, now)));
+            if served.is_err() {
+                let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
+                if failed.is_err() {
+                    client.drop_now();
+                }
+            }
+        }
+        for (number, news) in self.lease.news() {
+            if let Some(client) = self.clients.iter_mut().find(|client| client.number() == number) {
+                client.tell(&reply::lease(news), now);
+            }
         }
         self.clients.retain(|client| !client.is_gone());
         self.desk.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
     }
 
+    /// Lets in who waits at the doors, a bounded number of them.
     fn let_in(&mut self, now: Instant) {
-        for door in &self.doors {
-            let Some((stream, token)) = door.accept() else { continue };
-            self.comers += 1;
-            let session = Session::new(self.comers, token);
-            let crowded = self.clients.len() >= MAX_CLIENTS;
-            let refusal = crowded.then(|| {
-                session.close(&Problem::refused("the connection", format!("{MAX_CLIENTS} clients are here already")))
-            });
-            let mut client = Client::new(stream, session, now);
-            match refusal {
-                None => self.clients.push(client),
-                // One round is all that it gets: what does not fit into its socket is lost with it.
-                Some(answer) => {
-                    client.turn_away(&answer, now);
-                    client.serve(&self.desk, &mut self.lease, now);
+        for (at, door) in self.doors.iter().enumerate() {
+            if self.shut_until[at].is_some_and(|until| now < until) {
+                continue;
+            }
+            self.shut_until[at] = None;
+            for _ in 0..MAX_COMERS {
+                if door.asks_for_token() && !make_place_for_stranger(&mut self.clients, at, now) {
+                    self.shut_until[at] = Some(now + DOOR_REST);
+                    break;
+                }
+                let comer = match door.accept() {
+                    Ok(comer) => comer,
+                    Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                    Err(error) if error.kind() == ErrorKind::ConnectionAborted => continue,
+                    // It would be ready to be asked again at once: the system has no file left, say.
+                    Err(_) => {
+                        self.shut_until[at] = Some(now + DOOR_REST);
+                        break;
+                    }
+                };
+                self.comers += 1;
+                let mut client = Client::new(comer, at, self.comers, now);
+                let standing = client.standing();
+                if has_place(&self.clients, at, standing) {
+                    self.clients.push(client);
+                } else {
+                    client.turn_away(&crowded(standing), now);
                 }
             }
         }
@@ -116,8 +159,11 @@ impl Room {
     fn sleep(&self, most: Duration) {
         let now = Instant::now();
         let due = self.clients.iter().filter_map(Client::due).min();
+        let doors_due = self.shut_until.iter().flatten().min();
+        let due = [due, doors_due.copied()].into_iter().flatten().min();
         let sleep = due.map_or(most, |due| due.saturating_duration_since(now).min(most));
-        let doors = self.doors.iter().map(|door| PollFd::from_borrowed_fd(door.fd(), PollFlags::IN));
+        let open = self.doors.iter().zip(&self.shut_until).filter(|(_, shut)| shut.is_none());
+        let doors = open.map(|(door, _)| PollFd::from_borrowed_fd(door.fd(), PollFlags::IN));
         let clients = self.clients.iter().map(|client| {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)
@@ -141,3 +187,7 @@ impl Room {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "server_tests.rs"]
+mod tests;

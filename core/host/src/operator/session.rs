@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use super::desk::Desk;
-use super::lease::Lease;
+use super::lease::{ANSWER_WITHIN, Lease};
+use super::places::MAX_OWNERS;
 use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
 use super::token;
@@ -28,6 +29,8 @@ pub struct Session {
     pub client: u64,
     /// The token that the first line must name.
     token: Option<String>,
+    /// Whether its door has a place for one more who has named the token.
+    pub has_place: bool,
     lines: u64,
     subscription: Option<Subscription>,
 }
@@ -41,7 +44,7 @@ struct Subscription {
 impl Session {
     /// A client that has just come; over TCP its first line names `token`.
     pub fn new(client: u64, token: Option<String>) -> Self {
-        Self { client, token, lines: 0, subscription: None }
+        Self { client, token, has_place: true, lines: 0, subscription: None }
     }
 
     /// Whether the client has said who it is, or need not.
@@ -52,12 +55,18 @@ impl Session {
     /// Answers a line.
     pub fn line(&mut self, text: &str, desk: &Desk, lease: &mut Lease, now: Instant) -> Answer {
         self.lines += 1;
+        lease.hears(self.client);
         let request = match parse(text) {
             Ok(request) => request,
-            Err(problem) => return self.close(&problem),
+            // Who has not said yet who it is has one line.
+            Err(problem) if problem.ends_connection() || !self.is_known() => return self.close(&problem),
+            Err(problem) => return Answer { line: reply::error(self.lines, &problem), last: false },
         };
         if let Some(token) = self.token.take() {
-            return self.introduce(&token, &request);
+            let answer = self.introduce(&token, &request);
+            // A stranger stays one: it gets none of the owner's places while its last line is on the way.
+            self.token = answer.last.then_some(token);
+            return answer;
         }
         match self.grant(&request, desk, lease, now) {
             Ok(line) => Answer { line, last: false },
@@ -92,6 +101,9 @@ impl Session {
     fn introduce(&self, expected: &str, request: &Request) -> Answer {
         match request {
             Request::Token(given) if token::is_same(given, expected) => {
+                if !self.has_place {
+                    return self.close(&Problem::crowded(MAX_OWNERS));
+                }
                 Answer { line: reply::ok(&json!({ "client": self.client })), last: false }
             }
             Request::Token(_) => self.close(&Problem::refused("key \"token\"", "it is another token".to_string())),
@@ -105,12 +117,12 @@ impl Session {
             Request::Command(command) => self.command(*command, desk, lease),
             Request::Status => Ok(reply::status(&desk.status())),
             Request::Jog(words) => self.jog(words.as_ref(), desk, lease),
-            Request::Lease(word) => self.lease(*word, lease),
+            Request::Lease(word) => self.lease(*word, lease, now),
             Request::Token(_) => Err(Problem::refused("key \"token\"", "no token is asked for here".to_string())),
             Request::Subscribe(rate_hz) => {
-                let every = (*rate_hz > 0.0).then(|| Duration::from_secs_f64(1.0 / rate_hz));
+                let every = rate_hz.map(|rate_hz| Duration::from_secs_f64(1.0 / rate_hz));
                 self.subscription = every.map(|every| Subscription { every, due: now });
-                Ok(reply::ok(&json!({ "subscribe": { "rate_hz": rate_hz } })))
+                Ok(reply::ok(&json!({ "subscribe": { "rate_hz": rate_hz.unwrap_or(0.0) } })))
             }
         }
     }
@@ -136,19 +148,31 @@ impl Session {
         Ok(reply::ok(&json!({ "jog": axis.map_or(json!("stop"), |axis| json!({ "axis": axis })), "tick": tick })))
     }
 
-    fn lease(&self, word: LeaseWord, lease: &mut Lease) -> Result<String, Problem> {
+    fn lease(&self, word: LeaseWord, lease: &mut Lease, now: Instant) -> Result<String, Problem> {
         let refused = |why: String| Problem::refused("key \"lease\"", why);
         match word {
             LeaseWord::Take => lease
-                .take(self.client)
+                .take(self.client, now)
                 .map(|()| reply::ok(&json!({ "lease": "take", "client": self.client })))
-                .map_err(|holder| refused(format!("client {holder} holds the lease"))),
+                .map_err(|holder| refused(held_by(holder))),
+            LeaseWord::TakeOver => {
+                lease.take_over(self.client);
+                Ok(reply::ok(&json!({ "lease": "take-over", "client": self.client })))
+            }
             LeaseWord::Release if lease.release(self.client) => {
                 Ok(reply::ok(&json!({ "lease": "release", "client": self.client })))
             }
             LeaseWord::Release => Err(refused("this client does not hold the lease".to_string())),
         }
     }
+}
+
+fn held_by(holder: u64) -> String {
+    let within_s = ANSWER_WITHIN.as_secs();
+    format!(
+        "client {holder} holds the lease; it is asked whether it is there, and the next \"take\" is granted once it has \
+         said nothing for {within_s} s; \"take-over\" takes it now"
+    )
 }
 
 fn without_lease(lease: &Lease) -> String {

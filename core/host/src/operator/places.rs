@@ -1,0 +1,59 @@
+//! How many clients may be there: each kind at each door has places of its own, so that who is not known takes none of
+//! those of whoever is.
+
+use std::time::{Duration, Instant};
+
+use super::client::{Client, Standing};
+use super::reply::Problem;
+
+/// Most clients that are known, at one door.
+pub const MAX_OWNERS: usize = 16;
+/// Most clients of other users, at one door.
+const MAX_GUESTS: usize = 4;
+/// Most clients that have not said who they are, at one door. Each costs a socket and a few hundred bytes.
+const MAX_STRANGERS: usize = 32;
+/// How long a stranger keeps its place, though others wait for it. A client that knows the token sends it right after it
+/// has connected; on a computer that is short of processor time that may take some tens of milliseconds.
+const GRACE: Duration = Duration::from_millis(100);
+
+/// Whether `door` has a place for one more of a kind.
+pub fn has_place(clients: &[Client], door: usize, standing: Standing) -> bool {
+    count(clients, door, standing) < most(standing)
+}
+
+/// What a client is told for which there is no place.
+pub fn crowded(standing: Standing) -> Problem {
+    Problem::crowded(most(standing))
+}
+
+/// Makes a place for one more stranger at `door`: the oldest goes, unless it has only just come. `false` where there is
+/// none: whoever comes now waits in front of the door, behind those who came before.
+pub fn make_place_for_stranger(clients: &mut [Client], door: usize, now: Instant) -> bool {
+    if has_place(clients, door, Standing::Stranger) {
+        return true;
+    }
+    let strangers = clients.iter_mut().filter(|client| is(client, door, Standing::Stranger));
+    let Some(oldest) = strangers.max_by_key(|client| client.age(now)).filter(|oldest| oldest.age(now) >= GRACE) else {
+        return false;
+    };
+    let why = "its place is needed: the first line over TCP is {\"token\":\"…\"}, at once".to_string();
+    oldest.turn_away(&Problem::refused("the connection", why), now);
+    oldest.drop_now();
+    true
+}
+
+fn most(standing: Standing) -> usize {
+    match standing {
+        Standing::Owner => MAX_OWNERS,
+        Standing::Guest => MAX_GUESTS,
+        Standing::Stranger => MAX_STRANGERS,
+    }
+}
+
+fn count(clients: &[Client], door: usize, standing: Standing) -> usize {
+    clients.iter().filter(|client| is(client, door, standing)).count()
+}
+
+fn is(client: &Client, door: usize, standing: Standing) -> bool {
+    !client.is_gone() && client.door == door && client.standing() == standing
+}

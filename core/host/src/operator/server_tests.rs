@@ -1,0 +1,134 @@
+//! The room without its thread and doors: what one client does to the others.
+
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tandem_machine::Machine;
+
+use super::*;
+use crate::operator::listen::{Comer, Stream};
+
+/// A client whose handling panics.
+struct Defective(UnixStream);
+
+impl Read for Defective {
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        panic!("a defect in the handling of a client, on purpose")
+    }
+}
+
+impl Write for Defective {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Stream for Defective {
+    fn fd(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
+    }
+
+    fn end_writing(&self) {}
+}
+
+fn room() -> Room {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let machine = Machine::read(&path, &[]).unwrap();
+    Room::new(Arc::new(Desk::new(&machine, Arc::default(), Arc::default())), vec![])
+}
+
+impl Room {
+    fn comes(&mut self, stream: Box<dyn Stream>, token: Option<&str>, now: Instant) {
+        let comer = Comer { stream, token: token.map(str::to_string), is_guest: false };
+        self.comers += 1;
+        self.clients.push(Client::new(comer, 0, self.comers, now));
+    }
+
+    /// A client that is known, with its end.
+    fn friend(&mut self, now: Instant) -> BufReader<UnixStream> {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        ours.set_nonblocking(true).unwrap();
+        self.comes(Box::new(ours), None, now);
+        BufReader::new(theirs)
+    }
+
+    fn ask(&mut self, client: &mut BufReader<UnixStream>, line: &str, now: Instant) -> Value {
+        writeln!(client.get_mut(), "{line}").unwrap();
+        self.round(now);
+        hear(client)
+    }
+}
+
+fn hear(client: &mut BufReader<UnixStream>) -> Value {
+    let mut line = String::new();
+    client.read_line(&mut line).unwrap();
+    serde_json::from_str(&line).unwrap()
+}
+
+#[test]
+fn a_panic_in_the_handling_of_a_client_ends_that_client_and_no_other() {
+    let (mut room, now) = (room(), Instant::now());
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let mut friend = room.friend(now);
+    room.comes(Box::new(Defective(ours)), None, now);
+    room.lease.take(2, now).unwrap();
+    assert!(room.ask(&mut friend, r#"{"command":"hold"}"#, now)["ok"].is_object());
+    assert_eq!(hear(&mut BufReader::new(theirs))["error"]["what"], "failed");
+    assert!(!room.clients.iter().any(|client| client.number() == 2 && client.is_talking()));
+    assert!(room.ask(&mut friend, r#"{"lease":"take"}"#, now)["ok"].is_object(), "the lease went with it");
+    room.round(now);
+    assert!(room.ask(&mut friend, r#"{"command":"resume"}"#, now)["ok"].is_object());
+}
+
+#[test]
+fn a_hung_holder_of_the_lease_loses_it_to_who_asks_twice_and_is_told() {
+    let (mut room, now) = (room(), Instant::now());
+    let (mut hung, mut other) = (room.friend(now), room.friend(now));
+    let take = r#"{"lease":"take"}"#;
+    room.ask(&mut hung, take, now);
+    let refusal = room.ask(&mut other, take, now);
+    assert!(refusal["error"]["why"].as_str().unwrap().contains("client 1 holds the lease"), "{refusal}");
+    assert_eq!(hear(&mut hung)["lease"]["asked_by"], 2);
+    let later = now + Duration::from_secs(4);
+    assert!(room.ask(&mut other, take, later)["error"].is_object());
+    let late = now + Duration::from_secs(5);
+    assert!(room.ask(&mut other, take, late)["ok"].is_object());
+    assert_eq!(hear(&mut hung)["lease"]["lost_to"], 2);
+    assert!(room.ask(&mut other, r#"{"command":"resume"}"#, late)["ok"].is_object());
+    assert!(room.ask(&mut hung, r#"{"command":"resume"}"#, late)["error"].is_object());
+}
+
+#[test]
+fn a_holder_that_says_anything_keeps_the_lease() {
+    let (mut room, start) = (room(), Instant::now());
+    let (mut holder, mut other) = (room.friend(start), room.friend(start));
+    let take = r#"{"lease":"take"}"#;
+    room.ask(&mut holder, take, start);
+    for turn in 0..10 {
+        let now = start + Duration::from_secs(4 * turn);
+        assert!(room.ask(&mut other, take, now)["error"].is_object());
+        assert_eq!(hear(&mut holder)["lease"]["asked_by"], 2);
+        assert!(room.ask(&mut holder, r#"{"status":{}}"#, now)["ok"].is_object());
+    }
+    assert!(room.ask(&mut holder, r#"{"command":"resume"}"#, start)["ok"].is_object());
+}
+
+#[test]
+fn the_lease_is_taken_over_from_whoever_holds_it_by_an_explicit_request() {
+    let (mut room, now) = (room(), Instant::now());
+    let (mut holder, mut other) = (room.friend(now), room.friend(now));
+    room.ask(&mut holder, r#"{"lease":"take"}"#, now);
+    assert!(room.ask(&mut other, r#"{"lease":"take-over"}"#, now)["ok"].is_object());
+    assert_eq!(hear(&mut holder)["lease"]["lost_to"], 2);
+    assert!(room.ask(&mut holder, r#"{"command":"abort"}"#, now)["error"].is_object());
+    assert!(room.ask(&mut holder, r#"{"command":"hold"}"#, now)["ok"].is_object(), "to hold needs no lease");
+    assert!(room.ask(&mut other, r#"{"command":"resume"}"#, now)["ok"].is_object());
+}
