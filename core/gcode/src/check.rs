@@ -5,7 +5,8 @@ use std::sync::Arc;
 use tandem_sdk::Block;
 
 use crate::config::Config;
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::fault::{Fault, Span};
 use crate::interpreter::Interpreter;
 use crate::item::Item;
 use crate::lines::{Lines, Next, Pass};
@@ -35,6 +36,8 @@ pub struct CheckReport {
     pub diagnostics: Vec<Diagnostic>,
     /// Number of errors beyond those.
     pub unlisted: u64,
+    /// What does not keep the program from being driven, but is worth to be known.
+    pub warnings: Vec<Diagnostic>,
     /// Lines read: to the end of the program.
     pub lines: u32,
     /// Blocks, dwells included.
@@ -105,10 +108,47 @@ impl<'a> FirstPass<'a> {
             }
             self.report.lines = lines.number;
         }
+        self.look_behind_percent(program, &mut lines)?;
         self.items.clear();
         self.interpreter.finish(&mut self.items)?;
         self.take_items(program, b"");
         Ok(())
+    }
+
+    /// Where `%` ended the program: text behind it is not driven, which nobody may find out by what is missing. RS274/NGC
+    /// lets a program that begins with `%` end at the second one, whatever follows; a `%` that closes what none opened
+    /// may only be the last text of the file.
+    fn look_behind_percent(&mut self, program: &mut Program, lines: &mut Lines) -> Result<(), ProgramError> {
+        let Some((percent, opened)) = self.interpreter.ended_by_percent() else { return Ok(()) };
+        loop {
+            let found = match lines.next(program) {
+                Ok(Next::End) => return Ok(()),
+                Ok(Next::Line(range)) => {
+                    let text = lines.text(&range);
+                    let Some(at) = self.interpreter.first_text(text) else { continue };
+                    let message = if opened {
+                        format!(
+                            "this and all that follows is not driven: the % of line {percent} has ended the program"
+                        )
+                    } else {
+                        format!(
+                            "text behind the % of line {percent}: % ends a program that begins with it, \
+                             and this one does not; what follows would not be driven"
+                        )
+                    };
+                    let fault = Fault::new(Span::new(at, text.len()), "behind-percent", message);
+                    Diagnostic::new(&program.name, lines.number, text, fault)
+                }
+                Ok(Next::Bad(diagnostic)) | Err(ProgramError::Text(diagnostic)) => diagnostic,
+                Err(other) => return Err(other),
+            };
+            if opened {
+                self.report.warnings.push(Diagnostic { severity: Severity::Warning, ..found });
+            } else {
+                self.report.add(found);
+            }
+            return Ok(());
+        }
     }
 
     fn line(&mut self, program: &Program, number: u32, text: &[u8]) {

@@ -8,9 +8,29 @@ use crate::fault::{Fault, Span};
 /// Most characters of a line that are shown on either side of the column.
 const CONTEXT: usize = 60;
 
-/// One error of a part program.
+/// How grave a [`Diagnostic`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The program is not driven.
+    Error,
+    /// The program is driven; this is worth to be known.
+    Warning,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        })
+    }
+}
+
+/// One error of a part program, or a warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
+    /// Whether it stops the program.
+    pub severity: Severity,
     /// Name of the program, as it was opened.
     pub file: Arc<str>,
     /// Line, from 1.
@@ -43,6 +63,7 @@ impl Diagnostic {
         let column = 1 + characters(&text[..start]);
         let (excerpt, caret) = excerpt(text, start);
         Self {
+            severity: Severity::Error,
             file: Arc::clone(file),
             line,
             column,
@@ -95,7 +116,7 @@ fn escape(bytes: &[u8], to: &mut String) {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: error: {}", self.file, self.line, self.column, self.message)?;
+        write!(f, "{}:{}:{}: {}: {}", self.file, self.line, self.column, self.severity, self.message)?;
         if self.excerpt.is_empty() {
             return Ok(());
         }

@@ -34,6 +34,14 @@ enum Phase {
     Ended,
 }
 
+impl Phase {
+    /// The phase behind a line with text on it.
+    #[inline]
+    fn after_text(self) -> Self {
+        if self == Self::Fresh { Self::Running } else { self }
+    }
+}
+
 /// The state of one part program and of the machine as the program knows it.
 #[derive(Clone)]
 pub struct Interpreter {
@@ -45,6 +53,8 @@ pub struct Interpreter {
     pub(crate) parameters: Parameters,
     file: Arc<str>,
     phase: Phase,
+    /// The line of the `%` that ended the program, and whether one had opened it.
+    ended_by_percent: Option<(u32, bool)>,
     /// Whether a word of the program has been read; a program number may only come before.
     begun: bool,
     /// The curve whose lines are being read.
@@ -70,6 +80,7 @@ impl Interpreter {
             parameters: Parameters::new(),
             file: "program".into(),
             phase: Phase::Fresh,
+            ended_by_percent: None,
             begun: false,
             curve: None,
             bezier_tail: None,
@@ -88,6 +99,30 @@ impl Interpreter {
     /// Whether the program has ended: further lines are passed over.
     pub fn ended(&self) -> bool {
         self.phase == Phase::Ended
+    }
+
+    /// The line of the `%` that ended the program, and whether one had opened it; `None` where something else ended it.
+    pub(crate) fn ended_by_percent(&self) -> Option<(u32, bool)> {
+        self.ended_by_percent
+    }
+
+    /// Where the first text of a line is that would be driven or refused: what is no blank, no comment, no `%` and in no
+    /// line that block delete leaves out.
+    pub(crate) fn first_text(&self, line: &[u8]) -> Option<usize> {
+        let mut scanner = Scanner::new(line, 0);
+        // Ctrl-Z ends the text of old systems.
+        while matches!(scanner.peek(), b' ' | b'\t' | 0x1a) {
+            scanner.advance(1);
+        }
+        if scanner.peek() == b'%' || scanner.peek() == b'/' && !self.config.block_delete {
+            scanner.advance(1);
+        } else if scanner.peek() == b'/' {
+            return None;
+        }
+        let start = scanner.at();
+        // A comment that is not closed is no comment.
+        let at = if scanner.skip_ignorable().is_ok() { scanner.at() } else { start };
+        (at < line.len()).then_some(at)
     }
 
     /// Manual input: lines are taken again after M2 or M30.
@@ -235,10 +270,12 @@ impl Interpreter {
             _ if scanner.at_end() => return Ok(None),
             b'%' => return self.percent(&mut scanner, out),
             b'/' if self.config.block_delete => return Ok(None),
-            b'/' => scanner.advance(1),
+            b'/' => {
+                scanner.advance(1);
+                self.phase = Phase::after_text(self.phase);
+            }
             b'(' | b';' => {}
-            _ if self.phase == Phase::Fresh => self.phase = Phase::Running,
-            _ => {}
+            _ => self.phase = Phase::after_text(self.phase),
         }
         Ok(Some(scanner.at()))
     }
@@ -253,6 +290,7 @@ impl Interpreter {
         if self.phase == Phase::Fresh {
             self.phase = Phase::Opened;
         } else {
+            self.ended_by_percent = Some((self.state.line, self.phase == Phase::Opened));
             let open = self.no_curve_open();
             self.end(out);
             open?;

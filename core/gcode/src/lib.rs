@@ -74,7 +74,7 @@ mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
 pub use config::{Config, ProbeInput, Tool};
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult};
 pub use source::{Program, ProgramError};

@@ -42,6 +42,40 @@ fn a_report_counts() {
     assert!((report.length_mm - 8.0).abs() < 1e-12);
 }
 
+/// A `%` that nothing opened ends the program; what stands behind it was left out without a word.
+#[test]
+fn text_behind_a_percent_sign_is_not_dropped_without_a_word() {
+    let found = |bytes: &[u8]| {
+        let report = report_of(bytes);
+        let shown = |list: &[tandem_gcode::Diagnostic]| {
+            list.iter().map(|d| format!("{}:{} {}", d.line, d.column, d.code)).collect::<Vec<_>>().join(", ")
+        };
+        (shown(&report.diagnostics), shown(&report.warnings), report.blocks)
+    };
+    let error = |place: &str, blocks| (format!("{place} behind-percent"), String::new(), blocks);
+    let warning = |place: &str, blocks| (String::new(), format!("{place} behind-percent"), blocks);
+    let nothing = |blocks| (String::new(), String::new(), blocks);
+    assert_eq!(found(b"G0 X1\n%\nG0 X2\nM2\n"), error("3:1", 1));
+    assert_eq!(found(b"G0 X1\n%\n\n (here) G0 X2\n"), error("4:9", 1));
+    assert_eq!(found(b"/G0 X1\n%\n/G0 X2\n"), error("3:2", 1), "block delete is off: the line is driven");
+    assert_eq!(found(b"G0 X1\n%\n(not closed\n"), error("3:1", 1));
+    assert_eq!(found(b"G0 X1\n% (end)\n\n%\n (a comment) ; one more\n\x1a"), nothing(1));
+    // RS274/NGC: whatever follows the second % is none of the program. It is said all the same.
+    assert_eq!(found(b"\n(head)\n%\nG0 X1\n%\nG0 X2\n"), warning("6:1", 1));
+    assert_eq!(found(b"%\nG0 X1\n%\n%\n\n"), nothing(1));
+    assert_eq!(found(b"%\nG0 X1\nM30\n%\nnotes"), nothing(2), "M30 is the end, and comes to rest");
+    // Far behind, and no program text at all.
+    let mut long = b"%\nG0 X1\n%\n".to_vec();
+    long.extend(std::iter::repeat_n(b'\n', 200_000));
+    assert_eq!(found(&long), nothing(1));
+    long.extend(b"\x00\x01");
+    assert!(found(&long).1.ends_with("binary"));
+    assert_eq!(shown(&items_of(b"%\nG0 X1\n%\nG0 X2\n")), ["2: Rapid 0 to 1 0 0 0", "End"]);
+    let told = report_of(b"%\nG0 X1\n%\nG0 X2\n").warnings[0].to_string();
+    let said = "t.ngc:4:1: warning: this and all that follows is not driven: the % of line 3 has ended the program";
+    assert!(told.starts_with(said), "{told}");
+}
+
 #[test]
 fn a_line_of_ten_megabytes_is_one_error() {
     let mut text = b"G0 X1\n(".to_vec();

@@ -34,7 +34,7 @@ impl fmt::Display for Unread {
 pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -> Result<Path, Unread> {
     let mut state = State::new(machine, rows);
     let program = program.strip_prefix('\u{feff}').unwrap_or(program);
-    let mut percent_signs = 0;
+    let mut percent = Percent::default();
     for (index, text) in program.lines().enumerate() {
         let unread = |cause| Unread { line: index + 1, cause };
         let text = match text.trim_start().strip_prefix('/') {
@@ -42,12 +42,10 @@ pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -
             Some(rest) => rest,
             None => text,
         };
-        if text.trim() == "%" {
-            percent_signs += 1;
-            if percent_signs == 2 {
-                break;
-            }
-            continue;
+        match percent.meets(text).map_err(unread)? {
+            Met::Over => break,
+            Met::Nothing => continue,
+            Met::Words => {}
         }
         let line = Line::parse(text).map_err(unread)?;
         if state.execute(line, index + 1).map_err(unread)? {
@@ -55,4 +53,47 @@ pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -
         }
     }
     state.into_path().map_err(|cause| Unread { line: program.lines().count(), cause })
+}
+
+/// How far a program is between its percent signs.
+#[derive(Debug, Default)]
+struct Percent {
+    /// Whether the first text was a `%`; unknown before any.
+    opened: Option<bool>,
+    /// A `%` has ended a program that none had opened.
+    over: bool,
+}
+
+/// What a line is to [`Percent`].
+enum Met {
+    /// Nothing of it is driven.
+    Nothing,
+    /// A line to be read.
+    Words,
+    /// The end of a program that `%` had opened: what follows is none of it.
+    Over,
+}
+
+impl Percent {
+    /// Takes a line, without its block delete.
+    fn meets(&mut self, text: &str) -> Result<Met, String> {
+        let alone = line::without_comments(text)?;
+        match (alone.as_str(), self.opened) {
+            ("" | "\u{1a}", _) => Ok(Met::Nothing),
+            ("%", None) => {
+                self.opened = Some(true);
+                Ok(Met::Nothing)
+            }
+            ("%", Some(true)) => Ok(Met::Over),
+            ("%", Some(false)) => {
+                self.over = true;
+                Ok(Met::Nothing)
+            }
+            _ if self.over => Err("text behind the % that ends a program that none had opened".into()),
+            _ => {
+                self.opened.get_or_insert(false);
+                Ok(Met::Words)
+            }
+        }
+    }
 }

@@ -33,6 +33,16 @@ fn numbers_comments_and_blanks() {
     visits("G1X0.20000Y0.00000Z0.08570F3000\nM30\nX5\n", &[at(0.0, 0.0, 0.0), at(0.2, 0.0, 0.0857)]);
 }
 
+/// A `%` that none had opened was passed over, and the lines behind it were read.
+#[test]
+fn a_percent_sign_ends_a_program_and_text_behind_one_that_none_opened_is_not_judged() {
+    let line = [at(0.0, 0.0, 0.0), at(5.0, 0.0, 0.0)];
+    visits("G1 X5 F3000\n%\n\n(end)\n%\n", &line);
+    visits("\n(head)\n%(open)\nG1 X5 F3000\n%\nX99\n", &line);
+    let reason = "program line 3: text behind the % that ends a program that none had opened";
+    is_not_judged("G1 X5 F3000\n%\nX7\n", reason);
+}
+
 #[test]
 fn words_that_move_nothing() {
     visits(

@@ -85,7 +85,7 @@ fn number(letter: char, rest: &str) -> Result<(f64, &str), String> {
 
 /// The line in capitals, without comments and blanks. Comments may hold others: read so, a word is never lost to a
 /// bracket too many, for a comment without an end is an error.
-fn without_comments(text: &str) -> Result<String, String> {
+pub fn without_comments(text: &str) -> Result<String, String> {
     let mut words = String::with_capacity(text.len());
     let mut depth = 0_usize;
     for c in text.chars() {
