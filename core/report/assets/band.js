@@ -1,7 +1,12 @@
+// Height of a row, px: that of its name.
+const BAND_ROW = 12.5;
+
 // What binds where: a row for each, filled where it does.
 class BandPlot extends Plot {
   constructor() {
     super({ title: "What binds", unit: () => "", curves: [], fixed: [0, about.binding.length] });
+    this.canvas.style.flex = `1 0 ${about.binding.length * BAND_ROW + 9}px`;
+    this.root.style.flexBasis = "auto";
     this.shares = element("i", "note");
     this.root.firstChild.append(this.shares);
   }

@@ -60,14 +60,28 @@ function makeButtons(view) {
     unit.textContent = feedUnit();
     changed("look");
   };
-  byId("go-to-line").onkeydown = (event) => event.key === "Enter" && goToLine(Number(event.target.value), view);
+  byId("go-to-line").onkeydown = (event) => event.key === "Enter" && goToLine(Number(event.target.value || NaN), view);
+  byId("go-to-line").oninput = () => (byId("line-answer").hidden = true);
 }
 
 function goToLine(number, view) {
   const from = columns.line.indexOf(number), to = columns.line.lastIndexOf(number);
-  byId("go-to-line").setCustomValidity(from < 0 ? "no sample belongs to this line" : "");
-  byId("go-to-line").reportValidity();
+  const answer = byId("line-answer");
+  answer.textContent = from < 0 ? lineAnswer(number) : "";
+  answer.hidden = from >= 0;
   if (from >= 0) goToTime(columns.t[from], columns.t[to], view);
+}
+
+// Why there is nothing to go to.
+function lineAnswer(number) {
+  if (!Number.isInteger(number) || number < 1) return "a line is a whole number from 1 on";
+  let before = 0, after = Infinity;
+  for (const other of columns.line) {
+    if (other < number) before = Math.max(before, other);
+    else after = Math.min(after, other);
+  }
+  const near = [[before, before > 0], [after, after < Infinity]].filter(([, there]) => there).map(([other]) => other);
+  return `nothing moves on line ${number}` + (near.length ? `; the next that move: ${near.join(", ")}` : "");
 }
 
 function goToTime(from, to, view) {

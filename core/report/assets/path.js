@@ -128,6 +128,8 @@ class PathView {
   strokeAll(lines, colour) {
     const { context } = this;
     context.strokeStyle = colour;
+    // A sharp join of lines that nearly turn back would stand out by several line widths.
+    context.lineJoin = "round";
     context.beginPath();
     let endX, endY;
     for (let k = 0; k < lines.length; k += 4) {

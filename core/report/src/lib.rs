@@ -45,4 +45,4 @@ mod thin;
 
 pub use estimate::{EstimateReport, EstimatedField, EstimatedProgram};
 pub use latency::{LatencyBin, LatencyReport, LatencySeries};
-pub use model::{Axis, Report, Samples, Signal, Unit};
+pub use model::{Axis, Ended, Report, Samples, Signal, Unit};

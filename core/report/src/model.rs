@@ -17,6 +17,8 @@ pub struct Report {
     pub planner: String,
     /// The summary, shown as a table in this order: name and value, both as they shall be read.
     pub facts: Vec<(String, String)>,
+    /// What ended the run before its program was over: it stands first on the page.
+    pub ended: Option<Ended>,
     /// The axes, in the order of [`Samples::command`].
     pub axes: Vec<Axis>,
     /// Period at which the drives get a sample, in s. Velocity, acceleration and jerk are differences over it.
@@ -32,6 +34,15 @@ pub struct Report {
     pub jerk_is_judged: bool,
     /// A sentence that says how the caller thinned the samples, if so; the page repeats it.
     pub decimated: Option<String>,
+}
+
+/// What ended a run before its program was over, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// A fault.
+    Fault(String),
+    /// Somebody stopped it.
+    Stopped(String),
 }
 
 impl Report {

@@ -2,7 +2,7 @@
 
 use crate::columns::Derived;
 use crate::differences::peak;
-use crate::model::Report;
+use crate::model::{Ended, Report};
 use crate::text::{count, escape, number};
 
 /// One line under the heading: program, machine, planner.
@@ -15,12 +15,8 @@ pub(crate) fn subtitle(report: &Report) -> String {
 /// The verdict strip: what was judged, and how it went.
 pub(crate) fn verdict(report: &Report, derived: &Derived) -> String {
     let findings = &derived.findings;
-    let mut strip = chip(
-        if findings.limit_violations == 0 { "good" } else { "bad" },
-        "limit violations",
-        &count(findings.limit_violations),
-        if report.jerk_is_judged { "velocity, acceleration, jerk" } else { "velocity, acceleration" },
-    );
+    let mut strip = ended_chip(report);
+    strip += &limits_chip(report, derived);
     strip += &deviation_chip(report, findings.off_path);
     strip += &duration_chip(report);
     let fastest = number(peak(&report.samples.feed_mm_s) * 60.0);
@@ -28,6 +24,49 @@ pub(crate) fn verdict(report: &Report, derived: &Derived) -> String {
     strip += &sigma_chip(report);
     strip + &following_chip(report, derived)
 }
+
+fn ended_chip(report: &Report) -> String {
+    match &report.ended {
+        None => String::new(),
+        Some(Ended::Fault(words)) => chip("bad ended", "the run", "ended in a fault", words),
+        Some(Ended::Stopped(words)) => chip("warn ended", "the run", "was stopped", words),
+    }
+}
+
+/// How often a limit was exceeded. It is green only where nothing lies above a limit at all: a peak that the judge still
+/// lets pass stands beside the count.
+fn limits_chip(report: &Report, derived: &Derived) -> String {
+    let violations = derived.findings.limit_violations;
+    let judged = if report.jerk_is_judged { "velocity, acceleration, jerk" } else { "velocity, acceleration" };
+    let above = furthest_above(report, derived);
+    let state = match (violations, &above) {
+        (0, None) => "good",
+        (0, Some(_)) => "warn",
+        _ => "bad",
+    };
+    let note = above.map_or_else(|| judged.to_string(), |above| format!("{judged}; {above}"));
+    chip(state, "limit violations", &count(violations), &note)
+}
+
+/// The judged peak that lies furthest above its limit, in words. Accelerations where steps are allowed have no plain limit.
+fn furthest_above(report: &Report, derived: &Derived) -> Option<String> {
+    let peaks = report.axes.iter().zip(&derived.motions).flat_map(|(axis, motion)| {
+        let plain = axis.speed_difference == 0.0;
+        [
+            (axis, "velocity", peak(&motion.velocity), Some(axis.max_velocity)),
+            (axis, "acceleration", peak(&motion.acceleration), Some(axis.max_acceleration).filter(|_| plain)),
+            (axis, "jerk", peak(&motion.jerk), axis.max_jerk.filter(|_| report.jerk_is_judged)),
+        ]
+    });
+    let shares = peaks.filter_map(|(axis, name, peak, limit)| Some((peak / limit.filter(|l| *l > 0.0)?, axis, name)));
+    // Beyond what rounding of positions alone makes of a peak.
+    let above = shares.filter(|(share, ..)| *share > 1.0 + ROUNDING);
+    let (share, axis, name) = above.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!("{name} of {} {} % above", axis.letter, number(100.0 * (share - 1.0))))
+}
+
+/// Share above a limit that is no more than rounding.
+const ROUNDING: f64 = 1e-4;
 
 fn deviation_chip(report: &Report, off_path: usize) -> String {
     let Some(values) = &report.samples.deviation_mm else {

@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tandem_report::{Axis, Report, Samples, Unit};
+use tandem_report::{Axis, Ended, Report, Samples, Unit};
 
 const CHROMIUM: &str = "/usr/bin/chromium";
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -48,6 +48,81 @@ fn a_run_with_little_to_show_draws() {
         let dom = browse(folder.path(), &["--dump-dom"], &format!("file://{}", page.display()));
         assert_ready(&dom);
     }
+}
+
+/// The strip at the top of a faulted run showed nothing of it, and a green 0 stood beside a jerk above its limit.
+#[test]
+fn the_strip_says_that_a_run_ended_in_a_fault_and_is_green_only_where_nothing_is_above_a_limit() {
+    let html = |report: &Report| {
+        let mut html = Vec::new();
+        report.write(&mut html).unwrap();
+        let html = String::from_utf8(html).unwrap();
+        html.split("<ul class=\"verdict\">").nth(1).unwrap().split("</ul>").next().unwrap().to_string()
+    };
+    let whole = html(&lathe(50));
+    assert!(
+        !whole.contains("ended in") && whole.contains("<li class=\"good\"><i>limit violations</i><b>0</b>"),
+        "{whole}"
+    );
+    let fault = Report { ended: Some(Ended::Fault("guard: X <too> fast".into())), ..lathe(50) };
+    let strip = html(&fault);
+    assert!(strip.starts_with("<li class=\"bad ended\"><i>the run</i><b>ended in a fault</b>"), "{strip}");
+    assert!(strip.contains("guard: X &lt;too&gt; fast"), "{strip}");
+    let stopped = html(&Report { ended: Some(Ended::Stopped("at line 3".into())), ..lathe(50) });
+    assert!(stopped.starts_with("<li class=\"warn ended\"><i>the run</i><b>was stopped</b>"), "{stopped}");
+    // 0.2 % above is within what the judge lets pass: no violation, and not green either.
+    for (judged, state, words) in [(true, "warn", "jerk; jerk of X 0.2 % above<"), (false, "good", "acceleration<")] {
+        let mut report = Report { jerk_is_judged: judged, ..lathe(50) };
+        // The jerk of a start with 10 mm/s² in one period.
+        let since = |i: i32| (i - 5).max(0);
+        report.samples.command[0] = (0..50).map(|i| f64::from(since(i) * (since(i) - 1)) * 0.5e-5).collect();
+        report.axes[0].max_jerk = Some(10_000.0 / 1.002);
+        let strip = html(&report);
+        let chip = format!("<li class=\"{state}\"><i>limit violations</i><b>0</b>");
+        assert!(strip.contains(&chip) && strip.contains(words), "{strip}");
+    }
+}
+
+/// What the page shows where a script types into it and looks at it.
+#[test]
+fn a_line_that_is_not_there_is_answered_and_names_of_what_binds_do_not_overlap() {
+    if chromium_is_missing() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let probe = "<script>
+        const until = setInterval(() => {
+          if (!document.documentElement.dataset.ready) return;
+          clearInterval(until);
+          const field = document.getElementById('go-to-line'), said = [];
+          for (const text of ['4000', '1.5', '', '10']) {
+            field.value = text;
+            field.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' }));
+            const answer = document.getElementById('line-answer');
+            said.push(answer.hidden ? 'gone there' : answer.textContent);
+          }
+          const band = document.querySelector('canvas[aria-label=\"What binds\"]');
+          said.push('row ' + Math.floor(band.clientHeight / about.binding.length));
+          said.push('joins ' + document.getElementById('path').getContext('2d').lineJoin);
+          const shown = document.createElement('pre');
+          shown.id = 'probe';
+          shown.textContent = said.join('|');
+          document.body.append(shown);
+        }, 20);
+        </script></body>";
+    let mut html = Vec::new();
+    run::report(6, false).write(&mut html).unwrap();
+    let page = folder.path().join("probed.html");
+    fs::write(&page, String::from_utf8(html).unwrap().replace("</body>", probe)).unwrap();
+    let dom = browse(folder.path(), &["--dump-dom"], &format!("file://{}", page.display()));
+    assert_ready(&dom);
+    let said = dom.split("<pre id=\"probe\">").nth(1).unwrap_or_default().split("</pre>").next().unwrap_or_default();
+    let said: Vec<_> = said.split('|').collect();
+    assert!(said[0].starts_with("nothing moves on line 4000; the next that move: "), "{said:?}");
+    assert_eq!(said[1..4], ["a line is a whole number from 1 on", "a line is a whole number from 1 on", "gone there"]);
+    let row: u32 = said[4].strip_prefix("row ").unwrap().parse().unwrap();
+    assert!(row >= 12, "names of 11 px need rows of at least 12: {row}");
+    assert_eq!(said[5], "joins round");
 }
 
 #[test]
