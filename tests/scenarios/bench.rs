@@ -113,6 +113,11 @@ fn row(sample: &Sample, fine_period_s: f64) -> Row {
 }
 
 impl Ran {
+    /// Where the axes came to rest, by their names, mm and deg.
+    pub fn ends(&self) -> [&std::collections::BTreeMap<String, f64>; 2] {
+        [&self.outcome.summary.end_position_mm, &self.outcome.summary.end_position_deg]
+    }
+
     /// Nothing went wrong, no count says that something nearly did, and the program is driven to its end.
     pub fn expect_clean(&self) -> Result<(), String> {
         let summary = &self.outcome.summary;

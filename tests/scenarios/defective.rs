@@ -110,7 +110,7 @@ struct Tracing(TraceCsv);
 
 impl RunObserver for Tracing {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
-        self.0.sample(sample, signals);
+        self.0.sample(sample, signals).unwrap();
     }
 }
 

@@ -185,7 +185,7 @@ fn the_ring_runs_dry_wherever_the_rough_loop_can_be_late() {
         ran.expect_clean()?;
         ran.expect_known_changes()?;
         places.extend(starved_at(&ran));
-        if ran.outcome.summary.end_position_mm != free.outcome.summary.end_position_mm {
+        if ran.ends() != free.ends() {
             return Err("it ends elsewhere".to_string());
         }
         passed(&bench.judge(&ran, |_| ()))

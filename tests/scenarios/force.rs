@@ -223,7 +223,7 @@ fn the_guard_holds_on_the_path_says_so_and_the_operator_goes_on() {
     assert_eq!(done.status(), 0, "{}", done.errors());
     let errors = done.errors();
     assert!(
-        errors.contains("line 4: the feed strategy asks for a hold") && errors.contains("torque_nm = "),
+        errors.contains("line 4: the feed strategy force-control asks for a hold") && errors.contains("torque_nm = "),
         "{errors}"
     );
     let stops = done.summary()["stops"].clone();

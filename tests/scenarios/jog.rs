@@ -95,6 +95,15 @@ fn steps_add_up_exactly() {
 }
 
 #[test]
+fn quit_and_exit_end_the_session_and_what_follows_is_nobodys_line() {
+    for word in ["quit", "exit"] {
+        let said = say(&format!("x+0.1 600\n{word}\nx+0.1 600\n"));
+        assert_eq!((said.status, said.positions.len(), said.errors.as_str()), (0, 1, ""), "{word}");
+        assert!((said.column(0).last().unwrap() - 0.1).abs() < 1e-9, "{word}");
+    }
+}
+
+#[test]
 fn a_late_keep_alive_stops_after_its_time_and_the_way_to_rest() {
     for (feed_mm_per_min, keep_alive_ms) in [(600.0, 200), (6000.0, 200), (6000.0, 50), (3000.0, 120)] {
         let set = format!("operator.jog_keep_alive_ms={keep_alive_ms}");

@@ -231,6 +231,26 @@ fn a_feed_on_the_cylinder_is_tangential() {
     assert!((table - expected).abs() < 0.01, "{table} deg/s where 50 mm/s on 30 mm are {expected}");
 }
 
+/// Degrees a second stood under `max_velocity_mm_s`.
+#[test]
+fn what_the_summary_says_of_a_rotary_axis_is_called_after_its_unit() {
+    let done = Scenario::text("G21 G90 G94\nF1800\nG1 X5 A45\nM2\n").on(&machine("mill-4axis.toml")).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let summary = done.summary();
+    for (linear, rotary) in [
+        ("max_velocity_mm_s", "max_velocity_deg_s"),
+        ("max_acceleration_mm_s2", "max_acceleration_deg_s2"),
+        ("max_jerk_mm_s3", "max_jerk_deg_s3"),
+        ("end_position_mm", "end_position_deg"),
+    ] {
+        assert!(summary[linear]["x"].is_f64() && summary[linear]["a"].is_null(), "{linear}: {}", summary[linear]);
+        assert!(summary[rotary]["a"].is_f64() && summary[rotary]["x"].is_null(), "{rotary}: {}", summary[rotary]);
+    }
+    assert!((summary["end_position_deg"]["a"].as_f64().unwrap() - 45.0).abs() < 1e-9);
+    let three = Scenario::of(&program("square.ngc")).run().summary();
+    assert!(three["max_velocity_deg_s"].is_null(), "no rotary axes, no such key");
+}
+
 #[test]
 fn the_summary_and_manual_input_know_the_joints() {
     let done = on_corexy(DIAGONAL, &[]).run();

@@ -83,6 +83,19 @@ fn the_end_of_a_program_is_not_the_end_of_the_session() {
     assert!(said.positions().last().unwrap().starts_with("x_mm 3.0000"), "{}", said.errors());
 }
 
+/// `quit` was read as G-code: "no function is called UIT".
+#[test]
+fn quit_and_exit_end_the_session_and_what_follows_is_nobodys_line() {
+    for word in ["quit", "EXIT", "  Quit "] {
+        let said = say(&format!("G0 X1\n{word}\nG0 X2\n"), &VIRTUAL);
+        assert_eq!((said.output.status.code(), said.errors().as_str()), (Some(0), ""), "{word}");
+        assert_eq!(said.positions().len(), 1, "{word}");
+    }
+    let fails = ["--clock", "virtual", "--set", "faults.wrap=[{kind=\"fail\",at_call=500}]"];
+    let said = say("G91\nG1 X50 F600\nquit\n!reset\nG0 Y2\n", &fails);
+    assert_eq!((said.output.status.code(), said.positions().len()), (Some(3), 1), "{}", said.errors());
+}
+
 #[test]
 fn a_fault_is_left_with_reset_from_where_the_machine_stands() {
     let fails = ["--clock", "virtual", "--set", "faults.wrap=[{kind=\"fail\",at_call=500}]"];

@@ -282,7 +282,7 @@ fn the_ring_runs_dry_smoothly_wherever_the_rough_loop_can_be_late() {
         let ran = bench.run(&format!("{tick},stall-rough,100"));
         starved += ran.outcome.summary.starvations;
         check(&bench, &ran)?;
-        let same = ran.outcome.summary.end_position_mm == free.outcome.summary.end_position_mm;
+        let same = ran.ends() == free.ends();
         same.then_some(()).ok_or("it ends elsewhere".to_string())
     });
     println!("starved {starved} times");

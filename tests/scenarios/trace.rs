@@ -128,6 +128,29 @@ fn one_changed_bit_is_found() {
     }
 }
 
+/// Only commands were compared: feedback, state and feed could differ as they liked.
+#[test]
+fn every_column_is_compared_unless_only_the_commands_are_asked_for() {
+    let folder = TempDir::new().unwrap();
+    let ideal = square(&folder, "ideal.ttr");
+    let lagging = folder.path().join("lagging.ttr");
+    let program = root().join("examples/programs/square.ngc");
+    let machine = mill();
+    let arguments = ["run", program.to_str().unwrap(), "--machine", machine.to_str().unwrap()].map(Path::new);
+    let drives = ["--set", "driver.options.model=second-order", "--trace", lagging.to_str().unwrap()].map(Path::new);
+    assert_eq!(tandem(&[arguments, drives].concat()).status.code(), Some(0));
+    let (status, said, _) = trace(&["diff".as_ref(), &ideal, &lagging]);
+    assert_eq!(status, 1);
+    assert!(said.starts_with("first difference: tick ") && said.contains(": x_fb_mm: "), "{said}");
+    for column in ["x_fb_mm: ", "y_fb_mm: "] {
+        let line = said.lines().find(|line| line.starts_with(column)).unwrap_or_else(|| panic!("{said}"));
+        assert!(line.contains(" samples differ, by at most "), "{line}");
+    }
+    assert!(!said.contains("x_cmd_mm") && !said.contains("z_fb_mm"), "{said}");
+    let (status, said, _) = trace(&["diff".as_ref(), "--commands-only".as_ref(), &ideal, &lagging]);
+    assert_eq!((status, said.contains("samples in 3 columns")), (0, true), "{said}");
+}
+
 #[test]
 fn one_changed_byte_is_noticed() {
     let folder = TempDir::new().unwrap();

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod plugin;
+mod trace;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -8,13 +9,14 @@ use std::path::PathBuf;
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 
 pub use plugin::{Kind, Plugin};
+pub use trace::Trace;
 
 /// Tandem, an open CNC motion controller.
 #[derive(Parser)]
 #[command(
     version,
     about,
-    after_help = "Exit status: 0 done, 1 refused (nothing moved), 2 usage, 3 fault or stop while running."
+    after_help = "Exit status: 0 done, 1 refused (nothing moved), 2 usage, 3 fault or stop while running, or a file not complete."
 )]
 pub struct Args {
     #[command(subcommand)]
@@ -25,13 +27,13 @@ pub struct Args {
 pub enum Command {
     /// Run a part program
     Run(Box<Run>),
-    /// List every error of a part program; nothing moves
+    /// List every error of a part program, and what a run would refuse of the machine; nothing moves, no drive is claimed
     Check(Check),
-    /// Take lines of G-code from the keyboard or a pipe, each from where the machine stands
+    /// Take lines of G-code from the keyboard or a pipe, each from where the machine stands; quit or exit ends
     Mdi(Box<Mdi>),
     /// Home the axes, as the machine file says
     Home(Home),
-    /// Move single axes by hand: with keys, over a socket, or by lines of a pipe
+    /// Move single axes by hand: with keys, over a socket, or by lines of a pipe; q, or the line quit, ends
     Jog(Box<Jog>),
     /// Say how long part programs take; nothing moves
     Estimate(Estimate),
@@ -83,7 +85,7 @@ pub struct Session {
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format
-    #[arg(long, value_name = "F.csv|F.ttr")]
+    #[arg(long, value_name = "F.csv|F.ttr", value_parser = file_name)]
     pub trace: Option<PathBuf>,
 }
 
@@ -114,7 +116,8 @@ pub struct Run {
     pub commands: Option<PathBuf>,
     #[command(flatten)]
     pub operator: Operator,
-    /// Write every sample; a name that ends in .ttr asks for the binary format
+    /// Write every sample; a name that ends in .ttr asks for the binary format. - is standard output, here and for one of
+    /// the three files below; what the run says goes to standard error then
     #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
     /// Write the summary
@@ -166,6 +169,9 @@ pub struct Check {
     pub program: PathBuf,
     #[command(flatten)]
     pub machine: Machine,
+    /// As for a run with --home, which a machine that is to be homed first always is
+    #[arg(long)]
+    pub home: bool,
 }
 
 #[derive(Group)]
@@ -200,7 +206,7 @@ pub struct Estimate {
     #[arg(long)]
     pub json: bool,
     /// Draw the length of the blocks against the feed reached in them
-    #[arg(long, value_name = "F.html")]
+    #[arg(long, value_name = "F.html", value_parser = file_name)]
     pub report: Option<PathBuf>,
 }
 
@@ -209,13 +215,13 @@ pub struct Calibrate {
     #[command(flatten)]
     pub machine: Machine,
     /// Write the model
-    #[arg(long, value_name = "MODEL.toml", required_unless_present = "program")]
+    #[arg(long, value_name = "MODEL.toml", required_unless_present = "program", value_parser = file_name)]
     pub out: Option<PathBuf>,
     /// Fit to the times of a file instead of an experiment; docs/machining-time.md has its columns
     #[arg(long, value_name = "F.csv")]
     pub from: Option<PathBuf>,
     /// Only write the experiment as a program, to be run and timed at another control
-    #[arg(long, value_name = "F.ngc", conflicts_with_all = ["out", "from", "model"])]
+    #[arg(long, value_name = "F.ngc", conflicts_with_all = ["out", "from", "model"], value_parser = file_name)]
     pub program: Option<PathBuf>,
     /// Fit this form instead of the one that fits best
     #[arg(long)]
@@ -237,7 +243,7 @@ pub struct Identify {
     #[arg(long, value_name = "LETTER")]
     pub axis: char,
     /// The file to write, which the machine file includes; beside it and called after machine and axis where left out
-    #[arg(long, value_name = "F.toml")]
+    #[arg(long, value_name = "F.toml", value_parser = file_name)]
     pub out: Option<PathBuf>,
     /// The clock that drives the experiment
     #[arg(long, default_value = "virtual")]
@@ -267,38 +273,11 @@ pub struct Latency {
     #[arg(long)]
     pub load: bool,
     /// Draw the histogram
-    #[arg(long, value_name = "F.html")]
+    #[arg(long, value_name = "F.html", value_parser = file_name)]
     pub report: Option<PathBuf>,
     /// Show beside it what `cyclictest -h` has printed by the end of the measurement
     #[arg(long, value_name = "F")]
     pub cyclictest: Option<PathBuf>,
-}
-
-#[derive(Subcommand)]
-pub enum Trace {
-    /// Write a binary trace as CSV
-    Export {
-        /// The binary trace
-        trace: PathBuf,
-        /// The file to write
-        #[arg(long, value_name = "F.csv")]
-        csv: PathBuf,
-        /// Write the operator's commands, for `tandem run --commands`
-        #[arg(long, value_name = "F.csv")]
-        commands: Option<PathBuf>,
-    },
-    /// Print what a binary trace holds, and whether it is complete
-    Info {
-        /// The binary trace
-        trace: PathBuf,
-    },
-    /// Compare the command samples of two traces, binary or CSV; exit status 1 where they differ
-    Diff {
-        /// One trace
-        a: PathBuf,
-        /// The other
-        b: PathBuf,
-    },
 }
 
 #[derive(Subcommand)]
@@ -316,7 +295,7 @@ pub enum Script {
         /// The source
         source: PathBuf,
         /// The module to write; beside the source where it is not stated
-        #[arg(long, value_name = "F.wasm")]
+        #[arg(long, value_name = "F.wasm", value_parser = file_name)]
         out: Option<PathBuf>,
     },
     /// Print what a module is: calls, parameters, memory; try it on a sample
@@ -374,6 +353,14 @@ impl From<Clock> for tandem_host::Clock {
             Clock::Wall => Self::Wall,
         }
     }
+}
+
+/// A file to write where standard output carries other text.
+fn file_name(text: &str) -> Result<PathBuf, String> {
+    if text == "-" {
+        return Err("standard output carries other text here: name a file".to_string());
+    }
+    Ok(text.into())
 }
 
 fn key_value(text: &str) -> Result<(String, String), String> {

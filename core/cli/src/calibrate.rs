@@ -13,7 +13,7 @@ use tandem_host::{Clock, Output};
 use tandem_machine::Machine;
 
 use crate::args::{self, Form};
-use crate::{REFUSED, built_in};
+use crate::{FAULT, REFUSED, built_in};
 
 /// Blocks to each polygon where the control's own clock measures.
 const BLOCKS_MEASURED: u32 = 400;
@@ -34,7 +34,11 @@ pub fn calibrate(options: &args::Calibrate) -> Result<u8, Box<dyn Error>> {
     match chosen(options.model, &measured, &evidence, &fits) {
         Ok(fitted) => {
             print(&residuals(&fitted, &measured.timed));
-            write(options, &machine, &fitted)?;
+            if let Err(cause) = write(options, &machine, &fitted) {
+                // The experiment is over, and what it has found stands above.
+                say!("error: {cause}");
+                return Ok(FAULT);
+            }
             Ok(0)
         }
         Err(cause) => {

@@ -1,4 +1,4 @@
-//! `tandem check`.
+//! `tandem check`: everything that `tandem run` looks at before the drives are claimed.
 
 use std::error::Error;
 use std::io::Write;
@@ -9,14 +9,17 @@ use tandem_machine::Machine;
 use crate::args::Check;
 use crate::{REFUSED, built_in, program};
 
-/// Lists every error of a program.
+/// Lists every error of a program, or says what the run would refuse of the machine.
 pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
-    let mut program = program::open(&options.program)?;
+    let program = program::open(&options.program)?;
     let name = program.name().to_string();
-    let switches = Switches { block_delete: options.machine.block_delete, ..Switches::default() };
-    let report = check_program(&machine, &built_in::registry()?, &mut program, switches)?;
+    // A machine that is to be homed first is run with --home: there is no other run to ask about.
+    let home = options.home || machine.require_homing && !machine.homing.is_empty();
+    let switches = Switches { block_delete: options.machine.block_delete, home, ..Switches::default() };
+    let report = check_program(machine, &built_in::registry()?, program, switches)?;
     if report.is_ok() {
+        program::print_warnings(&report);
         let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
         let _ = writeln!(std::io::stdout(), "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors");
         if report.open_lines > 0 {

@@ -7,6 +7,7 @@ use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Event, EventKind};
 
+use crate::broken::Broken;
 use crate::report::Collector;
 use crate::trace::TraceSink;
 use crate::{FAULT, args, built_in};
@@ -24,16 +25,19 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
     let run = Run::home(machine.clone(), &built_in::registry()?)?;
     let trace = options.trace.as_ref().map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
     let report = options.report.as_ref().map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
-    let mut observer = Observer { corrections: Corrections::new(&machine), trace: trace.transpose()?, report };
+    let (corrections, broken) = (Corrections::new(&machine), Broken::default());
+    let mut observer = Observer { corrections, trace: trace.transpose()?, report, broken };
     let outcome = run.drive(options.clock.into(), &[], &mut observer)?;
-    observer.trace.map_or(Ok(()), TraceSink::finish)?;
-    if let (Some(report), Some(path)) = (observer.report, &options.report) {
-        report.write(path, &outcome.summary)?;
+    let Observer { trace, report, mut broken, .. } = observer;
+    broken.note(trace.map_or(Ok(()), TraceSink::finish));
+    if let (Some(report), Some(path)) = (report, &options.report) {
+        broken.note(report.write(path, &outcome.summary));
     }
+    broken.tell();
     for failure in outcome.summary.fault.iter().chain(&outcome.summary.stopped) {
         say!("fault: {failure}");
     }
-    let failed = outcome.summary.fault.is_some() || outcome.summary.stopped.is_some();
+    let failed = outcome.summary.fault.is_some() || outcome.summary.stopped.is_some() || broken.is_any();
     Ok(if failed { FAULT } else { 0 })
 }
 
@@ -41,9 +45,14 @@ struct Observer {
     corrections: Corrections,
     trace: Option<TraceSink>,
     report: Option<Collector>,
+    broken: Broken,
 }
 
 impl RunObserver for Observer {
+    fn broken_record(&mut self) -> Option<String> {
+        self.broken.tell()
+    }
+
     fn note(&mut self, note: &str) {
         say!("{note}");
     }
@@ -54,7 +63,7 @@ impl RunObserver for Observer {
 
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         if let Some(trace) = &mut self.trace {
-            trace.sample(sample, signals);
+            self.broken.note(trace.sample(sample, signals));
         }
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);

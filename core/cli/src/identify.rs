@@ -4,7 +4,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tandem_force_control::fit::{Fit, Point, stribeck};
 use tandem_force_control::inertia::{Differences, Rls};
@@ -13,7 +13,7 @@ use tandem_host::{Output, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
-use crate::{args, built_in};
+use crate::{FAULT, args, built_in};
 
 /// Speeds of the air runs, rad/s: down to those of cutting, where friction is not viscous.
 const SPEEDS_RAD_PER_S: [f64; 8] = [0.26, 0.52, 1.05, 2.1, 4.2, 8.4, 16.8, 31.4];
@@ -72,12 +72,21 @@ pub fn identify(options: &args::Identify) -> Result<u8, Box<dyn Error>> {
     let fit = stribeck(&points, true).ok_or("too few air runs fit into travel and feed of the axis")?;
     let inertia = inertia(&rows, &purposes, &motor, &fit, machine.fine_period_s)?;
     let path = options.out.clone().unwrap_or_else(|| beside(&options.machine, motor.letter));
-    let mut out = Output::create(&path)?;
-    out.write_all(file(&motor, &fit, &inertia, &machine).as_bytes())?;
-    out.finish()?;
     // A reader that has gone away is no reason to fail.
-    let _ = std::io::stdout().write_all(shown(&motor, &points, &fit, &inertia, &path).as_bytes());
+    let _ = std::io::stdout().write_all(shown(&motor, &points, &fit, &inertia).as_bytes());
+    if let Err(cause) = write(&path, &file(&motor, &fit, &inertia, &machine)) {
+        // The machine has moved, and what it has found stands above.
+        say!("error: {cause}");
+        return Ok(FAULT);
+    }
+    let _ = writeln!(std::io::stdout(), "written: {}; include it in the machine file", path.display());
     Ok(0)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    let mut out = Output::create(path)?;
+    out.write_all(text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+    out.finish()
 }
 
 impl Motor {
@@ -215,7 +224,7 @@ fn inertia(rows: &[Row], purposes: &[Purpose], motor: &Motor, fit: &Fit, period_
     Ok(Inertia { kg_m2, doubt_percent: 100.0 * doubt / kg_m2, samples })
 }
 
-fn beside(machine: &std::path::Path, letter: char) -> PathBuf {
+fn beside(machine: &Path, letter: char) -> PathBuf {
     let stem = machine.file_stem().unwrap_or_default().to_string_lossy();
     machine.with_file_name(format!("{stem}-{letter}.toml"))
 }
@@ -246,7 +255,7 @@ fn file(motor: &Motor, fit: &Fit, inertia: &Inertia, machine: &Machine) -> Strin
     )
 }
 
-fn shown(motor: &Motor, points: &[Point], fit: &Fit, inertia: &Inertia, path: &std::path::Path) -> String {
+fn shown(motor: &Motor, points: &[Point], fit: &Fit, inertia: &Inertia) -> String {
     let mut text = format!("axis {}\n  speed, rad/s   torque, N·m    model, N·m\n", motor.letter);
     for Point { speed_rad_per_s, torque_nm } in points {
         let model_nm = fit.model.torque_nm(*speed_rad_per_s);
@@ -265,5 +274,5 @@ fn shown(motor: &Motor, points: &[Point], fit: &Fit, inertia: &Inertia, path: &s
     );
     let (kg_m2, percent, samples) = (inertia.kg_m2, inertia.doubt_percent, inertia.samples);
     let _ = writeln!(text, "inertia   {kg_m2:.4e} kg·m² ± {percent:.2} %, from {samples} samples");
-    text + &format!("written: {}; include it in the machine file\n", path.display())
+    text
 }

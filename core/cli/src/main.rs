@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod args;
+mod broken;
 mod built_in;
 mod calibrate;
 mod check;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, PlanningRow, Summary};
+use tandem_host::{Output, PlanningRow, RecordError, Summary};
 use tandem_machine::{JerkMode, Machine};
-use tandem_report::{Axis, Report, Samples, Signal, Unit};
+use tandem_report::{Axis, Ended, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport};
 
@@ -79,18 +79,25 @@ impl Collector {
     }
 
     /// Writes the page.
-    pub fn write(mut self, path: &Path, summary: &Summary) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// It cannot be written: nothing of it is left.
+    pub fn write(mut self, path: &Path, summary: &Summary) -> Result<(), RecordError> {
         self.report.samples.deviation_mm = Some(self.deviation_mm);
         self.report.facts = facts(summary);
+        let fault = summary.fault.clone().map(Ended::Fault);
+        self.report.ended = fault.or_else(|| summary.stopped.clone().map(Ended::Stopped));
         self.report.signals.extend(self.corners.signals());
         let (curves, chord_share) = self.curves.signals();
         self.report.signals.extend(curves);
         self.report.samples.chord_share = chord_share;
         let (most_mm, each_mm) = self.tolerances.of_run_mm();
         (self.report.path_tolerance_mm, self.report.samples.tolerance_mm) = (Some(most_mm), each_mm);
-        let mut out = Output::create(path)?;
-        self.report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
-        out.finish()
+        let lost = |cause: String| RecordError::lost("report", path, cause);
+        let mut out = Output::create(path).map_err(lost)?;
+        self.report.write(&mut out).map_err(|e| lost(e.to_string()))?;
+        out.close().map_err(|e| lost(e.to_string()))?;
+        out.finish().map_err(lost)
     }
 }
 
@@ -137,6 +144,9 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         ),
         fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
     ];
+    facts.extend(summary.timing().map(|timing| fact("fine loop", timing)));
+    facts.extend(summary.warnings().into_iter().map(|warning| fact("warning", warning)));
+    facts.extend(summary.record_errors.iter().map(|error| fact("not complete", error.to_string())));
     if let (Some(ratio), Some(reference_time_s)) = (summary.time_ratio, summary.reference_time_s) {
         facts.insert(1, fact("T/T_ref", format!("{ratio:.4} of {reference_time_s} s")));
     }

@@ -1,19 +1,20 @@
 //! `tandem run`.
 
 use std::error::Error;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tandem_host::{
-    BlocksCsv, Clock, HostError, Outcome, Output, PolicySummary, Run, RunObserver, Stop, StopAnswer, Summary, Switches,
-    Timed, parse_commands,
+    BlocksCsv, Clock, HostError, Outcome, Output, PolicySummary, RecordError, Run, RunObserver, Stop, StopAnswer,
+    Summary, Switches, Timed, parse_commands,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 
+use crate::broken::Broken;
 use crate::home::Corrections;
-use crate::operator::{Keyboard, Operator, Presence};
+use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
@@ -33,6 +34,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         }
         other => other?,
     };
+    program::print_warnings(&run.checked);
     let clock = options.clock.into();
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
@@ -42,7 +44,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         outcome.summary.compare(reference_time_s);
     }
     sinks.operator.end(&outcome.summary);
-    sinks.finish(options, &outcome.summary)?;
+    sinks.finish(options, &mut outcome.summary);
     Ok(conclude(options, &outcome))
 }
 
@@ -65,12 +67,13 @@ fn switches(options: &args::Run, keys: bool) -> Switches {
 
 /// Refuses to write a file twice, or over what the run reads.
 fn distinct_files(options: &args::Run) -> Result<(), String> {
-    let written = [&options.trace, &options.summary, &options.report, &options.blocks];
-    let mut taken = vec![resolved(&options.program), resolved(&options.machine.file.path)];
+    let mut taken = vec![resolved(&options.machine.file.path)];
+    // Standard input and standard output are both called -.
+    taken.extend(Some(&options.program).filter(|path| path.as_os_str() != "-").map(|path| resolved(path)));
     taken.extend(options.commands.iter().map(|path| resolved(path)));
-    for path in written.into_iter().flatten() {
+    for (_, path) in written(options) {
         let file = resolved(path);
-        let regular = !file.exists() || file.is_file();
+        let regular = path.as_os_str() == "-" || !file.exists() || file.is_file();
         if regular && taken.contains(&file) {
             return Err(format!("{}: the run reads this file, or writes it already", path.display()));
         }
@@ -111,7 +114,13 @@ struct Sinks {
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
     report: Option<Collector>,
+    summary: Option<Output>,
+    broken: Broken,
 }
+
+/// Room that the summary takes before anything moves, bytes: a summary of about a hundred stops. So it can be written when
+/// the trace has filled the disk.
+const SUMMARY_ROOM_BYTES: u64 = 16 * 1024;
 
 impl Sinks {
     fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run) -> Result<Self, String> {
@@ -133,21 +142,36 @@ impl Sinks {
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
             report,
+            summary: options.summary.as_deref().map(summary_file).transpose()?,
+            broken: Broken::default(),
         })
     }
 
-    fn finish(self, options: &args::Run, summary: &Summary) -> Result<(), String> {
+    /// Ends every file. What cannot be written is said, and told by the summary.
+    fn finish(self, options: &args::Run, summary: &mut Summary) {
         self.progress.finish();
-        self.trace.map_or(Ok(()), TraceSink::finish)?;
-        self.blocks.map_or(Ok(()), BlocksCsv::finish)?;
+        let mut broken = self.broken;
+        broken.note(self.trace.map_or(Ok(()), TraceSink::finish));
+        broken.note(self.blocks.map_or(Ok(()), BlocksCsv::finish));
+        summary.record_errors = broken.errors().to_vec();
         if let (Some(report), Some(path)) = (self.report, &options.report) {
-            report.write(path, summary)?;
+            broken.note(report.write(path, summary));
         }
-        options.summary.as_ref().map_or(Ok(()), |path| write_summary(path, summary))
+        summary.record_errors = broken.errors().to_vec();
+        if let (Some(out), Some(path)) = (self.summary, &options.summary) {
+            let written = write_summary(out, summary);
+            broken.note(written.map_err(|cause| RecordError::lost("summary", path, cause)));
+        }
+        broken.tell();
+        summary.record_errors = broken.errors().to_vec();
     }
 }
 
 impl RunObserver for Sinks {
+    fn broken_record(&mut self) -> Option<String> {
+        self.broken.tell()
+    }
+
     fn note(&mut self, note: &str) {
         say!("{note}");
     }
@@ -155,7 +179,7 @@ impl RunObserver for Sinks {
     fn block(&mut self, block: &Block, report: &BlockReport) {
         self.tell_of_time_constant(block);
         if let Some(blocks) = &mut self.blocks {
-            blocks.block(block, report);
+            self.broken.note(blocks.block(block, report));
         }
         if let Some(collector) = &mut self.report {
             collector.block(block, report);
@@ -189,7 +213,7 @@ impl RunObserver for Sinks {
 
     fn command(&mut self, command: &Timed) {
         if let Some(trace) = &mut self.trace {
-            trace.command(command);
+            self.broken.note(trace.command(command));
         }
     }
 
@@ -201,7 +225,7 @@ impl RunObserver for Sinks {
         self.progress.sample(sample);
         self.operator.sample(sample, self.progress.share());
         if let Some(trace) = &mut self.trace {
-            trace.sample(sample, signals);
+            self.broken.note(trace.sample(sample, signals));
         }
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);
@@ -234,16 +258,37 @@ fn stop_word(kind: EventKind) -> Option<&'static str> {
     }
 }
 
-fn write_summary(path: &Path, summary: &Summary) -> Result<(), String> {
+/// The file of the summary, with room for it.
+fn summary_file(path: &Path) -> Result<Output, String> {
     let mut out = Output::create(path)?;
-    let text = serde_json::to_string_pretty(summary).map_err(|e| format!("{}: {e}", path.display()))?;
-    writeln!(out, "{text}").map_err(|e| format!("{}: {e}", path.display()))?;
+    out.reserve(SUMMARY_ROOM_BYTES)?;
+    Ok(out)
+}
+
+/// Writes the summary, on a full disk without the list of stops.
+fn write_summary(mut out: Output, summary: &mut Summary) -> Result<(), String> {
+    let write = |out: &mut Output, summary: &Summary| {
+        let text = serde_json::to_string_pretty(summary).map_err(io::Error::other)?;
+        writeln!(out, "{text}").and_then(|()| out.close())
+    };
+    if let Err(error) = write(&mut out, summary) {
+        if summary.stops.is_empty() {
+            return Err(error.to_string());
+        }
+        tell(&format!("error: summary: {error}; it is written without its list of {} stops", summary.stops.len()));
+        summary.stops.clear();
+        out.begin_again().and_then(|()| write(&mut out, summary)).map_err(|e| e.to_string())?;
+    }
     out.finish()
 }
 
 fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
-    // A reader that has gone away (a closed pipe) is no reason to fail: the run is done.
-    let _ = print_outcome(&mut std::io::stdout().lock(), options, &outcome.summary);
+    // A reader that has gone away (a closed pipe) is no reason to fail: the run is done. Standard output may carry a file.
+    let _ = if written(options).iter().any(|(_, path)| path.as_os_str() == "-") {
+        print_outcome(&mut io::stderr().lock(), options, &outcome.summary)
+    } else {
+        print_outcome(&mut io::stdout().lock(), options, &outcome.summary)
+    };
     let Summary { fault, stopped, .. } = &outcome.summary;
     if let Some(fault) = fault {
         say!("fault: {fault}");
@@ -251,7 +296,11 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     if let Some(stopped) = stopped {
         say!("{stopped}");
     }
-    if fault.is_some() || stopped.is_some() { FAULT } else { 0 }
+    for warning in outcome.summary.warnings() {
+        say!("warning: {warning}");
+    }
+    let whole = fault.is_none() && stopped.is_none() && outcome.summary.record_errors.is_empty();
+    if whole { 0 } else { FAULT }
 }
 
 /// The stop that took longest to come to rest.
@@ -259,7 +308,7 @@ fn longest(stops: &[Stop]) -> Option<&Stop> {
     stops.iter().max_by(|a, b| a.time_s.total_cmp(&b.time_s).then(b.tick.cmp(&a.tick)))
 }
 
-fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> std::io::Result<()> {
+fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> io::Result<()> {
     let Stop { tick, line, cause, time_s, distance_mm, .. } = stop;
     let reaction = match stop.reaction_periods {
         Some(1) => "slower from the first sample".to_string(),
@@ -273,7 +322,7 @@ fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> std::io::
     )
 }
 
-fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> std::io::Result<()> {
+fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> io::Result<()> {
     let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
     let dry = if summary.dry_run { "dry run of " } else { "" };
     let ratio = summary.time_ratio.map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
@@ -289,19 +338,29 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
         "limit violations {limit_violations}, guard stops {guard_stops}, governed samples {governed_samples}, \
          starvations {starvations}, path deviation {deviation_um:.3} µm"
     )?;
+    if let Some(timing) = summary.timing() {
+        writeln!(out, "{timing}")?;
+    }
     if let Some(stop) = longest(&summary.stops) {
         print_stop(out, summary, stop)?;
     }
+    for (what, path) in written(options) {
+        match summary.record_errors.iter().find(|error| error.what == what).map(|error| &error.kept_as) {
+            None => writeln!(out, "{what}: {}", path.display())?,
+            Some(Some(part)) => writeln!(out, "{what}: {part}, not complete")?,
+            Some(None) => writeln!(out, "{what}: not complete")?,
+        }
+    }
+    Ok(())
+}
+
+/// The files that the command line asks for, and what they are.
+fn written(options: &args::Run) -> Vec<(&'static str, &Path)> {
     let files = [
         ("trace", &options.trace),
         ("blocks", &options.blocks),
         ("summary", &options.summary),
         ("report", &options.report),
     ];
-    for (what, path) in files {
-        if let Some(path) = path {
-            writeln!(out, "{what}: {}", path.display())?;
-        }
-    }
-    Ok(())
+    files.into_iter().filter_map(|(what, path)| Some((what, path.as_deref()?))).collect()
 }

@@ -9,8 +9,9 @@ use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, Planner};
 
 use crate::error::HostError;
+use crate::ready::check_block;
 use crate::registry::Registry;
-use crate::run::{Run, Switches, check_block};
+use crate::run::{Run, Switches};
 use crate::setup;
 
 /// What the operator says next.

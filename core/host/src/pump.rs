@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
+use tandem_machine::RecordErrorMode;
 use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
@@ -57,6 +58,12 @@ pub trait RunObserver {
     /// What the policy script did until now: told now and then, and where there is a note on it.
     fn policy(&mut self, _summary: &PolicySummary) {}
 
+    /// A file that the observer writes cannot be written any further, in words; told once. The motion does what
+    /// `[recorder]` of the machine file says.
+    fn broken_record(&mut self) -> Option<String> {
+        None
+    }
+
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
 }
@@ -81,6 +88,8 @@ pub struct Pump<'a> {
     pub planner: String,
     /// How many analog inputs have a name.
     pub analog: usize,
+    /// What a file that cannot be written any further does to the motion.
+    pub on_record_error: RecordErrorMode,
     commands: CommandLog,
     /// Time of each rough period, and of all of them, ns.
     pub planning: Lateness,
@@ -114,6 +123,7 @@ impl<'a> Pump<'a> {
             skips_homing: false,
             planner: String::new(),
             analog: 0,
+            on_record_error: RecordErrorMode::default(),
             commands,
             planning: Lateness::new(),
             planning_ns: 0,
@@ -199,6 +209,23 @@ impl<'a> Pump<'a> {
             }
         }
         come.commit_all();
+        self.serve_broken_record();
+    }
+
+    /// Where a file cannot be written any further: the motion goes on, or stops on the path, as the machine file says. Who
+    /// is there may resume it; without anybody the run ends at that rest.
+    fn serve_broken_record(&mut self) {
+        let Some(words) = self.observer.broken_record() else { return };
+        match self.on_record_error {
+            RecordErrorMode::Continue => {
+                self.observer.note("the motion goes on without that file (recorder.on_error = \"continue\")");
+            }
+            RecordErrorMode::Hold if self.observer.is_attended() => {
+                self.host.controls.hold.store(true, Relaxed);
+                self.observer.note("feed hold (recorder.on_error = \"hold\"): a resume goes on without that file");
+            }
+            RecordErrorMode::Hold => self.fail(format!("recorder: {words}")),
+        }
     }
 
     /// Asks the operator where the program has stopped for one, then goes on.

@@ -5,14 +5,15 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_fine::{Fault, FineLoop};
-use tandem_gcode::{CheckReport, Program, Stream, check};
+use tandem_gcode::{CheckReport, Program};
 use tandem_machine::{JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
-use tandem_sdk::{AxisVector, Block, Driver, Planner, PluginError};
+use tandem_sdk::{AxisVector, PluginError};
 
 use crate::command::Timed;
 use crate::error::HostError;
+use crate::exchange_time::{self, ExchangeTimes};
 use crate::fault_text::describe;
 use crate::homing::Homing;
 use crate::joints::{JointSpace, JointWatch};
@@ -20,12 +21,13 @@ use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
+use crate::ready::{Plugins, Ready};
 use crate::record::limited_by;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
 use crate::wall_clock::Periods;
-use crate::{faults, rules, setup, virtual_clock, wall_clock};
+use crate::{setup, virtual_clock, wall_clock};
 
 /// Which clock drives the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +68,7 @@ pub struct Run {
     leaves_path: bool,
     uses_time_constants: bool,
     joints: Arc<JointSpace>,
+    exchange: Arc<ExchangeTimes>,
     switches: Switches,
     /// What the first pass found: totals.
     pub checked: CheckReport,
@@ -82,57 +85,6 @@ pub struct Outcome {
     pub position: AxisVector,
 }
 
-/// Runs the whole program through interpreter and planner; nothing moves.
-///
-/// # Errors
-/// The program cannot be read; a plugin refuses. What is wrong with the program is in the report.
-pub fn check_program(
-    machine: &Machine,
-    registry: &Registry,
-    program: &mut Program,
-    switches: Switches,
-) -> Result<CheckReport, HostError> {
-    let planner = setup::planner(machine, registry)?;
-    first_pass(machine, planner.as_ref(), program, switches)
-}
-
-/// Hands every block of the program to `per_block`, in order; nothing moves, and no plugin is asked.
-///
-/// # Errors
-/// The program cannot be read. What is wrong with the program is in the report.
-pub fn each_block(
-    machine: &Machine,
-    program: &mut Program,
-    switches: Switches,
-    per_block: &mut dyn FnMut(&Block),
-) -> Result<CheckReport, HostError> {
-    let config = setup::interpreter_config(machine, switches);
-    Ok(check(program, &config, &mut |block| {
-        per_block(block);
-        Ok(())
-    })?)
-}
-
-/// The whole program through the interpreter and `planner`, which stays as it was.
-fn first_pass(
-    machine: &Machine,
-    planner: &dyn Planner,
-    program: &mut Program,
-    switches: Switches,
-) -> Result<CheckReport, HostError> {
-    let config = setup::interpreter_config(machine, switches);
-    Ok(check(program, &config, &mut |block| check_block(machine, planner, block))?)
-}
-
-/// Whether the machine and its planner can drive `block`.
-pub(crate) fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
-    let spindle_rad_per_s = machine.spindle.max_rad_per_s;
-    if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
-        return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
-    }
-    planner.check(block).map_err(|e| e.to_string())
-}
-
 impl Run {
     /// Checks the whole program and opens the plugins.
     ///
@@ -141,23 +93,10 @@ impl Run {
     pub fn prepare(
         machine: Machine,
         registry: &Registry,
-        mut program: Program,
+        program: Program,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let planner = setup::planner(&machine, registry)?;
-        let driver = setup::driver(&machine, registry)?;
-        // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let checked = first_pass(&machine, planner.as_ref(), &mut program, switches)?;
-        if !checked.is_ok() {
-            return Err(HostError::Check(Box::new(checked)));
-        }
-        rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
-        let name = program.name().to_string();
-        let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
-        let policy = PolicyHost::open(&machine)?;
-        let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
-        Self::assemble(machine, registry, Some(name), source, policy, planner, driver, checked, switches)
+        Self::open(Ready::of_program(machine, registry, program, switches)?)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -168,12 +107,11 @@ impl Run {
         source: Box<dyn Source + Send>,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let planner = setup::planner(&machine, registry)?;
-        let driver = setup::driver(&machine, registry)?;
-        rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
+        let plugins = Plugins::of(&machine, registry)?;
+        plugins.check(&machine, registry, switches)?;
         let source = setup::behind_homing(&machine, source, switches);
-        Self::assemble(machine, registry, Some(name), source, None, planner, driver, CheckReport::default(), switches)
+        let checked = CheckReport::default();
+        Self::open(Ready::new(machine, registry, Some(name), source, None, plugins, checked, switches)?)
     }
 
     /// A run that homes the axes of [`Machine::homing`] and nothing else. Its samples are in the coordinates of the
@@ -183,48 +121,35 @@ impl Run {
     /// Everything that refuses: plugins, what does not go together.
     pub fn home(machine: Machine, registry: &Registry) -> Result<Self, HostError> {
         let switches = Switches { home: true, ..Switches::default() };
-        let planner = setup::planner(&machine, registry)?;
-        let driver = setup::driver(&machine, registry)?;
-        rules::check(&machine, &planner.describe(), driver.describe())?;
-        rules::check_homing(&machine, &JointSpace::of(&machine, registry)?, switches)?;
+        let plugins = Plugins::of(&machine, registry)?;
+        plugins.check(&machine, registry, switches)?;
         let source = Box::new(Homing::new(&machine, &machine.homing, None));
         let checked = CheckReport::default();
-        Self::assemble(machine, registry, None, source, None, planner, driver, checked, switches)
+        Self::open(Ready::new(machine, registry, None, source, None, plugins, checked, switches)?)
     }
 
-    #[allow(clippy::too_many_arguments)] // the parts made by `prepare`, each once
-    fn assemble(
-        machine: Machine,
-        registry: &Registry,
-        program: Option<String>,
-        source: Box<dyn Source + Send>,
-        policy: Option<PolicyHost>,
-        planner: Box<dyn Planner>,
-        mut driver: Box<dyn Driver>,
-        checked: CheckReport,
-        switches: Switches,
-    ) -> Result<Self, HostError> {
-        let joints = Arc::new(JointSpace::of(&machine, registry)?);
-        let feed = setup::feed(&machine, registry, &joints, policy.as_ref(), checked.length_mm)?;
-        rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
-        driver = faults::wrap(&machine, driver, &joints)?;
+    /// Claims the drives.
+    fn open(ready: Ready) -> Result<Self, HostError> {
+        let Ready { machine, program, source, policy, planner, mut driver, feed, joints, checked, switches, .. } =
+            ready;
         setup::open(&machine, driver.as_mut(), &joints)?;
         // As lockstep needs it: the samples of each rough period are taken behind it.
         let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, ..Sizes::default() };
         let (rough_end, fine_end, host) = bridge(sizes);
         let description = planner.describe();
         let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
-        fine_config.record_drives = program.is_none();
+        fine_config.record_drives = ready.records_drives;
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let rough_config = RoughConfig::new(machine.rough_period_s);
-        let mut fine =
-            FineLoop::new(&fine_config, fine_end, driver, JointSpace::of(&machine, registry)?.into_kinematics());
+        let exchange = Arc::new(ExchangeTimes::default());
+        let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
+        let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics.into_kinematics());
         fine.reset();
         Ok(Self {
             rough: RoughLoop::new(rough_config, source, planner, rough_end),
             fine,
             machine,
-            program: program.unwrap_or_else(|| HOMING.to_string()),
+            program,
             host,
             feed,
             policy,
@@ -233,6 +158,7 @@ impl Run {
             leaves_path: description.leaves_path != 0,
             uses_time_constants: description.uses_time_constants != 0,
             joints,
+            exchange,
             checked,
         })
     }
@@ -281,8 +207,10 @@ impl Run {
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
         (pump.skips_homing, pump.analog) = (self.switches.home, machine.analog.len());
+        pump.on_record_error = machine.on_record_error;
         pump.planner.clone_from(&machine.planner.plugin);
         let mut measured = None;
+        self.exchange.measures.store(clock == Clock::Wall, Relaxed);
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
             Clock::Wall => {
@@ -303,6 +231,7 @@ impl Run {
             summary.overruns = timing.overruns;
             summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
             summary.page_faults = Some(page_faults);
+            summary.exchange_us = Some(self.exchange.read());
         }
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = self.switches.home || fine.joints_went_alone();
@@ -328,14 +257,6 @@ fn not_let_go(machine: &Machine, error: &PluginError, summary: &mut Summary, obs
     }
 }
 
-/// What stands for the name of a program in a run that only homes.
-const HOMING: &str = "(homing)";
-
-fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
-    let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;
-    format!("the spindle is asked for {:.0} rpm; it turns at most at {:.0}", rpm(asked_rad_per_s), rpm(most_rad_per_s))
-}
-
 fn periods(machine: &Machine) -> Periods {
     let ns = |seconds: f64| (seconds * 1e9).round() as i64;
     Periods {
@@ -348,10 +269,13 @@ fn periods(machine: &Machine) -> Periods {
 
 fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {
     let (monitor, counters) = (&pump.monitor, fine.counters());
-    let each = |values: &AxisVector| {
-        let shown = |i: usize| if machine.axes.is_rotary(i) { values[i].to_degrees() } else { values[i] };
-        (0..machine.axes.count()).map(|i| (machine.axes.letter(i).to_lowercase().to_string(), shown(i))).collect()
+    let axes = &machine.axes;
+    let of = |rotary: bool, values: &AxisVector| {
+        let shown = |i: usize| if rotary { values[i].to_degrees() } else { values[i] };
+        let chosen = (0..axes.count()).filter(|i| axes.is_rotary(*i) == rotary);
+        chosen.map(|i| (axes.letter(i).to_lowercase().to_string(), shown(i))).collect()
     };
+    let (linear, rotary) = (|values: &AxisVector| of(false, values), |values: &AxisVector| of(true, values));
     Summary {
         format: FORMAT,
         program: program.to_string(),
@@ -368,9 +292,12 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         fine_period_s: machine.fine_period_s,
         rough_period_s: machine.rough_period_s,
         samples: counters.samples,
-        max_velocity_mm_s: each(&monitor.peaks[0]),
-        max_acceleration_mm_s2: each(&monitor.peaks[1]),
-        max_jerk_mm_s3: each(&monitor.peaks[2]),
+        max_velocity_mm_s: linear(&monitor.peaks[0]),
+        max_velocity_deg_s: rotary(&monitor.peaks[0]),
+        max_acceleration_mm_s2: linear(&monitor.peaks[1]),
+        max_acceleration_deg_s2: rotary(&monitor.peaks[1]),
+        max_jerk_mm_s3: linear(&monitor.peaks[2]),
+        max_jerk_deg_s3: rotary(&monitor.peaks[2]),
         joints: monitor.joints.as_ref().map(JointWatch::peaks),
         max_path_deviation_mm: monitor.max_path_deviation_mm(),
         jerk: if machine.motion.jerk == JerkMode::Limit { "limit" } else { "report" }.to_string(),
@@ -381,11 +308,14 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         overruns: 0,
         missed_periods: counters.missed_periods,
         lateness_us: None,
+        exchange_us: None,
         page_faults: None,
         starvations: counters.starvations,
         late_ratios: counters.late_ratios,
         lost_samples: pump.host.status.lost_samples.load(Relaxed),
-        end_position_mm: each(&monitor.position),
+        record_errors: vec![],
+        end_position_mm: linear(&monitor.position),
+        end_position_deg: rotary(&monitor.position),
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
         planning_us: PlanningUs::from(&pump.planning),

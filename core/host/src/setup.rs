@@ -5,8 +5,8 @@ use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription, StrategyContext,
-    size_of_contract,
+    AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription, PluginError,
+    StrategyContext, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
@@ -113,17 +113,29 @@ pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>,
     registry.driver(&machine.driver).map_err(|e| refused(machine, "driver", e))
 }
 
-/// Claims the drives.
-pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
-    let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
-    context.start_position = joints.to_joints(&machine.start);
+/// Whether the drives could be claimed, as far as that can be told without them.
+pub fn check_driver(machine: &Machine, driver: &dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
+    let context = driver_context(machine, joints);
     let known = joints.health(&context.start_position);
     known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
-    let opened = driver.open(&context).and_then(|()| driver.start());
-    opened.map_err(|e| {
-        let cause = format!("driver {}: {}", machine.driver.plugin, e.message());
-        refused(machine, "driver", PluginRefusal { option: e.option().map(str::to_string), cause })
-    })
+    driver.check(&context).map_err(|e| driver_refuses(machine, &e))
+}
+
+/// Claims the drives.
+pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
+    let opened = driver.open(&driver_context(machine, joints)).and_then(|()| driver.start());
+    opened.map_err(|e| driver_refuses(machine, &e))
+}
+
+fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
+    let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
+    context.start_position = joints.to_joints(&machine.start);
+    context
+}
+
+fn driver_refuses(machine: &Machine, error: &PluginError) -> HostError {
+    let cause = format!("driver {}: {}", machine.driver.plugin, error.message());
+    refused(machine, "driver", PluginRefusal { option: error.option().map(str::to_string), cause })
 }
 
 /// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.

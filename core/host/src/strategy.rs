@@ -19,6 +19,8 @@ pub struct FeedRunner {
     pub answer: Option<Answer>,
     /// Why the strategy stops the machine, in words: it is not asked again.
     pub fault: Option<String>,
+    /// The strategy asked for a hold in the rough period before: that has been said.
+    holds: bool,
 }
 
 impl FeedRunner {
@@ -30,7 +32,17 @@ impl FeedRunner {
         max_ratio: f64,
     ) -> Self {
         let window = Vec::with_capacity(per_window);
-        Self { strategy, name: String::new(), policy, window, per_window, max_ratio, answer: None, fault: None }
+        Self {
+            strategy,
+            name: String::new(),
+            policy,
+            window,
+            per_window,
+            max_ratio,
+            answer: None,
+            fault: None,
+            holds: false,
+        }
     }
 
     /// Names of the strategy's signals.
@@ -76,10 +88,12 @@ impl FeedRunner {
             Err(cause) => Some(self.fail(&cause)),
         };
         self.window.clear();
+        let held = std::mem::replace(&mut self.holds, kind == Some(RequestKind::Hold));
         let kind = kind?;
         // Where the ring is full the same was asked for eight times, and has not acted yet.
         let _ = requests.push(StrategyRequest { tick, kind });
-        (kind == RequestKind::Hold).then(|| self.words_of_hold(sample, tick))
+        // A strategy may ask in every period for as long as its cause lasts.
+        (self.holds && !held).then(|| self.words_of_hold(sample, tick))
     }
 
     /// Who asks for a hold, where, and what its signals say.
@@ -87,7 +101,8 @@ impl FeedRunner {
         let values = self.answer.map_or([0.0; MAX_SIGNALS], |answer| answer.signals);
         let signals: Vec<String> =
             self.signals().iter().zip(values).map(|(name, value)| format!("{name} = {value:.4}")).collect();
-        format!("line {}: the feed strategy asks for a hold, at tick {tick}: {}", sample.line, signals.join(", "))
+        let because = if signals.is_empty() { String::new() } else { format!(": {}", signals.join(", ")) };
+        format!("line {}: the feed strategy {} asks for a hold, at tick {tick}{because}", sample.line, self.name)
     }
 
     fn ask(&mut self, period: u64) -> Result<Option<Answer>, String> {

@@ -8,12 +8,13 @@ use crate::joints::JointPeaks;
 use crate::lateness::Lateness;
 use crate::policy::PolicySummary;
 use crate::realtime::PageFaults;
+use crate::record::RecordError;
 use crate::stops::Stop;
 
 /// Number of the summary format.
 pub const FORMAT: u32 = 1;
 
-/// What a run was and did. Rotary axes are in deg.
+/// What a run was and did. Rotary axes are in deg, under keys of their own, which machines without any lack.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
     /// [`FORMAT`].
@@ -46,12 +47,21 @@ pub struct Summary {
     pub rough_period_s: f64,
     /// Samples sent.
     pub samples: u64,
-    /// Largest |velocity| per axis, finite differences, mm/s.
+    /// Largest |velocity| per linear axis, finite differences, mm/s.
     pub max_velocity_mm_s: BTreeMap<String, f64>,
-    /// Largest |acceleration| per axis, finite differences, mm/s².
+    /// The same per rotary axis, deg/s.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub max_velocity_deg_s: BTreeMap<String, f64>,
+    /// Largest |acceleration| per linear axis, finite differences, mm/s².
     pub max_acceleration_mm_s2: BTreeMap<String, f64>,
-    /// Largest |jerk| per axis, finite differences, mm/s³.
+    /// The same per rotary axis, deg/s².
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub max_acceleration_deg_s2: BTreeMap<String, f64>,
+    /// Largest |jerk| per linear axis, finite differences, mm/s³.
     pub max_jerk_mm_s3: BTreeMap<String, f64>,
+    /// The same per rotary axis, deg/s³.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub max_jerk_deg_s3: BTreeMap<String, f64>,
     /// The same per joint, where the joints are not the axes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, JointPeaks>>,
@@ -73,6 +83,8 @@ pub struct Summary {
     pub missed_periods: u64,
     /// How late the fine loop woke; absent on the virtual clock.
     pub lateness_us: Option<LatenessUs>,
+    /// How long the driver's exchange took; absent on the virtual clock.
+    pub exchange_us: Option<ExchangeUs>,
     /// Page faults of the fine thread; absent on the virtual clock.
     pub page_faults: Option<PageFaults>,
     /// How often the queue ran low.
@@ -81,8 +93,13 @@ pub struct Summary {
     pub late_ratios: u64,
     /// Samples the recorder lost.
     pub lost_samples: u64,
-    /// Where the machine came to rest.
+    /// Files of the run that could not be written to their end.
+    pub record_errors: Vec<RecordError>,
+    /// Where the machine came to rest, linear axes.
     pub end_position_mm: BTreeMap<String, f64>,
+    /// The same of rotary axes, deg.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub end_position_deg: BTreeMap<String, f64>,
     /// Time the run took on the wall, s.
     pub wall_time_s: f64,
     /// Time spent in the rough loop a block, ns.
@@ -111,6 +128,52 @@ impl Summary {
         self.reference_time_s = Some(reference_time_s);
         self.time_ratio = whole.then_some(self.motion_time_s / reference_time_s);
     }
+}
+
+impl Summary {
+    /// What is to be known of a run that came to its end all the same, in words.
+    pub fn warnings(&self) -> Vec<String> {
+        if self.missed_periods == 0 && self.overruns == 0 {
+            return vec![];
+        }
+        let Self { missed_periods, overruns, samples, .. } = self;
+        let period_ms = self.fine_period_s * 1e3;
+        let mut words = format!("{missed_periods} fine periods went by without a sample beside {samples} with one");
+        if *overruns > 0 {
+            let work = if *overruns == 1 { "time the work of a period" } else { "times the work of a period" };
+            words += &format!("; {overruns} {work} went past its end");
+        }
+        let exchange = self.exchange_us.filter(|exchange| exchange.longer_than_period > 0);
+        let late_us = self.lateness_us.map_or(0.0, |late| late.max);
+        match exchange {
+            Some(ExchangeUs { max, longer_than_period }) => {
+                let (longest_ms, often) = (max / 1e3, longer_than_period);
+                words += &format!(": the driver's exchange took longer than the period of {period_ms} ms");
+                words += &format!(" {often} times, at most {longest_ms:.3} ms");
+            }
+            None if late_us >= period_ms * 1e3 => {
+                words += &format!(": the computer woke the fine loop up to {:.3} ms late", late_us / 1e3);
+            }
+            None => {}
+        }
+        vec![words]
+    }
+
+    /// How the periods of the fine loop were kept, in words; nothing on the virtual clock.
+    pub fn timing(&self) -> Option<String> {
+        let late_us = self.lateness_us?.max;
+        let Self { overruns, missed_periods, .. } = self;
+        Some(format!("overruns {overruns}, missed periods {missed_periods}, latest wake-up {late_us:.0} µs"))
+    }
+}
+
+/// How long the driver's exchange took of a fine period.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExchangeUs {
+    /// The longest, µs.
+    pub max: f64,
+    /// How many took longer than the fine period.
+    pub longer_than_period: u64,
 }
 
 /// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.

@@ -20,6 +20,9 @@ impl FeedStrategy for Once {
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
         let request = match (window.period == PERIOD, self.0.as_str()) {
             (true, "hold") => Request::Hold,
+            // For as long as its cause lasts.
+            _ if self.0 == "long hold" && (PERIOD..PERIOD + 40).contains(&window.period) => Request::Hold,
+            _ if self.0 == "long hold" && window.period == PERIOD + 60 => Request::Hold,
             (true, "fault") => Request::Fault(7),
             (true, "defect") => return Err(PluginError::fixed("it has lost its way")),
             _ => Request::None,
@@ -55,9 +58,13 @@ fn open_loaded(_options: &RawOptions, _context: &StrategyContext) -> Result<Load
 }
 
 #[derive(Default)]
-struct Samples(Vec<Sample>, Vec<String>);
+struct Samples(Vec<Sample>, Vec<String>, Vec<String>);
 
 impl RunObserver for Samples {
+    fn note(&mut self, note: &str) {
+        self.2.push(note.to_string());
+    }
+
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
         self.0.push(*sample);
     }
@@ -84,9 +91,14 @@ fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
     let program = Program::spool("line", &b"G21 G90\nF5000\nG1 X60\nM2\n"[..]).unwrap();
     let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
     let mut samples = Samples::default();
-    let commands: &[Timed] = if asks == "hold" { &[Timed::parse("400,resume").unwrap()] } else { &[] };
-    let commands = if clock == Clock::Virtual { commands } else { &[] };
-    let outcome = run.drive(clock, commands, &mut samples).unwrap();
+    let commands = match asks {
+        "hold" => vec!["400,resume"],
+        "long hold" => vec!["560,resume", "700,resume"],
+        _ => vec![],
+    };
+    let commands: Vec<_> = commands.into_iter().map(|line| Timed::parse(line).unwrap()).collect();
+    let commands = if clock == Clock::Virtual { commands } else { vec![] };
+    let outcome = run.drive(clock, &commands, &mut samples).unwrap();
     (outcome.summary, samples)
 }
 
@@ -98,6 +110,15 @@ fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
     assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "hold", Some(1)));
     assert_eq!(samples.1, [format!("{TICK},hold"), "400,resume".to_string()]);
     assert_eq!(summary.end_position_mm["x"], 60.0);
+}
+
+/// A strategy that asks in every period was told of in every period: thousands of lines a minute, without a reason.
+#[test]
+fn a_hold_that_is_asked_for_in_every_period_is_told_once() {
+    let (summary, samples) = driven("long hold", Clock::Virtual);
+    assert_eq!(summary.fault, None);
+    let line = |tick: u64| format!("line 3: the feed strategy once asks for a hold, at tick {tick}");
+    assert_eq!(samples.2, [line(TICK), line(TICK + 60 * 8)]);
 }
 
 #[test]

@@ -79,6 +79,7 @@ static MACHINE: &[Key] = &[
     key("driver.analog", "names", "[]", "Names of the driver's analog inputs from 0 on, at most 4: signals of trace and report"),
     key("faults.<fault>", "wrapper's", "none", "Seeded faults around the driver"),
     key("guard.mode", "stop or count", "stop", "What a sample beyond a limit does: stops the machine, or is counted (simulated drives only)"),
+    key("recorder.on_error", "continue or hold", "continue", "Whether the motion goes on or comes to rest where a file of the run cannot be written: a full disk"),
     key("policy.script", "file", "required", "Policy script, a WASM module; without the table there is none"),
     key("policy.fuel_per_call", "instructions", "20000", "Instructions that one call of the script may use; a window of blocks may use more"),
     key("policy.fuel_per_block", "instructions", "1000", "Instructions for each block of a window, on top"),

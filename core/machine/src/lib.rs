@@ -48,6 +48,6 @@ pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;
 pub use motion::{FineThread, JerkMode, Motion};
-pub use parts::{GuardMode, Operator, PluginChoice, Policy, Spindle};
+pub use parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle};
 pub use probe::Probe;
 pub use tools::{Tool, ToolTable};

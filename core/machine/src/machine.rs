@@ -13,7 +13,7 @@ use crate::load::Loader;
 use crate::motion::{FineThread, Loops, Motion};
 use crate::node::plain;
 use crate::overrides;
-use crate::parts::{GuardMode, Operator, PluginChoice, Policy, Spindle, analog_names, text};
+use crate::parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle, analog_names, text};
 use crate::places::Places;
 use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
@@ -68,6 +68,8 @@ pub struct Machine {
     pub faults: Option<toml::Table>,
     /// What the guard does.
     pub guard: GuardMode,
+    /// What the motion does where a file that the run writes cannot be written any further.
+    pub on_record_error: RecordErrorMode,
     /// Policy script, if there is one.
     pub policy: Option<Policy>,
     /// What the spindle may do.
@@ -158,6 +160,7 @@ struct Tables {
     analog: Vec<String>,
     faults: Option<toml::Table>,
     guard: GuardMode,
+    on_record_error: RecordErrorMode,
     policy: Option<Policy>,
     spindle: Spindle,
     probe: Option<Probe>,
@@ -181,6 +184,7 @@ impl Tables {
             analog: analog_names(&root.section("driver")),
             faults: optional("faults").and_then(|s| s.table().map(plain)),
             guard: GuardMode::read(&root.section("guard")),
+            on_record_error: RecordErrorMode::read(&root.section("recorder")),
             policy: optional("policy").and_then(|s| Policy::read(&s)),
             spindle: Spindle::read(&root.section("spindle")),
             probe: optional("probe").and_then(|s| Probe::read(&s)),
@@ -215,6 +219,7 @@ impl Tables {
             analog: self.analog,
             faults: self.faults,
             guard: self.guard,
+            on_record_error: self.on_record_error,
             policy: self.policy,
             spindle: self.spindle,
             probe: self.probe,

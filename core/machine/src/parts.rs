@@ -78,6 +78,23 @@ impl GuardMode {
     }
 }
 
+/// What the motion does where a file that the run writes cannot be written any further: a full disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RecordErrorMode {
+    /// It goes on without that file: a workpiece is worth more than its record.
+    #[default]
+    Continue,
+    /// It comes to rest on the path. Where somebody is there who can resume it waits for that, else the run ends.
+    Hold,
+}
+
+impl RecordErrorMode {
+    /// Reads `[recorder]`.
+    pub(crate) fn read(recorder: &Section<'_>) -> Self {
+        recorder.choice("on_error", &[("continue", Self::Continue), ("hold", Self::Hold)]).unwrap_or_default()
+    }
+}
+
 /// The policy script of the machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Policy {

@@ -225,10 +225,20 @@ impl Feedback {
     }
 }
 
-/// Talks to the drives. At most these six methods; `exchange` and `quick_stop` run on the fine loop.
+/// Talks to the drives. At most these seven methods; `exchange` and `quick_stop` run on the fine loop.
 pub trait Driver: Send {
     /// Simulated or real.
     fn describe(&self) -> DriverDescription;
+
+    /// Whether the options go with the machine: everything that can be told without hardware. It is asked before
+    /// [`Driver::open`], and by `tandem check`, which opens no driver: so it touches nothing, and writes nothing. Host; may
+    /// allocate. A driver whose options go with every machine leaves it out.
+    ///
+    /// # Errors
+    /// What does not go together, and which option it is ([`PluginError::of_option`]).
+    fn check(&self, _context: &DriverContext) -> Result<(), PluginError> {
+        Ok(())
+    }
 
     /// Claims the hardware. Host, before the loops; may allocate.
     ///

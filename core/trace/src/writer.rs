@@ -81,9 +81,27 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// `out` refuses.
     pub fn finish(mut self) -> io::Result<W> {
-        self.put(Kind::End, self.header, |_, _, _| {})?;
-        self.out.flush()?;
+        self.end()?;
         Ok(self.out)
+    }
+
+    /// Writes the closing record; nothing may follow it.
+    ///
+    /// # Errors
+    /// `out` refuses.
+    pub fn end(&mut self) -> io::Result<()> {
+        self.put(Kind::End, self.header, |_, _, _| {})?;
+        self.out.flush()
+    }
+
+    /// What the trace is written to.
+    pub fn out(&mut self) -> &mut W {
+        &mut self.out
+    }
+
+    /// What the trace was written to, without its closing record where [`Writer::end`] has not come before.
+    pub fn into_inner(self) -> W {
+        self.out
     }
 
     fn put(&mut self, kind: Kind, seed: u32, row: impl FnOnce(&History, Shape, &mut Vec<u8>)) -> io::Result<()> {

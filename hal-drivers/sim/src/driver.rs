@@ -94,10 +94,10 @@ impl SimulatedDrives {
         }
         let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
         match self.options.switches.iter().map(last_joint).find(|joint| *joint >= count) {
-            Some(joint) => Err(PluginError::new(format!(
-                "sim: options: switches: joint = {joint}: the machine has joints 0 to {}",
-                count - 1
-            ))),
+            Some(joint) => Err(PluginError::of_option(
+                "switches",
+                format!("joint = {joint}: the machine has joints 0 to {}", count - 1),
+            )),
             None => Ok(()),
         }
     }
@@ -238,6 +238,10 @@ fn servo(options: &Options, period_s: f64) -> Servo {
 impl Driver for SimulatedDrives {
     fn describe(&self) -> DriverDescription {
         DriverDescription::simulated()
+    }
+
+    fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
+        self.check_machine(context)
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {

@@ -49,6 +49,7 @@ impl Script {
             self.lines += 1;
             match parse(&text) {
                 Ok(Line::Reset) => return true,
+                Ok(Line::Quit) => return false,
                 Ok(Line::Nothing) => {}
                 _ => self.refuse(1, &format!("the machine is in fault; {} goes on", super::RESET)),
             }
@@ -94,6 +95,7 @@ impl Script {
             }
             Line::Where => self.shared.tell_position(),
             Line::Reset => return Err("there is no fault to reset".to_string()),
+            Line::Quit => self.shared.quit.store(true, Relaxed),
             Line::Command(command) => {
                 if let Some((desk, _)) = self.shared.desk() {
                     desk.give(*command)?;
@@ -155,7 +157,8 @@ impl JogHand for Hand {
         }
         let mut script = self.script();
         let Some(script) = script.as_mut().filter(|_| jogs.is_ready()) else { return };
-        while script.is_due(jogs) {
+        // What follows the word that ends the session is nobody's line.
+        while script.is_due(jogs) && !self.shared.is_over() {
             script.wait = Wait::Nothing;
             match script.input.next(script.may_wait) {
                 NextLine::Line(text) => script.take(&text, jogs),

@@ -1,7 +1,9 @@
-//! The lines of a pipe: `x+ 600`, `x-0.1 600`, `stop`, `wait 0.5`, `where`, and the operator's commands.
+//! The lines of a pipe: `x+ 600`, `x-0.1 600`, `stop`, `wait 0.5`, `where`, `quit`, and the operator's commands.
 
 use tandem_host::Command;
 use tandem_host::jog::{JogWords, ReachWords};
+
+use crate::mdi::conversation::is_farewell;
 
 /// What a line asks for.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +18,8 @@ pub enum Line {
     Where,
     /// Takes back a fault.
     Reset,
+    /// Ends the session, as the end of the input does.
+    Quit,
     /// A command as sockets and command files know it.
     Command(Command),
     /// An empty line.
@@ -53,6 +57,7 @@ pub fn parse(text: &str) -> Result<Line, Wrong> {
         "stop" => lone(Line::Stop),
         "where" => lone(Line::Where),
         super::RESET => lone(Line::Reset),
+        word if is_farewell(word) => lone(Line::Quit),
         "wait" => wait(second),
         _ => match motion(first) {
             None => Command::parse(first, second).map(Line::Command).map_err(|why| unknown(first, why)),
@@ -68,7 +73,7 @@ pub fn parse(text: &str) -> Result<Line, Wrong> {
 fn unknown(word: &str, why: String) -> String {
     if why.starts_with("no command") {
         return format!(
-            "{word:?} is no jog (x+ 600 or x-0.1 600), not stop, wait, where or {}, and {why}",
+            "{word:?} is no jog (x+ 600 or x-0.1 600), not stop, wait, where, quit or {}, and {why}",
             super::RESET
         );
     }
@@ -129,6 +134,8 @@ mod tests {
             ("wait 0.5", Line::Wait(0.5)),
             ("where", Line::Where),
             ("!reset", Line::Reset),
+            ("quit", Line::Quit),
+            (" EXIT ", Line::Quit),
             ("hold", Line::Command(Command::Hold)),
             ("feed-override 0.5", Line::Command(Command::FeedOverride(0.5))),
             ("", Line::Nothing),

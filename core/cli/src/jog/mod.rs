@@ -14,6 +14,7 @@ use tandem_host::{Clock, Run, RunObserver, Summary, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
+use crate::broken::Broken;
 use crate::operator::{Keyboard, Operator, Presence, Signals, is_on_terminal};
 use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in};
@@ -51,8 +52,10 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         }
     };
     drop(keyboard);
-    sinks.trace.map_or(Ok(()), TraceSink::finish)?;
-    Ok(if faulted { FAULT } else { u8::from(shared.has_refused()) * REFUSED })
+    let Sinks { trace, mut broken, .. } = sinks;
+    broken.note(trace.map_or(Ok(()), TraceSink::finish));
+    broken.tell();
+    Ok(if faulted || broken.is_any() { FAULT } else { u8::from(shared.has_refused()) * REFUSED })
 }
 
 fn take_keys(shared: &Arc<Shared>, jogs: &Arc<Jogs>) -> Result<Keyboard, String> {
@@ -76,13 +79,23 @@ struct Sinks {
     /// Tick of the session at which the run began: a trace goes on after a reset.
     first_tick: u64,
     next_tick: u64,
-    /// What the computer did not grant has been said.
-    noted: bool,
+    /// What has been said: what the computer does not grant is said once, not in every run.
+    noted: Vec<String>,
+    /// The trace, where it could not be written to its end.
+    broken: Broken,
 }
 
 impl Sinks {
     fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, trace: None, operator: None, first_tick: 0, next_tick: 0, noted: false }
+        Self {
+            shared,
+            trace: None,
+            operator: None,
+            first_tick: 0,
+            next_tick: 0,
+            noted: vec![],
+            broken: Broken::default(),
+        }
     }
 
     fn begin(&mut self, options: &args::Jog, machine: &Machine, jogs: &Arc<Jogs>, run: &Run) -> Result<(), String> {
@@ -104,13 +117,17 @@ impl Sinks {
         if let Some(mut operator) = self.operator.take() {
             operator.end(&summary);
         }
-        self.noted = true;
     }
 }
 
 impl RunObserver for Sinks {
+    fn broken_record(&mut self) -> Option<String> {
+        self.broken.tell()
+    }
+
     fn note(&mut self, note: &str) {
-        if !self.noted {
+        if !self.noted.iter().any(|said| said == note) {
+            self.noted.push(note.to_string());
             self.shared.say(note);
         }
     }
@@ -121,7 +138,7 @@ impl RunObserver for Sinks {
 
     fn command(&mut self, command: &Timed) {
         if let Some(trace) = &mut self.trace {
-            trace.command(&Timed { tick: self.first_tick + command.tick, ..*command });
+            self.broken.note(trace.command(&Timed { tick: self.first_tick + command.tick, ..*command }));
         }
     }
 
@@ -133,7 +150,7 @@ impl RunObserver for Sinks {
             operator.sample(&sample, 1.0);
         }
         if let Some(trace) = &mut self.trace {
-            trace.sample(&sample, signals);
+            self.broken.note(trace.sample(&sample, signals));
         }
     }
 }

@@ -35,6 +35,7 @@ impl Shared {
     /// Nothing said yet.
     pub fn new(real_time: bool, keys: bool) -> Self {
         if keys {
+            say!("a line of G-code is driven when it is complete; quit, exit or Ctrl-D ends the session");
             Keyboard::explain();
         }
         Self {
@@ -68,12 +69,15 @@ impl Shared {
             inner.prompted = false;
             drop(inner);
             match next {
+                NextLine::Line(line) if is_farewell(&line) => return false,
                 NextLine::Line(line) if line.trim() == RESET => {
                     self.fault.store(false, Relaxed);
                     return true;
                 }
                 NextLine::Line(line) if line.trim().is_empty() => {}
-                NextLine::Line(_) => self.refuse(&format!("the machine is in fault; {RESET} goes on")),
+                NextLine::Line(_) => {
+                    self.refuse(&format!("the machine is in fault; {RESET} goes on, quit ends the session"))
+                }
                 NextLine::Later | NextLine::Over => return false,
             }
         }
@@ -110,6 +114,12 @@ impl Inner {
     }
 }
 
+/// Whether a line is a word that ends a session.
+pub fn is_farewell(line: &str) -> bool {
+    let word = line.trim();
+    word.eq_ignore_ascii_case("quit") || word.eq_ignore_ascii_case("exit")
+}
+
 /// The dialogue of a session.
 pub struct Conversation {
     shared: Arc<Shared>,
@@ -133,6 +143,7 @@ impl Dialogue for Conversation {
         let next = inner.input.next(!self.shared.real_time);
         inner.prompted &= next == NextLine::Later;
         match next {
+            NextLine::Line(line) if is_farewell(&line) => NextLine::Over,
             NextLine::Line(line) if line.trim() == RESET => {
                 drop(inner);
                 self.shared.refuse("there is no fault to reset");

@@ -1,6 +1,6 @@
 //! `tandem mdi`: manual input.
 
-mod conversation;
+pub mod conversation;
 pub mod input;
 
 use std::error::Error;
@@ -10,6 +10,7 @@ use tandem_host::{Clock, Run, RunObserver, Session, StopAnswer, Switches, Timed}
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
 
+use crate::broken::Broken;
 use crate::operator::{Operator, Presence, is_on_terminal};
 use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in};
@@ -36,7 +37,8 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     let conversation = Conversation::new(Arc::clone(&shared), machine.axes);
     let mut session = Session::new(machine.clone(), &registry, switches, Box::new(conversation))?;
     let clock = if real_time { Clock::Wall } else { Clock::Virtual };
-    let mut sinks = Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: false };
+    let mut sinks =
+        Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: vec![], broken: Broken::default() };
     let mut faulted = false;
     while !faulted || shared.is_reset() {
         let run = session.enable()?;
@@ -49,8 +51,11 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         faulted = true;
         say!("fault: {fault}; {RESET} goes on from here");
     }
-    sinks.trace.map_or(Ok(()), TraceSink::finish)?;
-    let status = if shared.ended_in_fault() { FAULT } else { u8::from(shared.has_refused()) * REFUSED };
+    let Sinks { trace, mut broken, .. } = sinks;
+    broken.note(trace.map_or(Ok(()), TraceSink::finish));
+    broken.tell();
+    let status =
+        if shared.ended_in_fault() || broken.is_any() { FAULT } else { u8::from(shared.has_refused()) * REFUSED };
     Ok(status)
 }
 
@@ -61,8 +66,10 @@ struct Sinks {
     /// Tick of the session at which the run began: a trace goes on after a reset.
     first_tick: u64,
     next_tick: u64,
-    /// What the computer did not grant has been said.
-    noted: bool,
+    /// What has been said: what the computer does not grant is said once, not in every run.
+    noted: Vec<String>,
+    /// The trace, where it could not be written to its end.
+    broken: Broken,
 }
 
 impl Sinks {
@@ -88,13 +95,17 @@ impl Sinks {
         if let Some(mut operator) = self.operator.take() {
             operator.end(summary);
         }
-        self.noted = true;
     }
 }
 
 impl RunObserver for Sinks {
+    fn broken_record(&mut self) -> Option<String> {
+        self.broken.tell()
+    }
+
     fn note(&mut self, note: &str) {
-        if !self.noted {
+        if !self.noted.iter().any(|said| said == note) {
+            self.noted.push(note.to_string());
             say!("{note}");
         }
     }
@@ -115,7 +126,7 @@ impl RunObserver for Sinks {
 
     fn command(&mut self, command: &Timed) {
         if let Some(trace) = &mut self.trace {
-            trace.command(&Timed { tick: self.first_tick + command.tick, ..*command });
+            self.broken.note(trace.command(&Timed { tick: self.first_tick + command.tick, ..*command }));
         }
     }
 
@@ -126,7 +137,7 @@ impl RunObserver for Sinks {
             operator.sample(&sample, 1.0);
         }
         if let Some(trace) = &mut self.trace {
-            trace.sample(&sample, signals);
+            self.broken.note(trace.sample(&sample, signals));
         }
     }
 }

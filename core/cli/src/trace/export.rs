@@ -23,7 +23,7 @@ pub fn export(trace: &Path, csv: &Path, commands: Option<&Path>) -> Result<u8, B
     let mut csv = TraceCsv::of_axes(csv, header.axes, header.fine_period_s, &signals)?;
     let count = signals.len();
     while let Some(record) = trace.next()? {
-        csv.sample(&record.sample, &record.signals[..count]);
+        csv.sample(&record.sample, &record.signals[..count])?;
     }
     csv.finish()?;
     if let Some(path) = commands {

@@ -1,27 +1,40 @@
-//! Command samples of a trace in either format.
+//! Samples of a trace in either format, column by column.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use tandem_host::TraceCsv;
-use tandem_trace::MAGIC;
+use tandem_trace::{MAGIC, Record};
 
 use super::binary::Binary;
 use super::sink::is_binary_name;
 
-/// One command sample.
+/// The column of a trace that holds words; all others hold numbers.
+const STATE: &str = "state";
+
+/// What stands in a column of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(Cow<'static, str>),
+}
+
+/// One sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Number of the fine period, where it is known.
     pub tick: Option<u64>,
     /// Its time, s.
     pub t_s: f64,
-    /// One value for each of the columns.
-    pub values: Vec<f64>,
+    /// One for each of the columns.
+    pub cells: Vec<Cell>,
 }
 
-/// A trace whose command samples are read.
+/// A trace whose samples are read.
 pub enum Samples {
     /// In the binary format.
     Binary(Box<Binary>),
@@ -49,39 +62,41 @@ impl Samples {
         matches!(self, Self::Binary(_))
     }
 
-    /// Names of the command columns; `shown` as in a CSV, in degrees, instead of as stored, in rad.
+    /// Names of the columns, without that of time; `shown` as in a CSV, where rotary axes are in degrees and blocks have
+    /// no column, instead of as stored.
     pub fn columns(&self, shown: bool) -> Vec<String> {
         match self {
             Self::Csv(csv) => csv.columns.iter().map(|(name, _)| name.clone()).collect(),
             Self::Binary(binary) => {
-                let axes = binary.header().axes;
+                let header = binary.header();
+                let axes = header.axes;
                 let unit = |axis| match (axes.is_rotary(axis), shown) {
                     (false, _) => "mm",
                     (true, true) => "deg",
                     (true, false) => "rad",
                 };
-                let name = |axis| format!("{}_cmd_{}", axes.letter(axis).to_ascii_lowercase(), unit(axis));
-                (0..axes.count()).map(name).collect()
+                let mut names: Vec<String> =
+                    ["block", "line"][usize::from(shown)..].iter().map(|n| (*n).into()).collect();
+                for kind in ["cmd", "fb"] {
+                    let name = |axis| format!("{}_{kind}_{}", axes.letter(axis).to_ascii_lowercase(), unit(axis));
+                    names.extend((0..axes.count()).map(name));
+                }
+                names.extend(["feed_mm_s", "sigma", STATE, "ratio"].map(String::from));
+                names.extend(header.signals.iter().map(|signal| format!("sig_{signal}")));
+                names
             }
         }
     }
 
-    /// The next row; `shown` as in a CSV, in degrees, instead of as stored, in rad.
+    /// The next row; `shown` as for [`Samples::columns`].
     ///
     /// # Errors
     /// The path with the place and the cause.
     pub fn next(&mut self, shown: bool) -> Result<Option<Row>, String> {
-        let binary = match self {
-            Self::Csv(csv) => return csv.next(),
-            Self::Binary(binary) => binary,
-        };
-        let Some(record) = binary.next()? else { return Ok(None) };
-        let (axes, period_s) = (binary.header().axes, binary.header().fine_period_s);
-        let command = record.sample.command;
-        let value = |axis| if axes.is_rotary(axis) && shown { command[axis].to_degrees() } else { command[axis] };
-        let values = (0..axes.count()).map(value).collect();
-        let tick = record.sample.tick;
-        Ok(Some(Row { tick: Some(tick), t_s: TraceCsv::t_s(tick, period_s), values }))
+        match self {
+            Self::Csv(csv) => csv.next(),
+            Self::Binary(binary) => Ok(binary.next()?.map(|record| row(binary, &record, shown))),
+        }
     }
 
     /// Exit status once all is read: 1 where not every sample could be, which is then said.
@@ -93,12 +108,30 @@ impl Samples {
     }
 }
 
+/// The row of a record of a binary trace.
+fn row(binary: &Binary, record: &Record, shown: bool) -> Row {
+    let header = binary.header();
+    let (axes, sample) = (header.axes, &record.sample);
+    let mut numbers = if shown { vec![] } else { vec![sample.block as f64] };
+    numbers.push(f64::from(sample.line));
+    for position in [&sample.command, &sample.feedback] {
+        let value = |axis| if axes.is_rotary(axis) && shown { position[axis].to_degrees() } else { position[axis] };
+        numbers.extend((0..axes.count()).map(value));
+    }
+    numbers.extend([sample.feed_mm_per_s, sample.sigma]);
+    let mut cells: Vec<Cell> = numbers.into_iter().map(Cell::Number).collect();
+    cells.push(Cell::Word(sample.state.name().into()));
+    let behind = [&[sample.ratio], &record.signals[..header.signals.len()]].concat();
+    cells.extend(behind.into_iter().map(Cell::Number));
+    Row { tick: Some(sample.tick), t_s: TraceCsv::t_s(sample.tick, header.fine_period_s), cells }
+}
+
 /// A trace CSV.
 pub struct Csv {
     path: PathBuf,
     rows: csv::StringRecordsIntoIter<File>,
     time: usize,
-    /// Name and place of each command column.
+    /// Name and place of each column but that of time.
     columns: Vec<(String, usize)>,
     /// Time of the row before, s.
     last_t_s: Option<f64>,
@@ -113,8 +146,8 @@ impl Csv {
         let head = reader.headers().map_err(say)?;
         let time = head.iter().position(|name| name == "t_s");
         let time = time.ok_or_else(|| format!("{}: no trace: it has no column t_s", path.display()))?;
-        let commands = head.iter().enumerate().filter(|(_, name)| name.contains("_cmd_"));
-        let columns = commands.map(|(index, name)| (name.to_string(), index)).collect();
+        let others = head.iter().enumerate().filter(|(index, _)| *index != time);
+        let columns = others.map(|(index, name)| (name.to_string(), index)).collect();
         let rows = reader.into_records();
         Ok(Self { path: path.to_owned(), rows, time, columns, last_t_s: None, period_s: None })
     }
@@ -127,11 +160,18 @@ impl Csv {
             let line = row.position().map_or(0, csv::Position::line);
             text.parse::<f64>().map_err(|_| format!("{}:{line}: {text:?} is no number", self.path.display()))
         };
+        let cell = |(name, index): &(String, usize)| {
+            if name == STATE {
+                Ok(Cell::Word(row[*index].to_string().into()))
+            } else {
+                number(*index).map(Cell::Number)
+            }
+        };
         let t_s = number(self.time)?;
-        let values = self.columns.iter().map(|(_, index)| number(*index)).collect::<Result<_, _>>()?;
+        let cells = self.columns.iter().map(cell).collect::<Result<_, _>>()?;
         self.period_s = self.period_s.or_else(|| self.last_t_s.map(|last_t_s| t_s - last_t_s));
         self.last_t_s = Some(t_s);
         let tick = if t_s == 0.0 { Some(0) } else { self.period_s.map(|period_s| (t_s / period_s).round() as u64) };
-        Ok(Some(Row { tick, t_s, values }))
+        Ok(Some(Row { tick, t_s, cells }))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, Run, Timed, TraceCsv};
+use tandem_host::{Output, RecordError, Run, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_trace::{Header, Writer};
@@ -15,8 +15,8 @@ pub enum TraceSink {
     Binary {
         /// Writes it.
         writer: Box<Writer<Output>>,
-        /// The first record that could not be written, in words.
-        failed: Option<String>,
+        /// It has been told that no further record can be written.
+        failed: bool,
     },
 }
 
@@ -40,34 +40,50 @@ impl TraceSink {
             signals: signals.iter().map(ToString::to_string).collect(),
         };
         let writer = Writer::new(Output::create(path)?, &header).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self::Binary { writer: Box::new(writer), failed: None })
+        Ok(Self::Binary { writer: Box::new(writer), failed: false })
     }
 
-    /// Adds a sample.
-    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) {
+    /// Adds a sample. After an error all further ones are left out.
+    ///
+    /// # Errors
+    /// Once: no further sample can be written.
+    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) -> Result<(), RecordError> {
         match self {
             Self::Csv(csv) => csv.sample(sample, signals),
-            Self::Binary { failed: Some(_), .. } => {}
-            Self::Binary { writer, failed } => *failed = writer.sample(sample, signals).err().map(|e| e.to_string()),
+            Self::Binary { failed: true, .. } => Ok(()),
+            Self::Binary { writer, failed } => writer.sample(sample, signals).map_err(|error| {
+                *failed = true;
+                RecordError::of("trace", writer.out(), error).at(sample)
+            }),
         }
     }
 
     /// Adds a command of the operator; a CSV has no place for it.
-    pub fn command(&mut self, command: &Timed) {
-        if let Self::Binary { writer, failed: failed @ None } = self {
-            *failed = writer.command(&command.to_string()).err().map(|e| e.to_string());
+    ///
+    /// # Errors
+    /// As [`TraceSink::sample`].
+    pub fn command(&mut self, command: &Timed) -> Result<(), RecordError> {
+        match self {
+            Self::Csv(_) | Self::Binary { failed: true, .. } => Ok(()),
+            Self::Binary { writer, failed } => writer.command(&command.to_string()).map_err(|error| {
+                *failed = true;
+                RecordError { tick: Some(command.tick), ..RecordError::of("trace", writer.out(), error) }
+            }),
         }
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The first sample that could not be written, or the file cannot take its name.
-    pub fn finish(self) -> Result<(), String> {
+    /// The last samples cannot be written, or the file cannot take its name. What has been told is not told again.
+    pub fn finish(self) -> Result<(), RecordError> {
         match self {
             Self::Csv(csv) => csv.finish(),
-            Self::Binary { failed: Some(error), .. } => Err(format!("trace: {error}")),
-            Self::Binary { writer, .. } => writer.finish().map_err(|e| format!("trace: {e}"))?.finish(),
+            Self::Binary { failed: true, .. } => Ok(()),
+            Self::Binary { mut writer, .. } => match writer.end() {
+                Ok(()) => writer.into_inner().finish_record("trace"),
+                Err(error) => Err(RecordError::of("trace", writer.out(), error)),
+            },
         }
     }
 }

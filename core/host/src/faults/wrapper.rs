@@ -74,6 +74,10 @@ impl Driver for Wrapper {
         self.inner.describe()
     }
 
+    fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
+        self.inner.check(context)
+    }
+
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         self.inner.open(context)
     }

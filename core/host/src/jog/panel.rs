@@ -10,7 +10,7 @@ use tandem_rings::{Controls, Rest};
 use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, Planner};
 
 use super::{Jog, JogEnd, JogRest, Reach};
-use crate::run::check_block;
+use crate::ready::check_block;
 
 /// Steps that may wait behind the one that moves.
 const MOST_WAITING: usize = 16;

@@ -9,15 +9,41 @@ use tandem_sdk::AxisVector;
 use super::JointSpace;
 use crate::monitor::raise;
 
-/// What one joint did, as finite differences of the samples; deg for mm where it turns.
+/// What one joint did, as finite differences of the samples: the largest magnitudes. What it is called names its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct JointPeaks {
-    /// Largest |velocity|, mm/s.
-    pub max_velocity_mm_s: f64,
-    /// Largest |acceleration|, mm/s².
-    pub max_acceleration_mm_s2: f64,
-    /// Largest |jerk|, mm/s³.
-    pub max_jerk_mm_s3: f64,
+#[serde(untagged)]
+pub enum JointPeaks {
+    /// A joint that slides.
+    Linear {
+        /// Largest |velocity|, mm/s.
+        max_velocity_mm_s: f64,
+        /// Largest |acceleration|, mm/s².
+        max_acceleration_mm_s2: f64,
+        /// Largest |jerk|, mm/s³.
+        max_jerk_mm_s3: f64,
+    },
+    /// A joint that turns.
+    Rotary {
+        /// Largest |velocity|, deg/s.
+        max_velocity_deg_s: f64,
+        /// Largest |acceleration|, deg/s².
+        max_acceleration_deg_s2: f64,
+        /// Largest |jerk|, deg/s³.
+        max_jerk_deg_s3: f64,
+    },
+}
+
+impl JointPeaks {
+    /// Velocity, acceleration and jerk, mm and s.
+    fn linear([max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3]: [f64; 3]) -> Self {
+        Self::Linear { max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3 }
+    }
+
+    /// Velocity, acceleration and jerk, rad and s.
+    fn rotary(peaks: [f64; 3]) -> Self {
+        let [max_velocity_deg_s, max_acceleration_deg_s2, max_jerk_deg_s3] = peaks.map(f64::to_degrees);
+        Self::Rotary { max_velocity_deg_s, max_acceleration_deg_s2, max_jerk_deg_s3 }
+    }
 }
 
 /// Watches the joints of a run, with rest before the first sample.
@@ -51,9 +77,8 @@ impl JointWatch {
     /// Peaks by the names of the joints.
     pub fn peaks(&self) -> BTreeMap<String, JointPeaks> {
         let each = self.space.joints.iter().enumerate().map(|(i, joint)| {
-            let [max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3] =
-                self.peaks.map(|peak| if joint.rotary { peak[i].to_degrees() } else { peak[i] });
-            (joint.name.clone(), JointPeaks { max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3 })
+            let peaks = self.peaks.map(|peak| peak[i]);
+            (joint.name.clone(), if joint.rotary { JointPeaks::rotary(peaks) } else { JointPeaks::linear(peaks) })
         });
         each.collect()
     }

@@ -1,18 +1,21 @@
 //! The blocks as they were driven.
 
+use std::io::Write;
 use std::path::Path;
 
 use tandem_machine::Machine;
 use tandem_sdk::{Axes, Block, BlockKind, BlockReport, LimitedBy};
 
+use super::failure::RecordError;
 use super::output::Output;
 
 /// Writes a blocks CSV.
 pub struct BlocksCsv {
-    writer: csv::Writer<Output>,
+    out: Output,
     axes: Axes,
     rapid_mm_per_s: Vec<f64>,
-    failed: Option<String>,
+    /// It has been told that no further row can be written.
+    failed: bool,
 }
 
 impl BlocksCsv {
@@ -21,37 +24,41 @@ impl BlocksCsv {
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine) -> Result<Self, String> {
-        let mut writer = csv::Writer::from_writer(Output::create(path)?);
+        let mut out = Output::create(path)?;
         let columns = "index,line,kind,length_mm,feed_mm_s,start_feed_mm_s,peak_feed_mm_s,end_feed_mm_s,time_s,time_constant_ms,limited_by";
         let mut head: Vec<String> = columns.split(',').map(str::to_string).collect();
         for axis in 0..machine.axes.count() {
             let unit = if machine.axes.is_rotary(axis) { "deg" } else { "mm" };
             head.push(format!("{}_end_{unit}", machine.axes.letter(axis).to_ascii_lowercase()));
         }
-        writer.write_record(&head).map_err(|e| format!("{}: {e}", path.display()))?;
+        writeln!(out, "{}", head.join(",")).map_err(|e| format!("{}: {e}", path.display()))?;
         let rapid_mm_per_s = machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect();
-        Ok(Self { writer, axes: machine.axes, rapid_mm_per_s, failed: None })
+        Ok(Self { out, axes: machine.axes, rapid_mm_per_s, failed: false })
     }
 
-    /// Adds a block.
-    pub fn block(&mut self, block: &Block, report: &BlockReport) {
-        let row = self.row(block, report);
-        if self.failed.is_none()
-            && let Err(error) = self.writer.write_record(&row)
-        {
-            self.failed = Some(error.to_string());
+    /// Adds a block. After an error all further ones are left out.
+    ///
+    /// # Errors
+    /// Once: no further row can be written.
+    pub fn block(&mut self, block: &Block, report: &BlockReport) -> Result<(), RecordError> {
+        if self.failed {
+            return Ok(());
         }
+        // Names and numbers: nothing that a CSV would have to quote.
+        let row = self.row(block, report).join(",");
+        writeln!(self.out, "{row}").map_err(|error| {
+            self.failed = true;
+            RecordError { line: Some(block.line), ..RecordError::of("blocks", &mut self.out, error) }
+        })
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The first row that could not be written, or the file cannot take its name.
-    pub fn finish(self) -> Result<(), String> {
-        match self.failed {
-            Some(error) => Err(format!("blocks: {error}")),
-            None => self.writer.into_inner().map_err(|e| format!("blocks: {e}"))?.finish(),
-        }
+    /// The last rows cannot be written, or the file cannot take its name. What [`BlocksCsv::block`] has told is not told
+    /// again.
+    pub fn finish(self) -> Result<(), RecordError> {
+        if self.failed { Ok(()) } else { self.out.finish_record("blocks") }
     }
 
     fn row(&self, block: &Block, report: &BlockReport) -> Vec<String> {

@@ -1,10 +1,12 @@
 //! What a run leaves behind: trace, blocks, and files that appear only when they are complete.
 
 mod blocks_csv;
+mod failure;
 mod output;
 mod trace_csv;
 
 pub use blocks_csv::BlocksCsv;
 pub(crate) use blocks_csv::limited_by;
+pub use failure::RecordError;
 pub use output::Output;
 pub use trace_csv::TraceCsv;

@@ -1,22 +1,36 @@
-//! Files that a run writes. What exists is replaced only when the new content is complete.
+//! Files that a run writes, and standard output as one. What exists is replaced only when the new content is complete.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
+use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+
+use super::failure::RecordError;
+
+/// The name that stands for standard output.
+const STANDARD_OUTPUT: &str = "-";
 
 /// A file in the making, beside the one it will become. What is no regular file (a device, a pipe) is written directly.
 pub struct Output {
     path: PathBuf,
     part: Option<PathBuf>,
     writer: Option<BufWriter<File>>,
+    /// The file that is not complete stays beside the one that it would have become.
+    keeps: bool,
 }
 
 impl Output {
-    /// Starts a file at `path`.
+    /// Starts a file at `path`; `-` is standard output.
     ///
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path) -> Result<Self, String> {
+        if path.as_os_str() == STANDARD_OUTPUT {
+            let handle = io::stdout().as_fd().try_clone_to_owned();
+            let file = handle.map_err(|e| format!("standard output cannot be written: {e}"))?;
+            let writer = Some(BufWriter::with_capacity(1 << 16, File::from(file)));
+            return Ok(Self { path: "standard output".into(), part: None, writer, keeps: false });
+        }
         // A link stays a link: the file that it leads to is the one to replace.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let special = fs::metadata(&path).is_ok_and(|found| !found.is_file());
@@ -26,7 +40,36 @@ impl Output {
             None => OpenOptions::new().write(true).open(&path),
         };
         let file = file.map_err(|e| format!("{}: it cannot be written: {e}", path.display()))?;
-        Ok(Self { path, part, writer: Some(BufWriter::with_capacity(1 << 16, file)) })
+        Ok(Self { path, part, writer: Some(BufWriter::with_capacity(1 << 16, file)), keeps: false })
+    }
+
+    /// Takes room for the first `bytes` now, so that they can be written when the disk has become full. What is no regular
+    /// file has none to take.
+    ///
+    /// # Errors
+    /// The path with the system's words: there is no room for them now.
+    pub fn reserve(&mut self, bytes: u64) -> Result<(), String> {
+        let (Some(_), Some(writer)) = (&self.part, &mut self.writer) else { return Ok(()) };
+        let file = writer.get_mut();
+        let taken = rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, bytes);
+        // Not every file system knows how: then the room is written.
+        let taken = taken.map_err(io::Error::from).or_else(|_| {
+            io::copy(&mut io::Read::take(io::repeat(b' '), bytes), file)?;
+            file.rewind()
+        });
+        taken.map_err(|e| format!("{}: it cannot be written: {e}", self.path.display()))
+    }
+
+    /// What it becomes.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// From now on what is written stays, also where the file never takes its name. Where it lies meanwhile; none for what
+    /// is written directly.
+    pub fn keep(&mut self) -> Option<&Path> {
+        self.keeps = true;
+        self.part.as_deref()
     }
 
     /// Everything is written: the file takes its name.
@@ -34,12 +77,52 @@ impl Output {
     /// # Errors
     /// The path with the system's words.
     pub fn finish(mut self) -> Result<(), String> {
-        let named = self.close().and_then(|()| self.part.as_ref().map_or(Ok(()), |part| fs::rename(part, &self.path)));
-        named.map_err(|e| format!("{}: {e}", self.path.display()))
+        self.close().and_then(|()| self.name()).map_err(|e| format!("{}: {e}", self.path.display()))
     }
 
-    fn close(&mut self) -> io::Result<()> {
-        self.writer.take().map_or(Ok(()), |mut writer| writer.flush())
+    /// [`Output::finish`] for `what` of a run: where it fails, what is written stays.
+    ///
+    /// # Errors
+    /// What could not be written, and where the rest is.
+    pub fn finish_record(mut self, what: &'static str) -> Result<(), RecordError> {
+        let written = self.close().and_then(|()| self.name());
+        written.map_err(|error| RecordError::of(what, &mut self, error))
+    }
+
+    fn name(&self) -> io::Result<()> {
+        self.part.as_ref().map_or(Ok(()), |part| fs::rename(part, &self.path))
+    }
+
+    /// Everything is written, or as much as can be: the first error is also that of [`Output::finish`].
+    ///
+    /// # Errors
+    /// The system's words.
+    pub fn close(&mut self) -> io::Result<()> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        writer.flush()?;
+        // Of the room that was taken what is not used goes back.
+        if self.part.is_some() {
+            let file = writer.get_mut();
+            let end = file.stream_position()?;
+            file.set_len(end)?;
+        }
+        self.writer = None;
+        Ok(())
+    }
+
+    /// Begins again from the first byte.
+    ///
+    /// # Errors
+    /// The system's words.
+    pub fn begin_again(&mut self) -> io::Result<()> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        // What could not be written is given up.
+        let (mut file, _) = writer.into_parts();
+        if self.part.is_some() {
+            file.rewind()?;
+        }
+        self.writer = Some(BufWriter::with_capacity(1 << 16, file));
+        Ok(())
     }
 }
 
@@ -61,7 +144,10 @@ impl Write for Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        if let (Some(_), Some(part)) = (self.writer.take(), &self.part) {
+        let Some(writer) = self.writer.take() else { return };
+        // What could not be written is not tried once more.
+        drop(writer.into_parts());
+        if let (false, Some(part)) = (self.keeps, &self.part) {
             let _ = fs::remove_file(part);
         }
     }

@@ -7,6 +7,7 @@ use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::Axes;
 
+use super::failure::RecordError;
 use super::output::Output;
 
 /// Writes a trace CSV.
@@ -14,7 +15,8 @@ pub struct TraceCsv {
     out: Output,
     axes: Axes,
     period_s: f64,
-    failed: Option<String>,
+    /// It has been told that no further row can be written.
+    failed: bool,
 }
 
 impl TraceCsv {
@@ -34,27 +36,30 @@ impl TraceCsv {
         let mut out = Output::create(path)?;
         let head = head(&axes, signals);
         writeln!(out, "{head}").map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { out, axes, period_s: fine_period_s, failed: None })
+        Ok(Self { out, axes, period_s: fine_period_s, failed: false })
     }
 
-    /// Adds a row.
-    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) {
-        if self.failed.is_none()
-            && let Err(error) = self.row(sample, signals)
-        {
-            self.failed = Some(error.to_string());
+    /// Adds a row. After an error all further ones are left out.
+    ///
+    /// # Errors
+    /// Once: no further row can be written.
+    pub fn sample(&mut self, sample: &Sample, signals: &[f64]) -> Result<(), RecordError> {
+        if self.failed {
+            return Ok(());
         }
+        self.row(sample, signals).map_err(|error| {
+            self.failed = true;
+            RecordError::of("trace", &mut self.out, error).at(sample)
+        })
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The first row that could not be written, or the file cannot take its name.
-    pub fn finish(self) -> Result<(), String> {
-        match self.failed {
-            Some(error) => Err(format!("trace: {error}")),
-            None => self.out.finish(),
-        }
+    /// The last rows cannot be written, or the file cannot take its name. What [`TraceCsv::sample`] has told is not told
+    /// again.
+    pub fn finish(self) -> Result<(), RecordError> {
+        if self.failed { Ok(()) } else { self.out.finish_record("trace") }
     }
 
     /// The time at which a tick stands in the trace, s.

@@ -19,6 +19,7 @@ pub struct Table {
     open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
     close: unsafe extern "C" fn(*mut c_void),
     describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
+    check: unsafe extern "C" fn(*const c_void, *const DriverContext, *mut (), Errors) -> u32,
     claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
     start: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
     exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
@@ -52,6 +53,7 @@ where
         open: Self::open,
         close: entry::close::<T>,
         describe: describe::<T>,
+        check: check::<T>,
         claim: claim::<T>,
         start: start::<T>,
         exchange: exchange::<T>,
@@ -76,6 +78,16 @@ where
 unsafe extern "C" fn describe<T: Driver>(this: *const c_void, answer: *mut DriverDescription, error: Errors) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
     unsafe { this.fault.guard("describe", answer, error, || Ok(this.plugin.describe())) }
+}
+
+unsafe extern "C" fn check<T: Driver>(
+    this: *const c_void,
+    context: *const DriverContext,
+    answer: *mut (),
+    error: Errors,
+) -> u32 {
+    let this = unsafe { &*this.cast::<Instance<T>>() };
+    unsafe { this.fault.guard("check", answer, error, || this.plugin.check(&*context)) }
 }
 
 unsafe extern "C" fn claim<T: Driver>(
@@ -138,6 +150,10 @@ impl Driver for Linked {
         let asked = ask(|answer, error| unsafe { (self.table.describe)(self.handle.instance, answer, error) });
         // It has panicked, and says so when it is opened.
         asked.unwrap_or_else(|_| DriverDescription::real())
+    }
+
+    fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
+        ask(|answer, error| unsafe { (self.table.check)(self.handle.instance, context, answer, error) })
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {

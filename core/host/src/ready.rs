@@ -1,0 +1,169 @@
+//! Everything of a run that can be made and checked before the drives are claimed: what a run and a check share.
+
+use std::sync::Arc;
+
+use tandem_gcode::{CheckReport, Program, Stream, check};
+use tandem_machine::Machine;
+use tandem_rough::Source;
+use tandem_sdk::{Block, Driver, Planner};
+
+use crate::error::HostError;
+use crate::joints::JointSpace;
+use crate::policy::PolicyHost;
+use crate::registry::Registry;
+use crate::run::Switches;
+use crate::strategy::FeedRunner;
+use crate::{faults, rules, setup};
+
+/// Everything that a run needs, made and checked; the drives are not claimed. Whatever refuses a run without asking the
+/// drives refuses it here, so that a check finds all of it.
+pub struct Ready {
+    pub machine: Machine,
+    pub program: String,
+    pub source: Box<dyn Source + Send>,
+    pub policy: Option<PolicyHost>,
+    pub planner: Box<dyn Planner>,
+    pub driver: Box<dyn Driver>,
+    pub feed: Option<FeedRunner>,
+    pub joints: Arc<JointSpace>,
+    pub kinematics: JointSpace,
+    pub checked: CheckReport,
+    pub switches: Switches,
+    pub records_drives: bool,
+}
+
+/// Planner and driver of a machine, as they are made for a run.
+pub struct Plugins {
+    pub planner: Box<dyn Planner>,
+    pub driver: Box<dyn Driver>,
+}
+
+impl Plugins {
+    pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
+        Ok(Self { planner: setup::planner(machine, registry)?, driver: setup::driver(machine, registry)? })
+    }
+
+    /// Whether they go with each other, and with what is asked of them.
+    pub fn check(&self, machine: &Machine, registry: &Registry, switches: Switches) -> Result<(), HostError> {
+        rules::check(machine, &self.planner.describe(), self.driver.describe())?;
+        rules::check_homing(machine, &JointSpace::of(machine, registry)?, switches)
+    }
+}
+
+impl Ready {
+    pub fn of_program(
+        machine: Machine,
+        registry: &Registry,
+        mut program: Program,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let plugins = Plugins::of(&machine, registry)?;
+        // The program first: where it needs another planner, what is wrong with this one does not matter.
+        let checked = first_pass(&machine, plugins.planner.as_ref(), &mut program, switches)?;
+        if !checked.is_ok() {
+            return Err(HostError::Check(Box::new(checked)));
+        }
+        plugins.check(&machine, registry, switches)?;
+        let name = program.name().to_string();
+        let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
+        let policy = PolicyHost::open(&machine)?;
+        let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
+        Self::new(machine, registry, Some(name), source, policy, plugins, checked, switches)
+    }
+
+    #[allow(clippy::too_many_arguments)] // the parts that differ between runs, each once
+    pub fn new(
+        machine: Machine,
+        registry: &Registry,
+        program: Option<String>,
+        source: Box<dyn Source + Send>,
+        policy: Option<PolicyHost>,
+        plugins: Plugins,
+        checked: CheckReport,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let joints = Arc::new(JointSpace::of(&machine, registry)?);
+        let feed = setup::feed(&machine, registry, &joints, policy.as_ref(), checked.length_mm)?;
+        rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
+        let driver = faults::wrap(&machine, plugins.driver, &joints)?;
+        setup::check_driver(&machine, driver.as_ref(), &joints)?;
+        Ok(Self {
+            kinematics: JointSpace::of(&machine, registry)?,
+            records_drives: program.is_none(),
+            program: program.unwrap_or_else(|| HOMING.to_string()),
+            planner: plugins.planner,
+            machine,
+            source,
+            policy,
+            driver,
+            feed,
+            joints,
+            checked,
+            switches,
+        })
+    }
+}
+
+/// Prepares a run of the program as [`Run::prepare`] does, short of claiming the drives: nothing moves, and no driver is
+/// opened.
+///
+/// # Errors
+/// Everything that refuses: plugins and their options, policy, what does not go together; the program cannot be read. What
+/// is wrong with the program is in the report.
+pub fn check_program(
+    machine: Machine,
+    registry: &Registry,
+    program: Program,
+    switches: Switches,
+) -> Result<CheckReport, HostError> {
+    match Ready::of_program(machine, registry, program, switches) {
+        Ok(ready) => Ok(ready.checked),
+        Err(HostError::Check(report)) => Ok(*report),
+        Err(refused) => Err(refused),
+    }
+}
+
+/// Hands every block of the program to `per_block`, in order; nothing moves, and no plugin is asked.
+///
+/// # Errors
+/// The program cannot be read. What is wrong with the program is in the report.
+pub fn each_block(
+    machine: &Machine,
+    program: &mut Program,
+    switches: Switches,
+    per_block: &mut dyn FnMut(&Block),
+) -> Result<CheckReport, HostError> {
+    let config = setup::interpreter_config(machine, switches);
+    Ok(check(program, &config, &mut |block| {
+        per_block(block);
+        Ok(())
+    })?)
+}
+
+/// The whole program through the interpreter and `planner`, which stays as it was.
+fn first_pass(
+    machine: &Machine,
+    planner: &dyn Planner,
+    program: &mut Program,
+    switches: Switches,
+) -> Result<CheckReport, HostError> {
+    let config = setup::interpreter_config(machine, switches);
+    Ok(check(program, &config, &mut |block| check_block(machine, planner, block))?)
+}
+
+/// Whether the machine and its planner can drive `block`.
+pub(crate) fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
+    let spindle_rad_per_s = machine.spindle.max_rad_per_s;
+    if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
+        return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
+    }
+    planner.check(block).map_err(|e| e.to_string())
+}
+
+/// What stands for the name of a program in a run that only homes.
+const HOMING: &str = "(homing)";
+
+fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
+    let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;
+    format!("the spindle is asked for {:.0} rpm; it turns at most at {:.0}", rpm(asked_rad_per_s), rpm(most_rad_per_s))
+}

@@ -1,0 +1,94 @@
+//! Periods that are not kept: what is said of them.
+
+use std::path::Path;
+use std::thread;
+use std::time::Duration;
+
+use tandem_gcode::Program;
+use tandem_host::{Clock, Registry, Run, Summary, Switches};
+use tandem_machine::Machine;
+use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint, local_plugin};
+
+use crate::harness::{Scenario, mill};
+
+/// Drives whose exchange takes longer than the fine period.
+struct Sleeper(usize);
+
+impl Sleeper {
+    #[allow(clippy::unnecessary_wraps)] // the form of a constructor
+    fn made(_options: &RawOptions) -> Result<Self, PluginError> {
+        Ok(Self(0))
+    }
+}
+
+impl Driver for Sleeper {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::simulated()
+    }
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        self.0 = context.joint_count as usize;
+        Ok(())
+    }
+    fn start(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        thread::sleep(Duration::from_micros(1500));
+        feedback.follow(setpoint, self.0);
+        Ok(())
+    }
+    fn quick_stop(&mut self) {}
+    fn stop(&mut self) -> Result<(), PluginError> {
+        Ok(())
+    }
+}
+
+fn driven(driver: &str, clock: Clock) -> Summary {
+    let mut registry = Registry::default();
+    let sleeper = local_plugin!(driver "sleeper" = Sleeper::made);
+    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, sleeper] {
+        registry.register(plugin).unwrap();
+    }
+    let settings = [("driver.plugin", driver), ("loops.max_missed_periods", "100000")];
+    let settings = settings.map(|(key, value)| (key.to_string(), value.to_string()));
+    let machine = Machine::read(Path::new(&mill()), &settings).unwrap();
+    let program = Program::spool("p.ngc", &b"G21 G90\nF6000\nG1 X10\nM2\n"[..]).unwrap();
+    let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
+    run.drive(clock, &[], &mut ()).unwrap().summary
+}
+
+/// Thousands of periods went by without a sample: exit status 0, and nothing said outside of the summary.
+#[test]
+fn periods_that_go_by_without_a_sample_are_a_warning_that_names_the_cause() {
+    let late = driven("sleeper", Clock::Wall);
+    assert_eq!(late.fault, None);
+    // Every exchange takes a period and a half: each ends in a later period than the one it began in.
+    assert!(late.missed_periods >= late.samples / 2, "{} of {}", late.missed_periods, late.samples);
+    let exchange = late.exchange_us.unwrap();
+    assert!(exchange.max >= 1500.0 && exchange.longer_than_period >= late.samples, "{exchange:?}");
+    let warnings = late.warnings();
+    let (missed, words) = (late.missed_periods, &warnings[0]);
+    assert!(words.starts_with(&format!("{missed} fine periods went by without a sample")), "{words}");
+    assert!(words.contains("the driver's exchange took longer than the period of 1 ms"), "{words}");
+    let timing = late.timing().unwrap();
+    assert!(timing.contains(&format!("missed periods {missed}")), "{timing}");
+}
+
+#[test]
+fn where_every_period_is_kept_there_is_nothing_to_warn_of() {
+    let kept = driven("sim", Clock::Virtual);
+    assert_eq!((kept.warnings(), kept.timing(), kept.exchange_us), (vec![], None, None));
+}
+
+/// The command prints both: the line of the periods always, the warning where there is something to warn of.
+#[test]
+fn the_outcome_of_a_run_in_real_time_says_how_periods_were_kept() {
+    let wall = ["--clock", "wall", "--set", "loops.max_missed_periods=100000"];
+    let done = Scenario::text("G21 G90\nF6000\nG1 X5\nM2\n").with(&wall).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let said = String::from_utf8_lossy(&done.output.stdout).into_owned();
+    let (overruns, missed) = (done.number("overruns"), done.number("missed_periods"));
+    assert!(said.contains(&format!("overruns {overruns}, missed periods {missed}, latest wake-up ")), "{said}");
+    let warned = done.errors().contains("warning: ");
+    assert_eq!(warned, overruns + missed > 0.0, "{said}{}", done.errors());
+}
