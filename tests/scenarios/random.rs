@@ -4,36 +4,13 @@ use std::fmt::Write;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
+pub use tandem_rig::Random;
+
 use crate::harness::{Scenario, root};
 use crate::replay::for_each_seed;
 
 /// Runs with the planner that lets blocks overlap.
 pub const OVERLAP: &[&str] = &["--set", "planner.plugin=block-overlap"];
-
-/// A small generator (xorshift64*): the same program for the same seed everywhere.
-pub struct Random(u64);
-
-impl Random {
-    /// Seeds that follow each other give unlike numbers.
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
-
-    pub fn below(&mut self, count: u64) -> u64 {
-        (self.next() >> 33) % count
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 /// A program of lines, arcs, helices, chords, dwells, exact stops and feed changes, well inside the travel.
 pub fn program(seed: u64) -> String {
@@ -120,7 +97,7 @@ fn random_programs_run_within_limits() {
 #[test]
 fn random_holds_and_stalls_keep_the_limits() {
     for_each_seed("random_holds_and_stalls_keep_the_limits", 150, |seed| {
-        let lines = holds_and_stalls(&mut Random(seed | 1 << 40));
+        let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
         attempted(|| {
             Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
         })
@@ -161,7 +138,7 @@ fn random_programs_pass_the_check() {
 
 /// The program of a seed with a time constant in every fifth line of motion.
 fn program_with_constants(seed: u64) -> String {
-    let mut random = Random(seed.wrapping_mul(0xbf58_476d_1ce4_e5b9) | 1);
+    let mut random = Random::new(seed | 1 << 44);
     let mut text = String::new();
     for line in program(seed).lines() {
         text.push_str(line);
@@ -195,7 +172,7 @@ fn random_programs_overlap_within_limits_and_tolerance() {
 #[test]
 fn random_holds_and_stalls_of_overlapping_blocks_keep_the_limits() {
     for_each_seed("random_holds_and_stalls_of_overlapping_blocks_keep_the_limits", 80, |seed| {
-        let lines = holds_and_stalls(&mut Random(seed | 1 << 40));
+        let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
         attempted(|| {
             let text = program_with_constants(seed);
             Scenario::text(&text).with(OVERLAP).commands(&lines).run().assert_within_tolerance();

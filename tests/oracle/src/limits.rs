@@ -67,9 +67,11 @@ fn judge_period(rows: &[Row], period_s: f64, report: &mut Report) {
 
 fn judge_travel(axis: &Axis, positions: &[f64], report: &mut Report) {
     let [low, high] = axis.travel_mm;
+    // The end of travel itself may be programmed, also where it is zero: a position is as rounded as the greatest one that
+    // it may be computed from.
+    let magnitude_mm = positions.iter().fold(0.0_f64, |most, position| most.max(position.abs()));
+    let rounding = ROUNDED_ULPS * f64::EPSILON * magnitude_mm;
     for (index, &position) in positions.iter().enumerate() {
-        // The rounding of one position: the end of travel itself may be programmed.
-        let rounding = ROUNDED_ULPS * f64::EPSILON * position.abs();
         if position < low - rounding {
             report.add(Kind::Travel, index, Some(axis.index), position, low);
         } else if position > high + rounding {

@@ -1,0 +1,205 @@
+//! How long a run may take at most: crude, but of its own, so that a machine that stands still or crawls is found.
+
+use tandem_host::{Switches, each_block};
+use tandem_machine::Machine;
+use tandem_oracle::{Axis, Joints, axis_index};
+use tandem_sdk::{Block, BlockKind};
+
+/// A program may take this many times as long as it would with a rest at the end of each block.
+///
+/// A planner that keeps limits by dividing them (axis by axis, or between turning and speeding up) may need more than a
+/// rest at each block would; what is looked for is a machine that needs a hundred times as long, or never arrives.
+const SLACK: f64 = 4.0;
+/// Added to that, s: filters that settle, the first and the last period.
+const MORE_S: f64 = 0.5;
+/// Places of a curve at which it may rest, for each control point: a curve may turn as sharply as a corner anywhere.
+const RESTS_PER_POINT: f64 = 24.0;
+
+/// What one coordinate (an axis or a joint) may do, units and s.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Highest speed in feed.
+    pub feed: f64,
+    /// Highest speed in rapids.
+    pub rapid: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest jerk; infinite where there is none.
+    pub jerk: f64,
+}
+
+/// The longest that a motion of `length` from rest to rest needs below these limits: each of them alone, one after the
+/// other. The best motion is never longer.
+pub fn rest_to_rest_s(length: f64, speed: f64, acceleration: f64, jerk: f64) -> f64 {
+    length / speed + 2.0 * (length / acceleration).sqrt() + (32.0 * length / jerk).cbrt()
+}
+
+/// Adds up the time of a program, block by block.
+pub struct Bound<'a> {
+    machine: &'a tandem_oracle::Machine,
+    /// Index in the judge's letters, and whether it turns, for each axis of a block.
+    axes: Vec<(usize, bool)>,
+    filter_s: f64,
+    time_constant_s: f64,
+    total_s: f64,
+    dwell_s: f64,
+}
+
+impl<'a> Bound<'a> {
+    /// The longest time of `program`, s, without what an operator does.
+    ///
+    /// # Errors
+    /// The program cannot be read.
+    pub fn of(
+        program: &std::path::Path,
+        machine: &Machine,
+        judging: &'a tandem_oracle::Machine,
+        filter_s: f64,
+    ) -> Result<f64, String> {
+        let axes = (0..machine.axes.count())
+            .map(|axis| (axis_index(machine.axes.letter(axis)).unwrap_or_default(), machine.axes.is_rotary(axis)));
+        let mut bound = Self {
+            machine: judging,
+            axes: axes.collect(),
+            filter_s,
+            time_constant_s: machine.motion.time_constant_s,
+            total_s: 0.0,
+            dwell_s: 0.0,
+        };
+        let mut program = tandem_gcode::Program::open(program).map_err(|e| e.to_string())?;
+        each_block(machine, &mut program, Switches::default(), &mut |block| bound.add(block))
+            .map_err(|e| e.to_string())?;
+        Ok(SLACK * bound.total_s + bound.dwell_s + bound.settling_s() + MORE_S + 20.0 * machine.rough_period_s)
+    }
+
+    /// Time for slowing down and speeding up once more, s: what an operator may ask for last.
+    fn settling_s(&self) -> f64 {
+        let one = |axis: &Axis| {
+            let build_up_s = axis.max_jerk_mm_per_s3.map_or(0.0, |jerk| axis.max_acceleration_mm_per_s2 / jerk);
+            axis.max_speed_mm_per_s() / axis.max_acceleration_mm_per_s2 + 4.0 * build_up_s
+        };
+        4.0 * self.machine.axes.iter().map(one).fold(0.0, f64::max)
+    }
+
+    fn add(&mut self, block: &Block) {
+        if !block.time_constant_s.is_nan() {
+            self.time_constant_s = block.time_constant_s;
+        }
+        if block.kind == BlockKind::Dwell {
+            self.dwell_s += block.dwell_s + self.filter_s + 4.0 * self.machine.fine_period_s;
+            return;
+        }
+        let moved: Vec<(usize, f64)> = self
+            .axes
+            .iter()
+            .enumerate()
+            .map(|(axis, &(index, rotary))| {
+                let by = (block.end[axis] - block.start[axis]).abs();
+                (index, if rotary { by.to_degrees() } else { by })
+            })
+            .collect();
+        let overhead_s = self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
+        let moving_s = match block.kind {
+            BlockKind::Arc => self.arc_s(block, &moved),
+            BlockKind::Nurbs => self.curve_s(block),
+            _ => self.straight_s(block, &moved),
+        };
+        self.total_s += moving_s + overhead_s;
+    }
+
+    /// The axes and the joints, each with how far a block that moves the axes by `moved` moves it at most.
+    fn lanes(&self, moved: &[(usize, f64)]) -> Vec<(Rates, f64)> {
+        let by = |index: usize| moved.iter().find(|(axis, _)| *axis == index).map_or(0.0, |(_, by)| *by);
+        let mut lanes: Vec<_> = self.machine.axes.iter().map(|axis| (rates(axis), by(axis.index))).collect();
+        if let Joints::Known(joints) = &self.machine.joints {
+            for joint in joints {
+                // A planner that looks at one axis at a time divides a joint's limits between its axes.
+                let reach: f64 = moved.iter().map(|(axis, by)| joint.weights[*axis].abs() * by).sum();
+                let pulled = joint.weights.iter().filter(|weight| **weight != 0.0).count() as f64;
+                lanes.push((rates(&joint.limits), reach * pulled));
+            }
+        }
+        lanes
+    }
+
+    fn straight_s(&self, block: &Block, moved: &[(usize, f64)]) -> f64 {
+        let rapid = block.kind == BlockKind::Rapid;
+        let length = block.length_mm;
+        let mut limits = Along::of(if rapid { f64::INFINITY } else { feed(block) });
+        for (rates, by) in self.lanes(moved) {
+            limits.lane(&rates, rapid, by / length);
+        }
+        limits.rest_to_rest_s(length)
+    }
+
+    /// Half of each limit is for turning.
+    fn arc_s(&self, block: &Block, moved: &[(usize, f64)]) -> f64 {
+        let mut reach = moved.to_vec();
+        let (radius_mm, length) = (block.arc.radius_mm, block.length_mm);
+        for axis in block.arc.plane {
+            let index = self.axes[axis as usize].0;
+            reach.iter_mut().filter(|(axis, _)| *axis == index).for_each(|(_, by)| *by = length);
+        }
+        let mut limits = Along::of(feed(block));
+        for (rates, by) in self.lanes(&reach) {
+            limits.lane(&rates, false, by / length);
+        }
+        let turning = (0.5 * limits.acceleration * radius_mm).sqrt();
+        let jerking = (0.25 * limits.jerk * radius_mm * radius_mm).cbrt();
+        limits.speed = limits.speed.min(turning).min(jerking);
+        limits.acceleration /= 2.0;
+        limits.jerk /= 4.0;
+        limits.rest_to_rest_s(length)
+    }
+
+    fn curve_s(&self, block: &Block) -> f64 {
+        let length = block.length_mm;
+        let mut limits = Along::of(feed(block));
+        let every: Vec<(usize, f64)> = self.axes.iter().map(|(index, _)| (*index, length)).collect();
+        for (rates, by) in self.lanes(&every) {
+            limits.lane(&rates, false, by / length);
+        }
+        let rests = RESTS_PER_POINT * block.nurbs.control_points.len() as f64;
+        rests * limits.rest_to_rest_s(length / rests)
+    }
+}
+
+/// The limits along a block.
+struct Along {
+    speed: f64,
+    acceleration: f64,
+    jerk: f64,
+}
+
+impl Along {
+    fn of(speed: f64) -> Self {
+        Self { speed, acceleration: f64::INFINITY, jerk: f64::INFINITY }
+    }
+
+    /// A coordinate that moves by `share` for each unit along the block.
+    fn lane(&mut self, rates: &Rates, rapid: bool, share: f64) {
+        if share > 0.0 {
+            self.speed = self.speed.min(if rapid { rates.rapid } else { rates.feed } / share);
+            self.acceleration = self.acceleration.min(rates.acceleration / share);
+            self.jerk = self.jerk.min(rates.jerk / share);
+        }
+    }
+
+    fn rest_to_rest_s(&self, length: f64) -> f64 {
+        rest_to_rest_s(length, self.speed, self.acceleration, self.jerk)
+    }
+}
+
+fn rates(axis: &Axis) -> Rates {
+    Rates {
+        feed: axis.max_feed_mm_per_s,
+        rapid: axis.max_rapid_mm_per_s,
+        acceleration: axis.max_acceleration_mm_per_s2,
+        jerk: axis.max_jerk_mm_per_s3.unwrap_or(f64::INFINITY),
+    }
+}
+
+/// The feed in what the length is counted in: mm, or rad where only rotary axes move.
+fn feed(block: &Block) -> f64 {
+    block.feed_mm_per_s.min(block.feed_cap_mm_per_s)
+}
