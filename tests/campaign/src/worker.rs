@@ -17,6 +17,9 @@ pub const WORKER: &str = "worker";
 /// Address space of a worker, bytes: a run that asks for more aborts.
 const MOST_BYTES: u64 = 1 << 31;
 
+/// Characters of what a worker said before it died that are told: a backtrace is long.
+const MOST_WORDS: usize = 300;
+
 /// The main loop of a worker: a folder comes in as a line, a report goes out as a line.
 ///
 /// # Errors
@@ -135,7 +138,7 @@ impl Process {
         let _ = self.child.kill();
         let status = self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string());
         let words: Vec<String> = self.errors.iter().collect();
-        (status, words.join(" "))
+        (status, words.join(" ").chars().take(MOST_WORDS).collect())
     }
 }
 
