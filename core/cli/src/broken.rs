@@ -25,7 +25,9 @@ impl Broken {
             return None;
         }
         let words: Vec<String> = new.iter().map(ToString::to_string).collect();
-        words.iter().for_each(|words| tell(&format!("error: {words}")));
+        for words in &words {
+            tell(&format!("error: {words}"));
+        }
         self.told = self.errors.len();
         Some(words.join("; "))
     }

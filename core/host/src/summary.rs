@@ -138,25 +138,26 @@ impl Summary {
         }
         let Self { missed_periods, overruns, samples, .. } = self;
         let period_ms = self.fine_period_s * 1e3;
-        let mut words = format!("{missed_periods} fine periods went by without a sample beside {samples} with one");
-        if *overruns > 0 {
-            let work = if *overruns == 1 { "time the work of a period" } else { "times the work of a period" };
-            words += &format!("; {overruns} {work} went past its end");
-        }
+        let over = match overruns {
+            0 => String::new(),
+            1 => "; once the work of a period went past its end".to_string(),
+            _ => format!("; {overruns} times the work of a period went past its end"),
+        };
         let exchange = self.exchange_us.filter(|exchange| exchange.longer_than_period > 0);
         let late_us = self.lateness_us.map_or(0.0, |late| late.max);
-        match exchange {
-            Some(ExchangeUs { max, longer_than_period }) => {
-                let (longest_ms, often) = (max / 1e3, longer_than_period);
-                words += &format!(": the driver's exchange took longer than the period of {period_ms} ms");
-                words += &format!(" {often} times, at most {longest_ms:.3} ms");
-            }
+        let cause = match exchange {
+            Some(ExchangeUs { max, longer_than_period }) => format!(
+                ": the driver's exchange took longer than the period of {period_ms} ms {longer_than_period} times, \
+                 at most {:.3} ms",
+                max / 1e3
+            ),
             None if late_us >= period_ms * 1e3 => {
-                words += &format!(": the computer woke the fine loop up to {:.3} ms late", late_us / 1e3);
+                format!(": the computer woke the fine loop up to {:.3} ms late", late_us / 1e3)
             }
-            None => {}
-        }
-        vec![words]
+            None => String::new(),
+        };
+        let beside = format!("{missed_periods} fine periods went by without a sample beside {samples} with one");
+        vec![beside + &over + &cause]
     }
 
     /// How the periods of the fine loop were kept, in words; nothing on the virtual clock.

@@ -76,7 +76,7 @@ impl Shared {
                 }
                 NextLine::Line(line) if line.trim().is_empty() => {}
                 NextLine::Line(_) => {
-                    self.refuse(&format!("the machine is in fault; {RESET} goes on, quit ends the session"))
+                    self.refuse(&format!("the machine is in fault; {RESET} goes on, quit ends the session"));
                 }
                 NextLine::Later | NextLine::Over => return false,
             }

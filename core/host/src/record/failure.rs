@@ -39,6 +39,7 @@ impl RecordError {
     }
 
     /// The same, with the first sample that is missing.
+    #[must_use]
     pub fn at(self, sample: &Sample) -> Self {
         Self { tick: Some(sample.tick), line: Some(sample.line), ..self }
     }
