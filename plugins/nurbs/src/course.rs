@@ -104,6 +104,11 @@ impl Course {
         (length_mm / 3.0).min((end_mm - s_mm).max(length_mm / 100.0))
     }
 
+    /// Whether it is a line.
+    pub fn is_straight(&self) -> bool {
+        matches!(&self.shape, Shape::Path(path) if path.is_straight())
+    }
+
     /// Length of a vector over the axes that path speed counts.
     pub fn counted_length(&self, vector: &AxisVector) -> f64 {
         match &self.shape {

@@ -4,7 +4,7 @@ use super::motion::Driven;
 use super::timing::Timing;
 use crate::stream::relief::Reliefs;
 use crate::stream::{Bounds, Cursor, Job, Route, State, window_s};
-use crate::windowed::{Care, Corner, Grade, Limit, Ramp, Rounds, Spot, Survey, Tangential};
+use crate::windowed::{Care, Corner, Grade, Limit, Ramp, Rounds, STEP_S, Spot, Survey, Tangential};
 
 /// Multiples of acceleration and jerk that ramps take where the speed at the start is too high for less: in motion the
 /// window before may brake in less way than a cubic ramp.
@@ -30,10 +30,10 @@ impl First {
     /// To rest at the end of the run or of the window. In motion it follows the window that is driven for the lead. Gives
     /// whether it goes to the end.
     pub fn make(&mut self, job: &Job<Driven>, reliefs: &Reliefs) -> bool {
-        let Job { route, bounds, start, end_mm, before } = *job;
+        let Job { route, bounds, start, end_mm, before, .. } = *job;
         self.lead_s = before.map_or(0.0, |(window, now_s)| window.motion.lead_s(&window.times, now_s));
         let start = &before.map_or(start.state, |(window, now_s)| window.at(now_s + self.lead_s));
-        let window_s = window_s(bounds, start.speed_mm_per_s);
+        let window_s = window_s(route, start.speed_mm_per_s);
         let mut cursor = Cursor::default();
         let mut look = |at_mm: f64| spot(route, bounds, reliefs, at_mm, &mut cursor);
         let begin = Corner { at_mm: start.s_mm, speed_mm_per_s: start.speed_mm_per_s };
@@ -93,13 +93,16 @@ fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &
     let (at, leg) = route.at(at_mm, cursor);
     let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
+    let cap = leg.smooth_cap_mm_per_s(&at, bounds);
+    let step_mm = (0.15 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.3);
+    let most_mm = if leg.course.is_straight() { STEP_S * cap } else { f64::INFINITY };
     Spot {
-        speed_mm_per_s: reliefs.at(at_mm)[0] * leg.smooth_cap_mm_per_s(&at, bounds).min(step_cap),
+        speed_mm_per_s: reliefs.at(at_mm)[0] * cap.min(step_cap),
         tangential: Tangential {
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: (0.15 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.3),
+        step_mm: step_mm.min(most_mm),
         knot_mm,
     }
 }

@@ -67,7 +67,7 @@ impl Scan {
             if n == 1 {
                 self.begun_s = self.first.end().0;
             }
-            let kept_all = !self.dips(job, window) && check(job, window, Look::Between, &mut self.reliefs).is_kept();
+            let kept_all = !self.dips(job, window) && check(job, window, Look::Segments, &mut self.reliefs).is_kept();
             if !kept_all {
                 if n >= HOPELESS && kept.is_none() {
                     break;
@@ -82,7 +82,7 @@ impl Scan {
         if let Some(known) = kept {
             self.reliefs.keep_first(known);
             self.solve(job, false, window);
-            return !self.dips(job, window) && check(job, window, Look::Between, &mut self.reliefs).is_kept();
+            return !self.dips(job, window) && check(job, window, Look::Segments, &mut self.reliefs).is_kept();
         }
         false
     }
@@ -103,9 +103,9 @@ impl Scan {
 
     /// The window as the form `windowed` plans it, where that takes less than `below_s`.
     fn plan_ramps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, below_s: f64) -> bool {
-        let Job { route, bounds, start, end_mm, .. } = *job;
+        let Job { route, bounds, start, driven, end_mm, .. } = *job;
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
-        let found = self.windowed.plan(&Job { route, bounds, start, end_mm, before: None }, &mut self.window);
+        let found = self.windowed.plan(&Job { route, bounds, start, driven, end_mm, before: None }, &mut self.window);
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
         let found = found && self.window.duration_s() < below_s;
         if found {

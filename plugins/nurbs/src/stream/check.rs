@@ -1,10 +1,11 @@
-//! Every limit on the samples of the fine period.
+//! Every limit on the samples of the fine period, and on what segments make of them at any phase.
 
 use tandem_motion::nurbs::AlongPath;
-use tandem_sdk::{AxisVector, BlockKind, LimitedBy};
+use tandem_sdk::{AxisVector, BlockKind, LimitedBy, Segment, SegmentFlags};
 
-use super::between::{Between, Seen};
+use super::draw::{Drawn, Pen, draw};
 use super::relief::{Relief, Reliefs};
+use super::trail::{Found, Trail};
 use super::window::Reserve;
 use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
 
@@ -26,6 +27,9 @@ pub const BINDS: [(LimitedBy, f64); 5] = [
     (LimitedBy::Jerk, 0.9),
     (LimitedBy::Tolerance, 0.98),
 ];
+
+/// Share of the acceleration beyond which turning is to blame, whose acceleration goes with the square of the speed.
+const TURNING: f64 = 0.85;
 
 /// Where a motion has no value the speed is lowered on so much of the path, mm.
 const LOST_MM: f64 = 0.05;
@@ -69,8 +73,8 @@ impl Worst {
 pub enum Look {
     /// At its samples: enough for a try that will not do.
     Samples,
-    /// Between them and at other phases too.
-    Between,
+    /// Then at its segments: every phase of the samples, and every point.
+    Segments,
 }
 
 /// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
@@ -90,7 +94,7 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         return Worst { speed: f64::NAN, ..Worst::default() };
     }
     let (mut cursor, mut worst, mut before_mm) = (Cursor::default(), Worst::default(), [start.state.s_mm; 3]);
-    let (mut seen, mut rests) = (Seen::new(job.rests().then_some(start.history[2])), 0);
+    let mut rests = 0;
     while rests < 4 {
         let count = window.samples.len() - start.history.len();
         let t = start.first_tick_s + count as f64 * period_s;
@@ -104,10 +108,7 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         note_reserve(window, bounds, &at, state.speed_mm_per_s);
         window.samples.push(at.position);
         let first = if count == 0 { state.s_mm } else { before_mm[2] };
-        let mut here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
-        if look == Look::Between {
-            here.join(&Between { route, bounds, window }.worst(t, &mut seen, &mut cursor));
-        }
+        let here = compare(route, bounds, leg, (first, &state, &at), &window.samples);
         window.bounds.push(here.bound);
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.
@@ -117,6 +118,66 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         worst.join(&here);
         before_mm = [before_mm[1], before_mm[2], state.s_mm];
     }
+    if look == Look::Segments && worst.is_kept() {
+        worst.join(&check_segments(job, window, known, reliefs));
+    }
+    worst
+}
+
+/// Draws the window as it will be driven, to its end, and bounds what samples at any phase show of that.
+fn check_segments<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, known: usize, reliefs: &mut Reliefs) -> Worst {
+    let Job { bounds, driven, .. } = job;
+    let mut trail = std::mem::take(&mut window.trail);
+    trail.begin(driven.segments.iter(), bounds);
+    let (mut route, mut worst, duration_s) = (Some(*job.route), Worst::default(), window.duration_s());
+    let (mut from_s, mut at, mut segment) = (0.0, driven.at, Segment::rest(&driven.at, 0.0));
+    while let Some(ahead) = route.filter(|_| from_s < duration_s) {
+        segment.flags =
+            SegmentFlags(if ahead.front().block.kind == BlockKind::Rapid { SegmentFlags::RAPID.0 } else { 0 });
+        let Drawn { until_s, leg_over } = draw(&ahead, bounds, window, &Pen { from_s, at: &at }, &mut segment);
+        from_s = until_s;
+        at = segment.position(segment.duration_s);
+        worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, reliefs));
+        if leg_over {
+            route = ahead.behind_front();
+        }
+    }
+    let mut rest = Segment::rest(&at, 3.0 * bounds.context.fine_period_s);
+    rest.path[0] = segment.path_mm(segment.duration_s);
+    worst.join(&judge_last(&mut trail, job.route, bounds, &rest, known, reliefs));
+    window.trail = trail;
+    worst
+}
+
+/// Adds a segment, and what it and those before it exceed.
+fn judge_last(
+    trail: &mut Trail,
+    route: &Route,
+    bounds: &Bounds,
+    segment: &Segment,
+    known: usize,
+    reliefs: &mut Reliefs,
+) -> Worst {
+    trail.push(segment, bounds);
+    let Found { mut worst, from_mm, to_mm, stepped } = trail.judge(bounds);
+    if worst.is_kept() {
+        return worst;
+    }
+    let middle_s = 0.5 * segment.duration_s;
+    let (at, speed) =
+        (route.at(segment.path_mm(middle_s), &mut Cursor::default()).0, segment.path_speed_mm_per_s(middle_s));
+    let axes = bounds.context.limits.axes().iter().enumerate();
+    let turns = axes.map(|(axis, limits)| at.curvature[axis].abs() * speed * speed / limits.acceleration_mm_per_s2);
+    if worst.acceleration > 1.0 && turns.fold(0.0, f64::max) > TURNING {
+        // What turning takes goes with the square of the speed.
+        worst.speed = worst.speed.max(worst.acceleration.sqrt());
+        worst.acceleration = 0.0;
+    }
+    if stepped {
+        worst.speed = worst.speed.max(worst.acceleration).max(worst.jerk);
+    }
+    let (from_mm, to_mm) = if from_mm <= to_mm { (from_mm, to_mm) } else { (to_mm, from_mm) };
+    reliefs.add(known, worst.relief(from_mm, to_mm));
     worst
 }
 

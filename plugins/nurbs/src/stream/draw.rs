@@ -1,10 +1,11 @@
 //! Windows as segments.
 
 use tandem_motion::hermite;
-use tandem_sdk::{MAX_AXES, Segment};
+use tandem_sdk::{AxisVector, MAX_AXES, Segment};
 
-use super::route::{BESIDE_MM, SAME_MM};
-use super::{Cursor, Motion, Route, State, Window};
+use super::bernstein::{bernstein, highest};
+use super::route::BESIDE_MM;
+use super::{Bounds, Cursor, Motion, Route, State, Window};
 
 /// Most that a segment may stand off its path, mm.
 const OFF_MM: f64 = 1e-8;
@@ -29,74 +30,106 @@ pub struct Drawn {
     pub leg_over: bool,
 }
 
-/// Draws the segment from `from_s` on: at most to `to_s`, to the end of the interval of the grid, to the next knot and to
-/// the end of the leg at the front, where that leaves more than slivers. Position, velocity and acceleration of both ends
-/// are met. Does not allocate.
-pub fn draw<M: Motion>(route: &Route, window: &Window<M>, (from_s, to_s): (f64, f64), segment: &mut Segment) -> Drawn {
+/// From where a segment is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Pen<'a> {
+    /// Time in the window, s.
+    pub from_s: f64,
+    /// Where the segment before ends: this one goes on there, whatever the path rounds to.
+    pub at: &'a AxisVector,
+}
+
+/// Draws the segment at `pen`: at most a rough period long or four fine ones, to the end of the interval of the grid, to the
+/// next knot and to the end of the leg at the front, where that leaves more than slivers. Velocity and acceleration of both
+/// ends are met, and the position of the end; it keeps to the travel as the path does. It is the same segment whenever it is
+/// drawn from there: what was judged is what is driven. Does not allocate.
+pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: &Pen, segment: &mut Segment) -> Drawn {
+    let from_s = pen.from_s;
     let k = window.interval(from_s);
     let border_s = window.times[k + 1];
-    let asked_s = to_s.max(from_s + LEAST_S);
+    let context = &bounds.context;
+    let asked_s = from_s + context.rough_period_s.max(4.0 * context.fine_period_s).max(LEAST_S);
     let mut until_s = if border_s - asked_s < LEAST_S { border_s } else { asked_s };
     let mut cursor = Cursor::default();
-    let leg_end_mm = route.front().end_mm;
+    let (leg_end_mm, same_mm) = (route.front().end_mm, route.front().same_mm());
     let start = window.at_in(k, from_s);
-    let break_mm = route.front().next_break_mm(start.s_mm + SAME_MM);
-    if window.at_in(k, until_s).s_mm > break_mm + SAME_MM {
+    let break_mm = route.front().next_break_mm(start.s_mm + same_mm);
+    if window.at_in(k, until_s).s_mm > break_mm + same_mm {
         let break_s = window.time_at(break_mm, (from_s, until_s));
         if until_s - break_s > SLIVER_S && break_s - from_s > SLIVER_S {
             until_s = break_s;
         }
     }
-    if until_s - from_s < LEAST_S {
-        let end = window.at_in(k, until_s);
-        fill_sliver(route, [&start, &end], until_s - from_s, segment);
-        return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - SAME_MM };
-    }
     let mut end = window.at_in(k, until_s);
+    if until_s - from_s < LEAST_S {
+        fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, sliver);
+        return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - same_mm };
+    }
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
     for _ in 0..MAX_HALVINGS {
-        fill(route, &mut cursor, [&start, &end], until_s - from_s, segment);
-        if follows(route, &mut cursor, jerk_mm_per_s3, segment) {
-            break;
-        }
-        if until_s - from_s < 2.0 * LEAST_S {
+        fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
+        if until_s - from_s < 2.0 * LEAST_S
+            || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment)
+        {
             break;
         }
         until_s = f64::midpoint(from_s, until_s);
         end = window.at_in(k, until_s);
     }
-    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - SAME_MM }
+    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - same_mm }
 }
 
-fn fill(route: &Route, cursor: &mut Cursor, ends: [&State; 2], duration_s: f64, segment: &mut Segment) {
+/// Both ends as one polynomial: position, velocity and acceleration of each and the duration.
+type Through = fn([f64; 3], [f64; 3], f64) -> [f64; 6];
+
+fn fill(
+    route: &Route,
+    cursor: &mut Cursor,
+    (pen, ends): (&Pen, [&State; 2]),
+    duration_s: f64,
+    segment: &mut Segment,
+    through: Through,
+) {
     let [from, to] = ends;
-    let states = [(from, BESIDE_MM), (to, -BESIDE_MM)].map(|(end, beside_mm)| {
+    let mut states = [(from, BESIDE_MM), (to, -BESIDE_MM)].map(|(end, beside_mm)| {
         let at = route.at_side(end.s_mm, beside_mm, cursor);
         let (v, a) = (end.speed_mm_per_s, end.acceleration_mm_per_s2);
         [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
     });
+    states[0][0] = *pen.at;
     let [from, to] = &states;
     for axis in 0..MAX_AXES {
-        segment.coefficients[axis] = hermite(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
+        segment.coefficients[axis] = through(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
     }
     let along = ends.map(|end| [end.s_mm, end.speed_mm_per_s, end.acceleration_mm_per_s2]);
-    segment.path = hermite(along[0], along[1], duration_s);
+    segment.path = through(along[0], along[1], duration_s);
     segment.duration_s = duration_s;
 }
 
-/// A segment by the derivatives at its start: so short that its end is met to 2e-8 mm.
-fn fill_sliver(route: &Route, [from, to]: [&State; 2], duration_s: f64, segment: &mut Segment) {
-    let at = route.at_side(from.s_mm, BESIDE_MM, &mut Cursor::default());
-    let (v, a) = (from.speed_mm_per_s, from.acceleration_mm_per_s2);
-    let jerk = (to.acceleration_mm_per_s2 - a) / duration_s;
-    let second = at.direction * a + at.curvature * (v * v);
-    let third = at.direction * jerk + at.curvature * (3.0 * v * a) + at.third * (v * v * v);
-    for axis in 0..MAX_AXES {
-        let first = at.direction[axis] * v;
-        segment.coefficients[axis] = [at.position[axis], first, second[axis] / 2.0, third[axis] / 6.0, 0.0, 0.0];
+/// A piece through the start and through velocity and acceleration of both ends: one so short meets the end by that too, and
+/// the jerk that a quintic would take for the rounding of its ends is not in it.
+fn sliver(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
+    let ([x, v, a], change) = (from, to[1] - from[1]);
+    if h <= 0.0 {
+        return [x, v, a / 2.0, 0.0, 0.0, 0.0];
     }
-    segment.path = [from.s_mm, v, a / 2.0, jerk / 6.0, 0.0, 0.0];
-    segment.duration_s = duration_s;
+    let c = 3.0 * change / (h * h) - (2.0 * a + to[2]) / h;
+    let d = -2.0 * change / (h * h * h) + (a + to[2]) / (h * h);
+    [x, v, a / 2.0, c / 3.0, d / 4.0, 0.0]
+}
+
+/// Whether the segment keeps to the travel, but for what rounding of positions is allowed.
+fn stays(bounds: &Bounds, segment: &Segment) -> bool {
+    let period_s = bounds.context.fine_period_s;
+    bounds.context.limits.axes().iter().zip(&segment.coefficients).all(|(limits, c)| {
+        let rounding = 2.0 * f64::EPSILON * c[0].abs().max(1.0) / period_s;
+        let (low, high) = (limits.min_mm - rounding, limits.max_mm + rounding);
+        let b = bernstein(c, segment.duration_s);
+        let ends = [b[0], b[5]];
+        // An end beyond it is the path's own, which no shorter segment mends.
+        ends.iter().any(|end| *end < low || *end > high)
+            || highest(&b, high) <= high && highest(&b.map(|v| -v), -low) <= -low
+    })
 }
 
 /// A quintic that is off by e in its middle has a third derivative that is off by 384·e/T³ at its ends.

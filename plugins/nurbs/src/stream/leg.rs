@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tandem_motion::nurbs::{AlongPath, Place};
 use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, PlannerContext};
 
-use super::route::BESIDE_MM;
+use super::route::{BESIDE_MM, SAME_MM};
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
 
@@ -21,6 +21,9 @@ const STEP: f64 = 0.7;
 const WORTH: f64 = 0.05;
 /// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
 const STRAIGHT: f64 = 1e-3;
+
+/// Share of the length of a leg that is rounding.
+const SAME_SHARE: f64 = 1e-10;
 
 /// The limits that count here.
 #[derive(Clone, Copy, Debug)]
@@ -45,13 +48,14 @@ pub struct Leg {
     pub joined: bool,
     /// Highest speed that is to be driven, mm/s.
     pub feed_mm_per_s: f64,
-    /// The least of acceleration and of jerk of the axes that move in it.
+    /// What the axes that move in it leave along the path.
     pub least: Least,
 }
 
-/// The least that any of some axes may do.
+/// What axes leave along the path: the least of acceleration and of jerk, and no higher speed than that.
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
+    pub speed_mm_per_s: f64,
     pub acceleration_mm_per_s2: f64,
     pub jerk_mm_per_s3: f64,
 }
@@ -66,6 +70,13 @@ impl Leg {
     /// How far the path goes on from `s_mm` without a feature of its own, mm.
     pub fn smooth_for_mm(&self, s_mm: f64, place: &mut Place) -> f64 {
         self.course.smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
+    }
+
+    /// Path coordinates of the leg that are the same but for rounding differ by less, mm: where a rotary axis turns much on
+    /// little way, a nanometre of that is more than rounding.
+    pub fn same_mm(&self) -> f64 {
+        let rounding = 8.0 * f64::EPSILON * self.end_mm.abs();
+        SAME_MM.min(SAME_SHARE * (self.end_mm - self.start_mm)).max(rounding)
     }
 
     /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
@@ -134,11 +145,16 @@ impl Leg {
 }
 
 impl Least {
-    /// Of the axes that move at some of a few places of a stretch.
-    pub fn on(course: &Course, stretch: usize, bounds: &Bounds) -> Self {
+    /// Of the axes that move at some of a few places of a stretch, which is to be driven at `feed_mm_per_s`.
+    pub fn on(course: &Course, stretch: usize, bounds: &Bounds, rapid: bool, feed_mm_per_s: f64) -> Self {
         let length_mm = course.stretches()[stretch].length_mm;
         let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
         let directions = [0.0, 0.23, 0.47, 0.71, 1.0].map(|s| course.at(stretch, s * length_mm, &mut place).direction);
+        let tops = directions.map(|direction| {
+            let along = bounds.context.limits.along(&bounds.context.position, &direction);
+            if rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s }
+        });
+        let speed_mm_per_s = tops.into_iter().fold(0.0, f64::max).min(feed_mm_per_s);
         for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
             let along = directions.map(|direction| direction[axis].abs());
             if along.iter().all(|along| *along == 0.0) {
@@ -150,7 +166,7 @@ impl Least {
             let share = if joint { along.iter().copied().fold(1.0, f64::max) } else { least_of(&along).max(1.0) };
             least = [least[0].min(limits.acceleration_mm_per_s2 / share), least[1].min(limits.jerk_mm_per_s3 / share)];
         }
-        Self { acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
+        Self { speed_mm_per_s, acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
     }
 }
 

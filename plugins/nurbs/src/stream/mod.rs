@@ -3,12 +3,13 @@
 //! A window begins in the present state and ends at rest, so that what is planned can always be driven to its end:
 //!
 //! 1. a form plans it ([`Planning`]): the path coordinate over time ([`Motion`]);
-//! 2. [`check`]: every limit on the samples of the fine period, with those before the window in front;
-//! 3. [`draw`]: the first part of the window as segments; then the next window.
+//! 2. [`check`]: every limit on the samples of the fine period, with those before the window in front, then on its segments,
+//!    bounded for samples at any phase ([`trail`]);
+//! 3. [`draw`]: the first part of the window as these segments; then the next window.
 //!
 //! Where no next window is found in motion, the one before is driven on, at last to its end, which is checked already.
 
-mod between;
+mod bernstein;
 pub mod check;
 mod draw;
 mod leg;
@@ -16,13 +17,15 @@ mod planner;
 mod queue;
 pub mod relief;
 mod route;
+mod trail;
 mod window;
 
+use std::collections::VecDeque;
 use std::fmt::Debug;
 
-use tandem_sdk::AxisVector;
+use tandem_sdk::{AxisVector, Segment};
 
-pub use leg::{Bounds, Leg};
+pub use leg::{Bounds, Least, Leg};
 pub use planner::Streamer;
 pub use route::{Cursor, PAST_MM, Route};
 pub use window::{Window, interval, lay_times};
@@ -46,6 +49,15 @@ pub struct Start {
     pub first_tick_s: f64,
 }
 
+/// What was driven last.
+#[derive(Clone, Copy, Debug)]
+pub struct Driven<'a> {
+    /// The last segments, of three fine periods at least.
+    pub segments: &'a VecDeque<Segment>,
+    /// Where the machine is.
+    pub at: AxisVector,
+}
+
 /// The path coordinate over the time of a window, interval by interval.
 pub trait Motion: Debug + Default {
     /// The state `t_s` after the start of interval `k`.
@@ -65,6 +77,7 @@ pub struct Job<'a, M> {
     pub route: &'a Route<'a>,
     pub bounds: &'a Bounds,
     pub start: Start,
+    pub driven: Driven<'a>,
     /// Where the run ends, as far as it is known, mm.
     pub end_mm: f64,
     /// In motion the window that is driven, and the time in it at which this one begins, s.
@@ -87,14 +100,15 @@ pub trait Planning: Debug + Default {
 }
 
 /// Time of a window, s: three stops from `speed_mm_per_s`.
-pub fn window_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
-    WINDOW_S.max(3.0 * stop_s(bounds, speed_mm_per_s))
+pub fn window_s(route: &Route, speed_mm_per_s: f64) -> f64 {
+    WINDOW_S.max(3.0 * stop_s(route, speed_mm_per_s))
 }
 
-/// Longest time in which an axis stops from `speed_mm_per_s`, s.
-fn stop_s(bounds: &Bounds, speed_mm_per_s: f64) -> f64 {
-    let of = |a: &tandem_sdk::AxisLimits| {
-        speed_mm_per_s / a.acceleration_mm_per_s2 + a.acceleration_mm_per_s2 / a.jerk_mm_per_s3
+/// Longest time in which the axes that move on the path ahead stop from `speed_mm_per_s`, s.
+fn stop_s(route: &Route, speed_mm_per_s: f64) -> f64 {
+    let of = |least: &Least| {
+        let (a, j) = (least.acceleration_mm_per_s2, least.jerk_mm_per_s3);
+        speed_mm_per_s.min(least.speed_mm_per_s) / a + a / j
     };
-    bounds.context.limits.axes().iter().map(of).fold(0.0, f64::max)
+    route.legs().map(|leg| of(&leg.least)).fold(0.0, f64::max)
 }

@@ -1,14 +1,15 @@
 //! Blocks in, segments out.
 
+use std::collections::VecDeque;
+
 use tandem_sdk::{
     AxisVector, Block, BlockKind, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags,
     SegmentSink,
 };
 
-use super::draw::{Drawn, draw};
+use super::draw::{Drawn, Pen, draw};
 use super::queue::{Item, Queue};
-use super::route::SAME_MM;
-use super::{Bounds, Cursor, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
+use super::{Bounds, Cursor, Driven, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
 use crate::planner::{dwell_report, report};
 
@@ -35,6 +36,9 @@ pub struct Streamer<P: Planning> {
     /// Path coordinate and position at rest.
     at_mm: f64,
     position: AxisVector,
+    /// The last segments, of three fine periods; and where the last one ends.
+    recent: VecDeque<Segment>,
+    at: AxisVector,
     finished: bool,
 }
 
@@ -52,6 +56,8 @@ impl<P: Planning> Streamer<P> {
             blank: Segment::rest(&context.position, 0.0),
             at_mm: 0.0,
             position: context.position,
+            recent: VecDeque::new(),
+            at: context.position,
             finished: false,
         }
     }
@@ -95,9 +101,9 @@ impl<P: Planning> Streamer<P> {
         }
         let Some((driven_s, committed_s)) = self.driving else { return self.begin(sink) };
         if driven_s < committed_s {
-            return Ok(Some(self.emit_motion((driven_s, committed_s), left_s, sink)));
+            return Ok(Some(self.emit_motion((driven_s, committed_s), sink)));
         }
-        if committed_s >= self.window.duration_s() {
+        if driven_s >= self.window.duration_s() {
             self.rest(sink);
         } else {
             self.go_on(driven_s);
@@ -124,7 +130,13 @@ impl<P: Planning> Streamer<P> {
                 let first_tick_s = self.bounds.context.fine_period_s;
                 let start = Start { state, history: [self.position; 3], first_tick_s };
                 let (end_mm, closed) = self.queue.run_end(self.finished);
-                let job = Job { route: &route, bounds: &self.bounds, start, end_mm, before: None };
+                self.at = self.position;
+                self.recent.clear();
+                let mut rest = Segment::rest(&self.position, 3.0 * first_tick_s);
+                rest.path[0] = self.at_mm;
+                self.recent.push_back(rest);
+                let driven = Driven { segments: &self.recent, at: self.at };
+                let job = Job { route: &route, bounds: &self.bounds, start, driven, end_mm, before: None };
                 if !self.planning.plan(&job, &mut self.window) {
                     return Err(self.no_way());
                 }
@@ -158,7 +170,8 @@ impl<P: Planning> Streamer<P> {
         let start = Start { state: window.at(now_s), history, first_tick_s };
         let (end_mm, closed) = self.queue.run_end(self.finished);
         let before = Some((&self.window, now_s));
-        let job = Job { route: &route, bounds: &self.bounds, start, end_mm, before };
+        let driven = Driven { segments: &self.recent, at: self.at };
+        let job = Job { route: &route, bounds: &self.bounds, start, driven, end_mm, before };
         if self.planning.plan(&job, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driving = Some((0.0, self.commit_s(closed)));
@@ -174,13 +187,16 @@ impl<P: Planning> Streamer<P> {
         if window.whole && (closed || whole_s < SHORT_S) {
             return whole_s;
         }
-        let latest_s = whole_s - STOPS * stop_s(&self.bounds, window.most_mm_per_s);
+        let stop_s = self.queue.route().map_or(0.0, |route| stop_s(&route, window.most_mm_per_s));
+        let latest_s = whole_s - STOPS * stop_s;
         window.motion.commit_s(&window.times, latest_s.max(0.5 * whole_s))
     }
 
-    fn emit_motion(&mut self, (from_s, to_s): (f64, f64), left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
+    /// The next segment of the window, which begins before `to_s`.
+    fn emit_motion(&mut self, (from_s, to_s): (f64, f64), sink: &mut dyn SegmentSink) -> f64 {
         let Some(route) = self.queue.route() else {
-            self.driving = Some((to_s, to_s));
+            let end_s = self.window.duration_s();
+            self.driving = Some((end_s, end_s));
             return 0.0;
         };
         let leg = route.front();
@@ -190,7 +206,9 @@ impl<P: Planning> Streamer<P> {
             self.blank = blank(leg);
         }
         let mut segment = self.blank;
-        let Drawn { until_s, leg_over } = draw(&route, &self.window, (from_s, to_s.min(from_s + left_s)), &mut segment);
+        let pen = Pen { from_s, at: &self.at };
+        let Drawn { until_s, leg_over } = draw(&route, &self.bounds, &self.window, &pen, &mut segment);
+        self.remember(&segment);
         self.declare((from_s, until_s), &mut segment);
         if leg_over {
             self.leg_over(&mut segment);
@@ -202,6 +220,17 @@ impl<P: Planning> Streamer<P> {
             self.blank.flags = SegmentFlags(flags);
         }
         segment.duration_s
+    }
+
+    /// Keeps the last three fine periods.
+    fn remember(&mut self, segment: &Segment) {
+        self.at = segment.position(segment.duration_s);
+        self.recent.push_back(*segment);
+        let mut behind_s: f64 = self.recent.iter().skip(1).map(|recent| recent.duration_s).sum();
+        while behind_s >= 3.0 * self.bounds.context.fine_period_s {
+            self.recent.pop_front();
+            behind_s -= self.recent.front().map_or(f64::INFINITY, |first| first.duration_s);
+        }
     }
 
     fn is_new(&self, leg: &Leg) -> bool {
@@ -234,7 +263,7 @@ impl<P: Planning> Streamer<P> {
         let end_mm = self.window.motion.end_mm();
         // The end of a window is that of its leg but for rounding: then the position is that of the leg already.
         if let Some(route) = self.queue.route()
-            && end_mm > (self.at_mm + SAME_MM).max(route.front().start_mm)
+            && end_mm > (self.at_mm + route.front().same_mm()).max(route.front().start_mm)
         {
             self.position = route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
@@ -261,8 +290,8 @@ impl<P: Planning> Streamer<P> {
         rest.duration_s
     }
 
-    /// How the block is driven that begins at `from_s`. Where it ends beyond the window, its time is estimated from the
-    /// mean speed of the window.
+    /// How the block is driven that begins at `from_s`. Where it ends beyond the window, the rest of its time is estimated
+    /// from the highest speed of the window.
     fn block_report(&self, leg: &Leg, from_s: f64) -> BlockReport {
         let window = &self.window;
         let end_mm = leg.start_mm + leg.block_length_mm();
@@ -273,9 +302,9 @@ impl<P: Planning> Streamer<P> {
         let speeds = window.times.iter().filter(|t| **t >= from_s && **t <= until_s).map(|t| window.at(*t));
         let peak = speeds.fold(state.speed_mm_per_s, |most, at| most.max(at.speed_mm_per_s));
         let end = window.at(until_s);
-        let driven_mm = end.s_mm - state.s_mm;
         let beyond_mm = (end_mm - end.s_mm).max(0.0);
-        let time_s = (until_s - from_s) * if beyond_mm > 1e-9 { (driven_mm + beyond_mm) / driven_mm } else { 1.0 };
+        // The way to the rest at the end of the window is not how it will be driven.
+        let time_s = until_s - from_s + beyond_mm / window.most_mm_per_s.max(peak);
         let capped = leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s;
         let limited_by = match window.bound((from_s, until_s), self.bounds.context.fine_period_s) {
             Some(LimitedBy::Feed) if capped => LimitedBy::Policy,

@@ -32,7 +32,7 @@ impl Queue {
             self.items.push_back(Item::Dwell(*block));
             return;
         };
-        let count = course.stretches().len();
+        let (count, feed_mm_per_s) = (course.stretches().len(), feed_mm_per_s(block, &course, bounds));
         for stretch in 0..count {
             let length_mm = course.stretches()[stretch].length_mm;
             let leg = Leg {
@@ -44,8 +44,8 @@ impl Queue {
                 begins: stretch == 0,
                 ends: stretch + 1 == count,
                 joined: false,
-                feed_mm_per_s: feed_mm_per_s(block, &course, bounds),
-                least: Least::on(&course, stretch, bounds),
+                feed_mm_per_s,
+                least: Least::on(&course, stretch, bounds, block.kind == BlockKind::Rapid, feed_mm_per_s),
             };
             self.end_mm = leg.end_mm;
             if let Some(Item::Leg(before)) = self.items.back_mut() {

@@ -25,6 +25,8 @@ pub struct Cursor {
 #[derive(Clone, Copy, Debug)]
 pub struct Route<'a> {
     front: &'a Leg,
+    /// Where that leg stands in `items`.
+    first: usize,
     /// The leg at the front, and what comes behind it.
     items: &'a VecDeque<Item>,
 }
@@ -32,7 +34,13 @@ pub struct Route<'a> {
 impl<'a> Route<'a> {
     /// Of `items`, which begin with the leg `front`.
     pub fn new(front: &'a Leg, items: &'a VecDeque<Item>) -> Self {
-        Self { front, items }
+        Self { front, first: 0, items }
+    }
+
+    /// The path from the next leg on; none where no leg follows.
+    pub fn behind_front(&self) -> Option<Self> {
+        let front = self.leg(1)?;
+        Some(Self { front, first: self.first + 1, items: self.items })
     }
 
     /// The leg at the front.
@@ -41,10 +49,20 @@ impl<'a> Route<'a> {
     }
 
     fn leg(&self, index: usize) -> Option<&'a Leg> {
-        match self.items.get(index) {
+        match self.items.get(self.first + index) {
             Some(Item::Leg(leg)) => Some(leg),
             _ => None,
         }
+    }
+
+    /// The legs from the front on that join each other.
+    pub fn legs(&self) -> impl Iterator<Item = &'a Leg> {
+        let (route, mut goes_on) = (*self, true);
+        (0..).map_while(move |index| {
+            let leg = route.leg(index).filter(|_| goes_on)?;
+            goes_on = leg.joined;
+            Some(leg)
+        })
     }
 
     /// The leg on which `s_mm` lies, from the front over joined legs.

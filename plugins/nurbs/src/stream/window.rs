@@ -3,6 +3,7 @@
 use tandem_sdk::{AxisVector, LimitedBy};
 
 use super::check::BINDS;
+use super::trail::Trail;
 use super::{Motion, State};
 
 /// Sums up the durations of intervals into the times at their ends.
@@ -46,6 +47,8 @@ pub struct Window<M> {
     pub reserves: Vec<Reserve>,
     /// Its highest speed.
     pub most_mm_per_s: f64,
+    /// Memory of its check.
+    pub trail: Trail,
 }
 
 impl<M: Motion> Window<M> {

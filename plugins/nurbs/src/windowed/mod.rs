@@ -22,7 +22,7 @@ mod tests;
 pub use corners::{Limit, Spot, Survey};
 pub use grade::Grade;
 pub use motion::Ramps;
-pub use plan::Windowed;
+pub use plan::{STEP_S, Windowed};
 pub use ramp::{Ramp, Tangential};
 pub use ramps::{Care, Rounds};
 pub use ripple::Corner;

@@ -27,7 +27,10 @@ const TRIES: [usize; 2] = [12, 30];
 pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
 
 /// Samples of a window at most: slower than that is no motion.
-const MOST_SAMPLES: f64 = 1e6;
+const MOST_SAMPLES: f64 = 4e5;
+
+/// Time between places of a line at most, s.
+pub const STEP_S: f64 = 0.1;
 
 /// What a try takes back.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +68,7 @@ impl Planning for Windowed {
             let mut worst = check(job, window, Look::Samples, &mut self.reliefs);
             // After some tries samples alone count.
             if worst.is_kept() && (n > LOCAL_TRIES || !self.ease(job, window)) {
-                worst = check(job, window, Look::Between, &mut self.reliefs);
+                worst = check(job, window, Look::Segments, &mut self.reliefs);
                 if worst.is_kept() {
                     return true;
                 }
@@ -91,7 +94,7 @@ impl Windowed {
         let begin = Corner { at_mm: start.state.s_mm, speed_mm_per_s: speed };
         let mut look = |at_mm: f64| spot(route, bounds, at_mm, &mut cursor);
         self.survey.sections = SECTIONS;
-        window.whole = self.survey.make(begin, end_mm, window_s(bounds, speed), &mut look);
+        window.whole = self.survey.make(begin, end_mm, window_s(route, speed), &mut look);
         self.survey.keep();
     }
 
@@ -140,13 +143,17 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
     let (at, leg) = route.at(at_mm, cursor);
     let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
+    let speed_mm_per_s = leg.cap_mm_per_s(&at, bounds).min(step_cap);
+    let step_mm = (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(1e-7, 0.05);
+    // Where a rotary axis turns much on little way, that takes long.
+    let most_mm = if leg.course.is_straight() { STEP_S * leg.cap_mm_per_s(&at, bounds) } else { f64::INFINITY };
     Spot {
-        speed_mm_per_s: leg.cap_mm_per_s(&at, bounds).min(step_cap),
+        speed_mm_per_s,
         tangential: Tangential {
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(1e-7, 0.05),
+        step_mm: step_mm.min(most_mm),
         knot_mm,
     }
 }

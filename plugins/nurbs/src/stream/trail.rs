@@ -1,0 +1,317 @@
+//! What samples of the drawn segments show at any phase of the tick, bounded and not sampled.
+//!
+//! The difference of order n of samples, over the n-th power of the period T, is the n-th derivative averaged over n periods
+//! with a B-spline as weight. So it is never more than the derivative is at any point, and what steps of position, velocity
+//! and acceleration between segments add: a step Δv is seen as acceleration of Δv/T at most, and so on. Where that sum keeps
+//! a limit, every sample does. Where it does not, the difference itself is asked for: as a function of the phase it is a
+//! polynomial between the places where one of its samples enters the next segment, and its bound is exact.
+
+use std::collections::VecDeque;
+
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
+
+use super::Bounds;
+use super::bernstein::{bernstein, largest};
+use super::check::Worst;
+
+/// Periods that the longest difference takes.
+const PERIODS: usize = 3;
+/// What rounding may add to a share.
+const ROUNDING: f64 = 1e-9;
+/// Jerk at a rest as a share of its limit: there the tick begins anew, so the jerk itself is asked for and no difference. A
+/// segment follows the jerk of its path to 0.004.
+const AT_REST: f64 = 1.006;
+/// What samples show of steps where they are not at their worst place, of order 0, 1 and 2 in a difference of order 3.
+const WORST: [f64; 3] = [2.0, 1.0, 0.75];
+
+/// A segment, and what it reaches.
+#[derive(Clone, Debug)]
+struct Span {
+    duration_s: f64,
+    coefficients: [[f64; 6]; MAX_AXES],
+    path: [f64; 6],
+    /// Largest absolute values of the derivatives of order 1, 2 and 3 per lane.
+    reached: [[f64; PERIODS]; MAX_AXES],
+    /// Steps of position, velocity and acceleration at its start per lane.
+    steps: [[f64; PERIODS]; MAX_AXES],
+    rapid: bool,
+    rests: bool,
+}
+
+/// What was found in the periods that end in a segment.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Found {
+    pub worst: Worst,
+    /// Path coordinates between which a limit is exceeded, mm.
+    pub from_mm: f64,
+    pub to_mm: f64,
+    /// Steps between segments are a cause of it: what they show goes with the speed.
+    pub stepped: bool,
+}
+
+/// The last segments; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub struct Trail {
+    spans: VecDeque<Span>,
+}
+
+impl Trail {
+    /// Forgets everything but these segments, of which some may lie further back than counts.
+    pub fn begin<'a>(&mut self, recent: impl Iterator<Item = &'a Segment>, bounds: &Bounds) {
+        self.spans.clear();
+        for segment in recent {
+            self.push(segment, bounds);
+        }
+    }
+
+    /// Adds the segment that comes next. Allocates where more lie in three periods than ever before.
+    pub fn push(&mut self, segment: &Segment, bounds: &Bounds) {
+        let lanes = bounds.context.limits.axes();
+        let rapid = segment.flags.contains(SegmentFlags::RAPID);
+        let rests = segment.coefficients.iter().all(|c| c[1..] == [0.0; 5]);
+        let (mut reached, mut steps) = ([[0.0; PERIODS]; MAX_AXES], [[0.0; PERIODS]; MAX_AXES]);
+        for (lane, limits) in lanes.iter().enumerate() {
+            let c = &segment.coefficients[lane];
+            let h = segment.duration_s;
+            let [v, a, j] = rates(c);
+            reached[lane] = [
+                largest(&bernstein(&v, h), top_mm_per_s(limits, rapid)),
+                largest(&bernstein(&[a[0], a[1], a[2], a[3]], h), limits.acceleration_mm_per_s2),
+                largest(&bernstein(&[j[0], j[1], j[2]], h), limits.jerk_mm_per_s3),
+            ];
+            if let Some(before) = self.spans.back() {
+                let end = state(&before.coefficients[lane], before.duration_s);
+                let start = [c[0], c[1], 2.0 * c[2]];
+                steps[lane] = std::array::from_fn(|n| (start[n] - end[n]).abs());
+            }
+        }
+        let (coefficients, path) = (segment.coefficients, segment.path);
+        self.spans.push_back(Span { duration_s: segment.duration_s, coefficients, path, reached, steps, rapid, rests });
+        let most_s = PERIODS as f64 * bounds.context.fine_period_s;
+        let mut behind_s: f64 = self.spans.iter().rev().skip(1).map(|span| span.duration_s).sum();
+        while let Some(first) = self.spans.front()
+            && behind_s - first.duration_s >= most_s
+        {
+            behind_s -= first.duration_s;
+            self.spans.pop_front();
+        }
+    }
+
+    /// Every difference of samples that ends in the last segment, and velocity and acceleration at every point of it.
+    pub fn judge(&self, bounds: &Bounds) -> Found {
+        let Some(head) = self.spans.back() else { return Found::default() };
+        let period_s = bounds.context.fine_period_s;
+        let mut found = Found { from_mm: f64::INFINITY, to_mm: f64::NEG_INFINITY, ..Found::default() };
+        for (lane, limits) in bounds.context.limits.axes().iter().enumerate() {
+            let around = self.around(lane, period_s);
+            let tops = around.kinds.map(|there| f64::from(u8::from(there)));
+            let top = (tops[0] * limits.feed_mm_per_s).max(tops[1] * limits.rapid_mm_per_s);
+            let limit = [top, limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3];
+            let steps = around.show(period_s);
+            let here = [head.reached[lane][0] / top_mm_per_s(limits, head.rapid), head.reached[lane][1] / limit[1]];
+            found.take(here, [head.path[0], polynomial(&head.path, head.duration_s)], false);
+            for order in 1..=PERIODS {
+                let bound = around.reached[order - 1] + steps[order - 1];
+                let noise = noise(&head.coefficients[lane], order, period_s);
+                if bound <= limit[order - 1] * (1.0 + ROUNDING) + noise {
+                    continue;
+                }
+                // Without them it would be kept.
+                let stepped = around.reached[order - 1] <= limit[order - 1] * (1.0 + ROUNDING);
+                self.walk((lane, order), limit[order - 1], noise, stepped, period_s, &mut found);
+                let at_rest = bound / limit[order - 1];
+                if order == PERIODS && around.rests && at_rest > AT_REST {
+                    found.take_order(
+                        order,
+                        at_rest,
+                        [self.back_mm(period_s), polynomial(&head.path, head.duration_s)],
+                        stepped,
+                    );
+                }
+            }
+        }
+        found
+    }
+
+    /// What the periods before and in the last segment reach.
+    fn around(&self, lane: usize, period_s: f64) -> Around {
+        let (mut around, mut start_s) = (Around::default(), 0.0);
+        let last = self.spans.len() - 1;
+        for (n, span) in self.spans.iter().enumerate().rev() {
+            if n < last {
+                // Where it ends is where the one behind it starts.
+                if start_s <= -(PERIODS as f64) * period_s {
+                    break;
+                }
+                start_s -= span.duration_s;
+            }
+            for (most, reached) in around.reached.iter_mut().zip(span.reached[lane]) {
+                *most = most.max(reached);
+            }
+            if start_s > -(PERIODS as f64) * period_s {
+                for (sum, step) in around.steps.iter_mut().zip(span.steps[lane]) {
+                    *sum += step;
+                }
+            }
+            // A rest is of either kind.
+            around.kinds[usize::from(span.rapid)] |= !span.rests;
+            around.rests |= span.rests;
+        }
+        around
+    }
+
+    /// Path coordinate three periods before the last segment begins, mm.
+    fn back_mm(&self, period_s: f64) -> f64 {
+        let (n, t_s) = self.back(self.spans.len() - 1, 0.0, PERIODS as f64 * period_s);
+        polynomial(&self.spans[n].path, t_s)
+    }
+
+    /// The span and the time in it that lie `back_s` before `t_s` of span `n`; the start of the first where that is less.
+    fn back(&self, mut n: usize, mut t_s: f64, back_s: f64) -> (usize, f64) {
+        t_s -= back_s;
+        while t_s < 0.0 && n > 0 {
+            n -= 1;
+            t_s += self.spans[n].duration_s;
+        }
+        (n, t_s.max(0.0))
+    }
+
+    /// The exact largest difference of `order` of a lane whose last sample lies in the last segment.
+    fn walk(
+        &self,
+        (lane, order): (usize, usize),
+        limit: f64,
+        noise: f64,
+        stepped: bool,
+        period_s: f64,
+        found: &mut Found,
+    ) {
+        const WEIGHTS: [[f64; PERIODS + 1]; PERIODS] =
+            [[1.0, -1.0, 0.0, 0.0], [1.0, -2.0, 1.0, 0.0], [1.0, -3.0, 3.0, -1.0]];
+        let last = self.spans.len() - 1;
+        let head = &self.spans[last];
+        let mut places: [(usize, f64); PERIODS + 1] =
+            std::array::from_fn(|n| self.back(last, 0.0, n as f64 * period_s));
+        let allowed = (limit * (1.0 + ROUNDING) + noise) * power(period_s, order);
+        let mut done_s = 0.0;
+        while done_s < head.duration_s {
+            // To the next place where one of the samples comes to the end of its segment.
+            let left = |(n, t_s): &(usize, f64)| self.spans[*n].duration_s - t_s;
+            let step_s = places[..=order].iter().map(left).fold(head.duration_s - done_s, f64::min).max(0.0);
+            let base = head.coefficients[lane][0];
+            let mut sum = [0.0; 6];
+            for ((n, t_s), weight) in places.iter().zip(WEIGHTS[order - 1]).take(order + 1) {
+                let shifted = shift(&self.spans[*n].coefficients[lane], base, *t_s);
+                for (sum, c) in sum.iter_mut().zip(shifted) {
+                    *sum += weight * c;
+                }
+            }
+            let most = largest(&bernstein(&sum, step_s), allowed);
+            if most > allowed {
+                let from_mm = polynomial(&self.spans[places[order].0].path, places[order].1);
+                let to_mm = polynomial(&head.path, done_s + step_s);
+                found.take_order(order, most / (limit * power(period_s, order)), [from_mm, to_mm], stepped);
+            }
+            done_s += step_s;
+            let mut moved = false;
+            for (n, t_s) in &mut places {
+                *t_s += step_s;
+                // The head's own end ends the walk.
+                while *n < last && self.spans[*n].duration_s - *t_s <= f64::EPSILON * period_s {
+                    *t_s = (*t_s - self.spans[*n].duration_s).max(0.0);
+                    *n += 1;
+                    moved = true;
+                }
+            }
+            if step_s <= f64::EPSILON * period_s && !moved {
+                break;
+            }
+        }
+    }
+}
+
+/// What lies in three periods.
+#[derive(Clone, Copy, Debug, Default)]
+struct Around {
+    reached: [f64; PERIODS],
+    steps: [f64; PERIODS],
+    /// Whether it moves in feed, and in rapid motion.
+    kinds: [bool; 2],
+    rests: bool,
+}
+
+impl Around {
+    /// What its steps show in differences of order 1, 2 and 3 at most.
+    fn show(&self, period_s: f64) -> [f64; PERIODS] {
+        let ([p, v, a], per) = (self.steps, 1.0 / period_s);
+        [p * per, (p * per + v) * per, ((WORST[0] * p * per + WORST[1] * v) * per + WORST[2] * a) * per]
+    }
+}
+
+impl Found {
+    fn take(&mut self, [speed, acceleration]: [f64; 2], ends_mm: [f64; 2], stepped: bool) {
+        for (order, share) in [(1, speed), (2, acceleration)] {
+            if share > 1.0 + ROUNDING {
+                self.take_order(order, share, ends_mm, stepped);
+            }
+        }
+    }
+
+    fn take_order(&mut self, order: usize, share: f64, [from_mm, to_mm]: [f64; 2], stepped: bool) {
+        let worst = &mut self.worst;
+        let most = match order {
+            1 => &mut worst.speed,
+            2 => &mut worst.acceleration,
+            _ => &mut worst.jerk,
+        };
+        *most = most.max(share);
+        (self.from_mm, self.to_mm) = (self.from_mm.min(from_mm), self.to_mm.max(to_mm));
+        self.stepped |= stepped;
+    }
+}
+
+fn top_mm_per_s(limits: &tandem_sdk::AxisLimits, rapid: bool) -> f64 {
+    if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s }
+}
+
+/// What rounding of positions makes of a difference of `order`.
+fn noise(c: &[f64; 6], order: usize, period_s: f64) -> f64 {
+    let half = [0.5, 1.0, 2.0][order - 1];
+    4.0 * half * f64::EPSILON * c[0].abs().max(1.0) / power(period_s, order)
+}
+
+/// Coefficients of velocity, acceleration and jerk; those of the higher powers that are not there are zero.
+fn rates(c: &[f64; 6]) -> [[f64; 5]; 3] {
+    [
+        [c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4], 5.0 * c[5]],
+        [2.0 * c[2], 6.0 * c[3], 12.0 * c[4], 20.0 * c[5], 0.0],
+        [6.0 * c[3], 24.0 * c[4], 60.0 * c[5], 0.0, 0.0],
+    ]
+}
+
+/// Position, velocity and acceleration at `t`.
+fn state(c: &[f64; 6], t: f64) -> [f64; 3] {
+    let [v, a, _] = rates(c);
+    let of = |c: &[f64; 5]| c.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    [polynomial(c, t), of(&v), of(&a)]
+}
+
+fn power(period_s: f64, order: usize) -> f64 {
+    (0..order).fold(1.0, |product, _| product * period_s)
+}
+
+fn polynomial(c: &[f64; 6], t: f64) -> f64 {
+    c.iter().rev().fold(0.0, |sum, c| sum * t + c)
+}
+
+/// The same polynomial less `base`, in the powers of the time after `t`.
+fn shift(c: &[f64; 6], base: f64, t: f64) -> [f64; 6] {
+    let mut shifted = *c;
+    shifted[0] -= base;
+    for first in 0..5 {
+        for n in (first..5).rev() {
+            shifted[n] += t * shifted[n + 1];
+        }
+    }
+    shifted
+}
