@@ -4,7 +4,7 @@ use tandem_motion::tube::Lanes;
 use tandem_sdk::{AxisVector, Block, PlannerContext, PluginError, SegmentSink};
 
 use crate::emit::Emitter;
-use crate::flatten::Flat;
+use crate::flatten::{self, Flat};
 use crate::frame::Frame;
 use crate::plan::{Effort, Planning, Start, Tuning};
 use crate::profile;
@@ -49,8 +49,10 @@ pub struct Core<const L: usize> {
 
 /// What the planner for any number of axes asks of one.
 pub trait AnyCore: Send + std::fmt::Debug {
-    /// Whether there is room for another block.
+    /// Whether there is room for another block: fewer chords than that are held, and fewer blocks.
     fn has_room(&self, most_chords: usize) -> bool;
+    /// Whether the path of a block can be laid.
+    fn check_path(&self, block: &Block) -> Result<(), PluginError>;
     /// Takes a block that was checked.
     fn push(&mut self, block: &Block) -> Result<(), PluginError>;
     fn finish(&mut self);
@@ -69,8 +71,8 @@ impl<const L: usize> Core<L> {
             context: *context,
             route: Route::default(),
             planning: Planning::new(tuning),
-            window: Window::default(),
-            next: Window::default(),
+            window: Window::new(),
+            next: Window::new(),
             driven_s: None,
             flat: Flat::default(),
             before: Vec::with_capacity(BEFORE),
@@ -158,9 +160,13 @@ impl<const L: usize> Core<L> {
         true
     }
 
+    fn tolerance_mm(&self, block: &Block) -> f64 {
+        let stated = block.path_tolerance_mm;
+        if stated.is_nan() { self.context.path_tolerance_mm } else { stated }
+    }
+
     /// Chooses until when the window is driven: to its end where that is a rest of the program, else to where it is fastest.
     fn commit(&mut self) {
-        self.next.match_room(&self.window);
         let window = &mut self.window;
         let whole_s = window.duration_s();
         let (mut most, mut found) = (0.0, whole_s);
@@ -232,7 +238,13 @@ impl<const L: usize> AnyCore for Core<L> {
     fn has_room(&self, most_chords: usize) -> bool {
         let held_s = self.held_s - self.front_driven_s();
         let enough_s = HELD.0 * self.planning.tuning.window_s + HELD.1;
-        self.route.items.is_empty() || self.route.chord_count() < most_chords && held_s < enough_s
+        let held = self.route.chord_count().max(self.route.items.len());
+        self.route.items.is_empty() || held < most_chords && held_s < enough_s
+    }
+
+    fn check_path(&self, block: &Block) -> Result<(), PluginError> {
+        let tolerance_mm = self.tolerance_mm(block);
+        flatten::check(&self.context.axes, &self.frame, block, tolerance_mm)
     }
 
     fn push(&mut self, block: &Block) -> Result<(), PluginError> {
@@ -241,10 +253,10 @@ impl<const L: usize> AnyCore for Core<L> {
             self.route.push_dwell(block);
             return Ok(());
         }
-        let stated = block.path_tolerance_mm;
-        let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
+        let tolerance_mm = self.tolerance_mm(block);
         self.flat.lay(&self.context.axes, &self.frame, block, tolerance_mm)?;
         self.held_s += self.route.push(block, &self.flat, &self.frame, self.context.max_feed_ratio, tolerance_mm);
+        self.flat.forget();
         Ok(())
     }
 

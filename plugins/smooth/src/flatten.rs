@@ -11,8 +11,11 @@ use crate::frame::Frame;
 pub const SAGITTA_SHARE: f64 = 0.015;
 /// Longest chord of a curved block, mm.
 const LONGEST_MM: f64 = 1.0;
-/// Most chords of one block: what takes more is refused.
-pub const MAX_CHORDS: usize = 2_000_000;
+/// Most chords of one block: what takes more is refused. On a machine of eight axes they take 80 MB.
+pub const MAX_CHORDS: usize = 400_000;
+
+/// Chords whose memory is kept from one block to the next.
+const KEPT: usize = 8192;
 
 /// The ends of the chords of a block; keeps its memory.
 #[derive(Debug, Default)]
@@ -39,13 +42,14 @@ impl<const L: usize> Flat<L> {
             }
             _ => self.points.push(frame.lanes(&block.end)),
         }
-        if self.points.len() > MAX_CHORDS {
-            return Err(PluginError::new(format!(
-                "line {}: within its tolerance the path takes more than {MAX_CHORDS} chords; nurbs drives it as it is",
-                block.line
-            )));
+        if self.points.len() > MAX_CHORDS { Err(too_many()) } else { Ok(()) }
+    }
+
+    /// Gives memory back that only a block of very many chords needs.
+    pub fn forget(&mut self) {
+        if self.points.capacity() > KEPT {
+            self.points = Vec::new();
         }
-        Ok(())
     }
 
     fn lay_arc(&mut self, frame: &Frame<L>, block: &Block, sagitta_mm: f64) {
@@ -88,14 +92,28 @@ impl<const L: usize> Flat<L> {
     }
 }
 
-/// Whether the curve of `block` is one.
+fn too_many() -> PluginError {
+    PluginError::new(format!(
+        "within its tolerance the path takes more than {MAX_CHORDS} chords; nurbs drives it as it is"
+    ))
+}
+
+/// Whether chords can be laid along an arc or a curve.
 ///
 /// # Errors
-/// Why not.
-pub fn check(axes: &Axes, block: &Block) -> Result<(), PluginError> {
-    // SAFETY: the block is handed over in the call that asks, and its slices with it.
-    let data = unsafe { block.nurbs.to_data() };
-    Nurbs::new(&data, axes).map(|_| ()).map_err(|error| PluginError::new(error.to_string()))
+/// A curve that is none, and an arc or a curve that takes more than [`MAX_CHORDS`].
+pub fn check<const L: usize>(
+    axes: &Axes,
+    frame: &Frame<L>,
+    block: &Block,
+    tolerance_mm: f64,
+) -> Result<(), PluginError> {
+    let arc = || count(block.arc.radius_mm, block.arc.sweep_rad, SAGITTA_SHARE * tolerance_mm);
+    match block.kind {
+        BlockKind::Nurbs => Flat::default().lay(axes, frame, block, tolerance_mm),
+        BlockKind::Arc if arc() > MAX_CHORDS => Err(too_many()),
+        _ => Ok(()),
+    }
 }
 
 /// Chords of a circle.

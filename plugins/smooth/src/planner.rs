@@ -6,7 +6,6 @@ use tandem_sdk::{
 };
 
 use crate::core::{AnyCore, Core};
-use crate::flatten;
 use crate::options::Options;
 use crate::plan::Effort;
 
@@ -62,33 +61,15 @@ impl Planner for SmoothPlanner {
     }
 
     fn check(&self, block: &Block) -> Result<(), PluginError> {
-        let refuse = |why| Err(PluginError::fixed(why));
-        let sound = block.start.is_finite() && block.end.is_finite();
-        let stated = block.path_tolerance_mm;
-        let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
-        match block.kind {
-            BlockKind::Dwell if sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite() => Ok(()),
-            BlockKind::Dwell => refuse("a dwell needs a place and a duration of zero or more"),
-            _ if !(sound && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
-                refuse("a block needs two ends and a length above zero")
-            }
-            _ if !(block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0) => {
-                refuse("a block needs a feed above zero")
-            }
-            BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
-            _ if tolerance_mm.is_nan() || tolerance_mm < LEAST_TOLERANCE_MM => {
-                refuse("smooth needs a path tolerance of 0.0002 mm or more (G64 P); G61 drives lines exactly")
-            }
-            BlockKind::Nurbs => flatten::check(&self.context.axes, block),
-            _ => Ok(()),
-        }
+        self.check_facts(block)?;
+        self.core.check_path(block)
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
         if !self.core.has_room(BUFFER_CHORDS) {
             return Ok(Accepted::Full);
         }
-        self.check(block)?;
+        self.check_facts(block)?;
         self.core.push(block)?;
         Ok(Accepted::Accepted)
     }
@@ -112,5 +93,30 @@ impl Planner for SmoothPlanner {
     fn reset(&mut self, position: &AxisVector) {
         self.core.reset(position);
         self.context.position = *position;
+    }
+}
+
+impl SmoothPlanner {
+    /// Checks what a block says of itself, without a look at its path.
+    fn check_facts(&self, block: &Block) -> Result<(), PluginError> {
+        let refuse = |why| Err(PluginError::fixed(why));
+        let sound = block.start.is_finite() && block.end.is_finite();
+        let stated = block.path_tolerance_mm;
+        let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
+        match block.kind {
+            BlockKind::Dwell if sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite() => Ok(()),
+            BlockKind::Dwell => refuse("a dwell needs a place and a duration of zero or more"),
+            _ if !(sound && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
+                refuse("a block needs two ends and a length above zero")
+            }
+            _ if !(block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0) => {
+                refuse("a block needs a feed above zero")
+            }
+            BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
+            _ if tolerance_mm.is_nan() || tolerance_mm < LEAST_TOLERANCE_MM => {
+                refuse("smooth needs a path tolerance of 0.0002 mm or more (G64 P); G61 drives lines exactly")
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -10,6 +10,10 @@ use crate::frame::{Frame, along, dot, minus, plus};
 
 /// Way behind the present place that still counts, mm.
 const BEHIND: f64 = 2.0;
+/// Chords stepped over before the search for one begins.
+const STEPS: usize = 16;
+/// Chords of one block for which there is room to be made at once: no more than they take.
+const MANY: usize = 16_384;
 /// Direction cosine between blocks below which the path turns back: it rests there (a quarter of a degree off).
 const TURNS_BACK: f64 = -0.999_99;
 
@@ -114,15 +118,25 @@ impl<const L: usize> Run<'_, L> {
     /// The chord that `s` lies in, the later one at a vertex; `near` is where the last look-up was.
     #[inline(always)]
     pub fn chord_at(&self, s: f64, near: usize) -> usize {
-        let mut i = near.min(self.chords.len() - 1);
-        while i + 1 < self.chords.len() && self.chords[i + 1].s <= s {
-            i += 1;
-        }
-        while i > 0 && self.chords[i].s > s {
-            i -= 1;
-        }
-        i
+        chord_at(self.chords, s, near)
     }
+}
+
+/// The chord of `chords` that `s` lies in, the later one at a vertex; `near` is where the last look-up was: from there it goes
+/// a few steps, and then halves what is left, since a way may cross any number of chords.
+#[inline(always)]
+pub fn chord_at<const L: usize>(chords: &[Chord<L>], s: f64, near: usize) -> usize {
+    let mut i = near.min(chords.len() - 1);
+    for _ in 0..STEPS {
+        if i + 1 < chords.len() && chords[i + 1].s <= s {
+            i += 1;
+        } else if i > 0 && chords[i].s > s {
+            i -= 1;
+        } else {
+            return i;
+        }
+    }
+    chords.partition_point(|chord| chord.s <= s).max(1) - 1
 }
 
 impl<const L: usize> Route<L> {
@@ -163,6 +177,9 @@ impl<const L: usize> Route<L> {
         let mut before = self.chords.last().filter(|_| joins).map(|chord| chord.direction);
         let (start, first_chord) = (self.end, self.first + self.chords.len() as u64);
         let mut from = frame.lanes(&block.start);
+        if flat.points.len() > MANY {
+            self.chords.reserve_exact(flat.points.len());
+        }
         for point in &flat.points {
             let way = minus(point, &from);
             let length = dot(&way, &way).sqrt();

@@ -3,6 +3,7 @@
 use tandem_motion::tube::{Lanes, Site, each};
 
 use crate::frame::{dot, largest, minus};
+use crate::plan::INTERVALS;
 use crate::route::{Chord, Run};
 use crate::timing::Mark;
 
@@ -16,6 +17,10 @@ const OTHER_FEED: f64 = 0.99;
 const TIMELY_S: f64 = 3e-4;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
+/// Firm sites in a step at most.
+const DENSEST: f64 = 16.0;
+/// Most sites of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
+pub const MAX_SITES: usize = (DENSEST as usize + 2) * INTERVALS.1;
 /// Vertices looked at on each side.
 const LOOKS: usize = 24;
 
@@ -79,7 +84,8 @@ impl<const L: usize> Sites<L> {
     }
 
     /// Chooses sites by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
-    /// gap exceeds three quarters of a step. `share` of the tolerance is used.
+    /// gap exceeds three quarters of a step. Firm ones that are much nearer than the spline can tell apart are left to the
+    /// check. `share` of the tolerance is used.
     pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, share: f64) {
         self.chosen.clear();
         self.along.clear();
@@ -89,7 +95,7 @@ impl<const L: usize> Sites<L> {
         for n in 0..self.candidates.len() {
             let candidate = self.candidates[n];
             let t = timer.time(candidate.s);
-            if !candidate.firm && t < last_t + h / 3.0 {
+            if t < last_t + if candidate.firm { h / DENSEST } else { h / 3.0 } {
                 continue;
             }
             self.fill(run, marks, &mut last_t, t, grid, share);

@@ -3,7 +3,7 @@
 use tandem_motion::tube::{Lanes, each};
 
 use crate::frame::{Frame, along, largest};
-use crate::route::{Chord, Run};
+use crate::route::{Chord, Run, chord_at};
 
 /// A turn by more than this is sharp: nodes gather around it.
 const SHARP: f64 = 0.25;
@@ -59,21 +59,8 @@ struct Looker<'a, const L: usize> {
 
 impl<const L: usize> Looker<'_, L> {
     #[inline(always)]
-    fn behind(&self, s: f64) -> &Lanes<L> {
-        let mut i = self.at;
-        while i > 0 && self.chords[i].s > s {
-            i -= 1;
-        }
-        &self.chords[i].direction
-    }
-
-    #[inline(always)]
-    fn before(&self, s: f64) -> &Lanes<L> {
-        let mut i = self.at;
-        while i + 1 < self.chords.len() && self.chords[i + 1].s <= s {
-            i += 1;
-        }
-        &self.chords[i].direction
+    fn direction_at(&self, s: f64) -> &Lanes<L> {
+        &self.chords[chord_at(self.chords, s, self.at)].direction
     }
 
     /// The direction here: at a vertex the mean.
@@ -94,7 +81,7 @@ fn cap<const L: usize>(looker: &Looker<'_, L>, frame: &Frame<L>, s: f64, most: f
     let mut v = most;
     for _ in 0..80 {
         let way = v * corner_s;
-        let (from, to) = (looker.behind(s - way), looker.before(s + way));
+        let (from, to) = (looker.direction_at(s - way), looker.direction_at(s + way));
         let mut fits = true;
         for l in 0..L {
             let bend = (from[l] - 2.0 * here[l] + to[l]).abs();

@@ -3,8 +3,12 @@
 use tandem_motion::hermite;
 use tandem_motion::tube::{Lanes, each};
 
-use crate::sites::Timer;
+use crate::plan::INTERVALS;
+use crate::sites::{MAX_SITES, Timer};
 use crate::timing::Mark;
+
+/// Most marks of a window: its sites, and its two ends.
+const MAX_MARKS: usize = MAX_SITES + 2;
 
 /// Position, velocity and acceleration.
 pub type State<const L: usize> = [Lanes<L>; 3];
@@ -116,17 +120,16 @@ impl Default for Stop {
     }
 }
 
-impl<const L: usize> Default for Window<L> {
-    fn default() -> Self {
-        Self { pieces: Vec::new(), marks: Vec::new(), whole: false, commit_s: 0.0, stop: Stop::default() }
-    }
-}
-
 impl<const L: usize> Window<L> {
-    /// Grows its memory to that of `other`: they take turns, and either may be the larger in the next program.
-    pub fn match_room(&mut self, other: &Self) {
-        self.pieces.reserve(other.pieces.capacity().saturating_sub(self.pieces.len()));
-        self.marks.reserve(other.marks.capacity().saturating_sub(self.marks.len()));
+    /// Room for the largest window there can be, so that it never grows: windows take turns, and each may be the larger one.
+    pub fn new() -> Self {
+        Self {
+            pieces: Vec::with_capacity(INTERVALS.1),
+            marks: Vec::with_capacity(MAX_MARKS),
+            whole: false,
+            commit_s: 0.0,
+            stop: Stop::default(),
+        }
     }
 
     /// How long it takes to its end.
