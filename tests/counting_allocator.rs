@@ -1,11 +1,12 @@
-//! A global allocator that counts how often the calling thread uses the heap, and how much of it. Tests of several packages include this
-//! file by its path; each such test program gets the allocator.
+//! A global allocator that counts how often the calling thread uses the heap, and how much of it. Tests of several packages
+//! include this file by its path; each such test program gets the allocator.
 #![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 /// How often the heap was used.
+#[allow(dead_code, reason = "each user takes its own part")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeapUse {
     /// Pieces of memory asked for.
@@ -27,6 +28,7 @@ thread_local! {
 }
 
 /// What `work` does with the heap, on this thread.
+#[allow(dead_code, reason = "each user takes its own part")]
 pub fn heap_use_of(work: impl FnOnce()) -> HeapUse {
     let before = USED.get();
     work();

@@ -42,6 +42,7 @@ mod script;
 mod signals;
 mod single_block;
 mod smooth;
+mod smooth_limits;
 mod smooth_peers;
 mod starvation;
 mod stopping_time;

@@ -12,7 +12,7 @@ pub const SAGITTA_SHARE: f64 = 0.015;
 /// Longest chord of a curved block, mm.
 const LONGEST_MM: f64 = 1.0;
 /// Most chords of one block: what takes more is refused. On a machine of eight axes they take 80 MB.
-pub const MAX_CHORDS: usize = 400_000;
+pub const MAX_CHORDS: usize = 500_000;
 
 /// Chords whose memory is kept from one block to the next.
 const KEPT: usize = 8192;

@@ -3,6 +3,8 @@
 use tandem_motion::tube::{Lanes, each};
 use tandem_sdk::{AxisLimits, AxisVector, Block, PlannerContext};
 
+use crate::travel::Travel;
+
 /// Degrees in a radian: rotary lanes are in degrees, so that a path tolerance of 0.01 mm stands beside 0.01°, as in a part
 /// program.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
@@ -22,13 +24,16 @@ pub struct Frame<const L: usize> {
     pub acceleration: Lanes<L>,
     /// Jerk.
     pub jerk: Lanes<L>,
+    /// The ends of the travel.
+    pub travel: Travel<L>,
     /// Fine period, s.
     pub period_s: f64,
 }
 
 impl<const L: usize> Frame<L> {
-    /// The frame of a machine with at most `L` axes.
-    pub fn new(context: &PlannerContext) -> Self {
+    /// The frame of a machine with at most `L` axes, whose joints that are sums of axes are kept by narrower limits of the axes.
+    pub fn new(machine: &PlannerContext) -> Self {
+        let context = &machine.axis_by_axis();
         let axes = context.limits.axes();
         let rotary = |i: usize| i < axes.len() && context.axes.is_rotary(i);
         let scale: Lanes<L> = std::array::from_fn(|i| if rotary(i) { DEGREES } else { 1.0 });
@@ -43,6 +48,7 @@ impl<const L: usize> Frame<L> {
             speed: [of(|a| a.feed_mm_per_s), of(|a| a.rapid_mm_per_s)],
             acceleration: of(|a| a.acceleration_mm_per_s2),
             jerk: of(|a| a.jerk_mm_per_s3),
+            travel: Travel::new(machine, &scale),
             period_s: context.fine_period_s,
         }
     }
@@ -114,10 +120,4 @@ pub fn minus<const L: usize>(a: &Lanes<L>, b: &Lanes<L>) -> Lanes<L> {
 #[inline(always)]
 pub fn largest<const L: usize>(a: &Lanes<L>) -> f64 {
     a.iter().fold(0.0, |most, v| if v.abs() > most { v.abs() } else { most })
-}
-
-/// The smallest.
-#[inline(always)]
-pub fn smallest<const L: usize>(a: &Lanes<L>) -> f64 {
-    a.iter().fold(f64::INFINITY, |least, v| if *v < least { *v } else { least })
 }

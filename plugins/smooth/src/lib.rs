@@ -13,8 +13,10 @@
 #![allow(clippy::inline_always, reason = "what is inlined is compiled for the number of lanes of its caller")]
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go side by side")]
 
+mod beside;
 mod core;
 mod emit;
+mod feeds;
 mod flatten;
 mod frame;
 mod options;
@@ -26,6 +28,7 @@ mod report;
 mod route;
 mod sites;
 mod timing;
+mod travel;
 mod verify;
 mod window;
 

@@ -1,21 +1,30 @@
 //! What a piece of motion reaches at its highest, and what it leaves for a stop.
+//!
+//! A polynomial lies within the hull of its control points (Bernstein's form), and a convex measure of it is largest at one of
+//! them: the largest share of a limit in any lane, path speed, what is beyond the travel. The halves of a polynomial have
+//! hulls of their own, which close in on it with the square of their length. So nothing is left between places looked at:
+//! what passes is proven.
 
-use tandem_motion::tube::Lanes;
+use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, dot, largest, smallest};
-use crate::verify::larger;
+use crate::frame::{Frame, dot};
+use crate::verify::{ACCELERATION, JERK, SPEED, larger};
 use crate::window::{Bound, Piece, Stop};
 
-/// Share of an acceleration limit from which on a piece is looked at between its quarters.
-const NEAR_ACCELERATION: f64 = 0.9;
+/// Halvings at most: the hull of a part of a piece of 6 ms is then beyond its jerk by less than a ten-thousandth of a limit.
+const DEPTH: u32 = 8;
+/// A hull that is beyond its ends by no more than this share is as good as they are.
+const CLOSE: f64 = 1e-7;
 
-/// What a piece reaches, as shares of limits.
+/// What a piece reaches, as shares of limits; the last in lane units per s².
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reached {
     pub feed: f64,
     pub speed: f64,
     pub acceleration: f64,
     pub jerk: f64,
+    /// The size of the acceleration of all lanes.
+    pub bend: f64,
 }
 
 /// What binds it.
@@ -33,7 +42,125 @@ pub fn bound(reached: &Reached) -> Bound {
     }
 }
 
-/// The largest derivatives of a piece: jerk at its ends, middle and peak, the others at its ends and quarters.
+/// A bound of the largest convex `measure` of the polynomial with these control points. Where it is above `enough` it is near
+/// the largest.
+#[inline(always)]
+pub fn highest<const L: usize, const N: usize>(
+    control: &[Lanes<L>; N],
+    enough: f64,
+    measure: &impl Fn(&Lanes<L>) -> f64,
+) -> f64 {
+    let most = hull(control, measure);
+    if most <= enough || most.is_nan() { most } else { close_in(control, enough, measure, DEPTH) }
+}
+
+#[inline(always)]
+fn hull<const L: usize, const N: usize>(control: &[Lanes<L>; N], measure: &impl Fn(&Lanes<L>) -> f64) -> f64 {
+    let mut most = f64::NEG_INFINITY;
+    for point in control {
+        most = larger(most, measure(point));
+    }
+    most
+}
+
+fn close_in<const L: usize, const N: usize>(
+    control: &[Lanes<L>; N],
+    enough: f64,
+    measure: &impl Fn(&Lanes<L>) -> f64,
+    depth: u32,
+) -> f64 {
+    let most = hull(control, measure);
+    let ends = larger(measure(&control[0]), measure(&control[N - 1]));
+    if most <= enough || most - ends <= CLOSE * most.abs() || depth == 0 || most.is_nan() {
+        return most;
+    }
+    let [left, right] = halves(control);
+    let first = close_in(&left, enough, measure, depth - 1);
+    // What lies below that of one half does not matter in the other.
+    larger(first, close_in(&right, larger(enough, first), measure, depth - 1))
+}
+
+/// The control points of both halves (de Casteljau).
+fn halves<const L: usize, const N: usize>(control: &[Lanes<L>; N]) -> [[Lanes<L>; N]; 2] {
+    let (mut left, mut right) = (*control, *control);
+    for level in 1..N {
+        for n in 0..N - level {
+            right[n] = each(|l| f64::midpoint(right[n][l], right[n + 1][l]));
+        }
+        left[level] = right[0];
+    }
+    [left, right]
+}
+
+/// The control points of the derivatives of a piece.
+struct Derivatives<const L: usize> {
+    velocity: [Lanes<L>; 5],
+    acceleration: [Lanes<L>; 4],
+    jerk: [Lanes<L>; 3],
+}
+
+#[inline(always)]
+fn control_of<const L: usize>(piece: &Piece<L>) -> Derivatives<L> {
+    let (c, t) = (&piece.c, piece.duration_s);
+    let (t2, t3, t4) = (t * t, t * t * t, t * t * t * t);
+    let [p0, p1]: [Lanes<L>; 2] = [c[1], each(|l| 2.0 * t * c[2][l])];
+    let [p2, p3]: [Lanes<L>; 2] = [each(|l| 3.0 * t2 * c[3][l]), each(|l| 4.0 * t3 * c[4][l])];
+    let velocity = [
+        p0,
+        each(|l| p0[l] + p1[l] / 4.0),
+        each(|l| p0[l] + p1[l] / 2.0 + p2[l] / 6.0),
+        each(|l| p0[l] + 0.75 * p1[l] + p2[l] / 2.0 + p3[l] / 4.0),
+        each(|l| p0[l] + p1[l] + p2[l] + p3[l] + 5.0 * t4 * c[5][l]),
+    ];
+    let [q0, q1]: [Lanes<L>; 2] = [each(|l| 2.0 * c[2][l]), each(|l| 6.0 * t * c[3][l])];
+    let [q2, q3]: [Lanes<L>; 2] = [each(|l| 12.0 * t2 * c[4][l]), each(|l| 20.0 * t3 * c[5][l])];
+    let acceleration = [
+        q0,
+        each(|l| q0[l] + q1[l] / 3.0),
+        each(|l| q0[l] + (2.0 * q1[l] + q2[l]) / 3.0),
+        each(|l| q0[l] + q1[l] + q2[l] + q3[l]),
+    ];
+    let jerk = [
+        each(|l| 6.0 * c[3][l]),
+        each(|l| 6.0 * c[3][l] + 12.0 * t * c[4][l]),
+        each(|l| 6.0 * c[3][l] + 24.0 * t * c[4][l] + 60.0 * t2 * c[5][l]),
+    ];
+    Derivatives { velocity, acceleration, jerk }
+}
+
+/// The control points of the position of a piece.
+pub fn positions<const L: usize>(piece: &Piece<L>) -> [Lanes<L>; 6] {
+    const BINOMIAL: [[f64; 6]; 6] = [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1.0, 0.2, 0.0, 0.0, 0.0, 0.0],
+        [1.0, 0.4, 0.1, 0.0, 0.0, 0.0],
+        [1.0, 0.6, 0.3, 0.1, 0.0, 0.0],
+        [1.0, 0.8, 0.6, 0.4, 0.2, 0.0],
+        [1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
+    ];
+    let mut power = [1.0; 6];
+    for n in 1..6 {
+        power[n] = power[n - 1] * piece.duration_s;
+    }
+    // The place itself comes last, so that what is added to it is not rounded to it.
+    BINOMIAL.map(|row| each(|l| (1..6).map(|n| row[n] * power[n] * piece.c[n][l]).sum::<f64>() + piece.c[0][l]))
+}
+
+/// The largest share of `limit` in a lane.
+#[inline(always)]
+fn share_of<const L: usize>(limit: &Lanes<L>) -> impl Fn(&Lanes<L>) -> f64 {
+    let per: Lanes<L> = each(|l| 1.0 / limit[l]);
+    move |value| {
+        let mut most = 0.0;
+        for l in 0..L {
+            most = larger(most, (value[l] * per[l]).abs());
+        }
+        most
+    }
+}
+
+/// The largest derivatives of a piece.
+#[inline(always)]
 pub fn derivatives<const L: usize>(
     piece: &Piece<L>,
     frame: &Frame<L>,
@@ -42,83 +169,26 @@ pub fn derivatives<const L: usize>(
     feed: f64,
     stop: &mut Stop,
 ) -> Reached {
-    let mut reached = Reached::default();
-    let t = piece.duration_s;
-    for l in 0..L {
-        let (c3, c4, c5) = (6.0 * piece.c[3][l], 24.0 * piece.c[4][l], 60.0 * piece.c[5][l]);
-        let mut most = larger(c3.abs(), (c3 + t * (c4 + t * c5)).abs());
-        let peak = -c4 / (2.0 * c5);
-        if peak > 0.0 && peak < t {
-            most = larger(most, (c3 + peak * (c4 + peak * c5)).abs());
-        }
-        reached.jerk = larger(reached.jerk, most / frame.jerk[l]);
-    }
-    for part in [0.25, 0.5, 0.75, 1.0] {
-        let (v, a) = (piece.velocity(part * t), piece.acceleration(part * t));
-        let mut squared = 0.0;
-        for l in 0..L {
-            squared += (counted[l] * v[l]).powi(2);
-            reached.speed = larger(reached.speed, v[l].abs() / speed[l]);
-            reached.acceleration = larger(reached.acceleration, a[l].abs() / frame.acceleration[l]);
-        }
-        reached.feed = larger(reached.feed, squared.sqrt() / feed);
-        if part == 1.0 {
-            leave(stop, frame, &v, &a, squared.sqrt());
-        }
-    }
-    if reached.acceleration > NEAR_ACCELERATION {
-        reached.acceleration = larger(reached.acceleration, peak_acceleration(piece, frame));
-    }
-    // What jerk can add to a speed between quarters.
-    let jerk = reached.jerk * largest(&frame.jerk);
-    let between = jerk * (t / 4.0).powi(2) / 8.0;
-    if reached.feed + between / feed > 1.0 || reached.speed + between / smallest(speed) > 1.0 {
-        (reached.feed, reached.speed) = peak_speeds(piece, counted, (feed, speed), jerk);
-    }
+    let Derivatives { velocity, acceleration, jerk } = control_of(piece);
+    let path_speed = |v: &Lanes<L>| (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum::<f64>().sqrt();
+    let per_feed = 1.0 / feed;
+    let reached = Reached {
+        feed: highest(&velocity, SPEED, &|v| path_speed(v) * per_feed),
+        speed: highest(&velocity, SPEED, &share_of(speed)),
+        acceleration: highest(&acceleration, ACCELERATION, &share_of(&frame.acceleration)),
+        jerk: highest(&jerk, JERK, &share_of(&frame.jerk)),
+        bend: hull(&acceleration, &|a| dot(a, a)).sqrt(),
+    };
+    let (v, a) = (&velocity[4], &acceleration[3]);
+    leave(stop, frame, v, a, path_speed(v));
     reached
-}
-
-/// The highest acceleration inside a piece, as a share of the limit: where the jerk of a lane is zero.
-fn peak_acceleration<const L: usize>(piece: &Piece<L>, frame: &Frame<L>) -> f64 {
-    let mut most = 0.0;
-    for l in 0..L {
-        let (a, half_b, c) = (60.0 * piece.c[5][l], 12.0 * piece.c[4][l], 6.0 * piece.c[3][l]);
-        let root = half_b * half_b - a * c;
-        if root < 0.0 {
-            continue;
-        }
-        // Of the two the one that loses no digits, and the other from the product of both.
-        let sum = -(half_b + root.sqrt().copysign(half_b));
-        for t in [sum / a, c / sum].into_iter().filter(|t| *t > 0.0 && *t < piece.duration_s) {
-            most = larger(most, piece.acceleration(t)[l].abs() / frame.acceleration[l]);
-        }
-    }
-    most
-}
-
-/// The highest path speed of a piece as a share of its feed, and the highest of a lane as a share of its limit: at
-/// sixteenths, and what jerk can add between them.
-fn peak_speeds<const L: usize>(
-    piece: &Piece<L>,
-    counted: &Lanes<L>,
-    (feed, speed): (f64, &Lanes<L>),
-    jerk: f64,
-) -> (f64, f64) {
-    let step_s = piece.duration_s / 16.0;
-    let between = jerk * step_s * step_s / 8.0;
-    let mut most = (0.0, 0.0);
-    for n in 0..=16 {
-        let v = piece.velocity(f64::from(n) * step_s);
-        most.0 = larger(most.0, (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum());
-        most.1 = (0..L).fold(most.1, |most, l| larger(most, (v[l].abs() + between) / speed[l]));
-    }
-    ((most.0.sqrt() + between) / feed, most.1)
 }
 
 /// Share of an acceleration limit that counts as left at least, for the moment that turning takes all of it.
 const LEAST_LEFT: f64 = 0.02;
 
 /// Notes what is left for a stop: with d the direction and n what turns, `A − max(0, −sign(d)·n)` over |d|.
+#[inline(always)]
 fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &Lanes<L>, speed: f64) {
     if speed < 1e-3 {
         return;
@@ -132,5 +202,46 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
         stop.time_s = stop.time_s.max(speed * d.abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
         stop.jerk = stop.jerk.min(frame.jerk[l] / d.abs().max(1e-9));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_rig::Random;
+
+    /// A piece between random states, rough enough for peaks between its ends.
+    fn piece(random: &mut Random) -> Piece<2> {
+        let duration_s = random.length(5e-5, 0.05);
+        let mut state = || {
+            let scale = [1.0, 1.0 / duration_s, 1.0 / (duration_s * duration_s)];
+            scale.map(|scale| [(); 2].map(|()| scale * random.between(-1.0, 1.0)))
+        };
+        Piece::between(&state(), &state(), 0.0, duration_s)
+    }
+
+    #[test]
+    fn nothing_that_a_piece_reaches_is_above_what_is_said_of_it() {
+        let mut random = Random::new(1);
+        for _ in 0..500 {
+            let piece = piece(&mut random);
+            let t = |n: u32| f64::from(n) / 4000.0 * piece.duration_s;
+            let Derivatives { velocity, acceleration, .. } = control_of(&piece);
+            let largest = |of: &dyn Fn(f64) -> Lanes<2>| {
+                (0..=4000).flat_map(|n| of(t(n))).fold(0.0, |most: f64, value| most.max(value.abs()))
+            };
+            let one = share_of(&[1.0; 2]);
+            let said = [
+                highest(&positions(&piece), 0.0, &one),
+                highest(&velocity, 0.0, &one),
+                highest(&acceleration, 0.0, &one),
+            ];
+            let reached =
+                [largest(&|t| piece.position(t)), largest(&|t| piece.velocity(t)), largest(&|t| piece.acceleration(t))];
+            for (said, reached) in said.into_iter().zip(reached) {
+                assert!(said >= reached * (1.0 - 1e-12), "{said} is said, {reached} is reached");
+                assert!(said <= reached * (1.0 + 1e-4), "{said} is said, and no more than {reached} is reached");
+            }
+        }
     }
 }

@@ -3,10 +3,12 @@
 use tandem_motion::retime::End;
 use tandem_motion::tube::{Asked, Lanes, Pacer, Place, Smoother, Spline, each};
 
+use crate::feeds::Feeds;
 use crate::frame::Frame;
 use crate::route::Run;
-use crate::sites::{Grid, Sites};
+use crate::sites::{Grid, Keep, Sites};
 use crate::timing::{Mark, Reach, Timing};
+use crate::travel::Travel;
 use crate::verify::{Checked, Checker};
 use crate::window::{Piece, State, Window};
 
@@ -108,6 +110,8 @@ struct Shares {
     jerk: f64,
     acceleration: f64,
     boxes: f64,
+    /// How far inside of the ends of the travel the motion is to stay, in lane units.
+    margin: f64,
     feed: f64,
     /// What jerk counts behind a start in motion.
     firm: f64,
@@ -149,10 +153,12 @@ impl<const L: usize> Planning<L> {
         }
         let end = self.marks[self.marks.len() - 1].s;
         self.sites.gather(run, start.s, end);
+        let travel = frame.travel.around(run, (start.s, end), &start.state[0]);
         let mut shares = Shares {
             jerk: JERK_SHARE,
             acceleration: ACCELERATION_SHARE,
             boxes: self.tuning.box_share,
+            margin: 0.0,
             feed: FEED_SHARE,
             firm: 1.0,
         };
@@ -163,7 +169,7 @@ impl<const L: usize> Planning<L> {
         loop {
             let last = settled || round >= rounds;
             self.effort.rounds += 1;
-            if !self.round(run, frame, start, &shares, &counted, last) {
+            if !self.round(run, frame, start, (&shares, travel), &counted, last) {
                 return false;
             }
             let now_s = self.marks[self.marks.len() - 1].t;
@@ -177,7 +183,7 @@ impl<const L: usize> Planning<L> {
                 continue;
             }
             self.build(window);
-            let checked = self.checker.check(run, frame, &counted, start, window);
+            let checked = self.checker.check(run, frame, &counted, start, (window, travel.as_ref()));
             if checked.passes() {
                 window.whole = run.closed && end >= run.end() - 1e-9;
                 return true;
@@ -221,7 +227,7 @@ impl<const L: usize> Planning<L> {
         run: &Run<'_, L>,
         frame: &Frame<L>,
         start: &Start<'_, L>,
-        shares: &Shares,
+        (shares, travel): (&Shares, Option<Travel<L>>),
         counted: &Lanes<L>,
         last: bool,
     ) -> bool {
@@ -229,7 +235,8 @@ impl<const L: usize> Planning<L> {
         let intervals = ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
         let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
         self.lay_spline(run, start, &grid);
-        self.sites.choose(run, &self.marks, grid, shares.boxes);
+        let keep = Keep { share: shares.boxes, travel, margin: shares.margin };
+        self.sites.choose(run, &self.marks, grid, &keep);
         self.smoother.firm = if start.resting { (0, 1.0) } else { (FIRM_INTERVALS, shares.firm) };
         let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.chosen, &frame.jerk);
         self.fill_pacer(run, frame, shares, counted);
@@ -343,46 +350,18 @@ impl<const L: usize> Planning<L> {
     }
 }
 
-/// The feed of intervals, asked for in order: the lowest of the chords whose sites lie in or next to one. A vertex has both
-/// of its chords: speed at the end of an interval is what the next one allows.
-struct Feeds<'a, const L: usize> {
-    run: &'a Run<'a, L>,
-    along: &'a [(f64, u32)],
-    sites: &'a [tandem_motion::tube::Site<L>],
-    at: usize,
-}
-
-impl<const L: usize> Feeds<'_, L> {
-    fn of(&mut self, k: usize) -> f64 {
-        while self.at + 1 < self.sites.len() && (self.sites[self.at + 1].interval as usize) < k {
-            self.at += 1;
-        }
-        let mut feed = f64::INFINITY;
-        let mut n = self.at;
-        while n < self.sites.len() {
-            let (s, chord) = (self.along[n].0, self.along[n].1 as usize);
-            feed = feed.min(self.run.chords[chord].feed);
-            if chord > 0 && s <= self.run.chords[chord].s {
-                feed = feed.min(self.run.chords[chord - 1].feed);
-            }
-            if (self.sites[n].interval as usize) > k {
-                break;
-            }
-            n += 1;
-        }
-        if feed.is_infinite() && self.sites.is_empty() {
-            feed = self.run.chords.iter().fold(f64::INFINITY, |least, chord| least.min(chord.feed));
-        }
-        feed
-    }
-}
+/// Share of the tolerance that may lie between two samples before a refused window is to turn more slowly.
+const BULGE: f64 = 0.25;
 
 /// Shares for the next round: what was exceeded, in proportion.
 fn take_back(shares: Shares, checked: &Checked) -> Shares {
     let less = |share: f64, ratio: f64, aim: f64| if ratio > 1.0 { share * (aim / ratio).max(0.7) } else { share };
+    // Where the motion leaves the path between two samples, it has to turn more slowly.
+    let slower = if checked.deviation > 1.0 && checked.bulge > BULGE { (BULGE / checked.bulge).max(0.3) } else { 1.0 };
     Shares {
         jerk: less(shares.jerk, checked.jerk, 0.998),
-        acceleration: less(shares.acceleration, checked.acceleration, 0.998),
+        acceleration: slower * less(shares.acceleration, checked.acceleration, 0.998),
+        margin: shares.margin + 2.0 * checked.travel.max(0.0),
         boxes: less(shares.boxes, checked.deviation, 0.96),
         feed: less(shares.feed, checked.speed, 0.9995),
         firm: shares.firm,

@@ -14,7 +14,7 @@ pub const BUFFER_CHORDS: usize = 65_536;
 /// Time that is told from none, s.
 const LEAST_S: f64 = 1e-9;
 /// Least path tolerance of a block that does not end at rest, mm.
-const LEAST_TOLERANCE_MM: f64 = 2e-4;
+const LEAST_TOLERANCE_MM: f64 = 1e-4;
 
 /// Rough loop. A block allocates when it is accepted, a window where one is longer than any before.
 #[derive(Debug)]
@@ -30,8 +30,8 @@ impl SmoothPlanner {
     /// # Errors
     /// A machine with a limit that is no positive number.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
-        let context = &context.axis_by_axis();
-        let axes = context.limits.axes();
+        let axis_by_axis = context.axis_by_axis();
+        let axes = axis_by_axis.limits.axes();
         let sound = |value: f64| value > 0.0 && value.is_finite();
         let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
         if !values.into_iter().all(sound) {
@@ -114,7 +114,7 @@ impl SmoothPlanner {
             }
             BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
             _ if tolerance_mm.is_nan() || tolerance_mm < LEAST_TOLERANCE_MM => {
-                refuse("smooth needs a path tolerance of 0.0002 mm or more (G64 P); G61 drives lines exactly")
+                refuse("smooth needs a path tolerance of 0.0001 mm or more (G64 P); G61 drives lines exactly")
             }
             _ => Ok(()),
         }

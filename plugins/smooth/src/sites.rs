@@ -6,6 +6,7 @@ use crate::frame::{dot, largest, minus};
 use crate::plan::INTERVALS;
 use crate::route::{Chord, Run};
 use crate::timing::Mark;
+use crate::travel::Travel;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
@@ -61,6 +62,16 @@ pub struct Grid {
     pub lanes: usize,
 }
 
+/// What is left of the boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct Keep<const L: usize> {
+    /// Share of the tolerance that is used.
+    pub share: f64,
+    /// The ends of the travel, where they are near, and how far inside of them the motion is to stay, in lane units.
+    pub travel: Option<Travel<L>>,
+    pub margin: f64,
+}
+
 impl<const L: usize> Sites<L> {
     /// Vertices between two path coordinates, and middles of chords that bulge between them.
     pub fn gather(&mut self, run: &Run<'_, L>, from: f64, to: f64) {
@@ -85,8 +96,8 @@ impl<const L: usize> Sites<L> {
 
     /// Chooses sites by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
     /// gap exceeds three quarters of a step. Firm ones that are much nearer than the spline can tell apart are left to the
-    /// check. `share` of the tolerance is used.
-    pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, share: f64) {
+    /// check. Boxes are what `keep` leaves of them.
+    pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, keep: &Keep<L>) {
         self.chosen.clear();
         self.along.clear();
         let h = grid.step_s;
@@ -98,19 +109,19 @@ impl<const L: usize> Sites<L> {
             if t < last_t + if candidate.firm { h / DENSEST } else { h / 3.0 } {
                 continue;
             }
-            self.fill(run, marks, &mut last_t, t, grid, share);
+            self.fill(run, marks, &mut last_t, t, grid, keep);
             if t > 0.4 * h && t < end_s {
                 let half = candidate.half.unwrap_or_else(|| half_widths(run, &candidate, grid.lanes));
                 self.candidates[n].half = Some(half);
-                self.add(run, t, &candidate, &half, grid, share);
+                self.add(run, t, &candidate, &half, grid, keep);
             }
             last_t = t;
         }
-        self.fill(run, marks, &mut last_t, end_s, grid, share);
+        self.fill(run, marks, &mut last_t, end_s, grid, keep);
     }
 
     /// Places between `last_t` and `t`.
-    fn fill(&mut self, run: &Run<'_, L>, marks: &[Mark], last_t: &mut f64, t: f64, grid: Grid, share: f64) {
+    fn fill(&mut self, run: &Run<'_, L>, marks: &[Mark], last_t: &mut f64, t: f64, grid: Grid, keep: &Keep<L>) {
         let h = grid.step_s;
         let count = ((t - *last_t) / (0.75 * h) * (1.0 - 1e-9)).ceil() as usize;
         if count < 2 {
@@ -131,15 +142,18 @@ impl<const L: usize> Sites<L> {
             at = run.chord_at(s, at);
             let candidate = Candidate { s, chord: at as u32, vertex: false, firm: false, half: None };
             let half = half_widths(run, &candidate, grid.lanes);
-            self.add(run, time, &candidate, &half, grid, share);
+            self.add(run, time, &candidate, &half, grid, keep);
         }
     }
 
-    fn add(&mut self, run: &Run<'_, L>, t: f64, candidate: &Candidate<L>, half: &Lanes<L>, grid: Grid, share: f64) {
+    fn add(&mut self, run: &Run<'_, L>, t: f64, candidate: &Candidate<L>, half: &Lanes<L>, grid: Grid, keep: &Keep<L>) {
         let place = t / grid.step_s;
         let interval = (place as usize).min(grid.intervals - 1);
         let point = run.chords[candidate.chord as usize].at(candidate.s);
-        let half = each(|l| share * half[l]);
+        let (mut point, mut half) = (point, each(|l| keep.share * half[l]));
+        if let Some(travel) = &keep.travel {
+            travel.cut(&mut point, &mut half, keep.margin);
+        }
         self.chosen.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
         self.along.push((candidate.s, candidate.chord));
     }

@@ -11,6 +11,8 @@ const SHARP: f64 = 0.25;
 const GRADED: (f64, f64) = (1e-3, 1.35);
 /// Longest distance between nodes.
 const LONGEST: f64 = 1.0;
+/// Part of a window's time that the way between two nodes takes at most: a slow window is not longer than it should be.
+const PART: f64 = 0.1;
 /// Distance below which vertices that are not sharp are no nodes of their own.
 const SHORTEST: f64 = 0.02;
 /// Factor from one speed tried to the next.
@@ -165,7 +167,8 @@ impl Timing {
             if s >= reach.end || t >= reach.window_s && self.nodes.len() > 8 {
                 return;
             }
-            s = next_node(run, &looker, reach, s, &mut ahead, &mut grown);
+            let longest = (PART * reach.window_s * node.speed).clamp(GRADED.0, LONGEST);
+            s = next_node(run, &looker, reach, s, longest, &mut ahead, &mut grown);
         }
     }
 }
@@ -176,6 +179,7 @@ fn next_node<const L: usize>(
     looker: &Looker<'_, L>,
     reach: &Reach,
     s: f64,
+    longest: f64,
     ahead: &mut usize,
     grown: &mut f64,
 ) -> f64 {
@@ -191,7 +195,7 @@ fn next_node<const L: usize>(
     let spread = (GRADED.1 - 1.0) * behind + GRADED.0;
     let narrow = ((GRADED.1 - 1.0) / GRADED.1 * before).max(GRADED.0);
     *grown = if i + 1 == *ahead && s > chords[i].s { (*grown * 1.2).min(LONGEST) } else { 0.25 };
-    let step = spread.min(narrow).min(*grown);
+    let step = spread.min(narrow).min(*grown).min(longest);
     if !sharp && step >= vertex - s {
         // Vertices that are near each other share a node.
         let mut k = i + 1;

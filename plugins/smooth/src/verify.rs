@@ -1,28 +1,28 @@
 //! The guarantee: every limit on the motion as it is emitted, from its start to its rest.
 //!
 //! Differences of samples are means of derivatives, so what holds for every instant of the quintics holds for samples at
-//! any phase, and across windows, since position, velocity and acceleration are continuous. Distances are taken at
-//! samples a fine period apart.
+//! any phase, and across windows, since position, velocity and acceleration are continuous. Derivatives, and positions near
+//! the ends of the travel, are judged by bounds of the polynomials ([`crate::peaks`]). Distances are taken at samples a fine
+//! period apart, with what the motion and the path can do between.
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, dot, minus};
-use crate::peaks::{bound, derivatives};
+use crate::beside::{ALLOWED, Beside, DEVIATION, HALVINGS, NEAR_ENOUGH, SEARCHED, beside, closer, stretch, to_chord};
+use crate::feeds::Feeder;
+use crate::frame::{Frame, dot};
+use crate::peaks::{bound, derivatives, highest, positions};
 use crate::plan::Start;
 use crate::route::Run;
 use crate::sites::Timer;
-use crate::window::{Piece, Stop, Window};
+use crate::travel::Travel;
+use crate::window::{Stop, Window};
 
 /// Share of a limit that the motion may reach at an instant.
-const SPEED: f64 = 1.0;
-const ACCELERATION: f64 = 0.9995;
-const JERK: f64 = 1.003;
-/// Share of the tolerance that samples at this phase may reach: at others it is a little more.
-const DEVIATION: f64 = 0.985;
-/// Below this share of the tolerance nothing nearer is looked for.
-const NEAR_ENOUGH: f64 = 0.35;
-/// Chords searched on each side.
-const SEARCHED: usize = 400;
+pub const SPEED: f64 = 1.0;
+pub const ACCELERATION: f64 = 0.9995;
+pub const JERK: f64 = 1.003;
+/// Share of the tolerance beyond which it does not matter how much it is: the boxes of the next try are as narrow as they get.
+const FAR: f64 = 1.4;
 
 /// The largest of each, as a share of what is allowed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,17 +31,21 @@ pub struct Checked {
     pub acceleration: f64,
     pub jerk: f64,
     pub deviation: f64,
+    /// What lies between two samples, as a share of the tolerance, where it makes the deviation too large.
+    pub bulge: f64,
+    /// How far the motion is beyond an end of the travel, in lane units.
+    pub travel: f64,
 }
 
 impl Checked {
     /// Whether all is kept.
     pub fn passes(&self) -> bool {
         // A comparison with NaN is false.
-        self.speed <= 1.0 && self.acceleration <= 1.0 && self.jerk <= 1.0 && self.deviation <= 1.0
+        self.speed <= 1.0 && self.acceleration <= 1.0 && self.jerk <= 1.0 && self.deviation <= 1.0 && self.travel <= 0.0
     }
 
     pub fn is_finite(&self) -> bool {
-        (self.speed + self.acceleration + self.jerk + self.deviation).is_finite()
+        (self.speed + self.acceleration + self.jerk + self.deviation + self.travel).is_finite()
     }
 }
 
@@ -49,11 +53,14 @@ impl Checked {
 #[derive(Debug)]
 pub struct Checker<const L: usize> {
     samples: Vec<Lanes<L>>,
+    /// Bounds of the size of acceleration and jerk of every piece.
+    bends: Vec<f64>,
+    jerks: Vec<f64>,
 }
 
 impl<const L: usize> Default for Checker<L> {
     fn default() -> Self {
-        Self { samples: Vec::new() }
+        Self { samples: Vec::new(), bends: Vec::new(), jerks: Vec::new() }
     }
 }
 
@@ -65,22 +72,64 @@ impl<const L: usize> Checker<L> {
         frame: &Frame<L>,
         counted: &Lanes<L>,
         start: &Start<'_, L>,
-        window: &mut Window<L>,
+        (window, travel): (&mut Window<L>, Option<&Travel<L>>),
+    ) -> Checked {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has what the function is compiled for.
+            return unsafe { self.check_wide(run, frame, counted, start, (window, travel)) };
+        }
+        self.check_any(run, frame, counted, start, (window, travel))
+    }
+
+    /// The same in wider instructions; the numbers are the same bit for bit.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn check_wide(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        counted: &Lanes<L>,
+        start: &Start<'_, L>,
+        (window, travel): (&mut Window<L>, Option<&Travel<L>>),
+    ) -> Checked {
+        self.check_any(run, frame, counted, start, (window, travel))
+    }
+
+    #[inline(always)]
+    fn check_any(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        counted: &Lanes<L>,
+        start: &Start<'_, L>,
+        (window, travel): (&mut Window<L>, Option<&Travel<L>>),
     ) -> Checked {
         let mut checked = Checked::default();
         window.stop = Stop::default();
+        self.bends.clear();
+        self.jerks.clear();
+        let size_of_jerk = dot(&frame.jerk, &frame.jerk).sqrt();
         let mut feeder = Feeder { run, timer_at: 0, chord: run.chord_at(start.s, 0) };
         let speed = &frame.speed[usize::from(run.rapid)];
         for n in 0..window.pieces.len() {
             let (least, feed) = feeder.range(window, n);
             let mut shares = derivatives(&window.pieces[n], frame, speed, counted, feed, &mut window.stop);
             if least < feed && shares.feed * feed > least {
-                shares.feed = larger(shares.feed, feeder.peak(&window.pieces[n], counted, frame.period_s));
+                let counted_jerk: Lanes<L> = each(|l| counted[l] * frame.jerk[l]);
+                let jerk = shares.jerk * dot(&counted_jerk, &counted_jerk).sqrt();
+                shares.feed = larger(shares.feed, feeder.peak(&window.pieces[n], counted, frame.period_s, jerk));
             }
             window.pieces[n].bound = bound(&shares);
             checked.speed = larger(checked.speed, larger(shares.feed, shares.speed) / SPEED);
             checked.acceleration = larger(checked.acceleration, shares.acceleration / ACCELERATION);
             checked.jerk = larger(checked.jerk, shares.jerk / JERK);
+            if let Some(travel) = travel {
+                let beyond = highest(&positions(&window.pieces[n]), 0.0, &|at| travel.beyond(at));
+                checked.travel = larger(checked.travel, beyond);
+            }
+            self.bends.push(shares.bend);
+            self.jerks.push(shares.jerk * size_of_jerk);
         }
         let finite = checked.is_finite() && window.duration_s().is_finite();
         if !finite {
@@ -88,11 +137,15 @@ impl<const L: usize> Checker<L> {
         }
         self.sample(start, window, frame.period_s);
         let before = start.before.len();
-        checked.deviation = self.samples_off(run, window, frame.period_s, before);
-        checked.deviation = checked.deviation.max(self.vertices_off(run, start, window, frame.period_s));
+        checked.deviation = self.motion_off(run, window, frame.period_s, before);
+        if checked.deviation <= 1.0 {
+            let (off, bulge) = self.vertices_off(run, start, window, frame.period_s);
+            (checked.deviation, checked.bulge) = (checked.deviation.max(off), bulge);
+        }
         checked
     }
 
+    #[inline(always)]
     fn sample(&mut self, start: &Start<'_, L>, window: &Window<L>, period_s: f64) {
         self.samples.clear();
         self.samples.extend_from_slice(start.before);
@@ -109,10 +162,13 @@ impl<const L: usize> Checker<L> {
         }
     }
 
-    /// The largest distance of a sample from the path, as a share of what is allowed.
-    fn samples_off(&self, run: &Run<'_, L>, window: &Window<L>, period_s: f64, before: usize) -> f64 {
-        let (mut worst, mut mark) = (0.0f64, 0);
+    /// A bound of the distance of the motion from the path, as a share of what is allowed, at samples of any phase: what lies
+    /// between two of this one is looked at again where it matters.
+    #[inline(always)]
+    fn motion_off(&self, run: &Run<'_, L>, window: &Window<L>, period_s: f64, before: usize) -> f64 {
+        let (mut worst, mut mark, mut piece) = (0.0f64, 0, 0);
         let mut near = run.chord_at(window.marks[0].s, 0);
+        let mut last: Option<Beside<L>> = None;
         for (n, sample) in self.samples[before..].iter().enumerate() {
             let t = n as f64 * period_s;
             while mark + 2 < window.marks.len() && window.marks[mark + 1].t <= t {
@@ -121,30 +177,79 @@ impl<const L: usize> Checker<L> {
             let (a, b) = (window.marks[mark], window.marks[mark + 1]);
             let s = a.s + (b.s - a.s) * ((t - a.t) / (b.t - a.t).max(1e-12)).clamp(0.0, 1.0);
             near = run.chord_at(s, near);
-            worst = larger(worst, nearest_chord(run, near, sample));
+            let here = beside(run, near, sample);
+            let Some(last) = last.replace(here) else {
+                worst = here.share;
+                continue;
+            };
+            let mut bend = self.bends[piece];
+            while piece + 1 < window.pieces.len() && window.pieces[piece].end_s() < t {
+                piece += 1;
+                bend = larger(bend, self.bends[piece]);
+            }
+            let bulge = bend * period_s * period_s / 8.0;
+            let mut between = stretch(run, &last, &here, bulge);
+            if between > 1.0 {
+                let ends = [t - period_s, t.min(window.duration_s())];
+                between = closer(run, window, ends, (&last, &here), bulge, HALVINGS);
+            }
+            worst = larger(worst, between);
+            if worst > FAR || worst.is_nan() {
+                break;
+            }
         }
         worst
     }
 
-    /// The largest distance of a vertex from the chain of samples.
-    fn vertices_off(&self, run: &Run<'_, L>, start: &Start<'_, L>, window: &Window<L>, period_s: f64) -> f64 {
+    /// A bound of the distance of a vertex from the chain of samples, as a share of what is allowed, at any phase, and of what
+    /// lies between samples of that, as a share of the tolerance.
+    #[inline(always)]
+    fn vertices_off(&self, run: &Run<'_, L>, start: &Start<'_, L>, window: &Window<L>, period_s: f64) -> (f64, f64) {
         let (from, to) = (start.s - AROUND, window.end());
         let mut timer = Timer { marks: &window.marks, at: 0 };
-        let mut worst = 0.0f64;
+        let (mut worst, mut most_bulge, mut piece) = (0.0f64, 0.0f64, 0);
         let mut i = run.chord_at(from, 0).max(1);
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
-            let near = if chord.s <= start.s { 0.0 } else { timer.time(chord.s) / period_s };
+            let t = if chord.s <= start.s { 0.0 } else { timer.time(chord.s) };
             let tolerance = chord.tolerance.max(run.chords[i - 1].tolerance);
+            while piece + 1 < window.pieces.len() && window.pieces[piece].end_s() < t {
+                piece += 1;
+            }
             if chord.s > from {
-                let off = self.nearest_sample(near as usize + start.before.len(), &chord.start, tolerance);
-                worst = larger(worst, off);
+                let near = (t / period_s) as usize + start.before.len();
+                let off = self.nearest_sample(near, &chord.start, tolerance);
+                let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
+                if off + bulge > ALLOWED * tolerance {
+                    bulge = self.bulge_around(window, piece, t, period_s);
+                    most_bulge = larger(most_bulge, bulge / tolerance);
+                }
+                worst = larger(worst, (off + bulge) / (ALLOWED * tolerance));
+                if worst > FAR || worst.is_nan() {
+                    break;
+                }
             }
             i += 1;
         }
-        worst
+        (worst, most_bulge)
     }
 
+    /// How far the motion stands off the chain of samples around `t`: what turns it counts alone, as far as its direction is
+    /// known for a period.
+    fn bulge_around(&self, window: &Window<L>, near: usize, t: f64, period_s: f64) -> f64 {
+        let around = near.saturating_sub(1)..(near + 2).min(self.bends.len());
+        let bend = self.bends[around].iter().fold(0.0, |most, bend| larger(most, *bend));
+        let piece = &window.pieces[near];
+        let local = (t - piece.start_s).clamp(0.0, piece.duration_s);
+        let (v, a) = (piece.velocity(local), piece.acceleration(local));
+        let (squared, along) = (dot(&v, &v), dot(&v, &a));
+        let across = (dot(&a, &a) - along * along / squared.max(1e-12)).max(0.0).sqrt();
+        let change = self.jerks[near] * period_s;
+        let turned = (bend * period_s / squared.sqrt().max(1e-9)).min(1.0);
+        (across + change + turned * bend).min(bend) * period_s * period_s / 8.0
+    }
+
+    #[inline(always)]
     fn nearest_sample(&self, near: usize, vertex: &Lanes<L>, tolerance: f64) -> f64 {
         let last = self.samples.len() - 2;
         let near = near.min(last);
@@ -167,102 +272,12 @@ impl<const L: usize> Checker<L> {
                 break;
             }
         }
-        best.sqrt() / allowed
+        best.sqrt()
     }
 }
 
 /// Way before the start in which vertices are looked at again: the samples behind the start are new.
 const AROUND: f64 = 0.05;
-
-/// The distance of `point` from the path around chord `near`, as a share of what is allowed.
-fn nearest_chord<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -> f64 {
-    let chords = run.chords;
-    let share = |i: usize| {
-        let chord = &chords[i];
-        let way = minus(point, &chord.start);
-        let along = dot(&way, &chord.direction).clamp(0.0, chord.length);
-        let across: Lanes<L> = each(|l| way[l] - along * chord.direction[l]);
-        dot(&across, &across) / (chord.tolerance * chord.tolerance)
-    };
-    let mut best = share(near);
-    for step in 1..SEARCHED {
-        if best < NEAR_ENOUGH * NEAR_ENOUGH || step > 3 && best <= DEVIATION * DEVIATION {
-            break;
-        }
-        if near + step < chords.len() {
-            best = smaller(best, share(near + step));
-        }
-        if near >= step {
-            best = smaller(best, share(near - step));
-        }
-    }
-    best.sqrt() / DEVIATION
-}
-
-fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) -> f64 {
-    let (chord, way) = (minus(b, a), minus(point, a));
-    let squared = dot(&chord, &chord);
-    let along = if squared > 0.0 { (dot(&way, &chord) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
-    dot(&across, &across)
-}
-
-/// The feeds of the chords that a piece touches.
-struct Feeder<'a, const L: usize> {
-    run: &'a Run<'a, L>,
-    timer_at: usize,
-    chord: usize,
-}
-
-impl<const L: usize> Feeder<'_, L> {
-    /// The lowest and the highest.
-    fn range(&mut self, window: &Window<L>, n: usize) -> (f64, f64) {
-        let piece = &window.pieces[n];
-        let marks = &window.marks;
-        while self.timer_at + 2 < marks.len() && marks[self.timer_at + 1].t <= piece.start_s {
-            self.timer_at += 1;
-        }
-        self.chord = self.run.chord_at(marks[self.timer_at].s, self.chord);
-        let mut range = (self.run.chords[self.chord].feed, self.run.chords[self.chord].feed);
-        let mut mark = self.timer_at;
-        while mark + 1 < marks.len() && marks[mark].t < piece.end_s() {
-            mark += 1;
-        }
-        let mut i = self.chord;
-        while i + 1 < self.run.chords.len() && self.run.chords[i + 1].s < marks[mark].s {
-            i += 1;
-            let feed = self.run.chords[i].feed;
-            range = (range.0.min(feed), range.1.max(feed));
-        }
-        range
-    }
-
-    /// The highest path speed of a piece as a share of the feed where it is: that of the chord beside it, or of one that is
-    /// reached within half a fine period.
-    fn peak(&self, piece: &Piece<L>, counted: &Lanes<L>, period_s: f64) -> f64 {
-        let chords = self.run.chords;
-        let (mut most, mut i) = (0.0, self.chord);
-        for n in 0..=16 {
-            let t = f64::from(n) / 16.0 * piece.duration_s;
-            let (at, v) = (piece.position(t), piece.velocity(t));
-            let passed = |i: usize| dot(&minus(&at, &chords[i].start), &chords[i].direction);
-            while i + 1 < chords.len() && passed(i + 1) > 0.0 {
-                i += 1;
-            }
-            let soon = dot(&v, &v).sqrt() * period_s / 2.0;
-            let mut feed = chords[i].feed;
-            if i > 0 && passed(i) < soon {
-                feed = feed.max(chords[i - 1].feed);
-            }
-            if i + 1 < chords.len() && passed(i) > chords[i].length - soon {
-                feed = feed.max(chords[i + 1].feed);
-            }
-            let squared: f64 = (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum();
-            most = larger(most, squared.sqrt() / feed);
-        }
-        most
-    }
-}
 
 #[inline(always)]
 pub fn larger(a: f64, b: f64) -> f64 {

@@ -9,7 +9,7 @@ mod common;
 use common::{Point, context, lines};
 use counting_allocator::peak_bytes_of;
 use tandem_rig::{Away, Random, stream};
-use tandem_sdk::{Block, BlockKind, Planner};
+use tandem_sdk::{Block, BlockKind};
 use tandem_smooth::{BUFFER_CHORDS, Options, SmoothPlanner};
 
 /// Bytes held at most where few blocks are.

@@ -122,7 +122,7 @@ fn an_arc_of_too_many_chords_is_refused() {
         let arc = tandem_rig::arc(&context.position, [0.0, 500.0], turns * std::f64::consts::TAU, 100.0);
         planner.check(&tandem_rig::numbered(vec![arc])[0])
     };
-    assert!(check(100.0).is_ok(), "three hundred thousand chords of a millimetre");
+    assert!(check(100.0).is_ok(), "four hundred thousand chords of a millimetre");
     let refused = check(1000.0).unwrap_err().to_string();
-    assert_eq!(refused, "within its tolerance the path takes more than 400000 chords; nurbs drives it as it is");
+    assert_eq!(refused, "within its tolerance the path takes more than 500000 chords; nurbs drives it as it is");
 }

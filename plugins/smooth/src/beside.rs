@@ -1,0 +1,125 @@
+//! The distance of the motion from the path: at a place, and between two.
+
+use tandem_motion::tube::{Lanes, each};
+
+use crate::frame::{dot, minus, plus};
+use crate::route::Run;
+use crate::verify::larger;
+use crate::window::Window;
+
+/// Share of the tolerance that the motion may reach at an instant.
+pub const ALLOWED: f64 = 0.999;
+/// Share of the tolerance from which on a nearer chord is looked for.
+pub const DEVIATION: f64 = 0.95;
+/// Halvings at most of the time between two samples: what lies between is then a thousandth of the way.
+pub const HALVINGS: u32 = 10;
+/// Below this share of the tolerance nothing nearer is looked for.
+pub const NEAR_ENOUGH: f64 = 0.35;
+/// Chords searched on each side.
+pub const SEARCHED: usize = 400;
+
+/// A place of the motion, and the path beside it.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside<const L: usize> {
+    point: Lanes<L>,
+    chord: usize,
+    /// The place on that chord.
+    foot: Lanes<L>,
+    /// The distance of the two, and as a share of what is allowed.
+    off: f64,
+    pub share: f64,
+}
+
+/// The path beside `point`, around chord `near`.
+#[inline(always)]
+pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -> Beside<L> {
+    let chords = run.chords;
+    let look = |i: usize| {
+        let chord = &chords[i];
+        let way = minus(point, &chord.start);
+        let along = dot(&way, &chord.direction).clamp(0.0, chord.length);
+        let across: Lanes<L> = each(|l| way[l] - along * chord.direction[l]);
+        dot(&across, &across) / (chord.tolerance * chord.tolerance)
+    };
+    let (mut best, mut found) = (look(near), near);
+    for step in 1..SEARCHED {
+        if best < NEAR_ENOUGH * NEAR_ENOUGH || step > 3 && best <= DEVIATION * DEVIATION {
+            break;
+        }
+        for i in [near.checked_add(step), near.checked_sub(step)].into_iter().flatten() {
+            if i < chords.len() {
+                let share = look(i);
+                (best, found) = if share < best { (share, i) } else { (best, found) };
+            }
+        }
+    }
+    let chord = &chords[found];
+    let along = dot(&minus(point, &chord.start), &chord.direction).clamp(0.0, chord.length);
+    let share = best.sqrt();
+    let foot = plus(&chord.start, along, &chord.direction);
+    Beside { point: *point, chord: found, foot, off: share * chord.tolerance, share: share / ALLOWED }
+}
+
+/// A bound of the distance from the path between two places of the motion, as a share of what is allowed. The line between
+/// them stands off the line between their feet by no more than they do themselves; the path between the feet stands off
+/// that line by no more than its vertices, and the motion off the other by no more than `bulge`.
+#[inline(always)]
+pub fn stretch<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>, bulge: f64) -> f64 {
+    let chords = run.chords;
+    let (first, last) = (a.chord.min(b.chord), a.chord.max(b.chord));
+    let mut tolerance = chords[first].tolerance;
+    let mut between = 0.0f64;
+    if first < last {
+        let way = minus(&b.foot, &a.foot);
+        let per = 1.0 / dot(&way, &way).max(f64::MIN_POSITIVE);
+        for chord in &chords[first + 1..=last] {
+            tolerance = tolerance.min(chord.tolerance);
+            let to = minus(&chord.start, &a.foot);
+            let along = dot(&to, &way) * per;
+            let across: Lanes<L> = each(|l| to[l] - along * way[l]);
+            between = larger(between, dot(&across, &across));
+        }
+        between = between.sqrt();
+    }
+    (larger(a.off, b.off) + bulge + between) / (ALLOWED * tolerance)
+}
+
+/// The same in halves, as often as it takes; in the end what the motion can do between two places.
+pub fn closer<const L: usize>(
+    run: &Run<'_, L>,
+    window: &Window<L>,
+    [from_s, to_s]: [f64; 2],
+    (a, b): (&Beside<L>, &Beside<L>),
+    bulge: f64,
+    left: u32,
+) -> f64 {
+    let ends = larger(a.share, b.share);
+    if left == 0 {
+        let way = minus(&b.point, &a.point);
+        let least = run.chords[a.chord].tolerance.min(run.chords[b.chord].tolerance);
+        return ends + (dot(&way, &way).sqrt() / 2.0 + bulge) / (ALLOWED * least);
+    }
+    let t = f64::midpoint(from_s, to_s);
+    let middle = beside(run, usize::midpoint(a.chord, b.chord), &window.state(t)[0]);
+    let mut worst = larger(ends, middle.share);
+    for (times, places) in [([from_s, t], (a, &middle)), ([t, to_s], (&middle, b))] {
+        // What is too far already need not be known better.
+        if worst > 1.0 || worst.is_nan() {
+            break;
+        }
+        let between = stretch(run, places.0, places.1, bulge / 4.0);
+        let between = if between > 1.0 { closer(run, window, times, places, bulge / 4.0, left - 1) } else { between };
+        worst = larger(worst, between);
+    }
+    worst
+}
+
+/// The squared distance of `point` from the line between `a` and `b`.
+#[inline(always)]
+pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) -> f64 {
+    let (chord, way) = (minus(b, a), minus(point, a));
+    let squared = dot(&chord, &chord);
+    let along = if squared > 0.0 { (dot(&way, &chord) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
+    dot(&across, &across)
+}

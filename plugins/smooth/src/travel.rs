@@ -1,0 +1,112 @@
+//! The ends of the travel, as a window sees them.
+
+use tandem_motion::tube::{Lanes, each};
+use tandem_sdk::{MAX_AXES, PlannerContext};
+
+use crate::frame::{dot, plus};
+use crate::route::Run;
+
+/// Units in the last place by which a position on the end of the travel may be beyond it: the rounding of a polynomial.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// Share of a box that stays free of the end of the travel: between two places the spline is not held.
+const FREE: f64 = 0.05;
+/// Share of a box that is left at least.
+const LEFT: f64 = 0.1;
+
+/// Lowest and highest position of every lane, and of joints that are sums of axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Travel<const L: usize> {
+    low: Lanes<L>,
+    high: Lanes<L>,
+    /// What the joint takes of the lanes, and its ends.
+    joints: [(Lanes<L>, [f64; 2]); MAX_AXES],
+    joint_count: usize,
+}
+
+impl<const L: usize> Travel<L> {
+    /// Of a machine whose axes are lanes by `scale`; joints stand behind the axes in `context`.
+    pub fn new(context: &PlannerContext, scale: &Lanes<L>) -> Self {
+        let limits = context.limits.axes();
+        let joints = context.joint_lanes.map_or(&[][..], |lanes| lanes.weights());
+        let count = limits.len() - joints.len();
+        let mut travel = Self {
+            low: each(|l| if l < count { scale[l] * limits[l].min_mm } else { f64::NEG_INFINITY }),
+            high: each(|l| if l < count { scale[l] * limits[l].max_mm } else { f64::INFINITY }),
+            joints: [([0.0; L], [f64::NEG_INFINITY, f64::INFINITY]); MAX_AXES],
+            joint_count: joints.len(),
+        };
+        for (n, weights) in joints.iter().enumerate() {
+            let limits = &limits[count + n];
+            let of_lanes = each(|l| if l < count { weights[l] / scale[l] } else { 0.0 });
+            travel.joints[n] = (of_lanes, [limits.min_mm, limits.max_mm]);
+        }
+        travel
+    }
+
+    fn joints(&self) -> &[(Lanes<L>, [f64; 2])] {
+        &self.joints[..self.joint_count]
+    }
+
+    /// The travel around the path from `from` to `to`, where a motion within the tolerance may come to an end of it; none where
+    /// it cannot. A path that is itself beyond an end, of axes that are not homed, may be followed there.
+    pub fn around(&self, run: &Run<'_, L>, (from, to): (f64, f64), here: &Lanes<L>) -> Option<Self> {
+        let (first, last) = (run.chord_at(from, 0), run.chord_at(to, 0));
+        let (mut low, mut high, mut tolerance) = (*here, *here, 0.0f64);
+        for chord in &run.chords[first..=last] {
+            low = each(|l| low[l].min(chord.start[l]));
+            high = each(|l| high[l].max(chord.start[l]));
+            tolerance = tolerance.max(chord.tolerance);
+        }
+        let end = run.chords[last].at(to.min(run.chords[last].end()));
+        (low, high) = (each(|l| low[l].min(end[l])), each(|l| high[l].max(end[l])));
+        let mut near = (0..L).any(|l| low[l] - tolerance < self.low[l] || high[l] + tolerance > self.high[l]);
+        let mut travel =
+            Self { low: each(|l| self.low[l].min(low[l])), high: each(|l| self.high[l].max(high[l])), ..*self };
+        for (weights, ends) in &mut travel.joints[..self.joint_count] {
+            let starts = run.chords[first..=last].iter().map(|chord| dot(weights, &chord.start));
+            let values = starts.chain([dot(weights, here), dot(weights, &end)]);
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+            let tolerance = tolerance * dot(weights, weights).sqrt();
+            near |= low - tolerance < ends[0] || high + tolerance > ends[1];
+            *ends = [ends[0].min(low), ends[1].max(high)];
+        }
+        near.then_some(travel)
+    }
+
+    /// By how much a position is beyond an end, in lane units: a convex function of it. Below zero inside.
+    #[inline(always)]
+    pub fn beyond(&self, position: &Lanes<L>) -> f64 {
+        let mut most = f64::NEG_INFINITY;
+        let over =
+            |value: f64, [low, high]: [f64; 2]| (value - high).max(low - value) - ROUNDING * value.abs().max(1.0);
+        for l in 0..L {
+            most = most.max(over(position[l], [self.low[l], self.high[l]]));
+        }
+        for (weights, ends) in self.joints() {
+            most = most.max(over(dot(weights, position), *ends));
+        }
+        most
+    }
+
+    /// Cuts the box around `middle` off at the ends of the travel, and `margin` inside of them.
+    pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64) {
+        for l in 0..L {
+            let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]);
+            let high = (middle[l] + half[l]).min(self.high[l] - free);
+            let low = (middle[l] - half[l]).max(self.low[l] + free);
+            if high > low {
+                (middle[l], half[l]) = (f64::midpoint(low, high), (high - low) / 2.0);
+            }
+        }
+        // A joint takes of all lanes alike: the box is made smaller until its corners are inside.
+        for (weights, [low, high]) in self.joints() {
+            let value = dot(weights, middle);
+            let reach: f64 = (0..L).map(|l| weights[l].abs() * half[l]).sum();
+            let room = (high - value).min(value - low) - margin;
+            if reach > room {
+                let share = (room / reach).max(LEFT);
+                *half = plus(&[0.0; L], share, half);
+            }
+        }
+    }
+}
