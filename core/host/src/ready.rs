@@ -19,16 +19,22 @@ use crate::{faults, rules, setup};
 /// drives refuses it here, so that a check finds all of it.
 pub struct Ready {
     pub machine: Machine,
+    /// The program's name, or what stands for it.
     pub program: String,
+    /// What the rough loop pulls.
     pub source: Box<dyn Source + Send>,
     pub policy: Option<PolicyHost>,
     pub planner: Box<dyn Planner>,
+    /// With its faults around it, where the machine has any.
     pub driver: Box<dyn Driver>,
     pub feed: Option<FeedRunner>,
     pub joints: Arc<JointSpace>,
+    /// The same once more, for the fine loop to own.
     pub kinematics: JointSpace,
+    /// What the first pass found.
     pub checked: CheckReport,
     pub switches: Switches,
+    /// Samples are in the coordinates of the drives: a run that only homes.
     pub records_drives: bool,
 }
 
@@ -39,11 +45,18 @@ pub struct Plugins {
 }
 
 impl Plugins {
+    /// Makes them. Host; allocates.
+    ///
+    /// # Errors
+    /// One of them is not there, or refuses its options.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         Ok(Self { planner: setup::planner(machine, registry)?, driver: setup::driver(machine, registry)? })
     }
 
     /// Whether they go with each other, and with what is asked of them.
+    ///
+    /// # Errors
+    /// What does not go together, with its place in the machine file.
     pub fn check(&self, machine: &Machine, registry: &Registry, switches: Switches) -> Result<(), HostError> {
         rules::check(machine, &self.planner.describe(), self.driver.describe())?;
         rules::check_homing(machine, &JointSpace::of(machine, registry)?, switches)
@@ -51,6 +64,10 @@ impl Plugins {
 }
 
 impl Ready {
+    /// Checks the whole program and makes everything for a run of it. Host; allocates.
+    ///
+    /// # Errors
+    /// Everything that refuses: the program's errors, plugins, policy, what does not go together.
     pub fn of_program(
         machine: Machine,
         registry: &Registry,
@@ -71,6 +88,10 @@ impl Ready {
         Self::new(machine, registry, Some(name), source, policy, plugins, checked, switches)
     }
 
+    /// Makes what every run needs for the parts that differ between runs. Host; allocates.
+    ///
+    /// # Errors
+    /// Joints, feed strategy, faults or driver refuse.
     #[allow(clippy::too_many_arguments)] // the parts that differ between runs, each once
     pub fn new(
         machine: Machine,

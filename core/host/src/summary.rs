@@ -128,9 +128,7 @@ impl Summary {
         self.reference_time_s = Some(reference_time_s);
         self.time_ratio = whole.then_some(self.motion_time_s / reference_time_s);
     }
-}
 
-impl Summary {
     /// What is to be known of a run that came to its end all the same, in words.
     pub fn warnings(&self) -> Vec<String> {
         if self.missed_periods == 0 && self.overruns == 0 {
