@@ -12,8 +12,8 @@ use crate::bound::Bound;
 use crate::case::Case;
 use crate::verdict::{Asked, Report, judge};
 
-/// Samples after which a run is ended, whatever the bound says.
-const MOST_SAMPLES: usize = 600_000;
+/// Samples after which a run is ended, whatever the bound says: a program that needs more is not what is drawn.
+pub const MOST_SAMPLES: usize = 600_000;
 /// Time without any motion at the end of a run that has taken too long, s: it stands still.
 const STILL_S: f64 = 0.2;
 

@@ -7,13 +7,15 @@ use toml::Table;
 
 use crate::case::Case;
 use crate::machine::Planner;
-use crate::run::Ran;
+use crate::run::{MOST_SAMPLES, Ran};
 
 /// Memory that a run may take, MB.
 const MOST_MEMORY_MB: f64 = 200.0;
 /// Distance from the path that rounding and inverse functions are forgiven, mm.
 const ON_THE_PATH_MM: f64 = 2e-6;
 
+/// Rounding of positions that went through filters, mm.
+const FILTERED_MM: f64 = 1e-9;
 /// A programmed feed exceeded by less than this share is told apart from one that is exceeded for all to see.
 const LITTLE_FEED: f64 = 1e-3;
 
@@ -81,6 +83,8 @@ pub struct Asked {
     pub off_the_path: bool,
     /// How long a filter of the planner needs to settle, s.
     pub filter_s: f64,
+    /// The widest tolerance in force, mm.
+    pub widest_tolerance_mm: f64,
     /// The longest time for which two blocks may overlap, s.
     pub overlap_s: f64,
     fine_period_s: f64,
@@ -122,6 +126,7 @@ impl Asked {
             max_ratio: commands.iter().map(ratio).fold(1.0, f64::max),
             off_the_path: option("corner_control").and_then(toml::Value::as_str) == Some("off"),
             filter_s: filter_ms / 1000.0,
+            widest_tolerance_mm: widest_tolerance_mm(case, machine),
             overlap_s: longest_constant_s(case, machine) + slowest_s.fold(0.0, f64::max),
             fine_period_s: machine.fine_period_s,
             commands,
@@ -144,6 +149,8 @@ impl Asked {
             }
             Some(Planner::BlockOverlap) => {
                 options.feed_window_s = Some(self.overlap_s);
+                // Its corners keep the tolerance; the chords between samples lie off the path besides.
+                options.vertex_tolerance_mm = Some(self.widest_tolerance_mm + longest_step_mm / 2.0);
                 if self.off_the_path {
                     options.checks.retain(|check| ![Check::Path, Check::Vertices, Check::Feed].contains(check));
                 }
@@ -164,10 +171,19 @@ impl Asked {
     }
 }
 
-fn longest_constant_s(case: &Case, machine: &Machine) -> f64 {
-    let words = case.program.lines().filter_map(|line| line.split("TA").nth(1));
+/// The greatest number behind `word` in the program, or `or` where that is greater.
+fn greatest(case: &Case, word: &str, or: f64) -> f64 {
+    let words = case.program.lines().filter_map(|line| line.split(word).nth(1));
     let number = |rest: &str| rest.split(|c: char| !c.is_ascii_digit() && c != '.').next()?.parse::<f64>().ok();
-    words.filter_map(number).map(|ms| ms / 1000.0).fold(machine.motion.time_constant_s, f64::max)
+    words.filter_map(number).fold(or, f64::max)
+}
+
+fn widest_tolerance_mm(case: &Case, machine: &Machine) -> f64 {
+    greatest(case, "G64 P", machine.motion.path_tolerance_mm)
+}
+
+fn longest_constant_s(case: &Case, machine: &Machine) -> f64 {
+    greatest(case, "TA", 1000.0 * machine.motion.time_constant_s) / 1000.0
 }
 
 fn longest_chord(trace: &Trace) -> f64 {
@@ -196,7 +212,14 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
         let time_s = ran.rows.len() as f64 * asked.fine_period_s;
         let line = ran.rows.last().map_or(0, |row| row.line);
         let words = format!("after {time_s:.2} s ({} samples) it is on line {line}", ran.most_samples);
-        return Some(Report::failed(if still { "standstill" } else { "slow" }, words));
+        let kind = if still {
+            "standstill"
+        } else if ran.most_samples == MOST_SAMPLES {
+            "too-long"
+        } else {
+            "slow"
+        };
+        return Some(Report::failed(kind, words));
     };
     let summary = &outcome.summary;
     match (&summary.fault, &summary.stopped) {
@@ -219,7 +242,11 @@ fn judged(ran: &Ran, case: &Case, judging: &tandem_oracle::Machine, asked: &Aske
     let options = asked.options(judging, &trace, ran.longest_step_mm);
     let verdict = tandem_oracle::judge(&trace, &case.program, judging, &options);
     let found = |kind: Kind| {
-        let of_kind = verdict.findings.iter().filter(move |finding| finding.kind == kind);
+        // A filter adds up what it has taken in: its rounding grows with the length of the run.
+        let rounded = |finding: &Finding| {
+            asked.planner == Some(Planner::AfterInterpolation) && kind == Kind::Travel && size(finding) < FILTERED_MM
+        };
+        let of_kind = verdict.findings.iter().filter(move |finding| finding.kind == kind && !rounded(finding));
         let worst = of_kind.clone().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let count = of_kind.count();
         let words = format!("{count} samples, the worst: {}", words(worst));

@@ -38,7 +38,10 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
     let mut link = 0;
     // Samples far off the path belong to no vertex; they must not widen the search either.
     let deviation_mm = if followed.misses.is_empty() { followed.deviation_mm } else { 0.0 };
-    let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end);
+    // A run that ended early may have come to rest just short of the end of its last piece.
+    let last = elements.len().min(followed.end.element + 1) - 1;
+    let passed = |index: usize| index < last || !options.ends_early || !elements[index].exact_stop;
+    let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end && passed(index));
     let vertices = reached.map(|(index, element)| {
         while link + 1 < followed.places.len() && followed.places[link + 1] <= end_of(index) {
             link += 1;

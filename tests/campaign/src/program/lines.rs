@@ -89,7 +89,7 @@ impl Program<'_> {
 
     /// A number of repetitions: sometimes so many that buffers fill.
     fn many(&mut self, most: u64) -> u64 {
-        let most = if self.random.below(8) == 0 { 20 * most } else { most };
+        let most = if self.random.below(12) == 0 { 16 * most } else { most };
         self.random.below(most) + 3
     }
 
@@ -151,7 +151,7 @@ impl Program<'_> {
         }
     }
 
-    /// A probe, whether it touches or not, and the way to a place that does not depend on it.
+    /// A probe, whether it touches or not, and the way back.
     pub(super) fn probe(&mut self) {
         let Some(surface) = self.machine.probe else { return };
         let (axis, letter) = (surface.axis, self.machine.axes[surface.axis].letter);
@@ -164,9 +164,8 @@ impl Program<'_> {
         let touching = if surface.touches(self.at[axis]) { ["G38.5"; 2] } else { ["G38.3", "G31"] };
         let word = self.random.pick(&touching);
         self.line(&format!("{word} {letter}{to:.*}", self.digits));
-        let back = self.place(axis, self.scale_mm);
-        self.line(&format!("G1 {letter}{back:.*}", self.digits));
-        self.left_s -= 2.0 * self.machine.fine_ms / 1000.0;
-        self.at[axis] = back;
+        // Back to where it began, at most as far as to where the probe may have come.
+        self.spend(&[(axis, by)], false);
+        self.line(&format!("G1 {letter}{:.*}", self.digits, self.at[axis]));
     }
 }
