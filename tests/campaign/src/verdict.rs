@@ -223,7 +223,7 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
     };
     let summary = &outcome.summary;
     match (&summary.fault, &summary.stopped) {
-        (Some(fault), _) if asked.emergency.is_none() => {
+        (Some(fault), _) if asked.emergency.is_none() || !fault.contains("emergency") => {
             // The words of the host for a run in which program time passes no more.
             let still = fault.contains("nothing has moved") || ran.stands_still(asked.fine_period_s);
             let kind = if still { "standstill" } else { "fault" };
