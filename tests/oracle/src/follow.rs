@@ -8,6 +8,8 @@ use crate::{
 
 /// Deviations below this are rounding, and are not resolved further.
 const SMALLEST_DEVIATION_MM: f64 = 1e-13;
+/// How often the tolerance is halved before samples count as off the path.
+const NARROWER: u32 = 16;
 /// How closely the smallest sufficient tolerance is found.
 const RESOLUTION: f64 = 1.05;
 
@@ -77,8 +79,11 @@ impl Followed {
 /// The smallest tolerance with which the walk succeeds, and that walk; none where the allowed one is too small.
 fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
     let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
-    let (mut low_mm, mut high_mm) = (SMALLEST_DEVIATION_MM, walker.widest_mm());
-    let mut places = walk(high_mm)?;
+    // With a wide tolerance a walk may dawdle on a piece that the samples have left, until the next vertex is out of reach;
+    // one that keeps closer to the samples does not. Each of them that succeeds is a proof.
+    let caps = (0..NARROWER).map(|times| walker.widest_mm() / f64::from(1u32 << times));
+    let (mut high_mm, mut places) = caps.into_iter().find_map(|cap_mm| Some((cap_mm, walk(cap_mm)?)))?;
+    let mut low_mm = SMALLEST_DEVIATION_MM;
     while high_mm > RESOLUTION * low_mm {
         let middle_mm = (low_mm * high_mm).sqrt();
         match walk(middle_mm) {

@@ -95,6 +95,19 @@ fn a_reversal_and_a_crossing_fool_nobody() {
     assert!(judge(&other_way).kinds().contains(&Kind::PathDeviation));
 }
 
+/// A walk that takes the first place of each sample would still be on the first piece where the samples are on the third.
+#[test]
+fn reversals_closer_than_a_few_tolerances_are_followed() {
+    let program = "F600\nG1 X-0.1\nX0\nX-0.135\nX0\nX0.1\nM2\n";
+    let wide = Options { sample_tolerance_mm: Some(0.036), vertex_tolerance_mm: Some(0.036), ..Options::default() };
+    let judged = |turns: &[f64]| {
+        let points: Vec<Position> = turns.iter().map(|x| at(*x, 0.0, 0.0)).collect();
+        judge(&trace(&stop_at_all(&points, 5.0, 500.0)), program, &smooth_machine(), &wide)
+    };
+    assert_passes(&judged(&[0.0, -0.075, -0.025, -0.135, 0.1]));
+    assert!(!judged(&[0.0, -0.05, -0.025, -0.135, 0.1]).passed(), "the first reversal is missed by more than allowed");
+}
+
 #[test]
 fn stopping_and_going_back_a_little_is_off_the_order_of_travel() {
     let back = [at(0.0, 0.0, 0.0), at(10.0, 0.0, 0.0), at(9.9, 0.0, 0.0), at(20.0, 0.0, 0.0), at(20.0, 15.0, 0.0)];
