@@ -14,8 +14,8 @@ const MOST_MEMORY_MB: f64 = 200.0;
 /// Distance from the path that rounding and inverse functions are forgiven, mm.
 const ON_THE_PATH_MM: f64 = 2e-6;
 
-/// Rounding of positions that went through filters, mm.
-const FILTERED_MM: f64 = 1e-9;
+/// Beyond the end of the travel by less than this, mm, is rounding: of sums in a filter, or of a length turned into a place.
+const ROUNDED_MM: f64 = 1e-9;
 /// A programmed feed exceeded by less than this share is told apart from one that is exceeded for all to see.
 const LITTLE_FEED: f64 = 1e-3;
 
@@ -242,10 +242,7 @@ fn judged(ran: &Ran, case: &Case, judging: &tandem_oracle::Machine, asked: &Aske
     let options = asked.options(judging, &trace, ran.longest_step_mm);
     let verdict = tandem_oracle::judge(&trace, &case.program, judging, &options);
     let found = |kind: Kind| {
-        // A filter adds up what it has taken in: its rounding grows with the length of the run.
-        let rounded = |finding: &Finding| {
-            asked.planner == Some(Planner::AfterInterpolation) && kind == Kind::Travel && size(finding) < FILTERED_MM
-        };
+        let rounded = |finding: &Finding| kind == Kind::Travel && size(finding) < ROUNDED_MM;
         let of_kind = verdict.findings.iter().filter(move |finding| finding.kind == kind && !rounded(finding));
         let worst = of_kind.clone().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let count = of_kind.count();
