@@ -73,6 +73,12 @@ impl Bench {
         self.drive(settings, &[])
     }
 
+    /// The same with commands.
+    pub fn try_run_with(&self, settings: &[(String, String)], commands: &str) -> Result<Ran, HostError> {
+        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
+        self.drive(settings, &commands)
+    }
+
     fn drive(&self, settings: &[(String, String)], commands: &[Timed]) -> Result<Ran, HostError> {
         let machine = Machine::read(&self.machine, settings).unwrap();
         let program = tandem_gcode::Program::open(&self.program).unwrap();
@@ -186,8 +192,14 @@ fn registry() -> Registry {
     let watched = local_plugin!(planner "watched" = watched);
     let boastful = local_plugin!(planner "boastful" = boastful);
     let mut registry = Registry::default();
-    let linked = [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, tandem_smooth::PLUGIN];
-    for plugin in linked.into_iter().chain([watched, boastful]) {
+    let planners = [
+        tandem_look_ahead::PLUGIN,
+        tandem_block_overlap::PLUGIN,
+        tandem_after_interpolation::PLUGIN,
+        tandem_nurbs::PLUGIN,
+        tandem_smooth::PLUGIN,
+    ];
+    for plugin in planners.into_iter().chain([tandem_sim::PLUGIN]).chain([watched, boastful]) {
         registry.register(plugin).unwrap();
     }
     registry

@@ -33,6 +33,7 @@ mod policy;
 mod preparation;
 mod probing;
 mod program_flow;
+mod progress;
 mod random;
 mod random_curves;
 mod record;

@@ -9,6 +9,11 @@ use tandem_sdk::{AxisVector, Event, Segment, SegmentFlags};
 use crate::points::Points;
 use crate::steps::{Recent, Steps};
 
+/// What a move lacks to the end of a segment, as a share of its time, that is rounding: the move reaches the end, and owes it. A
+/// sum of pieces is a rounding off itself, which is no time to spend a period on.
+const ROUNDING: f64 = 1e-12;
+/// The same for a rest of the plan, near which nothing moves: what many pieces of a dwell are off together.
+const REST_ROUNDING: f64 = 1e-9;
 /// Entries of older epochs that are dropped in one fine period: each may be a cache miss.
 const DROPS: usize = 256;
 
@@ -18,7 +23,10 @@ pub struct Cursor {
     entries: Consumer<Queued>,
     segment: Segment,
     start_s: f64,
+    /// Time in the segment: less than its duration but at a rest, and where the queue ends in motion.
     local_s: f64,
+    /// What rounding has left out of the moves so far, s: none is lost in it, however short.
+    owed_s: f64,
     /// Path coordinate here, mm, and path speed, mm/s of program time: asked for more often than the place moves.
     path_mm: f64,
     path_speed_mm_per_s: f64,
@@ -51,6 +59,7 @@ impl Cursor {
             segment: Segment::rest(position, 0.0),
             start_s: 0.0,
             local_s: 0.0,
+            owed_s: 0.0,
             path_mm: 0.0,
             path_speed_mm_per_s: 0.0,
             crossed: None,
@@ -102,7 +111,7 @@ impl Cursor {
         (rest.block, rest.line, rest.feed_mm_per_s) =
             (self.segment.block, self.segment.line, self.segment.feed_mm_per_s);
         rest.path[0] = self.path_mm;
-        (self.start_s, self.local_s) = (self.program_time_s(), 0.0);
+        (self.start_s, self.local_s, self.owed_s) = (self.program_time_s(), 0.0, 0.0);
         self.segment = rest;
         self.resting = true;
         self.epoch += 1;
@@ -158,7 +167,7 @@ impl Cursor {
         let (first, second) = chunk.as_slices();
         for queued in first.iter().chain(second) {
             if left_s <= 0.0 || points.is_full() {
-                return;
+                break;
             }
             let Queued::Segment { segment, .. } = queued else { continue };
             points.add(segment, 0.0, segment.duration_s.min(left_s));
@@ -166,6 +175,10 @@ impl Cursor {
             if ends(segment) {
                 return;
             }
+        }
+        if left_s <= 0.0 {
+            // The sum of the pieces may be a rounding short of it.
+            points.covered_s = horizon_s;
         }
     }
 
@@ -211,18 +224,27 @@ impl Cursor {
     }
 
     fn go(&mut self, mut left_s: f64, mut event: impl FnMut(&Event) -> bool) -> Reached {
+        let asked_s = left_s;
         loop {
-            let here_s = if self.resting { 0.0 } else { self.segment.duration_s - self.local_s };
-            if !self.resting && left_s < here_s {
-                self.local_s += left_s;
-                return Reached::Inside;
+            if !self.resting {
+                // The place decides, not the time left: a time below its rounding would move it never, or onto the end.
+                let duration_s = self.segment.duration_s;
+                let wanted_s = left_s + self.owed_s;
+                let to_s = (self.local_s + wanted_s).max(0.0);
+                let rests = ends(&self.segment);
+                if to_s < duration_s - asked_s * if rests { REST_ROUNDING } else { ROUNDING } {
+                    self.owed_s = wanted_s - (to_s - self.local_s);
+                    self.local_s = to_s;
+                    return Reached::Inside;
+                }
+                if rests {
+                    (self.local_s, self.owed_s) = (duration_s, 0.0);
+                    self.resting = true;
+                    return Reached::Rest;
+                }
+                let over_s = wanted_s - (duration_s - self.local_s);
+                (left_s, self.owed_s) = (over_s.max(0.0), over_s.min(0.0));
             }
-            if !self.resting && ends(&self.segment) {
-                self.local_s = self.segment.duration_s;
-                self.resting = true;
-                return Reached::Rest;
-            }
-            left_s -= here_s;
             if !self.next(&mut event) {
                 return if self.resting { Reached::Rest } else { Reached::Wall };
             }
@@ -294,5 +316,74 @@ impl Ahead {
             most_feed_mm_per_s: segment.feed_mm_per_s,
             rapid: segment.flags.contains(SegmentFlags::RAPID),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+    use tandem_sdk::{AxisLimits, MAX_AXES};
+
+    /// A dwell of `dwell_s` as a planner emits it in rough periods of `rough_s`, behind a move that ends anywhere.
+    fn dwell(dwell_s: f64, rough_s: f64, before_s: f64) -> Cursor {
+        let (mut input, output) = RingBuffer::new(4096);
+        let (mut start_s, mut left_s) = (before_s, dwell_s);
+        while left_s > 0.0 {
+            let piece_s = left_s.min(rough_s);
+            left_s -= piece_s;
+            let mut segment = Segment::rest(&AxisVector::ZERO, piece_s);
+            segment.flags = if left_s > 0.0 { SegmentFlags::DWELL } else { SegmentFlags::ENDS_AT_REST };
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+            start_s += piece_s;
+        }
+        Cursor::new(output, &AxisVector::ZERO)
+    }
+
+    /// Fine periods until the cursor rests at the end of the queue.
+    fn periods(cursor: &mut Cursor, period_s: f64, rate: f64, most: u64) -> Option<u64> {
+        let axis = AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: 1.0,
+            rapid_mm_per_s: 1.0,
+            acceleration_mm_per_s2: 1.0,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let mut points = Points::new(&[axis; MAX_AXES], 1);
+        (1..=most).find(|_| {
+            cursor.scan(rate * period_s, &mut points);
+            let covered_s = if cursor.is_resting() { f64::MAX } else { points.covered_s };
+            cursor.advance((rate * period_s).min(covered_s), |_| false);
+            cursor.is_resting() && cursor.is_last()
+        })
+    }
+
+    #[test]
+    fn a_dwell_takes_its_periods_whatever_the_pair_of_periods_and_the_rate_are() {
+        for fine_ms in [0.125, 0.2, 0.25, 0.3, 0.37, 0.4, 0.5, 0.625, 0.75, 1.0, 1.25, 1.3, 2.0] {
+            for ratio in 1..=21 {
+                let (period_s, rough_s) = (fine_ms / 1000.0, fine_ms * f64::from(ratio) / 1000.0);
+                for (dwell_s, rate) in [(0.05, 1.0), (0.1, 1.0), (0.05, 0.3), (0.013, 0.01), (40.0 * period_s, 1.0)] {
+                    let exact = dwell_s / (rate * period_s);
+                    let took = periods(&mut dwell(dwell_s, rough_s, 0.3), period_s, rate, 2 * exact as u64 + 10);
+                    // What the pieces' own rounding leaves is no period of its own.
+                    let expected = (exact - 1e-6).ceil() as u64;
+                    assert_eq!(took, Some(expected), "{fine_ms} ms, {ratio} of them, {dwell_s} s at {rate}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn time_below_the_rounding_of_the_place_is_owed_and_not_lost() {
+        let mut cursor = dwell(1e6, 2e6, 0.0);
+        cursor.advance(9e5, |_| false);
+        // An ulp there is 1.2e-10 s.
+        for _ in 0..1_000_000 {
+            cursor.advance(1e-11, |_| false);
+        }
+        assert!((cursor.program_time_s() - 9e5 - 1e-5).abs() < 1e-9, "{}", cursor.program_time_s() - 9e5);
     }
 }

@@ -33,6 +33,34 @@ pub struct Along {
 }
 
 impl Along {
+    /// The highest speed at the end of a period from which `end_mm_per_s` is met within `left_mm`, mm/s; never less than
+    /// that. Jerk is not limited.
+    ///
+    /// Speed is linear within periods, so braking is laid out in whole ones. With u the speeds above the end speed v_e, u₀
+    /// now and u at the end of this period, s = a·T the change in a period and n periods of braking behind this one, the way
+    /// in units of T is `(u₀ + u)/2 + v_e` in this period and `(n − ½)·u − s·n(n − 1)/2 + n·v_e` behind it. With
+    /// `D = left/T − (v₀ + v_e)/2` that is `n·u = D − n·v_e + s·n(n − 1)/2`, and n is the largest number with which u is not
+    /// below the `(n − 1)·s` that take n periods. The next period finds n − 1 and u − s: braking is even, the end speed is
+    /// met and not gone below, and rest is met at the place itself.
+    pub fn speed_towards(&self, left_mm: f64, end_mm_per_s: f64, period_s: f64) -> f64 {
+        let step = self.most_mm_per_s2 * period_s;
+        let way = left_mm / period_s - f64::midpoint(self.speed_mm_per_s, end_mm_per_s);
+        if step.is_infinite() {
+            // Nothing that is queued moves.
+            return f64::INFINITY;
+        }
+        if way < end_mm_per_s || step <= 0.0 {
+            return end_mm_per_s;
+        }
+        let slope = end_mm_per_s - step / 2.0;
+        let root = (slope * slope + 2.0 * step * way).sqrt();
+        // In each case the form that does not cancel.
+        let periods = if slope > 0.0 { 2.0 * way / (slope + root) } else { (root - slope) / step };
+        let periods = periods.floor().max(1.0);
+        let above = (way / periods - end_mm_per_s + step * (periods - 1.0) / 2.0).min(periods * step);
+        end_mm_per_s + above.max(0.0)
+    }
+
     /// Way until the speed has come down to `end_mm_per_s`, mm: acceleration to zero, deceleration up, held, and down.
     pub fn way_to_mm(&self, end_mm_per_s: f64) -> f64 {
         let (a, j) = (self.most_mm_per_s2, self.jerk_mm_per_s3);
@@ -59,5 +87,55 @@ impl Along {
         way_mm += held_s * (v - peak * held_s / 2.0);
         v -= peak * held_s;
         way_mm + fall_s * (v - fall_s * (peak / 2.0 - j * fall_s / 6.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn along(speed_mm_per_s: f64, most_mm_per_s2: f64) -> Along {
+        Along { speed_mm_per_s, acceleration_mm_per_s2: 0.0, most_mm_per_s2, jerk_mm_per_s3: f64::INFINITY }
+    }
+
+    proptest! {
+        /// Whatever the deceleration, the feeds and the period are: the end speed is met at the place, never gone below on the
+        /// way, and no period brakes harder than it may.
+        #[test]
+        fn the_end_speed_is_met_and_not_gone_below(
+            acceleration in -1.0..5.0f64, from in -2.0..2.5f64, share in 0.0..1.0f64, period in -4.0..-2.7f64,
+            way in 1.0..3.0f64, phase in 0.0..1.0f64, rests in proptest::bool::ANY,
+        ) {
+            let (a, v, period_s) = (10f64.powf(acceleration), 10f64.powf(from), 10f64.powf(period));
+            let end = if rests { 0.0 } else { share * v };
+            // Enough to brake in whole periods, and one more.
+            let enough = (v * v - end * end) / (2.0 * a) * way + (3.0 + phase) * v * period_s + a * period_s * period_s;
+            let (mut left, mut speed) = (enough, v);
+            let periods = (4.0 * enough / (v + end) / period_s) as u64 + (v / (a * period_s)) as u64 + 10;
+            prop_assume!(periods < 200_000);
+            for _ in 0..8 * periods {
+                let next = along(speed, a).speed_towards(left, end, period_s).min(v);
+                prop_assert!(next >= end, "{next} below {end}");
+                prop_assert!(speed - next <= a * period_s * (1.0 + 1e-6) + 1e-9 * v, "{speed} to {next}");
+                let before = left;
+                left -= f64::midpoint(speed, next) * period_s;
+                speed = next;
+                if left <= 1e-9 * enough || (left < end * period_s && speed <= end * (1.0 + 1e-9)) {
+                    let still_mm = (speed * speed - end * end) / (2.0 * a);
+                    prop_assert!(still_mm <= left.max(0.0) + 1e-8 * enough, "arrives with {speed} for {end}");
+                    prop_assert!(left > -1e-6 * enough - end * period_s, "passed by {}", -left);
+                    return Ok(());
+                }
+                prop_assert!(left < before, "stands still {left} mm before the place");
+            }
+            prop_assert!(false, "does not arrive: {left} of {enough} left at {speed}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_nothing_to_brake_with_asks_for_the_end_speed_and_what_does_not_move_for_none() {
+        assert_eq!(along(5.0, 0.0).speed_towards(1.0, 2.0, 1e-3), 2.0);
+        assert_eq!(along(0.0, f64::INFINITY).speed_towards(1.0, 2.0, 1e-3), f64::INFINITY);
     }
 }

@@ -15,6 +15,21 @@ pub struct Mark {
     pub path_mm: f64,
     /// Programmed feed from there, mm/s.
     pub feed_mm_per_s: f64,
+    /// Planned path speed there, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Path acceleration planned from there on, mm/s².
+    pub acceleration_mm_per_s2: f64,
+}
+
+impl Mark {
+    /// The speed to arrive with, mm/s, where `ratio` of the feed is asked for. A corner, which the plan leaves getting
+    /// faster, lies inside a period in which the governor cannot yet take that back: its rise is left out, up to the half.
+    pub fn speed_to_meet_mm_per_s(&self, ratio: f64, period_s: f64) -> f64 {
+        let asked = ratio * self.feed_mm_per_s;
+        let sigma = if self.speed_mm_per_s > asked { asked / self.speed_mm_per_s } else { 1.0 };
+        let rise = sigma * sigma * self.acceleration_mm_per_s2.max(0.0) * period_s;
+        (asked - rise).max(asked / 2.0)
+    }
 }
 
 /// Entries looked at in a period: four times what may be driven in one.
@@ -76,7 +91,12 @@ impl Preview {
             return;
         }
         if segment.feed_mm_per_s < self.feed_mm_per_s {
-            self.mark(Mark { path_mm: segment.path[0], feed_mm_per_s: segment.feed_mm_per_s });
+            self.mark(Mark {
+                path_mm: segment.path[0],
+                feed_mm_per_s: segment.feed_mm_per_s,
+                speed_mm_per_s: segment.path[1],
+                acceleration_mm_per_s2: 2.0 * segment.path[2],
+            });
         }
         self.feed_mm_per_s = segment.feed_mm_per_s;
     }
@@ -88,6 +108,8 @@ impl Preview {
         } else {
             let last = &mut self.marks[(self.first + self.count - 1) % MARKS];
             last.feed_mm_per_s = last.feed_mm_per_s.min(mark.feed_mm_per_s);
+            last.speed_mm_per_s = last.speed_mm_per_s.min(mark.speed_mm_per_s);
+            last.acceleration_mm_per_s2 = last.acceleration_mm_per_s2.max(mark.acceleration_mm_per_s2);
         }
     }
 }

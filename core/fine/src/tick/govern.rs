@@ -8,12 +8,31 @@ use super::single_block::LINE_END_MM;
 use crate::config::GuardMode;
 use crate::governor::{Aim, Governor};
 use crate::law::Along;
+use crate::preview::Mark;
 
 /// The feed ratios that count now.
 struct Ratios {
     feed: f64,
     rapid: f64,
 }
+
+/// What a period is asked for.
+struct Asked {
+    /// Rate at its end.
+    at_end: f64,
+    /// Mean rate.
+    mean: f64,
+    /// Path speed that counts for the mean, mm/s.
+    allowed_mm_per_s: f64,
+    rapid: bool,
+}
+
+/// Share of the speed asked for by which a period may begin above it and still end as far below, so that its mean is met. The
+/// rounds that seek the rate leave a thousandth where the plan changes by half in a period.
+const ABOVE: f64 = 0.01;
+
+/// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
+const REST_ROUNDS: u32 = 8;
 
 /// Share of the jerk that braking for a place ahead counts on.
 const JERK_SHARE: f64 = 0.9;
@@ -118,23 +137,61 @@ impl FineLoop {
     /// The rate at which the path speed is at most ratio × programmed feed at the end of the period, and no more than
     /// `way_speed_mm_per_s`.
     fn ratio_target(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
-        let (from, from_mm) = (self.governor.sigma(), self.cursor.path_mm());
+        if self.cursor.is_resting() {
+            return self.ratio_from_rest(ratios, way_speed_mm_per_s);
+        }
+        let from = self.governor.sigma();
+        let speed_mm_per_s = from * self.cursor.path_speed_mm_per_s();
         let mut sigma = from;
         // The plan at the end of the period depends on the rate sought: three rounds settle it.
         for _ in 0..3 {
-            let delta_s = self.governor.program_time_s(sigma);
-            let ahead = self.cursor.ahead(delta_s);
-            let at_end = within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s);
-            let mean = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
-            let of_period = 2.0 * within(ratios.feed * ahead.most_feed_mm_per_s, mean) - from;
-            let next = if ahead.rapid { ratios.rapid } else { at_end.min(of_period).clamp(0.0, 1.0) };
-            let next = next.min(within(way_speed_mm_per_s, ahead.speed_mm_per_s));
+            let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, way_speed_mm_per_s);
+            let steady = asked.at_end.min(asked.mean);
+            // From above, an end that makes the mean right lies as far below: the next period would begin in a dip.
+            let above = speed_mm_per_s > (1.0 + ABOVE) * asked.allowed_mm_per_s;
+            let next = if above { steady } else { asked.at_end.min(2.0 * asked.mean - from) }.clamp(0.0, 1.0);
             if next == sigma {
                 break;
             }
             sigma = next;
         }
         sigma
+    }
+
+    /// The same from rest, where any rate is as good to begin with: one that is kept over the period.
+    fn ratio_from_rest(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        let mut sigma = 1.0;
+        // The faster the plan is left, the lower the rate it leaves: their geometric mean is the answer where speed grows
+        // with time, and halves what is wrong with it in each round where it grows with the square of time.
+        for round in 0..REST_ROUNDS {
+            let asked = self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
+            let next = asked.at_end.min(asked.mean);
+            if next == sigma || round + 1 == REST_ROUNDS {
+                break;
+            }
+            sigma = if asked.rapid { next } else { (sigma * next).sqrt() };
+        }
+        self.governor.jump(sigma);
+        sigma
+    }
+
+    /// What is asked of a period in which `delta_s` of program time passes.
+    fn asked_of_period(&mut self, delta_s: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> Asked {
+        let from_mm = self.cursor.path_mm();
+        let ahead = self.cursor.ahead(delta_s);
+        let allowed_mm_per_s = ratios.feed * ahead.most_feed_mm_per_s;
+        let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s);
+        if ahead.rapid {
+            let at_end = ratios.rapid.min(of_places);
+            return Asked { at_end, mean: f64::INFINITY, allowed_mm_per_s, rapid: true };
+        }
+        let mean_mm_per_s = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
+        Asked {
+            at_end: within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s).min(of_places),
+            mean: within(allowed_mm_per_s, mean_mm_per_s),
+            allowed_mm_per_s,
+            rapid: false,
+        }
     }
 
     /// The speed at the end of this period from which every lower feed ahead, and the end of the line, can be met, mm/s.
@@ -148,27 +205,25 @@ impl FineLoop {
         let until_s = self.cursor.program_time_s() + stop_s;
         self.preview.extend(&mut self.cursor, until_s);
         let marks = self.preview.marks();
-        marks.fold(at_end, |least, mark| least.min(self.speed_towards(mark.path_mm, ratios.feed * mark.feed_mm_per_s)))
+        let met = |mark: &Mark| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
+        marks.fold(at_end, |least, mark| least.min(self.speed_towards(mark.path_mm, met(mark))))
     }
 
     /// The speed at the end of this period from which `end_mm_per_s` can be met at `place_mm`, mm/s.
     ///
-    /// With limits of order 2: with `d` the way left and `v₀` the speed now, `v² ≤ v_e² + 2a(d − (v₀ + v)T/2)`. With a jerk
-    /// limit it is decided period by period whether braking may still wait.
+    /// With limits of order 2 the speeds at the ends of the periods to come are laid out ([`Along::speed_towards`]). With a
+    /// jerk limit it is decided period by period whether braking may still wait.
     fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
         let (along, period_s) = (self.along(), self.config.period_s);
         let left_mm = place_mm - self.cursor.path_mm();
-        if self.config.order >= 3 {
-            let soon_mm = 2.0 * period_s * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
-            let later = Along { speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s), ..along };
-            // So near there is no way to get faster again: the place would be passed.
-            let waits = left_mm > LINE_END_MM && later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
-            return if waits { f64::INFINITY } else { end_mm_per_s };
+        if self.config.order < 3 {
+            return along.speed_towards(left_mm, end_mm_per_s, period_s);
         }
-        let step = along.most_mm_per_s2 * period_s;
-        let way = 2.0 * along.most_mm_per_s2 * left_mm - step * (along.speed_mm_per_s + step);
-        let square = end_mm_per_s * end_mm_per_s + way + step * step / 4.0;
-        (square.max(0.0).sqrt() - step / 2.0).max(0.0)
+        let soon_mm = 2.0 * period_s * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
+        let later = Along { speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s), ..along };
+        // So near there is no way to get faster again: the place would be passed.
+        let waits = left_mm > LINE_END_MM && later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
+        if waits { f64::INFINITY } else { end_mm_per_s }
     }
 
     /// The state along the path, with what every queued segment leaves to brake with.
