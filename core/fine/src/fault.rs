@@ -66,6 +66,15 @@ pub enum FaultKind {
     EmergencyStop,
     /// A fault on the soft side: the machine stopped on the path.
     Soft,
+    /// Program time hardly passed though nothing asked for a stop, the queue was not starved and something was queued.
+    NoProgress {
+        /// Fine periods in which it did not.
+        periods: u64,
+        /// Program time that passed in them, s.
+        grown_s: f64,
+        /// Least rate of program time that was asked for meanwhile.
+        asked: f64,
+    },
     /// More fine periods were missed than the machine allows.
     MissedPeriods,
 }

@@ -122,6 +122,29 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn every_axis_bounds_the_rate_and_not_only_the_first_and_the_last() {
+        let axis = AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: 100.0,
+            rapid_mm_per_s: 100.0,
+            acceleration_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let limits = [axis; MAX_AXES];
+        for moving in 0..3 {
+            let mut segment = tandem_sdk::Segment::rest(&tandem_sdk::AxisVector::ZERO, 1.0);
+            segment.coefficients[moving][1] = 50.0;
+            let mut points = Points::new(&limits, 3);
+            points.add(&segment, 0.0, 0.001);
+            // 1000 mm/s² take 1 mm/s of 50 in a period.
+            let sigma = Governor::new(&limits, 3, 0.001).choose(0.0, &points);
+            assert!((sigma - (1.0 - MARGIN / 50.0)).abs() < 1e-9, "axis {moving}: {sigma}");
+        }
+    }
+
     proptest! {
         #[test]
         fn the_crossing_is_the_first(gap in 0.0..10.0f64, slope in -5.0..5.0f64, curve in -5.0..5.0f64) {

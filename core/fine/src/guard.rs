@@ -133,3 +133,84 @@ impl Guard {
         (beyond && self.relaxed == 0).then_some(FaultKind::Guard { breach: Breach::Jerk, axis, value, limit })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{GuardMode, Joints};
+    use tandem_sdk::{AxisLimits, Limits};
+
+    /// A machine that may step by 2 mm/s, accelerate by 1000 mm/s², and moves at most 1 m.
+    fn guard() -> Guard {
+        let axis = AxisLimits {
+            min_mm: -500.0,
+            max_mm: 500.0,
+            feed_mm_per_s: 100.0,
+            rapid_mm_per_s: 100.0,
+            acceleration_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: 2.0,
+        };
+        Guard::new(&FineConfig {
+            period_s: 0.001,
+            limits: Limits::new(&[axis; 3]).unwrap(),
+            joints: Joints::Axes,
+            speed_difference_mm_per_s: [2.0; MAX_AXES],
+            order: 2,
+            guard: GuardMode::Stop,
+            position: AxisVector::ZERO,
+            max_feed_ratio: 1.0,
+            max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+            pause_at_stops: false,
+            dry_run: false,
+            unhomed: 0,
+            record_drives: false,
+        })
+    }
+
+    /// The first breach over samples of `axis` with these velocities, mm/s.
+    fn breach(axis: usize, velocities: &[f64]) -> Option<FaultKind> {
+        let (mut guard, mut at) = (guard(), AxisVector::ZERO);
+        for velocity in velocities {
+            at[axis] += velocity * 0.001;
+            let checked = guard.check(&at, 0);
+            if checked.breach.is_some() {
+                return checked.breach;
+            }
+            guard.sent(&at, &checked);
+        }
+        None
+    }
+
+    #[test]
+    fn the_speed_difference_is_what_is_allowed_and_a_thousandth_more_is_not() {
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                // What the acceleration explains in a period, and the difference, at once.
+                assert_eq!(breach(axis, &[sign * 3.0]), None);
+                assert!(breach(axis, &[sign * 3.003]).is_some(), "axis {axis}");
+                // The difference is there once in a window, however it is spread.
+                assert_eq!(breach(axis, &[sign * 3.0, sign * 4.0, sign * 5.0]), None);
+                assert!(breach(axis, &[sign * 3.0, sign * 4.0, sign * 5.003]).is_some(), "axis {axis}");
+                // It leaks away by what is not used.
+                assert_eq!(breach(axis, &[sign * 3.0, sign * 3.0, sign * 3.0, sign * 6.0]), None);
+            }
+        }
+    }
+
+    #[test]
+    fn velocity_and_travel_are_kept_to_their_tolerance() {
+        let mut up: Vec<f64> = (1..=100).map(f64::from).collect();
+        assert_eq!(breach(1, &up), None);
+        up.push(100.001);
+        assert!(matches!(breach(1, &up), Some(FaultKind::Guard { breach: Breach::Velocity, axis: 1, .. })));
+        let mut guard = guard();
+        guard.position[2] = 500.0;
+        let mut at = guard.position;
+        assert!(guard.check(&at, 0).breach.is_none(), "the end of the travel is travel");
+        at[2] += 1e-9;
+        let found = guard.check(&at, 0).breach;
+        assert!(matches!(found, Some(FaultKind::Guard { breach: Breach::Position, axis: 2, limit: 500.0, .. })));
+        assert!(guard.check(&at, 0b100).breach.is_none(), "an axis that is not homed has no travel yet");
+    }
+}

@@ -36,7 +36,7 @@ impl Along {
     /// The highest speed at the end of a period from which `end_mm_per_s` is met within `left_mm`, mm/s; never less than
     /// that. Jerk is not limited.
     ///
-    /// Speed is linear within periods, so braking is laid out in whole ones. With u the speeds above the end speed v_e, u₀
+    /// Speed is linear within periods, so braking is laid out in whole ones. With u the speeds above the end speed `v_e`, u₀
     /// now and u at the end of this period, s = a·T the change in a period and n periods of braking behind this one, the way
     /// in units of T is `(u₀ + u)/2 + v_e` in this period and `(n − ½)·u − s·n(n − 1)/2 + n·v_e` behind it. With
     /// `D = left/T − (v₀ + v_e)/2` that is `n·u = D − n·v_e + s·n(n − 1)/2`, and n is the largest number with which u is not

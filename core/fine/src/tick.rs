@@ -5,6 +5,7 @@ mod follow;
 mod govern;
 mod joints;
 mod keep_alive;
+mod progress;
 mod request;
 mod rest;
 mod single_block;
@@ -32,6 +33,7 @@ use crate::ramp::Ramp;
 use crate::state::{self, Input};
 use joints::Lead;
 use keep_alive::KeepAlive;
+use progress::Progress;
 use rest::Stop;
 
 /// What the fine loop counted.
@@ -98,6 +100,7 @@ pub struct FineLoop {
     edge: EdgeWatch,
     stop: Option<Stop>,
     keep_alive: KeepAlive,
+    progress: Progress,
     outputs: Outputs,
     phase: Phase,
     state: MachineState,
@@ -151,6 +154,7 @@ impl FineLoop {
             edge: EdgeWatch::default(),
             stop: None,
             keep_alive: KeepAlive::default(),
+            progress: Progress::new(config),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
             state: MachineState::Fault,

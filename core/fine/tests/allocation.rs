@@ -1,5 +1,6 @@
 //! No fine period touches the heap, whatever happens in it.
 
+#[allow(dead_code)] // what other tests need of it
 mod common;
 #[path = "../../../tests/counting_allocator.rs"]
 mod counting_allocator;

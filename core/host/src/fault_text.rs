@@ -53,6 +53,11 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
         }
         FaultKind::EmergencyStop => "emergency stop".to_string(),
         FaultKind::Soft => soft.unwrap_or("stopped by the host").to_string(),
+        FaultKind::NoProgress { periods, grown_s, asked } => format!(
+            "the machine stands still though nothing stops it: in {periods} fine periods program time passed by {grown_s:e} s, \
+             at a rate of {asked:.6} asked for, on the plan of planner {}",
+            machine.planner.plugin
+        ),
         FaultKind::MissedPeriods => {
             format!("more than {} fine periods were missed: the drives saw a step", machine.max_missed_periods)
         }

@@ -32,6 +32,8 @@ pub struct Queue {
     /// Program time at the end of what is in the ring, s.
     queued_s: f64,
     ends_at_rest: bool,
+    /// What was emitted last ends at rest.
+    plan_rests: bool,
     seams: Seams,
     defect: Option<&'static str>,
 }
@@ -52,6 +54,7 @@ impl Queue {
             emitted_s: 0.0,
             queued_s: 0.0,
             ends_at_rest: true,
+            plan_rests: true,
             seams: Seams::default(),
             defect: None,
         }
@@ -77,6 +80,7 @@ impl Queue {
         self.seams = Seams::default();
         self.path_start_mm = rest.path_mm;
         (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
+        self.plan_rests = true;
         self.staged.clear();
         self.events.clear();
         self.blocks.clear();
@@ -126,6 +130,16 @@ impl Queue {
     /// Digital inputs as the fine loop last read them.
     pub fn inputs(&self) -> u64 {
         self.end.status.inputs.load(Relaxed)
+    }
+
+    /// Program time at the end of what the planner has emitted, s.
+    pub fn emitted_s(&self) -> f64 {
+        self.emitted_s
+    }
+
+    /// Whether what the planner has emitted ends at rest.
+    pub fn plan_rests(&self) -> bool {
+        self.plan_rests
     }
 
     /// Whether all is driven: nothing staged, and the fine loop rests at the end of its queue.
@@ -195,6 +209,7 @@ impl SegmentSink for Queue {
             }
         }
         self.emitted_s += segment.duration_s;
+        self.plan_rests = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
         self.depth.push(segment, self.emitted_s);
     }
 

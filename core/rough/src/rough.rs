@@ -146,10 +146,14 @@ impl RoughLoop {
         let mut short = 0;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
             self.feed(observer)?;
+            let before_s = self.queue.emitted_s();
             let advanced =
                 self.planner.advance(period_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
             if let Some(defect) = self.queue.defect() {
                 return Err(planner_error(None, defect));
+            }
+            if advanced.done != 0 && !self.queue.plan_rests() {
+                return Err(planner_error(None, "advance says that it is done, and the plan does not end at rest"));
             }
             self.stretch_over = advanced.done != 0;
             if self.stretch_over {
@@ -157,10 +161,12 @@ impl RoughLoop {
                 return Ok(());
             }
             self.queue.flush(false);
-            if advanced.duration_s == 0.0 && !self.finished {
+            // What came counts, not what the planner says of it.
+            let emitted_s = self.queue.emitted_s() - before_s;
+            if emitted_s == 0.0 && !self.finished {
                 return Err(planner_error(Some(self.line), "it is full, and advance emits nothing"));
             }
-            short += u32::from(advanced.duration_s < period_s / 2.0);
+            short += u32::from(emitted_s < period_s / 2.0);
             if short > MOST_SHORT_ADVANCES {
                 return Err(planner_error(None, "advance emits a little at a time, and hardly gets on"));
             }
@@ -278,3 +284,7 @@ fn read_input(wait: &InputWait, inputs: u64) -> Option<f64> {
     };
     met.then_some(if high { 1.0 } else { 0.0 })
 }
+
+#[cfg(test)]
+#[path = "rough_tests.rs"]
+mod tests;

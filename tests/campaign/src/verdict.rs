@@ -225,7 +225,8 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
     match (&summary.fault, &summary.stopped) {
         (Some(fault), _) if asked.emergency.is_none() || !fault.contains("emergency") => {
             // The words of the host for a run in which program time passes no more.
-            let kind = if fault.contains("nothing has moved") { "standstill" } else { "fault" };
+            let still = fault.contains("nothing has moved") || fault.contains("stands still though nothing stops it");
+            let kind = if still { "standstill" } else { "fault" };
             Some(Report::failed(if summary.guard_stops > 0 { "guard" } else { kind }, fault))
         }
         (None, Some(stopped)) if !asked.aborted => Some(Report::failed("standstill", stopped)),

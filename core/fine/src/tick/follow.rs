@@ -49,6 +49,7 @@ impl FineLoop {
             let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed);
             self.outputs.stop_requested || homing
         });
+        self.watch_progress(ask, reached);
         self.begin_edge();
         let mut position = self.cursor.position();
         self.add_joints(&mut position);

@@ -44,6 +44,7 @@ impl FineLoop {
         let most = if ask == Ask::Run || self.config.order >= 3 { 1.0 } else { self.governor.sigma() };
         self.cursor.scan(most * self.config.period_s, &mut self.points);
         let ratios = self.ratios_in_force();
+        self.ask_for_rate((ratios.feed / self.config.max_feed_ratio).min(ratios.rapid));
         let below = ratios.feed < self.config.max_feed_ratio;
         if self.config.order >= 3 {
             if self.runs_as_planned(ask, below, &ratios) {
@@ -92,6 +93,7 @@ impl FineLoop {
     /// Limits of velocity and acceleration: σ is linear in the period.
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
         let limit = self.plan_limit();
+        self.ask_for_rate(limit);
         let wanted = if ask == Ask::Run { self.ratio_target(ratios, way_speed_mm_per_s) } else { 0.0 };
         let target = wanted.min(limit);
         let unchanged = target == self.governor.sigma();
@@ -104,6 +106,7 @@ impl FineLoop {
         let path = self.cursor.path_derivatives();
         let ahead = self.cursor.ahead(self.governor.sigma() * self.config.period_s);
         let limit = self.plan_limit();
+        self.ask_for_rate(limit);
         let run = if ahead.rapid { ratios.rapid.min(limit) } else { limit };
         let feed = if ahead.rapid || ratios.feed >= self.config.max_feed_ratio {
             f64::INFINITY
@@ -197,6 +200,9 @@ impl FineLoop {
     /// The speed at the end of this period from which every lower feed ahead, and the end of the line, can be met, mm/s.
     fn speed_for_places(&mut self, ratios: &Ratios, end_mm: Option<f64>) -> f64 {
         let at_end = end_mm.map_or(f64::INFINITY, |end_mm| self.speed_towards(end_mm, 0.0));
+        if end_mm.is_some() {
+            self.ask_for_rate(0.0);
+        }
         if ratios.feed >= self.config.max_feed_ratio {
             return at_end;
         }
@@ -206,7 +212,15 @@ impl FineLoop {
         self.preview.extend(&mut self.cursor, until_s);
         let marks = self.preview.marks();
         let met = |mark: &Mark| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
-        marks.fold(at_end, |least, mark| least.min(self.speed_towards(mark.path_mm, met(mark))))
+        let mut least = (at_end, f64::INFINITY);
+        for mark in marks {
+            least = (least.0.min(self.speed_towards(mark.path_mm, met(mark))), least.1.min(met(mark)));
+        }
+        let planned_mm_per_s = self.cursor.path_speed_mm_per_s();
+        if least.1 < planned_mm_per_s {
+            self.ask_for_rate(least.1 / planned_mm_per_s);
+        }
+        least.0
     }
 
     /// The speed at the end of this period from which `end_mm_per_s` can be met at `place_mm`, mm/s.

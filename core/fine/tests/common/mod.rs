@@ -1,8 +1,8 @@
 //! A fine loop with both other ends in the test's hands, and motion along X to feed it.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
@@ -21,6 +21,8 @@ const PLANNED_MM_PER_S2: f64 = 200.0;
 /// Drives that follow exactly, until they are told to fail.
 struct Echo {
     failing: Arc<AtomicBool>,
+    spoiled: Arc<AtomicBool>,
+    quick_stops: Arc<AtomicU64>,
 }
 
 impl Driver for Echo {
@@ -39,11 +41,16 @@ impl Driver for Echo {
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         feedback.position = setpoint.position;
         feedback.speed = setpoint.velocity;
+        if self.spoiled.load(Relaxed) {
+            feedback.position[0] = f64::NAN;
+        }
         feedback.state.fill(if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled });
         if self.failing.load(Relaxed) { Err(PluginError::fixed("the drives are lost")) } else { Ok(()) }
     }
 
-    fn quick_stop(&mut self) {}
+    fn quick_stop(&mut self) {
+        self.quick_stops.fetch_add(1, Relaxed);
+    }
 
     fn stop(&mut self) -> Result<(), PluginError> {
         Ok(())
@@ -56,6 +63,8 @@ pub struct Bench {
     pub host: HostEnd,
     rough: RoughEnd,
     failing: Arc<AtomicBool>,
+    spoiled: Arc<AtomicBool>,
+    quick_stops: Arc<AtomicU64>,
     queued_s: f64,
     x_mm: f64,
     epoch: u32,
@@ -99,10 +108,15 @@ impl Bench {
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));
-        let driver = Echo { failing: Arc::clone(&failing) };
+        let (spoiled, quick_stops) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+        let driver = Echo {
+            failing: Arc::clone(&failing),
+            spoiled: Arc::clone(&spoiled),
+            quick_stops: Arc::clone(&quick_stops),
+        };
         let mut fine = FineLoop::new(&config, end, Box::new(driver), kinematics);
         fine.reset();
-        Self { fine, host, rough, failing, queued_s: 0.0, x_mm: 0.0, epoch: 0 }
+        Self { fine, host, rough, failing, spoiled, quick_stops, queued_s: 0.0, x_mm: 0.0, epoch: 0 }
     }
 
     /// What the machine is doing.
@@ -113,6 +127,22 @@ impl Bench {
     /// The next exchange fails.
     pub fn fail_drives(&self) {
         self.failing.store(true, Relaxed);
+    }
+
+    /// What the first drive reports is no number from the next exchange on.
+    pub fn spoil_feedback(&self) {
+        self.spoiled.store(true, Relaxed);
+    }
+
+    /// How often the drives were told to stop by themselves.
+    pub fn quick_stops(&self) -> u64 {
+        self.quick_stops.load(Relaxed)
+    }
+
+    /// Says of what is queued that it ends at rest, whatever it does.
+    pub fn say_that_it_ends_at_rest(&self) {
+        self.rough.depth.wall_s.store(f64::INFINITY);
+        self.rough.depth.required_s.store(0.0);
     }
 
     /// Queues the way from rest to the feed.

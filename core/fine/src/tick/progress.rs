@@ -1,0 +1,83 @@
+//! Progress of program time: where nothing is asked to stop, it gets on, or the machine faults.
+//!
+//! In any window of [`Progress::most_periods`] fine periods in which nothing asks for a stop, the queue is not starved and
+//! something is queued, program time grows by at least one fine period at the least rate that was asked for in the window.
+//! The window is derived from the machine: from rest an axis is at its highest speed V after `V/A + A/J`. At half the rate
+//! the plan itself takes a quarter of the acceleration and an eighth of the jerk at most, so that what is left brings σ up in
+//! four times that, and by then far more than one period of program time has passed.
+
+use super::FineLoop;
+use super::follow::Ask;
+use crate::config::FineConfig;
+use crate::cursor::Reached;
+use crate::fault::FaultKind;
+
+/// How many times the longest way of an axis from rest to its highest speed a window lasts.
+const WINDOW: f64 = 4.0;
+/// Periods beside that: in the first 16 a jerk limit lets σ change by hundredths only, whatever the axes could.
+const FIRST_PERIODS: f64 = 32.0;
+
+/// A rate of program time that is none: a period of it is the rounding of a day of program time.
+const NO_RATE: f64 = 1e-8;
+
+/// What has passed since progress was last made.
+#[derive(Debug)]
+pub(super) struct Progress {
+    most_periods: u64,
+    periods: u64,
+    /// Program time when the window began, s.
+    from_s: f64,
+    /// Least rate asked for in the window.
+    asked: f64,
+}
+
+impl Progress {
+    /// A window that has just begun. Host.
+    pub(super) fn new(config: &FineConfig) -> Self {
+        let longest_s = config.limits.axes[..config.lane_count()].iter().fold(0.0, |most: f64, axis| {
+            let build_up_s = if config.order >= 3 { axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3 } else { 0.0 };
+            most.max(axis.feed_mm_per_s.max(axis.rapid_mm_per_s) / axis.acceleration_mm_per_s2 + build_up_s)
+        });
+        let most_periods = (WINDOW * longest_s / config.period_s + FIRST_PERIODS).ceil() as u64;
+        Self { most_periods, periods: 0, from_s: 0.0, asked: 1.0 }
+    }
+
+    fn begin(&mut self, now_s: f64) {
+        (self.periods, self.from_s, self.asked) = (0, now_s, 1.0);
+    }
+}
+
+impl FineLoop {
+    /// A rate of this much is asked for in this period, by ratios and places ahead.
+    pub(super) fn ask_for_rate(&mut self, rate: f64) {
+        self.progress.asked = self.progress.asked.min(rate);
+    }
+
+    /// Whether an override or a ratio is as good as 0: what passes then is in the rounding of a day.
+    fn stands_by_ratio(&self) -> bool {
+        let (operator, adaptive) = (self.outputs.override_permitted, self.outputs.adaptive_permitted);
+        let feed = if operator { self.given.feed_override } else { 1.0 } * if adaptive { self.ratio } else { 1.0 };
+        let rapid = if operator { self.given.rapid_override } else { 1.0 };
+        feed.min(rapid) < NO_RATE
+    }
+
+    fn has_nothing_to_do(&self, reached: Reached) -> bool {
+        reached == Reached::Rest && self.cursor.is_last()
+    }
+
+    /// Behind a move: program time has got on, or nothing wants it to, or that is a fault.
+    pub(super) fn watch_progress(&mut self, ask: Ask, reached: Reached) {
+        let now_s = self.cursor.program_time_s();
+        let grown_s = now_s - self.progress.from_s;
+        let least_s = self.progress.asked * self.config.period_s;
+        // What is true nearly always is looked at first.
+        if grown_s > least_s || ask != Ask::Run || self.stands_by_ratio() || self.has_nothing_to_do(reached) {
+            self.progress.begin(now_s);
+            return;
+        }
+        self.progress.periods += 1;
+        if self.progress.periods > self.progress.most_periods {
+            self.fail(FaultKind::NoProgress { periods: self.progress.periods, grown_s, asked: self.progress.asked });
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Promises of the fine loop that nothing else of this package would miss.
+
+#[allow(dead_code)] // what other tests need of it
+mod common;
+
+use std::sync::atomic::Ordering::Relaxed;
+
+use common::Bench;
+use tandem_fine::{FaultKind, GuardMode};
+use tandem_rings::{MachineState, Sample};
+
+fn tick(bench: &mut Bench, periods: u32) -> Vec<Sample> {
+    let mut samples = vec![];
+    for _ in 0..periods {
+        bench.fine.tick();
+        samples.extend(std::iter::from_fn(|| bench.host.samples.pop().ok()));
+    }
+    samples
+}
+
+/// At the feed, with seconds of it ahead.
+fn cruising() -> Bench {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.accelerate();
+    bench.cruise(3.0);
+    bench.brake();
+    tick(&mut bench, 300);
+    assert_eq!(bench.state(), MachineState::Running);
+    bench
+}
+
+#[test]
+fn a_ramp_ends_in_one_quick_stop_of_the_drives_and_not_before() {
+    let mut bench = cruising();
+    bench.host.controls.emergency_stop.store(true, Relaxed);
+    // 20 mm/s at 1000 mm/s²: 20 periods.
+    tick(&mut bench, 19);
+    assert_eq!((bench.state(), bench.quick_stops()), (MachineState::Stopping, 0));
+    tick(&mut bench, 30);
+    assert_eq!((bench.state(), bench.quick_stops()), (MachineState::Fault, 1));
+}
+
+#[test]
+fn feedback_that_is_no_number_while_ramping_goes_no_further_and_changes_no_cause() {
+    let mut bench = cruising();
+    bench.host.controls.emergency_stop.store(true, Relaxed);
+    tick(&mut bench, 5);
+    bench.spoil_feedback();
+    let samples = tick(&mut bench, 10);
+    assert!(samples.len() == 10 && samples.iter().all(|sample| sample.feedback.0.iter().all(|v| v.is_finite())));
+    assert!(samples.iter().all(|sample| sample.feedback == samples[0].feedback), "the last number there was");
+    assert_eq!(bench.fine.fault().map(|fault| fault.kind), Some(FaultKind::EmergencyStop));
+}
+
+#[test]
+fn feedback_that_is_no_number_faults_a_machine_that_moves() {
+    let mut bench = cruising();
+    bench.spoil_feedback();
+    tick(&mut bench, 1);
+    assert_eq!(bench.fine.fault().map(|fault| fault.kind), Some(FaultKind::Feedback { joint: Some(0) }));
+}
+
+#[test]
+fn a_jog_is_let_go_in_the_period_in_which_its_keep_alive_is_late() {
+    for most in [1, 2, 50] {
+        let mut bench = cruising();
+        let jog = &bench.host.controls.jog;
+        jog.most_periods.store(most, Relaxed);
+        jog.beats.fetch_add(1, Relaxed);
+        tick(&mut bench, 1);
+        // The beat is seen in this period; `most` periods later nobody has said anything.
+        tick(&mut bench, most as u32 - 1);
+        assert!(!bench.host.controls.jog.let_go.load(Relaxed), "{most} periods");
+        tick(&mut bench, 1);
+        assert!(bench.host.controls.jog.let_go.load(Relaxed), "{most} periods");
+    }
+}
+
+#[test]
+fn missed_periods_count_for_the_keep_alive_and_are_counted_to_one() {
+    let mut bench = cruising();
+    let jog = &bench.host.controls.jog;
+    jog.most_periods.store(50, Relaxed);
+    jog.beats.fetch_add(1, Relaxed);
+    tick(&mut bench, 1);
+    bench.fine.missed(48, 1000);
+    assert_eq!(bench.fine.counters().missed_periods, 48);
+    assert!(bench.fine.fault().is_none());
+    tick(&mut bench, 1);
+    assert!(!bench.host.controls.jog.let_go.load(Relaxed));
+    tick(&mut bench, 1);
+    assert!(bench.host.controls.jog.let_go.load(Relaxed));
+    // As many as are allowed are no fault, one more is.
+    bench.fine.missed(2, 2);
+    assert!(bench.fine.fault().is_none());
+    bench.fine.missed(3, 2);
+    assert_eq!(bench.fine.fault().map(|fault| fault.kind), Some(FaultKind::MissedPeriods));
+    assert_eq!(bench.fine.counters().missed_periods, 53);
+}

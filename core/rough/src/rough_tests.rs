@@ -1,0 +1,113 @@
+//! Planners that never come to an end end in words, and a rough period is bounded work.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_gcode::Item;
+use tandem_rings::{FineEnd, HostEnd, Rest, Sizes, bridge};
+use tandem_sdk::{
+    Accepted, Advanced, AxisVector, Block, Planner, PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink,
+};
+
+use super::*;
+
+const ROUGH_PERIOD_S: f64 = 0.01;
+
+/// Program time emitted by a call that is asked for this much, and what it says of it: duration and whether it is done.
+type Emits = fn(f64, &mut dyn SegmentSink) -> (f64, bool);
+
+struct Fake {
+    emits: Emits,
+    calls: Arc<AtomicU64>,
+}
+
+impl Planner for Fake {
+    fn describe(&self) -> PlannerDescription {
+        PlannerDescription::order_2()
+    }
+    fn check(&self, _block: &Block) -> Result<(), PluginError> {
+        Ok(())
+    }
+    fn accept(&mut self, _block: &Block) -> Result<Accepted, PluginError> {
+        Ok(Accepted::Accepted)
+    }
+    fn finish(&mut self) {}
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+        self.calls.fetch_add(1, Relaxed);
+        let (duration_s, done) = (self.emits)(duration_s, sink);
+        Ok(Advanced { duration_s, done: u32::from(done) })
+    }
+    fn reset(&mut self, _position: &AxisVector) {}
+}
+
+/// A program that is over at once: the planner has its whole plan to emit.
+struct Over;
+
+impl Source for Over {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        items.push(Item::End);
+        Ok(false)
+    }
+    fn provide_input(&mut self, _value: f64) {}
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        true
+    }
+}
+
+/// A rough loop with this planner, how often it is advanced, and the other ends.
+fn with(emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
+    let calls = Arc::new(AtomicU64::new(0));
+    let planner = Box::new(Fake { emits, calls: Arc::clone(&calls) });
+    let (rough, fine, host) = bridge(Sizes::default());
+    (RoughLoop::new(RoughConfig::new(ROUGH_PERIOD_S), Box::new(Over), planner, rough), calls, (fine, host))
+}
+
+fn piece(duration_s: f64, flags: SegmentFlags, sink: &mut dyn SegmentSink) {
+    let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+    segment.flags = flags;
+    sink.segment(&segment);
+}
+
+#[test]
+fn a_planner_that_says_it_emitted_and_did_not_is_named_within_one_period() {
+    let (mut rough, calls, _ends) = with(|duration_s, _| (duration_s, false));
+    let error = rough.step(&mut ()).expect_err("nothing was emitted").to_string();
+    assert!(error.contains("hardly gets on"), "{error}");
+    assert!(calls.load(Relaxed) <= u64::from(MOST_SHORT_ADVANCES) + 1);
+}
+
+#[test]
+fn a_planner_that_is_never_done_is_named_within_one_period() {
+    let (mut rough, _, _ends) = with(|_, _| (0.0, false));
+    let error = rough.step(&mut ()).expect_err("it is never done").to_string();
+    assert!(error.contains("hardly gets on"), "{error}");
+}
+
+#[test]
+fn a_plan_that_is_done_in_motion_is_refused() {
+    let (mut rough, _, _ends) = with(|duration_s, sink| {
+        piece(duration_s, SegmentFlags::default(), sink);
+        (duration_s, true)
+    });
+    let error = rough.step(&mut ()).expect_err("it ends in motion").to_string();
+    assert!(error.contains("does not end at rest"), "{error}");
+}
+
+#[test]
+fn a_rough_period_asks_for_the_depth_and_for_no_more() {
+    let (mut rough, calls, (_fine, host)) = with(|duration_s, sink| {
+        piece(duration_s, SegmentFlags::default(), sink);
+        (duration_s, false)
+    });
+    rough.step(&mut ()).unwrap();
+    // Two rough periods and the margin of three: what nothing that moves needs.
+    assert!((5..=6).contains(&calls.swap(0, Relaxed)));
+    for period in 1..100 {
+        rough.step(&mut ()).unwrap();
+        assert_eq!(calls.swap(0, Relaxed), 0, "nothing was driven since");
+        host.status.program_time_s.store(f64::from(period) * ROUGH_PERIOD_S);
+        rough.step(&mut ()).unwrap();
+        assert!(calls.swap(0, Relaxed) <= 2, "one period was driven");
+    }
+}
