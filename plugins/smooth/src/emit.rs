@@ -196,10 +196,11 @@ impl<const L: usize> Core<L> {
         }
         segment.path = shifted(&self.emitter.path, t);
         segment.duration_s = until_s - from_s;
-        let (a, j) = (self.window.stop.deceleration(), STOP_JERK * self.window.stop.jerk);
+        let a = self.window.stop.deceleration();
         let v = self.window.stop.speed.max(1e-9);
         segment.stop_deceleration_mm_per_s2 = a;
-        (segment.max_sigma_rate_per_s, segment.max_sigma_acceleration_per_s2) = (a / v, j / v);
+        segment.max_sigma_rate_per_s = a / v;
+        segment.max_sigma_acceleration_per_s2 = STOP_JERK * self.window.stop.jerk_per_speed;
         segment
     }
 

@@ -170,17 +170,20 @@ pub fn derivatives<const L: usize>(
     stop: &mut Stop,
 ) -> Reached {
     let Derivatives { velocity, acceleration, jerk } = control_of(piece);
-    let path_speed = |v: &Lanes<L>| (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum::<f64>().sqrt();
-    let per_feed = 1.0 / feed;
+    let squared = |v: &Lanes<L>| {
+        let counted: Lanes<L> = each(|l| counted[l] * v[l]);
+        dot(&counted, &counted)
+    };
+    let per_feed = 1.0 / (feed * feed);
     let reached = Reached {
-        feed: highest(&velocity, SPEED, &|v| path_speed(v) * per_feed),
+        feed: highest(&velocity, SPEED * SPEED, &|v| squared(v) * per_feed).sqrt(),
         speed: highest(&velocity, SPEED, &share_of(speed)),
         acceleration: highest(&acceleration, ACCELERATION, &share_of(&frame.acceleration)),
         jerk: highest(&jerk, JERK, &share_of(&frame.jerk)),
         bend: hull(&acceleration, &|a| dot(a, a)).sqrt(),
     };
     let (v, a) = (&velocity[4], &acceleration[3]);
-    leave(stop, frame, v, a, path_speed(v));
+    leave(stop, frame, v, a, squared(v).sqrt());
     reached
 }
 
@@ -201,7 +204,7 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
         let turning = (a[l] - along * v[l]) * d.signum();
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
         stop.time_s = stop.time_s.max(speed * d.abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
-        stop.jerk = stop.jerk.min(frame.jerk[l] / d.abs().max(1e-9));
+        stop.jerk_per_speed = stop.jerk_per_speed.min(frame.jerk[l] / v[l].abs().max(1e-9));
     }
 }
 

@@ -93,7 +93,7 @@ fn stop<const L: usize>(frame: &Frame<L>, counted: &Lanes<L>, direction: &Lanes<
     let per = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>().sqrt().max(1e-12);
     Stop {
         time_s: peak / along(&frame.acceleration, direction),
-        jerk: per * along(&frame.jerk, direction),
+        jerk_per_speed: along(&frame.jerk, direction) / peak,
         speed: per * peak,
     }
 }

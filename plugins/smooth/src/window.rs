@@ -101,8 +101,8 @@ pub struct Stop {
     /// The longest time that a stop takes at the deceleration left where it begins, s. Where the path turns sharply little
     /// is left, but speed is low there.
     pub time_s: f64,
-    /// Least path jerk of the limits.
-    pub jerk: f64,
+    /// Least jerk of a lane over its speed there, 1/s²: where a rotary axis turns much on little path, path speed is low.
+    pub jerk_per_speed: f64,
     /// Highest path speed.
     pub speed: f64,
 }
@@ -116,7 +116,7 @@ impl Stop {
 
 impl Default for Stop {
     fn default() -> Self {
-        Self { time_s: 0.0, jerk: f64::INFINITY, speed: 0.0 }
+        Self { time_s: 0.0, jerk_per_speed: f64::INFINITY, speed: 0.0 }
     }
 }
 

@@ -199,6 +199,13 @@ fn distance(p: &[f64; 4], a: &[f64; 4], b: &[f64; 4]) -> f64 {
     of(&|i| (p[i] - a[i] - share * (b[i] - a[i])).powi(2)).sqrt()
 }
 
+/// How long the deceleration of a stop takes to be built up, as segments declare it for the depth of the queue: with half of
+/// the jerk, the time of the slowest axis twice. More would let the machine wait for more than can be queued.
+fn longest_ramp_s(segments: &[Segment]) -> f64 {
+    let moving = segments.iter().filter(|segment| segment.duration_s > 0.0 && segment.max_sigma_rate_per_s.is_finite());
+    moving.map(|s| s.max_sigma_rate_per_s / s.max_sigma_acceleration_per_s2).fold(0.0, f64::max)
+}
+
 fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
     let mut random = Random::new(seed);
     let mut context = machine(&mut random);
@@ -238,6 +245,11 @@ fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
             blocks[0].feed_mm_per_s
         )
     };
+    let ramp_s = longest_ramp_s(&collected.segments);
+    let slowest = context.limits.axes().iter().map(|axis| axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3);
+    if ramp_s > 2.0 * slowest.fold(0.0, f64::max) * (1.0 + 1e-9) {
+        return Err(told(format!("a stop is said to take {ramp_s} s to build up")));
+    }
     for phase in 0..PHASES {
         let phase = phase as f64 / PHASES as f64;
         let samples = samples(&collected.segments, context.fine_period_s, phase);
