@@ -1,9 +1,10 @@
 //! The heartbeat of the host as the drives see it.
 //!
-//! The tick of the setpoint is the heartbeat: it advances by one a fine period. Simulated drives have no clock but the
-//! exchanges, so silence shows in two ways: an exchange whose tick is not new (the drives lived through a period without
+//! The tick of the setpoint is the heartbeat: it advances by one a fine period. In a run the drives live by the exchanges, so
+//! silence shows in two ways: an exchange whose tick is not new (the drives lived through a period without
 //! a word), and a tick that has run ahead of the periods that the drives have lived (they lived through the missing ones
-//! without a word before this exchange). Tick 0 is no heartbeat: the host repeats it until the program starts.
+//! without a word before this exchange). A host that is gone makes no exchange at all: then the drives live by a clock of
+//! their own, which a test drives. Tick 0 is no heartbeat: the host repeats it until the program starts.
 
 /// More periods than this are not made up for at once, so that an exchange takes bounded time.
 const MOST_MISSED: u64 = 1000;
@@ -43,6 +44,11 @@ impl Watchdog {
         self.period = now.max(tick);
         self.heard = self.heard.max(tick);
         Heard { missed: tick.saturating_sub(now).min(MOST_MISSED), fresh }
+    }
+
+    /// A period of the drives' own clock goes by without an exchange.
+    pub fn pass(&mut self) {
+        self.period = self.period.saturating_add(u64::from(self.heard > 0));
     }
 
     /// A period went by in silence. Fine loop.

@@ -1,7 +1,7 @@
 //! The drives' heartbeat: a host that falls silent is noticed within the watchdog time, and the joints ramp to rest.
 
 use tandem_sdk::{AxisVector, Driver, DriverContext, Feedback, JointState, Setpoint};
-use tandem_sim::WATCHDOG_FAULT;
+use tandem_sim::{Options, SimulatedDrives, WATCHDOG_FAULT};
 
 const PERIOD_S: f64 = 0.001;
 const SPEED_MM_PER_S: f64 = 50.0;
@@ -106,4 +106,29 @@ fn drives_with_a_lag_coast_on_as_if_the_line_went_on() {
     let (heard, missed) = (exchange(&mut *heard, &at(305)), exchange(&mut *missed, &at(305)));
     assert_close(missed.position[0], heard.position[0]);
     assert_close(missed.speed[0], heard.speed[0]);
+}
+
+#[test]
+fn a_host_that_is_gone_is_noticed_by_the_drives_own_clock_and_they_stop_without_it() {
+    let text = "watchdog_periods = 3\nquick_stop_deceleration_mm_per_s2 = 2000";
+    let mut drives = SimulatedDrives::new(Options::parse(text).unwrap());
+    drives.open(&DriverContext::new(1, PERIOD_S)).unwrap();
+    drives.start().unwrap();
+    let moving = up_to(&mut drives, 100);
+    // From here on there is no host: nobody exchanges, nobody calls a quick stop.
+    for period in 1..=3 {
+        let feedback = drives.pass();
+        assert_eq!((feedback.state[0], feedback.speed[0]), (JointState::Enabled, SPEED_MM_PER_S), "period {period}");
+    }
+    let first = drives.pass();
+    assert_eq!((first.state[0], first.fault_code[0]), (JointState::Fault, WATCHDOG_FAULT));
+    assert_close(first.speed[0], SPEED_MM_PER_S - 2.0);
+    let rest = (0..40).map(|_| drives.pass()).last().unwrap();
+    let stopping_mm = SPEED_MM_PER_S * SPEED_MM_PER_S / (2.0 * 2000.0);
+    assert_close(rest.position[0] - moving.position[0], 3.0 * PERIOD_S * SPEED_MM_PER_S + stopping_mm);
+    assert_eq!(rest.speed[0], 0.0);
+    // A new host finds the fault, and the joint where it stands.
+    let back = exchange(&mut drives, &at(150));
+    assert_eq!((back.state[0], back.position[0]), (JointState::Fault, rest.position[0]));
+    assert_eq!(exchange(&mut drives, &Setpoint { reset: 1, ..at(151) }).state[0], JointState::Enabled);
 }
