@@ -16,6 +16,7 @@ mod check;
 mod corners;
 mod curves;
 mod estimate;
+mod hang;
 mod home;
 mod identify;
 mod jog;
@@ -43,7 +44,9 @@ const REFUSED: u8 = 1;
 const FAULT: u8 = 3;
 
 fn main() -> ExitCode {
-    let status = match Args::parse().command {
+    let command = Args::parse().command;
+    hang::arrange();
+    let status = match command {
         Command::Run(options) => run::run(&options),
         Command::Mdi(options) => mdi::mdi(&options),
         Command::Jog(options) => jog::jog(&options),

@@ -18,7 +18,7 @@ use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
-use crate::{FAULT, REFUSED, args, built_in, operator, program};
+use crate::{FAULT, REFUSED, args, built_in, hang, operator, program};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
@@ -39,6 +39,8 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run)?;
+    let clock_name = if clock == Clock::Wall { "wall" } else { "virtual" };
+    hang::summarise_in(options.summary.as_ref(), &name, &machine, clock_name, &run);
     let mut outcome = run.drive(clock, &commands, &mut sinks)?;
     if let Some(reference_time_s) = options.reference_time_s {
         outcome.summary.compare(reference_time_s);

@@ -47,6 +47,10 @@ impl Numbers {
 /// The fault that the drives report; one that has let go while the machine is `moving` is one too. Fine loop.
 pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<FaultKind> {
     let first = |state: JointState| feedback.state[..joints].iter().position(|s| *s == state);
+    let foreign = feedback.state[..joints].iter().position(|state| !state.is_known());
+    if let Some(joint) = foreign {
+        return Some(FaultKind::State { joint, number: feedback.state[joint].0 });
+    }
     let faulty = first(JointState::Fault).map(|joint| FaultKind::Drive { joint, code: feedback.fault_code[joint] });
     let off = || first(JointState::Disabled).filter(|_| moving).map(|joint| FaultKind::Drive { joint, code: 0 });
     faulty.or_else(off)
@@ -96,6 +100,17 @@ mod tests {
         assert_eq!(following(&feedback, &command, 3, &most_mm), fault, "at the limit it is not beyond it");
         feedback.state[2] = JointState::Disabled;
         assert_eq!(following(&feedback, &command, 3, &most_mm), None, "what is off follows nothing");
+    }
+
+    #[test]
+    fn a_number_that_stands_for_no_state_is_a_fault_whether_it_moves_or_not() {
+        let mut feedback = Feedback { state: [JointState::Enabled; 8], ..Feedback::default() };
+        feedback.state[1] = JointState(250);
+        for moving in [true, false] {
+            let fault = Some(FaultKind::State { joint: 1, number: 250 });
+            assert_eq!(reported(&feedback, 3, moving), fault);
+            assert_eq!(reported(&feedback, 1, moving), None, "there is no such joint");
+        }
     }
 
     #[test]

@@ -36,6 +36,13 @@ pub enum FaultKind {
         /// The drive's code.
         code: u32,
     },
+    /// The driver gives a number as the state of a joint that stands for none.
+    State {
+        /// Joint index.
+        joint: usize,
+        /// The number.
+        number: u32,
+    },
     /// A number of the feedback is not finite.
     Feedback {
         /// Joint index; none for the spindle.

@@ -32,6 +32,11 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
             let joint = names.joint(*joint);
             format!("driver {}: the drive of {joint} reports fault {code}", machine.driver.plugin)
         }
+        FaultKind::State { joint, number } => {
+            let joint = names.joint(*joint);
+            let known = "0 (disabled), 1 (enabled) and 2 (fault) are known";
+            format!("driver {}: its exchange gives {number} as the state of {joint}: {known}", machine.driver.plugin)
+        }
         FaultKind::Feedback { joint } => {
             let of = joint.map_or("the spindle".to_string(), |joint| names.joint(joint));
             format!("driver {}: the feedback of {of} is not a finite number", machine.driver.plugin)

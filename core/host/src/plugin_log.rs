@@ -39,7 +39,7 @@ unsafe extern "C" fn take(record: *const LogRecord) {
 pub fn drain_plugin_log(each: &mut dyn FnMut(&str)) {
     let Some(ring) = RING.get() else { return };
     while let Some(record) = ring.pop() {
-        let level = match record.level {
+        let level = match record.level() {
             tandem_sdk::log::LogLevel::Info => "",
             tandem_sdk::log::LogLevel::Warning => "warning: ",
             tandem_sdk::log::LogLevel::Error => "error: ",

@@ -137,6 +137,7 @@ impl<'a> Pump<'a> {
             return;
         }
         let started = Instant::now();
+        tandem_sdk::abi::beat();
         self.serve_policy();
         self.tell_plugin_log();
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);

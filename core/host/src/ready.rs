@@ -8,6 +8,7 @@ use tandem_rough::Source;
 use tandem_sdk::{Block, Driver, Planner};
 
 use crate::error::HostError;
+use crate::hang::HangWatch;
 use crate::joints::JointSpace;
 use crate::policy::PolicyHost;
 use crate::registry::Registry;
@@ -18,6 +19,8 @@ use crate::{faults, rules, setup};
 /// Everything that a run needs, made and checked; the drives are not claimed. Whatever refuses a run without asking the
 /// drives refuses it here, so that a check finds all of it.
 pub struct Ready {
+    /// Looks whether the threads of the run come back, from the first plugin that is made.
+    pub watch: Option<HangWatch>,
     pub machine: Machine,
     /// The program's name, or what stands for it.
     pub program: String,
@@ -40,6 +43,7 @@ pub struct Ready {
 
 /// Planner and driver of a machine, as they are made for a run.
 pub struct Plugins {
+    pub watch: Option<HangWatch>,
     pub planner: Box<dyn Planner>,
     pub driver: Box<dyn Driver>,
 }
@@ -50,7 +54,8 @@ impl Plugins {
     /// # Errors
     /// One of them is not there, or refuses its options.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
-        Ok(Self { planner: setup::planner(machine, registry)?, driver: setup::driver(machine, registry)? })
+        let watch = HangWatch::of(machine);
+        Ok(Self { watch, planner: setup::planner(machine, registry)?, driver: setup::driver(machine, registry)? })
     }
 
     /// Whether they go with each other, and with what is asked of them.
@@ -112,6 +117,7 @@ impl Ready {
             kinematics: JointSpace::of(&machine, registry)?,
             records_drives: program.is_none(),
             program: program.unwrap_or_else(|| HOMING.to_string()),
+            watch: plugins.watch,
             planner: plugins.planner,
             machine,
             source,
@@ -178,6 +184,7 @@ pub(crate) fn check_block(machine: &Machine, planner: &dyn Planner, block: &Bloc
     if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
         return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
     }
+    tandem_sdk::abi::beat();
     planner.check(block).map_err(|e| e.to_string())
 }
 

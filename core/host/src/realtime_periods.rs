@@ -1,5 +1,6 @@
 //! One call a period, with absolute deadlines, on any clock.
 
+use crate::hang::FineRuns;
 use crate::lateness::Lateness;
 
 /// A clock that can wait. Times are ns from any origin.
@@ -15,6 +16,11 @@ pub trait PeriodClock {
 pub trait Body {
     /// Whether no further period is wanted.
     fn is_over(&self) -> bool;
+
+    /// The thread is prepared, and the first period follows; the answer is dropped after the last. Fine thread.
+    fn begin(&self) -> Option<FineRuns> {
+        None
+    }
 
     /// One period. Fine thread; does not allocate.
     fn period(&mut self);

@@ -8,7 +8,7 @@ use tandem_rings::{HostEnd, RoughEnd, Sizes, bridge};
 use tandem_sdk::{AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES};
 
 use super::{Body, PeriodClock, Timing, run};
-use crate::wall_clock::Fine;
+use crate::wall_clock::FineBody;
 
 const PERIOD_NS: i64 = 1_000_000;
 
@@ -175,7 +175,7 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
 }
 
 /// The fine loop, for at most so many more periods.
-struct AtMost(Fine, u32);
+struct AtMost(FineBody, u32);
 
 impl Body for AtMost {
     fn is_over(&self) -> bool {
@@ -197,7 +197,7 @@ fn more_missed_periods_than_allowed_are_a_fault() {
     for (periods, faults) in [(1, false), (2, false), (3, true), (50, true)] {
         let (fine, _rough, _host) = waiting();
         let mut clock = Scripted { now: Now::default(), sleeps: 0, stalls: vec![(20, periods * PERIOD_NS)] };
-        let mut body = AtMost(Fine { fine, max_missed: 2 }, 100);
+        let mut body = AtMost(FineBody { fine, max_missed: 2, watch: None }, 100);
         run(&mut clock, PERIOD_NS, &mut body, &mut Timing::default());
         let fine = body.0.fine;
         assert_eq!(fine.counters().missed_periods, periods.unsigned_abs());

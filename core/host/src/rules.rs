@@ -12,6 +12,10 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
     let refuse = |key: &str, cause: String| Err(refusal(machine, key, cause));
     let simulated = driver.simulated != 0;
     let name = &machine.planner.plugin;
+    if !(2..=3).contains(&planner.order) {
+        let cause = format!("{name} describes plans of order {}: 2 and 3 are known", planner.order);
+        return refuse("planner.plugin", cause);
+    }
     if machine.guard == GuardMode::Count && !simulated {
         let cause =
             format!("\"count\" sends samples beyond the limits: not with {}, which moves metal", machine.driver.plugin);
@@ -77,6 +81,18 @@ pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostEr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_order_that_is_none_is_refused() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let machine = Machine::read(&path, &[]).unwrap();
+        for (order, known) in [(0, false), (1, false), (2, true), (3, true), (4, false), (250, false)] {
+            let planner = PlannerDescription { order, ..PlannerDescription::order_2() };
+            let words = check(&machine, &planner, DriverDescription::simulated()).err().map(|e| e.to_string());
+            let told = words.is_some_and(|words| words.contains(&format!("plans of order {order}: 2 and 3 are known")));
+            assert_eq!(told, !known, "{order}");
+        }
+    }
 
     /// A planner that breaks limits, such as the published feed of `nurbs`, runs on simulated drives that count only.
     #[test]

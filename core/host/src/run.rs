@@ -15,6 +15,7 @@ use crate::command::Timed;
 use crate::error::HostError;
 use crate::exchange_time::{self, ExchangeTimes};
 use crate::fault_text::describe;
+use crate::hang::HangWatch;
 use crate::homing::Homing;
 use crate::joints::{JointSpace, JointWatch};
 use crate::monitor::Monitor;
@@ -70,6 +71,7 @@ pub struct Run {
     joints: Arc<JointSpace>,
     exchange: Arc<ExchangeTimes>,
     switches: Switches,
+    watch: Option<HangWatch>,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -130,8 +132,9 @@ impl Run {
 
     /// Claims the drives.
     fn open(ready: Ready) -> Result<Self, HostError> {
-        let Ready { machine, program, source, policy, planner, mut driver, feed, joints, checked, switches, .. } =
-            ready;
+        let Ready {
+            watch, machine, program, source, policy, planner, mut driver, feed, joints, checked, switches, ..
+        } = ready;
         setup::open(&machine, driver.as_mut(), &joints)?;
         // As lockstep needs it: the samples of each rough period are taken behind it.
         let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, ..Sizes::default() };
@@ -146,6 +149,7 @@ impl Run {
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics.into_kinematics());
         fine.reset();
         Ok(Self {
+            watch,
             rough: RoughLoop::new(rough_config, source, planner, rough_end),
             fine,
             machine,
@@ -196,6 +200,9 @@ impl Run {
     pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
         let started = Instant::now();
         let machine = self.machine;
+        if let Some(watch) = &self.watch {
+            watch.begin(Arc::clone(&self.host.controls), Arc::clone(&self.host.status));
+        }
         let mut fine = self.fine;
         let mut monitor = Monitor::new(&machine, self.leaves_path);
         monitor.joints = JointWatch::new(&self.joints, machine.fine_period_s);
@@ -214,7 +221,12 @@ impl Run {
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
             Clock::Wall => {
-                let timed = wall_clock::drive(&mut pump, fine, periods(&machine))?;
+                let timed = wall_clock::drive(
+                    &mut pump,
+                    fine,
+                    periods(&machine),
+                    self.watch.as_ref().map(HangWatch::for_fine),
+                )?;
                 (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
             }
         }

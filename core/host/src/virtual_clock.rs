@@ -4,6 +4,7 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_fine::FineLoop;
+use tandem_sdk::abi::{Method, beat, calling};
 
 use crate::command::{Command, Timed};
 use crate::pump::Pump;
@@ -34,7 +35,8 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
                     stalled += periods;
                 }
             }
-            fine.tick();
+            calling(Method::FinePeriod, || fine.tick());
+            beat();
             tick += 1;
         }
         pump.drain();

@@ -13,6 +13,7 @@ use tandem_machine::FineThread;
 use tandem_rings::{Sizes, sample_ring};
 
 use crate::error::HostError;
+use crate::hang::{FineRuns, FineWatch};
 use crate::pump::Pump;
 use crate::realtime::{PageFaults, ProcessGrants, prepare_thread};
 use crate::realtime_periods::{Body, PeriodClock, Timing, run};
@@ -43,14 +44,19 @@ pub struct Ended<B> {
 }
 
 /// Drives the run to its end in real time; gives the fine loop back.
-pub fn drive(pump: &mut Pump<'_>, mut fine: FineLoop, periods: Periods) -> Result<Ended<FineLoop>, HostError> {
+pub fn drive(
+    pump: &mut Pump<'_>,
+    mut fine: FineLoop,
+    periods: Periods,
+    watch: Option<FineWatch>,
+) -> Result<Ended<FineLoop>, HostError> {
     // Here the recorder may look away for seconds.
     let (to_host, from_fine) = sample_ring(Sizes::default().samples);
     fine.hand_out_through(to_host);
     pump.host.samples = from_fine;
     fill_first(pump);
-    let thread =
-        TimedThread::start(Fine { fine, max_missed: periods.max_missed }, periods.fine_ns, periods.fine_thread)?;
+    let body = FineBody { fine, max_missed: periods.max_missed, watch };
+    let thread = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
     for note in &thread.notes {
         pump.note(note);
     }
@@ -71,19 +77,26 @@ fn fill_first(pump: &mut Pump<'_>) {
 }
 
 /// The fine loop as the body of its thread.
-pub struct Fine {
+pub struct FineBody {
     pub fine: FineLoop,
     /// Missed periods in a row above which the machine faults.
     pub max_missed: u64,
+    /// Who looks whether it comes back.
+    pub watch: Option<FineWatch>,
 }
 
-impl Body for Fine {
+impl Body for FineBody {
     fn is_over(&self) -> bool {
         self.fine.is_over()
     }
 
+    fn begin(&self) -> Option<FineRuns> {
+        self.watch.as_ref().map(FineWatch::begin)
+    }
+
     fn period(&mut self) {
         self.fine.tick();
+        tandem_sdk::abi::beat();
     }
 
     fn missed(&mut self, periods: u64, in_a_row: u64) {
@@ -150,8 +163,10 @@ fn live<B: Body>(mut body: B, period_ns: i64, asks: FineThread, notes: &SyncSend
     let mut clock = Monotonic;
     // The first reading maps the kernel's page of clock data: no lock on memory covers it.
     clock.now_ns();
+    let runs = body.begin();
     let before = PageFaults::of_this_thread();
     run(&mut clock, period_ns, &mut body, &mut timing);
+    drop(runs);
     let page_faults = PageFaults::of_this_thread().since(before);
     Ended { body, timing, page_faults }
 }

@@ -39,6 +39,10 @@ pub struct Machine {
     pub max_missed_periods: u32,
     /// What the fine loop's thread asks of the computer.
     pub fine_thread: FineThread,
+    /// Time without a period after which the fine loop counts as hung, s: the process ends, and the drives' watchdog acts.
+    pub fine_hang_after_s: f64,
+    /// The same for a call of a plugin on the soft side, and on the virtual clock, s.
+    pub soft_hang_after_s: f64,
     /// How the machine moves where a block says nothing.
     pub motion: Motion,
     /// Axes, in the order of the file.
@@ -203,6 +207,8 @@ impl Tables {
             fine_periods_per_rough: self.loops.fine_periods_per_rough,
             max_missed_periods: self.loops.max_missed_periods,
             fine_thread: self.loops.fine_thread,
+            fine_hang_after_s: self.loops.fine_hang_after_s,
+            soft_hang_after_s: self.loops.soft_hang_after_s,
             motion: self.motion,
             axes,
             limits,

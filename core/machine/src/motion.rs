@@ -99,7 +99,19 @@ pub(crate) struct Loops {
     pub fine_periods_per_rough: u32,
     pub max_missed_periods: u32,
     pub fine_thread: FineThread,
+    pub fine_hang_after_s: f64,
+    pub soft_hang_after_s: f64,
 }
+
+/// Time after which a fine loop that has not come back does not any more, at least, s. Thousands of times what a period takes,
+/// and long enough for a computer without a real-time kernel that is busy with other things; the drives' own watchdogs, which
+/// stop the machine, take some hundredths of a second.
+const FINE_HANG_AFTER_S: f64 = 2.0;
+/// The same in fine periods, where they are long.
+const FINE_HANG_AFTER_PERIODS: f64 = 1000.0;
+/// Time after which a call of a plugin on the soft side does not come back any more, s: drives on a field bus may take half a
+/// minute to start, and plans of the densest programs a few seconds.
+const SOFT_HANG_AFTER_S: f64 = 60.0;
 
 impl Loops {
     /// Reads `[loops]`.
@@ -111,9 +123,13 @@ impl Loops {
             core: loops.whole("fine_core", 0, LAST_CORE),
             priority: loops.whole("fine_priority", 1, 99).unwrap_or(FineThread::default().priority),
         };
+        let fine_period_s = fine.unwrap_or(1.0) / 1000.0;
+        let at_least_s = FINE_HANG_AFTER_S.max(FINE_HANG_AFTER_PERIODS * fine_period_s);
         Self {
             rough_period_s: rough.unwrap_or(8.0) / 1000.0,
-            fine_period_s: fine.unwrap_or(1.0) / 1000.0,
+            fine_period_s,
+            fine_hang_after_s: loops.at_least("fine_hang_after_ms", 10.0).map_or(at_least_s, |ms| ms / 1000.0),
+            soft_hang_after_s: loops.at_least("soft_hang_after_s", 0.1).unwrap_or(SOFT_HANG_AFTER_S),
             fine_periods_per_rough: count.unwrap_or(1),
             max_missed_periods: loops.whole("max_missed_periods", 0, u32::MAX).unwrap_or(2),
             fine_thread,

@@ -1,5 +1,6 @@
 //! Axes and vectors over them.
 
+use crate::abi::layout::{Layout, START, fold, fold_text, layout};
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Sub};
 
 /// Most axes (and joints) that one machine has.
@@ -12,6 +13,10 @@ pub const MAX_AXES: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(64))]
 pub struct AxisVector(pub [f64; MAX_AXES]);
+
+impl Layout for AxisVector {
+    const HASH: u64 = fold(fold_text(START, "AxisVector"), <[f64; MAX_AXES]>::HASH);
+}
 
 impl AxisVector {
     /// All entries zero.
@@ -108,6 +113,8 @@ pub struct Axes {
     letters: [u8; MAX_AXES],
     rotary: [bool; MAX_AXES],
 }
+
+layout!(Axes { size, count, letters, rotary });
 
 impl Axes {
     /// Axes from `(letter, rotary)` pairs; letters are upper case, one of `XYZABCUVW`.

@@ -1,5 +1,6 @@
 //! A block: one path element of a part program, in machine coordinates, with what the program says about it.
 
+use crate::abi::layout::{layout, layout_of_enum};
 use std::sync::Arc;
 
 use crate::{AxisVector, Edge, JointLanes, RawSlice, StopOn, size_of_contract};
@@ -20,6 +21,8 @@ pub enum BlockKind {
     Dwell = 4,
 }
 
+layout_of_enum!(BlockKind { Rapid, Line, Arc, Nurbs, Dwell });
+
 /// How exactly the path is to be followed where this block meets the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -29,6 +32,8 @@ pub enum PathMode {
     /// G61 (exact path) and G61.1 (exact stop): come to rest at the end of the block.
     ExactStop = 1,
 }
+
+layout_of_enum!(PathMode { Continuous, ExactStop });
 
 /// A circular arc or helix. The plane is spanned by two axes; the turn from the first to the second is positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +51,8 @@ pub struct ArcGeometry {
     pub sweep_rad: f64,
 }
 
+layout!(ArcGeometry { plane, center_mm, radius_mm, start_angle_rad, sweep_rad });
+
 /// A NURBS curve of degree `degree` over the machine's axes. Valid for the call only.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
@@ -59,6 +66,8 @@ pub struct NurbsGeometry {
     /// Knots, non-decreasing, `control points + degree + 1` of them.
     pub knots: RawSlice<f64>,
 }
+
+layout!(NurbsGeometry { degree, control_points, weights, knots });
 
 /// The data of a NURBS curve, owned: what outlives the call that hands over a [`NurbsGeometry`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -190,6 +199,30 @@ pub struct Block {
     /// What the lanes behind the axes are; none where every joint is an axis of its own. It lives as long as the process.
     pub joint_lanes: Option<&'static JointLanes>,
 }
+
+layout!(Block {
+    size,
+    kind,
+    path_mode,
+    line,
+    index,
+    start,
+    end,
+    arc,
+    nurbs,
+    length_mm,
+    feed_mm_per_s,
+    feed_cap_mm_per_s,
+    time_constant_s,
+    path_tolerance_mm,
+    dwell_s,
+    stop_on,
+    offset,
+    tool,
+    override_enabled,
+    spindle_rad_per_s,
+    joint_lanes
+});
 
 impl Block {
     /// A dwell of zero duration at `position`: the blank from which readers and tests build blocks.

@@ -42,6 +42,7 @@
 //! assert_eq!(feedback.state[2], JointState::Disabled);
 //! ```
 
+use crate::abi::layout::{Layout, START, fold, fold_text, layout};
 use crate::{AxisVector, MAX_AXES, PluginError, size_of_contract};
 
 /// Most latches a driver reports at once.
@@ -66,6 +67,8 @@ pub struct DriverContext {
     pub seed: u64,
 }
 
+layout!(DriverContext { size, joint_count, fine_period_s, start_position, seed });
+
 impl DriverContext {
     /// A context for `joint_count` joints at zero.
     pub fn new(joint_count: usize, fine_period_s: f64) -> Self {
@@ -88,6 +91,8 @@ pub struct DriverDescription {
     /// 1 where no metal moves: `guard.mode = "count"` and the virtual clock are permitted.
     pub simulated: u32,
 }
+
+layout!(DriverDescription { size, simulated });
 
 impl DriverDescription {
     /// A simulated driver.
@@ -127,6 +132,8 @@ pub struct Setpoint {
     pub spindle_rad_per_s: f64,
 }
 
+layout!(Setpoint { size, enable, reset, reserved, tick, outputs, position, velocity, acceleration, spindle_rad_per_s });
+
 impl Default for Setpoint {
     fn default() -> Self {
         Self {
@@ -144,17 +151,42 @@ impl Default for Setpoint {
     }
 }
 
-/// State of one joint's drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u32)]
-pub enum JointState {
+/// State of one joint's drive: one of three numbers. It is no `enum`, because drivers write it in every fine period, and what a
+/// driver writes that is none of them is told as that number.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct JointState(pub u32);
+
+#[allow(non_upper_case_globals)] // they read as the variants that they stand for
+impl JointState {
     /// No torque.
-    #[default]
-    Disabled = 0,
+    pub const Disabled: Self = Self(0);
     /// Following the setpoint.
-    Enabled = 1,
+    pub const Enabled: Self = Self(1);
     /// The drive reports a fault.
-    Fault = 2,
+    pub const Fault: Self = Self(2);
+
+    /// Whether it is one of the three. Any loop; does not allocate.
+    #[inline]
+    pub const fn is_known(self) -> bool {
+        self.0 <= Self::Fault.0
+    }
+}
+
+impl std::fmt::Debug for JointState {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::Disabled => f.write_str("Disabled"),
+            Self::Enabled => f.write_str("Enabled"),
+            Self::Fault => f.write_str("Fault"),
+            Self(number) => write!(f, "JointState({number})"),
+        }
+    }
+}
+
+impl Layout for JointState {
+    // The names in the order of their numbers, from 0 on.
+    const HASH: u64 = fold(fold_text(START, "JointState Disabled Enabled Fault"), u32::HASH);
 }
 
 /// A position caught by the drive on an input edge.
@@ -168,6 +200,8 @@ pub struct Latch {
     /// Positions per joint at the edge, mm or rad.
     pub position: AxisVector,
 }
+
+layout!(Latch { input, edge, position });
 
 /// What the drives report each fine period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -196,6 +230,20 @@ pub struct Feedback {
     /// Spindle angle, rad.
     pub spindle_angle_rad: f64,
 }
+
+layout!(Feedback {
+    size,
+    state,
+    fault_code,
+    position,
+    speed,
+    current_a,
+    inputs,
+    analog,
+    latches,
+    spindle_rad_per_s,
+    spindle_angle_rad
+});
 
 impl Default for Feedback {
     fn default() -> Self {

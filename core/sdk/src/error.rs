@@ -1,5 +1,6 @@
 //! What a plugin says when it refuses or fails.
 
+use crate::abi::layout::layout;
 use std::fmt;
 
 use crate::text::Text;
@@ -10,34 +11,37 @@ use crate::text::Text;
 pub struct PluginError {
     message: Text,
     option: Text,
-    panicked: bool,
+    /// 1 where it is a panic, else 0: a truth value of another side may be neither.
+    panicked: u32,
 }
+
+layout!(PluginError { message, option, panicked });
 
 impl PluginError {
     /// A message made up at run time. Allocates: not for the fine loop.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::fixed(""), panicked: false }
+        Self { message: Text::owned(message.into()), option: Text::fixed(""), panicked: 0 }
     }
 
     /// A fixed message. Does not allocate.
     pub const fn fixed(message: &'static str) -> Self {
-        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: false }
+        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: 0 }
     }
 
     /// What is wrong with the option `key`, a dotted path below `options`: the host adds where in `machine.toml` it
     /// was written. Allocates.
     pub fn of_option(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::owned(key.into()), panicked: false }
+        Self { message: Text::owned(message.into()), option: Text::owned(key.into()), panicked: 0 }
     }
 
     /// The words of a plugin that has panicked.
     pub(crate) const fn of_panic(message: &'static str) -> Self {
-        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: true }
+        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: 1 }
     }
 
     /// Whether the plugin has panicked, now or before.
     pub fn is_panic(&self) -> bool {
-        self.panicked
+        self.panicked != 0
     }
 
     /// The option that is wrong, where it is one: a dotted path below `options`.
@@ -61,3 +65,14 @@ impl fmt::Display for PluginError {
 }
 
 impl std::error::Error for PluginError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_truth_value_of_another_side_that_is_neither_is_read_as_a_number() {
+        let error = PluginError { panicked: 7, ..PluginError::fixed("words") };
+        assert!(error.is_panic() && !PluginError::fixed("words").is_panic());
+    }
+}

@@ -1,5 +1,6 @@
 //! Axis space to joint space and back.
 
+use crate::abi::layout::layout;
 use crate::{Axes, AxisVector, PluginError, size_of_contract};
 
 /// What a kinematics is told when it is made.
@@ -11,6 +12,8 @@ pub struct KinematicsContext {
     /// The machine's axes.
     pub axes: Axes,
 }
+
+layout!(KinematicsContext { size, axes });
 
 impl KinematicsContext {
     /// The context of a machine with these axes.

@@ -1,5 +1,6 @@
 //! Joints that are sums of axes, as planners carry them along.
 
+use crate::abi::layout::layout;
 use crate::{AxisLimits, AxisVector, Limits, MAX_AXES, size_of_contract};
 
 /// Joints that several axes move together (the belts of a `CoreXY`), each a *lane* behind the machine's axes: entry
@@ -17,6 +18,8 @@ pub struct JointLanes {
     count: u32,
     weights: [AxisVector; MAX_AXES],
 }
+
+layout!(JointLanes { size, first, count, weights });
 
 impl JointLanes {
     /// Lanes behind `axes` axes, one for each of `weights`.

@@ -59,7 +59,7 @@ pub use serde;
 extern crate self as tandem_sdk;
 
 /// Number of the plugin contract. A plugin built against another number is refused.
-pub const ABI_VERSION: u32 = 1;
+pub const ABI_VERSION: u32 = 2;
 
 /// The size field of a `repr(C)` structure, as every contract structure begins with it.
 ///

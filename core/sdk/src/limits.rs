@@ -1,5 +1,6 @@
 //! What the machine may do, as planners see it.
 
+use crate::abi::layout::layout;
 use crate::{AxisVector, MAX_AXES};
 
 /// Limits of one axis or joint. A rotary one is in rad.
@@ -21,6 +22,16 @@ pub struct AxisLimits {
     /// Allowable speed difference where blocks meet, mm/s.
     pub speed_difference_mm_per_s: f64,
 }
+
+layout!(AxisLimits {
+    min_mm,
+    max_mm,
+    feed_mm_per_s,
+    rapid_mm_per_s,
+    acceleration_mm_per_s2,
+    jerk_mm_per_s3,
+    speed_difference_mm_per_s
+});
 
 /// Limits along a path at one point: the largest path speed, acceleration and jerk that keep every axis and joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +62,8 @@ pub struct Limits {
     /// Limits per axis, in the order of the machine, then per joint lane.
     pub axes: [AxisLimits; MAX_AXES],
 }
+
+layout!(Limits { size, count, axes });
 
 impl Limits {
     /// Limits of the given axes; the rest of the array repeats the last one and is never asked.

@@ -4,6 +4,7 @@
 //! takes into a ring made beforehand and shows later, on the soft side. Neither allocates, locks or waits, so that
 //! `exchange` may do it as well. Where nobody listens (a test without a host) the record is dropped.
 
+use crate::abi::layout::{Layout, START, fold, fold_text, layout, layout_of_enum, table};
 use std::fmt::{self, Write};
 use std::sync::atomic::{AtomicPtr, Ordering};
 
@@ -27,26 +28,40 @@ pub enum LogLevel {
     Error = 2,
 }
 
+layout_of_enum!(LogLevel { Info, Warning, Error });
+
 /// One line of the log.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LogRecord {
     /// Size of this structure in bytes.
     pub size: u32,
-    /// How much it matters.
-    pub level: LogLevel,
+    /// How much it matters, as a number until it has been looked at.
+    level: u32,
     source: Short<LOG_SOURCE>,
     text: Short<LOG_TEXT>,
 }
 
+layout!(LogRecord { size, level, source, text });
+
 impl LogRecord {
     /// A record; a text that is too long is cut. Any loop; does not allocate.
     pub fn new(level: LogLevel, source: &str, text: fmt::Arguments<'_>) -> Self {
-        let mut this = Self { size: size_of_contract::<Self>(), level, source: Short::EMPTY, text: Short::EMPTY };
+        let mut this =
+            Self { size: size_of_contract::<Self>(), level: level as u32, source: Short::EMPTY, text: Short::EMPTY };
         // A text that does not fit is an error of the formatter, and marked by it.
         let _ = this.source.write_str(source);
         let _ = this.text.write_fmt(text);
         this
+    }
+
+    /// How much it matters. A number that stands for no level matters most.
+    pub fn level(&self) -> LogLevel {
+        match self.level {
+            0 => LogLevel::Info,
+            1 => LogLevel::Warning,
+            _ => LogLevel::Error,
+        }
     }
 
     /// The crate that wrote it.
@@ -66,6 +81,10 @@ impl LogRecord {
 struct Short<const N: usize> {
     length: u32,
     bytes: [u8; N],
+}
+
+impl<const N: usize> Layout for Short<N> {
+    const HASH: u64 = fold(fold_text(START, "Short"), N as u64);
 }
 
 /// What stands at the end of a text that was cut.
@@ -99,12 +118,13 @@ impl<const N: usize> Write for Short<N> {
     }
 }
 
-/// What a host offers its plugins.
-#[repr(C)]
-pub struct HostTable {
-    size: u32,
-    abi_version: u32,
-    log: unsafe extern "C" fn(*const LogRecord),
+table! {
+    /// What a host offers its plugins.
+    pub struct HostTable {
+        size: u32,
+        abi_version: u32,
+        log: unsafe extern "C" fn(*const LogRecord),
+    }
 }
 
 impl HostTable {

@@ -1,5 +1,6 @@
 //! The planner contract: blocks in, segments out.
 
+use crate::abi::layout::{layout, layout_of_enum};
 use crate::{Axes, AxisVector, Block, JointLanes, Limits, MAX_AXES, PluginError, Segment, size_of_contract};
 
 /// What a planner is told when it is opened.
@@ -27,6 +28,19 @@ pub struct PlannerContext {
     /// The joints that are sums of axes, where there are any: what stands behind the axes in `limits` and in vectors.
     pub joint_lanes: Option<&'static JointLanes>,
 }
+
+layout!(PlannerContext {
+    size,
+    axes,
+    limits,
+    fine_period_s,
+    rough_period_s,
+    path_tolerance_mm,
+    time_constant_s,
+    max_feed_ratio,
+    position,
+    joint_lanes
+});
 
 impl PlannerContext {
     /// The same machine for a planner that looks at one axis at a time, and not at what stands behind the axes: the limits
@@ -59,6 +73,8 @@ pub struct PlannerDescription {
     pub uses_time_constants: u32,
 }
 
+layout!(PlannerDescription { size, order, speed_difference_mm_per_s, breaks_limits, leaves_path, uses_time_constants });
+
 impl PlannerDescription {
     /// A planner that keeps velocity and acceleration limits, continuous in velocity, on the path.
     pub fn order_2() -> Self {
@@ -83,6 +99,19 @@ pub enum Accepted {
     Full = 1,
 }
 
+layout_of_enum!(Accepted { Accepted, Full });
+
+impl Accepted {
+    /// The answer that crosses the border as this number.
+    pub(crate) fn of_number(number: u32) -> Option<Self> {
+        match number {
+            0 => Some(Self::Accepted),
+            1 => Some(Self::Full),
+            _ => None,
+        }
+    }
+}
+
 /// How far `advance` came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
@@ -92,6 +121,8 @@ pub struct Advanced {
     /// 1 where all accepted blocks are emitted (and `finish` was called): the plan is at rest.
     pub done: u32,
 }
+
+layout!(Advanced { duration_s, done });
 
 /// What held a block's feed down most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,6 +151,24 @@ pub enum LimitedBy {
     Policy = 9,
 }
 
+layout_of_enum!(LimitedBy {
+    Feed,
+    Acceleration,
+    Curvature,
+    Junction,
+    Velocity,
+    Buffer,
+    TimeConstant,
+    Tolerance,
+    Jerk,
+    Policy,
+});
+
+impl LimitedBy {
+    /// How many there are: their numbers are those below.
+    pub(crate) const COUNT: u32 = Self::Policy as u32 + 1;
+}
+
 /// How a block is driven; becomes a row of the blocks CSV.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
@@ -141,6 +190,17 @@ pub struct BlockReport {
     /// Time constant used, s; NaN for planners that know none.
     pub time_constant_s: f64,
 }
+
+layout!(BlockReport {
+    size,
+    limited_by,
+    block,
+    start_feed_mm_per_s,
+    peak_feed_mm_per_s,
+    end_feed_mm_per_s,
+    time_s,
+    time_constant_s
+});
 
 /// Takes what a planner emits.
 pub trait SegmentSink {

@@ -1,5 +1,6 @@
 //! A plugin as a host has it, whether it is linked in or loaded.
 
+use crate::abi::layout::layout_of_enum;
 use crate::abi::{self, Descriptor};
 use crate::options::OptionDocs;
 use crate::{
@@ -23,6 +24,8 @@ pub enum PluginKind {
     /// A [`Kinematics`].
     Kinematics = 4,
 }
+
+layout_of_enum!(PluginKind { Planner, FeedStrategy, Driver, Kinematics });
 
 impl PluginKind {
     /// All kinds.

@@ -1,11 +1,16 @@
 //! What the rough loop hands to the fine loop.
 
+use crate::abi::layout::{Layout, START, fold, fold_text, layout, layout_of_enum};
 use crate::{AxisVector, MAX_AXES, size_of_contract};
 
 /// Facts about a [`Segment`], as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct SegmentFlags(pub u32);
+
+impl Layout for SegmentFlags {
+    const HASH: u64 = fold(fold_text(START, "SegmentFlags"), u32::HASH);
+}
 
 impl SegmentFlags {
     /// Rapid motion: the rapid override applies, not the feed override.
@@ -50,6 +55,13 @@ pub enum Edge {
     Falling = 2,
 }
 
+layout_of_enum!(Edge { None, Rising, Falling });
+
+impl Edge {
+    /// How many there are: their numbers are those below.
+    pub(crate) const COUNT: u32 = Self::Falling as u32 + 1;
+}
+
 /// What ends a motion early, and whether it is an error when nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
@@ -61,6 +73,8 @@ pub struct StopOn {
     /// 1 where reaching the end without the edge is a fault (G38.2, G38.4), else 0.
     pub miss_is_fault: u32,
 }
+
+layout!(StopOn { input, edge, miss_is_fault });
 
 /// A piece of motion: one polynomial of degree ≤ 5 per axis over `0 ≤ t ≤ duration_s`, in the powers of t.
 ///
@@ -108,6 +122,25 @@ pub struct Segment {
     /// fine loop goes by the limits themselves.
     pub max_sigma_acceleration_per_s2: f64,
 }
+
+layout!(Segment {
+    size,
+    epoch,
+    block,
+    line,
+    flags,
+    order,
+    stop_on,
+    duration_s,
+    coefficients,
+    path,
+    feed_mm_per_s,
+    stop_deceleration_mm_per_s2,
+    step_velocity,
+    step_acceleration,
+    max_sigma_rate_per_s,
+    max_sigma_acceleration_per_s2
+});
 
 impl Segment {
     /// A rest at `position` of `duration_s`, order 2.

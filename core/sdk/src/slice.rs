@@ -1,11 +1,17 @@
 //! Variable-length data across the contract.
 
+use crate::abi::layout::{Layout, START, fold, fold_text};
+
 /// A borrowed slice as pointer and length. Valid for the call in which it is handed over, no longer.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct RawSlice<T> {
     pointer: *const T,
     length: usize,
+}
+
+impl<T: Layout> Layout for RawSlice<T> {
+    const HASH: u64 = fold(fold(fold_text(START, "RawSlice"), size_of::<Self>() as u64), T::HASH);
 }
 
 // SAFETY: a `RawSlice` is only a description of where data lies; reading it is `unsafe` and the reader's promise.

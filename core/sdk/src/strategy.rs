@@ -1,5 +1,6 @@
 //! The feed-strategy contract: the samples of one rough period in, a feed ratio out.
 
+use crate::abi::layout::layout;
 use std::marker::PhantomData;
 
 use crate::{Axes, AxisVector, PluginError, RawSlice};
@@ -35,6 +36,20 @@ pub struct FineSample {
     pub spindle_rad_per_s: f64,
 }
 
+layout!(FineSample {
+    tick,
+    line,
+    reserved,
+    command,
+    position,
+    speed,
+    current_a,
+    feed_mm_per_s,
+    programmed_feed_mm_per_s,
+    sigma,
+    spindle_rad_per_s
+});
+
 /// What a strategy is told when it is opened.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -55,6 +70,8 @@ pub struct StrategyContext {
     pub joints_are_axes: u32,
 }
 
+layout!(StrategyContext { size, axis_count, axes, fine_period_s, rough_period_s, max_feed_ratio, joints_are_axes });
+
 /// One rough period.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -66,6 +83,8 @@ pub struct Window<'a> {
     samples: RawSlice<FineSample>,
     borrowed: PhantomData<&'a [FineSample]>,
 }
+
+layout!(Window<'a> { size, period, samples, borrowed });
 
 impl<'a> Window<'a> {
     /// The window of rough period `period` with all its fine samples.

@@ -1,5 +1,6 @@
 //! A text that crosses the contract with its owner.
 
+use crate::abi::layout::layout;
 use std::fmt;
 use std::mem::ManuallyDrop;
 
@@ -13,6 +14,8 @@ pub(crate) struct Text {
     /// None where the text is fixed.
     release: Option<unsafe extern "C" fn(*mut u8, usize, usize)>,
 }
+
+layout!(Text { pointer, length, capacity, release });
 
 // SAFETY: the text is never changed, and any thread may free it.
 unsafe impl Send for Text {}

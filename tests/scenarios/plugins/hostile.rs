@@ -252,6 +252,15 @@ fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
 }
 
 #[test]
+fn a_number_that_stands_for_no_state_of_a_drive_ends_in_a_fault_that_names_it() {
+    for call in [1, 20, 500] {
+        let words = Mischief::of("driver", "foreign", "exchange", call).words();
+        let said = "its exchange gives 250 as the state of joint 2: 0 (disabled), 1 (enabled) and 2 (fault) are known";
+        assert!(words.contains("hostile") && words.contains(said), "{call}: {words:?}");
+    }
+}
+
+#[test]
 fn output_without_end_ends() {
     for call in [1, 2] {
         let words = Mischief::of("planner", "endless", "advance", call).words();

@@ -2,8 +2,10 @@
 
 mod built;
 mod examples;
+mod hang;
 mod hostile;
 mod identical;
 mod kit;
+mod layout;
 mod made;
 mod refusals;

@@ -70,8 +70,8 @@ fn another_contract() {
     };
     let ours = head(tandem_sdk::ABI_VERSION, abi::LAYOUT);
     let newer = Patched::new("one-block", "libone_block.so", &ours, &head(7, abi::LAYOUT));
-    let words = "it is built for version 7 of the plugin contract; this host has 1";
-    expect("planner.plugin", newer.path(), words);
+    let words = format!("it is built for version 7 of the plugin contract; this host has {}", tandem_sdk::ABI_VERSION);
+    expect("planner.plugin", newer.path(), &words);
     let other = Patched::new("one-block", "libone_block.so", &ours, &head(tandem_sdk::ABI_VERSION, !abi::LAYOUT));
     expect("planner.plugin", other.path(), "it is built with another revision of tandem-sdk");
     let symbol = Patched::new("one-block", "libone_block.so", b"tandem_plugin_v1__", b"tandem_plugin_v2__");

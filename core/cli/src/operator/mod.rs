@@ -21,7 +21,7 @@ use crate::args;
 use enter::Enter;
 pub use keys::{Keyboard, press};
 pub use signals::{Signals, Stops};
-pub use terminal::is_on_terminal;
+pub use terminal::{is_on_terminal, restore_terminal};
 
 /// How often a program stop is looked after while machine time stands still.
 const LOOK: Duration = Duration::from_millis(5);

@@ -1,6 +1,7 @@
 //! The terminal, key by key.
 
 use std::io::{IsTerminal, stderr, stdin};
+use std::sync::{Mutex, PoisonError};
 
 use rustix::process::getpgrp;
 use rustix::stdio;
@@ -13,10 +14,20 @@ pub fn is_on_terminal() -> bool {
     stdin().is_terminal() && stderr().is_terminal() && tcgetpgrp(stdio::stdin()).is_ok_and(|group| group == getpgrp())
 }
 
-/// Gives keys at once and unseen while it lives; the terminal is as it was afterwards, after a panic too.
-pub struct RawTerminal {
-    before: Termios,
+/// How the terminal was before it was taken, while it is.
+static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
+
+/// Gives the terminal back from another thread: the process ends before its time.
+pub fn restore_terminal() {
+    let before = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some(before) = before {
+        // A terminal that has gone away needs nothing.
+        let _ = tcsetattr(stdio::stdin(), OptionalActions::Now, &before);
+    }
 }
+
+/// Gives keys at once and unseen while it lives; the terminal is as it was afterwards, after a panic too.
+pub struct RawTerminal(());
 
 impl RawTerminal {
     /// Takes the terminal of standard input.
@@ -32,13 +43,13 @@ impl RawTerminal {
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(stdio::stdin(), OptionalActions::Now, &raw).map_err(|e| format!("the terminal: {e}"))?;
-        Ok(Self { before })
+        *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
+        Ok(Self(()))
     }
 }
 
 impl Drop for RawTerminal {
     fn drop(&mut self) {
-        // A terminal that has gone away needs nothing.
-        let _ = tcsetattr(stdio::stdin(), OptionalActions::Now, &self.before);
+        restore_terminal();
     }
 }

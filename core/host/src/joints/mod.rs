@@ -13,6 +13,7 @@ mod stated;
 mod travel;
 
 use tandem_machine::Machine;
+use tandem_sdk::abi::{Method, calling};
 use tandem_sdk::{
     AxisLimits, AxisVector, JointLanes, Kinematics, KinematicsContext, Limits, MAX_AXES, Planner, PlannerDescription,
     PluginError,
@@ -71,6 +72,10 @@ impl JointSpace {
     /// Kinematics that are not there, refuse their options or do not lead back; joints that do not fit them; a travel that
     /// leaves an axis none, or that the machine starts outside of.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
+        calling(Method::KinematicsConvert, || Self::found(machine, registry))
+    }
+
+    fn found(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         let axes = machine.axes.count();
         let (joints, kinematics) = stated::joints(machine, registry)?;
         let Some(kinematics) = kinematics else {
@@ -135,7 +140,7 @@ impl JointSpace {
         match &self.map {
             Map::Axes => *axes,
             Map::Linear(linear, _) => linear.to_joints(axes),
-            Map::Curved(kinematics) => kinematics.to_joints(axes),
+            Map::Curved(kinematics) => calling(Method::KinematicsConvert, || kinematics.to_joints(axes)),
         }
     }
 
@@ -158,7 +163,7 @@ impl JointSpace {
         match &self.map {
             Map::Linear(_, Some(lanes)) => lanes.fill(&mut all),
             Map::Curved(kinematics) => {
-                let joints = kinematics.to_joints(axes);
+                let joints = calling(Method::KinematicsConvert, || kinematics.to_joints(axes));
                 all.0[self.axes..self.axes + self.count()].copy_from_slice(&joints.0[..self.count()]);
             }
             _ => {}

@@ -8,5 +8,5 @@ mod trace_csv;
 pub use blocks_csv::BlocksCsv;
 pub(crate) use blocks_csv::limited_by;
 pub use failure::RecordError;
-pub use output::Output;
+pub use output::{Output, flush_outputs};
 pub use trace_csv::TraceCsv;

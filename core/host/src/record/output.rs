@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use super::failure::RecordError;
 
@@ -14,9 +15,42 @@ const STANDARD_OUTPUT: &str = "-";
 pub struct Output {
     path: PathBuf,
     part: Option<PathBuf>,
-    writer: Option<BufWriter<File>>,
+    /// The thread that writes is the only one that takes it, unless the process ends before its time.
+    writer: Arc<Place>,
     /// The file that is not complete stays beside the one that it would have become.
     keeps: bool,
+}
+
+type Place = Mutex<Option<BufWriter<File>>>;
+
+/// The files in the making: what writes them, and where they lie meanwhile.
+static OPEN: Mutex<Vec<(Weak<Place>, PathBuf)>> = Mutex::new(Vec::new());
+
+/// The process is about to end before its time: what was written of each file until now goes onto the disk. The answer is
+/// where. Host, from any thread.
+pub fn flush_outputs() -> Vec<PathBuf> {
+    let open = std::mem::take(&mut *lock(&OPEN));
+    let flush = |(writer, path): (Weak<Place>, PathBuf)| {
+        let writer = writer.upgrade()?;
+        // Who writes at this moment may be the one that hangs, on a disk that does not answer: it is not waited for.
+        let mut writer = writer.try_lock().ok()?;
+        // What cannot be written any more cannot be kept.
+        writer.as_mut()?.flush().is_ok().then_some(path)
+    };
+    open.into_iter().filter_map(flush).collect()
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What lies in it is whole after every statement.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn begin(file: File, path: &Path) -> Arc<Place> {
+    let writer = Arc::new(Mutex::new(Some(BufWriter::with_capacity(1 << 16, file))));
+    let mut open = lock(&OPEN);
+    open.retain(|(other, _)| other.strong_count() > 0);
+    open.push((Arc::downgrade(&writer), path.to_owned()));
+    writer
 }
 
 impl Output {
@@ -28,8 +62,8 @@ impl Output {
         if path.as_os_str() == STANDARD_OUTPUT {
             let handle = io::stdout().as_fd().try_clone_to_owned();
             let file = handle.map_err(|e| format!("standard output cannot be written: {e}"))?;
-            let writer = Some(BufWriter::with_capacity(1 << 16, File::from(file)));
-            return Ok(Self { path: "standard output".into(), part: None, writer, keeps: false });
+            let path = PathBuf::from("standard output");
+            return Ok(Self { writer: begin(File::from(file), &path), path, part: None, keeps: false });
         }
         // A link stays a link: the file that it leads to is the one to replace.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -40,7 +74,8 @@ impl Output {
             None => OpenOptions::new().write(true).open(&path),
         };
         let file = file.map_err(|e| format!("{}: it cannot be written: {e}", path.display()))?;
-        Ok(Self { path, part, writer: Some(BufWriter::with_capacity(1 << 16, file)), keeps: false })
+        let writer = begin(file, part.as_ref().unwrap_or(&path));
+        Ok(Self { path, part, writer, keeps: false })
     }
 
     /// Takes room for the first `bytes` now, so that they can be written when the disk has become full. What is no regular
@@ -49,7 +84,8 @@ impl Output {
     /// # Errors
     /// The path with the system's words: there is no room for them now.
     pub fn reserve(&mut self, bytes: u64) -> Result<(), String> {
-        let (Some(_), Some(writer)) = (&self.part, &mut self.writer) else { return Ok(()) };
+        let mut writer = lock(&self.writer);
+        let (Some(_), Some(writer)) = (&self.part, writer.as_mut()) else { return Ok(()) };
         let file = writer.get_mut();
         let taken = rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, bytes);
         // Not every file system knows how: then the room is written.
@@ -98,7 +134,8 @@ impl Output {
     /// # Errors
     /// The system's words.
     pub fn close(&mut self) -> io::Result<()> {
-        let Some(writer) = &mut self.writer else { return Ok(()) };
+        let mut place = lock(&self.writer);
+        let Some(writer) = place.as_mut() else { return Ok(()) };
         writer.flush()?;
         // Of the room that was taken what is not used goes back.
         if self.part.is_some() {
@@ -106,7 +143,7 @@ impl Output {
             let end = file.stream_position()?;
             file.set_len(end)?;
         }
-        self.writer = None;
+        *place = None;
         Ok(())
     }
 
@@ -115,13 +152,14 @@ impl Output {
     /// # Errors
     /// The system's words.
     pub fn begin_again(&mut self) -> io::Result<()> {
-        let Some(writer) = self.writer.take() else { return Ok(()) };
+        let mut place = lock(&self.writer);
+        let Some(writer) = place.take() else { return Ok(()) };
         // What could not be written is given up.
         let (mut file, _) = writer.into_parts();
         if self.part.is_some() {
             file.rewind()?;
         }
-        self.writer = Some(BufWriter::with_capacity(1 << 16, file));
+        *place = Some(BufWriter::with_capacity(1 << 16, file));
         Ok(())
     }
 }
@@ -134,17 +172,17 @@ fn beside(path: &Path) -> PathBuf {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer.as_mut().map_or(Err(io::ErrorKind::BrokenPipe.into()), |w| w.write(bytes))
+        lock(&self.writer).as_mut().map_or(Err(io::ErrorKind::BrokenPipe.into()), |w| w.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.writer.as_mut().map_or(Ok(()), Write::flush)
+        lock(&self.writer).as_mut().map_or(Ok(()), Write::flush)
     }
 }
 
 impl Drop for Output {
     fn drop(&mut self) {
-        let Some(writer) = self.writer.take() else { return };
+        let Some(writer) = lock(&self.writer).take() else { return };
         // What could not be written is not tried once more.
         drop(writer.into_parts());
         if let (false, Some(part)) = (self.keeps, &self.part) {

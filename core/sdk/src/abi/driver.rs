@@ -5,6 +5,8 @@ use std::marker::PhantomData;
 
 use super::Descriptor;
 use super::entry::{self, Handle, Instance, ask, function};
+use super::layout::table;
+use super::watch::Method;
 use crate::{
     Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, PluginKind, PluginOptions, RawSlice,
     Setpoint, size_of_contract,
@@ -12,22 +14,21 @@ use crate::{
 
 type Errors = *mut PluginError;
 
-/// The functions of a driver. Each that answers writes its answer, or an error.
-#[repr(C)]
-pub struct Table {
-    size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
-    close: unsafe extern "C" fn(*mut c_void),
-    describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
-    check: unsafe extern "C" fn(*const c_void, *const DriverContext, *mut (), Errors) -> u32,
-    claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
-    start: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
-    exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
-    quick_stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
-    stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+table! {
+    /// The functions of a driver. Each that answers writes its answer, or an error.
+    pub struct Table {
+        size: u32,
+        open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *mut *mut c_void, Errors) -> u32,
+        close: unsafe extern "C" fn(*mut c_void),
+        describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
+        check: unsafe extern "C" fn(*const c_void, *const DriverContext, *mut (), Errors) -> u32,
+        claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
+        start: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+        exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
+        quick_stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+        stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+    }
 }
-
-pub const TABLE_SIZE: usize = size_of::<Table>();
 
 /// The plugin `name` of the driver that `open` makes from its options.
 pub const fn driver<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
@@ -140,43 +141,54 @@ struct Linked {
 pub fn open(table: &'static Table, name: &'static str, options: &str) -> Made<dyn Driver> {
     let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call.
-    let handle = Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, handle, error) })?;
+    let handle = Handle::open([Method::DriverNew, Method::DriverDrop], table.close, |handle, error| unsafe {
+        (table.open)(name, options, handle, error)
+    })?;
     Ok(Box::new(Linked { table, handle }))
 }
 
 // SAFETY of the calls: the handle is open, `ask` gives places to write to, references live for the call.
 impl Driver for Linked {
     fn describe(&self) -> DriverDescription {
-        let asked = ask(|answer, error| unsafe { (self.table.describe)(self.handle.instance, answer, error) });
+        let asked = ask(Method::DriverDescribe, |answer, error| unsafe {
+            (self.table.describe)(self.handle.instance, answer, error)
+        });
         // It has panicked, and says so when it is opened.
         asked.unwrap_or_else(|_| DriverDescription::real())
     }
 
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.check)(self.handle.instance, context, answer, error) })
+        ask(Method::DriverCheck, |answer, error| unsafe {
+            (self.table.check)(self.handle.instance, context, answer, error)
+        })
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.claim)(self.handle.instance, context, answer, error) })
+        ask(Method::DriverOpen, |answer, error| unsafe {
+            (self.table.claim)(self.handle.instance, context, answer, error)
+        })
     }
 
     fn start(&mut self) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.start)(self.handle.instance, answer, error) })
+        ask(Method::DriverStart, |answer, error| unsafe { (self.table.start)(self.handle.instance, answer, error) })
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.exchange)(self.handle.instance, setpoint, feedback, answer, error) })
+        ask(Method::DriverExchange, |answer, error| unsafe {
+            (self.table.exchange)(self.handle.instance, setpoint, feedback, answer, error)
+        })
     }
 
     fn quick_stop(&mut self) {
         // Nothing may be asked of it any more that could tell. The log is one for the fine loop.
-        if let Err(error) = ask(|answer, error| unsafe { (self.table.quick_stop)(self.handle.instance, answer, error) })
-        {
+        if let Err(error) = ask(Method::DriverQuickStop, |answer, error| unsafe {
+            (self.table.quick_stop)(self.handle.instance, answer, error)
+        }) {
             crate::log!(Error, "no quick stop: {error}");
         }
     }
 
     fn stop(&mut self) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) })
+        ask(Method::DriverStop, |answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) })
     }
 }

@@ -1,12 +1,13 @@
 //! What every entry of a plugin has in common: it catches panics, and a plugin that has panicked is not called again.
 
 use std::any::Any;
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::ptr::NonNull;
 use std::sync::{Once, OnceLock};
 
+use super::watch::{Method, calling, is_within};
 use crate::options::OptionDocs;
 use crate::text::Text;
 use crate::{PluginError, PluginOptions, RawSlice};
@@ -91,8 +92,6 @@ impl Fault {
 
 thread_local! {
     static PANICKED: Panicked = const { Panicked(RefCell::new(Told { place: String::new(), words: String::new() })) };
-    /// Whether the host is in a call of a plugin on this thread.
-    static CALLING: Cell<bool> = const { Cell::new(false) };
 }
 
 /// The last panic of this thread, until the error of a call has it.
@@ -127,7 +126,7 @@ pub fn quiet_linked_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| if CALLING.get() { keep_place(info) } else { before(info) }));
+        std::panic::set_hook(Box::new(move |info| if is_within() { keep_place(info) } else { before(info) }));
     });
 }
 
@@ -136,15 +135,6 @@ fn keep_place(info: &PanicHookInfo<'_>) {
     let words = info.payload_as_str().unwrap_or("without words").to_string();
     // At the very end of a thread there is no place for it any more.
     let _ = PANICKED.try_with(|panicked| panicked.0.replace(Told { place, words }));
-}
-
-/// Calls a plugin, or with `false` back from it into the host.
-#[inline]
-pub fn calling<R>(plugin: bool, call: impl FnOnce() -> R) -> R {
-    let before = CALLING.replace(plugin);
-    let answer = call();
-    CALLING.set(before);
-    answer
 }
 
 /// A function or closure that captures nothing, made from its type: it has no data.
@@ -221,6 +211,7 @@ pub unsafe fn text<'a>(raw: RawSlice<u8>) -> &'a str {
 pub struct Handle {
     pub instance: *mut c_void,
     close: unsafe extern "C" fn(*mut c_void),
+    drop: Method,
 }
 
 // SAFETY: every contract asks for plugins that may be sent, and those that are shared for plugins that may be.
@@ -231,27 +222,35 @@ unsafe impl Sync for Handle {}
 impl Handle {
     /// Opens a plugin with one of the `open` functions.
     pub fn open(
+        [new, drop]: [Method; 2],
         close: unsafe extern "C" fn(*mut c_void),
         call: impl FnOnce(*mut *mut c_void, *mut PluginError) -> u32,
     ) -> Result<Self, PluginError> {
-        let instance = ask(call)?;
-        Ok(Self { instance, close })
+        let instance = ask(new, call)?;
+        Ok(Self { instance, close, drop })
     }
 }
 
 impl Drop for Handle {
     fn drop(&mut self) {
         // SAFETY: it was opened, and is closed once.
-        calling(true, || unsafe { (self.close)(self.instance) });
+        calling(self.drop, || unsafe { (self.close)(self.instance) });
     }
+}
+
+/// What a plugin answered where only `known` numbers mean something. The answer was written to a place of plain numbers:
+/// one that stands for no choice is never taken for a choice.
+pub fn foreign(method: Method, field: &str, value: u32, known: &str) -> PluginError {
+    let name = method.words().map_or("a call", |(_, name)| name);
+    PluginError::new(format!("its {name} gives {value} as {field}: {known} are known"))
 }
 
 /// Makes a call of a table: room for its answer and its error, and the one of the two that came.
 #[inline]
-pub fn ask<R>(call: impl FnOnce(*mut R, *mut PluginError) -> u32) -> Result<R, PluginError> {
+pub fn ask<R>(method: Method, call: impl FnOnce(*mut R, *mut PluginError) -> u32) -> Result<R, PluginError> {
     let mut answer = std::mem::MaybeUninit::<R>::uninit();
     let mut error = std::mem::MaybeUninit::<PluginError>::uninit();
-    let status = calling(true, || call(answer.as_mut_ptr(), error.as_mut_ptr()));
+    let status = calling(method, || call(answer.as_mut_ptr(), error.as_mut_ptr()));
     // SAFETY: each status says which of the two was written.
     unsafe { if status == DONE { Ok(answer.assume_init()) } else { Err(error.assume_init()) } }
 }

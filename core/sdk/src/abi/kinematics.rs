@@ -5,7 +5,9 @@ use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
 use super::Descriptor;
-use super::entry::{self, Fault, Handle, Instance, ask, calling, function};
+use super::entry::{self, Fault, Handle, Instance, ask, function};
+use super::layout::table;
+use super::watch::{Method, converting};
 use crate::{
     AxisVector, Kinematics, KinematicsContext, Made, PluginError, PluginKind, PluginOptions, RawSlice, size_of_contract,
 };
@@ -14,20 +16,19 @@ type Errors = *mut PluginError;
 /// A conversion of one vector. One that fails gives numbers that are none, and `health` has the error.
 type Convert = unsafe extern "C" fn(*const c_void, *const AxisVector) -> AxisVector;
 
-/// The functions of a kinematics. The conversions return what they answer; others write it, or an error.
-#[repr(C)]
-pub struct Table {
-    size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const KinematicsContext, *mut *mut c_void, Errors) -> u32,
-    close: unsafe extern "C" fn(*mut c_void),
-    joint_count: unsafe extern "C" fn(*const c_void, u32, *mut u32, Errors) -> u32,
-    to_joints: Convert,
-    to_axes: Convert,
-    joint_direction: unsafe extern "C" fn(*const c_void, *const AxisVector, *const AxisVector) -> AxisVector,
-    health: unsafe extern "C" fn(*const c_void, *mut (), Errors) -> u32,
+table! {
+    /// The functions of a kinematics. The conversions return what they answer; others write it, or an error.
+    pub struct Table {
+        size: u32,
+        open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const KinematicsContext, *mut *mut c_void, Errors) -> u32,
+        close: unsafe extern "C" fn(*mut c_void),
+        joint_count: unsafe extern "C" fn(*const c_void, u32, *mut u32, Errors) -> u32,
+        to_joints: Convert,
+        to_axes: Convert,
+        joint_direction: unsafe extern "C" fn(*const c_void, *const AxisVector, *const AxisVector) -> AxisVector,
+        health: unsafe extern "C" fn(*const c_void, *mut (), Errors) -> u32,
+    }
 }
-
-pub const TABLE_SIZE: usize = size_of::<Table>();
 
 /// The plugin `name` of the kinematics that `open` makes from its options.
 pub const fn kinematics<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
@@ -142,8 +143,9 @@ pub fn open(
 ) -> Made<dyn Kinematics> {
     let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call.
-    let handle =
-        Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, context, handle, error) })?;
+    let handle = Handle::open([Method::KinematicsNew, Method::KinematicsDrop], table.close, |handle, error| unsafe {
+        (table.open)(name, options, context, handle, error)
+    })?;
     Ok(Box::new(Linked { table, handle }))
 }
 
@@ -151,24 +153,27 @@ pub fn open(
 impl Kinematics for Linked {
     fn joint_count(&self, axis_count: usize) -> usize {
         let count = axis_count as u32;
-        let asked =
-            ask(|answer, error| unsafe { (self.table.joint_count)(self.handle.instance, count, answer, error) });
+        let asked = ask(Method::KinematicsJointCount, |answer, error| unsafe {
+            (self.table.joint_count)(self.handle.instance, count, answer, error)
+        });
         asked.map_or(0, |joints| joints as usize)
     }
 
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
-        calling(true, || unsafe { (self.table.to_joints)(self.handle.instance, axes) })
+        converting(|| unsafe { (self.table.to_joints)(self.handle.instance, axes) })
     }
 
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        calling(true, || unsafe { (self.table.to_axes)(self.handle.instance, joints) })
+        converting(|| unsafe { (self.table.to_axes)(self.handle.instance, joints) })
     }
 
     fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        calling(true, || unsafe { (self.table.joint_direction)(self.handle.instance, position, direction) })
+        converting(|| unsafe { (self.table.joint_direction)(self.handle.instance, position, direction) })
     }
 
     fn health(&self) -> Result<(), PluginError> {
-        ask(|answer, error| unsafe { (self.table.health)(self.handle.instance, answer, error) })
+        ask(Method::KinematicsHealth, |answer, error| unsafe {
+            (self.table.health)(self.handle.instance, answer, error)
+        })
     }
 }

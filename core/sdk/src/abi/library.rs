@@ -3,31 +3,34 @@
 use std::ffi::c_void;
 
 use super::entry::{self, text};
-use crate::log::{HostTable, LogRecord};
+use super::layout::{START, Structure, fold, table};
+use super::watch::Method;
+use crate::log::{HostTable, LogLevel, LogRecord};
 use crate::text::Text;
 use crate::{
-    ABI_VERSION, Advanced, Answer, Axes, Block, BlockReport, DriverContext, DriverDescription, Feedback, FineSample,
-    JointLanes, KinematicsContext, Limits, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind,
-    RawSlice, Segment, Setpoint, StrategyContext, Window, size_of_contract,
+    ABI_VERSION, Accepted, Advanced, ArcGeometry, Axes, AxisLimits, AxisVector, Block, BlockKind, BlockReport,
+    DriverContext, DriverDescription, Edge, Feedback, FineSample, JointLanes, JointState, KinematicsContext, Latch,
+    LimitedBy, Limits, NurbsGeometry, PathMode, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind,
+    RawSlice, Segment, SegmentFlags, Setpoint, StopOn, StrategyContext, Window, size_of_contract,
 };
 
 /// What the exported symbol is called before the name of the crate. The number is that of [`Library`] itself.
 pub const SYMBOL_PREFIX: &str = "tandem_plugin_v1__";
 
-/// One plugin of a library.
-#[derive(Debug)]
-#[repr(C)]
-pub struct Descriptor {
-    /// Size of this structure in bytes.
-    size: u32,
-    /// Number of the [`PluginKind`].
-    kind: u32,
-    name: RawSlice<u8>,
-    version: RawSlice<u8>,
-    /// Describes the options, as TOML.
-    options: unsafe extern "C" fn(*mut Text, *mut PluginError) -> u32,
-    /// The table of the kind.
-    table: *const c_void,
+table! {
+    /// One plugin of a library.
+    #[derive(Debug)]
+    pub struct Descriptor {
+        size: u32,
+        // Number of the kind.
+        kind: u32,
+        name: RawSlice<u8>,
+        version: RawSlice<u8>,
+        // Describes the options, as TOML.
+        options: unsafe extern "C" fn(*mut Text, *mut PluginError) -> u32,
+        // The table of the kind.
+        table: *const c_void,
+    }
 }
 
 // SAFETY: it is never changed, and what it points at lives as long as the program.
@@ -76,7 +79,7 @@ impl Descriptor {
     /// The description of the options, as TOML.
     pub(crate) fn options(&self) -> Result<Text, PluginError> {
         // SAFETY: `ask` gives places that can be written to.
-        entry::ask(|answer, error| unsafe { (self.options)(answer, error) })
+        entry::ask(Method::None, |answer, error| unsafe { (self.options)(answer, error) })
     }
 }
 
@@ -87,13 +90,15 @@ pub struct Library {
     /// Size of this structure in bytes.
     size: u32,
     abi_version: u32,
-    /// Sizes of all structures of the contract in one number.
+    /// All structures of the contract in one number.
     layout: u64,
     /// Version of the SDK that it was built with.
     sdk_version: RawSlice<u8>,
     plugins: RawSlice<Descriptor>,
     /// Told once after loading: the host's table.
     prepare: unsafe extern "C" fn(*const HostTable),
+    /// The structures of the contract one by one.
+    structures: RawSlice<Structure>,
 }
 
 impl Library {
@@ -106,6 +111,7 @@ impl Library {
             sdk_version: RawSlice::new(env!("CARGO_PKG_VERSION").as_bytes()),
             plugins: RawSlice::new(plugins),
             prepare,
+            structures: RawSlice::new(STRUCTURES),
         }
     }
 
@@ -132,8 +138,11 @@ impl Library {
         if this.layout != LAYOUT {
             // SAFETY: a fixed text.
             let other = unsafe { text(this.sdk_version) };
+            // SAFETY: a fixed list, in a library that stays.
+            let differs = first_difference(unsafe { this.structures.as_slice() });
+            let differs = differs.map_or_else(String::new, |name| format!(": its {name} is another one"));
             return Err(format!(
-                "it is built with another revision of tandem-sdk ({other}; this host has {}): build it again",
+                "it is built with another revision of tandem-sdk ({other}; this host has {}){differs}: build it again",
                 env!("CARGO_PKG_VERSION")
             ));
         }
@@ -155,40 +164,107 @@ unsafe extern "C" fn prepare(host: *const HostTable) {
     crate::log::attach(unsafe { &*host });
 }
 
-/// Sizes of what crosses the contract, folded into one number (FNV-1a): another revision of the SDK has another.
+macro_rules! structures {
+    ($($name:ty),+ $(,)?) => {
+        [$(Structure::of::<$name>(stringify!($name))),+]
+    };
+}
+
+/// Every structure that crosses the contract, each behind those that it is made of: the first that differs is the one that was
+/// changed.
+static STRUCTURES: &[Structure] = &structures();
+
+const fn structures() -> [Structure; 44] {
+    structures![
+        PluginKind,
+        BlockKind,
+        PathMode,
+        Edge,
+        LimitedBy,
+        Accepted,
+        JointState,
+        LogLevel,
+        SegmentFlags,
+        AxisVector,
+        Axes,
+        AxisLimits,
+        Limits,
+        JointLanes,
+        Text,
+        PluginError,
+        StopOn,
+        ArcGeometry,
+        NurbsGeometry,
+        Block,
+        Segment,
+        BlockReport,
+        Advanced,
+        PlannerContext,
+        PlannerDescription,
+        FineSample,
+        Window<'_>,
+        StrategyContext,
+        super::strategy::Description,
+        super::strategy::Reply,
+        DriverContext,
+        DriverDescription,
+        Setpoint,
+        Latch,
+        Feedback,
+        KinematicsContext,
+        LogRecord,
+        HostTable,
+        super::planner::Sink,
+        super::planner::Table,
+        super::strategy::Table,
+        super::driver::Table,
+        super::kinematics::Table,
+        Descriptor,
+    ]
+}
+
+/// Every structure of the contract, folded into one number.
 pub const LAYOUT: u64 = {
-    let sizes = [
-        size_of::<PlannerContext>(),
-        size_of::<StrategyContext>(),
-        size_of::<DriverContext>(),
-        size_of::<KinematicsContext>(),
-        size_of::<PlannerDescription>(),
-        size_of::<DriverDescription>(),
-        size_of::<Axes>(),
-        size_of::<Limits>(),
-        size_of::<Block>(),
-        size_of::<JointLanes>(),
-        size_of::<Segment>(),
-        size_of::<BlockReport>(),
-        size_of::<Advanced>(),
-        size_of::<FineSample>(),
-        size_of::<Window<'_>>(),
-        size_of::<Answer>(),
-        size_of::<Setpoint>(),
-        size_of::<Feedback>(),
-        size_of::<PluginError>(),
-        size_of::<Descriptor>(),
-        size_of::<LogRecord>(),
-        super::planner::TABLE_SIZE,
-        super::strategy::TABLE_SIZE,
-        super::driver::TABLE_SIZE,
-        super::kinematics::TABLE_SIZE,
-    ];
-    let mut folded = 0xcbf2_9ce4_8422_2325_u64;
+    let all = structures();
+    let mut folded = START;
     let mut index = 0;
-    while index < sizes.len() {
-        folded = (folded ^ sizes[index] as u64).wrapping_mul(0x0100_0000_01b3);
+    while index < all.len() {
+        folded = fold(folded, all[index].hash);
         index += 1;
     }
     folded
 };
+
+/// The first structure of ours that is another one in `theirs`, or is not there.
+fn first_difference(theirs: &[Structure]) -> Option<&'static str> {
+    // SAFETY: names are fixed texts, and a library is never unloaded.
+    let name = |structure: &Structure| unsafe { text(structure.name) };
+    let is_same = |ours: &&Structure| theirs.iter().any(|other| other.hash == ours.hash && name(other) == name(ours));
+    STRUCTURES.iter().find(|ours| !is_same(ours)).map(|ours| unsafe { text(ours.name) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_structure_that_differs_is_named_and_not_those_that_hold_it() {
+        assert_eq!(first_difference(STRUCTURES), None);
+        let mut other = STRUCTURES.to_vec();
+        let changed = |name: &str| ["AxisLimits", "Limits", "PlannerContext"].contains(&name);
+        // SAFETY: fixed texts.
+        for structure in other.iter_mut().filter(|structure| changed(unsafe { text(structure.name) })) {
+            structure.hash ^= 1;
+        }
+        assert_eq!(first_difference(&other), Some("AxisLimits"));
+        assert_eq!(first_difference(&[]), Some("PluginKind"));
+    }
+
+    #[test]
+    fn every_structure_stands_once_in_the_list() {
+        let mut hashes: Vec<u64> = STRUCTURES.iter().map(|structure| structure.hash).collect();
+        hashes.sort_unstable();
+        hashes.dedup();
+        assert_eq!(hashes.len(), STRUCTURES.len());
+    }
+}

@@ -4,10 +4,12 @@ use std::ffi::c_void;
 use std::marker::PhantomData;
 
 use super::Descriptor;
-use super::entry::{self, Handle, Instance, ask, function};
+use super::entry::{self, Handle, Instance, ask, foreign, function};
+use super::layout::{layout, table};
+use super::watch::Method;
 use crate::{
-    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, PluginKind, PluginOptions, RawSlice, StrategyContext, Window,
-    size_of_contract,
+    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, PluginKind, PluginOptions, RawSlice, Request,
+    StrategyContext, Window, size_of_contract,
 };
 
 type Errors = *mut PluginError;
@@ -15,23 +17,59 @@ type Errors = *mut PluginError;
 /// What a strategy says of itself.
 #[derive(Clone, Copy)]
 #[repr(C)]
-struct Description {
+pub struct Description {
     max_ratio_change_per_s: f64,
     signal_count: u32,
     signals: [RawSlice<u8>; MAX_SIGNALS],
 }
 
-/// The functions of a feed strategy. Each that answers writes its answer, or an error.
+layout!(Description { max_ratio_change_per_s, signal_count, signals });
+
+/// An [`Answer`] on its way: what is asked for is a number until it has been looked at.
+#[derive(Clone, Copy)]
 #[repr(C)]
-pub struct Table {
-    size: u32,
-    open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
-    close: unsafe extern "C" fn(*mut c_void),
-    describe: unsafe extern "C" fn(*const c_void, *mut Description, Errors) -> u32,
-    update: unsafe extern "C" fn(*mut c_void, *const Window<'_>, *mut Answer, Errors) -> u32,
+pub struct Reply {
+    ratio: f64,
+    /// 0 for nothing, 1 for a hold, 2 for a fault.
+    request: u32,
+    /// Code of the fault.
+    code: u32,
+    signals: [f64; MAX_SIGNALS],
 }
 
-pub const TABLE_SIZE: usize = size_of::<Table>();
+layout!(Reply { ratio, request, code, signals });
+
+impl Reply {
+    fn new(answer: &Answer) -> Self {
+        let (request, code) = match answer.request {
+            Request::None => (0, 0),
+            Request::Hold => (1, 0),
+            Request::Fault(code) => (2, code),
+        };
+        Self { ratio: answer.ratio, request, code, signals: answer.signals }
+    }
+
+    fn read(&self) -> Result<Answer, PluginError> {
+        let request = match self.request {
+            0 => Request::None,
+            1 => Request::Hold,
+            2 => Request::Fault(self.code),
+            other => return Err(foreign(Method::StrategyUpdate, "the request", other, "0, 1 and 2")),
+        };
+        Ok(Answer { ratio: self.ratio, request, signals: self.signals })
+    }
+}
+
+table! {
+    /// The functions of a feed strategy. Each that answers writes its answer, or an error.
+    pub struct Table {
+        size: u32,
+        open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
+        close: unsafe extern "C" fn(*mut c_void),
+        describe: unsafe extern "C" fn(*const c_void, *mut Description, Errors) -> u32,
+        update: unsafe extern "C" fn(*mut c_void, *const Window<'_>, *mut Reply, Errors) -> u32,
+    }
+}
 
 /// The plugin `name` of the strategy that `open` makes from its options.
 pub const fn feed_strategy<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
@@ -97,11 +135,11 @@ fn description(this: &Instance<impl FeedStrategy>) -> Result<Description, Plugin
 unsafe extern "C" fn update<T: FeedStrategy>(
     this: *mut c_void,
     window: *const Window<'_>,
-    answer: *mut Answer,
+    answer: *mut Reply,
     error: Errors,
 ) -> u32 {
     let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    unsafe { fault.guard("update", answer, error, || plugin.update(&*window)) }
+    unsafe { fault.guard("update", answer, error, || plugin.update(&*window).map(|answer| Reply::new(&answer))) }
 }
 
 /// The host's side: a strategy behind its table.
@@ -121,9 +159,11 @@ pub fn open(
 ) -> Made<dyn FeedStrategy> {
     let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
     // SAFETY: everything lives for the call; the handle is open; names live as long as their library, which stays.
-    let handle =
-        Handle::open(table.close, |handle, error| unsafe { (table.open)(name, options, context, handle, error) })?;
-    let described = ask(|answer, error| unsafe { (table.describe)(handle.instance, answer, error) })?;
+    let handle = Handle::open([Method::StrategyNew, Method::StrategyDrop], table.close, |handle, error| unsafe {
+        (table.open)(name, options, context, handle, error)
+    })?;
+    let described =
+        ask(Method::StrategyDescribe, |answer, error| unsafe { (table.describe)(handle.instance, answer, error) })?;
     let names = &described.signals[..(described.signal_count as usize).min(MAX_SIGNALS)];
     // The contract hands names out for good, and few strategies are opened: their list is never freed.
     let signals = names.iter().map(|name| unsafe { entry::text(*name) }).collect::<Vec<_>>().leak();
@@ -141,6 +181,25 @@ impl FeedStrategy for Linked {
 
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
         // SAFETY: the handle is open, `ask` gives places to write to, the window lives for the call.
-        ask(|answer, error| unsafe { (self.table.update)(self.handle.instance, window, answer, error) })
+        let reply: Reply = ask(Method::StrategyUpdate, |answer, error| unsafe {
+            (self.table.update)(self.handle.instance, window, answer, error)
+        })?;
+        reply.read()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_that_is_no_choice_is_an_error_with_its_number() {
+        for request in [Request::None, Request::Hold, Request::Fault(7)] {
+            let answer = Answer { request, ..Answer::of_ratio(0.5) };
+            assert_eq!(Reply::new(&answer).read(), Ok(answer));
+        }
+        let foreign = Reply { request: 250, ..Reply::new(&Answer::of_ratio(0.5)) };
+        let error = foreign.read().unwrap_err();
+        assert_eq!(error.message(), "its update gives 250 as the request: 0, 1 and 2 are known");
     }
 }

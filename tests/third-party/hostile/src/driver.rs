@@ -2,7 +2,7 @@
 
 use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError, Setpoint};
 
-use crate::mischief::{Mischief, Options};
+use crate::mischief::{Misbehave, Mischief, Options};
 
 pub struct Hostile(Mischief, usize);
 
@@ -42,6 +42,9 @@ impl Driver for Hostile {
         feedback.position[0] = Mischief::number(what, feedback.position[0]);
         let state = if setpoint.enable != 0 { JointState::Enabled } else { JointState::Disabled };
         feedback.state[..self.1].fill(state);
+        if what == Misbehave::Foreign {
+            feedback.state[self.1 - 1] = JointState(250);
+        }
         Ok(())
     }
 

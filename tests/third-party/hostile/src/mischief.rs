@@ -27,6 +27,10 @@ pub enum Misbehave {
     Order,
     /// It fails, in words.
     Fail,
+    /// It does not come back.
+    Hang,
+    /// It gives a number that stands for nothing.
+    Foreign,
 }
 
 tandem_sdk::options! {
@@ -70,6 +74,9 @@ impl Mischief {
         match self.options.misbehave {
             Misbehave::Panic => panic!("as it was told"),
             Misbehave::PanicTwice => std::panic::panic_any(Bomb),
+            Misbehave::Hang => loop {
+                std::thread::park();
+            },
             Misbehave::Fail => Err(PluginError::fixed("it fails as it was told")),
             other => Ok(other),
         }
