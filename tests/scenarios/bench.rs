@@ -68,6 +68,12 @@ impl Bench {
         self.drive(&settings, &commands).unwrap()
     }
 
+    /// Runs it with commands as the machine file says, unless something refuses.
+    pub fn try_commands(&self, commands: &str) -> Result<Ran, HostError> {
+        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
+        self.drive(&[], &commands)
+    }
+
     /// Runs it with the built-in plugins and further settings of the machine, unless something refuses.
     pub fn try_run(&self, settings: &[(String, String)]) -> Result<Ran, HostError> {
         self.drive(settings, &[])
@@ -179,11 +185,15 @@ fn may_follow(from: MachineState, to: MachineState) -> bool {
     }
 }
 
+/// Samples after which a run is one that does not end.
+const MOST_SAMPLES: usize = 500_000;
+
 #[derive(Default)]
 struct Kept(Vec<Sample>);
 
 impl RunObserver for Kept {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
+        assert!(self.0.len() < MOST_SAMPLES, "the run does not end");
         self.0.push(*sample);
     }
 }
@@ -192,6 +202,8 @@ fn registry() -> Registry {
     let watched = local_plugin!(planner "watched" = watched);
     let boastful = local_plugin!(planner "boastful" = boastful);
     let mut registry = Registry::default();
+    let smooth = local_plugin!(planner "watched-smooth" = watched_smooth);
+    let nurbs = local_plugin!(planner "watched-nurbs" = watched_nurbs);
     let planners = [
         tandem_look_ahead::PLUGIN,
         tandem_block_overlap::PLUGIN,
@@ -199,7 +211,8 @@ fn registry() -> Registry {
         tandem_nurbs::PLUGIN,
         tandem_smooth::PLUGIN,
     ];
-    for plugin in planners.into_iter().chain([tandem_sim::PLUGIN]).chain([watched, boastful]) {
+    let others = [tandem_sim::PLUGIN, tandem_corexy::PLUGIN, tandem_wrapped_rotary::PLUGIN];
+    for plugin in planners.into_iter().chain(others).chain([watched, boastful, smooth, nurbs]) {
         registry.register(plugin).unwrap();
     }
     registry
@@ -214,7 +227,17 @@ fn watched(options: &RawOptions, context: &PlannerContext) -> Result<Watched, Pl
     Ok(Watched { inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?, boast: 1.0 })
 }
 
-/// The same, and it declares to leave twice the deceleration to stop with: half the depth of the ring.
+/// The planner inside the tolerance; what it emits is kept.
+fn watched_smooth(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
+    Ok(Watched { inner: tandem_smooth::PLUGIN.planner(&options.0, context)?, boast: 1.0 })
+}
+
+/// The planner of curves; what it emits is kept.
+fn watched_nurbs(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
+    Ok(Watched { inner: tandem_nurbs::PLUGIN.planner(&options.0, context)?, boast: 1.0 })
+}
+
+/// The same as `watched`, and it declares to leave twice the deceleration to stop with: half the depth of the ring.
 fn boastful(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
     Ok(Watched { inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?, boast: 2.0 })
 }

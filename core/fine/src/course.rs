@@ -34,6 +34,8 @@ pub struct Place<'a> {
     /// Entries passed.
     passed: usize,
     local_s: f64,
+    /// The place lies within what is queued, or at a rest that ends it.
+    known: bool,
 }
 
 impl<'a> Course<'a> {
@@ -44,7 +46,7 @@ impl<'a> Course<'a> {
 
     /// The place at local time `local_s` of the segment that moves.
     pub fn begin(&self, local_s: f64) -> Place<'a> {
-        Place { course: *self, segment: Some(self.segment), passed: 0, local_s }
+        Place { course: *self, segment: Some(self.segment), passed: 0, local_s, known: true }
     }
 
     fn entry(&self, n: usize) -> Option<&'a Queued> {
@@ -65,6 +67,16 @@ impl Place<'_> {
         motion
     }
 
+    /// Whether what lies behind the place is known: `false` beyond what is queued, unless that ends at rest.
+    pub fn is_known(&self) -> bool {
+        self.known
+    }
+
+    /// How much of `most_s` lies in the segment here, s; all of it where nothing moves.
+    pub fn stretch_s(&self, most_s: f64) -> f64 {
+        self.segment.map_or(most_s, |segment| (segment.duration_s - self.local_s).clamp(0.0, most_s))
+    }
+
     /// Moves on to the end of the segment, and by no more than `most_s`; gives what is left of it.
     pub fn advance(&mut self, most_s: f64) -> f64 {
         let Some(segment) = self.segment else { return 0.0 };
@@ -83,13 +95,19 @@ impl Place<'_> {
                 Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => rests = ends(segment),
                 Some(Queued::Segment { segment, .. }) => self.segment = Some(segment),
                 Some(Queued::Event(_)) => {}
-                None => rests = true,
+                None => (rests, self.known) = (true, false),
             }
             self.passed += 1;
         }
         self.local_s = 0.0;
-        let stepping = self.segment.filter(|segment| segment.flags.contains(SegmentFlags::STEPS));
-        before.zip(stepping).map(|(before, behind)| Steps::between(before, behind))
+        match (before, self.segment) {
+            // A plan made of samples may come to rest with some acceleration left.
+            (Some(before), None) if self.known => Some(Steps::to_rest(before)),
+            (Some(before), Some(behind)) if behind.flags.contains(SegmentFlags::STEPS) => {
+                Some(Steps::between(before, behind))
+            }
+            _ => None,
+        }
     }
 
     /// What steps within `horizon_s` from here.

@@ -9,6 +9,7 @@ mod smooth;
 mod steady;
 
 pub use smooth::Aim;
+use steady::Steadying;
 
 use tandem_sdk::{AxisLimits, MAX_AXES};
 
@@ -29,12 +30,23 @@ pub struct Governor {
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
+    /// Where jerk is limited: the way that was begun last, and one that is being tried.
+    begun: Steadying,
+    tried: Steadying,
 }
 
 impl Governor {
-    /// A governor at σ = 1: where nothing moves, program time passes at its own rate.
+    /// A governor at σ = 1: where nothing moves, program time passes at its own rate. Host; allocates.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
-        Self { sigma: 1.0, rate_per_s: 0.0, period_s, acceleration: limits.map(|l| l.acceleration_mm_per_s2), axes }
+        Self {
+            sigma: 1.0,
+            rate_per_s: 0.0,
+            period_s,
+            acceleration: limits.map(|l| l.acceleration_mm_per_s2),
+            axes,
+            begun: Steadying::new(),
+            tried: Steadying::new(),
+        }
     }
 
     /// The rate at the end of the last period.
@@ -50,6 +62,7 @@ impl Governor {
     /// Sets the rate where nothing moves and any rate is as good.
     pub fn jump(&mut self, sigma: f64) {
         (self.sigma, self.rate_per_s) = (sigma, 0.0);
+        self.begun.clear();
     }
 
     /// The highest rate at which the plan itself keeps the limits: 1 unless the planner is defective.

@@ -19,6 +19,18 @@ pub fn to_rest(x: f64, rate: f64, gentle: f64, most: f64, period_s: f64) -> f64 
     (-off / (period_s * period_s)).clamp(-most, most)
 }
 
+/// The shortest time in which a coordinate with `rate` and `change` of it comes to rest, s: `|change| ≤ most` where it is not
+/// more already, and the change of that within `±jerk`.
+pub fn stop_s(rate: f64, change: f64, most: f64, jerk: f64) -> f64 {
+    // Seen so that the rate is to be brought down after the change has come to nothing.
+    let down = if rate + change * change.abs() / (2.0 * jerk) < 0.0 { -1.0 } else { 1.0 };
+    let (rate, change) = (down * rate, down * change);
+    let peak = (jerk * rate + change * change / 2.0).max(0.0).sqrt();
+    let held = peak.min(most.max(-change));
+    let left = if peak > held { (rate + change * change / (2.0 * jerk) - held * held / jerk) / held } else { 0.0 };
+    (change + 2.0 * held) / jerk + left
+}
+
 /// State along the path and what it may be changed with.
 #[derive(Clone, Copy, Debug)]
 pub struct Along {

@@ -25,6 +25,12 @@ impl Steps {
         Self { velocity: velocity.0.map(f64::abs), acceleration: acceleration.0.map(f64::abs) }
     }
 
+    /// From the end of `before` to a rest there.
+    pub fn to_rest(before: &Segment) -> Self {
+        let (velocity, acceleration) = (before.velocity(before.duration_s), before.acceleration(before.duration_s));
+        Self { velocity: velocity.0.map(f64::abs), acceleration: acceleration.0.map(f64::abs) }
+    }
+
     /// Both, as if they came together.
     pub fn join(&mut self, other: &Self) {
         for axis in 0..MAX_AXES {

@@ -6,7 +6,7 @@
 use super::Governor;
 use super::steady::Way;
 use crate::course::Place;
-use crate::law::to_rest;
+use crate::law::{stop_s, to_rest};
 use crate::outlook::Outlook;
 use crate::steps::{Recent, Steps};
 
@@ -17,6 +17,9 @@ const MARGIN: f64 = 0.995;
 pub(super) const LEFT: f64 = 0.006;
 /// By which share of the limit jerk goes beyond it where it must: the first that leaves a rate is taken.
 const EXCESSES: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
+/// How much longer than the path by its speed an axis must need to decide how a stop begins. On a line both need the same,
+/// and the law of the path, which knows no single axis, comes in to rest without chatter.
+const CLEARLY: f64 = 1.2;
 /// Below this share of what one period can change, a rate is where it was to go.
 const SNAP: f64 = 1e-3;
 
@@ -79,7 +82,7 @@ impl Governor {
     /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is, `recent` what of
     /// its steps the next samples show.
     pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>, recent: Recent) -> Chosen {
-        let wanted = self.wanted(aim, outlook);
+        let wanted = self.wanted(aim, outlook).min(self.wanted_by_slowest(aim, outlook, &place));
         if wanted == 0.0 && self.rate_per_s == 0.0 {
             return Chosen { delta_s: self.sigma * self.period_s, relaxed: false };
         }
@@ -89,10 +92,23 @@ impl Governor {
         let here = Way { sigma: self.sigma, rate_per_s: self.rate_per_s, place, recent };
         let chosen = match self.steadied(wanted.clamp(-down, up), here, outlook) {
             Some(change) => Chosen { delta_s: self.pass(change), relaxed: false },
-            None => self.relaxed(outlook, &self.reserve(&here)),
+            None => self.go_on(outlook, &self.reserve(&here)),
         };
         self.settle(aim, outlook);
         chosen
+    }
+
+    /// Goes on the way that was begun, at whose end σ is constant.
+    fn go_on(&mut self, outlook: &Outlook, reserve: &Steps) -> Chosen {
+        if self.rate_per_s == 0.0 {
+            return Chosen { delta_s: self.pass(0.0), relaxed: false };
+        }
+        let Some((change, last)) = self.begun.next() else { return self.relaxed(outlook, reserve) };
+        let delta_s = self.pass(change);
+        if last {
+            self.rate_per_s = 0.0;
+        }
+        Chosen { delta_s, relaxed: false }
     }
 
     /// Makes σ constant as soon as velocity and acceleration allow it, with no more jerk than that takes.
@@ -111,11 +127,21 @@ impl Governor {
         }
         let steady = -self.rate_per_s / self.period_s;
         let chosen = if least.is_empty() { firm.nearest(steady) } else { least.nearest(steady) };
+        let chosen = firm.nearest(self.landing(chosen));
         let before = self.rate_per_s;
         let delta_s = self.pass(chosen);
         // Where σ has met an end of its range, σ̇ ended there and not as chosen.
         let change = (self.rate_per_s - before) / self.period_s;
         Chosen { delta_s, relaxed: all.is_empty() || !all.contains(change) }
+    }
+
+    /// `chosen`, or the σ̈ that is needed to come to the end of the range with σ constant, evenly from here on.
+    fn landing(&self, chosen: f64) -> f64 {
+        let (h, rate) = (self.period_s, self.rate_per_s);
+        let room = if rate > 0.0 { 1.0 - self.sigma } else { self.sigma };
+        let periods = (2.0 * room / (h * rate.abs())).floor().max(1.0);
+        let even = -rate / (periods * h);
+        if rate > 0.0 { chosen.min(even) } else { chosen.max(even) }
     }
 
     /// Ends an approach: what rounding leaves of it is far below what a period may change.
@@ -150,6 +176,33 @@ impl Governor {
         let capped = (asked - planned) / speed;
         // At its bound the law of the rate only says that its aim is far.
         if free < most { free.min(capped) } else { capped }
+    }
+
+    /// The same to rest soonest, by the axis that alone would need longest, where that is clearly longer than what the path
+    /// takes by its speed: an axis that is slow to turn round decides, though the path hardly has its direction yet.
+    fn wanted_by_slowest(&self, aim: &Aim, outlook: &Outlook, place: &Place<'_>) -> f64 {
+        let (h, sigma, rate) = (self.period_s, self.sigma, self.rate_per_s);
+        let [speed, acceleration, _] = aim.path;
+        if aim.speed_mm_per_s > 0.0 || sigma == 0.0 || speed <= 0.0 {
+            return f64::INFINITY;
+        }
+        let along = sigma * sigma * acceleration + speed * rate;
+        let path_s = stop_s(sigma * speed, along, f64::INFINITY, MARGIN * outlook.path_jerk_mm_per_s3);
+        let (mut longest_s, mut wanted) = (CLEARLY * path_s + 2.0 * h, f64::INFINITY);
+        let motion = place.motion();
+        for (axis, (most, jerk)) in outlook.limits() {
+            let velocity = motion.velocity[axis];
+            let turning = sigma * motion.acceleration[axis];
+            let (fast, changing) = (sigma * velocity, sigma * turning + velocity * rate);
+            let axis_s = stop_s(fast, changing, most, MARGIN * jerk);
+            if axis_s > longest_s && velocity != 0.0 {
+                let planned = sigma * sigma * sigma * motion.jerk[axis] + 3.0 * turning * rate;
+                let asked =
+                    to_rest(fast - h * changing / 2.0, changing, outlook.share * MARGIN * jerk, 4.0 * MARGIN * jerk, h);
+                (longest_s, wanted) = (axis_s, (asked - planned) / velocity);
+            }
+        }
+        wanted
     }
 
     fn approach(&self, off: f64, gentle: f64, most: f64) -> f64 {

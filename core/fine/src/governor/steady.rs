@@ -1,8 +1,8 @@
 //! Whether the rate of program time can be made constant again: what keeps the jerk limit on every way that is begun.
 //!
 //! A constant σ is admissible wherever the plan is. So σ̈ of a period is good if from its end on σ̇ can be brought to zero
-//! within the limits, tried out period by period on the plan ahead. From a state that was reached so, there is always
-//! a σ̈ that is: the next one of that way.
+//! within the limits and within 0 ≤ σ ≤ 1, tried out period by period on the plan ahead. The way that was found is kept:
+//! where no better one is found in the next period, it is gone on to its end.
 
 use super::Governor;
 use super::smooth::{Interval, LEFT};
@@ -12,14 +12,8 @@ use crate::steps::{AROUND, Recent, Steps};
 
 /// Share of the acceleration limit that is used at the points of a period: between them it may be higher.
 const ACCELERATION_MARGIN: f64 = 0.998;
-/// Share of the jerk limit that the coming period uses.
+/// Share of the jerk limit that is used at the points of a period.
 const JERK_MARGIN: f64 = 0.997;
-/// What a way that is begun uses less than that at its worst: its next periods find the plan where it was but for rounding.
-const BEGUN: f64 = -0.003;
-/// What a way that goes on may use more.
-const GOES_ON: f64 = 5e-4;
-/// Shares with which a way that was begun is tried again.
-const GOING_ON: [f64; 4] = [BEGUN, BEGUN + 2e-4, 0.0, GOES_ON];
 /// Program time that is none, s.
 const NONE_S: f64 = 1e-9;
 /// Tries between the σ̈ wanted and the one that makes σ constant.
@@ -27,6 +21,38 @@ const HALVINGS: u32 = 4;
 /// Time in which σ must have become constant, in units of the longest a/J, and how many periods that may be.
 const LONGEST: f64 = 3.2;
 const MOST_PERIODS: f64 = 640.0;
+
+/// σ̈ of the periods of a way at whose end σ is constant, 1/s².
+#[derive(Debug)]
+pub(super) struct Steadying {
+    changes_per_s2: Box<[f64]>,
+    count: usize,
+    passed: usize,
+}
+
+impl Steadying {
+    /// A way without periods, with room for the longest.
+    pub(super) fn new() -> Self {
+        Self { changes_per_s2: vec![0.0; MOST_PERIODS as usize].into_boxed_slice(), count: 0, passed: 0 }
+    }
+
+    /// Forgets the way: σ is constant.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.passed) = (0, 0);
+    }
+
+    fn push(&mut self, change_per_s2: f64) {
+        self.changes_per_s2[self.count] = change_per_s2;
+        self.count += 1;
+    }
+
+    /// The next period of the way, and whether it is the last.
+    pub(super) fn next(&mut self) -> Option<(f64, bool)> {
+        let change_per_s2 = *self.changes_per_s2[..self.count].get(self.passed)?;
+        self.passed += 1;
+        Some((change_per_s2, self.passed == self.count))
+    }
+}
 
 /// The rate of program time, and where it is on the plan.
 #[derive(Clone, Copy, Debug)]
@@ -59,41 +85,42 @@ impl Way<'_> {
 }
 
 impl Governor {
-    /// The σ̈ nearest to `wanted` from which σ can be made constant within the limits; `None` where there is none.
-    pub(super) fn steadied(&self, wanted: f64, here: Way<'_>, outlook: &Outlook) -> Option<f64> {
+    /// The σ̈ nearest to `wanted` from which σ can be made constant within the limits, with the way that does it in
+    /// `self.begun`; `None` where none is found.
+    pub(super) fn steadied(&mut self, wanted: f64, here: Way<'_>, outlook: &Outlook) -> Option<f64> {
         let h = self.period_s;
-        let range = self.range(&here, GOES_ON, outlook)?;
-        let steadies = |change: f64, more: f64| {
+        let range = self.range(&here, outlook)?;
+        let mut tries = |change: f64| {
             let mut way = here;
             way.pass(change, h);
-            self.steadies(way, more, outlook)
+            let found = self.steadies(way, outlook);
+            if found {
+                std::mem::swap(&mut self.begun, &mut self.tried);
+            }
+            found
         };
         let wanted = range.nearest(wanted);
-        if steadies(wanted, BEGUN) {
+        if tries(wanted) {
             return Some(wanted);
         }
-        let (mut good, mut bad) = (range.nearest(-self.rate_per_s / h), wanted);
+        let (mut good, mut bad) = (range.nearest(-here.rate_per_s / h), wanted);
         let mut found = None;
         for _ in 0..HALVINGS {
             let between = f64::midpoint(good, bad);
-            if steadies(between, BEGUN) {
+            if tries(between) {
                 (good, found) = (between, Some(between));
             } else {
                 bad = between;
             }
         }
-        // The way that was begun goes on: with other shares it would be another, and meet the plan at other places.
-        let goes_on = |more: f64| {
-            let change = self.range(&here, more, outlook)?.nearest(-self.rate_per_s / h);
-            steadies(change, more).then_some(change)
-        };
-        found.or_else(|| GOING_ON.into_iter().find_map(goes_on))
+        found
     }
 
-    /// Whether σ becomes constant.
-    fn steadies(&self, mut way: Way<'_>, more: f64, outlook: &Outlook) -> bool {
+    /// Whether σ becomes constant; the way that does it is noted in `self.tried`.
+    fn steadies(&mut self, mut way: Way<'_>, outlook: &Outlook) -> bool {
         let h = self.period_s;
         let periods = (LONGEST * outlook.horizon_s / h).clamp(16.0, MOST_PERIODS) as u32;
+        self.tried.clear();
         for _ in 0..periods {
             if !(0.0..=1.0).contains(&way.sigma) {
                 return false;
@@ -101,9 +128,11 @@ impl Governor {
             if way.rate_per_s == 0.0 {
                 return true;
             }
-            let Some(range) = self.range(&way, more, outlook) else { return false };
+            // What is not queued yet could be anything.
+            let Some(range) = self.range(&way, outlook).filter(|_| way.place.is_known()) else { return false };
             let steady = -way.rate_per_s / h;
             let change = range.nearest(steady);
+            self.tried.push(change);
             way.pass(change, h);
             if change == steady {
                 way.rate_per_s = 0.0;
@@ -112,21 +141,25 @@ impl Governor {
         false
     }
 
-    /// σ̈ that the limits allow in the period that begins here; `more` is added to the share of the jerk.
-    fn range(&self, way: &Way<'_>, more: f64, outlook: &Outlook) -> Option<Interval> {
+    /// σ̈ that the limits allow in the period that begins here.
+    fn range(&self, way: &Way<'_>, outlook: &Outlook) -> Option<Interval> {
         let h = self.period_s;
         let mut interval = Interval::ALL;
         let whole_s = h * (way.sigma + h * way.rate_per_s / 2.0).clamp(0.0, 1.0);
         let (mut place, mut left_s) = (way.place, whole_s);
         let bounds = (outlook, &self.reserve(way));
-        self.keep_at(way, 0.0, &place.motion(), more, bounds, &mut interval);
+        self.keep_at(way, 0.0, &place.motion(), bounds, &mut interval);
         while left_s > NONE_S {
-            left_s = place.advance(left_s);
-            let part = 1.0 - left_s / whole_s;
-            self.keep_at(way, part, &place.motion(), more, bounds, &mut interval);
+            // With the middle, what samples show of a quadratic course is a mean of what is kept here (Simpson's rule).
+            let stretch_s = place.stretch_s(left_s);
+            for end_s in [left_s - stretch_s / 2.0, left_s - stretch_s] {
+                place.advance(stretch_s / 2.0);
+                self.keep_at(way, 1.0 - end_s / whole_s, &place.motion(), bounds, &mut interval);
+            }
+            left_s -= stretch_s;
             if left_s > NONE_S {
                 place.step();
-                self.keep_at(way, part, &place.motion(), more, bounds, &mut interval);
+                self.keep_at(way, 1.0 - left_s / whole_s, &place.motion(), bounds, &mut interval);
             }
         }
         (!interval.is_empty()).then_some(interval)
@@ -147,7 +180,6 @@ impl Governor {
         way: &Way<'_>,
         part: f64,
         motion: &Motion,
-        more: f64,
         (outlook, reserve): (&Outlook, &Steps),
         keep: &mut Interval,
     ) {
@@ -159,7 +191,7 @@ impl Governor {
             let planned = cube * motion.jerk[axis];
             let turning = 3.0 * motion.acceleration[axis] * sigma;
             let left = JERK_MARGIN * jerk_limit - reserve.jerk_mm_per_s3(axis, sigma, h);
-            let most = left.max(planned.abs() + LEFT * jerk_limit) + more * jerk_limit;
+            let most = left.max(planned.abs() + LEFT * jerk_limit);
             keep.keep(planned + turning * rate, velocity + turning * part * h, most);
             let planned = square * motion.acceleration[axis];
             let left = ACCELERATION_MARGIN * acceleration_limit - reserve.acceleration_mm_per_s2(axis, sigma, h);
