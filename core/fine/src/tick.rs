@@ -49,6 +49,8 @@ pub struct Counters {
     pub governed_samples: u64,
     /// How often the queue ran low.
     pub starvations: u64,
+    /// Samples with σ < 1 because the ring holds too little program time, or comes by in too many pieces, for more.
+    pub queue_limited_samples: u64,
     /// Ratios that came after the tick they were meant for.
     pub late_ratios: u64,
     /// Fine periods that passed without a sample.
@@ -105,6 +107,9 @@ pub struct FineLoop {
     phase: Phase,
     state: MachineState,
     starved: bool,
+    /// The rough loop's looks after the ring when it was last looked at, and periods since it changed.
+    served: u32,
+    unserved: u32,
     recovering: bool,
     tick: u64,
     setpoint: Setpoint,
@@ -159,6 +164,8 @@ impl FineLoop {
             phase: Phase::Waiting,
             state: MachineState::Fault,
             starved: false,
+            served: 0,
+            unserved: 0,
             recovering: false,
             tick: 0,
             setpoint: Setpoint::default(),

@@ -137,13 +137,16 @@ impl Run {
         } = ready;
         setup::open(&machine, driver.as_mut(), &joints)?;
         // As lockstep needs it: the samples of each rough period are taken behind it.
-        let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, ..Sizes::default() };
-        let (rough_end, fine_end, host) = bridge(sizes);
         let description = planner.describe();
+        let depth_s = setup::queue_depth_s(&machine, &joints, description.order);
+        let segments = Sizes::segments_for(depth_s, machine.fine_period_s);
+        let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, segments };
+        let (rough_end, fine_end, host) = bridge(sizes);
         let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
         fine_config.record_drives = ready.records_drives;
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
-        let rough_config = RoughConfig::new(machine.rough_period_s);
+        let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
+        rough_config.advance_s = setup::advance_s(machine.rough_period_s, depth_s, segments);
         let exchange = Arc::new(ExchangeTimes::default());
         let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics.into_kinematics());
@@ -323,6 +326,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         exchange_us: None,
         page_faults: None,
         starvations: counters.starvations,
+        queue_limited_samples: counters.queue_limited_samples,
         late_ratios: counters.late_ratios,
         lost_samples: pump.host.status.lost_samples.load(Relaxed),
         record_errors: vec![],

@@ -3,10 +3,11 @@
 use tandem_fine::FineConfig;
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
+use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription, PluginError,
-    StrategyContext, size_of_contract,
+    AxisLimits, AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription,
+    PluginError, StrategyContext, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
@@ -176,6 +177,27 @@ fn strategy(
     };
     let made = registry.strategy(choice, &context);
     made.map(Some).map_err(|e| refused(machine, "feed_strategy", e))
+}
+
+/// Share of an axis' acceleration that planners leave along the path where it turns, at least.
+const LEFT_IN_TURNS: f64 = 0.6;
+
+/// Program time that the queue has to hold for a stop from the machine's highest speeds at its lowest accelerations, s.
+/// `order` is that of the limits that the planner keeps.
+pub fn queue_depth_s(machine: &Machine, joints: &JointSpace, order: u32) -> f64 {
+    let stop_s = |limits: &AxisLimits| {
+        let speed = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
+        let ramp_s = if order >= 3 { limits.acceleration_mm_per_s2 / limits.jerk_mm_per_s3 } else { 0.0 };
+        speed / (LEFT_IN_TURNS * STOP_SHARE * limits.acceleration_mm_per_s2) + 2.0 * ramp_s / STOP_JERK_SHARE
+    };
+    let worst_s = joints.limits.axes().iter().map(stop_s).filter(|stop_s| stop_s.is_finite()).fold(0.0, f64::max);
+    worst_s + 5.0 * machine.rough_period_s + 3.0 * machine.fine_period_s
+}
+
+/// Program time that the planner is asked for at a time, s: whole rough periods, one where a ring of `segments` holds
+/// `depth_s` in pieces that short. Each piece is a segment at least; a quarter of the ring is for these cuts.
+pub fn advance_s(rough_period_s: f64, depth_s: f64, segments: usize) -> f64 {
+    rough_period_s * (4.0 * depth_s / (rough_period_s * segments as f64)).ceil().max(1.0)
 }
 
 /// The fine loop's view of the machine.

@@ -89,6 +89,9 @@ pub struct Summary {
     pub page_faults: Option<PageFaults>,
     /// How often the queue ran low.
     pub starvations: u64,
+    /// Samples in which program time passed slower because the ring of segments holds too little of it for a stop from
+    /// full rate, or comes by in more pieces than the fine loop looks at.
+    pub queue_limited_samples: u64,
     /// Ratios that came late.
     pub late_ratios: u64,
     /// Samples the recorder lost.

@@ -1,6 +1,6 @@
 //! Floating-point atomics, and how far the queue reaches.
 
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// An `f64` in an atomic.
 #[derive(Debug, Default)]
@@ -30,6 +30,17 @@ pub const STOP_SHARE: f64 = 0.95;
 /// Share of the jerk that both loops count on for a stop: turning, and the plan's own jerk, take what they need.
 pub const STOP_JERK_SHARE: f64 = 0.8;
 
+/// Most entries of the ring that the fine loop looks at in one period, whatever the period.
+pub const MOST_ENTRIES: usize = 250;
+
+/// Entries of the ring that the fine loop comes past in one period at most: each may be a cache miss and takes up to a
+/// tenth of a µs for every axis, and a period of 1 ms has time for 250.
+pub fn most_entries_a_period(fine_period_s: f64) -> usize {
+    const FEWEST: f64 = 60.0;
+    const PER_S: f64 = 250_000.0;
+    (fine_period_s * PER_S).clamp(FEWEST, MOST_ENTRIES as f64) as usize
+}
+
 /// How far the queue reaches, and what it takes to stop within it. Written by the rough loop after each push.
 ///
 /// The fields are stored in the order in which the fine loop may safely see them: first the stop that the new segments
@@ -48,6 +59,15 @@ pub struct Depth {
     /// Program time that must lie before the wall for motion to start (or start again), s: the worst stop; zero where the
     /// end of the stream is queued or the ring is full.
     pub required_s: AtomicF64,
+    /// The ring has no room for more: it gets no deeper, and what it holds may be less than the worst stop.
+    pub full: AtomicBool,
+    /// Highest rate of program time from which the machine comes to rest inside what the ring holds, and at which no more
+    /// entries come in a fine period than the fine loop looks at; 1 where neither matters.
+    pub most_rate: AtomicF64,
+    /// Counts how often the rough loop has looked after the ring.
+    pub served: AtomicU32,
+    /// Machine time behind such a look for which `most_rate` holds without the next one, s.
+    pub served_for_s: AtomicF64,
     /// Epoch that the other fields are about; stored behind them when an epoch begins.
     pub epoch: AtomicU32,
 }
@@ -59,6 +79,8 @@ impl Depth {
         self.stop_deceleration_mm_per_s2.store(f64::INFINITY);
         self.stop_s.store(f64::INFINITY);
         self.stop_ramp_s.store(0.0);
+        self.full.store(false, Ordering::Release);
+        self.most_rate.store(1.0);
         self.wall_s.store(now_s);
         self.epoch.store(epoch, Ordering::Release);
     }
@@ -84,6 +106,10 @@ impl Default for Depth {
             stop_ramp_s: AtomicF64::new(0.0),
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),
+            full: AtomicBool::new(false),
+            most_rate: AtomicF64::new(1.0),
+            served: AtomicU32::new(0),
+            served_for_s: AtomicF64::new(0.0),
             epoch: AtomicU32::new(0),
         }
     }

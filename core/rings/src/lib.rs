@@ -12,7 +12,7 @@ mod request;
 mod rest;
 mod sample;
 
-pub use atomics::{AtomicF64, Depth, STOP_JERK_SHARE, STOP_SHARE};
+pub use atomics::{AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
 pub use controls::{Controls, JogControls, Status};
 pub use counts::Counts;
 pub use given::Given;
@@ -58,11 +58,24 @@ pub struct Sizes {
     pub samples: usize,
 }
 
+impl Sizes {
+    /// Fewest and most segments of a ring: 3 MB and 48 MB.
+    pub const SEGMENTS: [usize; 2] = [4096, 65_536];
+
+    /// Segments of a ring that holds `depth_s` of program time however short they are, where the fine loop can follow; no
+    /// more than there is memory for. Where that is less, the rough loop tells the fine loop so ([`Depth::most_rate`]).
+    pub fn segments_for(depth_s: f64, fine_period_s: f64) -> usize {
+        let [fewest, most] = Self::SEGMENTS;
+        let wanted =
+            (depth_s / fine_period_s * most_entries_a_period(fine_period_s) as f64).clamp(fewest as f64, most as f64);
+        (wanted as usize).next_power_of_two()
+    }
+}
+
 impl Default for Sizes {
-    /// 4096 segments (3 MB) hold the worst stop of blocks of a hundredth of a millimetre at 160 mm/s; 4096
-    /// samples hold 4 s of a recorder that is not looking.
+    /// 4096 segments (3 MB); 4096 samples hold 4 s of a recorder that is not looking.
     fn default() -> Self {
-        Self { segments: 4096, samples: 4096 }
+        Self { segments: Self::SEGMENTS[0], samples: 4096 }
     }
 }
 

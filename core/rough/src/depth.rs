@@ -1,7 +1,9 @@
 //! How much program time must be queued so that the machine can stop within it.
 
+use std::collections::VecDeque;
+
 use crate::window::SlidingMax;
-use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
+use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
 use tandem_sdk::{Segment, SegmentFlags};
 
 /// The worst stop over what is queued.
@@ -15,40 +17,112 @@ pub struct QueueDepth {
     stops: SlidingMax,
     /// Times in which the deceleration is built up, s.
     ramps: SlidingMax,
+    braking: Braking,
+    /// Negative rates at which entries come no denser than the fine loop looks at them.
+    dense: SlidingMax,
+    /// Where the last entries end, s of program time, and the place of the next one among them.
+    ends_s: Box<[f64]>,
+    next_end: usize,
     rough_period_s: f64,
+    fine_period_s: f64,
     factor: f64,
 }
 
+/// How far a stop has come at each end of a queued segment.
+///
+/// On the path the rate σ of program time can fall by a_s/v per s of machine time, so σ²/2 falls by a_s/v per s of program
+/// time. Its integral over program time, between two places, is therefore the σ²/2 that is braked away between them,
+/// whatever speeds and decelerations lie there.
+#[derive(Debug, Default)]
+struct Braking {
+    /// Program time at the end of each segment, s, and the integral up to there.
+    ends: VecDeque<(f64, f64)>,
+    /// The integral up to the first of them.
+    passed: f64,
+}
+
+impl Braking {
+    /// More than any stop takes, which is 1/2: what one segment adds at most, so that sums keep their precision.
+    const WHOLE_STOP: f64 = 1.0;
+
+    fn push(&mut self, stop: f64, until_s: f64) {
+        let before = self.ends.back().map_or(self.passed, |(_, sum)| *sum);
+        self.ends.push_back((until_s, before + stop.min(Self::WHOLE_STOP)));
+    }
+
+    fn forget(&mut self, now_s: f64) {
+        while let Some((_, sum)) = self.ends.pop_front_if(|(until_s, _)| *until_s < now_s) {
+            self.passed = sum;
+        }
+    }
+
+    /// The integral up to the last end that is not behind `at_s`.
+    fn before(&self, at_s: f64) -> f64 {
+        let count = self.ends.partition_point(|(until_s, _)| *until_s <= at_s);
+        if count == 0 { self.passed } else { self.ends[count - 1].1 }
+    }
+
+    /// The integral up to the first end that is not before `at_s`.
+    fn behind(&self, at_s: f64) -> f64 {
+        let count = self.ends.partition_point(|(until_s, _)| *until_s < at_s);
+        self.ends.get(count).or(self.ends.back()).map_or(self.passed, |(_, sum)| *sum)
+    }
+}
+
+/// Rough periods for which the rate that is told holds though the rough loop is late.
+pub const SERVED_FOR_PERIODS: f64 = 2.0;
+
+/// Halvings in which the rate is found that the ring allows: to a millionth.
+const HALVINGS: u32 = 20;
+
+/// The rate at least, for a queue whose segments leave no deceleration at all: the machine has to get out of it.
+const LEAST_RATE: f64 = 1e-3;
+
 impl QueueDepth {
     /// Nothing queued. `factor` is the share of the worst stop that is asked for, 1 but in tests.
-    pub fn new(rough_period_s: f64, factor: f64) -> Self {
+    pub fn new(rough_period_s: f64, fine_period_s: f64, factor: f64) -> Self {
         Self {
             speeds: SlidingMax::default(),
             decelerations: SlidingMax::default(),
             stops: SlidingMax::default(),
             ramps: SlidingMax::default(),
+            braking: Braking::default(),
+            dense: SlidingMax::default(),
+            ends_s: vec![f64::NEG_INFINITY; most_entries_a_period(fine_period_s)].into_boxed_slice(),
+            next_end: 0,
             rough_period_s,
+            fine_period_s,
             factor,
         }
     }
 
+    /// Rough period, s.
+    pub fn rough_period_s(&self) -> f64 {
+        self.rough_period_s
+    }
+
     /// Nothing is queued any more.
     pub fn clear(&mut self) {
-        *self = Self::new(self.rough_period_s, self.factor);
+        *self = Self::new(self.rough_period_s, self.fine_period_s, self.factor);
     }
 
     /// A segment has been queued that ends at `until_s`.
     pub fn push(&mut self, segment: &Segment, until_s: f64) {
+        self.count(until_s);
         if segment.flags.contains(SegmentFlags::DWELL) || segment.duration_s == 0.0 {
+            self.braking.push(Braking::WHOLE_STOP, until_s);
             return;
         }
         let at = |share: f64| segment.path_speed_mm_per_s(share * segment.duration_s);
         let speed = at(0.0).max(at(0.5)).max(at(1.0));
         self.speeds.push(speed, until_s);
         self.decelerations.push(-segment.stop_deceleration_mm_per_s2, until_s);
+        let stop_s = speed / segment.stop_deceleration_mm_per_s2;
         if speed > 0.0 {
-            self.stops.push(speed / segment.stop_deceleration_mm_per_s2, until_s);
+            self.stops.push(stop_s, until_s);
         }
+        let rests = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
+        self.braking.push(if rests { Braking::WHOLE_STOP } else { segment.duration_s / stop_s }, until_s);
         // Without a jerk limit both bounds are infinite.
         let ramp_s = segment.max_sigma_rate_per_s / segment.max_sigma_acceleration_per_s2;
         if ramp_s > 0.0 {
@@ -62,6 +136,42 @@ impl QueueDepth {
         self.decelerations.forget(now_s);
         self.stops.forget(now_s);
         self.ramps.forget(now_s);
+        self.braking.forget(now_s);
+        self.dense.forget(now_s);
+    }
+
+    /// Another entry ends at `until_s`: as many as the fine loop looks at are not to pass in less than a period.
+    fn count(&mut self, until_s: f64) {
+        let first_s = std::mem::replace(&mut self.ends_s[self.next_end], until_s);
+        self.next_end = (self.next_end + 1) % self.ends_s.len();
+        let rate = (until_s - first_s) / self.fine_period_s;
+        if rate < 1.0 {
+            self.dense.push(-rate, until_s);
+        }
+    }
+
+    /// Highest rate of program time at which no more entries come in a fine period than the fine loop looks at.
+    pub fn rate_for_entries(&self) -> f64 {
+        self.dense.max().map_or(1.0, |negative| (-negative).max(LEAST_RATE))
+    }
+
+    /// Highest rate of program time from which the machine comes to rest between `now_s` and `wall_s`, where the queue gets
+    /// no deeper. Before it brakes it drives on for as long as the rough loop may be late, and builds its deceleration up;
+    /// the same once more is for following what is said here.
+    pub fn rate_for_wall(&self, now_s: f64, wall_s: f64) -> f64 {
+        let late_s = (SERVED_FOR_PERIODS + 1.0) * self.rough_period_s + 3.0 * self.fine_period_s;
+        let before_s = late_s + 2.0 * self.stop_ramp_s() / STOP_JERK_SHARE;
+        let end = self.braking.before(wall_s);
+        let fits = |rate: f64| end - self.braking.behind(now_s + rate * before_s) >= rate * rate / (2.0 * STOP_SHARE);
+        if fits(1.0) {
+            return 1.0;
+        }
+        let (mut good, mut bad) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let rate = f64::midpoint(good, bad);
+            *(if fits(rate) { &mut good } else { &mut bad }) = rate;
+        }
+        good.max(LEAST_RATE)
     }
 
     /// Smallest stop deceleration queued, mm/s²; infinite where nothing moves.
@@ -105,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_worst_stop_of_equal_segments_is_speed_over_deceleration() {
-        let mut depth = QueueDepth::new(0.01, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
         depth.push(&level(50.0, 100.0), 1.0);
         depth.push(&level(20.0, 100.0), 2.0);
         assert!((depth.required_s() - (0.5 / STOP_SHARE + 0.02)).abs() < 1e-12);
@@ -113,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_slow_segment_that_leaves_little_does_not_lengthen_the_stop_of_a_fast_one() {
-        let mut depth = QueueDepth::new(0.01, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
         depth.push(&level(50.0, 1000.0), 1.0);
         depth.push(&level(0.004, 0.05), 2.0);
         assert!((depth.required_s() - (0.08 / STOP_SHARE + 0.02)).abs() < 1e-12);

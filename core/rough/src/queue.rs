@@ -1,13 +1,13 @@
 //! The rough loop's side of the segment ring.
 
 use std::collections::VecDeque;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::Ordering::{Relaxed, Release};
 
 use tandem_rings::{Queued, Rest, RoughEnd};
 use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, Segment, SegmentFlags, SegmentSink, StopOn};
 
 use crate::Observer;
-use crate::depth::QueueDepth;
+use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
 use crate::seams::Seams;
 
 /// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
@@ -17,8 +17,9 @@ pub struct Queue {
     epoch: u32,
     /// Path coordinate at the start of the epoch, mm: planners begin each at zero.
     path_start_mm: f64,
-    /// Emitted, not yet in the ring.
+    /// Emitted; those before `sent` are in the ring.
     staged: Vec<Queued>,
+    sent: usize,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported.
@@ -47,6 +48,7 @@ impl Queue {
             epoch: 0,
             path_start_mm: 0.0,
             staged: Vec::new(),
+            sent: 0,
             events: VecDeque::new(),
             blocks: VecDeque::new(),
             stops: VecDeque::new(),
@@ -82,6 +84,7 @@ impl Queue {
         (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
         self.plan_rests = true;
         self.staged.clear();
+        self.sent = 0;
         self.events.clear();
         self.blocks.clear();
         self.stops.clear();
@@ -158,14 +161,21 @@ impl Queue {
 
     /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
     pub fn flush(&mut self, over: bool) {
-        let (moved, _) = self.end.segments.push_partial_slice(&self.staged);
+        let (moved, _) = self.end.segments.push_partial_slice(&self.staged[self.sent..]);
         let last = moved.iter().rfind(|queued| matches!(queued, Queued::Segment { .. }));
         if let Some(Queued::Segment { start_s, segment }) = last {
             self.queued_s = start_s + segment.duration_s;
             self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
         }
-        let count = moved.len();
-        self.staged.drain(..count);
+        self.sent += moved.len();
+        if self.sent == self.staged.len() {
+            self.staged.clear();
+            self.sent = 0;
+        } else if self.sent > self.staged.len() / 2 {
+            // What is left moves to the front no more often than it doubles: it may be long.
+            self.staged.drain(..self.sent);
+            self.sent = 0;
+        }
         self.tell(over);
     }
 
@@ -173,13 +183,19 @@ impl Queue {
         let now_s = self.end.status.program_time_s.load();
         self.depth.passed(now_s);
         let shared = &self.end.depth;
+        // What is staged waits for room: the ring is full, and deeper it does not get.
+        let full = !self.staged.is_empty();
+        let most_rate = self.depth.rate_for_entries();
+        let most_rate = if full { most_rate.min(self.depth.rate_for_wall(now_s, self.queued_s)) } else { most_rate };
+        shared.most_rate.store(most_rate);
+        shared.full.store(full, Release);
         shared.stop_deceleration_mm_per_s2.store(self.depth.stop_deceleration_mm_per_s2());
         shared.stop_s.store(self.depth.stop_s());
         shared.stop_ramp_s.store(self.depth.stop_ramp_s());
         shared.wall_s.store(if self.ends_at_rest { f64::INFINITY } else { self.queued_s });
-        // What is staged waits for room: the ring is full, and deeper it does not get.
-        let enough = over || !self.staged.is_empty();
-        shared.required_s.store(if enough { 0.0 } else { self.depth.required_s() });
+        shared.required_s.store(if over || full { 0.0 } else { self.depth.required_s() });
+        shared.served_for_s.store(SERVED_FOR_PERIODS * self.depth.rough_period_s());
+        shared.served.fetch_add(1, Release);
     }
 
     fn stage_event(&mut self, mut event: Event) {

@@ -14,15 +14,20 @@ use crate::source::Source;
 pub struct RoughConfig {
     /// Rough period, s.
     pub rough_period_s: f64,
+    /// Fine period, s.
+    pub fine_period_s: f64,
+    /// Program time that the planner is asked for at a time, s: a rough period, or more where the ring would not hold the
+    /// worst stop of the machine in pieces that short.
+    pub advance_s: f64,
     /// Share of the worst stop that the queue holds: 1, or the machine cannot use the speed that is planned. Tests show
     /// with less what the depth is for.
     pub depth_factor: f64,
 }
 
 impl RoughConfig {
-    /// The configuration of a machine with this rough period, s.
-    pub fn new(rough_period_s: f64) -> Self {
-        Self { rough_period_s, depth_factor: 1.0 }
+    /// The configuration of a machine with these periods, s.
+    pub fn new(rough_period_s: f64, fine_period_s: f64) -> Self {
+        Self { rough_period_s, fine_period_s, advance_s: rough_period_s, depth_factor: 1.0 }
     }
 }
 
@@ -106,7 +111,7 @@ impl RoughLoop {
             config,
             source,
             planner,
-            queue: Queue::new(end, QueueDepth::new(config.rough_period_s, config.depth_factor)),
+            queue: Queue::new(end, QueueDepth::new(config.rough_period_s, config.fine_period_s, config.depth_factor)),
             items: Vec::new(),
             next: 0,
             dry: false,
@@ -142,13 +147,13 @@ impl RoughLoop {
     }
 
     fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
-        let period_s = self.config.rough_period_s;
+        let (period_s, advance_s) = (self.config.rough_period_s, self.config.advance_s);
         let mut short = 0;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
             self.feed(observer)?;
             let before_s = self.queue.emitted_s();
             let advanced =
-                self.planner.advance(period_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
+                self.planner.advance(advance_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
             if let Some(defect) = self.queue.defect() {
                 return Err(planner_error(None, defect));
             }
@@ -166,7 +171,7 @@ impl RoughLoop {
             if emitted_s == 0.0 && !self.finished {
                 return Err(planner_error(Some(self.line), "it is full, and advance emits nothing"));
             }
-            short += u32::from(emitted_s < period_s / 2.0);
+            short += u32::from(emitted_s < advance_s / 2.0);
             if short > MOST_SHORT_ADVANCES {
                 return Err(planner_error(None, "advance emits a little at a time, and hardly gets on"));
             }

@@ -1,6 +1,6 @@
 //! Following the plan: what is asked of the rate of program time, and the sample that results.
 
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_sdk::{AxisVector, EventKind};
@@ -32,7 +32,7 @@ impl FineLoop {
         let ask = self.ask();
         self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
-            self.governor.jump(if ask == Ask::Run { 1.0 } else { 0.0 });
+            self.governor.jump(if ask == Ask::Run { self.most_rate() } else { 0.0 });
         }
         if self.governor.sigma() == 0.0 && ask == Ask::Hold && self.controls.soft_fault.load(Relaxed) {
             self.fail(FaultKind::Soft);
@@ -104,7 +104,13 @@ impl FineLoop {
     }
 
     /// Starvation: the end of the queue is a wall unless it ends at rest, and the machine must be able to stop before.
+    ///
+    /// Where the ring is full and the rough loop looks after it, nothing is late: the wall moves on as entries are driven,
+    /// and the rate that the rough loop has found for what the ring holds counts instead.
     fn watch_queue(&mut self) {
+        let served = self.depth.served.load(Acquire);
+        self.unserved = if served == self.served { self.unserved + 1 } else { 0 };
+        self.served = served;
         let wall_s = self.depth.wall_s.load();
         if self.starved {
             self.starved = !self.depth.may_start(self.cursor.program_time_s());
@@ -116,7 +122,9 @@ impl FineLoop {
         let ramp_s = self.depth.stop_ramp_s.load() / STOP_JERK_SHARE;
         let stop_s = (speed / deceleration).min(self.governor.sigma() * self.depth.stop_s.load()) / STOP_SHARE;
         let stop_s = stop_s + ramp_s + 3.0 * self.config.period_s;
-        if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s {
+        let unserved_s = f64::from(self.unserved) * self.config.period_s;
+        let deep_as_can_be = self.depth.full.load(Acquire) && unserved_s <= self.depth.served_for_s.load();
+        if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s && !deep_as_can_be {
             self.starved = true;
             self.counters.starvations += 1;
         }

@@ -60,8 +60,10 @@ impl FineLoop {
         } else {
             self.govern_steep(ask, &ratios, way_speed)
         };
-        let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some();
+        let limited = self.most_rate() < 1.0;
+        let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some() || limited;
         let sigma = self.governor.sigma();
+        self.counters.queue_limited_samples += u64::from(limited && ask == Ask::Run && sigma < 1.0);
         self.recovering = asked || (self.recovering && sigma < 1.0);
         self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
         self.stop_at_line_end(end_mm);
@@ -72,12 +74,17 @@ impl FineLoop {
     fn runs_as_planned(&self, ask: Ask, below: bool, ratios: &Ratios) -> bool {
         let constant = self.governor.sigma() == 1.0 && self.governor.rate_per_s() == 0.0;
         let unasked = ask == Ask::Run && !below && ratios.rapid >= 1.0 && !self.given.single_block;
-        constant && unasked && self.plan_limit() == 1.0
+        constant && unasked && self.most_rate() == 1.0 && self.plan_limit() == 1.0
     }
 
     /// As much of `delta_s` as lies within what was looked at.
     fn covered(&self, delta_s: f64) -> f64 {
         delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
+    }
+
+    /// The highest rate that the queue allows.
+    pub(super) fn most_rate(&self) -> f64 {
+        self.depth.most_rate.load()
     }
 
     /// The highest rate at which the plan keeps velocity and acceleration. Jerk beyond the limit at single points need not be
@@ -92,7 +99,7 @@ impl FineLoop {
 
     /// Limits of velocity and acceleration: σ is linear in the period.
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
-        let limit = self.plan_limit();
+        let limit = self.plan_limit().min(self.most_rate());
         self.ask_for_rate(limit);
         let wanted = if ask == Ask::Run { self.ratio_target(ratios, way_speed_mm_per_s) } else { 0.0 };
         let target = wanted.min(limit);
@@ -105,7 +112,7 @@ impl FineLoop {
     fn govern_smooth(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
         let path = self.cursor.path_derivatives();
         let ahead = self.cursor.ahead(self.governor.sigma() * self.config.period_s);
-        let limit = self.plan_limit();
+        let limit = self.plan_limit().min(self.most_rate());
         self.ask_for_rate(limit);
         let run = if ahead.rapid { ratios.rapid.min(limit) } else { limit };
         let feed = if ahead.rapid || ratios.feed >= self.config.max_feed_ratio {

@@ -94,7 +94,8 @@ impl Rig {
         let mut fine = FineLoop::new(&config, fine_end, driver, None);
         fine.reset();
         let feed = Feed::default();
-        let rough_config = RoughConfig { depth_factor, ..RoughConfig::new(f64::from(FINE_PER_ROUGH) * PERIOD_S) };
+        let rough_config =
+            RoughConfig { depth_factor, ..RoughConfig::new(f64::from(FINE_PER_ROUGH) * PERIOD_S, PERIOD_S) };
         let rough = RoughLoop::new(rough_config, Box::new(feed.clone()), planner(&limits), rough_end);
         let (position, samples) = (AxisVector::ZERO, vec![]);
         Self { rough, fine, host, feed, position, blocks: 0, samples, error: None }
