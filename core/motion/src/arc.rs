@@ -120,20 +120,85 @@ impl Arc {
         largest
     }
 
-    /// Angle from the start, rad, of the point of the arc nearest to `point`; of several turns the one whose rise fits.
+    /// Angle from the start, rad, of the point of the arc or helix nearest to `point`.
     pub(crate) fn nearest(&self, start: &AxisVector, point: &AxisVector) -> f64 {
         let [x, y] = [0, 1].map(|i| point[usize::from(self.plane[i])] - self.center_mm[i]);
         let swept = self.sweep_rad.abs();
+        // Where in the plane the point lies, as an angle from the start in the direction of the sweep.
         let turn = ((y.atan2(x) - self.start_angle_rad) * self.sweep_rad.signum()).rem_euclid(TAU);
-        // A point just before the start belongs to the start, not to the end of the turn.
-        let beyond = (turn - swept).max(0.0);
-        let angle = if beyond > 0.0 && TAU - turn < beyond { 0.0 } else { turn };
-        let risen = self.rise.0.iter().enumerate().find(|(_, rise)| **rise != 0.0);
-        let turns = risen.map_or(0.0, |(axis, rise)| {
-            let wanted = (point[axis] - start[axis]) / rise * self.rad_per_mm.abs();
-            ((wanted - turn) / TAU).round().max(0.0)
-        });
-        if turns > 0.0 { (turn + turns * TAU).min(swept) } else { angle.min(swept) }
+        let axes = self.lanes.map_or(self.rise.0.len(), JointLanes::first);
+        let per_rad = self.rise.0[..axes].iter().map(|rise| rise / self.rad_per_mm.abs());
+        let (mut square, mut along) = (0.0, 0.0);
+        for (axis, rise) in per_rad.enumerate() {
+            square += rise * rise;
+            along += rise * (point[axis] - start[axis]);
+        }
+        if square == 0.0 {
+            // A point just before the start belongs to the start, not to the end of the turn.
+            let beyond = (turn - swept).max(0.0);
+            let angle = if beyond > 0.0 && TAU - turn < beyond { 0.0 } else { turn };
+            return angle.min(swept);
+        }
+        let way = Helix { pull: self.radius_mm * x.hypot(y), square, risen: along / square };
+        way.nearest(turn, swept)
+    }
+}
+
+/// The distance of a point from a helix, as a function of the angle from the start: the square of it is, but for a constant,
+/// `square·(angle − risen)² − 2·pull·cos(angle − turn)`.
+struct Helix {
+    /// Radius of the helix times that of the point, mm².
+    pull: f64,
+    /// Square of the rise per rad, mm².
+    square: f64,
+    /// The angle at which the rise is that of the point, rad.
+    risen: f64,
+}
+
+/// Steps of Newton's method, or halvings where it would leave its bracket: to the rounding of an angle.
+const STEPS: u32 = 60;
+
+impl Helix {
+    /// The angle of the nearest point between 0 and `swept`, rad.
+    ///
+    /// In the plane the distance is least at `turn` and at whole turns from it, along the rise at `risen`. Without ends the
+    /// nearest point lies between `risen` and the one of these angles that is nearest to it; where an end cuts that off, it
+    /// is the end, or lies in one of the neighbouring turns.
+    fn nearest(&self, turn: f64, swept: f64) -> f64 {
+        let middle = turn + ((self.risen.clamp(0.0, swept) - turn) / TAU).round() * TAU;
+        let inside = [middle - TAU, middle, middle + TAU].map(|turn| self.least_beside(turn).clamp(0.0, swept));
+        let cost = |angle: f64| {
+            let off = angle - self.risen;
+            self.square * off * off - 2.0 * self.pull * (angle - turn).cos()
+        };
+        let nearer = |best: f64, angle: f64| if cost(angle) < cost(best) { angle } else { best };
+        inside.into_iter().chain([swept]).fold(0.0, nearer)
+    }
+
+    /// The least distance between `turn`, where it is least in the plane, and the rise, at most half a turn away; `turn`
+    /// where there is none.
+    fn least_beside(&self, turn: f64) -> f64 {
+        let off = self.risen - turn;
+        let way = off.abs();
+        // Half of the derivative at `x` from the turn towards the rise: below zero at 0, and concave up to half a turn.
+        let slope = |x: f64| self.pull * x.sin() + self.square * (x - way);
+        let steepest = if self.square < self.pull { (-self.square / self.pull).acos() } else { PI };
+        let (mut low, mut high) = (0.0, if way <= PI { way } else { steepest });
+        if slope(high) < 0.0 {
+            return turn;
+        }
+        let mut x = high.min(self.square * way / (self.square + self.pull));
+        for _ in 0..STEPS {
+            let at = slope(x);
+            *(if at < 0.0 { &mut low } else { &mut high }) = x;
+            let next = x - at / (self.pull * x.cos() + self.square);
+            let next = if next > low && next < high { next } else { f64::midpoint(low, high) };
+            if next == x || (next - x).abs() <= f64::EPSILON * x.abs() {
+                break;
+            }
+            x = next;
+        }
+        turn + off.signum() * x
     }
 }
 
@@ -191,6 +256,45 @@ mod tests {
             let path = helix(radius, start, sweep, rise);
             prop_assert!(path.distance_mm(&path.position(at * path.length_mm())) < 1e-9);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_point_of_an_arc_or_helix_is_that_of_a_dense_search(
+            radius in 0.1..50.0f64, start in -3.0..3.0f64, sweep in 0.1..20.0f64, sign in proptest::bool::ANY,
+            pitch in prop_oneof![Just(0.0), -0.5..0.5f64, -500.0..500.0f64], at in -0.2..1.2f64,
+            off in proptest::array::uniform3(-1.0..1.0f64), far in prop_oneof![Just(1e-3), Just(1.0), Just(60.0)],
+        ) {
+            let path = helix(radius, start, if sign { sweep } else { -sweep }, pitch * sweep);
+            let mut point = path.position(at.clamp(0.0, 1.0) * path.length_mm());
+            for (axis, off) in off.iter().enumerate() {
+                point[axis] += far * off;
+            }
+            point[2] += (at - at.clamp(0.0, 1.0)) * pitch * sweep;
+            let steps = 4000;
+            let distance = |i: f64| {
+                let off = point - path.position(i / f64::from(steps) * path.length_mm());
+                off.0.iter().map(|d| d * d).sum::<f64>().sqrt()
+            };
+            let searched = (0..=steps).map(|i| distance(f64::from(i))).fold(f64::INFINITY, f64::min);
+            let found = path.distance_mm(&point);
+            let step_mm = path.length_mm() / f64::from(steps);
+            prop_assert!(found <= searched + 1e-9, "{found} for {searched}");
+            prop_assert!(found >= searched - step_mm, "{found} for {searched}, steps of {step_mm}");
+        }
+    }
+
+    #[test]
+    fn a_sample_beside_a_steep_helix_is_as_far_away_as_it_is() {
+        let path = helix(2.0, 0.0, 3.0, 60.0);
+        // The binormal of a helix is at right angles to it: 10 µm along it are 10 µm from the path.
+        let (at, rise) = (1.0f64, 20.0);
+        let mut point = path.position(path.length_mm() / 3.0);
+        let length = 2.0f64.hypot(rise);
+        for (axis, part) in [rise * at.sin(), -rise * at.cos(), 2.0].into_iter().enumerate() {
+            point[axis] += 0.01 * part / length;
+        }
+        assert!((path.distance_mm(&point) - 0.01).abs() < 1e-6, "{}", path.distance_mm(&point));
     }
 
     proptest! {
