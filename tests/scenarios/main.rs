@@ -51,6 +51,7 @@ mod starvation;
 mod stopping_time;
 mod stops;
 mod system_calls;
+mod times;
 mod trace;
 mod walks;
 mod walks_draw;

@@ -142,6 +142,7 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
             "samples beyond a limit sent, guard stops",
             format!("{}, {}", summary.limit_violations, summary.guard_stops),
         ),
+        fact("largest share of a limit, beyond it", worst(summary)),
         fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
     ];
     facts.extend(summary.timing().map(|timing| fact("fine loop", timing)));
@@ -154,11 +155,25 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
     let percent = |(by, time_s): (&String, &f64)| format!("{by} {:.1} %", 100.0 * time_s / total_s);
     if total_s > 0.0 {
         let each: Vec<_> = summary.limited_by_s.iter().map(percent).collect();
-        facts.push(fact("what limited most of each block, by the planner", each.join(", ")));
+        facts.push(fact("what the time of the motion went to", each.join(", ")));
     }
     facts.push(fact("planning a rough period, µs: periods", planning(summary)));
     facts.extend(summary.fault.iter().map(|fault| fact("fault", fault.clone())));
     facts
+}
+
+/// The worst sample beyond a limit, whatever its excuse.
+fn worst(summary: &Summary) -> String {
+    summary.worst_beyond().map_or("none".to_string(), |(what, of, within)| {
+        let within = if of.share <= within { "within" } else { "beyond" };
+        format!(
+            "{what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
+            of.share * 100.0,
+            of.tick,
+            of.line,
+            of.state
+        )
+    })
 }
 
 /// The histogram of planning times, by doublings; short ones together.

@@ -181,7 +181,7 @@ impl RunObserver for Sinks {
     fn block(&mut self, block: &Block, report: &BlockReport) {
         self.tell_of_time_constant(block);
         if let Some(blocks) = &mut self.blocks {
-            self.broken.note(blocks.block(block, report));
+            blocks.block(block, report);
         }
         if let Some(collector) = &mut self.report {
             collector.block(block, report);
@@ -228,6 +228,9 @@ impl RunObserver for Sinks {
         self.operator.sample(sample, self.progress.share());
         if let Some(trace) = &mut self.trace {
             self.broken.note(trace.sample(sample, signals));
+        }
+        if let Some(blocks) = &mut self.blocks {
+            self.broken.note(blocks.sample(sample));
         }
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);
@@ -342,6 +345,17 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
     )?;
     if let Some(timing) = summary.timing() {
         writeln!(out, "{timing}")?;
+    }
+    if let Some((what, of, within)) = summary.worst_beyond() {
+        let within = if of.share <= within { "within" } else { "beyond" };
+        writeln!(
+            out,
+            "largest share of a limit: {what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
+            of.share * 100.0,
+            of.tick,
+            of.line,
+            of.state
+        )?;
     }
     if let Some(stop) = longest(&summary.stops) {
         print_stop(out, summary, stop)?;

@@ -43,7 +43,7 @@ pub struct Counters {
     pub samples: u64,
     /// Samples the guard stopped: 0 or 1.
     pub guard_stops: u64,
-    /// Samples beyond a limit that were sent all the same (`guard.mode = "count"`).
+    /// Samples beyond a limit that were sent all the same: `guard.mode = "count"`, or a relaxed jerk.
     pub limit_violations: u64,
     /// Samples with σ < 1 though nothing asked for it.
     pub governed_samples: u64,
@@ -55,7 +55,7 @@ pub struct Counters {
     pub late_ratios: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
-    /// Samples sent beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
+    /// Those among them beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
     pub jerk_relaxed_samples: u64,
 }
 

@@ -3,10 +3,12 @@
 //! [`Run::prepare`] reads nothing but the machine and the program, checks the whole program, and refuses before
 //! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
 
+mod block_times;
 mod command;
 mod command_file;
 mod command_log;
 mod curve_watch;
+mod density;
 mod dry_run;
 mod error;
 mod exchange_time;
@@ -39,7 +41,9 @@ mod strategy;
 mod summary;
 mod virtual_clock;
 mod wall_clock;
+mod worst;
 
+pub use block_times::{BlockTimes, TimeGoesTo};
 pub use command::{Command, Timed};
 pub use command_file::parse_commands;
 pub use curve_watch::{CurveWatch, OnCurve};
@@ -61,4 +65,6 @@ pub use record::{BlocksCsv, Output, RecordError, TraceCsv, flush_outputs};
 pub use registry::{PluginRefusal, Registry};
 pub use run::{Clock, Outcome, Run, Switches};
 pub use stops::Stop;
-pub use summary::{ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, PlanningRow, PlanningUs, Summary};
+pub use summary::{
+    ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PlanningRow, PlanningUs, Summary,
+};

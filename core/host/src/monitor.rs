@@ -2,11 +2,13 @@
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport};
 
+use crate::block_times::{BlockTimes, TimeGoesTo};
 use crate::joints::JointWatch;
 use crate::path_watch::PathWatch;
 use crate::stops::StopWatch;
+use crate::worst::Worst;
 
 /// Watches a run. Finite differences at the fine period, with rest before the first sample.
 pub struct Monitor {
@@ -23,8 +25,10 @@ pub struct Monitor {
     pub length_mm: f64,
     /// Their nominal time, s.
     pub nominal_s: f64,
-    /// Their planned time by what held the feed down, s.
-    pub limited_by_s: Vec<(LimitedBy, f64)>,
+    /// The time of the motion by what held it down, s.
+    pub limited_by_s: Vec<(TimeGoesTo, f64)>,
+    times: BlockTimes,
+    pub(crate) worst: Worst,
     /// The last position sent.
     pub position: AxisVector,
     /// What each stop took.
@@ -48,6 +52,8 @@ impl Monitor {
             length_mm: 0.0,
             nominal_s: 0.0,
             limited_by_s: Vec::new(),
+            times: BlockTimes::new(machine.fine_period_s, machine.motion.max_feed_ratio),
+            worst: Worst::new(machine),
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
             watch: PathWatch::new(leaves_path, machine.motion.path_tolerance_mm, &machine.start),
@@ -70,13 +76,7 @@ impl Monitor {
     pub fn block(&mut self, block: &Block, report: &BlockReport) {
         self.watch.block(&self.axes, block);
         self.blocks += 1;
-        if block.kind != BlockKind::Dwell {
-            // A handful of reasons: looking through them is the quickest, and this is done for every block.
-            match self.limited_by_s.iter_mut().find(|(by, _)| *by == report.limited_by) {
-                Some((_, time_s)) => *time_s += report.time_s,
-                None => self.limited_by_s.push((report.limited_by, report.time_s)),
-            }
-        }
+        self.times.block(block, report);
         self.length_mm += block.length_mm;
         self.nominal_s += match block.kind {
             BlockKind::Dwell => block.dwell_s,
@@ -97,6 +97,13 @@ impl Monitor {
             self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
         }
         self.stops.sample(sample);
+        let by = &mut self.limited_by_s;
+        // A handful of reasons: looking through them is the quickest, and this is done for every block.
+        let part = |goes_to, time_s| match by.iter_mut().find(|(by, _)| *by == goes_to) {
+            Some((_, all_s)) => *all_s += time_s,
+            None => by.push((goes_to, time_s)),
+        };
+        self.times.sample(sample, part, |_, _| {});
         self.samples += 1;
         let velocity = (sample.command - self.last[0]) * (1.0 / self.period_s);
         let acceleration = (velocity - self.last[1]) * (1.0 / self.period_s);
@@ -104,6 +111,7 @@ impl Monitor {
         for (peak, now) in self.peaks.iter_mut().zip([&velocity, &acceleration, &jerk]) {
             raise(peak, now);
         }
+        self.worst.sample(sample, [&velocity, &acceleration, &jerk]);
         self.last = [sample.command, velocity, acceleration];
         if let Some(joints) = &mut self.joints {
             joints.sample(&sample.command);

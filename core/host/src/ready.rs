@@ -7,6 +7,7 @@ use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Driver, Planner};
 
+use crate::density::Density;
 use crate::error::HostError;
 use crate::hang::HangWatch;
 use crate::joints::JointSpace;
@@ -36,6 +37,8 @@ pub struct Ready {
     pub kinematics: JointSpace,
     /// What the first pass found.
     pub checked: CheckReport,
+    /// Entries of the ring of segments that hold the worst stop anywhere in the program.
+    pub entries: usize,
     pub switches: Switches,
     /// Samples are in the coordinates of the drives: a run that only homes.
     pub records_drives: bool,
@@ -81,7 +84,10 @@ impl Ready {
     ) -> Result<Self, HostError> {
         let plugins = Plugins::of(&machine, registry)?;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let checked = first_pass(&machine, plugins.planner.as_ref(), &mut program, switches)?;
+        let joints = JointSpace::of(&machine, registry)?;
+        let depth_s = setup::queue_depth_s(&machine, &joints, plugins.planner.describe().order);
+        let mut density = Density::new(&machine, depth_s);
+        let checked = first_pass(&machine, plugins.planner.as_ref(), &mut program, switches, &mut density)?;
         if !checked.is_ok() {
             return Err(HostError::Check(Box::new(checked)));
         }
@@ -90,7 +96,8 @@ impl Ready {
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
         let policy = PolicyHost::open(&machine)?;
         let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
-        Self::new(machine, registry, Some(name), source, policy, plugins, checked, switches)
+        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, checked, switches)?;
+        Ok(Self { entries: density.entries(), ..ready })
     }
 
     /// Makes what every run needs for the parts that differ between runs. Host; allocates.
@@ -126,6 +133,7 @@ impl Ready {
             feed,
             joints,
             checked,
+            entries: 0,
             switches,
         })
     }
@@ -173,9 +181,13 @@ fn first_pass(
     planner: &dyn Planner,
     program: &mut Program,
     switches: Switches,
+    density: &mut Density,
 ) -> Result<CheckReport, HostError> {
     let config = setup::interpreter_config(machine, switches);
-    Ok(check(program, &config, &mut |block| check_block(machine, planner, block))?)
+    Ok(check(program, &config, &mut |block| {
+        density.block(block);
+        check_block(machine, planner, block)
+    })?)
 }
 
 /// Whether the machine and its planner can drive `block`.

@@ -9,7 +9,7 @@ use tandem_gcode::{CheckReport, Program};
 use tandem_machine::{JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
-use tandem_sdk::{AxisVector, PluginError};
+use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
 
 use crate::command::Timed;
 use crate::error::HostError;
@@ -23,7 +23,6 @@ use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::ready::{Plugins, Ready};
-use crate::record::limited_by;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
@@ -65,7 +64,8 @@ pub struct Run {
     host: HostEnd,
     feed: Option<FeedRunner>,
     policy: Option<PolicyHost>,
-    steps: bool,
+    /// Steps of the velocity that the planner makes use of where blocks meet, per axis, mm/s.
+    speed_difference_mm_per_s: [f64; MAX_AXES],
     leaves_path: bool,
     uses_time_constants: bool,
     joints: Arc<JointSpace>,
@@ -136,10 +136,11 @@ impl Run {
             watch, machine, program, source, policy, planner, mut driver, feed, joints, checked, switches, ..
         } = ready;
         setup::open(&machine, driver.as_mut(), &joints)?;
-        // As lockstep needs it: the samples of each rough period are taken behind it.
         let description = planner.describe();
         let depth_s = setup::queue_depth_s(&machine, &joints, description.order);
-        let segments = Sizes::segments_for(depth_s, machine.fine_period_s);
+        let cuts = 2.0 * depth_s / machine.rough_period_s;
+        let segments = Sizes::segments_for(ready.entries as f64 + cuts);
+        // As lockstep needs it: the samples of each rough period are taken behind it.
         let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, segments };
         let (rough_end, fine_end, host) = bridge(sizes);
         let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
@@ -161,7 +162,7 @@ impl Run {
             feed,
             policy,
             switches,
-            steps: description.speed_difference_mm_per_s.iter().any(|step| *step > 0.0),
+            speed_difference_mm_per_s: description.speed_difference_mm_per_s,
             leaves_path: description.leaves_path != 0,
             uses_time_constants: description.uses_time_constants != 0,
             joints,
@@ -182,7 +183,7 @@ impl Run {
 
     /// Whether the planner makes use of velocity steps where blocks meet.
     pub fn allows_steps(&self) -> bool {
-        self.steps
+        self.speed_difference_mm_per_s.iter().any(|step| *step > 0.0)
     }
 
     /// Whether the planner drives each block with the time constant that it states.
@@ -208,6 +209,7 @@ impl Run {
         }
         let mut fine = self.fine;
         let mut monitor = Monitor::new(&machine, self.leaves_path);
+        monitor.worst.allow_steps(&self.speed_difference_mm_per_s);
         monitor.joints = JointWatch::new(&self.joints, machine.fine_period_s);
         let mut reloader = self.policy.as_ref().map(PolicyHost::reloader);
         if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
@@ -315,6 +317,9 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         max_jerk_deg_s3: rotary(&monitor.peaks[2]),
         joints: monitor.joints.as_ref().map(JointWatch::peaks),
         max_path_deviation_mm: monitor.max_path_deviation_mm(),
+        worst_of_limits: (0..machine.axes.count())
+            .map(|i| (machine.axes.letter(i).to_lowercase().to_string(), monitor.worst.of_axis(i)))
+            .collect(),
         jerk: if machine.motion.jerk == JerkMode::Limit { "limit" } else { "report" }.to_string(),
         limit_violations: counters.limit_violations,
         guard_stops: counters.guard_stops,
@@ -335,7 +340,12 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         wall_time_s: 0.0,
         planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
         planning_us: PlanningUs::from(&pump.planning),
-        limited_by_s: monitor.limited_by_s.iter().map(|(by, time_s)| (limited_by(*by).to_string(), *time_s)).collect(),
+        limited_by_s: monitor
+            .limited_by_s
+            .iter()
+            .filter(|(_, s)| *s > 0.0)
+            .map(|(by, s)| (by.name().to_string(), *s))
+            .collect(),
         policy: None,
         stops: monitor.stops.stops.clone(),
         stop_count: monitor.stops.count,

@@ -67,9 +67,12 @@ pub struct Summary {
     pub joints: Option<BTreeMap<String, JointPeaks>>,
     /// Largest distance of a sample from the programmed path, mm.
     pub max_path_deviation_mm: f64,
+    /// Per axis the sample that used most of each limit, whatever tolerance or excuse it had. Of steps of the velocity that
+    /// the machine allows, what goes beyond them counts as acceleration.
+    pub worst_of_limits: BTreeMap<String, OfLimits>,
     /// What the machine does with jerk: `limit` or `report`.
     pub jerk: String,
-    /// Samples beyond a limit that were sent all the same.
+    /// Samples beyond a limit that were sent all the same, those of `jerk_relaxed_samples` among them.
     pub limit_violations: u64,
     /// Samples the guard stopped.
     pub guard_stops: u64,
@@ -109,7 +112,8 @@ pub struct Summary {
     pub planning_ns_per_block: f64,
     /// What the rough loop took of a rough period.
     pub planning_us: PlanningUs,
-    /// Planned time of the blocks by what held the feed down, in the planner's words, s; dwells are left out.
+    /// Where the time of the motion went, sample by sample, s: what the planner says held the feed of the block down, or
+    /// what slowed or stopped the machine there. Together they are `motion_time_s`.
     pub limited_by_s: BTreeMap<String, f64>,
     /// The policy script, where the machine has one.
     pub policy: Option<PolicySummary>,
@@ -176,6 +180,50 @@ pub struct ExchangeUs {
     pub max: f64,
     /// How many took longer than the fine period.
     pub longer_than_period: u64,
+}
+
+/// The sample that used most of a limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct OfLimit {
+    /// Share of the limit; zero where there is none.
+    pub share: f64,
+    /// Its tick.
+    pub tick: u64,
+    /// Its program line.
+    pub line: u32,
+    /// What the machine was doing.
+    pub state: &'static str,
+}
+
+/// What was used most of the limits of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct OfLimits {
+    /// Of its highest speed.
+    pub velocity: OfLimit,
+    /// Of its acceleration.
+    pub acceleration: OfLimit,
+    /// Of its jerk, where it has a limit.
+    pub jerk: OfLimit,
+}
+
+impl Summary {
+    /// The worst sample beyond a limit that counts on this machine: what is exceeded, such as `X jerk`, the sample, and the
+    /// share up to which it is within the tolerance. `None` where no sample is beyond.
+    pub fn worst_beyond(&self) -> Option<(String, OfLimit, f64)> {
+        const TOLERANCE: f64 = 1e-6;
+        const JERK_TOLERANCE: f64 = 1e-2;
+        let jerk_counts = self.jerk == "limit";
+        let each = self.worst_of_limits.iter().flat_map(|(axis, of)| {
+            let jerk = jerk_counts.then_some(("jerk", of.jerk, JERK_TOLERANCE));
+            let others = [("velocity", of.velocity, TOLERANCE), ("acceleration", of.acceleration, TOLERANCE)];
+            others
+                .into_iter()
+                .chain(jerk)
+                .map(move |(name, of, tolerance)| (format!("{} {name}", axis.to_uppercase()), of, 1.0 + tolerance))
+        });
+        let beyond = each.filter(|(_, of, _)| of.share > 1.0 + TOLERANCE);
+        beyond.max_by(|(_, a, within_a), (_, b, within_b)| (a.share / within_a).total_cmp(&(b.share / within_b)))
+    }
 }
 
 /// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.

@@ -40,21 +40,26 @@ fn steps_are_allowed(axes: &[Axis]) -> bool {
     axes.iter().any(|axis| axis.speed_difference > 0.0)
 }
 
+/// Shares so near to 1 are rounding.
+const ROUNDING: f64 = 1e-6;
+
 /// A cell: the value, and a bar that says how much of the limit it is. Red only where exceeding it is a violation.
 fn usage(value: f64, limit: Option<f64>, tolerance: f64, judged: bool) -> String {
     let Some(limit) = limit.filter(|limit| *limit > 0.0) else {
         return format!("<td>{}", number(value));
     };
     let part = value / limit;
-    let state = match part > 1.0 + tolerance {
-        true if judged => "over",
-        true => "above",
-        false => "",
+    // By the value itself: what is beyond the limit but within the tolerance is told so, and not as what keeps it.
+    let (state, excess) = match part {
+        part if part > 1.0 + tolerance && judged => ("over", format!(", {:.2} % beyond", 100.0 * (part - 1.0))),
+        part if part > 1.0 + tolerance => ("above", format!(", {:.2} % beyond, not judged", 100.0 * (part - 1.0))),
+        part if part > 1.0 + ROUNDING => ("above", format!(", {:.2} % beyond, within tolerance", 100.0 * (part - 1.0))),
+        _ => ("", String::new()),
     };
     let width = (part * 100.0).clamp(0.0, 100.0);
     let of = format!("{} of {}", number(value), number(limit));
     format!(
-        "<td class=\"{state}\" title=\"{of}\">{}<small>/{}</small><u style=\"width:{width:.1}%\"></u>",
+        "<td class=\"{state}\" title=\"{of}\">{}<small>/{}{excess}</small><u style=\"width:{width:.1}%\"></u>",
         number(value),
         number(limit)
     )

@@ -62,13 +62,11 @@ impl Sizes {
     /// Fewest and most segments of a ring: 3 MB and 48 MB.
     pub const SEGMENTS: [usize; 2] = [4096, 65_536];
 
-    /// Segments of a ring that holds `depth_s` of program time however short they are, where the fine loop can follow; no
-    /// more than there is memory for. Where that is less, the rough loop tells the fine loop so ([`Depth::most_rate`]).
-    pub fn segments_for(depth_s: f64, fine_period_s: f64) -> usize {
+    /// Segments of a ring for as many `entries`, but no more than there is memory for. Where that is less, the rough loop
+    /// tells the fine loop so ([`Depth::most_rate`]).
+    pub fn segments_for(entries: f64) -> usize {
         let [fewest, most] = Self::SEGMENTS;
-        let wanted =
-            (depth_s / fine_period_s * most_entries_a_period(fine_period_s) as f64).clamp(fewest as f64, most as f64);
-        (wanted as usize).next_power_of_two()
+        (entries.clamp(fewest as f64, most as f64) as usize).next_power_of_two()
     }
 }
 

@@ -30,8 +30,8 @@ pub struct QueueDepth {
 
 /// How far a stop has come at each end of a queued segment.
 ///
-/// On the path the rate σ of program time can fall by a_s/v per s of machine time, so σ²/2 falls by a_s/v per s of program
-/// time. Its integral over program time, between two places, is therefore the σ²/2 that is braked away between them,
+/// On the path the rate σ of program time can fall by `a_s/v` per s of machine time, so σ²/2 falls by `a_s/v` per s of
+/// program time. Its integral over program time, between two places, is therefore the σ²/2 that is braked away between them,
 /// whatever speeds and decelerations lie there.
 #[derive(Debug, Default)]
 struct Braking {
@@ -229,5 +229,54 @@ mod tests {
         assert!((depth.required_s() - (0.08 / STOP_SHARE + 0.02)).abs() < 1e-12);
         depth.passed(1.5);
         assert!((depth.required_s() - (0.08 / STOP_SHARE + 0.02)).abs() < 1e-12);
+    }
+
+    /// A queue of pieces of 2 ms whose speeds and decelerations go up and down over two decades.
+    fn uneven(pieces: u32) -> (QueueDepth, Vec<(f64, f64)>) {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut stops = vec![];
+        for piece in 0..pieces {
+            let phase = f64::from(piece) * 0.05;
+            let (speed, deceleration) = (30.0 + 25.0 * phase.sin(), 100.0 * 10f64.powf((1.7 * phase).cos()));
+            depth.push(
+                &Segment { duration_s: 0.002, flags: SegmentFlags::default(), ..level(speed, deceleration) },
+                f64::from(piece + 1) * 0.002,
+            );
+            stops.push((f64::from(piece + 1) * 0.002, deceleration / speed));
+        }
+        (depth, stops)
+    }
+
+    #[test]
+    fn from_the_rate_that_a_full_ring_allows_a_stop_ends_inside_it() {
+        for pieces in [20, 60, 100, 150, 400] {
+            let (depth, stops) = uneven(pieces);
+            let wall_s = f64::from(pieces) * 0.002;
+            let rate = depth.rate_for_wall(0.0, wall_s);
+            // Late for two rough periods and noticed in the third, then as hard as the segments leave it.
+            let (mut sigma, mut now_s) = (rate, rate * (0.03 + 0.003));
+            while sigma > 0.0 {
+                let place = stops.iter().find(|(until_s, _)| *until_s > now_s);
+                let Some((_, rate_per_s)) = place else { panic!("{pieces}: {sigma} of {rate} is left at the wall") };
+                now_s += sigma * 1e-5;
+                sigma -= STOP_SHARE * rate_per_s * 1e-5;
+            }
+            assert!(pieces > 20 || rate < 1.0, "{pieces}: {rate}");
+        }
+        assert_eq!(uneven(400).0.rate_for_wall(0.0, 0.8), 1.0);
+    }
+
+    #[test]
+    fn more_entries_than_a_period_has_time_for_slow_program_time_until_they_are_passed() {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        depth.push(&level(50.0, 100.0), 1.0);
+        assert_eq!(depth.rate_for_entries(), 1.0);
+        let most = most_entries_a_period(0.001);
+        for entry in 1..=2 * most {
+            depth.push(&level(50.0, 100.0), 1.0 + entry as f64 * 0.0005 / most as f64);
+        }
+        assert!((depth.rate_for_entries() - 0.5).abs() < 1e-6);
+        depth.passed(1.1);
+        assert_eq!(depth.rate_for_entries(), 1.0);
     }
 }

@@ -60,7 +60,11 @@ fn with(emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
     let calls = Arc::new(AtomicU64::new(0));
     let planner = Box::new(Fake { emits, calls: Arc::clone(&calls) });
     let (rough, fine, host) = bridge(Sizes::default());
-    (RoughLoop::new(RoughConfig::new(ROUGH_PERIOD_S), Box::new(Over), planner, rough), calls, (fine, host))
+    (
+        RoughLoop::new(RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S), Box::new(Over), planner, rough),
+        calls,
+        (fine, host),
+    )
 }
 
 fn piece(duration_s: f64, flags: SegmentFlags, sink: &mut dyn SegmentSink) {

@@ -71,7 +71,7 @@ impl FineLoop {
                 self.next_position().0
             }
             (breach, _) => {
-                self.counters.limit_violations += u64::from(breach.is_some());
+                self.counters.limit_violations += u64::from(breach.is_some() || checked.relaxed);
                 self.guard.sent(&position, checked);
                 position
             }

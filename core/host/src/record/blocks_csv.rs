@@ -1,19 +1,25 @@
 //! The blocks as they were driven.
 
+use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 
 use tandem_machine::Machine;
+use tandem_rings::Sample;
 use tandem_sdk::{Axes, Block, BlockKind, BlockReport, LimitedBy};
 
 use super::failure::RecordError;
 use super::output::Output;
+use crate::block_times::BlockTimes;
 
 /// Writes a blocks CSV.
 pub struct BlocksCsv {
     out: Output,
     axes: Axes,
     rapid_mm_per_s: Vec<f64>,
+    /// Blocks that have not been driven to their end: their time is not known yet.
+    open: VecDeque<Open>,
+    times: BlockTimes,
     /// It has been told that no further row can be written.
     failed: bool,
 }
@@ -31,34 +37,49 @@ impl BlocksCsv {
             let unit = if machine.axes.is_rotary(axis) { "deg" } else { "mm" };
             head.push(format!("{}_end_{unit}", machine.axes.letter(axis).to_ascii_lowercase()));
         }
+        head.push("planned_time_s".to_string());
         writeln!(out, "{}", head.join(",")).map_err(|e| format!("{}: {e}", path.display()))?;
         let rapid_mm_per_s = machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect();
-        Ok(Self { out, axes: machine.axes, rapid_mm_per_s, failed: false })
+        let times = BlockTimes::new(machine.fine_period_s, machine.motion.max_feed_ratio);
+        Ok(Self { out, axes: machine.axes, rapid_mm_per_s, open: VecDeque::new(), times, failed: false })
     }
 
-    /// Adds a block. After an error all further ones are left out.
+    /// A block is planned for good: its row is written when it has been driven.
+    pub fn block(&mut self, block: &Block, report: &BlockReport) {
+        if !self.failed {
+            self.open.push_back(Open { index: block.index, line: block.line, row: self.row(block, report) });
+            self.times.block(block, report);
+        }
+    }
+
+    /// A sample was sent: rows of blocks that it has left behind are written. After an error all further ones are left out.
     ///
     /// # Errors
     /// Once: no further row can be written.
-    pub fn block(&mut self, block: &Block, report: &BlockReport) -> Result<(), RecordError> {
+    pub fn sample(&mut self, sample: &Sample) -> Result<(), RecordError> {
         if self.failed {
             return Ok(());
         }
-        // Names and numbers: nothing that a CSV would have to quote.
-        let row = self.row(block, report).join(",");
-        writeln!(self.out, "{row}").map_err(|error| {
-            self.failed = true;
-            RecordError { line: Some(block.line), ..RecordError::of("blocks", &mut self.out, error) }
-        })
+        let mut written = Ok(());
+        let Self { times, open, out, .. } = self;
+        times.sample(sample, |_, _| {}, |index, time_s| write(out, open, &mut written, index, time_s));
+        self.failed = written.is_err();
+        written
     }
 
     /// Ends the file.
     ///
     /// # Errors
-    /// The last rows cannot be written, or the file cannot take its name. What [`BlocksCsv::block`] has told is not told
+    /// The last rows cannot be written, or the file cannot take its name. What [`BlocksCsv::sample`] has told is not told
     /// again.
-    pub fn finish(self) -> Result<(), RecordError> {
-        if self.failed { Ok(()) } else { self.out.finish_record("blocks") }
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        if self.failed {
+            return Ok(());
+        }
+        let mut written = Ok(());
+        let Self { times, open, out, .. } = &mut self;
+        times.finish(|index, time_s| write(out, open, &mut written, index, time_s));
+        written.and_then(|()| self.out.finish_record("blocks"))
     }
 
     fn row(&self, block: &Block, report: &BlockReport) -> Vec<String> {
@@ -66,21 +87,18 @@ impl BlocksCsv {
         let time_constant_ms = report.time_constant_s * 1e3;
         let mut row = vec![block.index.to_string(), block.line.to_string(), kind(block).to_string()];
         let feed = if block.kind == BlockKind::Dwell { 0.0 } else { feed };
-        let numbers = [
-            block.length_mm,
-            feed,
-            report.start_feed_mm_per_s,
-            report.peak_feed_mm_per_s,
-            report.end_feed_mm_per_s,
-            report.time_s,
-        ];
+        let numbers =
+            [block.length_mm, feed, report.start_feed_mm_per_s, report.peak_feed_mm_per_s, report.end_feed_mm_per_s];
         row.extend(numbers.iter().map(f64::to_string));
+        debug_assert_eq!(row.len(), TIME);
+        row.push(String::new());
         row.push(if time_constant_ms.is_nan() { String::new() } else { time_constant_ms.to_string() });
         row.push(limited_by(report.limited_by).to_string());
         for axis in 0..self.axes.count() {
             let end = block.end[axis];
             row.push(if self.axes.is_rotary(axis) { end.to_degrees() } else { end }.to_string());
         }
+        row.push(report.time_s.to_string());
         row
     }
 
@@ -88,6 +106,26 @@ impl BlocksCsv {
     fn rapid_feed(&self, block: &Block) -> f64 {
         let each = self.rapid_mm_per_s.iter().enumerate().filter(|(i, _)| block.end[*i] != block.start[*i]);
         each.map(|(i, v)| v * block.length_mm / (block.end[i] - block.start[i]).abs()).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A block whose row waits for its time.
+struct Open {
+    index: u64,
+    line: u32,
+    row: Vec<String>,
+}
+
+/// The column of the time.
+const TIME: usize = 8;
+
+/// Writes the row of the block `index`, which has taken `time_s`, unless one before could not be written.
+fn write(out: &mut Output, open: &mut VecDeque<Open>, written: &mut Result<(), RecordError>, index: u64, time_s: f64) {
+    let Some(mut block) = open.pop_front_if(|front| front.index == index).filter(|_| written.is_ok()) else { return };
+    block.row[TIME] = time_s.to_string();
+    // Names and numbers: nothing that a CSV would have to quote.
+    if let Err(error) = writeln!(out, "{}", block.row.join(",")) {
+        *written = Err(RecordError { line: Some(block.line), ..RecordError::of("blocks", out, error) });
     }
 }
 
