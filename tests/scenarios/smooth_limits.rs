@@ -75,7 +75,8 @@ fn run_on(machine: &str, program: &str) -> Done {
 /// What is largest between two places looked at: the speed of an axis on an arc, and acceleration on a slow machine.
 #[test]
 fn peaks_between_the_knots_of_a_window_are_within_limits() {
-    let fast = alike([16.0, 1.0], 0.01, 1.2, [1676.209_650_858_652_1, 6113.433_532_641_78, 977_967.371_561_811_5], "");
+    let fast =
+        alike([16.0, 1.0], 0.01, 1.2, [1_676.209_650_858_652_1, 6_113.433_532_641_78, 977_967.371_561_811_5], "");
     let arcs = "F591.138\nG1 X-0.1710 Y2.3988 Z0.0000\nF1760.137\nG1 X35.1016 Y8.4035 Z5.5238\n\
                 G3 X34.9632 Y8.4947 Z5.5238 I0.1119 J0.3205\nG2 X37.7967 Y4.7399 Z5.5238 I-1.3789 J-3.9871\n";
     assert_undisturbed(&run_on(&fast, &format!("{arcs}M2\n")));
