@@ -25,6 +25,33 @@ fn a_path_along_the_end_of_the_travel_does_not_leave_it() {
     assert_undisturbed(&Scenario::text(program).on(&machine()).run());
 }
 
+/// A triangle whose first corner is an end of the travel, on a machine that is slow there.
+#[test]
+fn a_path_that_begins_at_the_end_of_the_travel_is_driven_once() {
+    let run = |low_mm: f64| {
+        let axis = |name: &str, low_mm: f64, limits: [f64; 3]| {
+            let [feed, acceleration, jerk] = limits;
+            format!(
+                "[axes.{name}]\ntravel_mm = [{low_mm}, 700]\nmax_feed_mm_per_min = {feed}\n\
+                 max_acceleration_mm_per_s2 = {acceleration}\nmax_jerk_mm_per_s3 = {jerk}\n"
+            )
+        };
+        let machine = format!(
+            "format = 1\n[motion]\npath_tolerance_mm = 0.04\n{}{}[planner]\nplugin = \"smooth\"\n[driver]\nplugin = \"sim\"\n",
+            axis("x", low_mm, [2000.0, 20.0, 2000.0]),
+            axis("y", -700.0, [20_000.0, 2000.0, 70_000.0])
+        );
+        let done = run_on(&machine, "F3218\nG1 X0.3\nY0.3\nX0 Y0\nM2\n");
+        assert_undisturbed(&done);
+        done
+    };
+    let (free, at_the_end) = (run(-100.0), run(0.0));
+    let x = at_the_end.column("x_cmd_mm");
+    let furthest = x.iter().position(|x| *x > 0.25).unwrap();
+    assert!(x[..furthest].is_sorted(), "it goes back on its way to the first corner");
+    assert!(at_the_end.number("motion_time_s") < 1.1 * free.number("motion_time_s"));
+}
+
 /// Walks whose corners lie on the ends of the travel of X and Y, on a machine with no travel to spare.
 #[test]
 fn random_programs_along_the_ends_of_the_travel_keep_inside() {

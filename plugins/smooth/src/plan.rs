@@ -235,7 +235,8 @@ impl<const L: usize> Planning<L> {
         let intervals = ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
         let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
         self.lay_spline(run, start, &grid);
-        let keep = Keep { share: shares.boxes, travel, margin: shares.margin };
+        let ends = (start.s, self.marks[self.marks.len() - 1].s);
+        let keep = Keep { share: shares.boxes, travel, margin: shares.margin, ends };
         self.sites.choose(run, &self.marks, grid, &keep);
         self.smoother.firm = if start.resting { (0, 1.0) } else { (FIRM_INTERVALS, shares.firm) };
         let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.chosen, &frame.jerk);

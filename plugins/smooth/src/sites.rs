@@ -70,6 +70,8 @@ pub struct Keep<const L: usize> {
     /// The ends of the travel, where they are near, and how far inside of them the motion is to stay, in lane units.
     pub travel: Option<Travel<L>>,
     pub margin: f64,
+    /// Path coordinates of the window's start and end.
+    pub ends: (f64, f64),
 }
 
 impl<const L: usize> Sites<L> {
@@ -152,7 +154,8 @@ impl<const L: usize> Sites<L> {
         let point = run.chords[candidate.chord as usize].at(candidate.s);
         let (mut point, mut half) = (point, each(|l| keep.share * half[l]));
         if let Some(travel) = &keep.travel {
-            travel.cut(&mut point, &mut half, keep.margin);
+            let way = (candidate.s - keep.ends.0).min(keep.ends.1 - candidate.s).max(0.0);
+            travel.cut(&mut point, &mut half, keep.margin, way);
         }
         self.chosen.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
         self.along.push((candidate.s, candidate.chord));

@@ -12,6 +12,10 @@ const ROUNDING: f64 = 32.0 * f64::EPSILON;
 const FREE: f64 = 0.05;
 /// Share of a box that is left at least.
 const LEFT: f64 = 0.1;
+/// How fast the motion may be asked to leave an end of the travel, as a share of the path driven since the window's start or
+/// left to its end: those two places are given, and may lie on the end of the travel. Without it a triangle of 0.3 mm that
+/// begins there was driven to and fro along its first side.
+const SLOPE: f64 = 0.1;
 
 /// Lowest and highest position of every lane, and of joints that are sums of axes.
 #[derive(Clone, Copy, Debug)]
@@ -88,10 +92,11 @@ impl<const L: usize> Travel<L> {
         most
     }
 
-    /// Cuts the box around `middle` off at the ends of the travel, and `margin` inside of them.
-    pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64) {
+    /// Cuts the box around `middle` off at the ends of the travel, and `margin` inside of them. `way` is that along the path to
+    /// the nearer of the window's start and end.
+    pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64, way: f64) {
         for l in 0..L {
-            let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]);
+            let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]).min(SLOPE * way);
             let high = (middle[l] + half[l]).min(self.high[l] - free);
             let low = (middle[l] - half[l]).max(self.low[l] + free);
             if high > low {
