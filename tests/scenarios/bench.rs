@@ -186,7 +186,7 @@ fn may_follow(from: MachineState, to: MachineState) -> bool {
 }
 
 /// Samples after which a run is one that does not end.
-const MOST_SAMPLES: usize = 500_000;
+const MOST_SAMPLES: usize = 4_000_000;
 
 #[derive(Default)]
 struct Kept(Vec<Sample>);

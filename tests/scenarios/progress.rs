@@ -1,5 +1,7 @@
 //! Program time gets on: whatever the machine, its periods and the feeds are, nothing stands still that nobody has stopped.
 
+use std::fmt::Write;
+
 use crate::bench::{Bench, Ran};
 use crate::harness::root;
 use crate::random::Random;
@@ -18,7 +20,7 @@ fn falling_and_rising(random: &mut Random) -> (Vec<f64>, String) {
     for feed in &feeds {
         // Long enough to be driven at the feed for a while, short enough for a test.
         x_mm += feed / 60.0 * random.between(0.05, 0.4);
-        text.push_str(&format!("G1 X{x_mm:.5} F{feed}\n"));
+        writeln!(text, "G1 X{x_mm:.5} F{feed}").unwrap();
     }
     text.push_str("M2\n");
     (feeds, text)

@@ -26,7 +26,7 @@ static MACHINE: &[Key] = &[
     key("loops.rough_period_ms", "ms", "8", "Period of the rough loop, which plans; a whole multiple of the fine period"),
     key("loops.fine_period_ms", "ms", "1", "Period of the fine loop, which interpolates and talks to the drives"),
     key("loops.max_missed_periods", "count", "2", "Fine periods missed in one stall above which the machine faults"),
-    key("loops.fine_hang_after_ms", "ms", "2000, or 1000 fine periods", "Time without a fine period on the wall clock after which the process ends"),
+    key("loops.fine_hang_after_ms", "ms", "the longer of 2000 and 1000 fine periods", "Time without a fine period on the wall clock after which the process ends"),
     key("loops.soft_hang_after_s", "s", "60", "Time after which any other call of a plugin counts as hung: the process ends"),
     key("loops.fine_core", "number", "the last core allowed", "Core that the fine loop is pinned to on the wall clock"),
     key("loops.fine_priority", "1 to 99", "80", "Priority of the fine loop among SCHED_FIFO threads on the wall clock"),
