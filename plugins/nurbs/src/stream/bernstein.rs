@@ -14,19 +14,29 @@ pub fn bernstein<const N: usize>(powers: &[f64; N], duration_s: f64) -> [f64; N]
         *value *= power;
         power *= duration_s;
     }
-    // Row j of Pascal's triangle over that of the degree: b(j) = Σ C(j,i)/C(n,i)·a(i).
-    let mut per_degree = [1.0; N];
-    for i in 1..N {
-        per_degree[i] = per_degree[i - 1] * i as f64 / (N - i) as f64;
-    }
     std::array::from_fn(|j| {
-        let (mut sum, mut choose) = (scaled[0], 1.0);
-        for i in 1..=j {
-            choose *= (j + 1 - i) as f64 / i as f64;
-            sum += choose * per_degree[i] * scaled[i];
-        }
-        sum
+        Table::<N>::SHARES[j].iter().zip(&scaled).fold(0.0, |sum, (share, value)| sum + share * value)
     })
+}
+
+/// What each power adds to each coefficient: row j of Pascal's triangle over that of the degree, C(j,i)/C(n,i).
+struct Table<const N: usize>;
+
+impl<const N: usize> Table<N> {
+    const SHARES: [[f64; N]; N] = {
+        let mut shares = [[0.0; N]; N];
+        let mut j = 0;
+        while j < N {
+            let (mut i, mut share) = (0, 1.0);
+            while i <= j {
+                shares[j][i] = share;
+                share *= (j - i) as f64 / (N - 1 - i + (i == N - 1) as usize) as f64;
+                i += 1;
+            }
+            j += 1;
+        }
+        shares
+    };
 }
 
 /// The largest value of a polynomial by its Bernstein coefficients: not below it, and where it is above `enough` no more
