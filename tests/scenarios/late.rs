@@ -7,17 +7,20 @@ use std::time::Duration;
 use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Run, Summary, Switches};
 use tandem_machine::Machine;
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint, local_plugin};
+use tandem_sdk::{
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint,
+    local_plugin,
+};
 
 use crate::harness::{Scenario, mill};
 
 /// Drives whose exchange takes longer than the fine period.
-struct Sleeper(usize);
+struct Sleeper(usize, AxisVector);
 
 impl Sleeper {
     #[allow(clippy::unnecessary_wraps)] // the form of a constructor
     fn made(_options: &RawOptions) -> Result<Self, PluginError> {
-        Ok(Self(0))
+        Ok(Self(0, AxisVector::ZERO))
     }
 }
 
@@ -26,11 +29,11 @@ impl Driver for Sleeper {
         DriverDescription::simulated()
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.0 = context.joint_count as usize;
+        (self.0, self.1) = (context.joint_count as usize, context.start_position);
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::at(self.1))
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         thread::sleep(Duration::from_micros(1500));

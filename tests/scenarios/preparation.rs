@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tandem_gcode::Program;
 use tandem_host::{HostError, Registry, Run, Switches, check_program};
 use tandem_machine::Machine;
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint, local_plugin};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint, local_plugin,
+};
 use tempfile::TempDir;
 
 use crate::harness::{mill, root};
@@ -165,9 +167,9 @@ impl Driver for Untouched {
         CLAIMED.fetch_add(1, Relaxed);
         Err(PluginError::fixed("the drives are claimed"))
     }
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         CLAIMED.fetch_add(1, Relaxed);
-        Ok(())
+        Ok(Attached::default())
     }
     fn exchange(&mut self, _setpoint: &Setpoint, _feedback: &mut Feedback) -> Result<(), PluginError> {
         CLAIMED.fetch_add(1, Relaxed);

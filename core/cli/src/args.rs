@@ -82,6 +82,9 @@ pub struct Session {
     /// Home the axes first, and after every fault, as the machine file says
     #[arg(long)]
     pub home: bool,
+    /// Reset faults in which drives stand before they are enabled
+    #[arg(long)]
+    pub reset: bool,
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format
@@ -96,12 +99,15 @@ pub struct Run {
     pub program: PathBuf,
     #[command(flatten)]
     pub machine: Machine,
-    /// The clock that drives the loops
-    #[arg(long, default_value = "virtual")]
-    pub clock: Clock,
+    /// The clock that drives the loops; without it that of the driver: virtual for simulated drives, wall for real ones
+    #[arg(long)]
+    pub clock: Option<Clock>,
     /// Home the axes first, as the machine file says
     #[arg(long)]
     pub home: bool,
+    /// Reset faults in which drives stand before they are enabled
+    #[arg(long)]
+    pub reset: bool,
     /// Wait for Enter at M0, M1 and M6 instead of logging them
     #[arg(long)]
     pub pause: bool,
@@ -178,12 +184,15 @@ pub struct Check {
 pub struct Home {
     #[command(flatten)]
     pub machine: Machine,
+    /// Reset faults in which drives stand before they are enabled
+    #[arg(long)]
+    pub reset: bool,
     /// Home this axis only
     #[arg(long, value_name = "LETTER")]
     pub axis: Option<char>,
-    /// The clock that drives the loops
-    #[arg(long, default_value = "virtual")]
-    pub clock: Clock,
+    /// The clock that drives the loops; without it that of the driver: virtual for simulated drives, wall for real ones
+    #[arg(long)]
+    pub clock: Option<Clock>,
     /// Write every sample, in the coordinates of the drives
     #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
@@ -226,9 +235,9 @@ pub struct Calibrate {
     /// Fit this form instead of the one that fits best
     #[arg(long)]
     pub model: Option<Form>,
-    /// The clock that drives the experiment
-    #[arg(long, default_value = "virtual")]
-    pub clock: Clock,
+    /// The clock that drives the experiment; without it that of the driver: virtual for simulated drives, wall for real ones
+    #[arg(long)]
+    pub clock: Option<Clock>,
 }
 
 #[derive(Group)]
@@ -245,9 +254,9 @@ pub struct Identify {
     /// The file to write, which the machine file includes; beside it and called after machine and axis where left out
     #[arg(long, value_name = "F.toml", value_parser = file_name)]
     pub out: Option<PathBuf>,
-    /// The clock that drives the experiment
-    #[arg(long, default_value = "virtual")]
-    pub clock: Clock,
+    /// The clock that drives the experiment; without it that of the driver: virtual for simulated drives, wall for real ones
+    #[arg(long)]
+    pub clock: Option<Clock>,
 }
 
 /// The forms that can be fitted.

@@ -9,11 +9,11 @@ use tandem_estimate::diagnose::{Evidence, Fitted, LEAST_R2, LinearFit, MOST_RMS,
 use tandem_estimate::experiment::{Experiment, Measured};
 use tandem_estimate::polygon::Timed;
 use tandem_estimate::{Choice, measurements, model_file};
-use tandem_host::{Clock, Output};
+use tandem_host::Output;
 use tandem_machine::Machine;
 
 use crate::args::{self, Form};
-use crate::{FAULT, REFUSED, built_in};
+use crate::{FAULT, REFUSED, built_in, clock};
 
 /// Blocks to each polygon where the control's own clock measures.
 const BLOCKS_MEASURED: u32 = 400;
@@ -80,8 +80,9 @@ fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box
     }
     let experiment = Experiment::new(machine, BLOCKS_MEASURED)?;
     left_out(&experiment);
-    let clock = if options.clock == args::Clock::Virtual { Clock::Virtual } else { Clock::Wall };
-    Ok(experiment.run(machine, &built_in::registry()?, clock)?)
+    let registry = built_in::registry()?;
+    let clock = clock::of(options.clock, machine, &registry);
+    Ok(experiment.run(machine, &registry, clock)?)
 }
 
 fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use tandem_host::{Run, RunObserver};
+use tandem_host::{Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Event, EventKind};
@@ -10,7 +10,7 @@ use tandem_sdk::{Event, EventKind};
 use crate::broken::Broken;
 use crate::report::Collector;
 use crate::trace::TraceSink;
-use crate::{FAULT, args, built_in};
+use crate::{FAULT, args, built_in, clock};
 
 /// Homes the axes of a machine.
 pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
@@ -22,12 +22,15 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
             return Err(format!("the machine has no [homing.{}]", letter.to_ascii_lowercase()).into());
         }
     }
-    let run = Run::home(machine.clone(), &built_in::registry()?)?;
+    let registry = built_in::registry()?;
+    let clock = clock::of(options.clock, &machine, &registry);
+    let switches = Switches { reset: options.reset, clock: Some(clock), ..Switches::default() };
+    let run = Run::home(machine.clone(), &registry, switches)?;
     let trace = options.trace.as_ref().map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
     let report = options.report.as_ref().map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
     let (corrections, broken) = (Corrections::new(&machine), Broken::default());
     let mut observer = Observer { corrections, trace: trace.transpose()?, report, broken };
-    let outcome = run.drive(options.clock.into(), &[], &mut observer)?;
+    let outcome = run.drive(clock, &[], &mut observer)?;
     let Observer { trace, report, mut broken, .. } = observer;
     broken.note(trace.map_or(Ok(()), TraceSink::finish));
     if let (Some(report), Some(path)) = (report, &options.report) {

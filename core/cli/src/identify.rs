@@ -13,7 +13,7 @@ use tandem_host::{Output, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
-use crate::{FAULT, args, built_in};
+use crate::{FAULT, args, built_in, clock};
 
 /// Speeds of the air runs, rad/s: down to those of cutting, where friction is not viscous.
 const SPEEDS_RAD_PER_S: [f64; 8] = [0.26, 0.52, 1.05, 2.1, 4.2, 8.4, 16.8, 31.4];
@@ -166,9 +166,11 @@ fn stroke(feed_mm_per_s: f64, acceleration_mm_per_s2: f64, room_mm: f64, motor: 
 
 fn drive(machine: Machine, text: &str, options: &args::Identify, index: usize) -> Result<Vec<Row>, Box<dyn Error>> {
     let program = Program::spool("identify", text.as_bytes())?;
-    let run = Run::prepare(machine, &built_in::registry()?, program, Switches::default())?;
+    let registry = built_in::registry()?;
+    let clock = clock::of(options.clock, &machine, &registry);
+    let run = Run::prepare(machine, &registry, program, Switches { clock: Some(clock), ..Switches::default() })?;
     let mut record = Record { index, rows: vec![] };
-    let summary = run.drive(options.clock.into(), &[], &mut record)?.summary;
+    let summary = run.drive(clock, &[], &mut record)?.summary;
     match summary.fault.or(summary.stopped) {
         Some(cause) => Err(cause.into()),
         None => Ok(record.rows),

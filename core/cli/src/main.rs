@@ -13,6 +13,7 @@ mod broken;
 mod built_in;
 mod calibrate;
 mod check;
+mod clock;
 mod corners;
 mod curves;
 mod estimate;

@@ -18,7 +18,7 @@ use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
-use crate::{FAULT, REFUSED, args, built_in, hang, operator, program};
+use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
@@ -26,7 +26,8 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
-    let switches = switches(options, keys_at_hand(options));
+    let clock = clock::of(options.clock, &machine, &registry);
+    let switches = switches(options, clock);
     let run = match Run::prepare(machine.clone(), &registry, program, switches) {
         Err(HostError::Check(report)) => {
             program::print_errors(&report);
@@ -35,10 +36,9 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         other => other?,
     };
     program::print_warnings(&run.checked);
-    let clock = options.clock.into();
     let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
-    let mut sinks = Sinks::create(options, &machine, &name, &run)?;
+    let mut sinks = Sinks::create(options, &machine, &name, &run, clock)?;
     let clock_name = if clock == Clock::Wall { "wall" } else { "virtual" };
     hang::summarise_in(options.summary.as_ref(), &name, &machine, clock_name, &run);
     let mut outcome = run.drive(clock, &commands, &mut sinks)?;
@@ -51,19 +51,22 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
 }
 
 /// Whether keys are to be taken: in real time, on a terminal.
-fn keys_at_hand(options: &args::Run) -> bool {
-    options.clock == args::Clock::Wall && operator::is_on_terminal()
+fn keys_at_hand(clock: Clock) -> bool {
+    clock == Clock::Wall && operator::is_on_terminal()
 }
 
 /// The operator's switches as the command line sets them. Where somebody can answer in real time, stops wait.
-fn switches(options: &args::Run, keys: bool) -> Switches {
-    let attended = keys || (options.clock == args::Clock::Wall && !options.operator.is_nowhere());
+fn switches(options: &args::Run, clock: Clock) -> Switches {
+    let attended = keys_at_hand(clock) || (clock == Clock::Wall && !options.operator.is_nowhere());
     Switches {
         block_delete: options.machine.block_delete,
         pause_at_stops: options.pause || (attended && !options.dry),
         optional_stop: options.pause || options.optional_stop,
         dry_run: options.dry,
         home: options.home,
+        reset: options.reset,
+        clock: Some(clock),
+        ..Switches::default()
     }
 }
 
@@ -125,19 +128,19 @@ struct Sinks {
 const SUMMARY_ROOM_BYTES: u64 = 16 * 1024;
 
 impl Sinks {
-    fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run) -> Result<Self, String> {
+    fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run, clock: Clock) -> Result<Self, String> {
         let signals = run.signals();
         let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
-        let keys = keys_at_hand(options);
-        let presence = Presence { real_time: options.clock == args::Clock::Wall, pause: options.pause, keys };
+        let keys = keys_at_hand(clock);
+        let presence = Presence { real_time: clock == Clock::Wall, pause: options.pause, keys };
         if keys {
             Keyboard::explain();
         }
         Ok(Self {
             without_time_constants: (!run.uses_time_constants()).then(|| machine.planner.plugin.clone()),
-            switches: switches(options, keys),
+            switches: switches(options, clock),
             operator: Operator::begin(&options.operator, machine, run, presence)?,
             homed: Corrections::new(machine),
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),

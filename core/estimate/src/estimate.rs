@@ -84,6 +84,7 @@ fn simulate(
     switches: Switches,
 ) -> Result<Estimate, EstimateError> {
     let name = program.name().to_string();
+    let switches = Switches { clock: Some(Clock::Virtual), ..switches };
     let run = Run::prepare(machine.clone(), registry, program, switches)?;
     let mut watch = Watch { limits: machine.limits, tally: Tally::default() };
     let summary = run.drive(Clock::Virtual, &[], &mut watch)?.summary;

@@ -147,10 +147,14 @@ impl Experiment {
     pub fn run(&self, machine: &Machine, registry: &Registry, clock: Clock) -> Result<Measured, String> {
         let (text, lines) = self.write(false);
         let program = Program::spool("the experiment", text.as_bytes()).map_err(|e| e.to_string())?;
-        let run = Run::prepare(machine.clone(), registry, program, Switches::default()).map_err(|e| match e {
-            HostError::Check(report) => report.diagnostics.first().map_or_else(String::new, ToString::to_string),
-            other => other.to_string(),
-        })?;
+        let run =
+            Run::prepare(machine.clone(), registry, program, Switches { clock: Some(clock), ..Switches::default() })
+                .map_err(|e| match e {
+                    HostError::Check(report) => {
+                        report.diagnostics.first().map_or_else(String::new, ToString::to_string)
+                    }
+                    other => other.to_string(),
+                })?;
         let mut watch = Watch {
             experiment: self,
             lines: &lines,

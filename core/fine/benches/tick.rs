@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, PluginError,
-    Segment, SegmentFlags, Setpoint,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits,
+    PluginError, Segment, SegmentFlags, Setpoint,
 };
 
 const TICKS: usize = 1000;
@@ -27,8 +27,8 @@ impl Driver for Echo {
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::default())
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
@@ -136,6 +136,11 @@ fn config(order: u32) -> FineConfig {
         dry_run: false,
         unhomed: 0,
         record_drives: false,
+        attached: Attached::default(),
+        enable_periods: 5000,
+        disable_periods: 5000,
+        reset_drives: false,
+        plans_from_rest: false,
     }
 }
 

@@ -1,8 +1,9 @@
 //! What the drives' answer says of the drives.
 
-use tandem_sdk::{AxisVector, Feedback, JointState};
+use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES};
 
 use crate::fault::FaultKind;
+use crate::history::History;
 
 /// The numbers of an answer that go on to strategies and trace.
 pub struct Numbers {
@@ -51,15 +52,26 @@ pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<Faul
     if let Some(joint) = foreign {
         return Some(FaultKind::State { joint, number: feedback.state[joint].0 });
     }
-    let faulty = first(JointState::Fault).map(|joint| FaultKind::Drive { joint, code: feedback.fault_code[joint] });
-    let off = || first(JointState::Disabled).filter(|_| moving).map(|joint| FaultKind::Drive { joint, code: 0 });
-    faulty.or_else(off)
+    let code = |joint: usize| feedback.fault_code[joint];
+    let faulty = first(JointState::Fault).map(|joint| FaultKind::Drive { joint, code: code(joint) });
+    let lost = || first(JointState::Lost).map(|joint| FaultKind::Lost { joint, code: code(joint) });
+    let holds = |state: &JointState| *state == JointState::Enabled;
+    let off = || feedback.state[..joints].iter().position(|state| !holds(state)).filter(|_| moving);
+    let let_go = || off().map(|joint| FaultKind::LetGo { joint, state: feedback.state[joint] });
+    faulty.or_else(lost).or_else(let_go)
 }
 
-/// The fault that a joint which follows is further from its `command` than its limit in `most_mm` allows. Fine loop.
+/// Where each joint was told to be when it did what is reported now: `delay_periods` before the last of what was `sent`. Fine
+/// loop.
+pub fn aims(sent: &History, delay_periods: &[u32; MAX_AXES]) -> AxisVector {
+    AxisVector(std::array::from_fn(|joint| sent.at(delay_periods[joint])[joint]))
+}
+
+/// The fault that a joint which follows is further from its `command` than its limit in `most_mm` allows; what is old is not
+/// judged. Fine loop.
 pub fn following(feedback: &Feedback, command: &AxisVector, joints: usize, most_mm: &AxisVector) -> Option<FaultKind> {
     let error = |joint: usize| (command[joint] - feedback.position[joint]).abs();
-    let holds = |joint: &usize| feedback.state[*joint] == JointState::Enabled;
+    let holds = |joint: &usize| feedback.state[*joint] == JointState::Enabled && feedback.age_periods[*joint] == 0;
     let lost = (0..joints).filter(holds).find(|joint| error(*joint) > most_mm[*joint]);
     lost.map(|joint| FaultKind::Following { joint, error_mm: error(joint), limit_mm: most_mm[joint] })
 }
@@ -119,7 +131,9 @@ mod tests {
         assert_eq!(reported(&feedback, 3, true), None);
         feedback.state[2] = JointState::Disabled;
         assert_eq!(reported(&feedback, 3, false), None);
-        assert_eq!(reported(&feedback, 3, true), Some(FaultKind::Drive { joint: 2, code: 0 }));
+        assert_eq!(reported(&feedback, 3, true), Some(FaultKind::LetGo { joint: 2, state: JointState::Disabled }));
+        feedback.state[0] = JointState::Lost;
+        assert_eq!(reported(&feedback, 3, false), Some(FaultKind::Lost { joint: 0, code: 0 }));
         (feedback.state[1], feedback.fault_code[1]) = (JointState::Fault, 9);
         assert_eq!(reported(&feedback, 3, false), Some(FaultKind::Drive { joint: 1, code: 9 }));
     }

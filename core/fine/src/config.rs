@@ -1,6 +1,6 @@
 //! What the fine loop knows of the machine.
 
-use tandem_sdk::{AxisVector, JointLanes, Limits, MAX_AXES};
+use tandem_sdk::{Attached, AxisVector, JointLanes, Limits, MAX_AXES};
 
 /// What the guard does with a sample beyond a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,6 +57,17 @@ pub struct FineConfig {
     pub unhomed: u32,
     /// Samples are published from the start, and in the coordinates of the drives: a record of homing itself.
     pub record_drives: bool,
+    /// Where the joints stand, as the driver has told.
+    pub attached: Attached,
+    /// Most fine periods that enabling the joints may take.
+    pub enable_periods: u64,
+    /// Most fine periods that disabling them may take.
+    pub disable_periods: u64,
+    /// Faults of the drives are reset before they are enabled.
+    pub reset_drives: bool,
+    /// The rest at which all joints are enabled ends an epoch ([`tandem_rings::RestCause::Attached`]), so that planning starts
+    /// where they really stand. Without it, what is queued begins at `position`.
+    pub plans_from_rest: bool,
 }
 
 impl FineConfig {

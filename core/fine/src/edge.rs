@@ -1,6 +1,8 @@
 //! The input edge that ends a motion: probing, homing.
 
-use tandem_sdk::{AxisVector, Edge, Feedback, Latch, MAX_LATCHES, Segment, StopOn};
+use tandem_sdk::{Arm, AxisVector, Edge, Feedback, Latch, MAX_LATCHES, Segment, StopOn};
+
+use crate::history::History;
 
 /// Watches for the edge while a block that waits for one moves.
 #[derive(Debug, Default)]
@@ -23,16 +25,32 @@ impl EdgeWatch {
     }
 
     /// Joint positions at the edge that `stop_on` waits for, mm or rad, where it has come. A latch of the drives is
-    /// nearer to the edge than the feedback, and shows an edge that is over before the period is. Fine loop.
-    pub fn find(&self, stop_on: &StopOn, feedback: &Feedback) -> Option<AxisVector> {
+    /// nearer to the edge than the feedback, and shows an edge that is over before the period is; a joint that it did not catch
+    /// is found in `measured`, where the joints were in the periods up to this one, a period of `period_s` after the other. What
+    /// is old is no edge. Fine loop.
+    pub fn find(&self, stop_on: &StopOn, feedback: &Feedback, measured: &History, period_s: f64) -> Option<AxisVector> {
         let fits = |latch: &Latch| latch.input == stop_on.input && latch.edge == stop_on.edge as u32;
         let latch = feedback.latches.iter().find(|latch| fits(latch) && !self.latches.contains(latch));
-        latch.map(|latch| latch.position).or_else(|| has_level(stop_on, feedback.inputs).then_some(feedback.position))
+        if let Some(latch) = latch {
+            let then = measured.before(latch.before_s / period_s);
+            let caught = |joint: usize| latch.joints >> joint & 1 == 1;
+            return Some(AxisVector(std::array::from_fn(|i| if caught(i) { latch.position[i] } else { then[i] })));
+        }
+        let is_new = feedback.input_age_periods[stop_on.input.min(63) as usize] == 0;
+        (is_new && has_level(stop_on, feedback.inputs)).then_some(feedback.position)
     }
 
     /// Forgets the block. Fine loop.
     pub fn end(&mut self) {
         self.block = None;
+    }
+}
+
+/// What the drives are to catch for `stop_on`.
+pub fn arm_for(stop_on: &StopOn) -> Arm {
+    match stop_on.edge {
+        Edge::None => Arm::default(),
+        edge => Arm { input: stop_on.input, edge: edge as u32 },
     }
 }
 
@@ -59,6 +77,38 @@ mod tests {
         Feedback { inputs, position: AxisVector([5.0; 8]), ..Feedback::default() }
     }
 
+    /// What is found where the joints have gone 1 mm a period up to 5 mm.
+    fn find(watch: &EdgeWatch, segment: &Segment, feedback: &Feedback) -> Option<AxisVector> {
+        let mut measured = History::new(&AxisVector::ZERO);
+        for at in 1..=5 {
+            measured.push(&AxisVector([f64::from(at); 8]));
+        }
+        watch.find(&segment.stop_on, feedback, &measured, 0.001)
+    }
+
+    #[test]
+    fn a_joint_that_was_not_caught_is_found_between_its_samples() {
+        let mut at_edge = feedback(0);
+        at_edge.latches[0] = Latch {
+            input: 3,
+            edge: 1,
+            joints: 2,
+            before_s: 0.00125,
+            position: AxisVector([9.0; 8]),
+            ..Latch::default()
+        };
+        let found = find(&EdgeWatch::default(), &probing(Edge::Rising), &at_edge).unwrap();
+        assert_eq!((found[0], found[1], found[2]), (3.75, 9.0, 3.75));
+    }
+
+    #[test]
+    fn an_old_input_is_no_edge() {
+        let mut old = feedback(8);
+        old.input_age_periods[3] = 1;
+        assert_eq!(find(&EdgeWatch::default(), &probing(Edge::Rising), &old), None);
+        assert!(find(&EdgeWatch::default(), &probing(Edge::Rising), &feedback(8)).is_some());
+    }
+
     #[test]
     fn a_level_that_is_there_before_the_motion_is_told_once() {
         for (edge, there, away) in [(Edge::Rising, 8, 0), (Edge::Falling, 0, 8)] {
@@ -67,8 +117,8 @@ mod tests {
             assert!(!watch.begin(&probing(edge), &feedback(there)), "it moves already");
             watch.end();
             assert!(!watch.begin(&probing(edge), &feedback(away)));
-            assert_eq!(watch.find(&probing(edge).stop_on, &feedback(away)), None);
-            assert_eq!(watch.find(&probing(edge).stop_on, &feedback(there)), Some(AxisVector([5.0; 8])));
+            assert_eq!(find(&watch, &probing(edge), &feedback(away)), None);
+            assert_eq!(find(&watch, &probing(edge), &feedback(there)), Some(AxisVector([5.0; 8])));
         }
         assert!(!EdgeWatch::default().begin(&probing(Edge::None), &feedback(u64::MAX)));
     }
@@ -78,14 +128,14 @@ mod tests {
         let segment = probing(Edge::Rising);
         let with = |input, edge, at: f64| {
             let mut feedback = feedback(0);
-            feedback.latches[2] = Latch { input, edge, position: AxisVector([at; 8]) };
+            feedback.latches[2] = Latch { input, edge, joints: 255, position: AxisVector([at; 8]), ..Latch::default() };
             feedback
         };
         let mut watch = EdgeWatch::default();
         watch.begin(&segment, &with(3, 1, 1.0));
-        assert_eq!(watch.find(&segment.stop_on, &with(3, 1, 1.0)), None, "of an older edge");
-        assert_eq!(watch.find(&segment.stop_on, &with(3, 2, 4.0)), None, "of the other edge");
-        assert_eq!(watch.find(&segment.stop_on, &with(2, 1, 4.0)), None, "of another input");
-        assert_eq!(watch.find(&segment.stop_on, &with(3, 1, 4.0)), Some(AxisVector([4.0; 8])));
+        assert_eq!(find(&watch, &segment, &with(3, 1, 1.0)), None, "of an older edge");
+        assert_eq!(find(&watch, &segment, &with(3, 2, 4.0)), None, "of the other edge");
+        assert_eq!(find(&watch, &segment, &with(2, 1, 4.0)), None, "of another input");
+        assert_eq!(find(&watch, &segment, &with(3, 1, 4.0)), Some(AxisVector([4.0; 8])));
     }
 }

@@ -1,5 +1,7 @@
 //! What can go wrong on the fine loop, as numbers; the host turns them into words.
 
+use tandem_sdk::JointState;
+
 /// Which limit a sample broke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Breach {
@@ -33,6 +35,29 @@ pub enum FaultKind {
     Drive {
         /// Joint index.
         joint: usize,
+        /// The drive's code.
+        code: u32,
+    },
+    /// The driver does not reach a drive any more.
+    Lost {
+        /// Joint index.
+        joint: usize,
+        /// The drive's code, as far as it is known.
+        code: u32,
+    },
+    /// A drive has let go of a joint that it is to hold.
+    LetGo {
+        /// Joint index.
+        joint: usize,
+        /// What it says instead.
+        state: JointState,
+    },
+    /// A joint was not enabled in the time that its driver has for it.
+    NotEnabled {
+        /// Joint index.
+        joint: usize,
+        /// What it says instead.
+        state: JointState,
         /// The drive's code.
         code: u32,
     },

@@ -70,6 +70,11 @@ impl Guard {
         self.position += *by;
     }
 
+    /// Stands still at `position` from here on, wherever that is.
+    pub fn place(&mut self, position: &AxisVector) {
+        *self = Self::new(&FineConfig { position: *position, ..self.config });
+    }
+
     /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
     pub fn check(&self, next: &AxisVector, unhomed: u32) -> Checked {
         let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
@@ -108,8 +113,10 @@ impl Guard {
         if !next.is_finite() {
             return breach(Breach::NotFinite, next, 0.0);
         }
-        if travels && (next < limits.min_mm - rounding || next > limits.max_mm + rounding) {
-            let nearest = if next < limits.min_mm { limits.min_mm } else { limits.max_mm };
+        // Who stands outside of the travel may go inward only.
+        let (lowest, highest) = (limits.min_mm.min(self.position[axis]), limits.max_mm.max(self.position[axis]));
+        if travels && (next < lowest - rounding || next > highest + rounding) {
+            let nearest = if next < lowest { limits.min_mm } else { limits.max_mm };
             return breach(Breach::Position, next, nearest);
         }
         let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
@@ -138,7 +145,7 @@ impl Guard {
 mod tests {
     use super::*;
     use crate::config::{GuardMode, Joints};
-    use tandem_sdk::{AxisLimits, Limits};
+    use tandem_sdk::{Attached, AxisLimits, Limits};
 
     /// A machine that may step by 2 mm/s, accelerate by 1000 mm/s², and moves at most 1 m.
     fn guard() -> Guard {
@@ -165,6 +172,11 @@ mod tests {
             dry_run: false,
             unhomed: 0,
             record_drives: false,
+            attached: Attached::default(),
+            enable_periods: 1,
+            disable_periods: 1,
+            reset_drives: false,
+            plans_from_rest: false,
         })
     }
 

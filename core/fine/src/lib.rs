@@ -11,6 +11,7 @@ mod edge;
 mod fault;
 mod governor;
 mod guard;
+mod history;
 mod law;
 mod outlook;
 mod outputs;

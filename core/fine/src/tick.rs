@@ -1,5 +1,6 @@
 //! The fine loop itself.
 
+mod attach;
 mod exchange;
 mod follow;
 mod govern;
@@ -17,7 +18,7 @@ use rtrb::{Consumer, Producer};
 use tandem_rings::{
     Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
 };
-use tandem_sdk::{AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
+use tandem_sdk::{Arm, AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
 
 use crate::config::FineConfig;
 use crate::cursor::Cursor;
@@ -25,12 +26,14 @@ use crate::edge::EdgeWatch;
 use crate::fault::{Fault, FaultKind};
 use crate::governor::Governor;
 use crate::guard::Guard;
+use crate::history::History;
 use crate::outlook::Outlook;
 use crate::outputs::Outputs;
 use crate::points::Points;
 use crate::preview::{LineEnd, Preview};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
+use attach::Attach;
 use joints::Lead;
 use keep_alive::KeepAlive;
 use progress::Progress;
@@ -57,12 +60,14 @@ pub struct Counters {
     pub missed_periods: u64,
     /// Those among them beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
     pub jerk_relaxed_samples: u64,
+    /// Fine periods in which what is known of some joint was old: a frame was lost or late.
+    pub old_feedback_periods: u64,
 }
 
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant)] // one of it lives for the whole run
 enum Phase {
-    /// Nothing has moved yet: the queue fills.
+    /// Nothing has moved yet: the drives are enabled, and the queue fills.
     Waiting,
     Following,
     /// At the rest that ended an epoch: the next one is waited for.
@@ -112,8 +117,19 @@ pub struct FineLoop {
     unserved: u32,
     recovering: bool,
     tick: u64,
+    attach: Attach,
     setpoint: Setpoint,
     feedback: Feedback,
+    /// Where the joints were told to be in the last periods, and where they were.
+    sent: History,
+    measured: History,
+    /// What the drives are to catch.
+    arm: Arm,
+    /// Fine periods since the drives were told to let go, and whether they have, or their time for it is over.
+    letting_go_periods: u64,
+    let_go: bool,
+    /// The program had ended before this period.
+    had_ended: bool,
     /// Where the axes are by the feedback, as far as the kinematics last knew.
     axes: AxisVector,
     lead: Lead,
@@ -168,8 +184,15 @@ impl FineLoop {
             unserved: 0,
             recovering: false,
             tick: 0,
+            attach: Attach::new(config),
             setpoint: Setpoint::default(),
-            feedback: Feedback::default(),
+            feedback: Feedback { position: config.attached.position, ..Feedback::default() },
+            sent: History::new(&config.attached.position),
+            measured: History::new(&config.attached.position),
+            arm: Arm::default(),
+            letting_go_periods: 0,
+            let_go: false,
+            had_ended: false,
             axes: config.axes_alone(&config.position),
             lead: Lead::Axes,
             counters: Counters::default(),
@@ -185,6 +208,7 @@ impl FineLoop {
         self.watch_jog();
         self.take_requests();
         let ended = self.outputs.ended;
+        self.had_ended = ended;
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();
         let (position, input) = self.next_position();
@@ -214,9 +238,18 @@ impl FineLoop {
         self.samples = samples;
     }
 
-    /// Acknowledges a fault: the drives may be enabled. A machine starts faulted. Host, between runs.
+    /// Acknowledges a fault: the drives may be enabled. A machine starts faulted; one that has faulted since resets its drives,
+    /// enables them where they stand, and reports the rest there. Host, between ticks.
     pub fn reset(&mut self) {
         self.state = state::next(self.state, Input::Reset);
+        if matches!(self.phase, Phase::Faulted) {
+            self.attach = Attach::again(self.feedback.position);
+            (self.fault, self.plugin_error, self.lead) = (None, None, Lead::Axes);
+            (self.letting_go_periods, self.let_go) = (0, false);
+            self.governor = Governor::new(&self.config.limits.axes, self.config.lane_count(), self.config.period_s);
+            self.progress = Progress::new(&self.config);
+            self.phase = Phase::Waiting;
+        }
     }
 
     /// Number of the fine period that comes next: 0 until the first motion.
@@ -239,9 +272,14 @@ impl FineLoop {
         self.plugin_error.as_ref()
     }
 
-    /// Whether the program has ended, or a fault has brought the machine to rest.
+    /// Whether the program has ended, or a fault has brought the machine to rest, and the drives have let go.
     pub fn is_over(&self) -> bool {
-        self.outputs.ended || matches!(self.phase, Phase::Faulted)
+        self.let_go
+    }
+
+    /// The driver, for what its codes mean. Host, between ticks.
+    pub fn driver(&self) -> &dyn Driver {
+        self.driver.as_ref()
     }
 
     /// Hands the driver back. Host.
@@ -283,7 +321,9 @@ impl FineLoop {
         if self.given.abort || self.is_jog_let_go() {
             return self.part(Stop::abort());
         }
-        if self.depth.may_start(self.cursor.program_time_s()) {
+        let of_this_epoch =
+            self.cursor.epoch() == 0 || (self.depth.is_of(self.cursor.epoch()) && self.cursor.drop_older());
+        if of_this_epoch && self.depth.may_start(self.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
         Input::Rest

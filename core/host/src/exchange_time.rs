@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint};
+use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
 
 use crate::summary::ExchangeUs;
 use crate::wall_clock::now_ns;
@@ -54,8 +54,12 @@ impl Driver for Timed {
         self.driver.open(context)
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         self.driver.start()
+    }
+
+    fn send(&mut self, setpoint: &Setpoint) {
+        self.driver.send(setpoint);
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
@@ -76,5 +80,9 @@ impl Driver for Timed {
 
     fn stop(&mut self) -> Result<(), PluginError> {
         self.driver.stop()
+    }
+
+    fn explain(&self, code: u32) -> Words {
+        self.driver.explain(code)
     }
 }

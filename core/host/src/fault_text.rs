@@ -2,25 +2,29 @@
 
 use tandem_fine::{Breach, Fault, FaultKind};
 use tandem_machine::Machine;
-use tandem_sdk::PluginError;
+use tandem_sdk::{Driver, JointState, PluginError};
 
 use crate::joints::JointSpace;
+use crate::setup::code_text;
 
 /// Who is meant by the numbers of a fault.
 struct Names<'a> {
     machine: &'a Machine,
     joints: &'a JointSpace,
+    drives: &'a dyn Driver,
 }
 
-/// What happened, who did it, where. `soft` is the cause of a fault on the soft side, `driver` what the driver said.
+/// What happened, who did it, where. `soft` is the cause of a fault on the soft side, `driver` what the driver said, and
+/// `drives` knows its codes.
 pub fn describe(
     machine: &Machine,
     joints: &JointSpace,
     fault: &Fault,
     soft: Option<&str>,
     driver: Option<&PluginError>,
+    drives: &dyn Driver,
 ) -> String {
-    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints });
+    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints, drives });
     format!("{} (line {}, tick {}, {t_s:.3} s)", cause(&names, &fault.kind, soft, driver), fault.line, fault.tick)
 }
 
@@ -29,12 +33,29 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
     match kind {
         FaultKind::Guard { breach, axis, value, limit } => names.guard(*breach, *axis, *value, *limit),
         FaultKind::Drive { joint, code } => {
-            let joint = names.joint(*joint);
+            let (joint, code) = (names.joint(*joint), code_text(names.drives, *code));
             format!("driver {}: the drive of {joint} reports fault {code}", machine.driver.plugin)
+        }
+        FaultKind::Lost { joint, code } => {
+            let (joint, code) = (names.joint(*joint), names.code_if_any(*code));
+            format!(
+                "driver {}: the drive of {joint} is lost: the driver does not reach it{code}",
+                machine.driver.plugin
+            )
+        }
+        FaultKind::LetGo { joint, state } => {
+            let (joint, state) = (names.joint(*joint), state_text(*state));
+            format!("driver {}: the drive of {joint} has let go: it is {state}", machine.driver.plugin)
+        }
+        FaultKind::NotEnabled { joint, state, code } => {
+            let (joint, code, within_s) =
+                (names.joint(*joint), names.code_if_any(*code), names.drives.describe().enable_s);
+            let (driver, state) = (&machine.driver.plugin, state_text(*state));
+            format!("driver {driver}: {joint} was not enabled within {within_s} s: its drive is {state}{code}")
         }
         FaultKind::State { joint, number } => {
             let joint = names.joint(*joint);
-            let known = "0 (disabled), 1 (enabled) and 2 (fault) are known";
+            let known = "0 (disabled) to 6 (lost) are known";
             format!("driver {}: its exchange gives {number} as the state of {joint}: {known}", machine.driver.plugin)
         }
         FaultKind::Feedback { joint } => {
@@ -69,7 +90,26 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
     }
 }
 
+/// A joint's state as people read it.
+pub fn state_text(state: JointState) -> &'static str {
+    match state {
+        JointState::Disabled => "disabled",
+        JointState::Enabling => "enabling",
+        JointState::Enabled => "enabled",
+        JointState::Homing => "homing",
+        JointState::QuickStop => "in its quick stop",
+        JointState::Fault => "in fault",
+        JointState::Lost => "lost",
+        _ => "in no known state",
+    }
+}
+
 impl Names<'_> {
+    /// The code of a drive behind other words; nothing where it has none.
+    fn code_if_any(&self, code: u32) -> String {
+        if code == 0 { String::new() } else { format!(", fault {}", code_text(self.drives, code)) }
+    }
+
     /// A joint by its number, and by its name where the machine file has given it one.
     fn joint(&self, joint: usize) -> String {
         match self.joints.joints.get(joint).filter(|_| !self.machine.joints.is_empty()) {

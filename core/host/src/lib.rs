@@ -4,6 +4,7 @@
 //! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
 
 mod block_times;
+mod claim;
 mod command;
 mod command_file;
 mod command_log;
@@ -64,6 +65,7 @@ pub use realtime_periods::Timing;
 pub use record::{BlocksCsv, Output, RecordError, TraceCsv, flush_outputs};
 pub use registry::{PluginRefusal, Registry};
 pub use run::{Clock, Outcome, Run, Switches};
+pub use setup::moves_metal;
 pub use stops::Stop;
 pub use summary::{
     ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PlanningRow, PlanningUs, Summary,

@@ -77,6 +77,11 @@ impl<'a> Session<'a> {
         Run::of_source(self.machine.clone(), self.registry, "manual input".to_string(), source, self.switches)
     }
 
+    /// The operator acknowledges the fault that ended the last run: the next one resets its drives.
+    pub fn reset_drives(&mut self) {
+        self.switches.reset = true;
+    }
+
     /// The machine has come to rest at `position` after a fault: the next line starts there.
     pub fn stands_at(&mut self, position: AxisVector) {
         self.machine.start = position;
@@ -182,7 +187,9 @@ impl Source for Lines {
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         let mut manual = lock(&self.0);
         match rest.cause {
-            RestCause::Abort | RestCause::Corrected => manual.interpreter.set_position(rest.position),
+            RestCause::Abort | RestCause::Corrected | RestCause::Attached => {
+                manual.interpreter.set_position(rest.position)
+            }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
                 manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
             }

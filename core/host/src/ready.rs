@@ -5,8 +5,9 @@ use std::sync::Arc;
 use tandem_gcode::{CheckReport, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
-use tandem_sdk::{Block, Driver, Planner};
+use tandem_sdk::{Block, Planner};
 
+use crate::claim::Claim;
 use crate::density::Density;
 use crate::error::HostError;
 use crate::hang::HangWatch;
@@ -29,8 +30,8 @@ pub struct Ready {
     pub source: Box<dyn Source + Send>,
     pub policy: Option<PolicyHost>,
     pub planner: Box<dyn Planner>,
-    /// With its faults around it, where the machine has any.
-    pub driver: Box<dyn Driver>,
+    /// The driver with its faults around it, where the machine has any; its drives claimed where that was asked for.
+    pub claim: Claim,
     pub feed: Option<FeedRunner>,
     pub joints: Arc<JointSpace>,
     /// The same once more, for the fine loop to own.
@@ -48,7 +49,7 @@ pub struct Ready {
 pub struct Plugins {
     pub watch: Option<HangWatch>,
     pub planner: Box<dyn Planner>,
-    pub driver: Box<dyn Driver>,
+    pub claim: Claim,
 }
 
 impl Plugins {
@@ -58,7 +59,8 @@ impl Plugins {
     /// One of them is not there, or refuses its options.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         let watch = HangWatch::of(machine);
-        Ok(Self { watch, planner: setup::planner(machine, registry)?, driver: setup::driver(machine, registry)? })
+        let planner = setup::planner(machine, registry)?;
+        Ok(Self { watch, planner, claim: Claim::new(setup::driver(machine, registry)?) })
     }
 
     /// Whether they go with each other, and with what is asked of them.
@@ -66,46 +68,107 @@ impl Plugins {
     /// # Errors
     /// What does not go together, with its place in the machine file.
     pub fn check(&self, machine: &Machine, registry: &Registry, switches: Switches) -> Result<(), HostError> {
-        rules::check(machine, &self.planner.describe(), self.driver.describe())?;
-        rules::check_homing(machine, &JointSpace::of(machine, registry)?, switches)
+        let (joints, driver) = (JointSpace::of(machine, registry)?, self.claim.describe());
+        rules::check(machine, &self.planner.describe(), driver)?;
+        rules::check_homing(machine, &joints, switches)?;
+        rules::check_real(machine, &joints, &driver, switches.clock)?;
+        self.claim.check(machine, &joints)
+    }
+
+    /// Puts the machine's faults around the driver.
+    ///
+    /// # Errors
+    /// What `[faults]` says wrongly.
+    pub fn add_faults(&mut self, machine: &Machine, registry: &Registry) -> Result<(), HostError> {
+        let joints = JointSpace::of(machine, registry)?;
+        self.claim.wrap(|driver| faults::wrap(machine, driver, &joints))
+    }
+
+    /// Claims the drives: the machine starts where they stand. Host; allocates.
+    ///
+    /// # Errors
+    /// The drives cannot be reached, or are in no state to be enabled.
+    pub fn attach(
+        mut self,
+        mut machine: Machine,
+        registry: &Registry,
+        switches: Switches,
+    ) -> Result<(Machine, Self), HostError> {
+        let joints = JointSpace::of(&machine, registry)?;
+        let stands = self.claim.attach(&machine, &joints, switches)?;
+        if stands != machine.start {
+            machine.start = stands;
+            self.planner = setup::planner(&machine, registry)?;
+        }
+        Ok((machine, self))
     }
 }
 
 impl Ready {
-    /// Checks the whole program and makes everything for a run of it. Host; allocates.
+    /// Checks the whole program and makes everything for a run of it; `claims` says whether the drives are claimed, which is the
+    /// last thing that may refuse but for a program that cannot begin where they stand. Host; allocates.
     ///
     /// # Errors
     /// Everything that refuses: the program's errors, plugins, policy, what does not go together.
     pub fn of_program(
-        machine: Machine,
+        mut machine: Machine,
         registry: &Registry,
         mut program: Program,
         switches: Switches,
+        claims: bool,
     ) -> Result<Self, HostError> {
-        let plugins = Plugins::of(&machine, registry)?;
+        let mut plugins = Plugins::of(&machine, registry)?;
+        // Only real drives know where a program on them begins.
+        let asks_first = claims && plugins.claim.describe().simulated == 0;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let joints = JointSpace::of(&machine, registry)?;
-        let depth_s = setup::queue_depth_s(&machine, &joints, plugins.planner.describe().order);
-        let mut density = Density::new(&machine, depth_s);
-        let checked = first_pass(&machine, plugins.planner.as_ref(), &mut program, switches, &mut density)?;
-        if !checked.is_ok() {
-            return Err(HostError::Check(Box::new(checked)));
+        let mut passed = (!asks_first).then(|| Passed::of(&machine, registry, &plugins, &mut program, switches));
+        if let Some(Err(refused)) = passed {
+            return Err(refused);
         }
         plugins.check(&machine, registry, switches)?;
+        plugins.add_faults(&machine, registry)?;
+        let policy = PolicyHost::open(&machine)?;
+        feed(&machine, registry, policy.as_ref(), 0.0)?;
+        if claims {
+            let start = machine.start;
+            (machine, plugins) = plugins.attach(machine, registry, switches)?;
+            passed = passed.filter(|_| machine.start == start);
+        }
+        let passed = match passed {
+            Some(passed) => passed?,
+            None => Passed::of(&machine, registry, &plugins, &mut program, switches)?,
+        };
         let name = program.name().to_string();
         let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
-        let policy = PolicyHost::open(&machine)?;
         let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
-        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, checked, switches)?;
-        Ok(Self { entries: density.entries(), ..ready })
+        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
+        Ok(Self { entries: passed.entries, ..ready })
+    }
+
+    /// Makes everything for a run of what `source` gives, which begins where the machine that it is given stands; the drives are
+    /// claimed. Host; allocates.
+    ///
+    /// # Errors
+    /// Plugins refuse, or do not go together.
+    pub fn of_source(
+        machine: Machine,
+        registry: &Registry,
+        name: Option<String>,
+        source: impl FnOnce(&Machine) -> Box<dyn Source + Send>,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let mut plugins = Plugins::of(&machine, registry)?;
+        plugins.check(&machine, registry, switches)?;
+        plugins.add_faults(&machine, registry)?;
+        feed(&machine, registry, None, 0.0)?;
+        let (machine, plugins) = plugins.attach(machine, registry, switches)?;
+        let source = source(&machine);
+        Self::new(machine, registry, name, source, None, plugins, CheckReport::default(), switches)
     }
 
     /// Makes what every run needs for the parts that differ between runs. Host; allocates.
-    ///
-    /// # Errors
-    /// Joints, feed strategy, faults or driver refuse.
     #[allow(clippy::too_many_arguments)] // the parts that differ between runs, each once
-    pub fn new(
+    fn new(
         machine: Machine,
         registry: &Registry,
         program: Option<String>,
@@ -115,12 +178,9 @@ impl Ready {
         checked: CheckReport,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let joints = Arc::new(JointSpace::of(&machine, registry)?);
-        let feed = setup::feed(&machine, registry, &joints, policy.as_ref(), checked.length_mm)?;
-        rules::check_signals(&machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
-        let driver = faults::wrap(&machine, plugins.driver, &joints)?;
-        setup::check_driver(&machine, driver.as_ref(), &joints)?;
+        let feed = feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
         Ok(Self {
+            joints: Arc::new(JointSpace::of(&machine, registry)?),
             kinematics: JointSpace::of(&machine, registry)?,
             records_drives: program.is_none(),
             program: program.unwrap_or_else(|| HOMING.to_string()),
@@ -129,14 +189,53 @@ impl Ready {
             machine,
             source,
             policy,
-            driver,
+            claim: plugins.claim,
             feed,
-            joints,
             checked,
             entries: 0,
             switches,
         })
     }
+}
+
+/// A program that is sound from its first line to its last.
+struct Passed {
+    report: CheckReport,
+    /// Entries of the ring of segments that hold the worst stop anywhere in it.
+    entries: usize,
+}
+
+impl Passed {
+    /// The whole program through the interpreter and the planner.
+    fn of(
+        machine: &Machine,
+        registry: &Registry,
+        plugins: &Plugins,
+        program: &mut Program,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let joints = JointSpace::of(machine, registry)?;
+        let depth_s = setup::queue_depth_s(machine, &joints, plugins.planner.describe().order);
+        let mut density = Density::new(machine, depth_s);
+        let report = first_pass(machine, plugins.planner.as_ref(), program, switches, &mut density)?;
+        if report.is_ok() {
+            Ok(Self { report, entries: density.entries() })
+        } else {
+            Err(HostError::Check(Box::new(report)))
+        }
+    }
+}
+
+/// What asks feed strategy and policy, where there is either, for a program of `length_mm`.
+fn feed(
+    machine: &Machine,
+    registry: &Registry,
+    policy: Option<&PolicyHost>,
+    length_mm: f64,
+) -> Result<Option<FeedRunner>, HostError> {
+    let feed = setup::feed(machine, registry, &JointSpace::of(machine, registry)?, policy, length_mm)?;
+    rules::check_signals(machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
+    Ok(feed)
 }
 
 /// Prepares a run of the program as [`Run::prepare`] does, short of claiming the drives: nothing moves, and no driver is
@@ -151,7 +250,7 @@ pub fn check_program(
     program: Program,
     switches: Switches,
 ) -> Result<CheckReport, HostError> {
-    match Ready::of_program(machine, registry, program, switches) {
+    match Ready::of_program(machine, registry, program, switches, false) {
         Ok(ready) => Ok(ready.checked),
         Err(HostError::Check(report)) => Ok(*report),
         Err(refused) => Err(refused),

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, RoughEnd, Sizes, bridge};
-use tandem_sdk::{AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES};
+use tandem_sdk::{Attached, AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES};
 
 use super::{Body, PeriodClock, Timing, run};
 use crate::wall_clock::FineBody;
@@ -166,6 +166,11 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         dry_run: false,
         unhomed: 0,
         record_drives: false,
+        attached: Attached::default(),
+        enable_periods: 5000,
+        disable_periods: 5000,
+        reset_drives: false,
+        plans_from_rest: false,
     };
     let (rough, end, host) = bridge(Sizes { segments: 16, samples: 256 });
     let mut driver = tandem_sim::SimulatedDrives::new(tandem_sim::Options::default());

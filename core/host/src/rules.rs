@@ -5,7 +5,7 @@ use tandem_sdk::{DriverDescription, MAX_SIGNALS, PlannerDescription};
 
 use crate::error::HostError;
 use crate::joints::JointSpace;
-use crate::run::Switches;
+use crate::run::{Clock, Switches};
 
 /// Checks planner, driver and guard against each other.
 pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDescription) -> Result<(), HostError> {
@@ -35,6 +35,40 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
         return refuse("planner.plugin", cause);
     }
     Ok(())
+}
+
+/// Real drives live in real time.
+pub fn refuse_virtual(machine: &Machine) -> HostError {
+    let cause = format!("{} moves metal: it is refused on the virtual clock", machine.driver.plugin);
+    refusal(machine, "driver.plugin", cause)
+}
+
+/// Checks the clock that is asked for, and what real drives need on top.
+pub fn check_real(
+    machine: &Machine,
+    joints: &JointSpace,
+    driver: &DriverDescription,
+    clock: Option<Clock>,
+) -> Result<(), HostError> {
+    if driver.simulated != 0 {
+        return Ok(());
+    }
+    if clock == Some(Clock::Virtual) {
+        return Err(refuse_virtual(machine));
+    }
+    let unwatched = joints.joints.iter().find(|joint| joint.max_following_error_mm.is_infinite());
+    match unwatched.filter(|_| driver.watches_following == 0) {
+        Some(joint) => {
+            let table = if machine.joints.is_empty() { "axes" } else { "joints" };
+            let unit = if joint.rotary { "deg" } else { "mm" };
+            let cause = format!(
+                "real drives need max_following_error_{unit}: {} watches no following error by itself",
+                machine.driver.plugin
+            );
+            Err(refusal(machine, &format!("{table}.{}", joint.name.to_ascii_lowercase()), cause))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Checks what homing asks of the machine, and what the machine asks of homing.

@@ -22,12 +22,12 @@ use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
-use crate::ready::{Plugins, Ready};
+use crate::ready::Ready;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
 use crate::wall_clock::Periods;
-use crate::{setup, virtual_clock, wall_clock};
+use crate::{rules, setup, virtual_clock, wall_clock};
 
 /// Which clock drives the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +53,12 @@ pub struct Switches {
     pub dry_run: bool,
     /// The axes that the machine file tells how to are homed before the program.
     pub home: bool,
+    /// Joints of which it is not known where they are may move: jogging.
+    pub unhomed: bool,
+    /// Faults in which drives stand are reset before they are enabled.
+    pub reset: bool,
+    /// The clock that is asked for; none where it follows the driver.
+    pub clock: Option<Clock>,
 }
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
@@ -72,6 +78,9 @@ pub struct Run {
     exchange: Arc<ExchangeTimes>,
     switches: Switches,
     watch: Option<HangWatch>,
+    clock: Clock,
+    /// Metal moves.
+    real: bool,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -98,7 +107,7 @@ impl Run {
         program: Program,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        Self::open(Ready::of_program(machine, registry, program, switches)?)
+        Self::open(Ready::of_program(machine, registry, program, switches, true)?)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -109,11 +118,8 @@ impl Run {
         source: Box<dyn Source + Send>,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let plugins = Plugins::of(&machine, registry)?;
-        plugins.check(&machine, registry, switches)?;
-        let source = setup::behind_homing(&machine, source, switches);
-        let checked = CheckReport::default();
-        Self::open(Ready::new(machine, registry, Some(name), source, None, plugins, checked, switches)?)
+        let behind = |machine: &Machine| setup::behind_homing(machine, source, switches);
+        Self::open(Ready::of_source(machine, registry, Some(name), behind, switches)?)
     }
 
     /// A run that homes the axes of [`Machine::homing`] and nothing else. Its samples are in the coordinates of the
@@ -121,21 +127,21 @@ impl Run {
     ///
     /// # Errors
     /// Everything that refuses: plugins, what does not go together.
-    pub fn home(machine: Machine, registry: &Registry) -> Result<Self, HostError> {
-        let switches = Switches { home: true, ..Switches::default() };
-        let plugins = Plugins::of(&machine, registry)?;
-        plugins.check(&machine, registry, switches)?;
-        let source = Box::new(Homing::new(&machine, &machine.homing, None));
-        let checked = CheckReport::default();
-        Self::open(Ready::new(machine, registry, None, source, None, plugins, checked, switches)?)
+    pub fn home(machine: Machine, registry: &Registry, switches: Switches) -> Result<Self, HostError> {
+        let switches = Switches { home: true, ..switches };
+        let homing =
+            |machine: &Machine| Box::new(Homing::new(machine, &machine.homing, None)) as Box<dyn Source + Send>;
+        Self::open(Ready::of_source(machine, registry, None, homing, switches)?)
     }
 
-    /// Claims the drives.
+    /// Makes the loops around drives that are claimed.
     fn open(ready: Ready) -> Result<Self, HostError> {
-        let Ready {
-            watch, machine, program, source, policy, planner, mut driver, feed, joints, checked, switches, ..
-        } = ready;
-        setup::open(&machine, driver.as_mut(), &joints)?;
+        let Ready { watch, machine, program, source, policy, planner, claim, feed, joints, checked, switches, .. } =
+            ready;
+        let drives = claim.describe();
+        let Some((driver, attached)) = claim.into_parts() else {
+            return Err(HostError::System("the drives are not claimed".to_string()));
+        };
         let description = planner.describe();
         let depth_s = setup::queue_depth_s(&machine, &joints, description.order);
         let cuts = 2.0 * depth_s / machine.rough_period_s;
@@ -143,11 +149,12 @@ impl Run {
         // As lockstep needs it: the samples of each rough period are taken behind it.
         let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, segments };
         let (rough_end, fine_end, host) = bridge(sizes);
-        let mut fine_config = setup::fine_config(&machine, &joints, &description, switches);
+        let mut fine_config = setup::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
         fine_config.record_drives = ready.records_drives;
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = setup::advance_s(machine.rough_period_s, depth_s, segments);
+        rough_config.awaits_drives = true;
         let exchange = Arc::new(ExchangeTimes::default());
         let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics.into_kinematics());
@@ -168,6 +175,8 @@ impl Run {
             joints,
             exchange,
             checked,
+            clock: switches.clock.unwrap_or(if drives.simulated == 0 { Clock::Wall } else { Clock::Virtual }),
+            real: drives.simulated == 0,
         })
     }
 
@@ -179,6 +188,11 @@ impl Run {
     /// The fine loop's status, to look at from other threads.
     pub fn status(&self) -> Arc<tandem_rings::Status> {
         Arc::clone(&self.host.status)
+    }
+
+    /// The clock that was asked for, or else the one that the driver goes with: real drives live in real time.
+    pub fn clock(&self) -> Clock {
+        self.clock
     }
 
     /// Whether the planner makes use of velocity steps where blocks meet.
@@ -200,9 +214,14 @@ impl Run {
     /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
     ///
     /// # Errors
-    /// The computer refuses: a thread cannot be started.
+    /// The computer refuses: a thread cannot be started. Real drives are refused on the virtual clock.
     pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
         let started = Instant::now();
+        if self.real && clock == Clock::Virtual {
+            let refused = rules::refuse_virtual(&self.machine);
+            let _ = self.fine.into_driver().stop();
+            return Err(refused);
+        }
         let machine = self.machine;
         if let Some(watch) = &self.watch {
             watch.begin(Arc::clone(&self.host.controls), Arc::clone(&self.host.status));
@@ -238,7 +257,8 @@ impl Run {
         pump.tell_policy_notes();
         pump.tell_plugin_log();
         let fault = fine.fault();
-        let text = fault.map(|f| describe(&machine, &self.joints, &f, pump.soft_cause(), fine.plugin_error()));
+        let text =
+            fault.map(|f| describe(&machine, &self.joints, &f, pump.soft_cause(), fine.plugin_error(), fine.driver()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);

@@ -6,8 +6,8 @@ use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, FeedStrategy, Planner, PlannerContext, PlannerDescription,
-    PluginError, StrategyContext, size_of_contract,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Name, Planner,
+    PlannerContext, PlannerDescription, PluginError, StrategyContext, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
@@ -114,6 +114,11 @@ pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>,
     registry.driver(&machine.driver).map_err(|e| refused(machine, "driver", e))
 }
 
+/// Whether real drives are behind the machine's driver; not where the driver cannot be made, which every run refuses. Host.
+pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
+    driver(machine, registry).is_ok_and(|driver| driver.describe().simulated == 0)
+}
+
 /// Whether the drives could be claimed, as far as that can be told without them.
 pub fn check_driver(machine: &Machine, driver: &dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
     let context = driver_context(machine, joints);
@@ -122,8 +127,8 @@ pub fn check_driver(machine: &Machine, driver: &dyn Driver, joints: &JointSpace)
     driver.check(&context).map_err(|e| driver_refuses(machine, &e))
 }
 
-/// Claims the drives.
-pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
+/// Claims the drives: where they stand.
+pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<Attached, HostError> {
     let opened = driver.open(&driver_context(machine, joints)).and_then(|()| driver.start());
     opened.map_err(|e| driver_refuses(machine, &e))
 }
@@ -131,7 +136,25 @@ pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> 
 fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
     let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
     context.start_position = joints.to_joints(&machine.start);
+    for (described, joint) in context.joints.iter_mut().zip(&joints.joints) {
+        described.name = Name::new(&joint.name);
+        described.rotary = u32::from(joint.rotary);
+        described.limits = joint.limits;
+    }
+    let bit = |input: u32| 1_u64 << input.min(63);
+    context.inputs = machine.probe.map_or(0, |probe| bit(probe.input));
+    context.inputs |= machine.homing.iter().fold(0, |mask, homing| mask | bit(homing.input));
+    context.analog = (0..machine.analog.len()).fold(0, |mask, input| mask | 1 << input);
+    context.outputs = u64::MAX;
+    context.spindle = 1;
     context
+}
+
+/// A drive's code as its manual writes it, with the driver's words for it.
+pub fn code_text(driver: &dyn Driver, code: u32) -> String {
+    let number = if driver.describe().hexadecimal_codes == 0 { code.to_string() } else { format!("{code:#06x}") };
+    let words = driver.explain(code);
+    if words.as_str().is_empty() { number } else { format!("{number} ({})", words.as_str()) }
 }
 
 fn driver_refuses(machine: &Machine, error: &PluginError) -> HostError {
@@ -205,8 +228,10 @@ pub fn fine_config(
     machine: &Machine,
     joints: &JointSpace,
     planner: &PlannerDescription,
+    (driver, attached): (&DriverDescription, &Attached),
     switches: Switches,
 ) -> FineConfig {
+    let periods = |seconds: f64| (seconds / machine.fine_period_s).ceil() as u64;
     FineConfig {
         period_s: machine.fine_period_s,
         limits: joints.limits,
@@ -224,5 +249,10 @@ pub fn fine_config(
         dry_run: switches.dry_run,
         unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },
         record_drives: false,
+        attached: *attached,
+        enable_periods: periods(driver.enable_s),
+        disable_periods: periods(driver.disable_s),
+        reset_drives: switches.reset,
+        plans_from_rest: true,
     }
 }

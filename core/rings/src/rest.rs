@@ -13,6 +13,8 @@ pub enum RestCause {
     Already,
     /// The operator's abort, or a jog that is let go.
     Abort,
+    /// All joints are enabled: planning starts here.
+    Attached,
     /// An axis is called otherwise from here on ([`tandem_sdk::EventKind::Correct`]); nothing has moved.
     Corrected,
 }

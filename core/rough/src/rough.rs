@@ -19,6 +19,8 @@ pub struct RoughConfig {
     /// Program time that the planner is asked for at a time, s: a rough period, or more where the ring would not hold the
     /// worst stop of the machine in pieces that short.
     pub advance_s: f64,
+    /// Nothing is planned before the joints are enabled, and then from where they stand ([`tandem_rings::RestCause::Attached`]).
+    pub awaits_drives: bool,
     /// Share of the worst stop that the queue holds: 1, or the machine cannot use the speed that is planned. Tests show
     /// with less what the depth is for.
     pub depth_factor: f64,
@@ -27,7 +29,7 @@ pub struct RoughConfig {
 impl RoughConfig {
     /// The configuration of a machine with these periods, s.
     pub fn new(rough_period_s: f64, fine_period_s: f64) -> Self {
-        Self { rough_period_s, fine_period_s, advance_s: rough_period_s, depth_factor: 1.0 }
+        Self { rough_period_s, fine_period_s, advance_s: rough_period_s, awaits_drives: false, depth_factor: 1.0 }
     }
 }
 
@@ -102,6 +104,8 @@ pub struct RoughLoop {
     line: u32,
     last_block: u64,
     pub(crate) done: bool,
+    /// The joints are not enabled yet.
+    pub(crate) awaits_drives: bool,
 }
 
 impl RoughLoop {
@@ -123,6 +127,7 @@ impl RoughLoop {
             line: 0,
             last_block: 0,
             done: false,
+            awaits_drives: config.awaits_drives,
         }
     }
 
@@ -133,6 +138,9 @@ impl RoughLoop {
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Progress, RoughError> {
         let rested = self.take_rests(observer);
         self.source.period();
+        if self.awaits_drives && rested.is_ok() {
+            return Ok(Progress::Working);
+        }
         let result = rested.and_then(|()| self.fill(observer));
         self.queue.flush(self.stretch_over || result.is_err());
         self.queue.tell_of_blocks(observer);

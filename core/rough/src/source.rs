@@ -31,7 +31,7 @@ pub trait Source {
 
     /// The machine rests at `rest.position`, before the end of what was planned: behind an edge that a block waited for
     /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), after the operator's abort, or after
-    /// a jog that was let go; or it is called otherwise (homing). The next block starts there. Whether the stream goes on;
+    /// a jog that was let go; or it is called otherwise (homing); or the joints are enabled there, before anything moves. The next block starts there. Whether the stream goes on;
     /// where not, the program is over.
     fn provide_rest(&mut self, rest: &Rest) -> bool;
 }
@@ -74,7 +74,7 @@ impl Source for Stream {
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         match rest.cause {
-            RestCause::Abort | RestCause::Corrected => self.set_position(rest.position),
+            RestCause::Abort | RestCause::Corrected | RestCause::Attached => self.set_position(rest.position),
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
                 self.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
             }

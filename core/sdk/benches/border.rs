@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, KinematicsContext, NoOptions,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, KinematicsContext, NoOptions,
     PluginError, Setpoint,
 };
 
@@ -23,8 +23,8 @@ impl Driver for Counter {
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::default())
     }
     #[inline]
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {

@@ -8,8 +8,8 @@
 //! | contract | loop | may allocate |
 //! |---|---|---|
 //! | [`Planner`], [`FeedStrategy`] | rough (soft) | yes, but not in a steady state |
-//! | [`Driver::exchange`], [`Driver::quick_stop`], [`Kinematics`] | fine (hard) | no |
-//! | factories, [`Driver::open`], [`Driver::start`], [`Driver::stop`] | host, outside the loops | yes |
+//! | [`Driver::send`], [`Driver::exchange`], [`Driver::quick_stop`], [`Kinematics`] | fine (hard) | no |
+//! | factories, [`Driver::open`], [`Driver::start`], [`Driver::stop`], [`Driver::explain`] | host, outside the loops | yes |
 //!
 //! No plugin reads a clock or a source of randomness: time and seeds are arguments.
 
@@ -35,7 +35,8 @@ mod text;
 pub use axis::{Axes, AxisVector, MAX_AXES};
 pub use block::{ArcGeometry, Block, BlockKind, NurbsData, NurbsGeometry, OwnedBlock, PathMode};
 pub use driver::{
-    Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_LATCHES, Setpoint,
+    Arm, Attached, Driver, DriverContext, DriverDescription, Feedback, JointDescription, JointState, Latch, MAX_ANALOG,
+    MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_LATCHES, Name, Setpoint,
 };
 pub use error::PluginError;
 pub use event::{Event, EventKind};
@@ -50,6 +51,7 @@ pub use plugin::{Made, Plugin, PluginKind};
 pub use segment::{Edge, Segment, SegmentFlags, StopOn};
 pub use slice::RawSlice;
 pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
+pub use text::Words;
 
 #[doc(hidden)]
 pub use serde;
@@ -59,7 +61,7 @@ pub use serde;
 extern crate self as tandem_sdk;
 
 /// Number of the plugin contract. A plugin built against another number is refused.
-pub const ABI_VERSION: u32 = 2;
+pub const ABI_VERSION: u32 = 3;
 
 /// The size field of a `repr(C)` structure, as every contract structure begins with it.
 ///

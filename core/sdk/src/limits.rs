@@ -33,6 +33,21 @@ layout!(AxisLimits {
     speed_difference_mm_per_s
 });
 
+impl AxisLimits {
+    /// No limit at all. Any loop; does not allocate.
+    pub const fn unlimited() -> Self {
+        Self {
+            min_mm: f64::NEG_INFINITY,
+            max_mm: f64::INFINITY,
+            feed_mm_per_s: f64::INFINITY,
+            rapid_mm_per_s: f64::INFINITY,
+            acceleration_mm_per_s2: f64::INFINITY,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: f64::INFINITY,
+        }
+    }
+}
+
 /// Limits along a path at one point: the largest path speed, acceleration and jerk that keep every axis and joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]

@@ -1,6 +1,6 @@
 //! A text that crosses the contract with its owner.
 
-use crate::abi::layout::layout;
+use crate::abi::layout::{Layout, START, fold, fold_text, layout};
 use std::fmt;
 use std::mem::ManuallyDrop;
 
@@ -63,6 +63,44 @@ impl Clone for Text {
             None => Self { release: None, ..*self },
             Some(_) => Self::owned(self.as_str().to_string()),
         }
+    }
+}
+
+/// Words of a plugin, such as what a fault code means; empty where it has none.
+#[derive(Clone, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Words(Text);
+
+impl Layout for Words {
+    const HASH: u64 = fold(fold_text(START, "Words"), Text::HASH);
+}
+
+impl Words {
+    /// Words made up at run time. Allocates: not for the fine loop.
+    pub fn new(words: impl Into<String>) -> Self {
+        Self(Text::owned(words.into()))
+    }
+
+    /// Fixed words. Any loop; does not allocate.
+    pub const fn fixed(words: &'static str) -> Self {
+        Self(Text::fixed(words))
+    }
+
+    /// The words. Any loop; does not allocate.
+    pub fn as_str(&self) -> &str {
+        self.0.as_str()
+    }
+}
+
+impl Default for Words {
+    fn default() -> Self {
+        Self::fixed("")
+    }
+}
+
+impl fmt::Debug for Words {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint, local_plugin};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint, local_plugin,
+};
 
 static CALLS: AtomicU32 = AtomicU32::new(0);
 
@@ -23,9 +25,9 @@ impl Driver for Panics {
         CALLS.fetch_add(1, Relaxed);
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         CALLS.fetch_add(1, Relaxed);
-        Ok(())
+        Ok(Attached::default())
     }
     fn exchange(&mut self, _setpoint: &Setpoint, _feedback: &mut Feedback) -> Result<(), PluginError> {
         CALLS.fetch_add(1, Relaxed);
@@ -50,7 +52,7 @@ fn nothing_is_called_after_a_panic() {
     assert_eq!(CALLS.load(Relaxed), 2);
     let later = [
         driver.open(&DriverContext::new(1, 0.001)),
-        driver.start(),
+        driver.start().map(|_| ()),
         driver.exchange(&Setpoint::default(), &mut Feedback::default()),
         driver.stop(),
     ];

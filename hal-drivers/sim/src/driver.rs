@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_AXES,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_AXES,
     PluginError, Setpoint,
 };
 
@@ -270,7 +270,7 @@ impl Driver for SimulatedDrives {
         Ok(())
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         const REFUSED: [&str; 3] =
             ["sim: start is refused: the driver is closed", "", "sim: start is refused: the driver is already running"];
         self.refuse_unless(Life::Opened, REFUSED)?;
@@ -285,7 +285,7 @@ impl Driver for SimulatedDrives {
         self.quick_stopping = false;
         self.watchdog = Watchdog::new(self.options.watchdog_periods);
         self.life = Life::Running;
-        Ok(())
+        Ok(Attached::at(self.start_position))
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {

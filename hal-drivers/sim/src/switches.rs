@@ -67,7 +67,13 @@ impl Switches {
                 (line.on, line.bouncing) = (on, line.bounce_periods);
                 if let Some(latch) = free.next().filter(|_| self.latching) {
                     let position = edge(from, to, |at| is_on(shapes.iter(), at));
-                    *latch = Latch { input: line.input, edge: if on { 1 } else { 2 }, position };
+                    *latch = Latch {
+                        input: line.input,
+                        edge: if on { 1 } else { 2 },
+                        joints: u32::MAX,
+                        position,
+                        ..Latch::default()
+                    };
                 }
             }
             let shown = if line.bouncing > 0 { random_bit(&mut self.random) } else { line.on };

@@ -4,7 +4,7 @@
 
 use tandem_conformance::{CountingAllocator, Setup, judge};
 use tandem_sdk::{
-    Answer, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Feedback, Kinematics,
+    Answer, Attached, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Feedback, Kinematics,
     KinematicsContext, Plugin, PluginError, Setpoint, StrategyContext, Window, local_plugin,
 };
 
@@ -36,18 +36,18 @@ impl Uses {
     }
 }
 
-struct Drives(Uses, usize);
+struct Drives(Uses, usize, AxisVector);
 
 impl Driver for Drives {
     fn describe(&self) -> DriverDescription {
         DriverDescription::simulated()
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.1 = context.joint_count as usize;
+        (self.1, self.2) = (context.joint_count as usize, context.start_position);
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::at(self.2))
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);
@@ -90,7 +90,7 @@ fn assert_found(plugin: Plugin, call: u64) {
 
 #[test]
 fn one_use_of_the_heap_is_found() {
-    assert_found(local_plugin!(driver "drives" = |o: &Options| Ok(Drives(Uses::new(o), 0))), 1500);
+    assert_found(local_plugin!(driver "drives" = |o: &Options| Ok(Drives(Uses::new(o), 0, AxisVector::ZERO))), 1500);
     assert_found(
         local_plugin!(feed_strategy "feeds" = |o: &Options, _: &StrategyContext| Ok(Feeds(Uses::new(o)))),
         1500,

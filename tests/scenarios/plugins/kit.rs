@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use tandem_conformance::{Setup, judge};
 use tandem_sdk::{
-    Accepted, Advanced, Answer, AxisVector, Block, BlockReport, Driver, DriverContext, DriverDescription, FeedStrategy,
-    Feedback, JointState, Kinematics, KinematicsContext, Planner, PlannerContext, PlannerDescription, Plugin,
-    PluginError, Segment, SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window, local_plugin,
+    Accepted, Advanced, Answer, Attached, AxisVector, Block, BlockReport, Driver, DriverContext, DriverDescription,
+    FeedStrategy, Feedback, JointState, Kinematics, KinematicsContext, Planner, PlannerContext, PlannerDescription,
+    Plugin, PluginError, Segment, SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window, local_plugin,
 };
 
 tandem_sdk::options! {
@@ -135,11 +135,11 @@ impl FeedStrategy for Feeds {
     }
 }
 
-struct Drives(Defect, usize);
+struct Drives(Defect, usize, AxisVector);
 
 impl Drives {
     fn open(options: &Options) -> Result<Self, PluginError> {
-        Ok(Self(Defect::new(options), 0))
+        Ok(Self(Defect::new(options), 0, AxisVector::ZERO))
     }
 }
 
@@ -148,11 +148,11 @@ impl Driver for Drives {
         DriverDescription::simulated()
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.1 = context.joint_count as usize;
+        (self.1, self.2) = (context.joint_count as usize, context.start_position);
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::at(self.2))
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);

@@ -33,7 +33,9 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let real_time = options.session.clock == args::Clock::Wall;
     let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
     let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
-    let switches = Switches { home: options.session.home, ..Switches::default() };
+    let clock = if real_time { Clock::Wall } else { Clock::Virtual };
+    let (home, reset) = (options.session.home, options.session.reset);
+    let switches = Switches { home, reset, unhomed: true, clock: Some(clock), ..Switches::default() };
     let hand = Hand::new(Arc::clone(&shared), script);
     let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(hand.clone()))?;
     let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
@@ -41,10 +43,10 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let faulted = loop {
         let run = session.enable()?;
         sinks.begin(options, &machine, session.jogs(), &run)?;
-        let clock = if real_time { Clock::Wall } else { Clock::Virtual };
         let outcome = run.drive(clock, &[], &mut sinks)?;
         sinks.end(outcome.summary.clone());
         session.stands_at(outcome.position);
+        session.reset_drives();
         let Some(fault) = outcome.summary.fault else { break false };
         shared.say(&format!("fault: {fault}; {} goes on from here", if shared.keys { "r" } else { RESET }));
         if !waits_for_reset(&hand, &shared, real_time)? {

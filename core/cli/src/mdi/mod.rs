@@ -31,6 +31,8 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         block_delete: options.machine.block_delete,
         pause_at_stops: attended,
         home: options.session.home,
+        reset: options.session.reset,
+        clock: Some(if real_time { Clock::Wall } else { Clock::Virtual }),
         ..Switches::default()
     };
     let shared = Arc::new(Shared::new(real_time, keys));
@@ -47,6 +49,7 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         shared.take_keys();
         sinks.end(&outcome.summary);
         session.stands_at(outcome.position);
+        session.reset_drives();
         let Some(fault) = &outcome.summary.fault else { break };
         faulted = true;
         say!("fault: {fault}; {RESET} goes on from here");

@@ -1,6 +1,7 @@
 //! Looking ahead in the queue without moving.
 
 use tandem_rings::Queued;
+use tandem_sdk::StopOn;
 
 use super::{Cursor, ends};
 use crate::course::{Course, Place};
@@ -26,6 +27,19 @@ impl Cursor {
             line.is_none()
         });
         line
+    }
+
+    /// What the motion that begins next at a rest waits for.
+    pub fn next_stop_on(&mut self) -> StopOn {
+        let (mut awaited, epoch) = (StopOn::default(), self.epoch);
+        self.walk(self.taken, Points::SEGMENTS, |queued| match queued {
+            Queued::Segment { segment, .. } if segment.epoch >= epoch => {
+                awaited = segment.stop_on;
+                false
+            }
+            _ => true,
+        });
+        awaited
     }
 
     /// Shows the queued entries from `number` on, at most `most` of them, until `look` says stop (`false`); gives the

@@ -12,15 +12,9 @@ use crate::state::Input;
 
 impl FineLoop {
     pub(super) fn exchange(&mut self, axes: &AxisVector) {
-        let joints = self.joints_of(axes);
-        let rate = 1.0 / self.config.period_s;
-        let velocity =
-            if self.setpoint.enable == 0 { AxisVector::ZERO } else { (joints - self.setpoint.position) * rate };
-        self.setpoint.acceleration = (velocity - self.setpoint.velocity) * rate;
-        self.setpoint.velocity = velocity;
-        self.setpoint.position = joints;
+        let joints = self.next_joints(axes);
         self.setpoint.tick = self.tick;
-        self.setpoint.enable = u32::from(!matches!(self.phase, Phase::Faulted));
+        self.setpoint.arm = self.arm;
         self.setpoint.outputs = self.outputs.bits;
         self.setpoint.spindle_rad_per_s = self.outputs.spindle_rad_per_s;
         let last = Numbers::of(&self.feedback);
@@ -29,12 +23,62 @@ impl FineLoop {
         let moving = matches!(self.phase, Phase::Following | Phase::Parted);
         let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
-        let reported = || answer::reported(&self.feedback, self.joints, moving);
-        let lost = || answer::following(&self.feedback, &joints, self.joints, &self.config.max_following_error_mm);
-        if let Some(kind) = fault.or_else(reported).or_else(lost) {
+        self.remember(&joints);
+        let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
+        let resets = self.is_resetting();
+        let reported = || answer::reported(&self.feedback, self.joints, moving).filter(|_| !resets && !letting_go);
+        let aims = answer::aims(&self.sent, &self.config.attached.delay_periods);
+        let far = || answer::following(&self.feedback, &aims, self.joints, &self.config.max_following_error_mm);
+        if let Some(kind) = fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go)) {
             self.fail(kind);
         }
+        self.watch_attach();
         self.watch_edge();
+        self.watch_letting_go(failed);
+    }
+
+    /// Where the joints are told to be, with what the setpoint says of their motion.
+    fn next_joints(&mut self, axes: &AxisVector) -> AxisVector {
+        if !self.attach.is_done() {
+            // They are told to be where they stand: that is no motion, though the numbers may change.
+            let joints = self.hold_still();
+            (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
+            self.setpoint.acceleration = AxisVector::ZERO;
+            return joints;
+        }
+        let (joints, rate) = (self.joints_of(axes), 1.0 / self.config.period_s);
+        let velocity = (joints - self.setpoint.position) * rate;
+        self.setpoint.acceleration = (velocity - self.setpoint.velocity) * rate;
+        (self.setpoint.position, self.setpoint.velocity) = (joints, velocity);
+        self.setpoint.enable = u32::from(!self.is_letting_go());
+        self.setpoint.reset = 0;
+        joints
+    }
+
+    /// Keeps what was sent, and what came back of it.
+    fn remember(&mut self, joints: &AxisVector) {
+        self.sent.push(joints);
+        self.measured.push(&self.feedback.position);
+        let is_old = self.feedback.age_periods[..self.joints].iter().any(|age| *age > 0);
+        self.counters.old_feedback_periods += u64::from(is_old);
+    }
+
+    /// Whether the drives are to let go: the program had ended before this period, or a fault has brought the machine to rest.
+    fn is_letting_go(&self) -> bool {
+        self.had_ended || matches!(self.phase, Phase::Faulted)
+    }
+
+    /// The exchange goes on until the brakes are closed, or the driver's time for it is over; a driver that `failed` knows of none.
+    fn watch_letting_go(&mut self, failed: bool) {
+        if self.setpoint.enable != 0 || !self.is_letting_go() {
+            return;
+        }
+        self.letting_go_periods += 1;
+        let holds = |state: &JointState| {
+            [JointState::Enabling, JointState::Enabled, JointState::Homing, JointState::QuickStop].contains(state)
+        };
+        let closed = failed || !self.feedback.state[..self.joints].iter().any(holds);
+        self.let_go |= closed || self.letting_go_periods >= self.config.disable_periods;
     }
 
     /// Whether the exchange failed; the driver's first words about it are kept for the host.

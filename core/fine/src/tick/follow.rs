@@ -41,6 +41,9 @@ impl FineLoop {
         if let Some(stop) = self.stop.filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting()) {
             return (*self.guard.position(), self.part(stop));
         }
+        if ask == Ask::Run && self.arm_next() {
+            return (*self.guard.position(), Input::Run);
+        }
         let delta_s = self.govern(ask);
         let waits = self.waits();
         let reached = self.cursor.advance(delta_s, |event| {

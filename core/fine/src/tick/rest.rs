@@ -4,10 +4,11 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{MachineState, Rest, RestCause, StopCause};
-use tandem_sdk::{AxisVector, Edge};
+use tandem_sdk::{Arm, AxisVector, Edge};
 
 use super::follow::Ask;
 use super::{FineLoop, Phase};
+use crate::edge::arm_for;
 use crate::fault::FaultKind;
 use crate::state::Input;
 
@@ -22,6 +23,10 @@ pub(super) struct Stop {
 impl Stop {
     pub(super) fn abort() -> Self {
         Self { cause: RestCause::Abort, latch: None }
+    }
+
+    pub(super) fn attached() -> Self {
+        Self { cause: RestCause::Attached, latch: None }
     }
 }
 
@@ -62,6 +67,18 @@ impl FineLoop {
         self.offset = self.offset - *by;
     }
 
+    /// At a rest: tells the drives what the next motion waits for. Whether they are told in this period, so that it begins in the
+    /// next one.
+    pub(super) fn arm_next(&mut self) -> bool {
+        if !self.cursor.is_resting() {
+            return false;
+        }
+        let arm = arm_for(&self.cursor.next_stop_on());
+        let is_new = arm != self.arm && arm != Arm::default();
+        self.arm = arm;
+        is_new
+    }
+
     /// Behind a move: a motion that waits for an edge may have begun.
     pub(super) fn begin_edge(&mut self) {
         if self.edge.begin(self.cursor.segment(), &self.feedback) {
@@ -75,7 +92,7 @@ impl FineLoop {
         if stop_on.edge == Edge::None || self.stop.is_some() || !matches!(self.phase, Phase::Following) {
             return;
         }
-        if let Some(latch) = self.edge.find(stop_on, &self.feedback) {
+        if let Some(latch) = self.edge.find(stop_on, &self.feedback, &self.measured, self.config.period_s) {
             self.stop = Some(Stop { cause: RestCause::Edge, latch: Some(latch) });
         }
     }
@@ -100,6 +117,7 @@ impl FineLoop {
         }
         self.cursor.part(self.guard.position());
         self.edge.end();
+        self.arm = Arm::default();
         self.preview.clear();
         self.line_end.forget();
         (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);

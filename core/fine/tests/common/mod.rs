@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
     Kinematics, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint,
 };
 
@@ -34,8 +34,8 @@ impl Driver for Echo {
         Ok(())
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::default())
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
@@ -105,6 +105,11 @@ impl Bench {
             dry_run: false,
             unhomed: 0,
             record_drives: false,
+            attached: Attached::default(),
+            enable_periods: 5000,
+            disable_periods: 5000,
+            reset_drives: false,
+            plans_from_rest: false,
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));

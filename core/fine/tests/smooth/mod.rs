@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
     PluginError, Segment, SegmentFlags, Setpoint,
 };
 
@@ -129,8 +129,8 @@ impl Driver for Echo {
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::default())
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
@@ -180,6 +180,11 @@ impl Machine {
             dry_run: false,
             unhomed: 0,
             record_drives: false,
+            attached: Attached::default(),
+            enable_periods: 5000,
+            disable_periods: 5000,
+            reset_drives: false,
+            plans_from_rest: false,
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,

@@ -3,7 +3,8 @@
 use std::sync::{Arc, Mutex};
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, PluginError, Setpoint,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, PluginError,
+    Setpoint,
 };
 
 use super::entry::Refusal;
@@ -22,8 +23,8 @@ impl Driver for Scribe {
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::default())
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         self.0.lock().unwrap().push(setpoint.tick);

@@ -1,6 +1,6 @@
 //! The wrapper: a driver around a driver.
 
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint};
+use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
 
 use super::kind::{Kind, Line, freeze};
 use super::random::Random;
@@ -82,7 +82,7 @@ impl Driver for Wrapper {
         self.inner.open(context)
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         self.schedule = Schedule::new(self.plan.when, self.random);
         self.line.clear();
         (self.handed, self.answered) = (Setpoint::default(), Feedback::default());
@@ -107,5 +107,9 @@ impl Driver for Wrapper {
 
     fn stop(&mut self) -> Result<(), PluginError> {
         self.inner.stop()
+    }
+
+    fn explain(&self, code: u32) -> Words {
+        self.inner.explain(code)
     }
 }

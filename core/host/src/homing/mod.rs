@@ -176,6 +176,9 @@ impl Source for Homing {
         };
         self.position = rest.position;
         self.awaiting = false;
+        if rest.cause == RestCause::Attached {
+            return true;
+        }
         if rest.cause == RestCause::Corrected {
             self.corrected = Some(*rest);
         }

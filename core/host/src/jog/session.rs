@@ -77,6 +77,11 @@ impl<'a> JogSession<'a> {
         Ok(run)
     }
 
+    /// The operator acknowledges the fault that ended the last run: the next one resets its drives.
+    pub fn reset_drives(&mut self) {
+        self.switches.reset = true;
+    }
+
     /// The run is over and the machine rests at `position`: the next one starts there.
     pub fn stands_at(&mut self, position: AxisVector) {
         self.machine.start = position;

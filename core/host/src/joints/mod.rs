@@ -144,6 +144,21 @@ impl JointSpace {
         }
     }
 
+    /// Axis positions at the joint positions `joints`, mm or rad.
+    pub fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        let axes = match &self.map {
+            Map::Axes => *joints,
+            Map::Linear(linear, _) => linear.to_axes(joints),
+            Map::Curved(kinematics) => calling(Method::KinematicsConvert, || kinematics.to_axes(joints)),
+        };
+        AxisVector::from_slice(&axes.0[..self.axes])
+    }
+
+    /// The name of joint `index`.
+    pub fn name(&self, index: usize) -> &str {
+        self.joints.get(index).map_or("?", |joint| &joint.name)
+    }
+
     /// Why `joints` are not known, where they are not: the plugin's own words, if it has any.
     ///
     /// # Errors

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, Plugin, PluginError, Setpoint,
-    local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, Plugin, PluginError,
+    Setpoint, local_plugin,
 };
 
 use super::{ARM, Arm, run};
@@ -75,10 +75,10 @@ tandem_sdk::options! {
 }
 
 /// Keeps what the drives are told. On the virtual clock everything runs on one thread.
-struct Recorder(Drives, usize);
+struct Recorder(Drives, usize, AxisVector);
 
 pub fn driver() -> Plugin {
-    local_plugin!(driver "recorder" = |options: &Drives| Ok(Recorder(options.clone(), 0)))
+    local_plugin!(driver "recorder" = |options: &Drives| Ok(Recorder(options.clone(), 0, AxisVector::ZERO)))
 }
 
 impl Driver for Recorder {
@@ -86,11 +86,11 @@ impl Driver for Recorder {
         DriverDescription::simulated()
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.1 = context.joint_count as usize;
+        (self.1, self.2) = (context.joint_count as usize, context.start_position);
         Ok(())
     }
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::at(self.2))
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);

@@ -10,8 +10,8 @@ use tandem_look_ahead::{LookAhead, Options};
 use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughError, RoughLoop, Source};
 use tandem_sdk::{
-    Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, MAX_AXES, PlannerContext,
-    StopOn, size_of_contract,
+    Attached, Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, MAX_AXES,
+    PlannerContext, StopOn, size_of_contract,
 };
 
 /// Fine period, s.
@@ -86,6 +86,11 @@ impl Rig {
             dry_run: false,
             unhomed: 0,
             record_drives: false,
+            attached: Attached::default(),
+            enable_periods: 5000,
+            disable_periods: 5000,
+            reset_drives: false,
+            plans_from_rest: false,
         };
         let options = "latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]";
         let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();

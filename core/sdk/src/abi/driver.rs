@@ -8,8 +8,8 @@ use super::entry::{self, Handle, Instance, ask, function};
 use super::layout::table;
 use super::watch::Method;
 use crate::{
-    Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, PluginKind, PluginOptions, RawSlice,
-    Setpoint, size_of_contract,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, PluginKind, PluginOptions,
+    RawSlice, Setpoint, Words, size_of_contract,
 };
 
 type Errors = *mut PluginError;
@@ -23,10 +23,12 @@ table! {
         describe: unsafe extern "C" fn(*const c_void, *mut DriverDescription, Errors) -> u32,
         check: unsafe extern "C" fn(*const c_void, *const DriverContext, *mut (), Errors) -> u32,
         claim: unsafe extern "C" fn(*mut c_void, *const DriverContext, *mut (), Errors) -> u32,
-        start: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+        start: unsafe extern "C" fn(*mut c_void, *mut Attached, Errors) -> u32,
+        send: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut (), Errors) -> u32,
         exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
         quick_stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
         stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
+        explain: unsafe extern "C" fn(*const c_void, u32, *mut Words, Errors) -> u32,
     }
 }
 
@@ -57,9 +59,11 @@ where
         check: check::<T>,
         claim: claim::<T>,
         start: start::<T>,
+        send: send::<T>,
         exchange: exchange::<T>,
         quick_stop: quick_stop::<T>,
         stop: stop::<T>,
+        explain: explain::<T>,
     };
 
     unsafe extern "C" fn open(
@@ -101,9 +105,23 @@ unsafe extern "C" fn claim<T: Driver>(
     unsafe { fault.guard("open", answer, error, || plugin.open(&*context)) }
 }
 
-unsafe extern "C" fn start<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
+unsafe extern "C" fn start<T: Driver>(this: *mut c_void, answer: *mut Attached, error: Errors) -> u32 {
     let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
     unsafe { fault.guard("start", answer, error, || plugin.start()) }
+}
+
+unsafe extern "C" fn send<T: Driver>(
+    this: *mut c_void,
+    setpoint: *const Setpoint,
+    answer: *mut (),
+    error: Errors,
+) -> u32 {
+    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
+    let work = || {
+        plugin.send(unsafe { &*setpoint });
+        Ok(())
+    };
+    unsafe { fault.guard("send", answer, error, work) }
 }
 
 unsafe extern "C" fn exchange<T: Driver>(
@@ -129,6 +147,11 @@ unsafe extern "C" fn quick_stop<T: Driver>(this: *mut c_void, answer: *mut (), e
 unsafe extern "C" fn stop<T: Driver>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
     let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
     unsafe { fault.guard("stop", answer, error, || plugin.stop()) }
+}
+
+unsafe extern "C" fn explain<T: Driver>(this: *const c_void, code: u32, answer: *mut Words, error: Errors) -> u32 {
+    let this = unsafe { &*this.cast::<Instance<T>>() };
+    unsafe { this.fault.guard("explain", answer, error, || Ok(this.plugin.explain(code))) }
 }
 
 /// The host's side: a driver behind its table.
@@ -169,8 +192,15 @@ impl Driver for Linked {
         })
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         ask(Method::DriverStart, |answer, error| unsafe { (self.table.start)(self.handle.instance, answer, error) })
+    }
+
+    fn send(&mut self, setpoint: &Setpoint) {
+        // A panic is told by the exchange that follows.
+        let _ = ask(Method::DriverSend, |answer, error| unsafe {
+            (self.table.send)(self.handle.instance, setpoint, answer, error)
+        });
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
@@ -190,5 +220,12 @@ impl Driver for Linked {
 
     fn stop(&mut self) -> Result<(), PluginError> {
         ask(Method::DriverStop, |answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) })
+    }
+
+    fn explain(&self, code: u32) -> Words {
+        let asked = ask(Method::DriverExplain, |answer, error| unsafe {
+            (self.table.explain)(self.handle.instance, code, answer, error)
+        });
+        asked.unwrap_or_default()
     }
 }

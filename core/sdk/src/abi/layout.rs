@@ -132,7 +132,7 @@ macro_rules! plain {
     };
 }
 
-plain!(u8, u32, i32, u64, usize, f64, bool);
+plain!(u8, u16, u32, i32, u64, i64, usize, f64, bool);
 
 impl<T: Layout, const N: usize> Layout for [T; N] {
     const HASH: u64 = fold(fold(fold_text(START, "array"), N as u64), T::HASH);

@@ -8,10 +8,11 @@ use super::watch::Method;
 use crate::log::{HostTable, LogLevel, LogRecord};
 use crate::text::Text;
 use crate::{
-    ABI_VERSION, Accepted, Advanced, ArcGeometry, Axes, AxisLimits, AxisVector, Block, BlockKind, BlockReport,
-    DriverContext, DriverDescription, Edge, Feedback, FineSample, JointLanes, JointState, KinematicsContext, Latch,
-    LimitedBy, Limits, NurbsGeometry, PathMode, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind,
-    RawSlice, Segment, SegmentFlags, Setpoint, StopOn, StrategyContext, Window, size_of_contract,
+    ABI_VERSION, Accepted, Advanced, ArcGeometry, Arm, Attached, Axes, AxisLimits, AxisVector, Block, BlockKind,
+    BlockReport, DriverContext, DriverDescription, Edge, Feedback, FineSample, JointDescription, JointLanes,
+    JointState, KinematicsContext, Latch, LimitedBy, Limits, Name, NurbsGeometry, PathMode, PlannerContext,
+    PlannerDescription, Plugin, PluginError, PluginKind, RawSlice, Segment, SegmentFlags, Setpoint, StopOn,
+    StrategyContext, Window, Words, size_of_contract,
 };
 
 /// What the exported symbol is called before the name of the crate. The number is that of [`Library`] itself.
@@ -174,7 +175,7 @@ macro_rules! structures {
 /// changed.
 static STRUCTURES: &[Structure] = &structures();
 
-const fn structures() -> [Structure; 44] {
+const fn structures() -> [Structure; 49] {
     structures![
         PluginKind,
         BlockKind,
@@ -191,6 +192,7 @@ const fn structures() -> [Structure; 44] {
         Limits,
         JointLanes,
         Text,
+        Words,
         PluginError,
         StopOn,
         ArcGeometry,
@@ -206,8 +208,12 @@ const fn structures() -> [Structure; 44] {
         StrategyContext,
         super::strategy::Description,
         super::strategy::Reply,
+        Name,
+        JointDescription,
         DriverContext,
         DriverDescription,
+        Attached,
+        Arm,
         Setpoint,
         Latch,
         Feedback,

@@ -61,6 +61,8 @@ methods!(
     DriverExchange = Driver "exchange",
     DriverQuickStop = Driver "quick_stop",
     DriverStop = Driver "stop",
+    DriverSend = Driver "send",
+    DriverExplain = Driver "explain",
     KinematicsNew = Kinematics "its constructor",
     KinematicsDrop = Kinematics "drop",
     KinematicsJointCount = Kinematics "joint_count",

@@ -1,6 +1,6 @@
 //! Driver: drives that follow exactly, and a CSV file of what they were told.
 
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint};
+use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint};
 
 tandem_sdk::options! {
     pub struct Options {
@@ -25,8 +25,8 @@ impl Driver for Recorder {
         std::fs::write(&self.0.file, "").map_err(|e| PluginError::of_option("file", e.to_string()))
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
-        Ok(())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(Attached::at(self.1.start_position))
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {

@@ -1,14 +1,16 @@
 //! A driver.
 
-use tandem_sdk::{Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError, Setpoint};
+use tandem_sdk::{
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError, Setpoint,
+};
 
 use crate::mischief::{Misbehave, Mischief, Options};
 
-pub struct Hostile(Mischief, usize);
+pub struct Hostile(Mischief, usize, AxisVector);
 
 impl Hostile {
     pub fn open(options: &Options) -> Result<Self, PluginError> {
-        Ok(Self(Mischief::new(options)?, 0))
+        Ok(Self(Mischief::new(options)?, 0, AxisVector::ZERO))
     }
 }
 
@@ -25,15 +27,15 @@ impl Driver for Hostile {
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.1 = context.joint_count as usize;
+        (self.1, self.2) = (context.joint_count as usize, context.start_position);
         self.0.of("open")?;
         // A thread of its own that goes wrong, where it is told so.
         let _ = std::thread::scope(|scope| scope.spawn(|| self.0.quietly("thread")).join());
         Ok(())
     }
 
-    fn start(&mut self) -> Result<(), PluginError> {
-        self.0.of("start").map(|_| ())
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        self.0.of("start").map(|_| Attached::at(self.2))
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {

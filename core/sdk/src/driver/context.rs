@@ -1,0 +1,195 @@
+//! What a driver is told when it is opened, and what it says of itself.
+
+use std::fmt;
+
+use crate::abi::layout::layout;
+use crate::{AxisLimits, AxisVector, MAX_AXES, size_of_contract};
+
+/// A short name that crosses the contract by value: UTF-8, cut at a character where it is too long, filled up with zeros.
+#[derive(Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub struct Name {
+    bytes: [u8; 32],
+}
+
+layout!(Name { bytes });
+
+impl Name {
+    /// `text`, or as much of it as there is room for. Any loop; does not allocate.
+    pub fn new(text: &str) -> Self {
+        let mut bytes = [0; 32];
+        let mut length = text.len().min(bytes.len());
+        while !text.is_char_boundary(length) {
+            length -= 1;
+        }
+        bytes[..length].copy_from_slice(&text.as_bytes()[..length]);
+        Self { bytes }
+    }
+
+    /// The text. Any loop; does not allocate.
+    pub fn as_str(&self) -> &str {
+        let length = self.bytes.iter().position(|byte| *byte == 0).unwrap_or(self.bytes.len());
+        std::str::from_utf8(&self.bytes[..length]).unwrap_or("a name that is not UTF-8")
+    }
+}
+
+impl fmt::Debug for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.as_str().fmt(f)
+    }
+}
+
+/// One joint that a driver moves.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct JointDescription {
+    /// Its name in the machine file; the letter of its axis where the joints are the axes.
+    pub name: Name,
+    /// 1 where it turns: its numbers are in rad. 0 where it slides: mm.
+    pub rotary: u32,
+    /// Method by which the drive itself homes it (`CiA 402` numbers); 0 where the host homes it, or nobody does.
+    pub homing_method: i32,
+    /// What it may do.
+    pub limits: AxisLimits,
+}
+
+layout!(JointDescription { name, rotary, homing_method, limits });
+
+/// What a driver is told when it is opened.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct DriverContext {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// Number of joints.
+    pub joint_count: u32,
+    /// Fine period: the time between two calls of `exchange`, s.
+    pub fine_period_s: f64,
+    /// Where a simulated machine stands at power-on, mm or rad per joint. Real drives know better.
+    pub start_position: AxisVector,
+    /// Seed for anything random a simulated driver does.
+    pub seed: u64,
+    /// The joints; the first `joint_count` count.
+    pub joints: [JointDescription; MAX_AXES],
+    /// Bit per digital input that the machine file expects of this driver.
+    pub inputs: u64,
+    /// Bit per digital output that the machine file expects of this driver.
+    pub outputs: u64,
+    /// Bit per analog input that the machine file expects of this driver.
+    pub analog: u32,
+    /// 1 where the spindle is this driver's.
+    pub spindle: u32,
+}
+
+layout!(DriverContext {
+    size,
+    joint_count,
+    fine_period_s,
+    start_position,
+    seed,
+    joints,
+    inputs,
+    outputs,
+    analog,
+    spindle
+});
+
+impl DriverContext {
+    /// A context for `joint_count` joints at zero, named by their numbers and without limits; nothing else is expected of the
+    /// driver. For tests of drivers. Host; does not allocate.
+    pub fn new(joint_count: usize, fine_period_s: f64) -> Self {
+        const NAMES: [&str; MAX_AXES] = ["0", "1", "2", "3", "4", "5", "6", "7"];
+        let joint = |i: usize| JointDescription {
+            name: Name::new(NAMES[i]),
+            rotary: 0,
+            homing_method: 0,
+            limits: AxisLimits::unlimited(),
+        };
+        Self {
+            size: size_of_contract::<Self>(),
+            joint_count: joint_count as u32,
+            fine_period_s,
+            start_position: AxisVector::ZERO,
+            seed: 0,
+            joints: std::array::from_fn(joint),
+            inputs: 0,
+            outputs: 0,
+            analog: 0,
+            spindle: 0,
+        }
+    }
+}
+
+/// What a driver says of itself, whatever the machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct DriverDescription {
+    /// Size of this structure in bytes.
+    pub size: u32,
+    /// 1 where no metal moves: `guard.mode = "count"` and the virtual clock are permitted.
+    pub simulated: u32,
+    /// 1 where the drives themselves fault when a joint is too far from its setpoint. A real driver that does not needs
+    /// `max_following_error` for each joint.
+    pub watches_following: u32,
+    /// 1 where an exchange may take longer than a fine period, as on a serial line: the host calls it on a thread of its own, and
+    /// the fine loop never waits for it.
+    pub slow: u32,
+    /// 1 where codes are written in hexadecimal, as `CiA 402` has them; 0 for decimal.
+    pub hexadecimal_codes: u32,
+    /// Reserved, zero.
+    pub reserved: u32,
+    /// Longest time that enabling all joints takes, brakes included, s; past it the host gives up and says which joint is not.
+    pub enable_s: f64,
+    /// Longest time from `enable = 0` to the last joint's [`crate::JointState::Disabled`], s. The exchange goes on until then.
+    pub disable_s: f64,
+}
+
+layout!(DriverDescription {
+    size,
+    simulated,
+    watches_following,
+    slow,
+    hexadecimal_codes,
+    reserved,
+    enable_s,
+    disable_s
+});
+
+/// Time that a driver which states nothing else has for enabling and for disabling, s: contactors, self-tests and brakes of
+/// ordinary drives take less than a second.
+const ORDINARY_S: f64 = 5.0;
+
+impl DriverDescription {
+    /// A simulated driver. Any loop; does not allocate.
+    pub const fn simulated() -> Self {
+        Self { simulated: 1, ..Self::real() }
+    }
+
+    /// A driver with real drives behind it. Any loop; does not allocate.
+    pub const fn real() -> Self {
+        Self {
+            size: size_of_contract::<Self>(),
+            simulated: 0,
+            watches_following: 0,
+            slow: 0,
+            hexadecimal_codes: 0,
+            reserved: 0,
+            enable_s: ORDINARY_S,
+            disable_s: ORDINARY_S,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_too_long_is_cut_at_a_character() {
+        assert_eq!(Name::new("x").as_str(), "x");
+        assert_eq!(Name::new("").as_str(), "");
+        let long = "a".repeat(31) + "ä";
+        assert_eq!(Name::new(&long).as_str(), "a".repeat(31));
+        assert_eq!(Name::new(&"b".repeat(32)).as_str(), "b".repeat(32));
+    }
+}
