@@ -12,7 +12,7 @@ const PROGRAMS: [&str; 2] = ["examples/programs/square.ngc", "tests/fixtures/pro
 
 fn run(program: &str, clock: &str) -> Done {
     // On a computer without a real-time kernel periods are missed; that shifts the samples in time, not in value.
-    let lenient = ["--set", "loops.max_missed_periods=1000000", "--clock", clock];
+    let lenient = ["--set", "loops.max_missed_periods=1000000", "--set", "loops.max_missed_share=1", "--clock", clock];
     let done = Scenario::of(&root().join(program)).with(&lenient).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     done
@@ -82,7 +82,11 @@ mod with_a_strategy {
     }
 
     fn run(clock: Clock) -> (Kept, bool) {
-        let overrides = [("feed_strategy.plugin", "fading"), ("loops.max_missed_periods", "1000000")];
+        let overrides = [
+            ("feed_strategy.plugin", "fading"),
+            ("loops.max_missed_periods", "1000000"),
+            ("loops.max_missed_share", "1"),
+        ];
         let machine = Machine::read(&mill(), &overrides.map(|(k, v)| (k.to_string(), v.to_string()))).unwrap();
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();

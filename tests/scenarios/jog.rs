@@ -233,7 +233,8 @@ fn a_machine_that_asks_for_homing_is_jogged_behind_it() {
 /// In real time with a socket.
 fn live(arguments: &[&str]) -> (Running, ChildStdin) {
     let mut run = Running::start_with("", |folder| {
-        let lenient = ["--set", "loops.max_missed_periods=1000000", "--listen", "s"];
+        let lenient =
+            ["--set", "loops.max_missed_periods=1000000", "--set", "loops.max_missed_share=1", "--listen", "s"];
         command(folder, &mill(), &lenient).args(arguments).spawn().unwrap()
     });
     let input = run.child().stdin.take().unwrap();
@@ -325,8 +326,16 @@ fn jogs_are_refused_where_a_program_runs() {
 
 #[test]
 fn keys_jog_and_the_terminal_is_as_it_was() {
-    let lenient =
-        ["--set", "loops.max_missed_periods=1000000", "--set", "operator.jog_keep_alive_ms=60000", "--listen", "s"];
+    let lenient = [
+        "--set",
+        "loops.max_missed_periods=1000000",
+        "--set",
+        "loops.max_missed_share=1",
+        "--set",
+        "operator.jog_keep_alive_ms=60000",
+        "--listen",
+        "s",
+    ];
     let start = |folder: &Path| shell(folder, &command(folder, &mill(), &lenient));
     if Command::new("script").arg("--version").stdout(Stdio::null()).status().is_err() {
         println!("skipped: there is no script(1) to make a terminal with");

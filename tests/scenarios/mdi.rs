@@ -114,7 +114,8 @@ fn a_fault_is_left_with_reset_from_where_the_machine_stands() {
 /// In real time with a socket, typed to bit by bit.
 fn live() -> (Running, std::process::ChildStdin) {
     let start = |folder: &Path| -> Child {
-        let lenient = ["--set", "loops.max_missed_periods=1000000", "--listen", "s"];
+        let lenient =
+            ["--set", "loops.max_missed_periods=1000000", "--set", "loops.max_missed_share=1", "--listen", "s"];
         command(folder, &lenient).spawn().unwrap()
     };
     let mut run = Running::start_with("", start);

@@ -87,7 +87,14 @@ impl Drop for Running {
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
     command.current_dir(folder).args(["run", "p.ngc", "--listen", "s", "--machine"]).arg(mill());
-    command.args(["--set", "loops.max_missed_periods=1000000", "--set", "motion.max_feed_ratio=2"]);
+    command.args([
+        "--set",
+        "loops.max_missed_periods=1000000",
+        "--set",
+        "loops.max_missed_share=1",
+        "--set",
+        "motion.max_feed_ratio=2",
+    ]);
     if !arguments.contains(&"--clock") {
         command.args(["--clock", "wall"]);
     }

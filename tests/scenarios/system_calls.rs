@@ -21,7 +21,7 @@ fn the_fine_thread_only_sleeps() {
         .arg(root().join("examples/programs/square.ngc"))
         .arg("--machine")
         .arg(mill())
-        .args(["--clock", "wall", "--set", "loops.max_missed_periods=1000000"])
+        .args(["--clock", "wall", "--set", "loops.max_missed_periods=1000000", "--set", "loops.max_missed_share=1"])
         .stdin(Stdio::null())
         .output();
     let Ok(output) = strace else {

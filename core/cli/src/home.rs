@@ -9,6 +9,7 @@ use tandem_sdk::{Event, EventKind};
 
 use crate::broken::Broken;
 use crate::report::Collector;
+use crate::run::tell_warnings;
 use crate::trace::TraceSink;
 use crate::{FAULT, args, built_in, clock};
 
@@ -40,6 +41,7 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
     for failure in outcome.summary.fault.iter().chain(&outcome.summary.stopped) {
         say!("fault: {failure}");
     }
+    tell_warnings(&outcome.summary);
     let failed = outcome.summary.fault.is_some() || outcome.summary.stopped.is_some() || broken.is_any();
     Ok(if failed { FAULT } else { 0 })
 }

@@ -13,6 +13,7 @@ use tandem_host::{Output, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
+use crate::run::tell_warnings;
 use crate::{FAULT, args, built_in, clock};
 
 /// Speeds of the air runs, rad/s: down to those of cutting, where friction is not viscous.
@@ -171,6 +172,7 @@ fn drive(machine: Machine, text: &str, options: &args::Identify, index: usize) -
     let run = Run::prepare(machine, &registry, program, Switches { clock: Some(clock), ..Switches::default() })?;
     let mut record = Record { index, rows: vec![] };
     let summary = run.drive(clock, &[], &mut record)?.summary;
+    tell_warnings(&summary);
     match summary.fault.or(summary.stopped) {
         Some(cause) => Err(cause.into()),
         None => Ok(record.rows),

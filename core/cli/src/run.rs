@@ -304,11 +304,16 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     if let Some(stopped) = stopped {
         say!("{stopped}");
     }
-    for warning in outcome.summary.warnings() {
-        say!("warning: {warning}");
-    }
+    tell_warnings(&outcome.summary);
     let whole = fault.is_none() && stopped.is_none() && outcome.summary.record_errors.is_empty();
     if whole { 0 } else { FAULT }
+}
+
+/// Says what is to be known of a run whatever its end.
+pub fn tell_warnings(summary: &Summary) {
+    for warning in summary.warnings() {
+        say!("warning: {warning}");
+    }
 }
 
 /// The stop that took longest to come to rest.

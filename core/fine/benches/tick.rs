@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use divan::counter::ItemsCount;
-use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits,
@@ -132,6 +132,7 @@ fn config(order: u32) -> FineConfig {
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
         max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+        missed: MissedLimits::default(),
         pause_at_stops: false,
         dry_run: false,
         unhomed: 0,

@@ -27,6 +27,22 @@ pub enum Joints {
     },
 }
 
+/// How many fine periods may go by in motion without a sample; more are a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissedLimits {
+    /// In a row.
+    pub in_a_row: u64,
+    /// Share of the periods of a sliding second; 1 for no limit.
+    pub share: f64,
+}
+
+impl Default for MissedLimits {
+    /// Two in a row, and 1 % of a second.
+    fn default() -> Self {
+        Self { in_a_row: 2, share: 0.01 }
+    }
+}
+
 /// Everything the fine loop is told before it runs.
 #[derive(Clone, Copy, Debug)]
 pub struct FineConfig {
@@ -48,6 +64,8 @@ pub struct FineConfig {
     pub max_feed_ratio: f64,
     /// Largest distance between the command and the feedback of a period, per joint, mm or rad; infinite for none.
     pub max_following_error_mm: AxisVector,
+    /// Which missed periods are a fault.
+    pub missed: MissedLimits,
     /// M0 and M6 wait for the operator; M1 does where the operator's switch is on.
     pub pause_at_stops: bool,
     /// Spindle, coolant and user outputs are not switched, and nothing waits for the operator.

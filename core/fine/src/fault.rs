@@ -107,8 +107,15 @@ pub enum FaultKind {
         /// Least rate of program time that was asked for meanwhile.
         asked: f64,
     },
-    /// More fine periods were missed than the machine allows.
-    MissedPeriods,
+    /// More fine periods were missed in motion than the machine allows.
+    MissedPeriods {
+        /// How many.
+        missed: u64,
+        /// How many are allowed.
+        most: u64,
+        /// They are among so many periods; none where they are in a row.
+        of_last: Option<u64>,
+    },
 }
 
 /// A fault with its place.

@@ -144,7 +144,7 @@ impl Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{GuardMode, Joints};
+    use crate::config::{GuardMode, Joints, MissedLimits};
     use tandem_sdk::{Attached, AxisLimits, Limits};
 
     /// A machine that may step by 2 mm/s, accelerate by 1000 mm/s², and moves at most 1 m.
@@ -168,6 +168,7 @@ mod tests {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+            missed: MissedLimits::default(),
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

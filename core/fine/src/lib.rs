@@ -22,6 +22,6 @@ mod state;
 mod steps;
 mod tick;
 
-pub use config::{FineConfig, GuardMode, Joints};
+pub use config::{FineConfig, GuardMode, Joints, MissedLimits};
 pub use fault::{Breach, Fault, FaultKind};
 pub use tick::{Counters, FineLoop};

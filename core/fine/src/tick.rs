@@ -6,6 +6,7 @@ mod follow;
 mod govern;
 mod joints;
 mod keep_alive;
+mod missed;
 mod progress;
 mod request;
 mod rest;
@@ -36,6 +37,7 @@ use crate::state::{self, Input};
 use attach::Attach;
 use joints::Lead;
 use keep_alive::KeepAlive;
+use missed::Missed;
 use progress::Progress;
 use rest::Stop;
 
@@ -58,7 +60,9 @@ pub struct Counters {
     pub late_ratios: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
-    /// Those among them beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
+    /// Those among them in which the machine moved.
+    pub missed_in_motion: u64,
+    /// Samples beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
     pub jerk_relaxed_samples: u64,
     /// Fine periods in which what is known of some joint was old: a frame was lost or late.
     pub old_feedback_periods: u64,
@@ -107,6 +111,7 @@ pub struct FineLoop {
     edge: EdgeWatch,
     stop: Option<Stop>,
     keep_alive: KeepAlive,
+    missed: Missed,
     progress: Progress,
     outputs: Outputs,
     phase: Phase,
@@ -175,6 +180,7 @@ impl FineLoop {
             edge: EdgeWatch::default(),
             stop: None,
             keep_alive: KeepAlive::default(),
+            missed: Missed::new(config),
             progress: Progress::new(config),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
@@ -222,15 +228,6 @@ impl FineLoop {
         }
         self.tick += u64::from(started);
         self.report();
-    }
-
-    /// Fine periods went by without a sample; more than `most` are a fault. Fine thread.
-    pub fn missed(&mut self, periods: u64, most: u64) {
-        self.counters.missed_periods += periods;
-        self.miss_beats(periods);
-        if periods > most {
-            self.fail(FaultKind::MissedPeriods);
-        }
     }
 
     /// Hands samples out through another ring from here on. Host, before the first tick.

@@ -121,7 +121,7 @@ fn every_way_into_a_fault_and_the_ramp_out() {
         match cause {
             0 => bench.host.controls.emergency_stop.store(true, Relaxed),
             1 => bench.host.controls.soft_fault.store(true, Relaxed),
-            2 => bench.fine.missed(3, 2),
+            2 => bench.fine.missed(3, 3),
             _ => bench.fail_drives(),
         }
         tick_until(&mut bench, MachineState::Fault);

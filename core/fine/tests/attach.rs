@@ -4,7 +4,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, Joints};
+use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
 use tandem_rig::Random;
 use tandem_rings::{HostEnd, MachineState, Queued, RestCause, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
@@ -123,6 +123,7 @@ impl Bench {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([0.01; MAX_AXES]),
+            missed: MissedLimits::default(),
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

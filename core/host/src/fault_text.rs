@@ -14,22 +14,28 @@ struct Names<'a> {
     drives: &'a dyn Driver,
 }
 
-/// What happened, who did it, where. `soft` is the cause of a fault on the soft side, `driver` what the driver said, and
-/// `drives` knows its codes.
-pub fn describe(
-    machine: &Machine,
-    joints: &JointSpace,
-    fault: &Fault,
-    soft: Option<&str>,
-    driver: Option<&PluginError>,
-    drives: &dyn Driver,
-) -> String {
-    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints, drives });
-    format!("{} (line {}, tick {}, {t_s:.3} s)", cause(&names, &fault.kind, soft, driver), fault.line, fault.tick)
+/// What others know of a fault.
+#[derive(Clone, Copy)]
+pub struct Known<'a> {
+    /// The cause of a fault on the soft side.
+    pub soft: Option<&'a str>,
+    /// What the driver or the kinematics said.
+    pub driver: Option<&'a PluginError>,
+    /// Knows what the drives' codes mean.
+    pub drives: &'a dyn Driver,
+    /// What made the fine loop late.
+    pub late: Option<&'a str>,
 }
 
-fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option<&PluginError>) -> String {
+/// What happened, who did it, where.
+pub fn describe(machine: &Machine, joints: &JointSpace, fault: &Fault, known: Known<'_>) -> String {
+    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints, drives: known.drives });
+    format!("{} (line {}, tick {}, {t_s:.3} s)", cause(&names, &fault.kind, known), fault.line, fault.tick)
+}
+
+fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
     let machine = names.machine;
+    let Known { soft, driver, late, .. } = known;
     match kind {
         FaultKind::Guard { breach, axis, value, limit } => names.guard(*breach, *axis, *value, *limit),
         FaultKind::Drive { joint, code } => {
@@ -84,8 +90,16 @@ fn cause(names: &Names<'_>, kind: &FaultKind, soft: Option<&str>, driver: Option
              at a rate of {asked:.6} asked for, on the plan of planner {}",
             machine.planner.plugin
         ),
-        FaultKind::MissedPeriods => {
-            format!("more than {} fine periods were missed: the drives saw a step", machine.max_missed_periods)
+        FaultKind::MissedPeriods { missed, most, of_last } => {
+            let late = late.unwrap_or("the computer was late");
+            let (which, key) = match of_last {
+                None => (format!("{missed} fine periods in a row"), "max_missed_periods"),
+                Some(of) => (format!("{missed} of the last {of} fine periods"), "max_missed_share"),
+            };
+            format!(
+                "{late}: {which} went by without a sample while the machine moved, loops.{key} allows {most}; \
+                 `tandem latency` shows what this computer keeps"
+            )
         }
     }
 }

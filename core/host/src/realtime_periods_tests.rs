@@ -3,9 +3,9 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode};
-use tandem_rings::{HostEnd, RoughEnd, Sizes, bridge};
-use tandem_sdk::{Attached, AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES};
+use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, MissedLimits};
+use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
+use tandem_sdk::{Attached, AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES, Segment, SegmentFlags};
 
 use super::{Body, PeriodClock, Timing, run};
 use crate::wall_clock::FineBody;
@@ -141,8 +141,8 @@ fn every_mixture_of_stalls_is_counted() {
     }
 }
 
-/// A fine loop that waits for its first segment, with both other ends so that the rings live.
-fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
+/// A fine loop with a minute of motion ahead, or none, and both other ends so that the rings live.
+fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
     let axis = AxisLimits {
         min_mm: -100.0,
         max_mm: 100.0,
@@ -162,6 +162,7 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         position: AxisVector::ZERO,
         max_feed_ratio: 1.0,
         max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+        missed: MissedLimits::default(),
         pause_at_stops: false,
         dry_run: false,
         unhomed: 0,
@@ -172,11 +173,28 @@ fn waiting() -> (FineLoop, RoughEnd, HostEnd) {
         reset_drives: false,
         plans_from_rest: false,
     };
-    let (rough, end, host) = bridge(Sizes { segments: 16, samples: 256 });
+    let (mut rough, end, host) = bridge(Sizes { segments: 16, samples: 1 << 17 });
+    if moves {
+        rough.segments.push(Queued::Segment { start_s: 0.0, segment: cruise() }).unwrap();
+        rough.depth.wall_s.store(f64::INFINITY);
+        rough.depth.required_s.store(0.0);
+    }
     let mut driver = tandem_sim::SimulatedDrives::new(tandem_sim::Options::default());
     driver.open(&DriverContext::new(3, 0.001)).unwrap();
     driver.start().unwrap();
-    (FineLoop::new(&config, end, Box::new(driver), None), rough, host)
+    let mut fine = FineLoop::new(&config, end, Box::new(driver), None);
+    fine.reset();
+    (fine, rough, host)
+}
+
+/// A minute at 1 mm/s, which the machine takes up at once.
+fn cruise() -> Segment {
+    let mut segment = Segment::rest(&AxisVector::ZERO, 60.0);
+    (segment.coefficients[0][1], segment.path[1]) = (1.0, 1.0);
+    segment.flags = SegmentFlags::ENDS_AT_REST;
+    segment.feed_mm_per_s = 1.0;
+    segment.stop_deceleration_mm_per_s2 = 1000.0;
+    segment
 }
 
 /// The fine loop, for at most so many more periods.
@@ -197,15 +215,39 @@ impl Body for AtMost {
     }
 }
 
+/// 1 s of a fine loop with these stalls asleep.
+fn second_of(moves: bool, stalls: Vec<(usize, i64)>) -> FineLoop {
+    let (fine, _rough, _host) = fine_loop(moves);
+    let mut clock = Scripted { now: Now::default(), sleeps: 0, stalls };
+    let mut body = AtMost(FineBody { fine, watch: None }, 900);
+    run(&mut clock, PERIOD_NS, &mut body, &mut Timing::default());
+    body.0.fine
+}
+
 #[test]
-fn more_missed_periods_than_allowed_are_a_fault() {
-    for (periods, faults) in [(1, false), (2, false), (3, true), (50, true)] {
-        let (fine, _rough, _host) = waiting();
-        let mut clock = Scripted { now: Now::default(), sleeps: 0, stalls: vec![(20, periods * PERIOD_NS)] };
-        let mut body = AtMost(FineBody { fine, max_missed: 2, watch: None }, 100);
-        run(&mut clock, PERIOD_NS, &mut body, &mut Timing::default());
-        let fine = body.0.fine;
-        assert_eq!(fine.counters().missed_periods, periods.unsigned_abs());
-        assert_eq!(fine.fault().map(|f| f.kind), faults.then_some(FaultKind::MissedPeriods), "{periods} periods");
+fn more_missed_periods_in_a_row_than_allowed_are_a_fault_in_motion() {
+    for (periods, faults) in [(1_i64, false), (2, false), (3, true), (50, true)] {
+        let missed = periods.unsigned_abs();
+        for moves in [true, false] {
+            let fine = second_of(moves, vec![(20, periods * PERIOD_NS)]);
+            let fault = FaultKind::MissedPeriods { missed, most: 2, of_last: None };
+            assert_eq!(fine.fault().map(|f| f.kind), (moves && faults).then_some(fault), "{periods} periods");
+            let counted = fine.counters();
+            assert_eq!((counted.missed_periods, counted.missed_in_motion), (missed, if moves { missed } else { 0 }));
+        }
+    }
+}
+
+#[test]
+fn a_stall_in_every_fiftieth_period_is_a_fault_at_the_eleventh_and_never_two_in_a_row() {
+    let stalls = |count: usize| (1..=count).map(|stall| (50 * stall, PERIOD_NS)).collect();
+    for (count, faults) in [(10, false), (11, true), (17, true)] {
+        let fine = second_of(true, stalls(count));
+        let fault = FaultKind::MissedPeriods { missed: 11, most: 10, of_last: Some(1000) };
+        assert_eq!(fine.fault().map(|f| f.kind), faults.then_some(fault), "{count} stalls");
+        // The eleventh ends it: the way to rest takes two periods.
+        let seen = if faults { 11 } else { count as u64 };
+        assert_eq!((fine.counters().missed_periods, fine.counters().missed_in_motion), (seen, seen));
+        assert_eq!(second_of(false, stalls(count)).fault(), None, "nothing moves");
     }
 }

@@ -14,7 +14,7 @@ use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
 use crate::command::Timed;
 use crate::error::HostError;
 use crate::exchange_time::{self, ExchangeTimes};
-use crate::fault_text::describe;
+use crate::fault_text::{Known, describe};
 use crate::hang::HangWatch;
 use crate::homing::Homing;
 use crate::joints::{JointSpace, JointWatch};
@@ -257,12 +257,9 @@ impl Run {
         pump.tell_policy_notes();
         pump.tell_plugin_log();
         let fault = fine.fault();
-        let text =
-            fault.map(|f| describe(&machine, &self.joints, &f, pump.soft_cause(), fine.plugin_error(), fine.driver()));
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
-        summary.fault = text;
         summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
         if let Some((timing, page_faults)) = measured {
             summary.overruns = timing.overruns;
@@ -270,6 +267,10 @@ impl Run {
             summary.page_faults = Some(page_faults);
             summary.exchange_us = Some(self.exchange.read());
         }
+        let late = summary.late_cause();
+        let known =
+            Known { soft: pump.soft_cause(), driver: fine.plugin_error(), drives: fine.driver(), late: late.as_deref() };
+        summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = self.switches.home || fine.joints_went_alone();
         let position = if sent { fine.sent() } else { pump.monitor.position };
@@ -299,7 +300,6 @@ fn periods(machine: &Machine) -> Periods {
     Periods {
         rough_ns: ns(machine.rough_period_s),
         fine_ns: ns(machine.fine_period_s),
-        max_missed: u64::from(machine.max_missed_periods),
         fine_thread: machine.fine_thread,
     }
 }
@@ -347,6 +347,7 @@ fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fi
         jerk_relaxed_samples: counters.jerk_relaxed_samples,
         overruns: 0,
         missed_periods: counters.missed_periods,
+        missed_in_motion: counters.missed_in_motion,
         lateness_us: None,
         exchange_us: None,
         page_faults: None,

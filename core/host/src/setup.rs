@@ -1,6 +1,6 @@
 //! From a machine to the parts of a run.
 
-use tandem_fine::FineConfig;
+use tandem_fine::{FineConfig, MissedLimits};
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
@@ -245,6 +245,7 @@ pub fn fine_config(
         position: joints.with_lanes(&machine.start),
         max_feed_ratio: machine.motion.max_feed_ratio,
         max_following_error_mm: joints.max_following_error_mm(),
+        missed: MissedLimits { in_a_row: u64::from(machine.max_missed_periods), share: machine.max_missed_share },
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
         unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },

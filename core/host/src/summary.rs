@@ -84,6 +84,8 @@ pub struct Summary {
     pub overruns: u64,
     /// Fine periods that passed without a sample.
     pub missed_periods: u64,
+    /// Those among them in which the machine moved.
+    pub missed_in_motion: u64,
     /// How late the fine loop woke; absent on the virtual clock.
     pub lateness_us: Option<LatenessUs>,
     /// How long the driver's exchange took; absent on the virtual clock.
@@ -141,35 +143,43 @@ impl Summary {
         if self.missed_periods == 0 && self.overruns == 0 {
             return vec![];
         }
-        let Self { missed_periods, overruns, samples, .. } = self;
-        let period_ms = self.fine_period_s * 1e3;
+        let Self { missed_periods, missed_in_motion, overruns, samples, .. } = self;
         let over = match overruns {
             0 => String::new(),
             1 => "; once the work of a period went past its end".to_string(),
             _ => format!("; {overruns} times the work of a period went past its end"),
         };
-        let exchange = self.exchange_us.filter(|exchange| exchange.longer_than_period > 0);
-        let late_us = self.lateness_us.map_or(0.0, |late| late.max);
-        let cause = match exchange {
-            Some(ExchangeUs { max, longer_than_period }) => format!(
-                ": the driver's exchange took longer than the period of {period_ms} ms {longer_than_period} times, \
+        let cause = self.late_cause().map(|cause| format!(": {cause}")).unwrap_or_default();
+        let beside = format!(
+            "{missed_periods} fine periods went by without a sample, {missed_in_motion} of them in motion, \
+             beside {samples} with one"
+        );
+        vec![beside + &over + &cause]
+    }
+
+    /// What made the fine loop late by a period or more, in words, where that is known.
+    pub fn late_cause(&self) -> Option<String> {
+        let period_ms = self.fine_period_s * 1e3;
+        if let Some(ExchangeUs { max, longer_than_period }) = self.exchange_us.filter(|e| e.longer_than_period > 0) {
+            return Some(format!(
+                "the driver's exchange took longer than the period of {period_ms} ms {longer_than_period} times, \
                  at most {:.3} ms",
                 max / 1e3
-            ),
-            None if late_us >= period_ms * 1e3 => {
-                format!(": the computer woke the fine loop up to {:.3} ms late", late_us / 1e3)
-            }
-            None => String::new(),
-        };
-        let beside = format!("{missed_periods} fine periods went by without a sample beside {samples} with one");
-        vec![beside + &over + &cause]
+            ));
+        }
+        let late_us = self.lateness_us?.max;
+        let late = late_us >= period_ms * 1e3;
+        late.then(|| format!("the computer woke the fine loop up to {:.3} ms late", late_us / 1e3))
     }
 
     /// How the periods of the fine loop were kept, in words; nothing on the virtual clock.
     pub fn timing(&self) -> Option<String> {
         let late_us = self.lateness_us?.max;
-        let Self { overruns, missed_periods, .. } = self;
-        Some(format!("overruns {overruns}, missed periods {missed_periods}, latest wake-up {late_us:.0} µs"))
+        let Self { overruns, missed_periods, missed_in_motion, .. } = self;
+        Some(format!(
+            "overruns {overruns}, missed periods {missed_periods}, in motion {missed_in_motion}, \
+             latest wake-up {late_us:.0} µs"
+        ))
     }
 }
 

@@ -27,8 +27,6 @@ pub struct Periods {
     pub rough_ns: i64,
     /// Fine period, ns.
     pub fine_ns: i64,
-    /// Missed periods in a row above which the machine faults.
-    pub max_missed: u64,
     /// What the fine thread asks of the computer.
     pub fine_thread: FineThread,
 }
@@ -55,7 +53,7 @@ pub fn drive(
     fine.hand_out_through(to_host);
     pump.host.samples = from_fine;
     fill_first(pump);
-    let body = FineBody { fine, max_missed: periods.max_missed, watch };
+    let body = FineBody { fine, watch };
     let thread = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
     for note in &thread.notes {
         pump.note(note);
@@ -79,8 +77,6 @@ fn fill_first(pump: &mut Pump<'_>) {
 /// The fine loop as the body of its thread.
 pub struct FineBody {
     pub fine: FineLoop,
-    /// Missed periods in a row above which the machine faults.
-    pub max_missed: u64,
     /// Who looks whether it comes back.
     pub watch: Option<FineWatch>,
 }
@@ -100,7 +96,7 @@ impl Body for FineBody {
     }
 
     fn missed(&mut self, periods: u64, in_a_row: u64) {
-        self.fine.missed(periods, self.max_missed.saturating_sub(in_a_row - periods));
+        self.fine.missed(periods, in_a_row);
     }
 }
 

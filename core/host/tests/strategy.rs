@@ -84,6 +84,7 @@ fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
         ("feed_strategy.plugin", "once".to_string()),
         ("feed_strategy.options.asks", format!("\"{asks}\"")),
         ("loops.max_missed_periods", "100000".to_string()),
+        ("loops.max_missed_share", "1".to_string()),
     ];
     let settings = settings.map(|(key, value)| (key.to_string(), value));
     let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");

@@ -35,8 +35,10 @@ pub struct Machine {
     pub fine_period_s: f64,
     /// How many fine periods a rough one has; at least 1.
     pub fine_periods_per_rough: u32,
-    /// Fine periods missed in a row above which the machine faults.
+    /// Fine periods missed in a row above which a machine that moves faults.
     pub max_missed_periods: u32,
+    /// Share of the fine periods of a sliding second, missed in motion, above which it faults, 0 to 1.
+    pub max_missed_share: f64,
     /// What the fine loop's thread asks of the computer.
     pub fine_thread: FineThread,
     /// Time without a period after which the fine loop counts as hung, s: the process ends, and the drives' watchdog acts.
@@ -206,6 +208,7 @@ impl Tables {
             fine_period_s: self.loops.fine_period_s,
             fine_periods_per_rough: self.loops.fine_periods_per_rough,
             max_missed_periods: self.loops.max_missed_periods,
+            max_missed_share: self.loops.max_missed_share,
             fine_thread: self.loops.fine_thread,
             fine_hang_after_s: self.loops.fine_hang_after_s,
             soft_hang_after_s: self.loops.soft_hang_after_s,

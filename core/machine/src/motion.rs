@@ -98,6 +98,7 @@ pub(crate) struct Loops {
     pub fine_period_s: f64,
     pub fine_periods_per_rough: u32,
     pub max_missed_periods: u32,
+    pub max_missed_share: f64,
     pub fine_thread: FineThread,
     pub fine_hang_after_s: f64,
     pub soft_hang_after_s: f64,
@@ -112,6 +113,10 @@ const FINE_HANG_AFTER_PERIODS: f64 = 1000.0;
 /// Time after which a call of a plugin on the soft side does not come back any more, s: drives on a field bus may take half a
 /// minute to start, and plans of the densest programs a few seconds.
 const SOFT_HANG_AFTER_S: f64 = 60.0;
+
+/// Share of the periods of a second that may be missed in motion. The drives bridge each of them by guessing; a computer that
+/// is set up for its period misses none in an hour, and one that misses one in a hundred will soon miss many in a row.
+const MAX_MISSED_SHARE: f64 = 0.01;
 
 impl Loops {
     /// Reads `[loops]`.
@@ -132,9 +137,20 @@ impl Loops {
             soft_hang_after_s: loops.at_least("soft_hang_after_s", 0.1).unwrap_or(SOFT_HANG_AFTER_S),
             fine_periods_per_rough: count.unwrap_or(1),
             max_missed_periods: loops.whole("max_missed_periods", 0, u32::MAX).unwrap_or(2),
+            max_missed_share: share(loops, "max_missed_share").unwrap_or(MAX_MISSED_SHARE),
             fine_thread,
         }
     }
+}
+
+/// Reads a share of a whole; `None` where it is absent or wrong, which is reported.
+fn share(loops: &Section<'_>, key: &str) -> Option<f64> {
+    let share = loops.at_least(key, 0.0)?;
+    if share > 1.0 {
+        loops.refuse(key, format!("must be at most 1, not {share}"));
+        return None;
+    }
+    Some(share)
 }
 
 fn fine_periods(loops: &Section<'_>, rough: f64, fine: f64) -> Option<u32> {

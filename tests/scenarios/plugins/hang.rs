@@ -18,7 +18,18 @@ fn hang(section: &str, method: &str, call: u32, clock: &str) -> Done {
     let machine = if section == "kinematics" { corexy } else { mill() };
     let acceleration: &[&str] =
         if section == "kinematics" { &["--set", "joints.a.max_acceleration_mm_per_s2=5000"] } else { &[] };
-    let settings = ["--set", &plugin, "--set", &options, "--clock", clock, "--set", "loops.max_missed_periods=1000000"];
+    let settings = [
+        "--set",
+        &plugin,
+        "--set",
+        &options,
+        "--clock",
+        clock,
+        "--set",
+        "loops.max_missed_periods=1000000",
+        "--set",
+        "loops.max_missed_share=1",
+    ];
     Scenario::text(PROGRAM).on(&machine).with(acceleration).with(&settings).with(&patience).run()
 }
 

@@ -45,6 +45,9 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         sinks.begin(options, &machine, session.jogs(), &run)?;
         let outcome = run.drive(clock, &[], &mut sinks)?;
         sinks.end(outcome.summary.clone());
+        for warning in outcome.summary.warnings() {
+            shared.say(&format!("warning: {warning}"));
+        }
         session.stands_at(outcome.position);
         session.reset_drives();
         let Some(fault) = outcome.summary.fault else { break false };

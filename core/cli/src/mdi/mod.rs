@@ -12,6 +12,7 @@ use tandem_rings::{Rest, Sample};
 
 use crate::broken::Broken;
 use crate::operator::{Operator, Presence, is_on_terminal};
+use crate::run::tell_warnings;
 use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in};
 
@@ -48,6 +49,7 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         let outcome = run.drive(clock, &[], &mut sinks)?;
         shared.take_keys();
         sinks.end(&outcome.summary);
+        tell_warnings(&outcome.summary);
         session.stands_at(outcome.position);
         session.reset_drives();
         let Some(fault) = &outcome.summary.fault else { break };

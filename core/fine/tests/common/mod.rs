@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
@@ -101,6 +101,7 @@ impl Bench {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+            missed: MissedLimits::default(),
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

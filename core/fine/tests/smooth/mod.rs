@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
@@ -189,6 +189,7 @@ impl Machine {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+            missed: MissedLimits::default(),
             pause_at_stops: false,
         };
         let (mut rough, end, host) = bridge(Sizes { segments: 4096, samples: 4096 });

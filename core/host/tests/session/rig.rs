@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
 use tandem_gcode::Item;
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
@@ -82,6 +82,7 @@ impl Rig {
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
+            missed: MissedLimits::default(),
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

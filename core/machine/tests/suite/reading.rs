@@ -29,6 +29,7 @@ fn three_axis_mill() {
     assert_eq!((machine.name.as_str(), letters(&machine).as_str()), ("three-axis mill", "XYZ"));
     assert_eq!((machine.rough_period_s, machine.fine_period_s), (0.008, 0.001));
     assert_eq!((machine.fine_periods_per_rough, machine.max_missed_periods), (8, 2));
+    assert_eq!(machine.max_missed_share, 0.01);
     assert_eq!((machine.motion.path_tolerance_mm, machine.motion.time_constant_s), (0.01, 0.05));
     assert_eq!((machine.motion.jerk, machine.guard), (JerkMode::Report, GuardMode::Stop));
     let z = machine.limits.axes()[2];
@@ -130,6 +131,7 @@ fn plugins() {
 fn the_other_tables() {
     let machine = full();
     assert_eq!((machine.fine_periods_per_rough, machine.max_missed_periods), (16, 3));
+    assert_eq!(machine.max_missed_share, 0.05);
     assert_eq!(machine.motion.max_feed_ratio, 1.5);
     assert_eq!(machine.faults.unwrap()["seed"].as_integer(), Some(7));
     let policy = machine.policy.unwrap();
@@ -162,9 +164,9 @@ fn tools() {
 fn places() {
     let machine = read(&fixtures().join("good/full.toml"), &["planner.options.zeta=2"]).unwrap();
     let place = |key: &str| machine.place(key).to_string().replace(&format!("{}/", fixtures().display()), "");
-    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:26:1");
+    assert_eq!(place("axes.x.travel_mm"), "good/full.toml:27:1");
     assert_eq!(place("axes.x.max_jerk_mm_per_s3"), "good/shared/axes.toml:9:1");
-    assert_eq!(place("planner.options.gamma"), "good/full.toml:78:10", "the table, where the key is absent");
+    assert_eq!(place("planner.options.gamma"), "good/full.toml:79:10", "the table, where the key is absent");
     assert_eq!(place("guard.severity"), "good/shared/drives.toml:10:2");
     assert_eq!(place("coolant"), "good/full.toml:1:1");
     assert_eq!(machine.place("planner.options.zeta"), Place::Override("planner.options.zeta".to_owned()));

@@ -1,0 +1,87 @@
+//! Fine periods that went by without a sample. At rest they cost nothing and are counted; in motion the drives had to
+//! bridge them, and can so only for a while.
+
+use super::FineLoop;
+use crate::config::FineConfig;
+use crate::fault::FaultKind;
+
+/// What the share of missed periods is looked at over, s.
+const WINDOW_S: f64 = 1.0;
+/// The same at most, in periods: 1 MHz, so that a period of nonsense asks for no nonsense of memory.
+const MOST_WINDOW_PERIODS: f64 = 1e6;
+
+/// What was missed in motion: in a row, and in the last second.
+///
+/// The last periods that were missed are remembered by their numbers, one more of them than the share allows in a window:
+/// where the oldest of them is still in the window, there are too many. So a period that is kept costs nothing.
+#[derive(Debug)]
+pub(super) struct Missed {
+    most_in_a_row: u64,
+    in_a_row: u64,
+    window_periods: u64,
+    /// Numbers of the periods that were missed last, a ring; empty where the share allows all of them.
+    last: Box<[u64]>,
+    next: usize,
+}
+
+impl Missed {
+    /// Nothing missed. Host; allocates.
+    pub(super) fn new(config: &FineConfig) -> Self {
+        let window = (WINDOW_S / config.period_s).round().clamp(1.0, MOST_WINDOW_PERIODS);
+        // A share that was written as a decimal number is not to lose a period by its last bit.
+        let most = (config.missed.share * window * (1.0 + 4.0 * f64::EPSILON)).floor();
+        let remembered = if most < window { most as usize + 1 } else { 0 };
+        Self {
+            most_in_a_row: config.missed.in_a_row,
+            in_a_row: 0,
+            window_periods: window as u64,
+            // Not zero: memory that is written to here is not mapped in a fine period.
+            last: vec![u64::MAX; remembered].into_boxed_slice(),
+            next: 0,
+        }
+    }
+
+    /// The periods from `first` on were missed in motion, as part of a row. Bounded by the window.
+    fn count(&mut self, first: u64, periods: u64) -> Option<FaultKind> {
+        self.in_a_row = self.in_a_row.saturating_add(periods);
+        if self.in_a_row > self.most_in_a_row {
+            let (missed, most) = (self.in_a_row, self.most_in_a_row);
+            return Some(FaultKind::MissedPeriods { missed, most, of_last: None });
+        }
+        // More than are remembered at once are too many anyway.
+        let too_many = (first..first + periods.min(self.last.len() as u64)).any(|period| self.remember(period));
+        let (missed, most) = (self.last.len() as u64, (self.last.len() as u64).saturating_sub(1));
+        too_many.then_some(FaultKind::MissedPeriods { missed, most, of_last: Some(self.window_periods) })
+    }
+
+    /// Whether those remembered with `period` lie in one window.
+    fn remember(&mut self, period: u64) -> bool {
+        self.last[self.next] = period;
+        self.next = (self.next + 1) % self.last.len();
+        // What was never missed stands for a time that has not come.
+        period.checked_sub(self.last[self.next]).is_some_and(|passed| passed < self.window_periods)
+    }
+}
+
+impl FineLoop {
+    /// `periods` fine periods went by without a sample, `in_a_row` of them with those that were reported before them.
+    ///
+    /// In motion more in a row than [`crate::MissedLimits::in_a_row`], or more of a sliding second than
+    /// [`crate::MissedLimits::share`], are a fault. Fine thread; does not allocate; bounded work.
+    pub fn missed(&mut self, periods: u64, in_a_row: u64) {
+        let first = self.tick.saturating_add(self.counters.missed_periods);
+        self.counters.missed_periods += periods;
+        self.miss_beats(periods);
+        if in_a_row == periods {
+            self.missed.in_a_row = 0;
+        }
+        // What was sent last moves, or nothing does.
+        if self.guard.velocity().0.iter().all(|speed| *speed == 0.0) {
+            return;
+        }
+        self.counters.missed_in_motion += periods;
+        if let Some(kind) = self.missed.count(first, periods) {
+            self.fail(kind);
+        }
+    }
+}
