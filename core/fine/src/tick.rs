@@ -254,6 +254,11 @@ impl FineLoop {
         self.tick
     }
 
+    /// How much later than its bus wants it the last exchange was, ns; `None` as long as no driver tells. Fine thread.
+    pub fn phase_ns(&self) -> Option<i64> {
+        None
+    }
+
     /// What was counted so far.
     pub fn counters(&self) -> Counters {
         self.counters

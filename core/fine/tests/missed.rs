@@ -37,8 +37,8 @@ fn cause(bench: &Bench) -> Option<FaultKind> {
     bench.fine.fault().map(|fault| fault.kind)
 }
 
-const fn in_a_row(missed: u64) -> Option<FaultKind> {
-    Some(FaultKind::MissedPeriods { missed, most: IN_A_ROW, of_last: None })
+const fn in_a_row(missed: u64) -> FaultKind {
+    FaultKind::MissedPeriods { missed, most: IN_A_ROW, of_last: None }
 }
 
 const OF_LAST: Option<FaultKind> =
@@ -47,7 +47,7 @@ const OF_LAST: Option<FaultKind> =
 #[test]
 fn in_motion_one_more_in_a_row_than_allowed_is_a_fault() {
     for (missed, fault) in
-        [(1, None), (2, None), (3, in_a_row(3)), (50, in_a_row(50)), (u64::MAX / 2, in_a_row(u64::MAX / 2))]
+        [(1, None), (2, None), (3, Some(in_a_row(3))), (50, Some(in_a_row(50))), (u64::MAX / 2, Some(in_a_row(u64::MAX / 2)))]
     {
         let mut bench = cruising();
         bench.fine.missed(missed, missed);
@@ -64,7 +64,7 @@ fn a_row_that_is_reported_in_two_parts_is_one_row_and_two_rows_are_two() {
     bench.fine.missed(2, 2);
     assert_eq!(cause(&bench), None, "a sample lies between them");
     bench.fine.missed(1, 3);
-    assert_eq!(cause(&bench), in_a_row(3));
+    assert_eq!(cause(&bench), Some(in_a_row(3)));
 }
 
 #[test]
@@ -153,7 +153,7 @@ proptest! {
             if missed > 0 {
                 bench.fine.missed(missed, missed);
             }
-            let mut expected = if missed > IN_A_ROW { in_a_row(missed) } else { None };
+            let mut expected = if missed > IN_A_ROW { Some(in_a_row(missed)) } else { None };
             for period in now..now + missed {
                 list.push_back(period);
                 while list.front().is_some_and(|first| period - first >= 1000) { list.pop_front(); }

@@ -25,6 +25,7 @@ mod manual;
 mod monitor;
 pub mod operator;
 mod path_watch;
+mod phase;
 mod plugin_log;
 mod policy;
 mod pump;

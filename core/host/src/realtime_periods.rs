@@ -2,6 +2,7 @@
 
 use crate::hang::FineRuns;
 use crate::lateness::Lateness;
+use crate::phase::PhaseSteering;
 
 /// A clock that can wait. Times are ns from any origin.
 pub trait PeriodClock {
@@ -25,6 +26,12 @@ pub trait Body {
     /// One period. Fine thread; does not allocate.
     fn period(&mut self);
 
+    /// How much later than the bus wants it the last period's exchange was, ns, within half a period; `None` where nobody
+    /// knows. Fine thread.
+    fn phase_ns(&self) -> Option<i64> {
+        None
+    }
+
     /// `periods` went by without a call of [`Body::period`]; with those before them it is `in_a_row` by now.
     fn missed(&mut self, periods: u64, in_a_row: u64);
 }
@@ -46,7 +53,20 @@ pub struct Timing {
 /// caught up, and nothing goes by uncounted. What the wake-up was late by whole periods is missed before the sample, so
 /// that the sample already answers it. Work that goes on into a later period has sent its sample nobody knows when: the
 /// period in which it ends counts as its own, and the ones before as missed.
+///
+/// Where the body knows the phase of its exchange, the next deadline is steered by it ([`PhaseSteering`]), and everything
+/// is counted against the deadlines as they are then. What the wake-up was late is known and is no phase of the deadline.
 pub fn run(clock: &mut impl PeriodClock, period_ns: i64, body: &mut impl Body, timing: &mut Timing) {
+    steered(clock, period_ns, body, timing, PhaseSteering::new(period_ns));
+}
+
+fn steered(
+    clock: &mut impl PeriodClock,
+    period_ns: i64,
+    body: &mut impl Body,
+    timing: &mut Timing,
+    mut steering: PhaseSteering,
+) {
     let mut deadline_ns = clock.now_ns() + period_ns;
     while !body.is_over() {
         clock.sleep_until(deadline_ns);
@@ -58,6 +78,7 @@ pub fn run(clock: &mut impl PeriodClock, period_ns: i64, body: &mut impl Body, t
             body.missed(slept_over.unsigned_abs(), slept_over.unsigned_abs());
         }
         deadline_ns += slept_over * period_ns;
+        let late_ns = late_ns - slept_over * period_ns;
         body.period();
         let worked_over = whole(clock.now_ns() - deadline_ns, period_ns);
         timing.overruns += u64::from(worked_over > 0);
@@ -66,7 +87,8 @@ pub fn run(clock: &mut impl PeriodClock, period_ns: i64, body: &mut impl Body, t
             timing.missed_periods += worked_over.unsigned_abs();
             body.missed(worked_over.unsigned_abs(), (slept_over + worked_over).unsigned_abs());
         }
-        deadline_ns += (worked_over + 1) * period_ns;
+        let phase_ns = body.phase_ns().filter(|_| worked_over == 0).map(|ns| ns.saturating_sub(late_ns));
+        deadline_ns += (worked_over + 1) * period_ns - steering.sooner_ns(phase_ns);
     }
 }
 
@@ -78,3 +100,7 @@ fn whole(ns: i64, period_ns: i64) -> i64 {
 #[cfg(test)]
 #[path = "realtime_periods_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "realtime_bus_tests.rs"]
+mod bus_tests;

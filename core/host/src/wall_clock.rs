@@ -95,6 +95,10 @@ impl Body for FineBody {
         tandem_sdk::abi::beat();
     }
 
+    fn phase_ns(&self) -> Option<i64> {
+        self.fine.phase_ns()
+    }
+
     fn missed(&mut self, periods: u64, in_a_row: u64) {
         self.fine.missed(periods, in_a_row);
     }
