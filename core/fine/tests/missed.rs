@@ -46,9 +46,13 @@ const OF_LAST: Option<FaultKind> =
 
 #[test]
 fn in_motion_one_more_in_a_row_than_allowed_is_a_fault() {
-    for (missed, fault) in
-        [(1, None), (2, None), (3, Some(in_a_row(3))), (50, Some(in_a_row(50))), (u64::MAX / 2, Some(in_a_row(u64::MAX / 2)))]
-    {
+    for (missed, fault) in [
+        (1, None),
+        (2, None),
+        (3, Some(in_a_row(3))),
+        (50, Some(in_a_row(50))),
+        (u64::MAX / 2, Some(in_a_row(u64::MAX / 2))),
+    ] {
         let mut bench = cruising();
         bench.fine.missed(missed, missed);
         assert_eq!(cause(&bench), fault);

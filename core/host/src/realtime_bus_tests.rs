@@ -20,7 +20,7 @@ impl Random {
     /// From 0 up to `below`.
     fn below(&mut self, below: i64) -> i64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (i128::from(self.0 >> 11) * i128::from(below) >> 53) as i64
+        ((i128::from(self.0 >> 11) * i128::from(below)) >> 53) as i64
     }
 }
 
