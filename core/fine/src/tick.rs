@@ -291,12 +291,14 @@ impl FineLoop {
 
     fn next_position(&mut self) -> (AxisVector, Input) {
         if self.given.emergency_stop {
+            // Also where another fault is being ramped out: it may be why somebody presses it.
+            self.outputs.switch_off(self.config.kept_outputs, SwitchedBy::EmergencyStop);
             self.fail(FaultKind::EmergencyStop);
         }
         match &mut self.phase {
             Phase::Waiting => (*self.guard.position(), self.wait()),
             Phase::Following => self.follow(),
-            Phase::Parted => (*self.guard.position(), self.wait_parted()),
+            Phase::Parted => (self.stand(), self.wait_parted()),
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
                 let (mut position, over) = (ramp.next(), ramp.is_over());

@@ -81,7 +81,11 @@ fn at_rest_they_are_counted_and_nothing_else() {
     let mut over = cruising();
     tick(&mut over, 46_000);
     assert_eq!(over.state(), MachineState::Standstill);
-    for bench in [&mut waiting, &mut holding, &mut over] {
+    let mut aborted = cruising();
+    aborted.host.controls.abort.store(true, Relaxed);
+    tick(&mut aborted, 100);
+    assert_eq!(aborted.state(), MachineState::Standstill);
+    for bench in [&mut waiting, &mut holding, &mut over, &mut aborted] {
         for _ in 0..100 {
             bench.fine.missed(50, 50);
             tick(bench, 1);

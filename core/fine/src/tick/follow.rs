@@ -39,7 +39,7 @@ impl FineLoop {
             return (*self.guard.position(), Input::Trip);
         }
         if let Some(stop) = self.stop.filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting()) {
-            return (*self.guard.position(), self.part(stop));
+            return (self.stand(), self.part(stop));
         }
         if ask == Ask::Run && self.arm_next() {
             return (*self.guard.position(), Input::Run);
@@ -60,6 +60,14 @@ impl FineLoop {
         self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
         let position = self.let_pass(position, &checked);
         (position, self.input(ask, reached))
+    }
+
+    /// The sample of a period that leaves the axes where they are; the guard knows from it that they stand.
+    pub(super) fn stand(&mut self) -> AxisVector {
+        let position = *self.guard.position();
+        let checked = self.guard.check(&position, self.outputs.unhomed);
+        self.guard.sent(&position, &checked);
+        position
     }
 
     fn let_pass(&mut self, position: AxisVector, checked: &Checked) -> AxisVector {
