@@ -82,6 +82,12 @@ impl Scenario {
         self.with(&["--commands", &path])
     }
 
+    /// With the file of what is switched.
+    pub fn events(self) -> Self {
+        let path = self.folder.path().join("events.csv").to_string_lossy().into_owned();
+        self.with(&["--events", &path])
+    }
+
     /// Runs it.
     pub fn run(self) -> Done {
         let at = |name: &str| self.folder.path().join(name);

@@ -50,6 +50,7 @@ mod smooth_peers;
 mod starvation;
 mod stopping_time;
 mod stops;
+mod switched;
 mod system_calls;
 mod times;
 mod trace;

@@ -216,3 +216,16 @@ fn a_trace_of_format_1_is_read() {
         assert!(said.contains(words), "{words:?} is not in {said}");
     }
 }
+
+/// What the program that wrote it exported is what this one exports: columns that it has not are not made up.
+#[test]
+fn a_trace_of_format_2_is_read_and_exported_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixtures = root().join("tests/fixtures/traces");
+    let (old, csv) = (fixtures.join("format-2.ttr"), folder.path().join("old.csv"));
+    let (status, said, _) = trace(&["info".as_ref(), &old]);
+    assert!(status == 0 && said.contains("format 2") && said.contains("complete"), "{said}");
+    assert_eq!(trace(&["export".as_ref(), &old, "--csv".as_ref(), &csv]).0, 0);
+    assert_eq!(std::fs::read_to_string(&csv).unwrap(), std::fs::read_to_string(fixtures.join("format-2.csv")).unwrap());
+    assert_eq!(trace(&["diff".as_ref(), &old, &csv]).0, 0);
+}

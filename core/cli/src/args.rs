@@ -123,7 +123,7 @@ pub struct Run {
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format. - is standard output, here and for one of
-    /// the three files below; what the run says goes to standard error then
+    /// the four files below; what the run says goes to standard error then
     #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
     /// Write the summary
@@ -135,6 +135,9 @@ pub struct Run {
     /// Write every block as it was driven
     #[arg(long, value_name = "F.csv")]
     pub blocks: Option<PathBuf>,
+    /// Write every switch of spindle, coolant and outputs, and what switched: program, abort, fault or emergency stop
+    #[arg(long, value_name = "F.csv")]
+    pub events: Option<PathBuf>,
     /// Say how the time of the run compares with the best known time of this program
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub reference_time_s: Option<f64>,

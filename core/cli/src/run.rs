@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tandem_host::{
-    BlocksCsv, Clock, HostError, Outcome, Output, PolicySummary, RecordError, Run, RunObserver, Stop, StopAnswer,
-    Summary, Switches, Timed, parse_commands,
+    BlocksCsv, Clock, EventsCsv, HostError, Left, Outcome, Output, PolicySummary, RecordError, Run, RunObserver, Stop,
+    StopAnswer, Summary, Switches, Timed, parse_commands,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
@@ -46,7 +46,7 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         outcome.summary.compare(reference_time_s);
     }
     sinks.operator.end(&outcome.summary);
-    sinks.finish(options, &mut outcome.summary);
+    sinks.finish(options, &outcome.left, &mut outcome.summary);
     Ok(conclude(options, &outcome))
 }
 
@@ -118,6 +118,7 @@ struct Sinks {
     progress: Progress,
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
+    events: Option<EventsCsv>,
     report: Option<Collector>,
     summary: Option<Output>,
     broken: Broken,
@@ -132,6 +133,7 @@ impl Sinks {
         let signals = run.signals();
         let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
+        let events = options.events.as_ref().map(|path| EventsCsv::create(path, machine.fine_period_s));
         let report = options.report.as_ref().map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
         let keys = keys_at_hand(clock);
         let presence = Presence { real_time: clock == Clock::Wall, pause: options.pause, keys };
@@ -146,6 +148,7 @@ impl Sinks {
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
+            events: events.transpose()?,
             report,
             summary: options.summary.as_deref().map(summary_file).transpose()?,
             broken: Broken::default(),
@@ -153,11 +156,12 @@ impl Sinks {
     }
 
     /// Ends every file. What cannot be written is said, and told by the summary.
-    fn finish(self, options: &args::Run, summary: &mut Summary) {
+    fn finish(self, options: &args::Run, left: &Left, summary: &mut Summary) {
         self.progress.finish();
         let mut broken = self.broken;
         broken.note(self.trace.map_or(Ok(()), TraceSink::finish));
         broken.note(self.blocks.map_or(Ok(()), BlocksCsv::finish));
+        broken.note(self.events.map_or(Ok(()), |events| events.finish(left)));
         summary.record_errors = broken.errors().to_vec();
         if let (Some(report), Some(path)) = (self.report, &options.report) {
             broken.note(report.write(path, summary));
@@ -193,6 +197,9 @@ impl RunObserver for Sinks {
 
     fn event(&mut self, event: &Event) {
         self.homed.event(event);
+        if let Some(events) = &mut self.events {
+            events.event(event);
+        }
         let Some(word) = stop_word(event.kind) else { return };
         let (line, switches) = (event.line, &self.switches);
         let waits =
@@ -234,6 +241,9 @@ impl RunObserver for Sinks {
         }
         if let Some(blocks) = &mut self.blocks {
             self.broken.note(blocks.sample(sample));
+        }
+        if let Some(events) = &mut self.events {
+            self.broken.note(events.sample(sample));
         }
         if let Some(report) = &mut self.report {
             report.sample(sample, deviation_mm, signals);
@@ -383,6 +393,7 @@ fn written(options: &args::Run) -> Vec<(&'static str, &Path)> {
     let files = [
         ("trace", &options.trace),
         ("blocks", &options.blocks),
+        ("events", &options.events),
         ("summary", &options.summary),
         ("report", &options.report),
     ];

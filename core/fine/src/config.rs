@@ -66,6 +66,8 @@ pub struct FineConfig {
     pub max_following_error_mm: AxisVector,
     /// Which missed periods are a fault.
     pub missed: MissedLimits,
+    /// Outputs that a fault and an emergency stop leave as they are, a bit each. Coolant is never among them.
+    pub kept_outputs: u64,
     /// M0 and M6 wait for the operator; M1 does where the operator's switch is on.
     pub pause_at_stops: bool,
     /// Spindle, coolant and user outputs are not switched, and nothing waits for the operator.

@@ -24,4 +24,4 @@ mod tick;
 
 pub use config::{FineConfig, GuardMode, Joints, MissedLimits};
 pub use fault::{Breach, Fault, FaultKind};
-pub use tick::{Counters, FineLoop};
+pub use tick::{Counters, FineLoop, Left};

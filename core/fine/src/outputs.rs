@@ -1,11 +1,7 @@
 //! What events switch: outputs, spindle, permissions. They travel to the drives with the setpoint.
 
+use tandem_rings::{FLOOD, MIST, SwitchedBy};
 use tandem_sdk::{AxisVector, Event, EventKind, MAX_AXES};
-
-/// Number of the output that stands for mist coolant; user outputs are 0 to 61.
-pub const MIST: u32 = 62;
-/// Number of the output that stands for flood coolant.
-pub const FLOOD: u32 = 63;
 
 /// Which words wait for the operator.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,6 +20,8 @@ pub struct Outputs {
     pub bits: u64,
     /// Spindle speed, rad/s.
     pub spindle_rad_per_s: f64,
+    /// What switched last.
+    pub by: SwitchedBy,
     /// The program permits the feed override.
     pub override_permitted: bool,
     /// The program permits the adaptive feed.
@@ -46,6 +44,7 @@ impl Outputs {
         Self {
             bits: 0,
             spindle_rad_per_s: 0.0,
+            by: SwitchedBy::Program,
             override_permitted: true,
             adaptive_permitted: true,
             ended: false,
@@ -61,10 +60,13 @@ impl Outputs {
         let on = event.value != 0.0;
         match event.kind {
             EventKind::Spindle | EventKind::Mist | EventKind::Flood | EventKind::DigitalOutput if self.dry_run => {}
-            EventKind::Spindle => self.spindle_rad_per_s = event.value,
-            EventKind::Mist => self.switch(MIST, on),
-            EventKind::Flood => self.switch(FLOOD, on),
-            EventKind::DigitalOutput => self.switch(event.index.clamp(0, 63).unsigned_abs(), on),
+            EventKind::Spindle => {
+                self.spindle_rad_per_s = event.value;
+                self.by = SwitchedBy::Program;
+            }
+            EventKind::Mist => self.switch_by(event, MIST),
+            EventKind::Flood => self.switch_by(event, FLOOD),
+            EventKind::DigitalOutput => self.switch_by(event, event.index.clamp(0, 63).unsigned_abs()),
             EventKind::FeedOverride => self.override_permitted = on,
             EventKind::AdaptiveFeed => self.adaptive_permitted = on,
             EventKind::ProgramStop | EventKind::ToolChange => self.stop_requested |= waits.program,
@@ -84,8 +86,21 @@ impl Outputs {
         self.spindle_rad_per_s = 0.0;
         self.switch(MIST, false);
         self.switch(FLOOD, false);
+        self.by = SwitchedBy::Abort;
         self.stop_requested = false;
         self.correction = None;
+    }
+
+    /// After an emergency stop, or at rest after a fault: everything goes off but the outputs in `kept`, a bit each.
+    pub fn switch_off(&mut self, kept: u64, by: SwitchedBy) {
+        self.spindle_rad_per_s = 0.0;
+        self.bits &= kept & !(1 << MIST | 1 << FLOOD);
+        self.by = by;
+    }
+
+    fn switch_by(&mut self, event: &Event, output: u32) {
+        self.switch(output, event.value != 0.0);
+        self.by = SwitchedBy::Program;
     }
 
     fn switch(&mut self, output: u32, on: bool) {

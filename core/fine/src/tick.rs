@@ -17,7 +17,8 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
 use tandem_rings::{
-    Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
+    Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest, Switched,
+    SwitchedBy,
 };
 use tandem_sdk::{Arm, AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
 
@@ -66,6 +67,19 @@ pub struct Counters {
     pub jerk_relaxed_samples: u64,
     /// Fine periods in which what is known of some joint was old: a frame was lost or late.
     pub old_feedback_periods: u64,
+}
+
+/// What the drives were sent beside the axes when that last changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Left {
+    /// The fine period.
+    pub tick: u64,
+    /// Block that moved.
+    pub block: u64,
+    /// Program line that moved.
+    pub line: u32,
+    /// What was sent.
+    pub switched: Switched,
 }
 
 #[derive(Debug)]
@@ -135,6 +149,7 @@ pub struct FineLoop {
     let_go: bool,
     /// The program had ended before this period.
     had_ended: bool,
+    left: Left,
     /// Where the axes are by the feedback, as far as the kinematics last knew.
     axes: AxisVector,
     lead: Lead,
@@ -199,6 +214,7 @@ impl FineLoop {
             letting_go_periods: 0,
             let_go: false,
             had_ended: false,
+            left: Left::default(),
             axes: config.axes_alone(&config.position),
             lead: Lead::Axes,
             counters: Counters::default(),
@@ -226,6 +242,7 @@ impl FineLoop {
             let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
         }
+        self.keep_switched();
         self.tick += u64::from(started);
         self.report();
     }
@@ -284,6 +301,11 @@ impl FineLoop {
         self.driver.as_ref()
     }
 
+    /// What was switched last. The period that ends a program switches, and has no sample. Host.
+    pub fn left(&self) -> Left {
+        self.left
+    }
+
     /// Hands the driver back. Host.
     pub fn into_driver(self) -> Box<dyn Driver> {
         self.driver
@@ -337,6 +359,9 @@ impl FineLoop {
         let checked = self.guard.check(&position, self.outputs.unhomed);
         self.guard.sent(&position, &checked);
         if over {
+            if self.outputs.by != SwitchedBy::EmergencyStop {
+                self.outputs.switch_off(self.config.kept_outputs, SwitchedBy::Fault);
+            }
             self.driver.quick_stop();
             self.phase = Phase::Faulted;
         }

@@ -124,6 +124,7 @@ impl Bench {
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([0.01; MAX_AXES]),
             missed: MissedLimits::default(),
+            kept_outputs: 0,
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

@@ -63,7 +63,9 @@ pub use ready::{check_program, each_block};
 pub use realtime::PageFaults;
 pub use realtime_latency::{Latency, measure_latency};
 pub use realtime_periods::Timing;
-pub use record::{BlocksCsv, Output, RecordError, TraceCsv, flush_outputs};
+pub use record::{
+    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, flush_outputs, outputs_word, rpm,
+};
 pub use registry::{PluginRefusal, Registry};
 pub use run::{Clock, Outcome, Run, Switches};
 pub use setup::moves_metal;
@@ -71,3 +73,4 @@ pub use stops::Stop;
 pub use summary::{
     ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PlanningRow, PlanningUs, Summary,
 };
+pub use tandem_fine::Left;

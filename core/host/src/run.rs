@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
-use tandem_fine::{Fault, FineLoop};
+use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::{JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
@@ -94,6 +94,8 @@ pub struct Outcome {
     pub fault: Option<Fault>,
     /// Where the machine came to rest, mm or rad.
     pub position: AxisVector,
+    /// What was switched last.
+    pub left: Left,
 }
 
 impl Run {
@@ -268,12 +270,17 @@ impl Run {
             summary.exchange_us = Some(self.exchange.read());
         }
         let late = summary.late_cause();
-        let known =
-            Known { soft: pump.soft_cause(), driver: fine.plugin_error(), drives: fine.driver(), late: late.as_deref() };
+        let known = Known {
+            soft: pump.soft_cause(),
+            driver: fine.plugin_error(),
+            drives: fine.driver(),
+            late: late.as_deref(),
+        };
         summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = self.switches.home || fine.joints_went_alone();
         let position = if sent { fine.sent() } else { pump.monitor.position };
+        let left = fine.left();
         let stopped = fine.into_driver().stop();
         drop(pump);
         if let Err(error) = stopped {
@@ -282,7 +289,7 @@ impl Run {
         // What plugins say when they are stopped and dropped.
         drain_plugin_log(&mut |line| observer.note(line));
         summary.wall_time_s = started.elapsed().as_secs_f64();
-        Ok(Outcome { summary, fault, position })
+        Ok(Outcome { summary, fault, position, left })
     }
 }
 

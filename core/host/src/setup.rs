@@ -246,6 +246,7 @@ pub fn fine_config(
         max_feed_ratio: machine.motion.max_feed_ratio,
         max_following_error_mm: joints.max_following_error_mm(),
         missed: MissedLimits { in_a_row: u64::from(machine.max_missed_periods), share: machine.max_missed_share },
+        kept_outputs: machine.kept_outputs(),
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
         unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },

@@ -80,6 +80,8 @@ static MACHINE: &[Key] = &[
     key("driver.plugin", "name or file", "required", "Driver of the drives, simulated or not"),
     key("driver.options.<option>", "plugin's", "none", "Options of the driver"),
     key("driver.analog", "names", "[]", "Names of the driver's analog inputs from 0 on, at most 4: signals of trace and report"),
+    key("outputs.<name>.output", "number", "required", "Number of the digital output that is called so, 0 to 61"),
+    key("outputs.<name>.on_fault", "off or keep", "off", "What an emergency stop does with the output at once, and a fault when the axes are at rest"),
     key("faults.<fault>", "wrapper's", "none", "Seeded faults around the driver"),
     key("guard.mode", "stop or count", "stop", "What a sample beyond a limit does: stops the machine, or is counted (simulated drives only)"),
     key("recorder.on_error", "continue or hold", "continue", "Whether the motion goes on or comes to rest where a file of the run cannot be written: a full disk"),

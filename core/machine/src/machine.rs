@@ -12,6 +12,7 @@ use crate::keys::keys;
 use crate::load::Loader;
 use crate::motion::{FineThread, Loops, Motion};
 use crate::node::plain;
+use crate::outputs::{self, Output};
 use crate::overrides;
 use crate::parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle, analog_names, text};
 use crate::places::Places;
@@ -70,6 +71,8 @@ pub struct Machine {
     pub driver: PluginChoice,
     /// Names of the driver's analog inputs from 0 on, for trace and report.
     pub analog: Vec<String>,
+    /// Digital outputs that the file names.
+    pub outputs: Vec<Output>,
     /// Faults around the driver, as the file states them: the wrappers read them.
     pub faults: Option<toml::Table>,
     /// What the guard does.
@@ -119,6 +122,11 @@ impl Machine {
         Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
     }
 
+    /// The outputs that a fault and an emergency stop leave as they are, a bit each.
+    pub fn kept_outputs(&self) -> u64 {
+        self.outputs.iter().filter(|output| output.kept).fold(0, |bits, output| bits | 1 << output.output)
+    }
+
     /// The configuration in force as TOML text: includes and overrides applied, files named absolutely. Reading it as
     /// a machine file gives this machine again.
     pub fn effective_toml(&self) -> &str {
@@ -164,6 +172,7 @@ struct Tables {
     feed_strategy: Option<PluginChoice>,
     driver: PluginChoice,
     analog: Vec<String>,
+    outputs: Vec<Output>,
     faults: Option<toml::Table>,
     guard: GuardMode,
     on_record_error: RecordErrorMode,
@@ -188,6 +197,7 @@ impl Tables {
             feed_strategy: optional("feed_strategy").and_then(|s| PluginChoice::read(&s)),
             driver: required("driver"),
             analog: analog_names(&root.section("driver")),
+            outputs: outputs::read(root),
             faults: optional("faults").and_then(|s| s.table().map(plain)),
             guard: GuardMode::read(&root.section("guard")),
             on_record_error: RecordErrorMode::read(&root.section("recorder")),
@@ -226,6 +236,7 @@ impl Tables {
             feed_strategy: self.feed_strategy,
             driver: self.driver,
             analog: self.analog,
+            outputs: self.outputs,
             faults: self.faults,
             guard: self.guard,
             on_record_error: self.on_record_error,

@@ -11,6 +11,7 @@ mod given;
 mod request;
 mod rest;
 mod sample;
+mod switched;
 
 pub use atomics::{AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
 pub use controls::{Controls, JogControls, Status};
@@ -19,6 +20,7 @@ pub use given::Given;
 pub use request::{RequestKind, StrategyRequest};
 pub use rest::{Rest, RestCause};
 pub use sample::{MachineState, Sample, StopCause};
+pub use switched::{FLOOD, MIST, Switched, SwitchedBy};
 
 use std::sync::Arc;
 

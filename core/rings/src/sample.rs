@@ -3,6 +3,7 @@
 use tandem_sdk::{AxisVector, MAX_ANALOG};
 
 use crate::Given;
+use crate::switched::Switched;
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,6 +116,10 @@ pub struct Sample {
     pub ratio: f64,
     /// Spindle speed read back, rad/s.
     pub spindle_rad_per_s: f64,
+    /// Spindle, coolant and outputs as they were sent.
+    pub switched: Switched,
+    /// How much later than the bus wants it the exchange was, ns; `None` where no driver tells.
+    pub phase_ns: Option<i64>,
     /// Analog inputs of the driver.
     pub analog: [f64; MAX_ANALOG],
     /// Why the machine is being stopped, as this position was chosen.

@@ -21,13 +21,13 @@ impl History {
     pub const EMPTY: Self = Self { last: [0; MAX_WORDS], before: [0; MAX_WORDS] };
 
     /// A history of one row that stood still.
-    pub fn after_key(row: Words) -> Self {
-        Self { last: row, before: row }
+    pub fn after_key(row: &Words) -> Self {
+        Self { last: *row, before: *row }
     }
 
     /// Goes on by one row.
-    pub fn push(&mut self, row: Words) {
-        self.before = std::mem::replace(&mut self.last, row);
+    pub fn push(&mut self, row: &Words) {
+        self.before = std::mem::replace(&mut self.last, *row);
     }
 
     /// What word `index` of the next row would be if all went on as before; the words before it are known.
@@ -82,7 +82,7 @@ fn unzigzag(number: u64) -> u64 {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape { axes: 8, signals: 8 };
+    const SHAPE: Shape = Shape { axes: 8, signals: 8, switched: true };
 
     #[test]
     fn differences_of_either_sign_come_back() {
@@ -95,8 +95,8 @@ mod tests {
     #[test]
     fn constant_speed_takes_hardly_a_byte() {
         let row = |k: u32| std::array::from_fn(|i| (100.0 + 0.05 * f64::from(k) + i as f64).to_bits());
-        let mut history = History::after_key(row(0));
-        history.push(row(1));
+        let mut history = History::after_key(&row(0));
+        history.push(&row(1));
         let mut bytes = vec![];
         history.encode(&row(2), SHAPE, &mut bytes);
         assert!(bytes.len() <= MAX_WORDS.div_ceil(2) + 2 * MAX_WORDS, "{} bytes", bytes.len());
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn what_is_no_row_is_none() {
-        let shape = Shape { axes: 1, signals: 0 };
+        let shape = Shape { axes: 1, signals: 0, switched: false };
         let decoded = |bytes: &[u8]| History::EMPTY.decode(bytes, shape);
         assert!(decoded(&[0; 5]).is_some() && decoded(&[1, 0, 0, 0, 0, 7]).is_some());
         assert_eq!(decoded(&[9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None);

@@ -10,8 +10,8 @@ use crate::words::Shape;
 
 /// The first bytes of a trace: not text, and spoilt by whatever rewrites line ends.
 pub const MAGIC: [u8; 8] = *b"\x89TTR\r\n\x1a\n";
-/// The format that is written. Format 1, without commands and dry runs, is read too.
-pub const FORMAT: u32 = 2;
+/// The format that is written. Format 1, without commands and dry runs, and format 2, without what is switched, are read too.
+pub const FORMAT: u32 = 3;
 /// Bytes before the body: magic, format, length of the body.
 const FIXED_BYTES: usize = MAGIC.len() + 4 + 4;
 /// Most bytes of the body, so that a damaged length asks for no memory.
@@ -36,9 +36,15 @@ pub struct Header {
     pub signals: Vec<String>,
 }
 
+/// Whether the samples of a trace of this format say what is switched, and the phase.
+pub fn has_switched(format: u32) -> bool {
+    format > 2
+}
+
 impl Header {
-    pub(crate) fn shape(&self) -> Shape {
-        Shape { axes: self.axes.count(), signals: self.signals.len() }
+    /// Of the samples of this `format`.
+    pub(crate) fn shape(&self, format: u32) -> Shape {
+        Shape { axes: self.axes.count(), signals: self.signals.len(), switched: has_switched(format) }
     }
 
     /// The header as bytes, its checksum last.

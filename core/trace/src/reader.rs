@@ -116,7 +116,7 @@ impl<R: Read> Reader<R> {
         let offset = self.source.offset();
         let bytes = self.source.peek(MAX_FRAME_BYTES).map_err(|e| TraceError::at(offset, e))?;
         let frame = frame::get(bytes, self.seeds);
-        Ok(frame.and_then(|frame| Found::decode(&frame, self.next, &self.history, self.header.shape())))
+        Ok(frame.and_then(|frame| Found::decode(&frame, self.next, &self.history, self.header.shape(self.format))))
     }
 
     fn take(&mut self, found: Found) -> Result<Option<Item>, TraceError> {
@@ -136,9 +136,9 @@ impl<R: Read> Reader<R> {
         };
         self.seeds.previous = Some(found.checksum);
         if found.kind == Kind::Key {
-            self.history = History::after_key(row);
+            self.history = History::after_key(&row);
         } else {
-            self.history.push(row);
+            self.history.push(&row);
         }
         self.next += 1;
         Ok(Some(Item::Record(Record { number: found.number, offset, sample, signals })))

@@ -1,25 +1,33 @@
 //! A sample as a row of 64-bit words, and back.
 
-use tandem_rings::{MachineState, Sample};
+use tandem_rings::{MachineState, Sample, Switched};
 use tandem_sdk::{AxisVector, MAX_AXES, MAX_SIGNALS};
 
-/// Tick, block, line, state; two positions; feed, sigma, ratio; signals.
-pub const MAX_WORDS: usize = 4 + 2 * MAX_AXES + 3 + MAX_SIGNALS;
+/// Tick, block, line, state; two positions; feed, sigma, ratio; what is switched, and the phase; signals.
+pub const MAX_WORDS: usize = 4 + 2 * MAX_AXES + 3 + SWITCHED_WORDS + MAX_SIGNALS;
+
+/// Outputs, spindle, phase.
+const SWITCHED_WORDS: usize = 3;
+
+/// The word of a phase that nobody tells: no phase is so long.
+const NO_PHASE: u64 = i64::MIN.cast_unsigned();
 
 /// A sample's words; the first [`Shape::words`] count, the rest is zero.
 pub type Words = [u64; MAX_WORDS];
 
-/// How many axes and signals a trace has.
+/// How many axes and signals a trace has, and whether it has what is switched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     pub axes: usize,
     pub signals: usize,
+    /// From format 3 on.
+    pub switched: bool,
 }
 
 impl Shape {
     /// Words of one sample.
     pub fn words(self) -> usize {
-        4 + 2 * self.axes + 3 + self.signals
+        4 + 2 * self.axes + 3 + if self.switched { SWITCHED_WORDS } else { 0 } + self.signals
     }
 
     /// The word of the command to which the feedback in word `index` belongs; `None` for other words.
@@ -33,9 +41,17 @@ impl Shape {
         let numbers = [sample.tick, sample.block, u64::from(sample.line), sample.state as u64];
         let positions = sample.command.0[..self.axes].iter().chain(&sample.feedback.0[..self.axes]);
         let rates = [sample.feed_mm_per_s, sample.sigma, sample.ratio];
-        let floats = positions.chain(&rates).chain(signals).map(|value| value.to_bits());
+        let switched = [
+            sample.switched.outputs,
+            sample.switched.spindle_rad_per_s.to_bits(),
+            sample.phase_ns.map_or(NO_PHASE, i64::cast_unsigned),
+        ];
+        let switched = switched.into_iter().take(if self.switched { SWITCHED_WORDS } else { 0 });
+        let bits = |value: &f64| value.to_bits();
+        let all = numbers.into_iter().chain(positions.chain(&rates).map(bits));
+        let all = all.chain(switched).chain(signals.iter().map(bits));
         let mut words = [0; MAX_WORDS];
-        for (to, from) in words.iter_mut().zip(numbers.into_iter().chain(floats)) {
+        for (to, from) in words.iter_mut().zip(all) {
             *to = from;
         }
         words
@@ -44,14 +60,16 @@ impl Shape {
     /// The sample and the signals of a row of words; `None` where they are those of no sample.
     pub fn to_sample(self, words: &Words) -> Option<(Sample, [f64; MAX_SIGNALS])> {
         let state = u32::try_from(words[3]).ok()?;
-        let mut floats = words[4..].iter().map(|word| f64::from_bits(*word));
+        let mut words_left = words[4..].iter().copied();
         let mut take = |count: usize| {
-            let mut values = [0.0; MAX_AXES];
-            values.iter_mut().take(count).for_each(|value| *value = floats.next().unwrap_or_default());
+            let mut values = [0; MAX_AXES];
+            values.iter_mut().take(count).for_each(|value| *value = words_left.next().unwrap_or_default());
             values
         };
-        let (command, feedback) = (take(self.axes), take(self.axes));
-        let [feed_mm_per_s, sigma, ratio, ..] = take(3);
+        let (command, feedback) = (take(self.axes).map(f64::from_bits), take(self.axes).map(f64::from_bits));
+        let [feed_mm_per_s, sigma, ratio, ..] = take(3).map(f64::from_bits);
+        let [outputs, spindle, phase, ..] =
+            if self.switched { take(SWITCHED_WORDS) } else { [0, 0, NO_PHASE, 0, 0, 0, 0, 0] };
         let sample = Sample {
             tick: words[0],
             block: words[1],
@@ -62,10 +80,12 @@ impl Shape {
             feed_mm_per_s,
             sigma,
             ratio,
+            switched: Switched { outputs, spindle_rad_per_s: f64::from_bits(spindle), ..Switched::default() },
+            phase_ns: (phase != NO_PHASE).then_some(phase.cast_signed()),
             ..Sample::default()
         };
         // A number that is no state's would have become another state.
-        (sample.state as u32 == state).then(|| (sample, take(self.signals)))
+        (sample.state as u32 == state).then(|| (sample, take(self.signals).map(f64::from_bits)))
     }
 }
 

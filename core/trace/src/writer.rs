@@ -6,7 +6,7 @@ use tandem_rings::Sample;
 
 use crate::code::{History, MAX_ROW_BYTES};
 use crate::frame::{self, Kind};
-use crate::header::Header;
+use crate::header::{FORMAT, Header};
 use crate::words::Shape;
 
 /// Every so many records one stands on its own: the most that damage in one place can cost, beside itself.
@@ -33,13 +33,14 @@ impl<W: Write> Writer<W> {
     pub fn new(mut out: W, header: &Header) -> io::Result<Self> {
         let (bytes, checksum) = header.to_bytes()?;
         out.write_all(&bytes)?;
-        let (shape, history) = (header.shape(), History::EMPTY);
+        let (shape, history) = (header.shape(FORMAT), History::EMPTY);
         Ok(Self { out, shape, header: checksum, previous: checksum, history, records: 0, bytes })
     }
 
     /// Adds a sample and the strategy's signals, as many as the header names.
     ///
-    /// Tick, block, line, state, command, feedback, feed, sigma and ratio are kept; the other fields are not.
+    /// Tick, block, line, state, command, feedback, feed, sigma, ratio, what is switched and the phase are kept; the other
+    /// fields are not.
     ///
     /// # Errors
     /// `out` refuses; another number of signals.
@@ -58,9 +59,9 @@ impl<W: Write> Writer<W> {
         self.put(kind, seed, |history, shape, bytes| history.encode(&row, shape, bytes))?;
         self.records += 1;
         if is_key {
-            self.history = History::after_key(row);
+            self.history = History::after_key(&row);
         } else {
-            self.history.push(row);
+            self.history.push(&row);
         }
         Ok(())
     }

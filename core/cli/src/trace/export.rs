@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use tandem_host::{Output, TraceCsv};
+use tandem_trace::has_switched;
 
 use super::binary::Binary;
 
@@ -20,7 +21,7 @@ pub fn export(trace: &Path, csv: &Path, commands: Option<&Path>) -> Result<u8, B
     let mut trace = Binary::open(trace)?;
     let header = trace.header();
     let signals: Vec<&str> = header.signals.iter().map(String::as_str).collect();
-    let mut csv = TraceCsv::of_axes(csv, header.axes, header.fine_period_s, &signals)?;
+    let mut csv = TraceCsv::of_axes(csv, header.axes, header.fine_period_s, &signals, has_switched(trace.format()))?;
     let count = signals.len();
     while let Some(record) = trace.next()? {
         csv.sample(&record.sample, &record.signals[..count])?;

@@ -5,14 +5,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use tandem_host::TraceCsv;
-use tandem_trace::{MAGIC, Record};
+use tandem_host::{SWITCHED_COLUMNS, TraceCsv, outputs_word, rpm};
+use tandem_trace::{MAGIC, Record, has_switched};
 
 use super::binary::Binary;
 use super::sink::is_binary_name;
 
-/// The column of a trace that holds words; all others hold numbers.
-const STATE: &str = "state";
+/// The columns of a trace that hold words; all others hold numbers.
+const WORDS: [&str; 3] = ["state", "coolant", "outputs"];
 
 /// What stands in a column of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +81,10 @@ impl Samples {
                     let name = |axis| format!("{}_{kind}_{}", axes.letter(axis).to_ascii_lowercase(), unit(axis));
                     names.extend((0..axes.count()).map(name));
                 }
-                names.extend(["feed_mm_s", "sigma", STATE, "ratio"].map(String::from));
+                names.extend(["feed_mm_s", "sigma", "state", "ratio"].map(String::from));
+                if has_switched(binary.format()) {
+                    names.extend(SWITCHED_COLUMNS.map(String::from));
+                }
                 names.extend(header.signals.iter().map(|signal| format!("sig_{signal}")));
                 names
             }
@@ -121,8 +124,14 @@ fn row(binary: &Binary, record: &Record, shown: bool) -> Row {
     numbers.extend([sample.feed_mm_per_s, sample.sigma]);
     let mut cells: Vec<Cell> = numbers.into_iter().map(Cell::Number).collect();
     cells.push(Cell::Word(sample.state.name().into()));
-    let behind = [&[sample.ratio], &record.signals[..header.signals.len()]].concat();
-    cells.extend(behind.into_iter().map(Cell::Number));
+    cells.push(Cell::Number(sample.ratio));
+    if has_switched(binary.format()) {
+        let switched = &sample.switched;
+        cells.push(Cell::Number(rpm(switched.spindle_rad_per_s)));
+        cells.extend([Cell::Word(switched.coolant().into()), Cell::Word(outputs_word(switched).into())]);
+        cells.push(Cell::Number(sample.phase_ns.map_or(f64::NAN, |ns| ns as f64)));
+    }
+    cells.extend(record.signals[..header.signals.len()].iter().copied().map(Cell::Number));
     Row { tick: Some(sample.tick), t_s: TraceCsv::t_s(sample.tick, header.fine_period_s), cells }
 }
 
@@ -161,7 +170,7 @@ impl Csv {
             text.parse::<f64>().map_err(|_| format!("{}:{line}: {text:?} is no number", self.path.display()))
         };
         let cell = |(name, index): &(String, usize)| {
-            if name == STATE {
+            if WORDS.contains(&name.as_str()) {
                 Ok(Cell::Word(row[*index].to_string().into()))
             } else {
                 number(*index).map(Cell::Number)

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::Sample;
+use tandem_rings::{Sample, Switched};
 use tandem_sdk::{AxisVector, JointState};
 
-use super::{FineLoop, Phase};
+use super::{FineLoop, Left, Phase};
 use crate::answer::{self, Numbers};
 use crate::fault::FaultKind;
 use crate::state::Input;
@@ -118,6 +118,8 @@ impl FineLoop {
             sigma: self.governor.sigma(),
             ratio: self.ratio * self.given.feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
+            switched: self.switched(),
+            phase_ns: self.phase_ns(),
             analog: self.feedback.analog,
             cause: self.cause,
             given: self.given,
@@ -125,6 +127,24 @@ impl FineLoop {
         self.counters.samples += 1;
         if self.samples.push(sample).is_err() {
             self.status.lost_samples.fetch_add(1, Relaxed);
+        }
+    }
+
+    /// What was sent last.
+    pub(super) fn switched(&self) -> Switched {
+        Switched {
+            outputs: self.setpoint.outputs,
+            spindle_rad_per_s: self.setpoint.spindle_rad_per_s,
+            by: self.outputs.by,
+        }
+    }
+
+    /// Keeps what was switched, and when.
+    pub(super) fn keep_switched(&mut self) {
+        let switched = self.switched();
+        if switched != self.left.switched {
+            let segment = self.cursor.segment();
+            self.left = Left { tick: self.tick, block: segment.block, line: segment.line, switched };
         }
     }
 

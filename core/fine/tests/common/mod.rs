@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Event, EventKind, Feedback, JointState,
-    Kinematics, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event, EventKind, Feedback,
+    JointState, Kinematics, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint, StopOn,
 };
 
 /// Fine period, s.
@@ -17,6 +17,9 @@ pub const PERIOD_S: f64 = 0.001;
 const FEED_MM_PER_S: f64 = 20.0;
 /// What the plan accelerates with, mm/s².
 const PLANNED_MM_PER_S2: f64 = 200.0;
+
+/// The output that a fault leaves on.
+pub const KEPT_OUTPUT: u32 = 3;
 
 /// Drives that follow exactly, until they are told to fail.
 struct Echo {
@@ -68,6 +71,7 @@ pub struct Bench {
     queued_s: f64,
     x_mm: f64,
     epoch: u32,
+    stop_on: StopOn,
 }
 
 impl Bench {
@@ -102,6 +106,7 @@ impl Bench {
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),
+            kept_outputs: 1 << KEPT_OUTPUT,
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,
@@ -122,7 +127,18 @@ impl Bench {
         };
         let mut fine = FineLoop::new(&config, end, Box::new(driver), kinematics);
         fine.reset();
-        Self { fine, host, rough, failing, spoiled, quick_stops, queued_s: 0.0, x_mm: 0.0, epoch: 0 }
+        Self {
+            fine,
+            host,
+            rough,
+            failing,
+            spoiled,
+            quick_stops,
+            queued_s: 0.0,
+            x_mm: 0.0,
+            epoch: 0,
+            stop_on: StopOn::default(),
+        }
     }
 
     /// What the machine is doing.
@@ -178,6 +194,16 @@ impl Bench {
         self.rough.depth.begin(self.epoch, self.queued_s);
     }
 
+    /// Queues a rest.
+    pub fn dwell(&mut self, duration_s: f64) {
+        self.piece(0.0, 0.0, duration_s, true);
+    }
+
+    /// What is queued from here on waits for an input that never comes.
+    pub fn probe(&mut self) {
+        self.stop_on = StopOn { input: 5, edge: Edge::Rising, miss_is_fault: 1 };
+    }
+
     /// Queues an event.
     pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
         let event = Event { program_time_s: self.queued_s, epoch: self.epoch, ..Event::new(kind, 1, 0, index, value) };
@@ -190,6 +216,7 @@ impl Bench {
         (segment.coefficients[0], segment.path) = (motion, motion);
         segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
         segment.epoch = self.epoch;
+        segment.stop_on = self.stop_on;
         segment.feed_mm_per_s = FEED_MM_PER_S;
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
         self.rough.segments.push(Queued::Segment { start_s: self.queued_s, segment }).unwrap();

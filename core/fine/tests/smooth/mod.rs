@@ -190,6 +190,7 @@ impl Machine {
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),
+            kept_outputs: 0,
             pause_at_stops: false,
         };
         let (mut rough, end, host) = bridge(Sizes { segments: 4096, samples: 4096 });

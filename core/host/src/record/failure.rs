@@ -11,7 +11,7 @@ use super::output::Output;
 /// A file that a run writes and that cannot be written any further: a full disk, a reader that has gone away.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct RecordError {
-    /// What it was to hold: `trace`, `blocks`, `report`, `summary`.
+    /// What it was to hold: `trace`, `blocks`, `events`, `report`, `summary`.
     pub what: &'static str,
     /// The file.
     pub file: String,

@@ -1,10 +1,11 @@
 //! The trace: one row a fine period, 17 significant digits.
 
+use std::f64::consts::TAU;
 use std::io::Write;
 use std::path::Path;
 
 use tandem_machine::Machine;
-use tandem_rings::Sample;
+use tandem_rings::{Sample, Switched};
 use tandem_sdk::Axes;
 
 use super::failure::RecordError;
@@ -15,6 +16,8 @@ pub struct TraceCsv {
     out: Output,
     axes: Axes,
     period_s: f64,
+    /// What is switched, and the phase, have columns.
+    switched: bool,
     /// It has been told that no further row can be written.
     failed: bool,
 }
@@ -25,18 +28,25 @@ impl TraceCsv {
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine, signals: &[&str]) -> Result<Self, String> {
-        Self::of_axes(path, machine.axes, machine.fine_period_s, signals)
+        Self::of_axes(path, machine.axes, machine.fine_period_s, signals, true)
     }
 
-    /// Starts the file with its head line, for a machine of which only axes and fine period are known.
+    /// Starts the file with its head line, for a machine of which only axes and fine period are known. `switched` is whether
+    /// what is switched, and the phase, are known.
     ///
     /// # Errors
     /// The path with the system's words.
-    pub fn of_axes(path: &Path, axes: Axes, fine_period_s: f64, signals: &[&str]) -> Result<Self, String> {
+    pub fn of_axes(
+        path: &Path,
+        axes: Axes,
+        fine_period_s: f64,
+        signals: &[&str],
+        switched: bool,
+    ) -> Result<Self, String> {
         let mut out = Output::create(path)?;
-        let head = head(&axes, signals);
+        let head = head(&axes, signals, switched);
         writeln!(out, "{head}").map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { out, axes, period_s: fine_period_s, failed: false })
+        Ok(Self { out, axes, period_s: fine_period_s, switched, failed: false })
     }
 
     /// Adds a row. After an error all further ones are left out.
@@ -78,14 +88,39 @@ impl TraceCsv {
         }
         write!(self.out, ",{},{}", number(sample.feed_mm_per_s), number(sample.sigma))?;
         write!(self.out, ",{},{}", sample.state.name(), number(sample.ratio))?;
+        if self.switched {
+            self.switched(sample)?;
+        }
         for signal in signals {
             write!(self.out, ",{}", number(*signal))?;
         }
         writeln!(self.out)
     }
+
+    fn switched(&mut self, sample: &Sample) -> std::io::Result<()> {
+        let (switched, rpm) = (&sample.switched, rpm(sample.switched.spindle_rad_per_s));
+        write!(self.out, ",{},{},{}", number(rpm), switched.coolant(), outputs_word(switched))?;
+        match sample.phase_ns {
+            Some(ns) => write!(self.out, ",{ns}"),
+            None => write!(self.out, ",nan"),
+        }
+    }
 }
 
-fn head(axes: &Axes, signals: &[&str]) -> String {
+/// Speed in 1/min of one in rad/s.
+pub fn rpm(rad_per_s: f64) -> f64 {
+    rad_per_s * 60.0 / TAU
+}
+
+/// Outputs of the user as a CSV has them: hexadecimal, for a number of 62 bits is more than tables of numbers keep.
+pub fn outputs_word(switched: &Switched) -> String {
+    format!("{:#x}", switched.user_outputs())
+}
+
+/// Names of the columns of what is switched, and of the phase.
+pub const SWITCHED_COLUMNS: [&str; 4] = ["spindle_set_rpm", "coolant", "outputs", "phase_ns"];
+
+fn head(axes: &Axes, signals: &[&str], switched: bool) -> String {
     let mut head = vec!["t_s".to_string(), "line".to_string()];
     for kind in ["cmd", "fb"] {
         for axis in 0..axes.count() {
@@ -94,6 +129,7 @@ fn head(axes: &Axes, signals: &[&str]) -> String {
         }
     }
     head.extend(["feed_mm_s", "sigma", "state", "ratio"].map(str::to_string));
+    head.extend(SWITCHED_COLUMNS.iter().filter(|_| switched).map(ToString::to_string));
     head.extend(signals.iter().map(|signal| format!("sig_{signal}")));
     head.join(",")
 }

@@ -83,6 +83,7 @@ impl Rig {
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),
+            kept_outputs: 0,
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,

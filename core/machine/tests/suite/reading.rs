@@ -147,6 +147,15 @@ fn the_other_tables() {
 }
 
 #[test]
+fn outputs() {
+    let machine = full();
+    let [vacuum, lamp] = &machine.outputs[..] else { panic!("two outputs: {:?}", machine.outputs) };
+    assert_eq!((vacuum.name.as_str(), vacuum.output, vacuum.kept), ("vacuum", 7, true));
+    assert_eq!((lamp.name.as_str(), lamp.output, lamp.kept), ("lamp", 61, false));
+    assert_eq!(machine.kept_outputs(), 1 << 7);
+}
+
+#[test]
 fn tools() {
     let machine = full();
     assert_eq!(machine.tools.path, Some(fixtures().join("good/shared/tools.toml")));

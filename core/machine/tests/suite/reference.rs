@@ -9,7 +9,7 @@ use tandem_machine::{Key, Machine, Place, keys, markdown, tool_keys};
 fn path(key: &Key) -> String {
     let rotary = key.path.contains("_deg");
     let (axis, joint) = if rotary { ("c", "c1") } else { ("x", "x2") };
-    key.path.replace("<axis>", axis).replace("<joint>", joint)
+    key.path.replace("<axis>", axis).replace("<joint>", joint).replace("<name>", "vacuum")
 }
 
 fn is_read_here(key: &Key) -> bool {
@@ -33,14 +33,17 @@ fn every_default_is_the_one_that_is_documented() {
     let minimal = fixtures().join("parts/mill.toml");
     // The defaults of an optional table show where the table is there.
     let policy = ("policy.script".to_owned(), "policy.wasm".to_owned());
-    let implicit = Machine::read(&minimal, std::slice::from_ref(&policy)).unwrap();
+    let output = ("outputs.vacuum.output".to_owned(), "7".to_owned());
+    let tables = [policy, output];
+    let implicit = Machine::read(&minimal, &tables).unwrap();
     let words = |key: &&Key| key.default.starts_with(|c: char| c.is_ascii_digit()) || key.unit.contains(" or ");
     let stated = keys().iter().filter(words).filter(|k| k.default != "required" && is_read_here(k));
     let mut count = 0;
     for key in stated.filter(|k| !k.path.starts_with("joints.")) {
         let axis = if key.path.contains("_deg") { "a" } else { "x" };
-        let path = key.path.replace("<axis>", axis);
-        let explicit = Machine::read(&minimal, &[policy.clone(), (path, key.default.to_owned())]).unwrap();
+        let path = key.path.replace("<axis>", axis).replace("<name>", "vacuum");
+        let stated = [&tables[..], &[(path, key.default.to_owned())]].concat();
+        let explicit = Machine::read(&minimal, &stated).unwrap();
         assert_eq!(described(&explicit), described(&implicit), "{}", key.path);
         count += 1;
     }

@@ -121,7 +121,7 @@ fn other_files_are_refused_with_the_cause() {
     let mut bytes = written(&header(3, 0), &[]);
     assert_eq!(refused(&bytes[..30]), "byte 30: the file ends within its header");
     bytes[MAGIC.len()] = 9;
-    assert_eq!(refused(&bytes), "byte 8: the trace has format 9, this program reads formats 1 to 2");
+    assert_eq!(refused(&bytes), "byte 8: the trace has format 9, this program reads formats 1 to 3");
     bytes[MAGIC.len()] = 1;
     bytes[20] ^= 1;
     assert_eq!(refused(&bytes), "byte 0: the header is damaged: its checksum differs");

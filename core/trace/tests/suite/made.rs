@@ -1,7 +1,7 @@
 //! Traces to test with.
 
 use proptest::prelude::*;
-use tandem_rings::{MachineState, Sample};
+use tandem_rings::{MachineState, Sample, Switched};
 use tandem_sdk::{Axes, AxisVector, MAX_SIGNALS};
 use tandem_trace::{Ending, Header, Item, Reader, TraceError, Writer};
 
@@ -42,14 +42,17 @@ pub fn read(bytes: &[u8]) -> Result<(Vec<Item>, Ending), TraceError> {
 pub fn bits((s, signals): &Row) -> Vec<u64> {
     let floats = s.command.0.into_iter().chain(s.feedback.0).chain([s.feed_mm_per_s, s.sigma, s.ratio]);
     let bits = floats.chain(*signals).map(f64::to_bits);
-    [s.tick, s.block, u64::from(s.line), s.state as u64].into_iter().chain(bits).collect()
+    let phase = s.phase_ns.map_or([0, 0], |ns| [1, ns.cast_unsigned()]);
+    let switched = [s.switched.outputs, s.switched.spindle_rad_per_s.to_bits()].into_iter().chain(phase);
+    [s.tick, s.block, u64::from(s.line), s.state as u64].into_iter().chain(switched).chain(bits).collect()
 }
 
 /// Rows of any numbers whatever, with so many axes and signals.
 pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value = Vec<Row>> {
     let floats = prop::array::uniform32(any_double());
-    let row =
-        (any::<u64>(), any::<u64>(), any::<u32>(), 0..7_u32, floats).prop_map(move |(tick, block, line, state, f)| {
+    let phase = prop::option::of(i64::MIN + 1..=i64::MAX);
+    let row = (any::<u64>(), any::<u64>(), any::<u32>(), 0..7_u32, floats, any::<u64>(), phase).prop_map(
+        move |(tick, block, line, state, f, outputs, phase_ns)| {
             let some = |from: usize, count: usize| std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 });
             let sample = Sample {
                 tick,
@@ -61,10 +64,13 @@ pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value
                 feed_mm_per_s: f[16],
                 sigma: f[17],
                 ratio: f[18],
+                switched: Switched { outputs, spindle_rad_per_s: f[27], ..Switched::default() },
+                phase_ns,
                 ..Sample::default()
             };
             (sample, some(19, signals))
-        });
+        },
+    );
     prop::collection::vec(row, 0..most)
 }
 

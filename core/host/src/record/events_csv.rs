@@ -1,0 +1,163 @@
+//! What was switched, and by whom.
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::path::Path;
+
+use tandem_fine::Left;
+use tandem_rings::{FLOOD, MIST, Sample, Switched, SwitchedBy};
+use tandem_sdk::{Event, EventKind};
+
+use super::failure::RecordError;
+use super::output::Output;
+use super::trace_csv::{TraceCsv, rpm};
+
+/// Writes an events CSV: a row for each switch of spindle, coolant and outputs.
+pub struct EventsCsv {
+    out: Output,
+    period_s: f64,
+    /// What was sent last: everything is off when a run begins.
+    last: Switched,
+    /// Words of the program that have not been seen to switch.
+    ahead: VecDeque<Word>,
+    /// It has been told that no further row can be written.
+    failed: bool,
+}
+
+/// What a word or a row switches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    Spindle,
+    /// Coolant too.
+    Output(u32),
+}
+
+/// A word of the program that switches.
+#[derive(Clone, Copy, Debug)]
+struct Word {
+    what: What,
+    /// rad/s, or 1 and 0.
+    value: f64,
+    line: u32,
+    before_block: u64,
+}
+
+impl Word {
+    fn of(event: &Event) -> Option<Self> {
+        let what = match event.kind {
+            EventKind::Spindle => What::Spindle,
+            EventKind::Mist => What::Output(MIST),
+            EventKind::Flood => What::Output(FLOOD),
+            EventKind::DigitalOutput => What::Output(event.index.unsigned_abs()),
+            _ => return None,
+        };
+        let is_on = f64::from(u8::from(event.value != 0.0));
+        let value = if what == What::Spindle { event.value } else { is_on };
+        Some(Self { what, value, line: event.line, before_block: event.before_block })
+    }
+}
+
+/// A period in which something may have switched.
+struct Period {
+    tick: u64,
+    /// Block and program line that moved.
+    block: u64,
+    line: u32,
+    switched: Switched,
+}
+
+impl EventsCsv {
+    /// Starts the file with its head line.
+    ///
+    /// # Errors
+    /// The path with the system's words.
+    pub fn create(path: &Path, fine_period_s: f64) -> Result<Self, String> {
+        let mut out = Output::create(path)?;
+        writeln!(out, "time_s,tick,line,word,value,by").map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Self { out, period_s: fine_period_s, last: Switched::default(), ahead: VecDeque::new(), failed: false })
+    }
+
+    /// An event of the program is on its way to the drives.
+    pub fn event(&mut self, event: &Event) {
+        if !self.failed {
+            self.ahead.extend(Word::of(event));
+        }
+    }
+
+    /// A sample was sent: what it switches is written. After an error all further ones are left out.
+    ///
+    /// # Errors
+    /// Once: no further row can be written.
+    pub fn sample(&mut self, sample: &Sample) -> Result<(), RecordError> {
+        let Sample { tick, block, line, switched, .. } = *sample;
+        let written = self.period(&Period { tick, block, line, switched }).map_err(|error| error.at(sample));
+        // What stands before a block that is over has switched, or was so already.
+        while self.ahead.pop_front_if(|word| word.before_block < block).is_some() {}
+        written
+    }
+
+    /// Ends the file. The period that ends a program switches too, and has no sample: that is what is `left`.
+    ///
+    /// # Errors
+    /// The last rows cannot be written, or the file cannot take its name. What [`EventsCsv::sample`] has told is not told
+    /// again.
+    pub fn finish(mut self, left: &Left) -> Result<(), RecordError> {
+        if self.failed {
+            return Ok(());
+        }
+        let Left { tick, block, line, switched } = *left;
+        self.period(&Period { tick, block, line, switched })?;
+        self.out.finish_record("events")
+    }
+
+    fn period(&mut self, period: &Period) -> Result<(), RecordError> {
+        if self.failed || period.switched == self.last {
+            return Ok(());
+        }
+        self.rows(period).map_err(|error| {
+            self.failed = true;
+            self.ahead.clear();
+            RecordError::of("events", &mut self.out, error)
+        })
+    }
+
+    fn rows(&mut self, period: &Period) -> std::io::Result<()> {
+        let (now, last) = (period.switched, std::mem::replace(&mut self.last, period.switched));
+        if now.spindle_rad_per_s != last.spindle_rad_per_s {
+            self.row(period, What::Spindle, now.spindle_rad_per_s)?;
+        }
+        for output in (0..u64::BITS).filter(|output| now.is_on(*output) != last.is_on(*output)) {
+            self.row(period, What::Output(output), f64::from(u8::from(now.is_on(output))))?;
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, period: &Period, what: What, value: f64) -> std::io::Result<()> {
+        let Period { tick, block, line, switched } = period;
+        let by_word = (switched.by == SwitchedBy::Program).then(|| self.line_of(what, value, *block)).flatten();
+        let (time_s, line) = (TraceCsv::t_s(*tick, self.period_s), by_word.unwrap_or(*line));
+        let (word, shown) = match what {
+            What::Spindle => ("spindle".to_string(), rpm(value)),
+            What::Output(MIST) => ("mist".to_string(), value),
+            What::Output(FLOOD) => ("flood".to_string(), value),
+            What::Output(output) => (format!("output {output}"), value),
+        };
+        // Names and numbers: nothing that a CSV would have to quote.
+        writeln!(self.out, "{time_s},{tick},{line},{word},{shown},{}", switched.by.name())
+    }
+
+    /// The line of the word that has switched `what` to `value` by the time `block` moves, or stands before the next. Of words
+    /// at one place the last counts. It, and those for the same before it, are used up.
+    fn line_of(&mut self, what: What, value: f64, block: u64) -> Option<u32> {
+        let is_it = |word: &Word| word.what == what && word.value == value && word.before_block <= block + 1;
+        let place = self.ahead.iter().find(|word| is_it(word))?.before_block;
+        let found = self.ahead.iter().rposition(|word| is_it(word) && word.before_block == place)?;
+        let line = self.ahead[found].line;
+        let mut index = 0;
+        self.ahead.retain(|word| {
+            index += 1;
+            word.what != what || index > found + 1
+        });
+        Some(line)
+    }
+}

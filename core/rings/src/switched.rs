@@ -1,0 +1,65 @@
+//! What is switched beside the axes.
+
+/// Number of the output that stands for mist coolant; user outputs are 0 to 61.
+pub const MIST: u32 = 62;
+/// Number of the output that stands for flood coolant.
+pub const FLOOD: u32 = 63;
+
+/// What switched last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SwitchedBy {
+    /// A word of the program.
+    #[default]
+    Program,
+    /// The operator's abort.
+    Abort,
+    /// A fault, when the axes are at rest.
+    Fault,
+    /// The emergency stop.
+    EmergencyStop,
+}
+
+impl SwitchedBy {
+    /// As people and programs read it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Program => "program",
+            Self::Abort => "abort",
+            Self::Fault => "fault",
+            Self::EmergencyStop => "emergency stop",
+        }
+    }
+}
+
+/// Spindle, coolant and outputs as the drives were sent them in a period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Switched {
+    /// Digital outputs, bit n is output n; [`MIST`] and [`FLOOD`] are the coolant.
+    pub outputs: u64,
+    /// Speed asked of the spindle, rad/s; its sign is the direction.
+    pub spindle_rad_per_s: f64,
+    /// What switched last; a trace does not keep it.
+    pub by: SwitchedBy,
+}
+
+impl Switched {
+    /// The outputs of the user alone, without coolant.
+    pub fn user_outputs(&self) -> u64 {
+        self.outputs & !(1 << MIST | 1 << FLOOD)
+    }
+
+    /// Whether this output is on.
+    pub fn is_on(&self, output: u32) -> bool {
+        self.outputs >> output & 1 == 1
+    }
+
+    /// The coolant as people and programs read it.
+    pub fn coolant(&self) -> &'static str {
+        match (self.is_on(MIST), self.is_on(FLOOD)) {
+            (false, false) => "off",
+            (true, false) => "mist",
+            (false, true) => "flood",
+            (true, true) => "both",
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Spindle, coolant and outputs in the trace and in the file of events: who switched what, and when.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::harness::{Done, Scenario, mill};
+
+/// Lines 6 and 7 move to and fro at 50 mm/s.
+const PROGRAM: &str = "G21 G90 F3000\nM3 S1000\nM64 P3\nM64 P7\nM8\nG1 X10\nG1 X0\nM65 P3\nM4 S500\nG1 X5\nM2\n";
+
+const KEPT: [&str; 2] = ["--set", "outputs.clamp={output=7,on_fault=\"keep\"}"];
+
+/// Tick, line, word, value and who switched, of each row.
+fn events(done: &Done) -> Vec<(u64, u32, String, f64, String)> {
+    let mut reader = csv::Reader::from_path(done.file("events.csv")).unwrap();
+    assert_eq!(reader.headers().unwrap(), &["time_s", "tick", "line", "word", "value", "by"][..]);
+    let row = |row: csv::StringRecord| {
+        let (time_s, tick): (f64, u64) = (row[0].parse().unwrap(), row[1].parse().unwrap());
+        assert!((time_s - tick as f64 * 0.001).abs() < 1e-9);
+        (tick, row[2].parse().unwrap(), row[3].to_string(), row[4].parse::<f64>().unwrap().round(), row[5].to_string())
+    };
+    reader.records().map(|record| row(record.unwrap())).collect()
+}
+
+fn words(done: &Done) -> Vec<String> {
+    events(done).into_iter().map(|(_, line, word, value, by)| format!("{line} {word} {value} {by}")).collect()
+}
+
+/// What the program switches before it moves.
+const BEFORE: [&str; 4] =
+    ["2 spindle 1000 program", "3 output 3 1 program", "4 output 7 1 program", "5 flood 1 program"];
+
+fn assert_words(done: &Done, behind: &[&str]) {
+    // Those of one tick stand in the order of the outputs.
+    let (mut found, mut expected) = (words(done), [&BEFORE[..], behind].concat());
+    found.sort();
+    expected.sort_unstable();
+    assert_eq!(found, expected, "{}", done.errors());
+}
+
+#[test]
+fn what_a_program_switches_up_to_its_end() {
+    let done = Scenario::text(PROGRAM).events().run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let ends = ["11 spindle 0 program", "11 flood 0 program"];
+    assert_words(&done, &[&["8 output 3 0 program", "9 spindle -500 program"], &ends[..]].concat());
+    let (outputs, coolant, rpm) = (done.cells("outputs"), done.cells("coolant"), done.column("spindle_set_rpm"));
+    let last = outputs.len() - 1;
+    assert_eq!((outputs[last].as_str(), coolant[last].as_str()), ("0x80", "flood"));
+    assert!((rpm[last] + 500.0).abs() < 1e-9 && outputs.iter().any(|bits| bits == "0x88"), "{}", rpm[last]);
+    assert!(done.cells("phase_ns").iter().all(|phase| phase == "nan"), "no driver tells a phase");
+    // The period that ends the program has no sample, and switches.
+    assert_eq!(events(&done).last().map(|row| row.0), Some(last as u64 + 1));
+    let said = String::from_utf8_lossy(&done.output.stdout).into_owned();
+    assert!(said.contains("\nevents: "), "{said}");
+}
+
+#[test]
+fn an_emergency_stop_switches_off_in_its_period() {
+    let done = Scenario::text(PROGRAM).with(&KEPT).events().commands("100,emergency-stop\n").run();
+    assert_eq!(done.status(), 3);
+    let by = "emergency stop";
+    let gone = ["spindle 0", "output 3 0", "flood 0"].map(|word| format!("6 {word} {by}"));
+    assert_words(&done, &gone.each_ref().map(String::as_str));
+    assert!(events(&done).iter().filter(|row| row.4 == by).all(|row| row.0 == 100), "{:?}", events(&done));
+    assert_eq!([99, 100].map(|tick| done.cells("outputs")[tick].clone()), ["0x88", "0x80"]);
+    assert!(done.cells("state").iter().filter(|state| *state == "stopping").count() > 20, "it moved for a while");
+}
+
+#[test]
+fn a_fault_switches_off_when_the_axes_are_at_rest() {
+    let fault = ["--set", "faults.wrap=[{kind=\"fail\",at_call=100}]"];
+    let done = Scenario::text(PROGRAM).with(&KEPT).with(&fault).events().run();
+    assert_eq!(done.status(), 3);
+    assert_words(&done, &["6 spindle 0 fault", "6 output 3 0 fault", "6 flood 0 fault"]);
+    let states = done.cells("state");
+    let rest = states.iter().position(|state| state == "fault").unwrap();
+    assert!(states[..rest].iter().filter(|state| *state == "stopping").count() > 20, "it moved for a while");
+    assert!(events(&done).iter().filter(|row| row.4 == "fault").all(|row| row.0 == rest as u64), "{:?}", events(&done));
+    let x = done.column("x_cmd_mm");
+    assert!(x[rest] == x[rest - 1] && (x[rest] - x[rest - 4]).abs() > 1e-6, "at rest, and no sooner than just before");
+}
+
+#[test]
+fn an_abort_leaves_outputs() {
+    let done = Scenario::text(PROGRAM).events().commands("100,abort\n").run();
+    assert_words(&done, &["6 spindle 0 abort", "6 flood 0 abort"]);
+}
+
+#[test]
+fn a_binary_trace_exports_the_same_columns() {
+    let done = Scenario::text(PROGRAM).run();
+    let program = done.file("program.ngc");
+    std::fs::write(&program, PROGRAM).unwrap();
+    let at = |name: &str| done.file(name);
+    let run = |arguments: &[&Path]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_tandem")).args(arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let [go, on, to] = ["run", "--machine", "--trace"].map(Path::new);
+    run(&[go, &program, on, &mill(), to, &at("same.ttr")]);
+    run(&["trace".as_ref(), "export".as_ref(), &at("same.ttr"), "--csv".as_ref(), &at("same.csv")]);
+    assert!(std::fs::read(at("same.csv")).unwrap() == std::fs::read(at("trace.csv")).unwrap());
+    run(&["trace".as_ref(), "diff".as_ref(), &at("same.ttr"), &at("trace.csv")]);
+}
+
+/// Numbers alone could not tell outputs above 53 apart.
+#[test]
+fn what_is_switched_otherwise_is_a_difference_but_none_of_commands() {
+    let other = PROGRAM.replace("M64 P3", "M64 P61").replace("M65 P3", "M65 P61");
+    let (a, b) = (Scenario::text(PROGRAM).run(), Scenario::text(&other).run());
+    let diff = |options: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
+        command.args(["trace", "diff"]).args(options).arg(a.file("trace.csv")).arg(b.file("trace.csv"));
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (status, said) = diff(&[]);
+    assert!(status == Some(1) && said.contains("outputs: 0x88 in A, 0x2000000000000080 in B"), "{said}");
+    assert_eq!(diff(&["--commands-only"]).0, Some(0));
+}
