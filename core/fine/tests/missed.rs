@@ -130,6 +130,24 @@ fn as_many_in_a_second_as_allowed_are_none_too_many_however_long_it_goes_on() {
     assert_eq!(cause(&bench), OF_LAST);
 }
 
+/// The first and the last of eleven lie in one second, or by a period do not.
+#[test]
+fn the_window_is_a_second_to_a_period() {
+    for (between, fault) in [(999, OF_LAST), (1000, None)] {
+        let mut bench = cruising();
+        bench.fine.missed(1, 1);
+        for _ in 1..OF_A_SECOND {
+            tick(&mut bench, 1);
+            bench.fine.missed(1, 1);
+        }
+        // Ten periods missed and nine kept so far, numbered 0 to 18.
+        tick(&mut bench, between - 19);
+        assert_eq!(cause(&bench), None);
+        bench.fine.missed(1, 1);
+        assert_eq!(cause(&bench), fault, "{between} periods from the first to the last");
+    }
+}
+
 #[test]
 fn what_was_missed_at_rest_takes_nothing_of_the_share() {
     let mut bench = cruising();
