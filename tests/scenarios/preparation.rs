@@ -157,7 +157,7 @@ impl Untouched {
 
 impl Driver for Untouched {
     fn describe(&self) -> DriverDescription {
-        DriverDescription::real()
+        DriverDescription { watches_following: 1, ..DriverDescription::real() }
     }
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
         let fits = context.joint_count == 3;

@@ -296,6 +296,11 @@ impl FineLoop {
         self.let_go
     }
 
+    /// Whether the joints do not hold yet: nothing can move, and planning waits for them. Any side.
+    pub fn is_attaching(&self) -> bool {
+        !self.attach.is_done() && !self.is_over()
+    }
+
     /// The driver, for what its codes mean. Host, between ticks.
     pub fn driver(&self) -> &dyn Driver {
         self.driver.as_ref()

@@ -71,8 +71,9 @@ impl Plugins {
         let (joints, driver) = (JointSpace::of(machine, registry)?, self.claim.describe());
         rules::check(machine, &self.planner.describe(), driver)?;
         rules::check_homing(machine, &joints, switches)?;
-        rules::check_real(machine, &joints, &driver, switches.clock)?;
-        self.claim.check(machine, &joints)
+        // A driver that has panicked says so here, and of what it is nothing is known.
+        self.claim.check(machine, &joints)?;
+        rules::check_real(machine, &joints, &driver, switches.clock)
     }
 
     /// Puts the machine's faults around the driver.

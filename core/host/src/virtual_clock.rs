@@ -19,6 +19,12 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
     let mut commands = commands.iter().peekable();
     let mut tick = 0;
     let mut stalled = 0;
+    while fine.is_attaching() {
+        calling(Method::FinePeriod, || fine.tick());
+        beat();
+    }
+    // A fault on the way has its samples too.
+    pump.drain();
     while !fine.is_over() {
         if stalled == 0 {
             pump.step();

@@ -14,8 +14,11 @@ impl RoughLoop {
             self.planner.reset(&rest.position);
             self.queue.restart(&rest);
             self.forget(&rest);
-            self.awaits_drives &= rest.cause != RestCause::Attached;
-            observer.rest(&rest);
+            if rest.cause == RestCause::Attached {
+                self.awaits_drives = false;
+            } else {
+                observer.rest(&rest);
+            }
             if let Some(cause) = refusal(&rest) {
                 return Err(RoughError::Stop { line: rest.line, cause });
             }

@@ -121,8 +121,9 @@ impl FineLoop {
         self.preview.clear();
         self.line_end.forget();
         (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);
-        // A jog that is let go leaves a hold as it is: the next one waits for its end too.
-        if self.given.abort {
+        // A jog that is let go leaves a hold as it is: the next one waits for its end too. An abort that comes while the joints
+        // are enabled is still to act.
+        if self.given.abort && stop.cause != RestCause::Attached {
             self.outputs.abort();
             let controls = &self.controls;
             for flag in [&controls.hold, &controls.program_hold, &controls.abort] {
