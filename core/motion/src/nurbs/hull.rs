@@ -15,10 +15,26 @@ pub(super) struct Hull {
     pub range: (f64, f64),
 }
 
+impl Nurbs {
+    /// Whether the curve lies inside a convex set all the way between two parameters. True is proven: the control points of
+    /// the parts of the curve there are inside, and a part that is not is halved up to `halvings` times. Does not allocate.
+    pub fn lies_inside(&self, range: (f64, f64), halvings: u32, inside: &impl Fn(&AxisVector) -> bool) -> bool {
+        let spans = self.span(range.0)..=self.span(range.1);
+        spans.into_iter().all(|span| {
+            let part = (self.knots[span].max(range.0), self.knots[span + 1].min(range.1));
+            part.1 <= part.0 || Hull::of_part(self, span, part).is_inside(halvings, inside)
+        })
+    }
+}
+
 impl Hull {
-    /// The whole of `span`, which has an extent: the blossom of the curve at its ends. Does not allocate.
+    /// The whole of `span`, which has an extent. Does not allocate.
     pub fn of_span(curve: &Nurbs, span: usize) -> Self {
-        let (from, to) = (curve.knots[span], curve.knots[span + 1]);
+        Self::of_part(curve, span, (curve.knots[span], curve.knots[span + 1]))
+    }
+
+    /// The part of `span`, which has an extent, between two parameters: the blossom of the curve at them. Does not allocate.
+    fn of_part(curve: &Nurbs, span: usize, (from, to): (f64, f64)) -> Self {
         let mut hull = Self { degree: curve.degree, points: [[0.0; MAX_AXES + 1]; MAX_DEGREE + 1], range: (from, to) };
         for index in 0..=curve.degree {
             hull.points[index] = blossom(curve, span, |level| if level + index <= curve.degree { from } else { to });
@@ -38,6 +54,17 @@ impl Hull {
             first.points[level] = second.points[0];
         }
         [first, second]
+    }
+
+    /// Whether it lies inside a convex set, as far as `halvings` show.
+    fn is_inside(&self, halvings: u32, inside: &impl Fn(&AxisVector) -> bool) -> bool {
+        if (0..=self.degree).all(|index| inside(&self.position(index))) {
+            return true;
+        }
+        // Its ends are places of the curve itself: where one is outside, no halving helps.
+        halvings > 0
+            && self.ends().iter().all(inside)
+            && self.halves().iter().all(|half| half.is_inside(halvings - 1, inside))
     }
 
     /// Degree of the curve.
