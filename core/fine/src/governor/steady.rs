@@ -162,6 +162,10 @@ impl Governor {
                 self.keep_at(way, 1.0 - left_s / whole_s, &place.motion(), bounds, &mut interval);
             }
         }
+        if whole_s <= NONE_S {
+            // From rest next to no program time passes in the period, but σ̇ grows in it, and the velocity of the axes.
+            self.keep_at(way, 1.0, &place.motion(), bounds, &mut interval);
+        }
         (!interval.is_empty()).then_some(interval)
     }
 
