@@ -193,17 +193,16 @@ const LEAST_LEFT: f64 = 0.02;
 /// Notes what is left for a stop: with d the direction and n what turns, `A − max(0, −sign(d)·n)` over |d|.
 #[inline(always)]
 fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &Lanes<L>, speed: f64) {
-    if speed < 1e-3 {
+    let squared = dot(v, v);
+    if squared < f64::MIN_POSITIVE {
         return;
     }
-    let squared = dot(v, v);
     let along = dot(v, a) / squared;
     stop.speed = stop.speed.max(speed);
     for l in 0..L {
-        let d = v[l] / speed;
-        let turning = (a[l] - along * v[l]) * d.signum();
+        let turning = (a[l] - along * v[l]) * v[l].signum();
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
-        stop.time_s = stop.time_s.max(speed * d.abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
+        stop.time_s = stop.time_s.max(v[l].abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
         stop.jerk_per_speed = stop.jerk_per_speed.min(frame.jerk[l] / v[l].abs().max(1e-9));
     }
 }
@@ -221,6 +220,23 @@ mod tests {
             scale.map(|scale| [(); 2].map(|()| scale * random.between(-1.0, 1.0)))
         };
         Piece::between(&state(), &state(), 0.0, duration_s)
+    }
+
+    #[test]
+    fn a_slow_motion_needs_time_for_its_stop_too() {
+        let axis = tandem_sdk::AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: 1.0,
+            rapid_mm_per_s: 1.0,
+            acceleration_mm_per_s2: 1e-3,
+            jerk_mm_per_s3: 1e-2,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let frame = Frame::<2>::new(&tandem_rig::context(&[axis; 2], 1e-3));
+        let (mut stop, v) = (Stop::default(), [5e-4, 0.0]);
+        leave(&mut stop, &frame, &v, &[0.0; 2], v[0]);
+        assert!((stop.time_s - 0.5).abs() < 1e-9 && (stop.jerk_per_speed - 20.0).abs() < 1e-9, "{stop:?}");
     }
 
     #[test]
