@@ -16,6 +16,8 @@ const SHARP: f64 = 0.1;
 const OTHER_FEED: f64 = 0.99;
 /// Time by which the motion may be early or late where the feed changes, s.
 const TIMELY_S: f64 = 3e-4;
+/// Half a box along the path at most, as a multiple of the tolerance: where a single axis moves nothing else bounds it.
+const LONGEST: f64 = 150.0;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
 /// Firm sites in a step at most.
@@ -212,7 +214,7 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
         need[l] = need[l].max(t * (0.3 / across).min(loose));
     }
     let worst = farthest(&need, &tangent);
-    widen(each(|l| need[l] * (BOX_SHARE * tolerance / worst)), tangent)
+    widen(each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance), tangent)
 }
 
 /// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
