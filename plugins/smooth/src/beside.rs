@@ -30,6 +30,14 @@ pub struct Beside<const L: usize> {
     pub share: f64,
 }
 
+impl<const L: usize> Beside<L> {
+    /// Path coordinate of the place on the path.
+    pub fn path_coordinate(&self, run: &Run<'_, L>) -> f64 {
+        let chord = &run.chords[self.chord];
+        chord.s + dot(&minus(&self.foot, &chord.start), &chord.direction)
+    }
+}
+
 /// The path beside `point`, around chord `near`.
 #[inline(always)]
 pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -> Beside<L> {

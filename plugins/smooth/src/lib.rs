@@ -20,6 +20,7 @@ mod feeds;
 mod flatten;
 mod frame;
 mod options;
+mod order;
 mod peaks;
 mod plan;
 mod planner;

@@ -10,6 +10,7 @@ use tandem_motion::tube::{Lanes, each};
 use crate::beside::{ALLOWED, Beside, DEVIATION, HALVINGS, NEAR_ENOUGH, SEARCHED, beside, closer, stretch, to_chord};
 use crate::feeds::Feeder;
 use crate::frame::{Frame, dot};
+use crate::order::Order;
 use crate::peaks::{bound, derivatives, highest, positions};
 use crate::plan::Start;
 use crate::route::Run;
@@ -56,11 +57,12 @@ pub struct Checker<const L: usize> {
     /// Bounds of the size of acceleration and jerk of every piece.
     bends: Vec<f64>,
     jerks: Vec<f64>,
+    order: Order,
 }
 
 impl<const L: usize> Default for Checker<L> {
     fn default() -> Self {
-        Self { samples: Vec::new(), bends: Vec::new(), jerks: Vec::new() }
+        Self { samples: Vec::new(), bends: Vec::new(), jerks: Vec::new(), order: Order::default() }
     }
 }
 
@@ -139,6 +141,10 @@ impl<const L: usize> Checker<L> {
         let before = start.before.len();
         checked.deviation = self.motion_off(run, window, frame.period_s, before);
         if checked.deviation <= 1.0 {
+            let near = run.chord_at(window.marks[0].s, 0);
+            if !self.order.walk(run, &self.samples, before, (near, window.end())) {
+                return Checked { deviation: FAR, ..checked };
+            }
             let (off, bulge) = self.vertices_off(run, start, window, frame.period_s);
             (checked.deviation, checked.bulge) = (checked.deviation.max(off), bulge);
         }
@@ -217,8 +223,12 @@ impl<const L: usize> Checker<L> {
                 piece += 1;
             }
             if chord.s > from {
-                let near = (t / period_s) as usize + start.before.len();
-                let off = self.nearest_sample(near, &chord.start, tolerance);
+                let before = start.before.len();
+                let (first, last) = self.order.around(chord.s);
+                // Where the window begins the samples before it count too.
+                let among = (if first == 0 { 0 } else { before + first }, before + last);
+                let near = (t / period_s) as usize + before;
+                let off = self.nearest_sample(near, among, &chord.start, tolerance);
                 let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
                 if off + bulge > ALLOWED * tolerance {
                     bulge = self.bulge_around(window, piece, t, period_s);
@@ -249,15 +259,17 @@ impl<const L: usize> Checker<L> {
         (across + change + turned * bend).min(bend) * period_s * period_s / 8.0
     }
 
+    /// The distance of `vertex` from the chain of those samples that may pass it, `among` which sample `near` is sought first.
     #[inline(always)]
-    fn nearest_sample(&self, near: usize, vertex: &Lanes<L>, tolerance: f64) -> f64 {
-        let last = self.samples.len() - 2;
-        let near = near.min(last);
+    fn nearest_sample(&self, near: usize, (first, last): (usize, usize), vertex: &Lanes<L>, tolerance: f64) -> f64 {
+        let last = last.min(self.samples.len() - 2);
+        let first = first.min(last);
+        let near = near.clamp(first, last);
         let enough = (NEAR_ENOUGH * tolerance).powi(2);
         let allowed = DEVIATION * tolerance;
         let mut best = f64::INFINITY;
         for step in 0..SEARCHED {
-            let (below, above) = (near.checked_sub(step), near + step);
+            let (below, above) = (near.checked_sub(step).filter(|n| *n >= first), near + step);
             if let Some(below) = below {
                 best = smaller(best, to_chord(vertex, &self.samples[below], &self.samples[below + 1]));
             }

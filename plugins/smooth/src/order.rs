@@ -1,0 +1,175 @@
+//! Places of the samples along the path, in their order: what is near a place that the path passes at another time is not
+//! there, and a motion that leaves out a loop, or turns back, does not follow the path.
+
+use tandem_motion::tube::Lanes;
+
+use crate::beside::{ALLOWED, beside, to_chord};
+use crate::frame::{dot, minus};
+use crate::route::{Chord, Run};
+
+/// How far a vertex may be from the samples between which it is passed, in tolerances: a place is the first that a sample may
+/// have, and lags behind it.
+const REACH: f64 = 4.0;
+
+/// Path coordinates of samples; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Order {
+    /// The first place that each sample may have, and the last; neither ever goes back.
+    first: Vec<f64>,
+    last: Vec<f64>,
+}
+
+impl Order {
+    /// Finds the places of `samples` in a motion to `end` that follows the path: each within tolerance of the path, none before
+    /// that of the sample before; false where there are none. Samples before `begin` are those of another window; where it is
+    /// left the path is near chord `near`.
+    pub fn walk<const L: usize>(
+        &mut self,
+        run: &Run<'_, L>,
+        samples: &[Lanes<L>],
+        begin: usize,
+        (near, end): (usize, f64),
+    ) -> bool {
+        let start = beside(run, near, &samples[begin]).path_coordinate(run);
+        let tolerance = run.chords[run.chord_at(start, near)].tolerance;
+        let mut walker = Walker::begin(run, (start - 2.0 * tolerance).max(run.chords[0].s));
+        self.first.clear();
+        self.last.clear();
+        for n in begin..samples.len() {
+            if !walker.goes_on(&samples[n - usize::from(n > begin)], &samples[n]) {
+                return false;
+            }
+            self.first.push(walker.s());
+        }
+        let mut walker = Walker::begin(run, end);
+        for n in (begin..samples.len()).rev() {
+            if !walker.goes_back(&samples[(n + 1).min(samples.len() - 1)], &samples[n]) {
+                return false;
+            }
+            self.last.push(walker.s());
+        }
+        self.last.reverse();
+        true
+    }
+
+    /// Between which samples, counted from where the window begins, a vertex at `s` may be passed.
+    pub fn around(&self, s: f64) -> (usize, usize) {
+        let first = self.last.partition_point(|place| *place < s);
+        let behind = self.first.partition_point(|place| *place <= s);
+        (first.saturating_sub(1), behind.saturating_sub(1))
+    }
+}
+
+/// A place on the path that goes with the samples.
+struct Walker<'a, const L: usize> {
+    chords: &'a [Chord<L>],
+    chord: usize,
+    along: f64,
+}
+
+impl<'a, const L: usize> Walker<'a, L> {
+    fn begin(run: &Run<'a, L>, s: f64) -> Self {
+        let chord = run.chord_at(s, 0);
+        Self { chords: run.chords, chord, along: (s - run.chords[chord].s).clamp(0.0, run.chords[chord].length) }
+    }
+
+    fn s(&self) -> f64 {
+        self.chords[self.chord].s + self.along
+    }
+
+    /// Goes on to the first place that is within tolerance of `sample`. Vertices on the way have to be near the way from the
+    /// sample before.
+    #[inline(always)]
+    fn goes_on(&mut self, before: &Lanes<L>, sample: &Lanes<L>) -> bool {
+        loop {
+            if let Some([first, _]) = within(&self.chords[self.chord], [self.along, f64::INFINITY], sample) {
+                self.along = first;
+                return true;
+            }
+            let next = self.chord + 1;
+            if next == self.chords.len() || !self.is_near(next, before, sample) {
+                return false;
+            }
+            (self.chord, self.along) = (next, 0.0);
+        }
+    }
+
+    /// Goes back to the last place that is within tolerance of `sample`, in the same way.
+    #[inline(always)]
+    fn goes_back(&mut self, behind: &Lanes<L>, sample: &Lanes<L>) -> bool {
+        loop {
+            if let Some([_, last]) = within(&self.chords[self.chord], [0.0, self.along], sample) {
+                self.along = last;
+                return true;
+            }
+            if self.chord == 0 || !self.is_near(self.chord, behind, sample) {
+                return false;
+            }
+            self.chord -= 1;
+            self.along = self.chords[self.chord].length;
+        }
+    }
+
+    /// Whether the vertex at the start of chord `vertex` is near the way from one sample to another.
+    #[inline(always)]
+    fn is_near(&self, vertex: usize, from: &Lanes<L>, to: &Lanes<L>) -> bool {
+        let reach = REACH * self.chords[vertex].tolerance.max(self.chords[vertex - 1].tolerance);
+        to_chord(&self.chords[vertex].start, from, to) <= reach * reach
+    }
+}
+
+/// The first and the last place on `chord` between `low` and `high` that are within tolerance of `sample`.
+#[inline(always)]
+fn within<const L: usize>(chord: &Chord<L>, [low, high]: [f64; 2], sample: &Lanes<L>) -> Option<[f64; 2]> {
+    let most = ALLOWED * chord.tolerance;
+    let way = minus(sample, &chord.start);
+    let foot = dot(&way, &chord.direction);
+    let across = minus(&way, &chord.direction.map(|d| foot * d));
+    let half = (most * most - dot(&across, &across)).sqrt();
+    let (first, last) = (low.max(foot - half), high.min(foot + half).min(chord.length));
+    // Where it is too far on the whole chord, half is no number.
+    (half >= 0.0 && first <= last).then_some([first, last])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: f64 = 0.01;
+
+    /// Lines through `points`.
+    fn lines(points: &[[f64; 2]]) -> Vec<Chord<2>> {
+        let mut s = 0.0;
+        let chord = |pair: &[[f64; 2]]| {
+            let way = minus(&pair[1], &pair[0]);
+            let length = dot(&way, &way).sqrt();
+            let direction = way.map(|v| v / length);
+            s += length;
+            Chord { start: pair[0], direction, s: s - length, length, feed: 1.0, tolerance: TOLERANCE, turn: 0.0 }
+        };
+        points.windows(2).map(chord).collect()
+    }
+
+    /// Whether samples at these points have places in order on the path.
+    fn in_order(path: &[[f64; 2]], samples: &[[f64; 2]]) -> bool {
+        let chords = lines(path);
+        let run = Run { chords: &chords, closed: true, rotary: false, rapid: false };
+        Order::default().walk(&run, samples, 0, (0, run.end()))
+    }
+
+    #[test]
+    fn a_motion_along_the_path_has_places_in_order() {
+        assert!(in_order(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], &[[0.0, 0.0], [0.5, 0.005], [0.995, 0.0], [1.0, 1.0]]));
+    }
+
+    #[test]
+    fn a_motion_that_turns_back_on_a_line_has_none() {
+        assert!(!in_order(&[[0.0, 0.0], [1.0, 0.0]], &[[0.0, 0.0], [0.5, 0.0], [0.45, 0.0], [1.0, 0.0]]));
+    }
+
+    #[test]
+    fn a_motion_that_leaves_out_a_loop_has_none() {
+        let path = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.3], [0.7, 0.3], [1.0, 0.0], [1.0, -1.0]];
+        assert!(!in_order(&path, &[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, -0.5], [1.0, -1.0]]));
+    }
+}
