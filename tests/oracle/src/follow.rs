@@ -49,6 +49,16 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
     followed
 }
 
+/// Between which places each link may be where all of the tolerance is used, as far as the path can be followed with so much;
+/// none where it cannot. The places that the smallest tolerance leaves may be those of another part of the path, where that has
+/// features smaller than the tolerance.
+pub fn ranges(elements: &[Element], followed: &Followed, options: &Options) -> Option<Vec<(Place, Place)>> {
+    let walker = Walker::new(elements, options);
+    let (cap_mm, first) = widest_tolerance(&walker, &followed.chain)?;
+    let last = latest(elements, followed.end, &followed.chain, cap_mm, options)?;
+    Some(first.into_iter().zip(last).collect())
+}
+
 impl Followed {
     fn chain(commands: &[Position]) -> Self {
         let (mut chain, mut samples, mut links) = (Vec::<Position>::new(), Vec::new(), Vec::new());
@@ -79,10 +89,7 @@ impl Followed {
 /// The smallest tolerance with which the walk succeeds, and that walk; none where the allowed one is too small.
 fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
     let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
-    // With a wide tolerance a walk may dawdle on a piece that the samples have left, until the next vertex is out of reach;
-    // one that keeps closer to the samples does not. Each of them that succeeds is a proof.
-    let caps = (0..NARROWER).map(|times| walker.widest_mm() / f64::from(1u32 << times));
-    let (mut high_mm, mut places) = caps.into_iter().find_map(|cap_mm| Some((cap_mm, walk(cap_mm)?)))?;
+    let (mut high_mm, mut places) = widest_tolerance(walker, chain)?;
     let mut low_mm = SMALLEST_DEVIATION_MM;
     while high_mm > RESOLUTION * low_mm {
         let middle_mm = (low_mm * high_mm).sqrt();
@@ -92,6 +99,15 @@ fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<P
         }
     }
     Some((high_mm, places))
+}
+
+/// The widest tolerance with which the walk succeeds, and that walk. With a wide one it may dawdle on a piece that the samples
+/// have left, until the next vertex is out of reach; one that keeps closer to the samples does not. Each of them that succeeds
+/// is a proof.
+fn widest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
+    let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
+    let mut caps = (0..NARROWER).map(|times| walker.widest_mm() / f64::from(1u32 << times));
+    caps.find_map(|cap_mm| Some((cap_mm, walk(cap_mm)?)))
 }
 
 /// The last places that samples may have: the first ones on the way back.

@@ -2,7 +2,7 @@
 
 use crate::{
     Options, Position,
-    follow::Followed,
+    follow::{self, Followed},
     geometry::{distance, distance_to_chord},
     path::{Element, Place},
 };
@@ -35,7 +35,7 @@ struct Laid<'a> {
 /// Every vertex up to where the samples end, the corners and the places where an arc is cut into pieces.
 pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) -> Vec<Vertex> {
     let laid = Laid::new(elements, followed);
-    let mut link = 0;
+    let (mut link, mut ranges) = (0, None);
     // Samples far off the path belong to no vertex; they must not widen the search either.
     let deviation_mm = if followed.misses.is_empty() { followed.deviation_mm } else { 0.0 };
     // A run that ended early may have come to rest just short of the end of its last piece.
@@ -47,7 +47,11 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
             link += 1;
         }
         let limit_mm = limit_mm(elements, index, options);
-        let off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + deviation_mm));
+        let mut off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + deviation_mm));
+        if off_mm > limit_mm && followed.misses.is_empty() {
+            let ranges = ranges.get_or_insert_with(|| follow::ranges(elements, followed, options).unwrap_or_default());
+            off_mm = off_mm.min(laid.distance_of_all_mm(index, ranges));
+        }
         Vertex { line: element.line, sample: followed.samples[link], off_mm, limit_mm, exact_stop: element.exact_stop }
     });
     vertices.collect()
@@ -100,6 +104,15 @@ impl<'a> Laid<'a> {
         let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - next_mm <= span_mm);
         let near = near_before.take(SEARCHED_CHORDS).chain(near_after.take(SEARCHED_CHORDS));
         near.map(chord).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same from every chord that may belong to the vertex, by the places between which each link may be.
+    fn distance_of_all_mm(&self, vertex: usize, ranges: &[(Place, Place)]) -> f64 {
+        let element = &self.elements[vertex];
+        let (point, end) = (element.shape.at(1.0), end_of(vertex));
+        let first = ranges.partition_point(|(_, last)| *last < end).saturating_sub(1);
+        let behind = ranges.partition_point(|(first, _)| *first <= end);
+        (first..behind).map(|from| self.chord_mm(from, &point, element.exact_stop)).fold(f64::INFINITY, f64::min)
     }
 
     fn chord_mm(&self, from: usize, point: &Position, samples_only: bool) -> f64 {
