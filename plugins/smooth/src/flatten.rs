@@ -6,7 +6,7 @@ use tandem_motion::tube::Lanes;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PluginError};
 
 use crate::beside::to_chord;
-use crate::frame::Frame;
+use crate::frame::{Frame, minus};
 
 /// Share of the tolerance that chords of a curved block stand off it.
 pub const SAGITTA_SHARE: f64 = 0.015;
@@ -132,15 +132,20 @@ impl<const L: usize> Smooth<'_, L> {
         (8.0 * self.sagitta / bend.max(1e-9)).sqrt().min(0.3 / bend.max(1e-9)).clamp(SHORTEST_MM, LONGEST_MM)
     }
 
-    /// Whether the curve between two path coordinates stands off its chord by no more than the sagitta. How it bends at some
-    /// places tells nothing of what lies between: where control points coincide it is straight at its ends, and a narrow bend
-    /// or a cusp is stepped over.
+    /// Whether the curve between two path coordinates stands off its chord by no more than the sagitta, and does not run to and
+    /// fro beside it. How it bends at some places tells nothing of what lies between: where control points coincide it is
+    /// straight at its ends, and a narrow bend or a cusp is stepped over.
     fn is_beside(&self, (from, to): (f64, f64), (start, end): (&Lanes<L>, &Lanes<L>), place: &mut Place) -> bool {
+        let way = minus(end, start);
+        // What path speed counts, as the length of the curve does.
+        let straight =
+            (0..L).map(|l| if self.frame.rotary[l] > 0.0 { 0.0 } else { way[l] * way[l] }).sum::<f64>().sqrt();
         let range = (self.table.parameter(from, place).0, self.table.parameter(to, place).0);
         // The chord of a circle meets it exactly; rounding is not to make it shorter.
         let most = (1.001 * self.sagitta).powi(2);
         let near = |at: &AxisVector| to_chord(&self.frame.lanes(at), start, end) <= most;
-        to - from <= LEAST_MM || self.curve.lies_inside(range, HALVINGS, &near)
+        to - from <= LEAST_MM
+            || to - from <= straight + 2.0 * self.sagitta && self.curve.lies_inside(range, HALVINGS, &near)
     }
 }
 
@@ -180,6 +185,7 @@ mod tests {
     use tandem_sdk::{AxisLimits, NurbsData};
 
     use super::*;
+    use crate::frame::dot;
 
     const SAGITTA: f64 = 1e-4;
 
@@ -208,8 +214,8 @@ mod tests {
         }
     }
 
-    /// How far the curve is from its chords at most, at many places.
-    fn off_chords(data: &NurbsData) -> f64 {
+    /// The ends of the chords of a curve, and the curve.
+    fn chain_and_curve(data: &NurbsData) -> (Vec<Lanes<4>>, Nurbs) {
         let (axes, frame) = machine();
         let mut block = Block::at(data.control_points[0]);
         (block.kind, block.end) = (BlockKind::Nurbs, data.control_points[data.degree]);
@@ -218,7 +224,13 @@ mod tests {
         flat.lay(&axes, &frame, &block, SAGITTA / SAGITTA_SHARE).unwrap();
         let mut chain = vec![frame.lanes(&block.start)];
         chain.append(&mut flat.points);
-        let curve = Nurbs::new(data, &axes).unwrap();
+        (chain, Nurbs::new(data, &axes).unwrap())
+    }
+
+    /// How far the curve is from its chords at most, at many places.
+    fn off_chords(data: &NurbsData) -> f64 {
+        let (chain, curve) = chain_and_curve(data);
+        let (_, frame) = machine();
         let places = (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
         let off =
             |at| chain.windows(2).map(|ends| to_chord(&at, &ends[0], &ends[1]).sqrt()).fold(f64::INFINITY, f64::min);
@@ -237,6 +249,22 @@ mod tests {
         // Almost a cusp, and control points that are nearly those of one.
         let narrow = [[-0.06537, -4.364, 0.0], [-0.0679, -4.361, 0.0], [-0.03, -4.409, 0.0], [-0.053, -4.38, 0.0]];
         assert!(off_chords(&bezier(&narrow)) <= 1.01 * SAGITTA);
+    }
+
+    fn length(chain: &[Lanes<4>]) -> f64 {
+        chain.windows(2).map(|ends| minus(&ends[1], &ends[0])).map(|way| dot(&way, &way).sqrt()).sum()
+    }
+
+    #[test]
+    fn a_curve_that_runs_to_and_fro_beside_a_line_is_followed() {
+        // All of it is beside the chord of its ends, or nearly so.
+        let near_line = [[0.0; 3], [0.15, 0.06005, 0.0], [-0.05, -0.02005, 0.0], [0.09, 0.036, 0.0]];
+        let (chain, curve) = chain_and_curve(&bezier(&near_line));
+        let (_, frame) = machine();
+        let places = (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
+        let fine: Vec<Lanes<4>> = places.collect();
+        assert!(length(&chain) > 0.99 * length(&fine), "{} for {}", length(&chain), length(&fine));
+        assert!(length(&fine) > 1.1 * length(&[fine[0], fine[2000]]));
     }
 
     #[test]
