@@ -90,18 +90,27 @@ impl JointLanes {
     }
 }
 
-/// Makes one limit of `axes` smaller, by the same factor, until together they ask no more of a lane than `most`.
+/// Makes one limit of `axes` smaller until together they ask no more of a lane than `most`: each gets an equal part of it, and
+/// those that ask for less leave the rest to the others. Parts in proportion would leave an axis next to nothing beside one
+/// that is a thousand times as quick.
 fn share(axes: &mut [AxisLimits], weights: &[f64], most: f64, limit: fn(&mut AxisLimits) -> &mut f64) {
-    let moving = || weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
-    let asked: f64 = moving().map(|(axis, weight)| weight.abs() * *limit(&mut axes[axis])).sum();
-    if asked <= most {
+    let mut asked = [0.0; MAX_AXES];
+    for (axis, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+        asked[axis] = weight.abs() * *limit(&mut axes[axis]);
+    }
+    if asked.iter().sum::<f64>() <= most {
         return;
     }
-    let count = moving().count() as f64;
-    for (axis, weight) in moving() {
-        let of = limit(&mut axes[axis]);
-        // Axes that state no jerk get equal parts of the joint's.
-        *of = if asked.is_finite() { *of * most / asked } else { of.min(most / (count * weight.abs())) };
+    let mut part = 0.0;
+    for _ in 0..MAX_AXES {
+        let modest: f64 = asked.iter().filter(|asked| **asked <= part).sum();
+        let others = asked.iter().filter(|asked| **asked > part).count();
+        if others > 0 {
+            part = (most - modest) / others as f64;
+        }
+    }
+    for (axis, weight) in weights.iter().enumerate().filter(|(axis, _)| asked[*axis] > part) {
+        *limit(&mut axes[axis]) = part / weight.abs();
     }
 }
 
@@ -146,10 +155,21 @@ mod tests {
         let narrow = belts().narrowed(&all);
         let feeds: Vec<f64> = narrow.axes().iter().map(|axis| axis.feed_mm_per_s).collect();
         assert_eq!(narrow.count, 3);
-        assert!((feeds[0] - 500.0 / 3.0).abs() < 1e-9 && (feeds[1] - 250.0 / 3.0).abs() < 1e-9, "{feeds:?}");
-        assert_eq!(feeds[2], 40.0, "an axis that no lane has a part of");
+        assert_eq!(feeds, [125.0, 125.0, 40.0], "equal parts, and an axis that no lane has a part of");
         let jerks: Vec<f64> = narrow.axes().iter().map(|axis| axis.jerk_mm_per_s3).collect();
         assert_eq!(jerks, [500.0, 500.0, none]);
+    }
+
+    #[test]
+    fn a_slow_axis_keeps_what_it_has_beside_a_quick_one() {
+        let all = limits(&[[14.0, 1e3], [27_000.0, 1e5], [40.0, 1e3], [7.0, 400.0], [23_000.0, 1e5]]);
+        let narrow = belts().narrowed(&all);
+        let most: Vec<f64> = narrow.axes().iter().map(|axis| axis.acceleration_mm_per_s2).collect();
+        assert_eq!(most[..2], [3.5, 3.5]);
+        let all = limits(&[[14.0, 1e3], [27_000.0, 1e5], [40.0, 1e3], [7014.0, 400.0], [23_000.0, 1e5]]);
+        let narrow = belts().narrowed(&all);
+        let most: Vec<f64> = narrow.axes().iter().map(|axis| axis.acceleration_mm_per_s2).collect();
+        assert_eq!(most[..2], [14.0, 7000.0]);
     }
 
     #[test]
