@@ -2,6 +2,8 @@
 
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment};
 
+use crate::law::stop_s;
+
 /// Share of the jerk that is counted on where the plan changes.
 const SHARE: f64 = 0.8;
 /// Change of the change of σ in a period.
@@ -20,6 +22,8 @@ pub struct Ahead3 {
     pub acceleration: [f64; MAX_AXES],
     /// Jerk, mm/s³.
     pub jerk: [f64; MAX_AXES],
+    /// Path jerk that the limits leave here on a straight path, mm/s³; infinite where the path stands still.
+    pub path_jerk_mm_per_s3: f64,
 }
 
 /// The points, nearest first: all ends of segments within the period, then a coarse grid.
@@ -103,11 +107,26 @@ impl Outlook {
             self.share = if steady { self.share } else { SHARE };
         }
         let [speed, ..] = derivatives(&segment.path, t_s);
+        point.path_jerk_mm_per_s3 = if speed > 0.0 { speed * per_speed } else { f64::INFINITY };
         if speed > 0.0 {
             self.path_jerk_mm_per_s3 = self.path_jerk_mm_per_s3.min(speed * per_speed);
             self.rate_change_per_s2 = self.rate_change_per_s2.min(per_speed);
         }
         self.count += 1;
+    }
+
+    /// The least path jerk of the points that are passed before a stop with it comes to rest, mm/s³: from the rate `sigma`, and
+    /// from `speed`, mm/s, and `acceleration`, mm/s², along the path. What lies behind does not matter: where an axis turns much
+    /// on little path it is next to nothing.
+    pub fn path_jerk_to_rest(&self, sigma: f64, speed: f64, acceleration: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for point in self.iter() {
+            if least.is_finite() && point.offset_s > sigma * stop_s(speed, acceleration, f64::INFINITY, least) {
+                break;
+            }
+            least = least.min(point.path_jerk_mm_per_s3);
+        }
+        least
     }
 
     /// Per axis: its number, and its limits of acceleration, mm/s², and jerk, mm/s³.

@@ -161,12 +161,13 @@ impl Governor {
         let most = MARGIN * outlook.rate_change_per_s2;
         let free =
             if most.is_finite() { self.approach(self.sigma - aim.sigma, outlook.share * most, most) } else { 0.0 };
-        let path_jerk = MARGIN * outlook.path_jerk_mm_per_s3.min(speed * outlook.most_change_per_s2);
+        let (sigma, rate) = (self.sigma, self.rate_per_s);
+        let along = sigma * sigma * acceleration + speed * rate;
+        let path_jerk = outlook.path_jerk_to_rest(sigma, sigma * speed, along);
+        let path_jerk = MARGIN * path_jerk.min(speed * outlook.most_change_per_s2);
         if aim.speed_mm_per_s.is_infinite() || speed <= 0.0 || !path_jerk.is_finite() {
             return free;
         }
-        let (sigma, rate) = (self.sigma, self.rate_per_s);
-        let along = sigma * sigma * acceleration + speed * rate;
         let over = sigma * speed - aim.speed_mm_per_s;
         if over == 0.0 && along == 0.0 {
             return free.min(0.0);
@@ -187,7 +188,8 @@ impl Governor {
             return f64::INFINITY;
         }
         let along = sigma * sigma * acceleration + speed * rate;
-        let path_s = stop_s(sigma * speed, along, f64::INFINITY, MARGIN * outlook.path_jerk_mm_per_s3);
+        let path_jerk = MARGIN * outlook.path_jerk_to_rest(sigma, sigma * speed, along);
+        let path_s = stop_s(sigma * speed, along, f64::INFINITY, path_jerk);
         let (mut longest_s, mut wanted) = (CLEARLY * path_s + 2.0 * h, f64::INFINITY);
         let motion = place.motion();
         for (axis, (most, jerk)) in outlook.limits() {
