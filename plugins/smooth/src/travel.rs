@@ -16,6 +16,10 @@ const LEFT: f64 = 0.1;
 /// left to its end: those two places are given, and may lie on the end of the travel. Without it a triangle of 0.3 mm that
 /// begins there was driven to and fro along its first side.
 const SLOPE: f64 = 0.1;
+/// How far the motion may stand off a path along an end of the travel, on its free side, as a multiple of the same path. A slow
+/// motion goes through the middle of its boxes: half a micrometre beside the end was driven by way of the middle of a box of
+/// 0.2 mm, at its feed.
+const ASIDE: f64 = 2.0;
 
 /// Lowest and highest position of every lane, and of joints that are sums of axes.
 #[derive(Clone, Copy, Debug)]
@@ -97,8 +101,10 @@ impl<const L: usize> Travel<L> {
     pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64, way: f64) {
         for l in 0..L {
             let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]).min(SLOPE * way);
-            let high = (middle[l] + half[l]).min(self.high[l] - free);
-            let low = (middle[l] - half[l]).max(self.low[l] + free);
+            let (above, below) = (self.high[l] - free - middle[l], middle[l] - self.low[l] - free);
+            // What is cut off on one side is not to draw the motion far to the other.
+            let (up, down) = (half[l].min(below.max(ASIDE * way)), half[l].min(above.max(ASIDE * way)));
+            let (high, low) = (middle[l] + above.min(up), middle[l] - below.min(down));
             if high > low {
                 (middle[l], half[l]) = (f64::midpoint(low, high), (high - low) / 2.0);
             }
