@@ -136,8 +136,10 @@ fn check_segments<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, known: usi
             SegmentFlags(if ahead.front().block.kind == BlockKind::Rapid { SegmentFlags::RAPID.0 } else { 0 });
         let Drawn { until_s, leg_over } = draw(&ahead, bounds, window, &Pen { from_s, at: &at }, &mut segment);
         from_s = until_s;
-        at = segment.position(segment.duration_s);
-        worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, reliefs));
+        if segment.duration_s > 0.0 {
+            at = segment.position(segment.duration_s);
+            worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, reliefs));
+        }
         if leg_over {
             route = ahead.behind_front();
         }

@@ -5,7 +5,7 @@ use tandem_sdk::{AxisVector, MAX_AXES, Segment};
 
 use super::bernstein::{bernstein, highest};
 use super::route::BESIDE_MM;
-use super::{Bounds, Cursor, Motion, Route, State, Window};
+use super::{Bounds, Cursor, Leg, Motion, Route, State, Window};
 
 /// Most that a segment may stand off its path, mm.
 const OFF_MM: f64 = 1e-8;
@@ -40,9 +40,10 @@ pub struct Pen<'a> {
 }
 
 /// Draws the segment at `pen`: at most a rough period long or four fine ones, to the end of the interval of the grid, to the
-/// next knot and to the end of the leg at the front, where that leaves more than slivers. Velocity and acceleration of both
-/// ends are met, and the position of the end; it keeps to the travel as the path does. It is the same segment whenever it is
-/// drawn from there: what was judged is what is driven. Does not allocate.
+/// next knot and to the end of the leg at the front, where that leaves more than slivers. Where the leg ends at once and
+/// another goes on it has no duration. Velocity and acceleration of both ends are met, and the position of the end; it keeps to
+/// the travel as the path does. It is the same segment whenever it is drawn from there: what was judged is what is driven. Does
+/// not allocate.
 pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: &Pen, segment: &mut Segment) -> Drawn {
     let from_s = pen.from_s;
     let k = window.interval(from_s);
@@ -53,12 +54,13 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
     let mut cursor = Cursor::default();
     let (leg_end_mm, same_mm) = (route.front().end_mm, route.front().same_mm());
     let start = window.at_in(k, from_s);
-    let break_mm = route.front().next_break_mm(start.s_mm + same_mm);
-    if window.at_in(k, until_s).s_mm > break_mm + same_mm {
-        let break_s = window.time_at(break_mm, (from_s, until_s));
-        if until_s - break_s > SLIVER_S && break_s - from_s > SLIVER_S {
-            until_s = break_s;
+    match first_break(route.front(), window, k, [from_s, until_s]) {
+        Some(Break::Knot(break_s)) => until_s = break_s,
+        Some(Break::Over) => {
+            fill(route, &mut cursor, (pen, [&start, &start]), 0.0, segment, sliver);
+            return Drawn { until_s: from_s, leg_over: true };
         }
+        None => {}
     }
     let mut end = window.at_in(k, until_s);
     if until_s - from_s < LEAST_S {
@@ -77,6 +79,37 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         end = window.at_in(k, until_s);
     }
     Drawn { until_s, leg_over: end.s_mm > leg_end_mm - same_mm }
+}
+
+/// Where a segment ends before it would.
+enum Break {
+    /// At the next knot or end of the leg, s.
+    Knot(f64),
+    /// The leg ends here, but for a sliver: another one goes on.
+    Over,
+}
+
+/// The first place between two times of interval `k` at which derivatives may jump, and that leaves more than slivers.
+fn first_break<M: Motion>(front: &Leg, window: &Window<M>, k: usize, [from_s, until_s]: [f64; 2]) -> Option<Break> {
+    let [from_mm, until_mm] = [from_s, until_s].map(|t_s| window.at_in(k, t_s).s_mm);
+    let mut known_mm = from_mm;
+    loop {
+        let break_mm = front.next_break_mm(known_mm + front.same_mm());
+        if until_mm <= break_mm + front.same_mm() {
+            return None;
+        }
+        let break_s = window.time_at(break_mm, (from_s, until_s));
+        if until_s - break_s <= SLIVER_S {
+            return None;
+        }
+        if break_s - from_s > SLIVER_S {
+            return Some(Break::Knot(break_s));
+        }
+        if break_mm >= front.end_mm {
+            return Some(Break::Over);
+        }
+        known_mm = break_mm;
+    }
 }
 
 /// Both ends as one polynomial: position, velocity and acceleration of each and the duration.

@@ -208,7 +208,9 @@ impl<P: Planning> Streamer<P> {
         let mut segment = self.blank;
         let pen = Pen { from_s, at: &self.at };
         let Drawn { until_s, leg_over } = draw(&route, &self.bounds, &self.window, &pen, &mut segment);
-        self.remember(&segment);
+        if segment.duration_s > 0.0 {
+            self.remember(&segment);
+        }
         self.declare((from_s, until_s), &mut segment);
         if leg_over {
             self.leg_over(&mut segment);
@@ -261,6 +263,13 @@ impl<P: Planning> Streamer<P> {
     /// Rest where the window ends: exactly at the end of the block, where that is there.
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
         let end_mm = self.window.motion.end_mm();
+        // The last segment may have gone over more legs than one, where those before the last take next to no time.
+        while let Some(leg) = self.queue.front().filter(|leg| leg.end_mm <= end_mm + leg.same_mm()) {
+            if leg.begins {
+                sink.block(&self.block_report(leg, self.window.duration_s()));
+            }
+            self.leg_over(&mut Segment::rest(&self.at, 0.0));
+        }
         // The end of a window is that of its leg but for rounding: then the position is that of the leg already.
         if let Some(route) = self.queue.route()
             && end_mm > (self.at_mm + route.front().same_mm()).max(route.front().start_mm)
