@@ -156,11 +156,23 @@ impl Queue {
     pub fn is_deep(&mut self, margin_s: f64) -> bool {
         let now_s = self.end.status.program_time_s.load();
         self.depth.passed(now_s);
-        !self.staged.is_empty() || self.emitted_s - now_s >= self.depth.required_s() + margin_s
+        self.is_waiting_for_room() || self.emitted_s - now_s >= self.depth.required_s() + margin_s
+    }
+
+    /// Whether something that was emitted waits for room in the ring.
+    pub fn is_waiting_for_room(&self) -> bool {
+        !self.staged.is_empty()
     }
 
     /// Moves what is staged into the ring and tells the fine loop how far it reaches. `over`: nothing follows for now.
-    pub fn flush(&mut self, over: bool) {
+    /// `full`: the ring was full before.
+    pub fn flush(&mut self, over: bool, full: bool) {
+        self.move_staged();
+        self.tell(over, full || self.is_waiting_for_room());
+    }
+
+    /// Moves what is staged into the ring, as far as there is room.
+    pub fn move_staged(&mut self) {
         let (moved, _) = self.end.segments.push_partial_slice(&self.staged[self.sent..]);
         let last = moved.iter().rfind(|queued| matches!(queued, Queued::Segment { .. }));
         if let Some(Queued::Segment { start_s, segment }) = last {
@@ -176,15 +188,13 @@ impl Queue {
             self.staged.drain(..self.sent);
             self.sent = 0;
         }
-        self.tell(over);
     }
 
-    fn tell(&mut self, over: bool) {
+    /// `full`: deeper the queue does not get.
+    fn tell(&mut self, over: bool, full: bool) {
         let now_s = self.end.status.program_time_s.load();
         self.depth.passed(now_s);
         let shared = &self.end.depth;
-        // What is staged waits for room: the ring is full, and deeper it does not get.
-        let full = !self.staged.is_empty();
         let most_rate = self.depth.rate_for_entries();
         let most_rate = if full { most_rate.min(self.depth.rate_for_wall(now_s, self.queued_s)) } else { most_rate };
         shared.most_rate.store(most_rate);

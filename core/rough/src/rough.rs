@@ -141,8 +141,13 @@ impl RoughLoop {
         if self.awaits_drives && rested.is_ok() {
             return Ok(Progress::Working);
         }
+        // What waits for room goes first: while some of it waits the planner is not advanced.
+        self.queue.move_staged();
         let result = rested.and_then(|()| self.fill(observer));
-        self.queue.flush(self.stretch_over || result.is_err());
+        let over = self.stretch_over || result.is_err();
+        // Where the ring was full it still counts as that, though the fine loop has just taken something.
+        let full = !over && self.queue.is_waiting_for_room();
+        self.queue.flush(over, full);
         self.queue.tell_of_blocks(observer);
         result?;
         self.answer_wait();
@@ -173,7 +178,7 @@ impl RoughLoop {
                 self.stretch_is_over();
                 return Ok(());
             }
-            self.queue.flush(false);
+            self.queue.flush(false, false);
             // What came counts, not what the planner says of it.
             let emitted_s = self.queue.emitted_s() - before_s;
             if emitted_s == 0.0 && !self.finished {

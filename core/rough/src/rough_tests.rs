@@ -57,9 +57,13 @@ impl Source for Over {
 
 /// A rough loop with this planner, how often it is advanced, and the other ends.
 fn with(emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
+    with_ring(Sizes::default(), emits)
+}
+
+fn with_ring(sizes: Sizes, emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
     let calls = Arc::new(AtomicU64::new(0));
     let planner = Box::new(Fake { emits, calls: Arc::clone(&calls) });
-    let (rough, fine, host) = bridge(Sizes::default());
+    let (rough, fine, host) = bridge(sizes);
     (
         RoughLoop::new(RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S), Box::new(Over), planner, rough),
         calls,
@@ -113,5 +117,25 @@ fn a_rough_period_asks_for_the_depth_and_for_no_more() {
         host.status.program_time_s.store(f64::from(period) * ROUGH_PERIOD_S);
         rough.step(&mut ()).unwrap();
         assert!(calls.swap(0, Relaxed) <= 2, "one period was driven");
+    }
+}
+
+#[test]
+fn a_ring_that_gets_room_is_filled_in_the_same_period_and_said_to_be_full() {
+    // Eight entries hold far less than the depth asks for, and one call emits more than has room beside what is there.
+    let sizes = Sizes { segments: 8, ..Sizes::default() };
+    let (mut rough, calls, (mut fine, host)) = with_ring(sizes, |duration_s, sink| {
+        (0..5).for_each(|_| piece(duration_s / 10.0, SegmentFlags::default(), sink));
+        (duration_s / 2.0, false)
+    });
+    rough.step(&mut ()).unwrap();
+    assert!(fine.depth.full.load(Relaxed));
+    for period in 1..20 {
+        calls.store(0, Relaxed);
+        host.status.program_time_s.store(f64::from(period) * 0.5 * ROUGH_PERIOD_S);
+        (0..5).for_each(|_| assert!(fine.segments.pop().is_ok()));
+        rough.step(&mut ()).unwrap();
+        assert_eq!(calls.load(Relaxed), 1);
+        assert!(fine.segments.slots() == 8 && fine.depth.full.load(Relaxed));
     }
 }
