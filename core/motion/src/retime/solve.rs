@@ -123,7 +123,7 @@ impl Retimer {
         loop {
             let target = shrink * status.gap;
             status.violation = self.assemble(target);
-            if status.iterations == ITERATIONS || status.gap > LOST || status.gap < ENOUGH && status.is_feasible() {
+            if status.iterations == ITERATIONS || !(status.gap <= LOST) || status.gap < ENOUGH && status.is_feasible() {
                 return status;
             }
             self.matrix.solve(&mut self.step);

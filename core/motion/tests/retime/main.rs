@@ -88,3 +88,12 @@ proptest! {
         prop_assert!(jerk < 4e5 * 1.01, "{jerk}");
     }
 }
+
+#[test]
+fn a_motion_that_is_none_ends_the_iteration_at_once() {
+    let points = [[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
+    let ends = (End::Rest, End::Rest);
+    let task = Task { points: &points, between: &[], limits: limits(1), jerk_share: 1.0, step_s: f64::INFINITY, ends };
+    let status = Retimer::default().solve(&task);
+    assert!(status.iterations <= 1 && !(status.gap < 1.0), "{status:?}");
+}

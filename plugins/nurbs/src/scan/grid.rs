@@ -6,7 +6,7 @@ use tandem_motion::retime::{Between, PLACES, Point};
 use super::motion::Rated;
 use super::spline::evaluate;
 use crate::stream::relief::Reliefs;
-use crate::stream::{Bounds, Cursor, Leg, PAST_MM, Route};
+use crate::stream::{Bounds, Cursor, Leg, Route};
 
 /// Turns of the path in an interval that ask for more places, rad, and where these are.
 const MORE: [(f64, &[[f64; PLACES]]); 2] =
@@ -122,7 +122,7 @@ impl Grid {
         let (mut cursor, mut from_mm) = (Cursor::default(), from_mm);
         for _ in 0..KNOTS {
             let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) else { return };
-            from_mm = knot_mm + PAST_MM;
+            from_mm = knot_mm;
             let at = motion.place(interval, knot_mm);
             let z = [at, at, if at < 0.5 { f64::midpoint(at, 1.0) } else { at / 2.0 }];
             let last = evaluate(&motion.coefficients, interval, z[2], motion.step_s);

@@ -4,7 +4,7 @@ use tandem_motion::hermite;
 use tandem_sdk::{AxisVector, MAX_AXES, Segment};
 
 use super::bernstein::{bernstein, highest};
-use super::route::BESIDE_MM;
+use super::route::Side;
 use super::{Bounds, Cursor, Leg, Motion, Route, State, Window};
 
 /// Most that a segment may stand off its path, mm.
@@ -52,7 +52,10 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
     let asked_s = from_s + context.rough_period_s.max(4.0 * context.fine_period_s).max(LEAST_S);
     let mut until_s = if border_s - asked_s < LEAST_S { border_s } else { asked_s };
     let mut cursor = Cursor::default();
-    let (leg_end_mm, same_mm) = (route.front().end_mm, route.front().same_mm());
+    // The last way of a rest takes long where jerk is low: near the end is the end only where the window ends.
+    let (leg_end_mm, same_mm, duration_s) = (route.front().end_mm, route.front().same_mm(), window.duration_s());
+    let is_over =
+        |end: &State, until_s: f64| end.s_mm >= leg_end_mm || until_s >= duration_s && end.s_mm > leg_end_mm - same_mm;
     let start = window.at_in(k, from_s);
     match first_break(route.front(), window, k, [from_s, until_s]) {
         Some(Break::Knot(break_s)) => until_s = break_s,
@@ -65,7 +68,7 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
     let mut end = window.at_in(k, until_s);
     if until_s - from_s < LEAST_S {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, sliver);
-        return Drawn { until_s, leg_over: end.s_mm > leg_end_mm - same_mm };
+        return Drawn { until_s, leg_over: is_over(&end, until_s) };
     }
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
     for _ in 0..MAX_HALVINGS {
@@ -78,7 +81,7 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         until_s = f64::midpoint(from_s, until_s);
         end = window.at_in(k, until_s);
     }
-    Drawn { until_s, leg_over: end.s_mm > leg_end_mm - same_mm }
+    Drawn { until_s, leg_over: is_over(&end, until_s) }
 }
 
 /// Where a segment ends before it would.
@@ -124,8 +127,8 @@ fn fill(
     through: Through,
 ) {
     let [from, to] = ends;
-    let mut states = [(from, BESIDE_MM), (to, -BESIDE_MM)].map(|(end, beside_mm)| {
-        let at = route.at_side(end.s_mm, beside_mm, cursor);
+    let mut states = [(from, Side::Behind), (to, Side::Before)].map(|(end, side)| {
+        let at = route.at_side(end.s_mm, side, cursor);
         let (v, a) = (end.speed_mm_per_s, end.acceleration_mm_per_s2);
         [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
     });

@@ -22,6 +22,10 @@ const WORTH: f64 = 0.05;
 /// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
 const STRAIGHT: f64 = 1e-3;
 
+/// Share of the length of a leg that is beside its ends at most.
+const BESIDE_SHARE: f64 = 0.05;
+/// Share of that which is rounding.
+const NEAR_SHARE: f64 = 0.01;
 /// Share of the length of a leg that is rounding.
 const SAME_SHARE: f64 = 1e-10;
 
@@ -77,6 +81,16 @@ impl Leg {
     pub fn same_mm(&self) -> f64 {
         let rounding = 8.0 * f64::EPSILON * self.end_mm.abs();
         SAME_MM.min(SAME_SHARE * (self.end_mm - self.start_mm)).max(rounding)
+    }
+
+    /// How far beside its ends and knots derivatives are taken, mm.
+    pub fn beside_mm(&self) -> f64 {
+        BESIDE_MM.min(BESIDE_SHARE * (self.end_mm - self.start_mm))
+    }
+
+    /// What is nearer than that to an end or a knot is there, mm.
+    pub fn near_mm(&self) -> f64 {
+        NEAR_SHARE * self.beside_mm()
     }
 
     /// Where the derivatives may jump first behind `s_mm`: a knot, or the end.
@@ -136,7 +150,7 @@ impl Leg {
 
     /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
     pub fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
-        let ends = self.beside(self.end_mm, -BESIDE_MM).zip(next.beside(next.start_mm, BESIDE_MM));
+        let ends = self.beside(self.end_mm, -self.beside_mm()).zip(next.beside(next.start_mm, next.beside_mm()));
         let Some((before, after)) = ends else { return false };
         let straight = (0..MAX_AXES).all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
         let feed_mm_per_s = self.feed_mm_per_s.min(next.feed_mm_per_s);

@@ -27,7 +27,7 @@ use tandem_sdk::{AxisVector, Segment};
 
 pub use leg::{Bounds, Least, Leg};
 pub use planner::Streamer;
-pub use route::{Cursor, PAST_MM, Route};
+pub use route::{Cursor, Route};
 pub use window::{Window, interval, lay_times};
 
 /// Time of a window at least, s.

@@ -9,16 +9,21 @@ use super::{Bounds, Leg};
 
 /// Path coordinates that are the same but for rounding, mm.
 pub const SAME_MM: f64 = 1e-9;
-/// How far beside a knot derivatives are taken, mm.
+/// How far beside a knot derivatives are taken at most, mm.
 pub const BESIDE_MM: f64 = 1e-7;
-/// So far behind a knot the next one is looked for, mm: path coordinates round.
-pub const PAST_MM: f64 = 2.0 * BESIDE_MM;
 
 /// Where a look-up was.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cursor {
     leg: usize,
     place: Place,
+}
+
+/// A side of a place on the path.
+#[derive(Clone, Copy, Debug)]
+pub enum Side {
+    Before,
+    Behind,
 }
 
 /// The path from a leg on, over those that join it.
@@ -91,15 +96,20 @@ impl<'a> Route<'a> {
         (leg.at(s_mm, &mut cursor.place), leg)
     }
 
-    /// Position and derivatives at `s_mm` as they are towards `beside_mm`, which is signed: at a knot the curvature may jump,
-    /// and where legs join the direction too.
-    pub fn at_side(&self, s_mm: f64, beside_mm: f64, cursor: &mut Cursor) -> AlongPath {
+    /// Position and derivatives at `s_mm` as they are on one side of it: at a knot the curvature may jump, and where legs join
+    /// the direction too.
+    pub fn at_side(&self, s_mm: f64, side: Side, cursor: &mut Cursor) -> AlongPath {
         let (at, leg) = self.at(s_mm, cursor);
-        if leg.next_break_mm(s_mm - SAME_MM) > s_mm + SAME_MM {
+        let near_mm = leg.near_mm();
+        let (starts, ends) = (s_mm < leg.start_mm + near_mm, s_mm > leg.end_mm - near_mm);
+        let joint = starts && cursor.leg > 0 || ends && leg.joined;
+        // Beside a rest there is one side only, and where that is a cusp its very end says nothing of the way to it.
+        let knot = !starts && !ends && leg.next_break_mm(s_mm - near_mm) <= s_mm + near_mm;
+        if !joint && !knot {
             return at;
         }
-        let beside = self.at(s_mm + beside_mm, cursor).0;
-        let direction = if s_mm > leg.end_mm - SAME_MM { beside.direction } else { at.direction };
+        let beside = self.sides(s_mm, cursor)[side as usize];
+        let direction = if joint { beside.direction } else { at.direction };
         AlongPath { position: at.position, direction, ..beside }
     }
 
@@ -109,23 +119,47 @@ impl<'a> Route<'a> {
         leg.smooth_for_mm(s_mm, &mut cursor.place)
     }
 
-    /// The first knot between two path coordinates, mm, and the path on both sides of it.
+    /// The first knot behind one path coordinate and before another, mm, and the path on both sides of it.
     pub fn knot(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> Option<(f64, [AlongPath; 2])> {
-        let break_mm = self.find(from_mm, cursor).next_break_mm(from_mm);
-        let sides = || [-BESIDE_MM, BESIDE_MM].map(|off| self.at(break_mm + off, cursor).0);
-        (from_mm < break_mm && break_mm < to_mm).then(sides).map(|sides| (break_mm, sides))
+        let leg = self.find(from_mm, cursor);
+        let break_mm = if from_mm < leg.end_mm - leg.near_mm() {
+            leg.next_break_mm(from_mm + leg.near_mm())
+        } else {
+            let next = self.leg(cursor.leg + 1).filter(|_| leg.joined)?;
+            next.next_break_mm(from_mm + next.near_mm())
+        };
+        (break_mm < to_mm).then(|| (break_mm, self.sides(break_mm, cursor)))
+    }
+
+    /// The path on both sides of a knot or of where two legs join: beside it, but in the span or leg that is there.
+    fn sides(&self, break_mm: f64, cursor: &mut Cursor) -> [AlongPath; 2] {
+        let leg = self.find(break_mm, cursor);
+        let before = cursor.leg.checked_sub(1).and_then(|index| self.leg(index));
+        let behind = self.leg(cursor.leg + 1).filter(|_| leg.joined);
+        let near = |leg: &Leg, s_mm: f64| leg.at(s_mm, &mut Place::default());
+        let at_end = break_mm > leg.end_mm - leg.near_mm();
+        let at_start = !at_end && break_mm < leg.start_mm + leg.near_mm();
+        match (before.filter(|_| at_start), behind.filter(|_| at_end)) {
+            (_, Some(next)) => [near(leg, leg.end_mm - leg.beside_mm()), near(next, next.start_mm + next.beside_mm())],
+            (Some(last), _) => [near(last, last.end_mm - last.beside_mm()), near(leg, leg.start_mm + leg.beside_mm())],
+            // At an end where none joins, both are the end itself.
+            _ => [-1.0, 1.0].map(|sign| leg.at(break_mm + sign * leg.beside_mm(), &mut cursor.place)),
+        }
     }
 
     /// Highest speed at `s_mm` for a jump of the derivatives there, infinite where there is none, and how far the next place
     /// is where there may be one, mm.
     pub fn step_cap_mm_per_s(&self, s_mm: f64, bounds: &Bounds, cursor: &mut Cursor) -> (f64, f64) {
-        let break_mm = self.find(s_mm, cursor).next_break_mm(s_mm - PAST_MM);
-        if break_mm >= s_mm + PAST_MM {
+        let leg = self.find(s_mm, cursor);
+        let past_mm = 2.0 * leg.beside_mm();
+        let starts = s_mm < leg.start_mm + past_mm && cursor.leg > 0;
+        let break_mm = if starts { leg.start_mm } else { leg.next_break_mm(s_mm - past_mm) };
+        if break_mm >= s_mm + past_mm {
             return (f64::INFINITY, break_mm - s_mm);
         }
-        let knot = self.knot([s_mm - PAST_MM, s_mm + PAST_MM], cursor);
-        let next_mm = self.find(s_mm, cursor).next_break_mm(s_mm + PAST_MM) - s_mm;
-        let cap = knot.map_or(f64::INFINITY, |(_, sides)| Leg::step_cap_mm_per_s(&sides, bounds));
-        (cap, next_mm)
+        let ends = break_mm >= leg.end_mm;
+        let next = if ends { self.leg(cursor.leg + 1).filter(|_| leg.joined) } else { Some(leg) };
+        let next_mm = next.map_or(f64::INFINITY, |leg| leg.next_break_mm(s_mm.max(break_mm) + leg.beside_mm()));
+        (Leg::step_cap_mm_per_s(&self.sides(break_mm, cursor), bounds), next_mm - s_mm)
     }
 }

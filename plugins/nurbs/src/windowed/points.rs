@@ -8,7 +8,7 @@ use super::motion::Ramps;
 use super::ramp::Ramp;
 use crate::stream::check::{POINT, jerk_share};
 use crate::stream::relief::{Relief, Reliefs};
-use crate::stream::{Cursor, Job, PAST_MM};
+use crate::stream::{Cursor, Job};
 
 /// What the next try aims at.
 const AIM: f64 = 0.99;
@@ -62,7 +62,7 @@ fn look(job: &Job<Ramps>, ramp: &Ramp, step_s: f64, mut of: impl FnMut(&AlongPat
             for side in &sides {
                 of(side, at_knot);
             }
-            from_mm = knot_mm + PAST_MM;
+            from_mm = knot_mm;
         }
         of(&job.route.at(state[0], &mut cursor).0, state);
         from_mm = state[0];
