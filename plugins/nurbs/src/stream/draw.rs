@@ -68,13 +68,17 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
     let mut end = window.at_in(k, until_s);
     if until_s - from_s < LEAST_S {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, sliver);
+        // At the end of the travel it meets its end: what it drifts is more than rounding there.
+        if !stays(bounds, segment, false) {
+            fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
+        }
         return Drawn { until_s, leg_over: is_over(&end, until_s) };
     }
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
     for _ in 0..MAX_HALVINGS {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
         if until_s - from_s < 2.0 * LEAST_S
-            || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment)
+            || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment, true)
         {
             break;
         }
@@ -154,16 +158,16 @@ fn sliver(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
     [x, v, a / 2.0, c / 3.0, d / 4.0, 0.0]
 }
 
-/// Whether the segment keeps to the travel, but for what rounding of positions is allowed.
-fn stays(bounds: &Bounds, segment: &Segment) -> bool {
+/// Whether the segment keeps to the travel, but for what rounding of positions is allowed. An end beyond it is the path's own
+/// where the segment meets its ends: no shorter one mends that.
+fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
     let period_s = bounds.context.fine_period_s;
     bounds.context.limits.axes().iter().zip(&segment.coefficients).all(|(limits, c)| {
         let rounding = 2.0 * f64::EPSILON * c[0].abs().max(1.0) / period_s;
         let (low, high) = (limits.min_mm - rounding, limits.max_mm + rounding);
         let b = bernstein(c, segment.duration_s);
-        let ends = [b[0], b[5]];
-        // An end beyond it is the path's own, which no shorter segment mends.
-        ends.iter().any(|end| *end < low || *end > high)
+        let beyond = |end: f64| end < low || end > high;
+        meets_ends && (beyond(b[0]) || beyond(b[5]))
             || highest(&b, high) <= high && highest(&b.map(|v| -v), -low) <= -low
     })
 }
