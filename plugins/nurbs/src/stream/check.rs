@@ -34,6 +34,9 @@ const TURNING: f64 = 0.85;
 /// Where a motion has no value the speed is lowered on so much of the path, mm.
 const LOST_MM: f64 = 0.05;
 
+/// Speed back along the path that is rounding, mm/s.
+const BACK_MM_PER_S: f64 = 1e-9;
+
 /// The largest of each, as a share of what is allowed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Worst {
@@ -100,7 +103,8 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         let t = start.first_tick_s + count as f64 * period_s;
         rests += u32::from(t >= duration_s);
         let state = window.at(t.min(duration_s));
-        if !state.speed_mm_per_s.is_finite() {
+        // No limit says that a motion goes forward.
+        if !(state.speed_mm_per_s >= -BACK_MM_PER_S && state.speed_mm_per_s.is_finite()) {
             reliefs.add(known, Relief { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
             return Worst { speed: f64::NAN, ..worst };
         }

@@ -18,6 +18,9 @@ const MAX_HALVINGS: u32 = 30;
 
 /// Least duration of a segment through both its ends, s: the derivatives of a shorter one are rounding.
 const LEAST_S: f64 = 5e-5;
+/// The same in a sharp turn, s, where the rounding of positions takes less than a share of the jerk.
+const SHARP_S: f64 = 4e-6;
+const NOISE: f64 = 0.002;
 /// Least duration of any segment, s.
 const SLIVER_S: f64 = 1e-6;
 
@@ -74,10 +77,10 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         }
         return Drawn { until_s, leg_over: is_over(&end, until_s) };
     }
-    let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
+    let (jerk_mm_per_s3, least_s) = (route.front().least.jerk_mm_per_s3, least_s(bounds, pen.at));
     for _ in 0..MAX_HALVINGS {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
-        if until_s - from_s < 2.0 * LEAST_S
+        if until_s - from_s < 2.0 * least_s
             || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment, true)
         {
             break;
@@ -86,6 +89,15 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         end = window.at_in(k, until_s);
     }
     Drawn { until_s, leg_over: is_over(&end, until_s) }
+}
+
+/// The shortest segment through both its ends whose jerk is not that of rounding of positions, s: in a sharp turn the path asks
+/// for it. A quintic whose ends are off by e has 60·e/T³ of that.
+fn least_s(bounds: &Bounds, at: &AxisVector) -> f64 {
+    let lanes = bounds.context.limits.axes().iter().zip(at.0);
+    let noise =
+        lanes.map(|(limits, x)| 60.0 * f64::EPSILON * x.abs().max(1.0) / limits.jerk_mm_per_s3).fold(0.0, f64::max);
+    (noise / NOISE).cbrt().clamp(SHARP_S, LEAST_S)
 }
 
 /// Where a segment ends before it would.
