@@ -9,8 +9,8 @@ use tandem_sdk::{Event, EventKind};
 
 use crate::broken::Broken;
 use crate::report::Collector;
-use crate::run::tell_warnings;
 use crate::trace::TraceSink;
+use crate::warnings::tell_warnings;
 use crate::{FAULT, args, built_in, clock};
 
 /// Homes the axes of a machine.

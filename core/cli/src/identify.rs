@@ -13,7 +13,7 @@ use tandem_host::{Output, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 
-use crate::run::tell_warnings;
+use crate::warnings::tell_warnings;
 use crate::{FAULT, args, built_in, clock};
 
 /// Speeds of the air runs, rad/s: down to those of cutting, where friction is not viscous.

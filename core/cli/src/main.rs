@@ -32,6 +32,7 @@ mod run;
 mod script;
 mod tolerances;
 mod trace;
+mod warnings;
 
 use std::process::ExitCode;
 

@@ -18,6 +18,7 @@ use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
+use crate::warnings::tell_warnings;
 use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program};
 
 /// Runs a program.
@@ -317,13 +318,6 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     tell_warnings(&outcome.summary);
     let whole = fault.is_none() && stopped.is_none() && outcome.summary.record_errors.is_empty();
     if whole { 0 } else { FAULT }
-}
-
-/// Says what is to be known of a run whatever its end.
-pub fn tell_warnings(summary: &Summary) {
-    for warning in summary.warnings() {
-        say!("warning: {warning}");
-    }
 }
 
 /// The stop that took longest to come to rest.

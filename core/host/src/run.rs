@@ -23,6 +23,8 @@ use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::ready::Ready;
+use crate::realtime::PageFaults;
+use crate::realtime_periods::Timing;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
@@ -263,12 +265,7 @@ impl Run {
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
         summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
-        if let Some((timing, page_faults)) = measured {
-            summary.overruns = timing.overruns;
-            summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
-            summary.page_faults = Some(page_faults);
-            summary.exchange_us = Some(self.exchange.read());
-        }
+        tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
         let known = Known {
             soft: pump.soft_cause(),
@@ -291,6 +288,15 @@ impl Run {
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault, position, left })
     }
+}
+
+/// What was `measured` in real time, where it was.
+fn tell_times(summary: &mut Summary, measured: Option<&(Timing, PageFaults)>, exchange: &ExchangeTimes) {
+    let Some((timing, page_faults)) = measured else { return };
+    summary.overruns = timing.overruns;
+    summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
+    summary.page_faults = Some(*page_faults);
+    summary.exchange_us = Some(exchange.read());
 }
 
 /// The driver could not release the drives: that is the fault of a run that has no other, and is told beside any other.

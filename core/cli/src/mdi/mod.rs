@@ -12,8 +12,8 @@ use tandem_rings::{Rest, Sample};
 
 use crate::broken::Broken;
 use crate::operator::{Operator, Presence, is_on_terminal};
-use crate::run::tell_warnings;
 use crate::trace::TraceSink;
+use crate::warnings::tell_warnings;
 use crate::{FAULT, REFUSED, args, built_in};
 
 use conversation::{Conversation, Shared};
