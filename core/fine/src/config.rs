@@ -45,6 +45,7 @@ impl Default for MissedLimits {
 
 /// Everything the fine loop is told before it runs.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools)] // independent facts of the machine and the run
 pub struct FineConfig {
     /// Fine period, s.
     pub period_s: f64,

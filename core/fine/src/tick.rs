@@ -8,6 +8,7 @@ mod joints;
 mod keep_alive;
 mod missed;
 mod progress;
+mod release;
 mod request;
 mod rest;
 mod single_block;
@@ -40,6 +41,7 @@ use joints::Lead;
 use keep_alive::KeepAlive;
 use missed::Missed;
 use progress::Progress;
+use release::Release;
 use rest::Stop;
 
 /// What the fine loop counted.
@@ -144,11 +146,7 @@ pub struct FineLoop {
     measured: History,
     /// What the drives are to catch.
     arm: Arm,
-    /// Fine periods since the drives were told to let go, and whether they have, or their time for it is over.
-    letting_go_periods: u64,
-    let_go: bool,
-    /// The program had ended before this period.
-    had_ended: bool,
+    release: Release,
     left: Left,
     /// Where the axes are by the feedback, as far as the kinematics last knew.
     axes: AxisVector,
@@ -211,9 +209,7 @@ impl FineLoop {
             sent: History::new(&config.attached.position),
             measured: History::new(&config.attached.position),
             arm: Arm::default(),
-            letting_go_periods: 0,
-            let_go: false,
-            had_ended: false,
+            release: Release::default(),
             left: Left::default(),
             axes: config.axes_alone(&config.position),
             lead: Lead::Axes,
@@ -230,7 +226,7 @@ impl FineLoop {
         self.watch_jog();
         self.take_requests();
         let ended = self.outputs.ended;
-        self.had_ended = ended;
+        self.release.had_ended = ended;
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();
         let (position, input) = self.next_position();
@@ -259,7 +255,7 @@ impl FineLoop {
         if matches!(self.phase, Phase::Faulted) {
             self.attach = Attach::again(self.feedback.position);
             (self.fault, self.plugin_error, self.lead) = (None, None, Lead::Axes);
-            (self.letting_go_periods, self.let_go) = (0, false);
+            self.release = Release::default();
             self.governor = Governor::new(&self.config.limits.axes, self.config.lane_count(), self.config.period_s);
             self.progress = Progress::new(&self.config);
             self.phase = Phase::Waiting;
@@ -273,7 +269,7 @@ impl FineLoop {
 
     /// How much later than its bus wants it the last exchange was, ns; `None` as long as no driver tells. Fine thread.
     pub fn phase_ns(&self) -> Option<i64> {
-        None
+        (self.feedback.has_phase != 0).then_some(self.feedback.phase_ns)
     }
 
     /// What was counted so far.
@@ -293,7 +289,7 @@ impl FineLoop {
 
     /// Whether the program has ended, or a fault has brought the machine to rest, and the drives have let go.
     pub fn is_over(&self) -> bool {
-        self.let_go
+        self.release.is_over
     }
 
     /// Whether the joints do not hold yet: nothing can move, and planning waits for them. Any side.

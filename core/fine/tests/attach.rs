@@ -28,6 +28,8 @@ struct Script {
     fault: Option<usize>,
     /// Joint that is lost from now on.
     lost: Option<usize>,
+    /// What the bus says of each exchange, ns.
+    phase_ns: Option<i64>,
     /// Periods by which all of the feedback is old from now on.
     age: u32,
     enabled_for: u64,
@@ -77,6 +79,7 @@ impl Driver for Drives {
             }
         }
         feedback.position = script.position;
+        (feedback.has_phase, feedback.phase_ns) = (u32::from(script.phase_ns.is_some()), script.phase_ns.unwrap_or(5));
         feedback.age_periods = [0; MAX_AXES];
         Ok(())
     }
@@ -185,14 +188,14 @@ impl Bench {
         let mut held = [None; JOINTS];
         for (index, (setpoint, before)) in script.told.iter().enumerate() {
             let all = before.state[..JOINTS].iter().all(|state| *state == JointState::Enabled);
-            for joint in 0..JOINTS {
+            for (joint, held) in held.iter_mut().enumerate() {
                 let at = setpoint.position[joint];
                 if before.state[joint] == JointState::Enabled && setpoint.enable != 0 {
-                    let stays = held[joint].unwrap_or(script.told[index - 1].0.position[joint]);
+                    let stays = held.unwrap_or(script.told[index - 1].0.position[joint]);
                     assert!(all || at == stays, "exchange {index}: joint {joint} moved before all held");
-                    held[joint] = Some(stays).filter(|_| !all);
+                    *held = Some(stays).filter(|_| !all);
                 } else {
-                    held[joint] = None;
+                    *held = None;
                     let known = if index == 0 { at } else { before.position[joint] };
                     assert!(
                         (at - known).abs() <= COUNT_MM,
@@ -214,7 +217,7 @@ fn joints_are_enabled_where_they_stand_and_motion_starts_there() {
         let mut random = Random::new(seed);
         let position = somewhere(&mut random);
         let enable_after = std::array::from_fn(|_| random.below(300));
-        let mut bench = Bench::new(Script { position, enable_after, ..Script::default() }, 1000);
+        let mut bench = Bench::new(Script { enable_after, position, ..Script::default() }, 1000);
         let rest = bench.attach(400).unwrap_or_else(|| panic!("seed {seed}: not enabled"));
         assert_eq!(rest.0[..JOINTS], position.0[..JOINTS], "seed {seed}");
         bench.queue_move();
@@ -294,6 +297,16 @@ fn a_joint_that_is_lost_is_a_fault_of_its_own_in_every_state() {
         bench.script.lock().unwrap().lost = Some(2);
         bench.fine.tick();
         assert_eq!(bench.fine.fault().map(|f| f.kind), Some(FaultKind::Lost { joint: 2, code: 0 }), "{ticks}");
+    }
+}
+
+#[test]
+fn the_phase_of_the_bus_reaches_the_clock_from_the_first_exchange_on() {
+    for phase_ns in [None, Some(-1234)] {
+        let mut bench = Bench::new(Script { enable_after: [9; 3], phase_ns, ..Script::default() }, 500);
+        assert_eq!(bench.fine.phase_ns(), None);
+        bench.fine.tick();
+        assert_eq!(bench.fine.phase_ns(), phase_ns);
     }
 }
 

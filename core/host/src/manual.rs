@@ -188,7 +188,7 @@ impl Source for Lines {
         let mut manual = lock(&self.0);
         match rest.cause {
             RestCause::Abort | RestCause::Corrected | RestCause::Attached => {
-                manual.interpreter.set_position(rest.position)
+                manual.interpreter.set_position(rest.position);
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
                 manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });

@@ -34,7 +34,7 @@ impl FineLoop {
         }
         self.watch_attach();
         self.watch_edge();
-        self.watch_letting_go(failed);
+        self.watch_release(failed);
     }
 
     /// Where the joints are told to be, with what the setpoint says of their motion.
@@ -61,24 +61,6 @@ impl FineLoop {
         self.measured.push(&self.feedback.position);
         let is_old = self.feedback.age_periods[..self.joints].iter().any(|age| *age > 0);
         self.counters.old_feedback_periods += u64::from(is_old);
-    }
-
-    /// Whether the drives are to let go: the program had ended before this period, or a fault has brought the machine to rest.
-    fn is_letting_go(&self) -> bool {
-        self.had_ended || matches!(self.phase, Phase::Faulted)
-    }
-
-    /// The exchange goes on until the brakes are closed, or the driver's time for it is over; a driver that `failed` knows of none.
-    fn watch_letting_go(&mut self, failed: bool) {
-        if self.setpoint.enable != 0 || !self.is_letting_go() {
-            return;
-        }
-        self.letting_go_periods += 1;
-        let holds = |state: &JointState| {
-            [JointState::Enabling, JointState::Enabled, JointState::Homing, JointState::QuickStop].contains(state)
-        };
-        let closed = failed || !self.feedback.state[..self.joints].iter().any(holds);
-        self.let_go |= closed || self.letting_go_periods >= self.config.disable_periods;
     }
 
     /// Whether the exchange failed; the driver's first words about it are kept for the host.

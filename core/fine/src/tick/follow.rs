@@ -42,7 +42,7 @@ impl FineLoop {
             return (self.stand(), self.part(stop));
         }
         if ask == Ask::Run && self.arm_next() {
-            return (*self.guard.position(), Input::Run);
+            return (self.stand(), Input::Run);
         }
         let delta_s = self.govern(ask);
         let waits = self.waits();

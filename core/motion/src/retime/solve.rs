@@ -123,7 +123,8 @@ impl Retimer {
         loop {
             let target = shrink * status.gap;
             status.violation = self.assemble(target);
-            if status.iterations == ITERATIONS || !(status.gap <= LOST) || status.gap < ENOUGH && status.is_feasible() {
+            let lost = status.gap > LOST || status.gap.is_nan();
+            if status.iterations == ITERATIONS || lost || status.gap < ENOUGH && status.is_feasible() {
                 return status;
             }
             self.matrix.solve(&mut self.step);
