@@ -73,15 +73,20 @@ impl Governor {
 
     /// The rate at the end of this period, as near to `target` as the limits let it come.
     pub fn choose(&self, target: f64, points: &Points) -> f64 {
-        let direction = if target > self.sigma { 1.0 } else { -1.0 };
-        let mut most = (target - self.sigma).abs();
+        self.choose_within(self.sigma, target, points, self.period_s)
+    }
+
+    /// The same from the rate `sigma`, within `time_s`.
+    pub fn choose_within(&self, sigma: f64, target: f64, points: &Points, time_s: f64) -> f64 {
+        let direction = if target > sigma { 1.0 } else { -1.0 };
+        let mut most = (target - sigma).abs();
         for point in points.iter() {
             for axis in 0..self.axes {
-                let limit = self.acceleration[axis];
-                most = most.min(self.reach(point.velocity[axis], point.acceleration[axis], limit, direction));
+                let planned = (point.velocity[axis] / time_s, point.acceleration[axis]);
+                most = most.min(reach(sigma, planned, self.acceleration[axis], direction));
             }
         }
-        (self.sigma + direction * most).clamp(0.0, 1.0)
+        (sigma + direction * most).clamp(0.0, 1.0)
     }
 
     /// Takes `sigma` as the rate at the end of this period; gives the program time that passes meanwhile, s.
@@ -96,21 +101,21 @@ impl Governor {
     pub fn program_time_s(&self, sigma: f64) -> f64 {
         f64::midpoint(self.sigma, sigma) * self.period_s
     }
+}
 
-    /// How far σ may go in `direction` within a period before an axis with the planned `velocity` and `acceleration`
-    /// meets its `limit`.
-    ///
-    /// With σ going from σ₀ to σ₀ + d·t the axis accelerates by `σ²·q″ + d·t/T·q′`: at the start of the period linear
-    /// in t, at its end quadratic. Where it is within the limit at both ends, it is so in between.
-    fn reach(&self, velocity: f64, acceleration: f64, limit: f64, direction: f64) -> f64 {
-        let planned = self.sigma * self.sigma * acceleration;
-        let most = (MARGIN * limit).max(planned.abs());
-        let turned = direction * velocity / self.period_s;
-        let slope = turned + 2.0 * direction * self.sigma * acceleration;
-        let up = crossing(most - planned, turned, 0.0).min(crossing(most - planned, slope, acceleration));
-        let down = crossing(most + planned, -turned, 0.0).min(crossing(most + planned, -slope, -acceleration));
-        up.min(down)
-    }
+/// How far σ may go from `sigma` in `direction` within a time T before an axis with the planned velocity, divided by T, and
+/// acceleration meets its `limit`.
+///
+/// With σ going from σ₀ to σ₀ + d·t the axis accelerates by `σ²·q″ + d·t/T·q′`: at the start of the time linear in t, at its
+/// end quadratic. Where it is within the limit at both ends, it is so in between.
+fn reach(sigma: f64, (velocity_per_s, acceleration): (f64, f64), limit: f64, direction: f64) -> f64 {
+    let planned = sigma * sigma * acceleration;
+    let most = (MARGIN * limit).max(planned.abs());
+    let turned = direction * velocity_per_s;
+    let slope = turned + 2.0 * direction * sigma * acceleration;
+    let up = crossing(most - planned, turned, 0.0).min(crossing(most - planned, slope, acceleration));
+    let down = crossing(most + planned, -turned, 0.0).min(crossing(most + planned, -slope, -acceleration));
+    up.min(down)
 }
 
 /// The first t ≥ 0 at which `slope·t + curve·t²` rises through `gap ≥ 0`; infinite where it never does.

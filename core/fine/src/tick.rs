@@ -7,6 +7,7 @@ mod govern;
 mod joints;
 mod keep_alive;
 mod missed;
+mod pieces;
 mod progress;
 mod release;
 mod request;

@@ -1,7 +1,7 @@
 //! Looking ahead in the queue without moving.
 
 use tandem_rings::Queued;
-use tandem_sdk::StopOn;
+use tandem_sdk::{Segment, StopOn};
 
 use super::{Cursor, ends};
 use crate::course::{Course, Place};
@@ -57,6 +57,18 @@ impl Cursor {
             at += 1;
         }
         at
+    }
+
+    /// Shows the segment here with the time in it, and those behind it with 0, until `look` says stop (`false`), or one ends
+    /// at rest. As many as a period looks at.
+    pub fn pieces(&mut self, mut look: impl FnMut(&Segment, f64) -> bool) {
+        if !self.resting && (!look(&self.segment, self.local_s) || ends(&self.segment)) {
+            return;
+        }
+        self.walk(self.taken, Points::SEGMENTS, |queued| match queued {
+            Queued::Segment { segment, .. } => look(segment, 0.0) && !ends(segment),
+            Queued::Event(_) => true,
+        });
     }
 
     /// First to third derivative of the path coordinate here by program time, mm/s and so on.

@@ -11,9 +11,9 @@ use crate::law::Along;
 use crate::preview::Mark;
 
 /// The feed ratios that count now.
-struct Ratios {
-    feed: f64,
-    rapid: f64,
+pub(super) struct Ratios {
+    pub(super) feed: f64,
+    pub(super) rapid: f64,
 }
 
 /// What a period is asked for.
@@ -105,7 +105,18 @@ impl FineLoop {
         let target = wanted.min(limit);
         let unchanged = target == self.governor.sigma();
         let sigma = if unchanged { target } else { self.governor.choose(target, &self.points) };
+        // Where the limits stand against the feed, it is looked at more closely.
+        if ask == Ask::Run && sigma > target && !self.cursor.is_resting() && !self.is_feed_kept(sigma, ratios) {
+            return self.govern_in_pieces(ratios, way_speed_mm_per_s, limit);
+        }
         self.governor.take(sigma)
+    }
+
+    /// Whether a period that ends at the rate `sigma` keeps ratio × programmed feed, at its end and in its mean.
+    fn is_feed_kept(&mut self, sigma: f64, ratios: &Ratios) -> bool {
+        let mean = f64::midpoint(self.governor.sigma(), sigma);
+        let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, f64::INFINITY);
+        sigma <= asked.at_end && mean <= asked.mean
     }
 
     /// Limits of jerk too: σ̈ is constant in the period.
@@ -274,9 +285,9 @@ impl FineLoop {
 }
 
 /// The rate at which a planned speed is at most `allowed`; 1 where it is anyway, to the rounding of a long path.
-fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
+pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
     if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed { allowed / planned_mm_per_s } else { 1.0 }
 }
 
 /// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
-const FEED_TOLERANCE: f64 = 1e-7;
+pub(super) const FEED_TOLERANCE: f64 = 1e-7;

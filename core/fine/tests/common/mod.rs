@@ -14,12 +14,15 @@ use tandem_sdk::{
 /// Fine period, s.
 pub const PERIOD_S: f64 = 0.001;
 /// Programmed feed, mm/s.
-const FEED_MM_PER_S: f64 = 20.0;
+pub const FEED_MM_PER_S: f64 = 20.0;
 /// What the plan accelerates with, mm/s².
 const PLANNED_MM_PER_S2: f64 = 200.0;
 
 /// The output that a fault leaves on.
 pub const KEPT_OUTPUT: u32 = 3;
+
+/// What a plan at its limits accelerates with, mm/s²: planners leave a thousandth.
+const MOST_MM_PER_S2: f64 = 999.0;
 
 /// Drives that follow exactly, until they are told to fail.
 struct Echo {
@@ -77,15 +80,25 @@ pub struct Bench {
 impl Bench {
     /// At rest at zero, nothing queued.
     pub fn new(guard: GuardMode) -> Self {
-        Self::of(guard, Joints::Axes, 3, None)
+        Self::of(guard, Joints::Axes, (3, 1.0), None)
+    }
+
+    /// What is queued may be planned at `max_feed_ratio` times the feed.
+    pub fn planned_at(max_feed_ratio: f64) -> Self {
+        Self::of(GuardMode::Stop, Joints::Axes, (3, max_feed_ratio), None)
     }
 
     /// Three axes and as many joints behind them, as `kinematics` give them.
     pub fn with_curved(kinematics: Box<dyn Kinematics>) -> Self {
-        Self::of(GuardMode::Stop, Joints::Curved { axes: 3 }, 6, Some(kinematics))
+        Self::of(GuardMode::Stop, Joints::Curved { axes: 3 }, (6, 1.0), Some(kinematics))
     }
 
-    fn of(guard: GuardMode, joints: Joints, entries: usize, kinematics: Option<Box<dyn Kinematics>>) -> Self {
+    fn of(
+        guard: GuardMode,
+        joints: Joints,
+        (entries, max_feed_ratio): (usize, f64),
+        kinematics: Option<Box<dyn Kinematics>>,
+    ) -> Self {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,
@@ -103,7 +116,7 @@ impl Bench {
             order: 2,
             guard,
             position: AxisVector::ZERO,
-            max_feed_ratio: 1.0,
+            max_feed_ratio,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),
             kept_outputs: 1 << KEPT_OUTPUT,
@@ -180,6 +193,12 @@ impl Bench {
     /// Queues motion at eleven times the feed: beyond the limits.
     pub fn leap(&mut self, duration_s: f64) {
         self.piece(11.0 * FEED_MM_PER_S, 0.0, duration_s, false);
+    }
+
+    /// Queues the way from rest to a speed and back, with all that the axis has.
+    pub fn peak(&mut self, peak_mm_per_s: f64) {
+        self.piece(0.0, MOST_MM_PER_S2, peak_mm_per_s / MOST_MM_PER_S2, false);
+        self.piece(peak_mm_per_s, -MOST_MM_PER_S2, peak_mm_per_s / MOST_MM_PER_S2, true);
     }
 
     /// Queues the way from the feed to rest.

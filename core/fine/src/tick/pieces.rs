@@ -1,0 +1,76 @@
+//! A period in which the plan turns from getting faster to braking, without a jerk limit.
+//!
+//! One rate of change of σ for the whole period would have to keep the limits on both sides of the turn: where the plan gets
+//! faster σ may fall, and where it brakes with all that an axis has it may not. So the feed could not be kept. Where that is
+//! so the period is driven segment by segment: in each σ is linear, and within the limits of that segment alone.
+
+use tandem_sdk::{Segment, SegmentFlags};
+
+use super::FineLoop;
+use super::govern::{FEED_TOLERANCE, Ratios, within};
+
+/// How far a period has been laid out.
+#[derive(Clone, Copy, Debug)]
+struct Laid {
+    sigma: f64,
+    /// Time of the period that is left, s.
+    left_s: f64,
+    /// Program time that has passed, s.
+    passed_s: f64,
+}
+
+impl Laid {
+    /// Passes `piece_s` of program time, or what the time that is left allows, with σ going to `sigma` in no less than `time_s`.
+    fn pass(&mut self, piece_s: f64, sigma: f64, time_s: f64) {
+        let mean = f64::midpoint(self.sigma, sigma);
+        let needed_s = piece_s / mean;
+        if needed_s < self.left_s {
+            *self = Self { sigma, left_s: self.left_s - needed_s, passed_s: self.passed_s + piece_s };
+            return;
+        }
+        let end = self.sigma + (sigma - self.sigma) * (self.left_s / time_s).min(1.0);
+        self.passed_s += f64::midpoint(self.sigma, end) * self.left_s;
+        (self.sigma, self.left_s) = (end, 0.0);
+    }
+}
+
+impl FineLoop {
+    /// Lays the period out segment by segment, at no rate above `limit`; takes the rate at its end and gives the program time
+    /// that passes, s.
+    pub(super) fn govern_in_pieces(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64, limit: f64) -> f64 {
+        let Self { cursor, points, governor, config, .. } = self;
+        let covered_s = points.covered_s;
+        let mut laid = Laid { sigma: governor.sigma(), left_s: config.period_s, passed_s: 0.0 };
+        cursor.pieces(|segment, from_s| {
+            let whole_s = segment.duration_s - from_s;
+            let piece_s = whole_s.min(laid.sigma * laid.left_s);
+            if piece_s > 0.0 {
+                let target = piece_target(segment, from_s, piece_s, laid.sigma, ratios, way_speed_mm_per_s).min(limit);
+                points.clear();
+                points.add(segment, from_s, whole_s.min(laid.sigma.max(target) * laid.left_s));
+                let shortest_s = laid.left_s.min(whole_s / laid.sigma.max(target));
+                let sigma = governor.choose_within(laid.sigma, target, points, shortest_s);
+                laid.pass(whole_s, sigma, shortest_s);
+            }
+            laid.left_s > 0.0 && laid.sigma > 0.0
+        });
+        points.covered_s = covered_s;
+        governor.take(laid.sigma);
+        laid.passed_s
+    }
+}
+
+/// The rate at the end of a piece of `segment` at which neither that end nor the mean exceed what is asked for.
+fn piece_target(segment: &Segment, from_s: f64, piece_s: f64, sigma: f64, ratios: &Ratios, places: f64) -> f64 {
+    let to_s = from_s + piece_s;
+    let (before, behind) = (segment.path_speed_mm_per_s(from_s), segment.path_speed_mm_per_s(to_s));
+    let of_places = within(places, behind);
+    if segment.flags.contains(SegmentFlags::RAPID) {
+        return ratios.rapid.min(of_places);
+    }
+    let allowed = ratios.feed * segment.feed_mm_per_s;
+    let at_end = within(allowed, behind).min(of_places);
+    let way_mm = segment.path_mm(to_s) - segment.path_mm(from_s);
+    let is_below = sigma * before <= allowed * (1.0 + FEED_TOLERANCE);
+    if is_below && way_mm > 0.0 { at_end.min((2.0 * allowed * piece_s / way_mm - sigma).max(0.0)) } else { at_end }
+}
