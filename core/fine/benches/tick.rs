@@ -125,6 +125,7 @@ fn config(order: u32) -> FineConfig {
         period_s: 1e-3,
         limits: Limits::new(&[axis; 3]).unwrap(),
         // The queue starts at speed: the guard is to look at it, not to stop it.
+        linear: u32::MAX,
         joints: tandem_fine::Joints::Axes,
         speed_difference_mm_per_s: [1000.0; 8],
         order,

@@ -51,6 +51,8 @@ pub struct FineConfig {
     pub period_s: f64,
     /// Limits of the axes, and of what `joints` puts behind them.
     pub limits: Limits,
+    /// Bit per linear axis: where any of them moves, a feed is their speed alone.
+    pub linear: u32,
     /// How the joints hang on the axes.
     pub joints: Joints,
     /// Allowable speed difference that the planner makes use of, per axis, mm/s.

@@ -12,6 +12,28 @@ pub struct Course<'a> {
     segment: &'a Segment,
     queued: [&'a [Queued]; 2],
     axes: usize,
+    linear: u32,
+}
+
+/// Where the plan is on its path, and how fast.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Position of the linear axes, mm; zero for the others.
+    pub linear_mm: [f64; MAX_AXES],
+    /// Path speed, mm/s of program time.
+    pub speed: f64,
+    /// Its rate of change, mm/s².
+    pub rise: f64,
+}
+
+impl Pace {
+    /// How far it is to `other`, mm: on the path, or straight on, whichever is more.
+    pub fn way_to_mm(&self, other: &Self) -> f64 {
+        let squares = self.linear_mm.iter().zip(&other.linear_mm).map(|(a, b)| (b - a) * (b - a));
+        squares.sum::<f64>().sqrt().max(other.path_mm - self.path_mm)
+    }
 }
 
 /// Derivatives of the plan at a place by program time, per axis.
@@ -39,9 +61,9 @@ pub struct Place<'a> {
 }
 
 impl<'a> Course<'a> {
-    /// `segment` moves, `queued` follows; `axes` axes are looked at.
-    pub fn new(segment: &'a Segment, queued: [&'a [Queued]; 2], axes: usize) -> Self {
-        Self { segment, queued, axes }
+    /// `segment` moves, `queued` follows; `axes` axes are looked at, those of the mask `linear` are linear ones.
+    pub fn new(segment: &'a Segment, queued: [&'a [Queued]; 2], (axes, linear): (usize, u32)) -> Self {
+        Self { segment, queued, axes, linear }
     }
 
     /// The place at local time `local_s` of the segment that moves.
@@ -65,6 +87,41 @@ impl Place<'_> {
             (motion.velocity[axis], motion.acceleration[axis], motion.jerk[axis]) = (velocity, acceleration, jerk);
         }
         motion
+    }
+
+    /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
+    ///
+    /// The path coordinate of a planner is a polynomial beside those of the axes, and may run behind the way that they
+    /// drive: the greater speed counts.
+    pub fn pace(&self) -> Option<Pace> {
+        let segment = self.segment?;
+        let [speed, rise, _] = derivatives(&segment.path, self.local_s);
+        let mut pace = Pace { path_mm: segment.path_mm(self.local_s), linear_mm: [0.0; MAX_AXES], speed, rise };
+        let (mut squares, mut product) = (0.0, 0.0);
+        let position = segment.position(self.local_s);
+        for axis in (0..self.course.axes).filter(|axis| self.course.linear >> axis & 1 == 1) {
+            let [velocity, acceleration, _] = derivatives(&segment.coefficients[axis], self.local_s);
+            pace.linear_mm[axis] = position[axis];
+            (squares, product) = (squares + velocity * velocity, product + velocity * acceleration);
+        }
+        if squares > speed * speed {
+            (pace.speed, pace.rise) = (squares.sqrt(), product / squares.sqrt());
+        }
+        Some(pace)
+    }
+
+    /// Programmed feed here, mm/s; infinite in a rapid, and where nothing moves.
+    pub fn feed_mm_per_s(&self) -> f64 {
+        self.segment.filter(|it| !it.flags.contains(SegmentFlags::RAPID)).map_or(f64::INFINITY, |it| it.feed_mm_per_s)
+    }
+
+    /// Moves on by `time_s`, over the ends of segments.
+    pub fn go(&mut self, time_s: f64) {
+        let mut left_s = self.advance(time_s);
+        while left_s > 0.0 && self.segment.is_some() {
+            self.step();
+            left_s = self.advance(left_s);
+        }
     }
 
     /// Whether what lies behind the place is known: `false` beyond what is queued, unless that ends at rest.

@@ -5,6 +5,7 @@
 //! for the continuous velocity that the segment declares; the steps themselves shrink with σ. A constant σ is always
 //! admissible where the plan is, so the interval for σ̇ is never empty.
 
+mod below;
 mod smooth;
 mod steady;
 

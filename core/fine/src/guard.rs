@@ -161,6 +161,7 @@ mod tests {
         Guard::new(&FineConfig {
             period_s: 0.001,
             limits: Limits::new(&[axis; 3]).unwrap(),
+            linear: u32::MAX,
             joints: Joints::Axes,
             speed_difference_mm_per_s: [2.0; MAX_AXES],
             order: 2,

@@ -124,6 +124,7 @@ impl Bench {
             order: 2,
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
+            linear: u32::MAX,
             max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([0.01; MAX_AXES]),
             missed: MissedLimits::default(),

@@ -155,6 +155,7 @@ fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
     let config = FineConfig {
         period_s: 0.001,
         limits: Limits::new(&[axis; 3]).unwrap(),
+        linear: u32::MAX,
         joints: tandem_fine::Joints::Axes,
         speed_difference_mm_per_s: [0.0; MAX_AXES],
         order: 2,

@@ -235,6 +235,7 @@ pub fn fine_config(
     FineConfig {
         period_s: machine.fine_period_s,
         limits: joints.limits,
+        linear: (0..machine.axes.count()).filter(|&i| !machine.axes.is_rotary(i)).fold(0, |mask, i| mask | 1 << i),
         joints: joints.fine(),
         speed_difference_mm_per_s: joints.speed_difference_mm_per_s(planner),
         order: planner.order,

@@ -113,7 +113,7 @@ impl Cursor {
     }
 
     /// Shows the plan from here on to `look`, as far as it is queued.
-    pub fn on_course<T>(&mut self, axes: usize, look: impl FnOnce(Place<'_>) -> T) -> T {
+    pub fn on_course<T>(&mut self, axes: (usize, u32), look: impl FnOnce(Place<'_>) -> T) -> T {
         let wanted = self.entries.slots().min(ON_COURSE);
         let local_s = if self.resting { self.segment.duration_s } else { self.local_s };
         match self.entries.read_chunk(wanted) {

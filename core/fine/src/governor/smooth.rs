@@ -30,6 +30,8 @@ pub struct Aim {
     pub sigma: f64,
     /// Path speed not to exceed, mm/s.
     pub speed_mm_per_s: f64,
+    /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
+    pub ratio: f64,
     /// Derivatives of the plan's path coordinate here by program time.
     pub path: [f64; 3],
 }
@@ -82,15 +84,16 @@ impl Governor {
     /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is, `recent` what of
     /// its steps the next samples show.
     pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>, recent: Recent) -> Chosen {
-        let wanted = self.wanted(aim, outlook).min(self.wanted_by_slowest(aim, outlook, &place));
+        let here = Way { sigma: self.sigma, rate_per_s: self.rate_per_s, place, recent };
+        let wanted = if aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite() {
+            self.wanted_below(aim, outlook, &here)
+        } else {
+            self.small(self.wanted(aim, outlook).min(self.wanted_by_slowest(aim, outlook, &place)), outlook)
+        };
         if wanted == 0.0 && self.rate_per_s == 0.0 {
             return Chosen { delta_s: self.sigma * self.period_s, relaxed: false };
         }
-        // Where next to nothing moves the limits leave more than small steps; to come in they are there.
-        let small = outlook.most_change_per_s2;
-        let (down, up) = if self.rate_per_s < 0.0 { (small, 4.0 * small) } else { (4.0 * small, small) };
-        let here = Way { sigma: self.sigma, rate_per_s: self.rate_per_s, place, recent };
-        let chosen = match self.steadied(wanted.clamp(-down, up), here, outlook) {
+        let chosen = match self.steadied(wanted, here, outlook) {
             Some(change) => Chosen { delta_s: self.pass(change), relaxed: false },
             None => self.go_on(outlook, &self.reserve(&here)),
         };
@@ -205,6 +208,23 @@ impl Governor {
             }
         }
         wanted
+    }
+
+    /// `wanted` in small steps: where next to nothing moves the limits leave more; to come in they are there.
+    pub(super) fn small(&self, wanted: f64, outlook: &Outlook) -> f64 {
+        let small = outlook.most_change_per_s2;
+        let (down, up) = if self.rate_per_s < 0.0 { (small, 4.0 * small) } else { (4.0 * small, small) };
+        wanted.clamp(-down, up)
+    }
+
+    /// σ̈ that brings the rate to `sigma` soonest; infinite where that is too far for the law to say more.
+    pub(super) fn freely(&self, sigma: f64, outlook: &Outlook) -> f64 {
+        let most = MARGIN * outlook.rate_change_per_s2;
+        if !most.is_finite() {
+            return f64::INFINITY;
+        }
+        let free = self.approach(self.sigma - sigma, outlook.share * most, most);
+        if free < most { free } else { f64::INFINITY }
     }
 
     fn approach(&self, off: f64, gentle: f64, most: f64) -> f64 {

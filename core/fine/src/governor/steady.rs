@@ -66,7 +66,7 @@ pub(super) struct Way<'a> {
 
 impl Way<'_> {
     /// Goes on for a period.
-    fn pass(&mut self, change_per_s2: f64, h: f64) {
+    pub(super) fn pass(&mut self, change_per_s2: f64, h: f64) {
         let (sigma, rate) = (self.sigma, self.rate_per_s);
         let mut left_s = h * (sigma + h * (rate / 2.0 + h * change_per_s2 / 6.0));
         let mut crossed: Option<Steps> = None;

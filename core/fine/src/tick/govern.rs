@@ -34,6 +34,9 @@ const ABOVE: f64 = 0.01;
 /// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
 const REST_ROUNDS: u32 = 8;
 
+/// Periods from rest for which the first rate is to last where jerk is limited.
+const BEGINNING: u32 = 6;
+
 /// Share of the jerk that braking for a place ahead counts on.
 const JERK_SHARE: f64 = 0.9;
 
@@ -121,29 +124,64 @@ impl FineLoop {
 
     /// Limits of jerk too: σ̈ is constant in the period.
     fn govern_smooth(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        if ask == Ask::Run && self.cursor.is_resting() {
+            self.begin_below(ratios);
+        }
         let path = self.cursor.path_derivatives();
         let ahead = self.cursor.ahead(self.governor.sigma() * self.config.period_s);
         let limit = self.plan_limit().min(self.most_rate());
         self.ask_for_rate(limit);
         let run = if ahead.rapid { ratios.rapid.min(limit) } else { limit };
-        let feed = if ahead.rapid || ratios.feed >= self.config.max_feed_ratio {
+        let ratio = if ratios.feed < self.config.max_feed_ratio { ratios.feed } else { f64::INFINITY };
+        let feed = if ahead.rapid || ratio.is_infinite() {
             f64::INFINITY
         } else {
-            ratios.feed * ahead.feed_mm_per_s.min(self.cursor.segment().feed_mm_per_s)
+            // What was driven before a rest counts no more.
+            let here = if self.cursor.is_resting() { f64::INFINITY } else { self.cursor.segment().feed_mm_per_s };
+            ratio * ahead.feed_mm_per_s.min(here)
         };
         let aim = match ask {
-            Ask::Run => Aim { sigma: run, speed_mm_per_s: feed.min(way_speed_mm_per_s), path },
+            Ask::Run => Aim { sigma: run, speed_mm_per_s: feed.min(way_speed_mm_per_s), ratio, path },
             // Where the plan stands still, its path says nothing.
-            _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, path },
+            _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, ratio, path },
         };
         let (governor, outlook) = (&mut self.governor, &self.outlook);
         let recent = self.cursor.recent_steps();
-        let lanes = self.config.lane_count();
+        let lanes = (self.config.lane_count(), self.config.linear);
         let chosen = self.cursor.on_course(lanes, |place| governor.smooth(&aim, outlook, place, recent));
         if chosen.relaxed {
             self.guard.relax_jerk();
         }
         chosen.delta_s
+    }
+
+    /// From rest, where any rate is as good to begin with: one at which the path speed stays below ratio × programmed feed for
+    /// some periods. What the plan gains in fewer than these the rate could not follow.
+    fn begin_below(&mut self, ratios: &Ratios) {
+        let mut sigma = self.governor.sigma();
+        for _ in 0..REST_ROUNDS {
+            let allowed = self.rate_below(sigma * self.config.period_s, ratios);
+            if sigma <= allowed {
+                break;
+            }
+            sigma = allowed.max((sigma * allowed).sqrt() * (1.0 - 1e-9));
+        }
+        let allowed = self.rate_below(sigma * self.config.period_s, ratios);
+        self.governor.jump(sigma.min(allowed));
+    }
+
+    /// The rate that keeps ratio × programmed feed in the coming periods, where `delta_s` of program time passes in each.
+    fn rate_below(&mut self, delta_s: f64, ratios: &Ratios) -> f64 {
+        let (mut rate, mut from_mm) = (f64::INFINITY, self.cursor.path_mm());
+        for period in 1..=BEGINNING {
+            let ahead = self.cursor.ahead(f64::from(period) * delta_s);
+            let fastest = ahead.speed_mm_per_s.max((ahead.path_mm - from_mm) / delta_s);
+            from_mm = ahead.path_mm;
+            if !ahead.rapid && ratios.feed < self.config.max_feed_ratio {
+                rate = rate.min(ratios.feed * ahead.feed_mm_per_s / fastest);
+            }
+        }
+        rate
     }
 
     fn ratios_in_force(&self) -> Ratios {

@@ -116,6 +116,7 @@ impl Bench {
             order: 2,
             guard,
             position: AxisVector::ZERO,
+            linear: u32::MAX,
             max_feed_ratio,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),

@@ -162,6 +162,11 @@ pub struct Done {
 
 impl Machine {
     pub fn new(plan: &Plan) -> Self {
+        Self::planned_at(plan, 1.0)
+    }
+
+    /// The plan is made at `max_feed_ratio` times the programmed feed.
+    pub fn planned_at(plan: &Plan, max_feed_ratio: f64) -> Self {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,
@@ -187,7 +192,8 @@ impl Machine {
             plans_from_rest: false,
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
-            max_feed_ratio: 1.0,
+            linear: u32::MAX,
+            max_feed_ratio,
             max_following_error_mm: AxisVector([f64::INFINITY; 8]),
             missed: MissedLimits::default(),
             kept_outputs: 0,
@@ -197,7 +203,9 @@ impl Machine {
         let mut from = 0.0;
         let cuts = plan.cuts();
         for &to in &cuts {
-            rough.segments.push(Queued::Segment { start_s: from, segment: plan.segment(from, to) }).unwrap();
+            let mut segment = plan.segment(from, to);
+            segment.feed_mm_per_s /= max_feed_ratio;
+            rough.segments.push(Queued::Segment { start_s: from, segment }).unwrap();
             from = to;
         }
         let end_mm = (plan.path)(plan.along(from)[0]);

@@ -75,6 +75,7 @@ impl Rig {
         let config = FineConfig {
             period_s: PERIOD_S,
             limits,
+            linear: u32::MAX,
             joints: tandem_fine::Joints::Axes,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 2,

@@ -1,0 +1,171 @@
+//! The governor where jerk is limited and the path speed is to stay below a feed that the plan goes beyond.
+//!
+//! What the plan does is looked at where the period ends, and not where it begins: its own jerk may turn round within. There
+//! the speed may rise by no more than leaves time to bring that to nothing. And where the plan turns it may use all the jerk
+//! or acceleration of an axis, so that σ cannot be lowered while it gets faster: that is tried out on the way ahead.
+
+use super::Governor;
+use super::smooth::{Aim, Interval};
+use super::steady::Way;
+use crate::course::Motion;
+use crate::outlook::Outlook;
+
+/// Share of the path jerk that bringing the rise of the speed to nothing counts on: in a period in which the plan's own jerk
+/// turns round little of it is there.
+const SHARE: f64 = 0.8;
+/// Periods in which the speed may go on rising as it does, for the same reason.
+const RESERVE: f64 = 1.0;
+/// Most that σ̈ may be lowered to, as a change of the change of σ in a period. The small steps of other approaches are for
+/// where next to nothing moves, and the speed is near the feed here.
+const MOST_CHANGE: f64 = 0.3;
+/// Rounds in which σ̈ is sought: what is wrong is squared by each.
+const ROUNDS: u32 = 5;
+/// To which change of σ in a period it is sought.
+const PRECISION: f64 = 1e-9;
+/// Share of the feed that is aimed at: the mean over a period may be that much higher than its ends.
+const AIMED: f64 = 1.0 - 1e-6;
+/// Places ahead at which the rate is tried out.
+const PLACES: usize = 40;
+/// How much farther each place lies behind the one before: together they reach over two hundred times the first distance,
+/// longer than a machine takes to its feed.
+const FARTHER: f64 = 1.07;
+/// The first distance, as a share of the longest time in which an axis builds its acceleration up; one period at least.
+const NEAREST: f64 = 1.0 / 48.0;
+/// Share of the limits of jerk and acceleration that is counted on there: between the places more may be used.
+const LEFT: f64 = 0.9;
+/// Tries in which σ̈ is sought for these places.
+const TRIES: u32 = 4;
+
+/// A place ahead.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ahead {
+    /// Program time from the place before, s.
+    step_s: f64,
+    /// Rate at which the path speed there is the highest that is allowed.
+    most: f64,
+    motion: Motion,
+}
+
+/// How fast a speed may rise that is to end at a limit.
+#[derive(Clone, Copy, Debug)]
+struct Curve {
+    jerk_mm_per_s3: f64,
+    reserve_s: f64,
+}
+
+impl Curve {
+    /// The rise `below_mm_per_s` below the limit, mm/s², and how fast it changes with that, 1/s. Above it is negative.
+    fn rise(&self, below_mm_per_s: f64) -> (f64, f64) {
+        let (reserve, way) = (self.reserve_s, below_mm_per_s.abs());
+        let rise = 2.0 * way / (reserve + (reserve * reserve + 2.0 * way / self.jerk_mm_per_s3).sqrt());
+        (rise.copysign(below_mm_per_s), 1.0 / (reserve + rise / self.jerk_mm_per_s3))
+    }
+}
+
+impl Governor {
+    /// σ̈ that brings the rate to the one aimed at, as far as the path speed stays below the feed here and ahead.
+    pub(super) fn wanted_below(&self, aim: &Aim, outlook: &Outlook, here: &Way<'_>) -> f64 {
+        let h = self.period_s;
+        if aim.path[0] <= 0.0 {
+            // From rest the rate was chosen for what follows.
+            return -self.rate_per_s / h;
+        }
+        let free = self.small(self.freely(aim.sigma, outlook), outlook);
+        let below = if aim.speed_mm_per_s.is_finite() { self.below(aim, free, here, outlook) } else { free };
+        self.in_time(aim, below, here, outlook).max(-MOST_CHANGE / (h * h))
+    }
+
+    /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve or below it, and its mean
+    /// below the limit.
+    fn below(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
+        let (h, limit) = (self.period_s, AIMED * aim.speed_mm_per_s);
+        let jerk = outlook.path_jerk_mm_per_s3.min(limit * MOST_CHANGE / (h * h));
+        let curve = Curve { jerk_mm_per_s3: SHARE * outlook.share * jerk, reserve_s: RESERVE * h };
+        let Some(from) = here.place.pace() else { return most };
+        let is_below = here.sigma * from.speed <= aim.speed_mm_per_s;
+        let mut change = most;
+        for _ in 0..ROUNDS {
+            let mut way = *here;
+            way.pass(change, h);
+            let Some(to) = way.place.pace().filter(|to| to.speed > 0.0) else { break };
+            let speed = way.sigma * to.speed;
+            let rise = way.sigma * way.sigma * to.rise + to.speed * way.rate_per_s;
+            let (allowed, per_s) = curve.rise(limit - speed);
+            let mut over = (rise - allowed) / (to.speed * h * (1.0 + per_s * h / 2.0));
+            if is_below {
+                let mean_over = (from.way_to_mm(&to) / h - aim.speed_mm_per_s) * 6.0 / (to.speed * h * h);
+                let end_over = (speed - limit) * 2.0 / (to.speed * h * h);
+                over = over.max(mean_over).max(end_over);
+            }
+            if (change == most && over <= 0.0) || over.abs() * h * h < PRECISION {
+                break;
+            }
+            change = (change - over).min(most);
+        }
+        change
+    }
+
+    /// The greatest σ̈ up to `most` behind which there is time to lower σ before the plan is too fast.
+    fn in_time(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
+        let (h, sigma) = (self.period_s, here.sigma);
+        let mut ahead = [Ahead::default(); PLACES];
+        let (mut place, mut step_s, mut count) = (here.place, (NEAREST * outlook.horizon_s).max(h * sigma), 0);
+        place.go(h * sigma);
+        for next in &mut ahead {
+            place.go(step_s);
+            let Some(pace) = place.pace() else { break };
+            *next = Ahead { step_s, most: aim.ratio * place.feed_mm_per_s() / pace.speed, motion: place.motion() };
+            step_s *= FARTHER;
+            count += 1;
+        }
+        let mut change = most;
+        for _ in 0..TRIES {
+            let over = self.over(change, here, &ahead[..count], outlook);
+            if over <= 0.0 {
+                break;
+            }
+            change -= over;
+        }
+        change
+    }
+
+    /// By how much σ̈ has to be lower than `change`, so that lowering σ as far as the limits allow from the next period on
+    /// keeps the speed below at the places ahead; not more than 0 where it does.
+    fn over(&self, change: f64, here: &Way<'_>, ahead: &[Ahead], outlook: &Outlook) -> f64 {
+        let h = self.period_s;
+        let mut sigma = here.sigma + h * (here.rate_per_s + h * change / 2.0);
+        let mut rate = here.rate_per_s + h * change;
+        let (mut time_s, mut most, mut was_below) = (0.0, f64::NEG_INFINITY, false);
+        let mut before = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for place in ahead {
+            if sigma <= 0.0 {
+                break;
+            }
+            let real_s = place.step_s / sigma;
+            let least = self.least(sigma, rate, &place.motion, outlook);
+            // What the limits leave at either end of the way counts on all of it.
+            let slower = (rate + real_s * least.0.max(before.0)).max(least.1.max(before.1).min(0.0));
+            sigma += real_s * f64::midpoint(rate, slower);
+            time_s += real_s;
+            (rate, before) = (slower, least);
+            was_below |= sigma <= place.most;
+            if was_below {
+                most = most.max((sigma - place.most) / (h * (h / 2.0 + time_s)));
+            }
+        }
+        most
+    }
+
+    /// The least σ̈ and the least rate of σ that the limits leave where the plan has this motion.
+    fn least(&self, sigma: f64, rate_per_s: f64, motion: &Motion, outlook: &Outlook) -> (f64, f64) {
+        let (mut changes, mut rates) = (Interval::ALL, Interval::ALL);
+        for (axis, (acceleration_limit, jerk_limit)) in outlook.limits() {
+            let velocity = motion.velocity[axis];
+            let turned = sigma * motion.acceleration[axis];
+            let planned = sigma * sigma * sigma * motion.jerk[axis];
+            changes.keep(planned + 3.0 * turned * rate_per_s, velocity, (LEFT * jerk_limit).max(planned.abs()));
+            rates.keep(sigma * turned, velocity, (LEFT * acceleration_limit).max((sigma * turned).abs()));
+        }
+        (changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)), rates.low)
+    }
+}
