@@ -145,7 +145,17 @@ mod tests {
             let length = dot(&way, &way).sqrt();
             let direction = way.map(|v| v / length);
             s += length;
-            Chord { start: pair[0], direction, s: s - length, length, feed: 1.0, tolerance: TOLERANCE, turn: 0.0 }
+            Chord {
+                start: pair[0],
+                direction,
+                s: s - length,
+                length,
+                feed: 1.0,
+                tolerance: TOLERANCE,
+                speed: 1.0,
+                turn_s: 1.0,
+                turn: 0.0,
+            }
         };
         points.windows(2).map(chord).collect()
     }

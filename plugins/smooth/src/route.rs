@@ -32,6 +32,9 @@ pub struct Chord<const L: usize> {
     pub feed: f64,
     /// What the motion may stand off the chord.
     pub tolerance: f64,
+    /// Speed of the lanes along it at most, and the time in which the slowest of them builds that up, s.
+    pub speed: f64,
+    pub turn_s: f64,
     /// Size of the turn at its start: the change of direction; zero behind a rest.
     pub turn: f64,
 }
@@ -176,6 +179,9 @@ impl<const L: usize> Route<L> {
         };
         let mut before = self.chords.last().filter(|_| joins).map(|chord| chord.direction);
         let (start, first_chord) = (self.end, self.first + self.chords.len() as u64);
+        let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
+        let least = |limits: &Lanes<L>| limits[..frame.count].iter().fold(f64::INFINITY, |least, v| v.min(least));
+        let (jerk, acceleration) = (least(&frame.jerk), least(&frame.acceleration));
         let mut from = frame.lanes(&block.start);
         if flat.points.len() > MANY {
             self.chords.reserve_exact(flat.points.len());
@@ -200,14 +206,27 @@ impl<const L: usize> Route<L> {
             // A vertex of a chord whose direction path speed does not count takes no feed: axis limits alone hold.
             let feed = if speed > 0.0 { block.command_feed_mm_per_s() * feed_ratio } else { f64::INFINITY };
             let tolerance = tolerance_mm * (1.0 - if flat.curved { SAGITTA_SHARE } else { 0.0 });
-            self.chords.push(Chord { start: from, direction, s: self.end, length, feed, tolerance, turn });
+            let fastest = along(limits, &direction);
+            let fastest = if speed > 0.0 { fastest.min(feed / speed.sqrt()) } else { fastest };
+            let turn_s = 2.0 * (fastest / jerk).sqrt() + fastest / acceleration;
+            let s = self.end;
+            self.chords.push(Chord {
+                start: from,
+                direction,
+                s,
+                length,
+                feed,
+                tolerance,
+                speed: fastest,
+                turn_s,
+                turn,
+            });
             self.end += length;
             from = *point;
             before = Some(direction);
         }
         let chords = (self.first + self.chords.len() as u64 - first_chord) as u32;
         let rests = block.ends_at_rest();
-        let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
         let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
         let least_s =
             (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);

@@ -18,6 +18,11 @@ const OTHER_FEED: f64 = 0.99;
 const TIMELY_S: f64 = 3e-4;
 /// Half a box along the path at most, as a multiple of the tolerance: where a single axis moves nothing else bounds it.
 const LONGEST: f64 = 150.0;
+/// Steps of the grid in whose way, and in that of the time in which the speed is built up, a box is of use: a slow motion has next
+/// to no jerk, and would go anywhere in a wider one.
+const SWING_STEPS: f64 = 4.0;
+/// Half a box along the path at most, in the same way.
+const LONGEST_SWING: f64 = 10.0;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
 /// Firm sites in a step at most.
@@ -115,7 +120,7 @@ impl<const L: usize> Sites<L> {
             }
             self.fill(run, marks, &mut last_t, t, grid, keep);
             if t > 0.4 * h && t < end_s {
-                let half = candidate.half.unwrap_or_else(|| half_widths(run, &candidate, grid.lanes));
+                let half = candidate.half.unwrap_or_else(|| half_widths(run, &candidate, grid));
                 self.candidates[n].half = Some(half);
                 self.add(run, t, &candidate, &half, grid, keep);
             }
@@ -145,7 +150,7 @@ impl<const L: usize> Sites<L> {
             let s = a.s + (b.s - a.s) * ((time - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
             at = run.chord_at(s, at);
             let candidate = Candidate { s, chord: at as u32, vertex: false, firm: false, half: None };
-            let half = half_widths(run, &candidate, grid.lanes);
+            let half = half_widths(run, &candidate, grid);
             self.add(run, time, &candidate, &half, grid, keep);
         }
     }
@@ -185,11 +190,13 @@ impl Timer<'_> {
 
 /// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
 /// that turn get most of it. Along the path the box may be longer.
-fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes: usize) -> Lanes<L> {
+fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
     let chords = run.chords;
     let (i, s) = (candidate.chord as usize, candidate.s);
-    let tolerance =
-        if candidate.vertex && i > 0 { chords[i].tolerance.min(chords[i - 1].tolerance) } else { chords[i].tolerance };
+    let lanes = grid.lanes;
+    let before = if candidate.vertex && i > 0 { &chords[i - 1] } else { &chords[i] };
+    let swing = chords[i].speed.max(before.speed) * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
+    let tolerance = chords[i].tolerance.min(before.tolerance).min(swing);
     let Needs { mut need, sharp_way, timely } = needs(run, i, s);
     let most = largest(&need);
     if most > 0.0 {
@@ -214,7 +221,10 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, lanes
         need[l] = need[l].max(t * (0.3 / across).min(loose));
     }
     let worst = farthest(&need, &tangent);
-    widen(each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance), tangent)
+    widen(
+        each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance).map(|half| half.min(LONGEST_SWING * swing)),
+        tangent,
+    )
 }
 
 /// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
