@@ -10,7 +10,7 @@ use super::{Between, End, LaneLimits, PLACES, Point};
 const ITERATIONS: usize = 40;
 /// Mean complementarity at which a solution is good enough.
 const ENOUGH: f64 = 1e-4;
-/// Mean complementarity from which no solution is found any more: there is none.
+/// Mean complementarity from which no solution is found any more, as where it is no number: there is none.
 const LOST: f64 = 1e6;
 /// Violation of a row, as a share of its limit, that is as good as none.
 const FEASIBLE: f64 = 2e-3;
@@ -124,7 +124,7 @@ impl Retimer {
             let target = shrink * status.gap;
             status.violation = self.assemble(target);
             let lost = status.gap > LOST || status.gap.is_nan();
-            if status.iterations == ITERATIONS || lost || status.gap < ENOUGH && status.is_feasible() {
+            if lost || status.iterations == ITERATIONS || status.gap < ENOUGH && status.is_feasible() {
                 return status;
             }
             self.matrix.solve(&mut self.step);

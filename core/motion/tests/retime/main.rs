@@ -91,9 +91,9 @@ proptest! {
 
 #[test]
 fn a_motion_that_is_none_ends_the_iteration_at_once() {
-    let points = vec![[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
+    let points = [[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
     let ends = (End::Rest, End::Rest);
     let task = Task { points: &points, between: &[], limits: limits(1), jerk_share: 1.0, step_s: f64::INFINITY, ends };
     let status = Retimer::default().solve(&task);
-    assert!(status.iterations <= 1 && (status.gap >= 1.0 || status.gap.is_nan()), "{status:?}");
+    assert!(status.iterations <= 1 && status.gap.is_nan(), "{status:?}");
 }

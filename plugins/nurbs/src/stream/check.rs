@@ -104,7 +104,7 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         rests += u32::from(t >= duration_s);
         let state = window.at(t.min(duration_s));
         // No limit says that a motion goes forward.
-        if !(state.speed_mm_per_s >= -BACK_MM_PER_S && state.speed_mm_per_s.is_finite()) {
+        if state.speed_mm_per_s < -BACK_MM_PER_S || !state.speed_mm_per_s.is_finite() {
             reliefs.add(known, Relief { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
             return Worst { speed: f64::NAN, ..worst };
         }

@@ -10,6 +10,9 @@ const APART_MM: f64 = 1e-9;
 /// Corners of a window at most: ramps that exceed the limit with so many are left to the check of the samples.
 const MOST_CORNERS: usize = 40_000;
 
+/// Looks along a ramp at most: one that takes hours is refused later, and must not take them in planning.
+const MOST_LOOKS: f64 = 1e5;
+
 /// How closely ramps are compared with the limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Care {
@@ -101,7 +104,7 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
     }
-    let looks = (ramp.duration_s / care.look_s).ceil().max(1.0);
+    let looks = (ramp.duration_s / care.look_s).ceil().clamp(1.0, MOST_LOOKS);
     let (mut most, mut found) = (1.0 + care.over, None);
     for n in 0..=looks as usize {
         let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
