@@ -1,18 +1,23 @@
-//! The driver contract over the simulated joints, spindle and switches.
+//! The driver contract over the simulated joints, spindle, switches and bus.
 
-use std::f64::consts::TAU;
+use std::time::{Duration, Instant};
 
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_ANALOG, MAX_AXES,
-    PluginError, Setpoint,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_AXES, PluginError, Setpoint,
+    Words,
 };
 
-use crate::joint::{CURRENT_A_PER_MM_PER_S2, Motion, Servo};
-use crate::options::{Model, Options, Switch};
-use crate::servo::ServoJoints;
+use crate::bus_clock::BusClock;
+use crate::encoder::{Encoders, PowerOn, attached};
+use crate::faults::DriveFaults;
+use crate::joint::Motion;
+use crate::mechanics::Mechanics;
+use crate::options::{Options, Switch};
+use crate::power::Power;
 use crate::spindle::Spindle;
 use crate::switches::Switches;
 use crate::watchdog::Watchdog;
+use crate::wire::{Frame, Wire};
 
 /// Fault code of every joint whose drives stopped by themselves because the host fell silent.
 pub const WATCHDOG_FAULT: u32 = 1;
@@ -23,14 +28,16 @@ enum Life {
     Closed,
     Opened,
     Running,
+    Stopped,
 }
 
 /// Simulated drives behind the driver contract.
 ///
-/// Joints stand at [`DriverContext::start_position`] when started. While `enable` is 0 they do not follow: they run out at
-/// the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are
-/// then reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its
-/// command in every state.
+/// Joints stand where their options or [`DriverContext::start_position`] have them at power-on, which is the first start after an
+/// opening; a driver that is started again finds them where they were left. While `enable` is 0 they do not follow: they run out
+/// at the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are then
+/// reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its command in
+/// every state.
 ///
 /// Where no new setpoint comes, joints go on at the velocity of the last one; after more than
 /// [`Options::watchdog_periods`] such periods in a row they ramp to rest at the quick-stop deceleration and report
@@ -41,15 +48,21 @@ pub struct SimulatedDrives {
     life: Life,
     joint_count: usize,
     period_s: f64,
-    start_position: AxisVector,
-    servo: Servo,
-    /// The joints of the model `servo`, once started.
-    motors: Option<ServoJoints>,
-    joints: [Motion; MAX_AXES],
-    /// The setpoint that the joints followed last; none while they follow nothing.
-    followed: Option<AxisVector>,
-    /// The velocity commanded last: the joints go on at it while no setpoint comes.
-    velocity: AxisVector,
+    mechanics: Mechanics,
+    powers: [Power; MAX_AXES],
+    encoders: Encoders,
+    faults: DriveFaults,
+    wire: Wire,
+    bus_clock: Option<BusClock>,
+    started: Instant,
+    /// The setpoint that the drives heard last.
+    heard: Setpoint,
+    /// Exchanges since the start.
+    exchanges: u64,
+    /// What was last heard of each joint.
+    told: [Motion; MAX_AXES],
+    /// Fine periods since then.
+    silent_periods: [u32; MAX_AXES],
     quick_stopping: bool,
     watchdog: Watchdog,
     spindle: Spindle,
@@ -63,20 +76,25 @@ impl SimulatedDrives {
     pub fn new(options: Options) -> Self {
         let period_s = 0.001; // replaced by `open`
         Self {
-            servo: servo(&options, period_s),
-            motors: None,
+            mechanics: Mechanics::new(&options, &AxisVector::ZERO, 0, period_s),
+            powers: [Power::new(0, 0); MAX_AXES],
+            encoders: Encoders::new(&options),
+            faults: DriveFaults::new(&options.faults),
+            wire: Wire::new(&options, &Feedback::default(), period_s),
+            bus_clock: None,
+            started: Instant::now(),
+            heard: Setpoint::default(),
+            exchanges: 0,
+            told: [Motion::default(); MAX_AXES],
+            silent_periods: [0; MAX_AXES],
             spindle: Spindle::new(options.spindle_time_constant_s, period_s),
             watchdog: Watchdog::new(options.watchdog_periods),
-            switches: Switches::new(&options.switches, options.latches, options.seed),
-            shift: unknown_start(&options),
+            switches: Switches::new(&options),
+            shift: AxisVector::ZERO,
             options,
             life: Life::Closed,
             joint_count: 0,
             period_s,
-            start_position: AxisVector::ZERO,
-            joints: [Motion::default(); MAX_AXES],
-            followed: None,
-            velocity: AxisVector::ZERO,
             quick_stopping: false,
         }
     }
@@ -86,10 +104,10 @@ impl SimulatedDrives {
     pub fn pass(&mut self) -> Feedback {
         let mut feedback = Feedback::default();
         if self.life == Life::Running {
-            let before = self.joints;
+            self.mechanics.begin();
             self.watchdog.pass();
             self.miss();
-            self.report(&before, true, &mut feedback);
+            self.report(&mut feedback);
         }
         feedback
     }
@@ -106,151 +124,186 @@ impl SimulatedDrives {
             return Err(PluginError::fixed("sim: the start position is not a finite number"));
         }
         let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
-        match self.options.switches.iter().map(last_joint).find(|joint| *joint >= count) {
-            Some(joint) => Err(PluginError::of_option(
-                "switches",
-                format!("joint = {joint}: the machine has joints 0 to {}", count - 1),
-            )),
+        let switches = self.options.switches.iter().map(|switch| ("switches", last_joint(switch)));
+        let faults = self.options.faults.iter().map(|fault| ("faults", fault.joint));
+        let latches = self.options.latch_joints.iter().map(|joint| ("latch_joints", *joint));
+        match switches.chain(faults).chain(latches).find(|(_, joint)| *joint >= count) {
+            Some((key, joint)) => {
+                let words = format!("joint = {joint}: the machine has joints 0 to {}", count - 1);
+                Err(PluginError::of_option(key, words))
+            }
             None => Ok(()),
         }
     }
 
+    /// The drives get their power: nobody has told them anything yet.
+    fn power_on(&mut self, start: &AxisVector) {
+        let (options, period_s) = (&self.options, self.period_s);
+        let PowerOn { reading, shift } = PowerOn::new(options, start);
+        let of_joint = |list: &[f64], joint: usize| list.get(joint).or(list.last()).copied().unwrap_or(0.0);
+        let power = |joint: usize| {
+            let wake_periods = periods(of_joint(&options.enable_s, joint), period_s);
+            Power::new(wake_periods, periods(of_joint(&options.brake_s, joint), period_s))
+        };
+        self.powers = std::array::from_fn(power);
+        self.mechanics = Mechanics::new(options, &reading, self.joint_count, period_s);
+        self.encoders = Encoders::new(options);
+        self.shift = shift;
+    }
+
+    /// The bus is up: everything between host and drives begins anew.
+    fn begin(&mut self) {
+        let (options, period_s) = (&self.options, self.period_s);
+        self.spindle = Spindle::new(options.spindle_time_constant_s, period_s);
+        self.watchdog = Watchdog::new(options.watchdog_periods);
+        self.bus_clock = options.bus_clock.as_ref().map(|clock| BusClock::new(clock, period_s, options.seed));
+        (self.heard, self.exchanges, self.quick_stopping) = (Setpoint::default(), 0, false);
+        self.faults.start();
+        self.faults.step(0, 0, &mut self.powers);
+        self.mechanics.begin();
+        let [_, at] = self.real_way();
+        self.switches.start(&at);
+        self.started = Instant::now();
+    }
+
     /// Lives through the periods up to and with this exchange. Fine loop.
-    fn live(&mut self, setpoint: &Setpoint) {
-        if setpoint.reset != 0 {
+    fn live(&mut self) {
+        if self.heard.reset != 0 {
             self.watchdog.reset();
+            self.powers.iter_mut().for_each(Power::reset);
         }
-        let heard = self.watchdog.hear(setpoint.tick);
+        let heard = self.watchdog.hear(self.heard.tick);
         (0..heard.missed).for_each(|_| self.miss());
-        if heard.fresh || setpoint.enable == 0 {
+        if heard.fresh || self.heard.enable == 0 {
             self.watchdog.fed();
-            self.move_joints(setpoint);
+            self.obey();
         } else {
             self.miss();
         }
     }
 
-    /// One period without a new setpoint: on at the last velocity, until the watchdog ends that.
-    fn miss(&mut self) {
-        let Some(last) = self.followed else { return self.brake() };
-        self.watchdog.silence();
-        if self.watchdog.is_tripped() {
-            return self.brake();
-        }
-        let next = last + self.velocity * self.period_s;
-        self.follow(&last, &next);
-    }
-
-    /// Moves all joints over one period. Fine loop.
-    fn move_joints(&mut self, setpoint: &Setpoint) {
-        if setpoint.enable == 0 || setpoint.reset != 0 {
+    /// One period with a setpoint.
+    fn obey(&mut self) {
+        if self.heard.enable == 0 || self.heard.reset != 0 {
             self.quick_stopping = false;
         }
-        if setpoint.enable == 0 || self.quick_stopping || self.watchdog.is_tripped() {
-            return self.brake();
-        }
-        // Drives that just begin to follow have no setpoint to interpolate from: for them it is a step.
-        let from = self.followed.unwrap_or(setpoint.position);
-        self.velocity = setpoint.velocity;
-        self.follow(&from, &setpoint.position);
+        self.mechanics.set_velocity(&self.heard.velocity);
+        let to = self.heard.position;
+        self.advance(&to);
     }
 
-    fn brake(&mut self) {
-        self.followed = None;
-        let deceleration = self.options.quick_stop_deceleration_mm_per_s2;
-        self.joints[..self.joint_count].iter_mut().for_each(|joint| joint.brake(deceleration, self.period_s));
-        if let Some(motors) = &mut self.motors {
-            motors.hold(&self.joints[..self.joint_count]);
+    /// One period without a new setpoint: on at the last velocity, until the watchdog ends that.
+    fn miss(&mut self) {
+        if self.mechanics.is_following() {
+            self.watchdog.silence();
         }
+        if self.watchdog.is_tripped() {
+            self.powers.iter_mut().for_each(|power| power.fail(WATCHDOG_FAULT));
+        }
+        let to = self.mechanics.coast();
+        self.advance(&to);
     }
 
-    fn follow(&mut self, from: &AxisVector, to: &AxisVector) {
-        if let Some(motors) = &mut self.motors {
-            motors.follow(to, &self.velocity, self.spindle.speed);
+    /// Moves all joints over one period.
+    fn advance(&mut self, to: &AxisVector) {
+        let follow = self.heard.enable != 0 && !self.quick_stopping;
+        let powers = &mut self.powers[..self.joint_count];
+        powers.iter_mut().for_each(|power| power.command(follow));
+        self.mechanics.step(powers, to, self.spindle.speed);
+        for (joint, power) in powers.iter_mut().enumerate() {
+            power.settle(self.mechanics.is_at_rest(joint));
         }
-        for (index, joint) in self.joints[..self.joint_count].iter_mut().enumerate() {
-            match self.options.model {
-                Model::SecondOrder => self.servo.follow(joint, from[index], to[index]),
-                Model::Ideal | Model::Servo => {
-                    let ideal = Motion { position: to[index], speed: self.velocity[index] };
-                    *joint = self.motors.as_ref().map_or(ideal, |motors| motors.motion(index));
-                }
-            }
-        }
-        self.followed = Some(*to);
     }
 
     /// Writes every field of the joints and every input; latches of the period before are over.
-    fn report(&mut self, before: &[Motion; MAX_AXES], enable: bool, feedback: &mut Feedback) {
-        for (index, joint) in self.joints[..self.joint_count].iter().enumerate() {
-            let seen = self.motors.as_ref().map_or(*joint, |motors| motors.measured(index));
-            feedback.position[index] = seen.position;
-            feedback.speed[index] = seen.speed;
-            let change = || CURRENT_A_PER_MM_PER_S2 * (joint.speed - before[index].speed) / self.period_s;
-            feedback.current_a[index] = match (self.options.model, &mut self.motors) {
-                (Model::SecondOrder, _) => change(),
-                (_, Some(motors)) => motors.current_a(index),
-                _ => 0.0,
-            };
-            feedback.state[index] = self.state(enable, joint);
-            feedback.fault_code[index] = if self.watchdog.is_tripped() { WATCHDOG_FAULT } else { 0 };
+    fn report(&mut self, feedback: &mut Feedback) {
+        for joint in 0..self.joint_count {
+            self.tell(joint, feedback);
+            feedback.current_a[joint] = self.mechanics.current_a(joint);
         }
-        let truth = self.motors.as_ref().map(|motors| &motors.truth);
-        feedback.analog = truth.map_or([0.0; MAX_ANALOG], |truth| [truth.cutting_torque_nm, truth.depth_mm, 0.0, 0.0]);
-        self.switch(before, feedback);
+        feedback.analog = self.mechanics.analog();
+        self.switch(feedback);
         feedback.spindle_rad_per_s = self.spindle.speed;
         feedback.spindle_angle_rad = self.spindle.angle;
+        feedback.spindle_at_speed = u32::from(self.spindle.is_at_speed());
     }
 
-    fn state(&self, enable: bool, joint: &Motion) -> JointState {
-        if self.watchdog.is_tripped() {
-            return JointState::Fault;
+    /// What is heard of a joint; of one that is lost, what was heard last.
+    fn tell(&mut self, joint: usize, feedback: &mut Feedback) {
+        let power = &self.powers[joint];
+        if power.is_lost() {
+            self.silent_periods[joint] = self.silent_periods[joint].saturating_add(1);
+        } else {
+            let seen = self.mechanics.seen(joint);
+            self.told[joint] = Motion { position: self.encoders.read(seen.position), speed: seen.speed };
+            self.silent_periods[joint] = 0;
         }
-        let at_rest_for_good = self.quick_stopping && joint.speed == 0.0;
-        if enable && !at_rest_for_good { JointState::Enabled } else { JointState::Disabled }
+        (feedback.position[joint], feedback.speed[joint]) = (self.told[joint].position, self.told[joint].speed);
+        (feedback.state[joint], feedback.fault_code[joint]) = (power.state(), power.code());
+        feedback.age_periods[joint] = self.silent_periods[joint];
     }
 
     /// The inputs after a period, and the positions caught in it, as the drives see them.
-    fn switch(&mut self, before: &[Motion; MAX_AXES], feedback: &mut Feedback) {
+    fn switch(&mut self, feedback: &mut Feedback) {
         feedback.inputs = 0;
         feedback.latches.iter_mut().filter(|latch| latch.edge != 0).for_each(|latch| *latch = Latch::default());
         if self.switches.are_none() {
             return;
         }
-        let (from, to) = (self.real(before), self.real(&self.joints));
-        feedback.inputs = self.switches.step(&from, &to, &mut feedback.latches);
-        for latch in feedback.latches.iter_mut().filter(|latch| latch.edge != 0) {
-            latch.position = latch.position - self.shift;
+        let [from, to] = self.real_way();
+        let latches = &mut feedback.latches;
+        feedback.inputs = self.switches.step([&from, &to], self.heard.arm, self.period_s, latches);
+        for latch in latches.iter_mut().filter(|latch| latch.edge != 0) {
+            for joint in (0..self.joint_count).filter(|joint| latch.joints >> joint & 1 == 1) {
+                latch.position[joint] = self.encoders.read(latch.position[joint] - self.shift[joint]);
+            }
         }
     }
 
-    /// Where the joints really stand.
-    fn real(&self, joints: &[Motion; MAX_AXES]) -> AxisVector {
-        AxisVector(std::array::from_fn(|i| joints[i].position + self.shift[i]))
+    /// Where the joints really were before this exchange, and where they are.
+    fn real_way(&self) -> [AxisVector; 2] {
+        self.mechanics.way().map(|joints| joints + self.shift)
     }
 
-    fn refuse_unless(&self, wanted: Life, refusals: [&'static str; 3]) -> Result<(), PluginError> {
-        if self.life == wanted { Ok(()) } else { Err(PluginError::fixed(refusals[self.life as usize])) }
+    /// The frame gets through or not; where none has for too long, every joint is lost.
+    fn deliver(&mut self, frame: Frame, feedback: &mut Feedback) {
+        if !self.wire.is_ideal() && self.wire.deliver(frame, feedback) {
+            self.powers.iter_mut().for_each(Power::lose);
+            feedback.state[..self.joint_count].fill(tandem_sdk::JointState::Lost);
+        }
+    }
+
+    fn refuse_unless(&self, wanted: &[Life], call: [&'static str; 4]) -> Result<(), PluginError> {
+        if wanted.contains(&self.life) { Ok(()) } else { Err(PluginError::fixed(call[self.life as usize])) }
     }
 }
 
-/// How far each joint stands from where its drive says: a seeded part of the option.
-fn unknown_start(options: &Options) -> AxisVector {
-    let mut state = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    AxisVector(std::array::from_fn(|_| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let share = (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
-        share * options.unknown_start_mm
-    }))
+/// Whole fine periods that `seconds` take; more than there will ever be where they never end.
+fn periods(seconds: f64, period_s: f64) -> u64 {
+    (seconds / period_s - 1e-6).ceil().max(0.0) as u64
 }
 
-fn servo(options: &Options, period_s: f64) -> Servo {
-    Servo::new(TAU * options.natural_frequency_hz, options.damping_ratio, period_s)
+/// The longest of the times that end.
+fn longest(seconds: &[f64]) -> f64 {
+    seconds.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max)
 }
+
+/// Time beyond the delays of drives within which they are up or down for certain, s: a second to come to rest in, lost frames.
+const MARGIN_S: f64 = 1.0;
 
 impl Driver for SimulatedDrives {
     fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
+        let ideal = DriverDescription::simulated();
+        let (enable_s, brake_s) = (&self.options.enable_s, &self.options.brake_s);
+        if enable_s.is_empty() && brake_s.is_empty() {
+            return ideal;
+        }
+        let closing_s = longest(brake_s);
+        DriverDescription {
+            enable_s: longest(enable_s) + closing_s + MARGIN_S,
+            disable_s: closing_s + MARGIN_S,
+            ..ideal
+        }
     }
 
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
@@ -258,51 +311,69 @@ impl Driver for SimulatedDrives {
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        const REFUSED: [&str; 3] =
-            ["", "sim: open is refused: the driver is already opened", "sim: open is refused: the driver is running"];
-        self.refuse_unless(Life::Closed, REFUSED)?;
+        const REFUSED: [&str; 4] = [
+            "",
+            "sim: open is refused: the driver is already opened",
+            "sim: open is refused: the driver is running",
+            "",
+        ];
+        self.refuse_unless(&[Life::Closed, Life::Stopped], REFUSED)?;
         self.check_machine(context)?;
         self.joint_count = context.joint_count as usize;
         self.period_s = context.fine_period_s;
-        self.start_position = context.start_position;
-        self.servo = servo(&self.options, self.period_s);
+        self.power_on(&context.start_position);
         self.life = Life::Opened;
         Ok(())
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        const REFUSED: [&str; 3] =
-            ["sim: start is refused: the driver is closed", "", "sim: start is refused: the driver is already running"];
-        self.refuse_unless(Life::Opened, REFUSED)?;
-        self.joints = std::array::from_fn(|i| Motion { position: self.start_position[i], speed: 0.0 });
-        self.motors = (self.options.model == Model::Servo)
-            .then(|| ServoJoints::new(&self.options, &self.start_position, self.joint_count, self.period_s));
-        self.spindle = Spindle::new(self.options.spindle_time_constant_s, self.period_s);
-        let at = self.real(&self.joints);
-        self.switches.start(&at);
-        self.followed = None;
-        self.velocity = AxisVector::ZERO;
-        self.quick_stopping = false;
-        self.watchdog = Watchdog::new(self.options.watchdog_periods);
+        const REFUSED: [&str; 4] = [
+            "sim: start is refused: the driver is closed",
+            "",
+            "sim: start is refused: the driver is already running",
+            "",
+        ];
+        self.refuse_unless(&[Life::Opened, Life::Stopped], REFUSED)?;
+        std::thread::sleep(Duration::from_secs_f64(self.options.bus_start_s));
+        self.begin();
+        let mut first = Feedback::default();
+        (0..self.joint_count).for_each(|joint| self.tell(joint, &mut first));
+        self.switch(&mut first);
+        self.wire = Wire::new(&self.options, &first, self.period_s);
         self.life = Life::Running;
-        Ok(Attached::at(self.start_position))
+        let stands = attached(self.options.encoder, first.position);
+        let delay_periods = [self.options.delay_periods; MAX_AXES];
+        Ok(Attached { state: first.state, fault_code: first.fault_code, delay_periods, ..stands })
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        const REFUSED: [&str; 3] = [
+        const REFUSED: [&str; 4] = [
             "sim: exchange is refused: the driver is closed",
             "sim: exchange is refused: the driver is opened but not started",
             "",
+            "sim: exchange is refused: the driver is stopped",
         ];
-        self.refuse_unless(Life::Running, REFUSED)?;
+        self.refuse_unless(&[Life::Running], REFUSED)?;
         let finite = setpoint.position.is_finite() && setpoint.velocity.is_finite();
         if !(finite && setpoint.spindle_rad_per_s.is_finite()) {
             return Err(PluginError::fixed("sim: exchange is refused: the setpoint is not a finite number"));
         }
-        let before = self.joints;
-        self.live(setpoint);
-        self.spindle.follow(setpoint.spindle_rad_per_s);
-        self.report(&before, setpoint.enable != 0, feedback);
+        let frame = self.wire.send(setpoint.tick);
+        if frame != Frame::Lost {
+            self.heard = *setpoint;
+        }
+        self.exchanges += 1;
+        self.mechanics.begin();
+        self.live();
+        self.faults.step(setpoint.tick, self.exchanges, &mut self.powers);
+        self.spindle.follow(self.heard.spindle_rad_per_s);
+        self.report(feedback);
+        self.heard.reset = 0;
+        self.deliver(frame, feedback);
+        if let Some(clock) = &mut self.bus_clock {
+            let now_ns = i64::try_from(self.started.elapsed().as_nanos()).unwrap_or(i64::MAX);
+            (feedback.has_phase, feedback.phase_ns) = (1, clock.phase_ns(now_ns));
+        }
         Ok(())
     }
 
@@ -311,8 +382,15 @@ impl Driver for SimulatedDrives {
     }
 
     fn stop(&mut self) -> Result<(), PluginError> {
-        self.life = Life::Closed;
+        if self.life != Life::Closed {
+            self.life = Life::Stopped;
+        }
+        self.powers.iter_mut().for_each(Power::cut);
         self.quick_stopping = false;
         Ok(())
+    }
+
+    fn explain(&self, code: u32) -> Words {
+        self.faults.explain(code)
     }
 }

@@ -25,22 +25,36 @@
 //! above_mm = 12.5
 //! ```
 //!
-//! Everything is computed from the setpoints and the fine period: no clock, and what is
-//! random comes from a seed, so a run repeats bit for bit.
+//! Beyond that it can be as demanding as real drives are, each of it off unless asked for: joints that stand anywhere, known or
+//! not (`encoder`), drives that take their time (`enable_s`, `brake_s`), gravity, faults, noise, and a bus that loses frames
+//! (`lost_frames`), is late or has a clock of its own. `docs/simulation.md` has all of it.
+//!
+//! Everything is computed from the setpoints and the fine period, and what is random comes from a seed, so a run repeats bit for
+//! bit. Only `bus_start_s` and `bus_clock` look at a clock, and no command depends on them.
 
+mod bus_clock;
 mod driver;
+mod encoder;
+mod faults;
 mod joint;
+mod mechanics;
 mod options;
+mod power;
 pub mod servo;
 mod shape;
 mod spindle;
 mod switches;
 mod watchdog;
+mod wire;
 
+pub use bus_clock::BusClockOptions;
 pub use driver::{SimulatedDrives, WATCHDOG_FAULT};
+pub use encoder::Encoder;
+pub use faults::DriveFault;
 pub use joint::CURRENT_A_PER_MM_PER_S2;
 pub use options::{Model, Options, Switch};
 pub use shape::Bore;
+pub use wire::Frames;
 
 use tandem_sdk::PluginError;
 

@@ -1,10 +1,14 @@
 //! The options of the simulated drives and what is refused.
 
 use serde::{Deserialize, Serialize};
-use tandem_sdk::{PluginError, PluginOptions};
+use tandem_sdk::{MAX_AXES, PluginError, PluginOptions};
 
+use crate::bus_clock::BusClockOptions;
+use crate::encoder::Encoder;
+use crate::faults::DriveFault;
 use crate::servo::{CuttingOptions, ServoOptions};
 use crate::shape::{Bore, Shape};
+use crate::wire::{self, Frames};
 
 /// How a joint follows its setpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,8 +67,46 @@ tandem_sdk::options! {
         pub watchdog_periods: u32 = 5,
         /// Simulated switches on the digital inputs; all other inputs are 0.
         pub switches: Vec<Switch> = Vec::new(),
-        /// Whether the drives catch the position at each edge of a switch, between two exchanges.
+        /// Whether the drives catch the position at the edge of a switch that they are armed for, between two exchanges.
         pub latches: bool = true,
+        /// Numbers of the joints whose drives catch it, from 0; empty: all. A drive knows its own joint alone.
+        pub latch_joints: Vec<usize> = Vec::new(),
+        /// What the encoders know at power-on. Incremental ones count from 0, wherever their joints stand, and say that nothing is
+        /// known.
+        pub encoder: Encoder = Encoder::Absolute,
+        /// Where the joints stand at power-on, from joint 0, mm (rad for a rotary joint); joints beyond the list stand where the
+        /// machine file has them.
+        pub start_mm: Vec<f64> = Vec::new(),
+        /// How far at most each joint stands from there, mm (rad for a rotary joint): seeded, and an absolute encoder knows it.
+        pub start_spread_mm: f64 = 0.0,
+        /// Steps in which positions are read, mm (rad for a rotary joint); 0: none.
+        pub encoder_count_mm: f64 = 0.0,
+        /// Noise of the positions read, mm rms (rad for a rotary joint).
+        pub encoder_noise_mm: f64 = 0.0,
+        /// Time from being told to hold until there is torque, s, from joint 0; the last entry stands for all joints after it.
+        /// inf: that joint never comes up.
+        pub enable_s: Vec<f64> = Vec::new(),
+        /// Time that a brake takes to open and to close, s, from joint 0; the last entry stands for all joints after it. 0: the joint
+        /// has no brake.
+        pub brake_s: Vec<f64> = Vec::new(),
+        /// Speed at which gravity pulls a joint along that has neither torque nor a brake, mm/s (rad/s), below 0 downwards; from
+        /// joint 0, joints beyond the list are not pulled.
+        pub sag_mm_per_s: Vec<f64> = Vec::new(),
+        /// Time that the start of the bus takes, s, by the computer's clock, whatever the clock of the run.
+        pub bus_start_s: f64 = 0.0,
+        /// Drives that go into a fault, or fall out of the bus.
+        pub faults: Vec<DriveFault> = Vec::new(),
+        /// Frames that get lost: the drives get no setpoint, the driver no answer.
+        pub lost_frames: Option<Frames> = None,
+        /// Answers that are not there in time; the setpoints are.
+        pub late_frames: Option<Frames> = None,
+        /// How many fine periods in a row may pass without an answer before all joints are lost, 0 to 1000.
+        pub patience_periods: u32 = 3,
+        /// Fine periods that an answer takes from the drives, 0 to 15.
+        pub delay_periods: u32 = 0,
+        /// A clock of the bus that is not the host's: the drives tell how far each exchange was from its tick. On the virtual clock
+        /// nobody steers by it.
+        pub bus_clock: Option<BusClockOptions> = None,
         /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
         /// random part of it. Switches are where they are; only homing finds out.
         pub unknown_start_mm: f64 = 0.0,
@@ -72,7 +114,7 @@ tandem_sdk::options! {
         pub servo: Vec<ServoOptions> = Vec::new(),
         /// What the model `servo` cuts.
         pub cutting: Option<CuttingOptions> = None,
-        /// Seed of what is random: bounce, the unknown start, noise of the current, a random workpiece.
+        /// Seed of what is random: bounce, the start, noise of encoders and currents, lost and late frames, a random workpiece.
         pub seed: u64 = 1,
     }
 }
@@ -100,7 +142,35 @@ impl Options {
         within("unknown_start_mm", self.unknown_start_mm, 0.0, 1e6)?;
         within("watchdog_periods", f64::from(self.watchdog_periods), 0.0, 100.0)?;
         self.switches.iter().try_for_each(Switch::check)?;
+        self.check_joints()?;
+        self.check_bus()?;
         self.check_servo()
+    }
+
+    /// Encoders, delays and brakes.
+    fn check_joints(&self) -> Result<(), PluginError> {
+        all_within("start_mm", &self.start_mm, -1e6, 1e6)?;
+        within("start_spread_mm", self.start_spread_mm, 0.0, 1e6)?;
+        within("encoder_count_mm", self.encoder_count_mm, 0.0, 1e3)?;
+        within("encoder_noise_mm", self.encoder_noise_mm, 0.0, 1e3)?;
+        all_within("enable_s", &self.enable_s, 0.0, f64::INFINITY)?;
+        all_within("brake_s", &self.brake_s, 0.0, 60.0)?;
+        all_within("sag_mm_per_s", &self.sag_mm_per_s, -1e4, 1e4)?;
+        match self.latch_joints.iter().find(|joint| **joint >= MAX_AXES) {
+            Some(joint) => {
+                Err(refusal("latch_joints", &format!("{joint}: a machine has joints 0 to {}", MAX_AXES - 1)))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn check_bus(&self) -> Result<(), PluginError> {
+        // Longer than this is a bus that does not start.
+        within("bus_start_s", self.bus_start_s, 0.0, 30.0)?;
+        within("patience_periods", f64::from(self.patience_periods), 0.0, 1e3)?;
+        wire::check(self)?;
+        self.faults.iter().try_for_each(DriveFault::check)?;
+        self.bus_clock.as_ref().map_or(Ok(()), BusClockOptions::check)
     }
 
     fn check_servo(&self) -> Result<(), PluginError> {
@@ -157,6 +227,14 @@ pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), P
     Err(PluginError::of_option(key, format!("{value}: must be {low} to {high}")))
 }
 
+/// Each of at most one number a joint.
+fn all_within(key: &str, values: &[f64], low: f64, high: f64) -> Result<(), PluginError> {
+    if values.len() > MAX_AXES {
+        return Err(refusal(key, &format!("{} numbers: a machine has {MAX_AXES} joints at most", values.len())));
+    }
+    values.iter().try_for_each(|value| within(key, *value, low, high))
+}
+
 pub(crate) fn refusal(key: &str, what: &str) -> PluginError {
     PluginError::of_option(key, what)
 }
@@ -210,6 +288,22 @@ mod tests {
             ("unknown_start_mm = -1", "unknown_start_mm"),
             ("[[switches]]\ninput = 1\njoint = 0", "above_mm"),
             ("[[switches]]\ninput = 1\njoint = -1\nabove_mm = 1", "-1"),
+            ("encoder = \"optical\"", "optical"),
+            ("start_mm = [nan]", "start_mm"),
+            ("start_mm = [0, 0, 0, 0, 0, 0, 0, 0, 0]", "9 numbers"),
+            ("encoder_noise_mm = -1", "encoder_noise_mm"),
+            ("enable_s = [-1]", "enable_s"),
+            ("brake_s = [inf]", "brake_s"),
+            ("latch_joints = [8]", "0 to 7"),
+            ("bus_start_s = 31", "bus_start_s"),
+            ("delay_periods = 16", "0 to 15"),
+            ("lost_frames = { periods = 2 }", "never happen"),
+            ("late_frames = { probability = 2 }", "late_frames.probability"),
+            ("[[faults]]\njoint = 0\ncode = 3", "at a tick or at an exchange"),
+            ("[[faults]]\njoint = 0\ntick = 3", "above 0"),
+            ("[[faults]]\njoint = 0\ntick = 3\nlost = true\ncode = 3", "no code"),
+            ("[[faults]]\njoint = 8\ntick = 3\ncode = 3", "joint = 8"),
+            ("bus_clock = { drift = 3 }", "drift"),
         ];
         for (text, word) in cases {
             let message = Options::parse(text).unwrap_err().to_string();

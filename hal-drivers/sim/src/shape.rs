@@ -68,8 +68,9 @@ pub(crate) fn is_on<'a>(mut shapes: impl Iterator<Item = &'a Shape>, at: &AxisVe
     shapes.any(|shape| shape.depth_mm(at) > 0.0)
 }
 
-/// Where on the straight way between two positions `is_on` changes; it differs between their ends. Fine loop, bounded.
-pub(crate) fn edge(from: &AxisVector, to: &AxisVector, is_on: impl Fn(&AxisVector) -> bool) -> AxisVector {
+/// Where on the straight way between two positions `is_on` changes, which differs between their ends, and the share of the way up
+/// to there. Fine loop, bounded.
+pub(crate) fn edge(from: &AxisVector, to: &AxisVector, is_on: impl Fn(&AxisVector) -> bool) -> (AxisVector, f64) {
     let before = is_on(from);
     let at = |share: f64| AxisVector(std::array::from_fn::<_, MAX_AXES, _>(|i| from[i] + (to[i] - from[i]) * share));
     let (mut low, mut high) = (0.0, 1.0);
@@ -77,7 +78,7 @@ pub(crate) fn edge(from: &AxisVector, to: &AxisVector, is_on: impl Fn(&AxisVecto
         let middle = f64::midpoint(low, high);
         if is_on(&at(middle)) == before { low = middle } else { high = middle }
     }
-    at(high)
+    (at(high), high)
 }
 
 #[cfg(test)]
@@ -98,10 +99,11 @@ mod tests {
             (top, [9.0, 2.0, -2.0], [9.0, 2.0, -4.0], [9.0, 2.0, -3.0]),
         ];
         for (shape, from, to, expected) in cases {
-            let found =
+            let (found, share) =
                 edge(&AxisVector::from_slice(&from), &AxisVector::from_slice(&to), |at| shape.depth_mm(at) > 0.0);
-            let back =
+            let (back, rest) =
                 edge(&AxisVector::from_slice(&to), &AxisVector::from_slice(&from), |at| shape.depth_mm(at) > 0.0);
+            assert!((share + rest - 1.0).abs() < 1e-12, "{share} {rest}");
             for axis in 0..3 {
                 assert!((found[axis] - expected[axis]).abs() < 1e-12 && (back[axis] - expected[axis]).abs() < 1e-12);
             }

@@ -12,6 +12,8 @@ pub(crate) struct Spindle {
     /// Integral of that share over the period, s.
     kept_s: f64,
     period_s: f64,
+    /// Speed that it was told last, rad/s.
+    command: f64,
 }
 
 impl Spindle {
@@ -23,7 +25,7 @@ impl Spindle {
         } else {
             (0.0, 0.0)
         };
-        Self { speed: 0.0, angle: 0.0, kept, kept_s, period_s }
+        Self { speed: 0.0, angle: 0.0, kept, kept_s, period_s, command: 0.0 }
     }
 
     /// One period under the speed `command` (rad/s), exactly integrated. Fine loop; does not allocate.
@@ -31,8 +33,20 @@ impl Spindle {
         let error = self.speed - command;
         self.angle += command * self.period_s + error * self.kept_s;
         self.speed = command + error * self.kept;
+        self.command = command;
+    }
+
+    /// Whether it turns as fast as it was told to, or stands where it was told to. Fine loop.
+    pub fn is_at_speed(&self) -> bool {
+        (self.speed - self.command).abs() <= AT_SPEED_SHARE * self.command.abs() + AT_REST_RAD_PER_S
     }
 }
+
+/// Share of its speed by which a spindle may be off while its drive says that it is there; drives come set to a few percent.
+const AT_SPEED_SHARE: f64 = 0.02;
+
+/// Speed below which a spindle stands, rad/s: ten turns a minute, what drives take for standstill.
+const AT_REST_RAD_PER_S: f64 = 1.0;
 
 #[cfg(test)]
 mod tests {
@@ -53,5 +67,22 @@ mod tests {
         let left = (-0.5_f64 / tau).exp();
         assert!((spindle.speed + 100.0 * (1.0 - left)).abs() < 1e-9);
         assert!((spindle.angle + 100.0 * (0.5 - tau * (1.0 - left))).abs() < 1e-9);
+    }
+
+    #[test]
+    fn it_says_when_it_is_there() {
+        let mut spindle = Spindle::new(0.1, 0.001);
+        assert!(spindle.is_at_speed(), "it stands and is to stand");
+        let up = (1..1000).find(|_| {
+            spindle.follow(300.0);
+            spindle.is_at_speed()
+        });
+        // 7 of 300 rad/s are left after 3.76 time constants.
+        assert_eq!(up, Some(376));
+        spindle.follow(0.0);
+        assert!(!spindle.is_at_speed());
+        let mut fast = Spindle::new(0.0, 0.001);
+        fast.follow(-300.0);
+        assert!(fast.is_at_speed());
     }
 }

@@ -1,8 +1,8 @@
 //! The simulated switches on the digital inputs: their edges, caught where they are, and their bounce.
 
-use tandem_sdk::{AxisVector, Latch, MAX_LATCHES};
+use tandem_sdk::{Arm, AxisVector, Latch, MAX_AXES, MAX_LATCHES};
 
-use crate::options::Switch;
+use crate::options::Options;
 use crate::shape::{Shape, edge, is_on};
 
 /// One digital input with the switches on it.
@@ -21,14 +21,16 @@ struct Line {
 pub(crate) struct Switches {
     lines: Vec<Line>,
     latching: bool,
+    /// Bit per joint whose drive catches its position.
+    catching: u32,
     random: u64,
 }
 
 impl Switches {
-    /// The inputs of checked options; `latching`: edges within a period are caught. Host; allocates.
-    pub fn new(switches: &[Switch], latching: bool, seed: u64) -> Self {
+    /// The inputs of checked options. Host; allocates.
+    pub fn new(options: &Options) -> Self {
         let mut lines: Vec<Line> = Vec::new();
-        for switch in switches {
+        for switch in &options.switches {
             let Some(shape) = switch.shape() else { continue };
             let found = lines.iter().position(|line| line.input == switch.input);
             let index = found.unwrap_or_else(|| {
@@ -39,8 +41,10 @@ impl Switches {
             lines[index].shapes.push(shape);
             lines[index].bounce_periods = lines[index].bounce_periods.max(switch.bounce_periods);
         }
+        let catching = options.latch_joints.iter().fold(0, |mask, joint| mask | 1 << joint);
+        let catching = if options.latch_joints.is_empty() { u32::MAX } else { catching };
         // A generator of this kind must not start at zero.
-        Self { lines, latching, random: seed.wrapping_mul(2).wrapping_add(1) }
+        Self { lines, latching: options.latches, catching, random: options.seed.wrapping_mul(2).wrapping_add(1) }
     }
 
     /// The machine stands at `at` and has not moved: nothing bounces.
@@ -55,25 +59,25 @@ impl Switches {
         self.lines.is_empty()
     }
 
-    /// The joints went from one position to the other in a period: the inputs. `latches`, empty before, take the positions
-    /// caught. Fine loop.
-    pub fn step(&mut self, from: &AxisVector, to: &AxisVector, latches: &mut [Latch; MAX_LATCHES]) -> u64 {
+    /// The joints went from one position to the other in a period of `period_s`: the inputs. `latches`, empty before, take the
+    /// positions caught at the edge that is `armed`. Fine loop.
+    pub fn step(
+        &mut self,
+        [from, to]: [&AxisVector; 2],
+        armed: Arm,
+        period_s: f64,
+        latches: &mut [Latch; MAX_LATCHES],
+    ) -> u64 {
         let mut inputs = 0;
-        let mut free = latches.iter_mut();
         for line in &mut self.lines {
             let shapes = &line.shapes;
             let on = is_on(shapes.iter(), to);
             if on != line.on {
                 (line.on, line.bouncing) = (on, line.bounce_periods);
-                if let Some(latch) = free.next().filter(|_| self.latching) {
-                    let position = edge(from, to, |at| is_on(shapes.iter(), at));
-                    *latch = Latch {
-                        input: line.input,
-                        edge: if on { 1 } else { 2 },
-                        joints: u32::MAX,
-                        position,
-                        ..Latch::default()
-                    };
+                let came = Arm { input: line.input, edge: if on { 1 } else { 2 } };
+                if self.latching && came == armed {
+                    let (position, share) = edge(from, to, |at| is_on(shapes.iter(), at));
+                    latches[0] = caught(came, self.catching, position, (1.0 - share) * period_s);
                 }
             }
             let shown = if line.bouncing > 0 { random_bit(&mut self.random) } else { line.on };
@@ -82,6 +86,14 @@ impl Switches {
         }
         inputs
     }
+}
+
+/// What the drives of `joints` have caught. What the others write there is not to be read, so it is no place.
+fn caught(edge: Arm, joints: u32, mut position: AxisVector, before_s: f64) -> Latch {
+    for joint in (0..MAX_AXES).filter(|joint| joints >> joint & 1 == 0) {
+        position[joint] = 0.0;
+    }
+    Latch { input: edge.input, edge: edge.edge, joints, before_s, position, ..Latch::default() }
 }
 
 /// The next bit of an xorshift generator.

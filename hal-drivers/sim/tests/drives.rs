@@ -81,7 +81,7 @@ fn quick_stop_ramps_down_and_lasts_until_released() {
         driver.quick_stop();
         let braking = exchange(&mut *driver, &at(100));
         assert!((braking.speed[0] - (moving.speed[0] - 2.0)).abs() < 1e-9, "{model}: 2000 mm/s² over 1 ms");
-        assert_eq!(braking.state[0], JointState::Enabled);
+        assert_eq!(braking.state[0], JointState::QuickStop);
         let rest = (101..140).map(|tick| exchange(&mut *driver, &at(tick))).last().unwrap();
         let distance = rest.position[0] - moving.position[0];
         assert!((distance - 50.0 * 50.0 / 4000.0).abs() < 1e-3, "{model}: stopped after {distance} mm");
@@ -139,7 +139,7 @@ fn calls_out_of_order_are_refused_with_the_state() {
     assert!(driver.start().unwrap_err().to_string().contains("running"));
     exchange(&mut *driver, &Setpoint::default());
     driver.stop().unwrap();
-    assert!(refused(&mut *driver).contains("closed"));
+    assert!(refused(&mut *driver).contains("stopped"));
     driver.open(&DriverContext::new(2, PERIOD_S)).unwrap();
     driver.start().unwrap();
     assert_eq!(

@@ -86,12 +86,15 @@ impl ServoJoints {
         })
     }
 
-    /// Brakes hold or slow the joints: they are where the brakes let them. Fine loop.
-    pub fn hold(&mut self, joints: &[Motion]) {
-        for (axis, motion) in self.axes.iter_mut().zip(joints) {
-            let turns = turns(&axis.options);
-            axis.rest_at(motion.position * turns, motion.speed * turns);
-        }
+    /// The brake of a joint holds or slows it: it is where the brake lets it. Fine loop.
+    pub fn hold(&mut self, joint: usize, motion: &Motion) {
+        let axis = &mut self.axes[joint];
+        let turns = turns(&axis.options);
+        axis.rest_at(motion.position * turns, motion.speed * turns);
+    }
+
+    /// No joint follows: nothing is cut. Fine loop.
+    pub fn rest(&mut self) {
         self.truth.cutting_torque_nm = 0.0;
     }
 

@@ -19,6 +19,7 @@ pub use options::{CuttingOptions, ServoOptions};
 pub use workpiece::{Profile, Random, Workpiece};
 
 pub(crate) use joints::ServoJoints;
+pub(crate) use noise::Noise;
 
 /// Step of the simulated plant, s.
 pub const PLANT_STEP_S: f64 = 1e-4;
