@@ -238,7 +238,7 @@ fn defects_of_strategies_drivers_and_kinematics_are_found() {
         ("moody", "determinism"),
     ];
     assert_found(local_plugin!(feed_strategy "feeds" = Feeds::open), &found);
-    let found = [("off", "feedback"), ("speed", "feedback"), ("moody", "determinism")];
+    let found = [("off", "enabling"), ("speed", "feedback"), ("moody", "determinism")];
     assert_found(local_plugin!(driver "drives" = Drives::open), &found);
     let found = [("few", "joints"), ("back", "there and back"), ("derivative", "derivative"), ("moody", "determinism")];
     assert_found(local_plugin!(kinematics "bends" = Bends::open), &found);
