@@ -99,6 +99,23 @@ fn each_kind_does_what_it_says() {
     }
 }
 
+/// A frame that is lost is told as what it is; a value that is frozen goes on lying.
+#[test]
+fn what_is_dropped_is_old_and_what_is_frozen_says_that_it_is_new() {
+    let ages = |kind: &str| {
+        let (mut driver, _) = wrapped(&format!("[[wrap]]\nkind = \"{kind}\"\nfrom_tick = 3\nuntil_tick = 6\n"));
+        let mut feedback = Feedback::default();
+        let mut age = |tick| {
+            driver.exchange(&Setpoint { tick, ..Setpoint::default() }, &mut feedback).unwrap();
+            assert_eq!(u32::from(feedback.input_age_periods[63]), feedback.age_periods[0]);
+            feedback.age_periods[2]
+        };
+        (1..8).map(&mut age).collect::<Vec<_>>()
+    };
+    assert_eq!(ages("drop"), [0, 0, 1, 2, 3, 0, 0]);
+    assert_eq!(ages("freeze"), [0; 7]);
+}
+
 #[test]
 fn a_delay_shifts_its_window_and_loses_what_it_holds_in_the_end() {
     let (got, answers) = ten("[[wrap]]\nkind = \"delay\"\nperiods = 2\nfrom_tick = 3\nuntil_tick = 8\n");

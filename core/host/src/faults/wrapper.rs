@@ -1,6 +1,8 @@
 //! The wrapper: a driver around a driver.
 
-use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_LATCHES, PluginError, Setpoint, Words,
+};
 
 use super::kind::{Kind, Line, freeze};
 use super::random::Random;
@@ -24,6 +26,8 @@ pub struct Wrapper {
     line: Line,
     /// What the drives were handed last.
     handed: Setpoint,
+    /// What the driver inside left in the feedback.
+    left: Feedback,
     /// What was answered last.
     answered: Feedback,
 }
@@ -35,21 +39,25 @@ impl Wrapper {
         let line = Line::new(if let Kind::Delay(periods) = plan.kind { periods } else { 0 });
         let schedule = Schedule::new(plan.when, random);
         let (handed, answered) = (Setpoint::default(), Feedback::default());
-        Self { inner, plan, random, schedule, line, handed, answered }
+        Self { inner, plan, random, schedule, line, handed, left: answered, answered }
     }
 
     fn hand_over(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         self.handed = *setpoint;
-        self.inner.exchange(setpoint, feedback)
+        self.hand_over_again(feedback)
     }
 
     fn hand_over_again(&mut self, feedback: &mut Feedback) -> Result<(), PluginError> {
-        self.inner.exchange(&self.handed, feedback)
+        // A driver is given the feedback as it left it, whatever has been made of that.
+        *feedback = self.left;
+        let answer = self.inner.exchange(&self.handed, feedback);
+        self.left = *feedback;
+        answer
     }
 
     fn hit(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         match self.plan.kind {
-            Kind::Drop => *feedback = self.answered,
+            Kind::Drop => *feedback = older(&self.answered),
             Kind::Duplicate => self.hand_over_again(feedback)?,
             Kind::Delay(_) => match self.line.pass(setpoint) {
                 Some(late) => self.hand_over(&late, feedback)?,
@@ -69,6 +77,15 @@ impl Wrapper {
     }
 }
 
+/// What is handed out again of an answer where none has come: the same numbers, one period older, and no latch once more.
+fn older(answered: &Feedback) -> Feedback {
+    let mut old = *answered;
+    old.age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
+    old.input_age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
+    old.latches = [Latch::default(); MAX_LATCHES];
+    old
+}
+
 impl Driver for Wrapper {
     fn describe(&self) -> DriverDescription {
         self.inner.describe()
@@ -85,7 +102,7 @@ impl Driver for Wrapper {
     fn start(&mut self) -> Result<Attached, PluginError> {
         self.schedule = Schedule::new(self.plan.when, self.random);
         self.line.clear();
-        (self.handed, self.answered) = (Setpoint::default(), Feedback::default());
+        (self.handed, self.left, self.answered) = (Setpoint::default(), Feedback::default(), Feedback::default());
         self.inner.start()
     }
 
