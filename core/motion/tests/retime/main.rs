@@ -91,7 +91,7 @@ proptest! {
 
 #[test]
 fn a_motion_that_is_none_ends_the_iteration_at_once() {
-    let points = [[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
+    let points = vec![[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
     let ends = (End::Rest, End::Rest);
     let task = Task { points: &points, between: &[], limits: limits(1), jerk_share: 1.0, step_s: f64::INFINITY, ends };
     let status = Retimer::default().solve(&task);
