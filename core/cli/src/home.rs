@@ -98,6 +98,7 @@ impl Corrections {
             EventKind::Correct => {
                 say!("homing {letter}: the switch is found; the axis stood {:+.6} {unit} off", event.value / scale);
             }
+            EventKind::HomeByDrive => say!("homing {letter}: by its drive, within {} s", event.value),
             EventKind::Homed => say!("homing {letter}: goes home, to {:.6} {unit}", home / scale),
             _ => {}
         }

@@ -45,8 +45,9 @@ impl Numbers {
     }
 }
 
-/// The fault that the drives report; one that has let go while the machine is `moving` is one too. Fine loop.
-pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<FaultKind> {
+/// The fault that the drives report; one that has let go while the machine is `moving` is one too. Joints that are their drives'
+/// `own`, a bit each, may move as those will. Fine loop.
+pub fn reported(feedback: &Feedback, joints: usize, moving: bool, own: u32) -> Option<FaultKind> {
     let first = |state: JointState| feedback.state[..joints].iter().position(|s| *s == state);
     let foreign = feedback.state[..joints].iter().position(|state| !state.is_known());
     if let Some(joint) = foreign {
@@ -55,8 +56,9 @@ pub fn reported(feedback: &Feedback, joints: usize, moving: bool) -> Option<Faul
     let code = |joint: usize| feedback.fault_code[joint];
     let faulty = first(JointState::Fault).map(|joint| FaultKind::Drive { joint, code: code(joint) });
     let lost = || first(JointState::Lost).map(|joint| FaultKind::Lost { joint, code: code(joint) });
-    let holds = |state: &JointState| *state == JointState::Enabled;
-    let off = || feedback.state[..joints].iter().position(|state| !holds(state)).filter(|_| moving);
+    let homes = |state: JointState| [JointState::Homing, JointState::QuickStop].contains(&state);
+    let holds = |joint: usize, state: JointState| state == JointState::Enabled || own >> joint & 1 == 1 && homes(state);
+    let off = || (0..joints).find(|joint| !holds(*joint, feedback.state[*joint])).filter(|_| moving);
     let let_go = || off().map(|joint| FaultKind::LetGo { joint, state: feedback.state[joint] });
     faulty.or_else(lost).or_else(let_go)
 }
@@ -68,11 +70,18 @@ pub fn aims(sent: &History, delay_periods: &[u32; MAX_AXES]) -> AxisVector {
 }
 
 /// The fault that a joint which follows is further from its `command` than its limit in `most_mm` allows; what is old is not
-/// judged. Fine loop.
-pub fn following(feedback: &Feedback, command: &AxisVector, joints: usize, most_mm: &AxisVector) -> Option<FaultKind> {
+/// judged, nor is a joint that is its drive's `own`, a bit each. Fine loop.
+pub fn following(
+    feedback: &Feedback,
+    command: &AxisVector,
+    joints: usize,
+    most_mm: &AxisVector,
+    own: u32,
+) -> Option<FaultKind> {
     let error = |joint: usize| (command[joint] - feedback.position[joint]).abs();
     let holds = |joint: &usize| feedback.state[*joint] == JointState::Enabled && feedback.age_periods[*joint] == 0;
-    let lost = (0..joints).filter(holds).find(|joint| error(*joint) > most_mm[*joint]);
+    let followed = |joint: &usize| own >> *joint & 1 == 0 && holds(joint);
+    let lost = (0..joints).filter(followed).find(|joint| error(*joint) > most_mm[*joint]);
     lost.map(|joint| FaultKind::Following { joint, error_mm: error(joint), limit_mm: most_mm[joint] })
 }
 
@@ -109,9 +118,10 @@ mod tests {
         let (command, most_mm) =
             (AxisVector([0.5; 8]), AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]));
         let fault = Some(FaultKind::Following { joint: 2, error_mm: 0.5, limit_mm: 0.25 });
-        assert_eq!(following(&feedback, &command, 3, &most_mm), fault, "at the limit it is not beyond it");
+        assert_eq!(following(&feedback, &command, 3, &most_mm, 0), fault, "at the limit it is not beyond it");
+        assert_eq!(following(&feedback, &command, 3, &most_mm, 1 << 2), None, "its drive has it");
         feedback.state[2] = JointState::Disabled;
-        assert_eq!(following(&feedback, &command, 3, &most_mm), None, "what is off follows nothing");
+        assert_eq!(following(&feedback, &command, 3, &most_mm, 0), None, "what is off follows nothing");
     }
 
     #[test]
@@ -120,21 +130,24 @@ mod tests {
         feedback.state[1] = JointState(250);
         for moving in [true, false] {
             let fault = Some(FaultKind::State { joint: 1, number: 250 });
-            assert_eq!(reported(&feedback, 3, moving), fault);
-            assert_eq!(reported(&feedback, 1, moving), None, "there is no such joint");
+            assert_eq!(reported(&feedback, 3, moving, 0), fault);
+            assert_eq!(reported(&feedback, 1, moving, 0), None, "there is no such joint");
         }
     }
 
     #[test]
     fn drives_off_are_a_fault_in_motion_only() {
         let mut feedback = Feedback { state: [JointState::Enabled; 8], ..Feedback::default() };
-        assert_eq!(reported(&feedback, 3, true), None);
+        assert_eq!(reported(&feedback, 3, true, 0), None);
         feedback.state[2] = JointState::Disabled;
-        assert_eq!(reported(&feedback, 3, false), None);
-        assert_eq!(reported(&feedback, 3, true), Some(FaultKind::LetGo { joint: 2, state: JointState::Disabled }));
+        assert_eq!(reported(&feedback, 3, false, 0), None);
+        assert_eq!(reported(&feedback, 3, true, 0), Some(FaultKind::LetGo { joint: 2, state: JointState::Disabled }));
+        feedback.state[2] = JointState::Homing;
+        assert_eq!(reported(&feedback, 3, true, 1 << 2), None);
+        assert!(reported(&feedback, 3, true, 1 << 1).is_some(), "another one is");
         feedback.state[0] = JointState::Lost;
-        assert_eq!(reported(&feedback, 3, false), Some(FaultKind::Lost { joint: 0, code: 0 }));
+        assert_eq!(reported(&feedback, 3, false, 0), Some(FaultKind::Lost { joint: 0, code: 0 }));
         (feedback.state[1], feedback.fault_code[1]) = (JointState::Fault, 9);
-        assert_eq!(reported(&feedback, 3, false), Some(FaultKind::Drive { joint: 1, code: 9 }));
+        assert_eq!(reported(&feedback, 3, false, 0), Some(FaultKind::Drive { joint: 1, code: 9 }));
     }
 }

@@ -61,6 +61,17 @@ pub enum FaultKind {
         /// The drive's code.
         code: u32,
     },
+    /// A drive did not home its joint in the time that it has for it.
+    NotHomed {
+        /// Joint index.
+        joint: usize,
+        /// What it says.
+        state: JointState,
+        /// The drive's code.
+        code: u32,
+        /// The time, s.
+        within_s: f64,
+    },
     /// The driver gives a number as the state of a joint that stands for none.
     State {
         /// Joint index.

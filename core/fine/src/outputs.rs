@@ -32,6 +32,8 @@ pub struct Outputs {
     pub stop_requested: bool,
     /// Axes are to be called otherwise: what is added to their coordinates, mm or rad.
     pub correction: Option<AxisVector>,
+    /// Joint that is to be handed over to its drive for homing, and the time that it has for it, s.
+    pub hand_over: Option<(usize, f64)>,
     /// Bit per axis that is not homed.
     pub unhomed: u32,
     /// Spindle, coolant and user outputs stay as they are.
@@ -50,6 +52,7 @@ impl Outputs {
             ended: false,
             stop_requested: false,
             correction: None,
+            hand_over: None,
             unhomed,
             dry_run,
         }
@@ -76,6 +79,10 @@ impl Outputs {
                 let axis = (event.index.unsigned_abs() as usize).min(MAX_AXES - 1);
                 self.correction.get_or_insert(AxisVector::ZERO)[axis] += event.value;
             }
+            // Where drives home axes, joints are axes.
+            EventKind::HomeByDrive => {
+                self.hand_over = Some(((event.index.unsigned_abs() as usize).min(MAX_AXES - 1), event.value));
+            }
             EventKind::Homed => self.unhomed &= !(1 << event.index.clamp(0, 31)),
             EventKind::ToolSelect | EventKind::SpindleOverride | EventKind::FeedHold => {}
         }
@@ -88,7 +95,7 @@ impl Outputs {
         self.switch(FLOOD, false);
         self.by = SwitchedBy::Abort;
         self.stop_requested = false;
-        self.correction = None;
+        (self.correction, self.hand_over) = (None, None);
     }
 
     /// After an emergency stop, or at rest after a fault: everything goes off but the outputs in `kept`, a bit each.

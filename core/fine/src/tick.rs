@@ -4,6 +4,7 @@ mod attach;
 mod exchange;
 mod follow;
 mod govern;
+mod hand_over;
 mod joints;
 mod keep_alive;
 mod missed;
@@ -38,6 +39,7 @@ use crate::preview::{LineEnd, Preview};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
 use attach::Attach;
+use hand_over::HandOver;
 use joints::Lead;
 use keep_alive::KeepAlive;
 use missed::Missed;
@@ -93,6 +95,8 @@ enum Phase {
     Following,
     /// At the rest that ended an epoch: the next one is waited for.
     Parted,
+    /// At rest: a drive homes its joint.
+    HandedOver(HandOver),
     Ramping(Ramp),
     Faulted,
 }
@@ -234,7 +238,7 @@ impl FineLoop {
         self.exchange(&position);
         self.state = state::next(state::next(self.state, self.drives()), input);
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
-        let recorded = self.outputs.unhomed == 0 || self.config.record_drives;
+        let recorded = (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
         if started && recorded && !ended && !self.outputs.ended {
             let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
@@ -323,6 +327,11 @@ impl FineLoop {
             Phase::Waiting => (*self.guard.position(), self.wait()),
             Phase::Following => self.follow(),
             Phase::Parted => (self.stand(), self.wait_parted()),
+            Phase::HandedOver(hand) => {
+                let hand = *hand;
+                let input = self.hand_over(hand);
+                (self.stand(), input)
+            }
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
                 let (mut position, over) = (ramp.next(), ramp.is_over());
@@ -374,6 +383,11 @@ impl FineLoop {
     fn fail(&mut self, kind: FaultKind) {
         if self.fault.is_some() {
             return;
+        }
+        if self.handed_over() != 0 {
+            let joint = self.handed_over().trailing_zeros() as usize;
+            self.phase = Phase::Parted;
+            self.take_back(joint);
         }
         self.fault = Some(Fault { kind, tick: self.tick, line: self.cursor.segment().line });
         self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));

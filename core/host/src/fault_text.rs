@@ -59,6 +59,11 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             let (driver, state) = (&machine.driver.plugin, state_text(*state));
             format!("driver {driver}: {joint} was not enabled within {within_s} s: its drive is {state}{code}")
         }
+        FaultKind::NotHomed { joint, state, code, within_s } => {
+            let (joint, state, code) = (names.joint(*joint), state_text(*state), names.code_if_any(*code));
+            let driver = &machine.driver.plugin;
+            format!("driver {driver}: {joint} was not homed by its drive within {within_s} s: it is {state}{code}")
+        }
         FaultKind::State { joint, number } => {
             let joint = names.joint(*joint);
             let known = "0 (disabled) to 6 (lost) are known";

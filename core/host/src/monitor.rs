@@ -15,6 +15,7 @@ pub struct Monitor {
     rapid_mm_per_s: Vec<f64>,
     period_s: f64,
     last: [AxisVector; 3],
+    last_tick: u64,
     /// Samples seen.
     pub samples: u64,
     /// Largest velocity, acceleration, jerk per axis.
@@ -45,6 +46,7 @@ impl Monitor {
         Self {
             rapid_mm_per_s: machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect(),
             period_s: machine.fine_period_s,
+            last_tick: 0,
             last: [AxisVector::ZERO; 3],
             samples: 0,
             peaks: [AxisVector::ZERO; 3],
@@ -93,7 +95,8 @@ impl Monitor {
 
     /// A sample was sent. Gives its distance from the path, mm.
     pub fn sample(&mut self, sample: &Sample) -> f64 {
-        if self.samples == 0 {
+        // A drive that homes its joint by itself has no samples; where it stands then is no motion.
+        if self.samples == 0 || sample.tick != self.last_tick + 1 {
             self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
         }
         self.stops.sample(sample);
@@ -113,6 +116,7 @@ impl Monitor {
         }
         self.worst.sample(sample, [&velocity, &acceleration, &jerk]);
         self.last = [sample.command, velocity, acceleration];
+        self.last_tick = sample.tick;
         if let Some(joints) = &mut self.joints {
             joints.sample(&sample.command);
         }

@@ -2,7 +2,7 @@
 
 use tandem_fine::{FineConfig, MissedLimits};
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
-use tandem_machine::{GuardMode, Machine};
+use tandem_machine::{AxisHoming, GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
@@ -143,7 +143,11 @@ fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
     }
     let bit = |input: u32| 1_u64 << input.min(63);
     context.inputs = machine.probe.map_or(0, |probe| bit(probe.input));
-    context.inputs |= machine.homing.iter().fold(0, |mask, homing| mask | bit(homing.input));
+    context.inputs |=
+        machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |mask, switch| mask | bit(switch.input));
+    for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
+        context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
+    }
     context.analog = (0..machine.analog.len()).fold(0, |mask, input| mask | 1 << input);
     context.outputs = u64::MAX;
     context.spindle = 1;

@@ -6,13 +6,29 @@ use crate::probe::LAST_INPUT;
 use crate::section::Section;
 use crate::shown::shorten;
 
-/// How one axis finds its switch, in internal units: mm, or rad for a rotary axis.
+/// How one axis finds its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisHoming {
     /// Index of the axis.
     pub axis: usize,
     /// Axes home one after the other, the lowest number first; where numbers are equal, in the order of the axes.
     pub sequence: u32,
+    /// By whom.
+    pub by: HomingBy,
+}
+
+/// Who finds the place of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HomingBy {
+    /// The host, by a switch on a digital input.
+    Switch(SwitchHoming),
+    /// The drive by itself.
+    Drive(DriveHoming),
+}
+
+/// How one axis finds its switch, in internal units: mm, or rad for a rotary axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SwitchHoming {
     /// Digital input of the switch, 0 to 63.
     pub input: u32,
     /// The input is 0 on the switch.
@@ -26,6 +42,39 @@ pub struct AxisHoming {
     /// Machine coordinate of the edge of the switch, mm.
     pub switch_mm: f64,
 }
+
+/// How a drive homes its axis by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveHoming {
+    /// Number of the method, as `CiA 402` and the drive's manual have it.
+    pub method: i32,
+    /// Time that it has for it, s.
+    pub within_s: f64,
+}
+
+impl AxisHoming {
+    /// The switch that the host looks for, if it does.
+    pub fn switch(&self) -> Option<&SwitchHoming> {
+        match &self.by {
+            HomingBy::Switch(switch) => Some(switch),
+            HomingBy::Drive(_) => None,
+        }
+    }
+
+    /// How the drive homes the axis, if it does.
+    pub fn drive(&self) -> Option<&DriveHoming> {
+        match &self.by {
+            HomingBy::Switch(_) => None,
+            HomingBy::Drive(drive) => Some(drive),
+        }
+    }
+}
+
+/// Time that a drive has for its homing where the file states none, s: an axis of 2 m at a search feed of 2 m/min needs as much.
+const DRIVE_WITHIN_S: f64 = 60.0;
+
+/// Greatest number of a homing method: `CiA 402` has an 8-bit number for it, of which the negative ones are the makers' own.
+const LAST_METHOD: u32 = 127;
 
 /// The keys of `[homing.<axis>]`, which carry their unit in their name.
 struct Keys {
@@ -68,6 +117,12 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
     let rotary = set.axes.is_rotary(axis);
     let (keys, other) = if rotary { (ROTARY, LINEAR) } else { (LINEAR, ROTARY) };
     refuse_other_unit(section, &keys, &other, rotary);
+    if section.has("drive_method") {
+        return by_drive(section, axis, &keys);
+    }
+    if section.has("drive_within_s") {
+        section.refuse("drive_within_s", "goes with drive_method");
+    }
     // Everything is read before the first failure ends it, so that all problems are told.
     let inverted = section.truth("invert").unwrap_or(false);
     let sequence = section.whole("sequence", 0, u32::MAX);
@@ -87,16 +142,31 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
             section.refuse(key, format!("is more than the axis's highest feed, {}", most / per_minute));
         }
     }
-    Some(AxisHoming {
-        axis,
-        sequence: sequence.unwrap_or(0),
+    let by = HomingBy::Switch(SwitchHoming {
         input: input?,
         inverted,
         search_mm_per_s: search? * per_minute,
         latch_mm_per_s: latch? * per_minute,
         back_off_mm: back_off? * keys.scale,
         switch_mm: switch? * keys.scale,
-    })
+    });
+    Some(AxisHoming { axis, sequence: sequence.unwrap_or(0), by })
+}
+
+/// An axis that its drive homes: the keys of a switch say nothing then.
+fn by_drive(section: &Section<'_>, axis: usize, keys: &Keys) -> Option<AxisHoming> {
+    let method = section.whole("drive_method", 1, LAST_METHOD)?.cast_signed();
+    for key in ["input", "invert", keys.search, keys.latch, keys.back_off, keys.switch] {
+        if section.has(key) {
+            section.refuse(
+                key,
+                "is of a switch that the host looks for: with drive_method the drive finds its place by itself",
+            );
+        }
+    }
+    let sequence = section.whole("sequence", 0, u32::MAX).unwrap_or(0);
+    let within_s = section.positive("drive_within_s").unwrap_or(DRIVE_WITHIN_S);
+    Some(AxisHoming { axis, sequence, by: HomingBy::Drive(DriveHoming { method, within_s }) })
 }
 
 fn refuse_other_unit(section: &Section<'_>, keys: &Keys, other: &Keys, rotary: bool) {

@@ -110,6 +110,8 @@ static MACHINE: &[Key] = &[
     key("homing.<axis>.latch_deg_per_min", "deg/min", "required", "Feed at which the position of the switch is taken"),
     key("homing.<axis>.back_off_deg", "deg", "required", "How far the axis backs off before that"),
     key("homing.<axis>.switch_deg", "deg", "required", "Machine coordinate of the edge of the switch"),
+    key("homing.<axis>.drive_method", "number", "none", "Method by which the drive homes the axis by itself (CiA 402 numbers), 1 to 127, instead of the keys of a switch"),
+    key("homing.<axis>.drive_within_s", "s", "one minute", "Time that the drive has for its homing"),
     key("operator.jog_keep_alive_ms", "ms", "200", "Time without a keep-alive, as key repeats are, after which a jog stops"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
 ];

@@ -44,7 +44,7 @@ mod units;
 mod values;
 
 pub use error::{MachineError, Place, Problem};
-pub use homing::AxisHoming;
+pub use homing::{AxisHoming, DriveHoming, HomingBy, SwitchHoming};
 pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;

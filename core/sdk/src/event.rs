@@ -37,6 +37,8 @@ pub enum EventKind {
     Correct = 13,
     /// Axis `index` is homed: its travel counts from here on.
     Homed = 14,
+    /// Axis `index` is handed over to its drive, which homes it by its own means within `value` s. The machine is at rest.
+    HomeByDrive = 15,
 }
 
 /// A non-motion word. It takes effect in the fine period in which the path reaches its place.

@@ -115,7 +115,7 @@ impl FineLoop {
     }
 
     /// Takes the place of `joints` as that of the axes; what a joint is beside them, such as one of a gantry, it keeps.
-    fn stand_at(&mut self, joints: &AxisVector) {
+    pub(super) fn stand_at(&mut self, joints: &AxisVector) {
         let axes = self.axes_of(joints);
         let mut position = self.config.axes_alone(&axes);
         match self.config.joints {

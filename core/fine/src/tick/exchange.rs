@@ -20,15 +20,16 @@ impl FineLoop {
         let last = Numbers::of(&self.feedback);
         let failed = self.ask_driver();
         // From the first motion on the drives hold, at rest too: what let go has moved.
-        let moving = matches!(self.phase, Phase::Following | Phase::Parted);
+        let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
+        let own = self.handed_over();
         let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
         self.remember(&joints);
         let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
         let resets = self.is_resetting();
-        let reported = || answer::reported(&self.feedback, self.joints, moving).filter(|_| !resets && !letting_go);
+        let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
         let aims = answer::aims(&self.sent, &self.config.attached.delay_periods);
-        let far = || answer::following(&self.feedback, &aims, self.joints, &self.config.max_following_error_mm);
+        let far = || answer::following(&self.feedback, &aims, self.joints, &self.config.max_following_error_mm, own);
         if let Some(kind) = fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go)) {
             self.fail(kind);
         }
@@ -46,6 +47,13 @@ impl FineLoop {
             self.setpoint.acceleration = AxisVector::ZERO;
             return joints;
         }
+        if self.handed_over() != 0 {
+            let joints = self.hold_the_others(axes);
+            (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
+            self.setpoint.acceleration = AxisVector::ZERO;
+            return joints;
+        }
+        self.setpoint.homing = 0;
         let (joints, rate) = (self.joints_of(axes), 1.0 / self.config.period_s);
         let velocity = (joints - self.setpoint.position) * rate;
         self.setpoint.acceleration = (velocity - self.setpoint.velocity) * rate;
@@ -75,7 +83,9 @@ impl FineLoop {
     }
 
     pub(super) fn drives(&self) -> Input {
-        let on = self.feedback.state[..self.joints].iter().all(|s| *s == JointState::Enabled);
+        let own = self.handed_over();
+        let holds = |joint: usize| own >> joint & 1 == 1 || self.feedback.state[joint] == JointState::Enabled;
+        let on = (0..self.joints).all(holds);
         if on { Input::DrivesOn } else { Input::DrivesOff }
     }
 

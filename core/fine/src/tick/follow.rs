@@ -41,6 +41,11 @@ impl FineLoop {
         if let Some(stop) = self.stop.filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting()) {
             return (self.stand(), self.part(stop));
         }
+        if ask == Ask::Run
+            && let Some(input) = self.begin_hand_over()
+        {
+            return (*self.guard.position(), input);
+        }
         if ask == Ask::Run && self.arm_next() {
             return (self.stand(), Input::Run);
         }
@@ -49,7 +54,7 @@ impl FineLoop {
         let reached = self.cursor.advance(delta_s, |event| {
             self.outputs.apply(event, waits);
             // At home one sample rests, so that a record begins with it.
-            let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed);
+            let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed | EventKind::HomeByDrive);
             self.outputs.stop_requested || homing
         });
         self.watch_progress(ask, reached);

@@ -25,6 +25,10 @@ impl Stop {
         Self { cause: RestCause::Abort, latch: None }
     }
 
+    pub(super) fn of(cause: RestCause) -> Self {
+        Self { cause, latch: None }
+    }
+
     pub(super) fn attached() -> Self {
         Self { cause: RestCause::Attached, latch: None }
     }

@@ -1,6 +1,6 @@
 //! One axis on its way home: which step follows which answer.
 
-use tandem_machine::{AxisHoming, Machine};
+use tandem_machine::{AxisHoming, DriveHoming, Machine, SwitchHoming};
 use tandem_rings::{Rest, RestCause};
 
 /// Part of the travel that a search may go beyond it.
@@ -9,6 +9,8 @@ const MARGIN: f64 = 0.1;
 /// What an axis does next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
+    /// Is homed by its drive.
+    HandOver,
     /// Reads the switch.
     Look,
     /// Goes towards the switch until it trips.
@@ -31,7 +33,12 @@ pub enum Step {
 /// An axis to home.
 #[derive(Clone, Copy, Debug)]
 pub struct Axis {
-    pub plan: AxisHoming,
+    /// Its index.
+    pub index: usize,
+    /// The switch that it looks for; nothing in it counts where its drive homes it.
+    pub plan: SwitchHoming,
+    /// How its drive homes it, where it does.
+    pub drive: Option<DriveHoming>,
     /// Where it goes in the end, mm.
     pub home_mm: f64,
     letter: char,
@@ -43,17 +50,25 @@ pub struct Axis {
 
 impl Axis {
     /// The axis of `plan` on `machine`.
-    pub fn new(machine: &Machine, plan: &AxisHoming) -> Self {
-        let limits = &machine.limits.axes()[plan.axis];
-        let rotary = machine.axes.is_rotary(plan.axis);
+    pub fn new(machine: &Machine, homing: &AxisHoming) -> Self {
+        let index = homing.axis;
+        let limits = &machine.limits.axes()[index];
+        let rotary = machine.axes.is_rotary(index);
         Self {
-            plan: *plan,
-            home_mm: machine.home[plan.axis],
-            letter: machine.axes.letter(plan.axis).to_ascii_lowercase(),
+            index,
+            plan: homing.switch().copied().unwrap_or_default(),
+            drive: homing.drive().copied(),
+            home_mm: machine.home[index],
+            letter: machine.axes.letter(index).to_ascii_lowercase(),
             travel_mm: limits.max_mm - limits.min_mm,
             acceleration_mm_per_s2: limits.acceleration_mm_per_s2,
             unit: if rotary { (1f64.to_radians(), "deg") } else { (1.0, "mm") },
         }
+    }
+
+    /// What it begins with.
+    pub fn first(&self) -> Step {
+        if self.drive.is_some() { Step::HandOver } else { Step::Look }
     }
 
     /// 1 or −1.
@@ -79,6 +94,7 @@ impl Axis {
     pub fn after_input(&self, step: Step, value: f64) -> Result<Step, String> {
         match step {
             Step::Look => Ok(if (value == 1.0) == self.plan.inverted { Step::Search } else { Step::Leave }),
+            Step::HandOver => Ok(step),
             _ if value < 0.0 => {
                 let back = self.shown(self.plan.back_off_mm);
                 Err(self.failure(&format!("is still on {back} behind its edge: it sticks, or back_off is too short")))
@@ -92,12 +108,12 @@ impl Axis {
     /// # Errors
     /// The switch did not change where it should have.
     pub fn after_rest(&self, step: Step, rest: &Rest) -> Result<Step, String> {
-        let edge_mm = rest.latch.map(|latch| latch[self.plan.axis]);
+        let edge_mm = rest.latch.map(|latch| latch[self.index]);
         match (step, rest.cause, edge_mm) {
             (Step::Search | Step::Leave, RestCause::Edge, _) => Ok(Step::BackOff),
             (Step::Latch, RestCause::Edge, Some(edge_mm)) => Ok(Step::Correct { by_mm: self.plan.switch_mm - edge_mm }),
-            (Step::Correct { .. }, RestCause::Corrected, _) => Ok(Step::GoHome),
-            (_, RestCause::Abort, _) => Ok(Step::Look),
+            (Step::Correct { .. } | Step::HandOver, RestCause::Corrected, _) => Ok(Step::GoHome),
+            (_, RestCause::Abort, _) => Ok(self.first()),
             (Step::Leave, ..) => {
                 let way = self.shown(self.search_mm());
                 Err(self.failure(&format!("is on and was not released within {way}: it sticks, or invert is wrong")))

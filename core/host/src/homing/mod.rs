@@ -8,7 +8,7 @@ mod tests;
 use std::collections::VecDeque;
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
-use tandem_machine::{AxisHoming, Machine};
+use tandem_machine::{AxisHoming, Machine, SwitchHoming};
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, BlockKind, Edge, Event, EventKind, PathMode, StopOn};
@@ -36,10 +36,11 @@ pub struct Homing {
 impl Homing {
     /// Homes the axes of `plan` on `machine`, then hands out `program`, if any.
     pub fn new(machine: &Machine, plan: &[AxisHoming], program: Option<Box<dyn Source + Send>>) -> Self {
+        let axes: VecDeque<_> = plan.iter().map(|homing| Axis::new(machine, homing)).collect();
         Self {
-            axes: plan.iter().map(|homing| Axis::new(machine, homing)).collect(),
+            step: axes.front().map_or(Step::Look, Axis::first),
+            axes,
             position: machine.start,
-            step: Step::Look,
             awaiting: false,
             failure: None,
             corrected: None,
@@ -55,6 +56,10 @@ impl Homing {
         let (fast, slow) = (plan.search_mm_per_s.abs(), plan.latch_mm_per_s);
         self.awaiting = true;
         match self.step {
+            Step::HandOver => {
+                let within_s = axis.drive.map_or(0.0, |drive| drive.within_s);
+                items.push(self.event(EventKind::HomeByDrive, axis, within_s));
+            }
             Step::Look => items.push(self.read(plan, InputMode::Immediate, 0.0)),
             Step::Search => self.travel(axis, axis.search_mm(), fast, trip, items),
             Step::Leave => self.travel(axis, -axis.search_mm(), fast, release, items),
@@ -64,27 +69,27 @@ impl Homing {
                 items.push(self.read(plan, released, BOUNCE_S));
             }
             Step::Latch => self.travel(axis, axis.latch_mm(), slow, trip, items),
-            Step::Correct { by_mm } => items.push(self.event(EventKind::Correct, plan, by_mm)),
+            Step::Correct { by_mm } => items.push(self.event(EventKind::Correct, axis, by_mm)),
             Step::GoHome => {
-                self.travel(axis, axis.home_mm - self.position[plan.axis], f64::INFINITY, Edge::None, items);
+                self.travel(axis, axis.home_mm - self.position[axis.index], f64::INFINITY, Edge::None, items);
                 // The end is the home position itself, whatever the rounding of the way there.
-                self.position[plan.axis] = axis.home_mm;
+                self.position[axis.index] = axis.home_mm;
                 if let Some(Item::Block(block)) = items.last_mut() {
-                    block.end[plan.axis] = axis.home_mm;
+                    block.end[axis.index] = axis.home_mm;
                 }
-                items.push(self.event(EventKind::Homed, plan, 0.0));
-                (self.step, self.awaiting) = (Step::Look, false);
+                items.push(self.event(EventKind::Homed, axis, 0.0));
                 self.axes.pop_front();
+                (self.step, self.awaiting) = (self.axes.front().map_or(Step::Look, Axis::first), false);
             }
         }
     }
 
-    fn read(&self, plan: &AxisHoming, mode: InputMode, timeout_s: f64) -> Item {
+    fn read(&self, plan: &SwitchHoming, mode: InputMode, timeout_s: f64) -> Item {
         Item::Wait(InputWait { line: 0, before_block: self.blocks, input: Input::Digital(plan.input), mode, timeout_s })
     }
 
-    fn event(&self, kind: EventKind, plan: &AxisHoming, value: f64) -> Item {
-        Item::Event(Event::new(kind, 0, self.blocks, (plan.axis as u32).cast_signed(), value))
+    fn event(&self, kind: EventKind, axis: &Axis, value: f64) -> Item {
+        Item::Event(Event::new(kind, 0, self.blocks, (axis.index as u32).cast_signed(), value))
     }
 
     /// A straight line of one axis; at an infinite feed a rapid.
@@ -93,7 +98,7 @@ impl Homing {
             return;
         }
         let mut block = Block::at(self.position);
-        block.end[axis.plan.axis] += by_mm;
+        block.end[axis.index] += by_mm;
         block.kind = if feed_mm_per_s.is_finite() { BlockKind::Line } else { BlockKind::Rapid };
         block.path_mode = PathMode::ExactStop;
         (block.index, block.length_mm, block.feed_mm_per_s) = (self.blocks, by_mm.abs(), feed_mm_per_s);

@@ -138,9 +138,11 @@ fn the_other_tables() {
     assert_eq!(policy.script, fixtures().join("good/corner.wasm"));
     assert_eq!(policy.parameters["corner_error_um"].as_integer(), Some(20));
     let [c, x] = machine.homing[..] else { panic!("two axes home: {:?}", machine.homing) };
-    assert!(machine.require_homing && c.sequence == 1 && !c.inverted && close(c.switch_mm, PI));
-    assert_eq!((x.axis, x.input, x.inverted, x.search_mm_per_s, x.latch_mm_per_s), (0, 10, true, -10.0, 1.0));
-    assert_eq!((x.back_off_mm, x.switch_mm), (3.0, -305.0));
+    let [by_c, by_x] = [c, x].map(|homing| *homing.switch().expect("a switch"));
+    assert!(machine.require_homing && c.sequence == 1 && !by_c.inverted && close(by_c.switch_mm, PI));
+    assert_eq!((x.axis, by_x.input, by_x.inverted), (0, 10, true));
+    assert_eq!((by_x.search_mm_per_s, by_x.latch_mm_per_s), (-10.0, 1.0));
+    assert_eq!((by_x.back_off_mm, by_x.switch_mm), (3.0, -305.0));
     let probe = machine.probe.unwrap();
     assert_eq!((probe.input, probe.inverted), (5, true));
     assert!(close(machine.spindle.min_rad_per_s, 2.0 * PI) && close(machine.spindle.max_rad_per_s, 400.0 * PI));
@@ -153,6 +155,19 @@ fn outputs() {
     assert_eq!((vacuum.name.as_str(), vacuum.output, vacuum.kept), ("vacuum", 7, true));
     assert_eq!((lamp.name.as_str(), lamp.output, lamp.kept), ("lamp", 61, false));
     assert_eq!(machine.kept_outputs(), 1 << 7);
+}
+
+#[test]
+fn homing_by_the_drive() {
+    let set = |x: &str| read(&fixtures().join("parts/mill.toml"), &[&format!("homing.x={x}")]);
+    let machine = set("{drive_method = 35, drive_within_s = 4}").unwrap();
+    let [x] = machine.homing[..] else { panic!("one axis homes: {:?}", machine.homing) };
+    assert_eq!(x.drive().map(|drive| (drive.method, drive.within_s)), Some((35, 4.0)));
+    assert!(x.switch().is_none());
+    let words = set("{drive_method = 35, input = 3}").unwrap_err().to_string();
+    assert!(words.contains("homing.x.input: is of a switch that the host looks for"), "{words}");
+    let words = set("{drive_method = 0}").unwrap_err().to_string();
+    assert!(words.contains("homing.x.drive_method: must be from 1 to 127, not 0"), "{words}");
 }
 
 #[test]
