@@ -144,6 +144,7 @@ fn config(order: u32) -> FineConfig {
         disable_periods: 5000,
         reset_drives: false,
         plans_from_rest: false,
+        roles: tandem_fine::Roles::default(),
     }
 }
 

@@ -2,6 +2,8 @@
 
 use tandem_sdk::{Attached, AxisVector, JointLanes, Limits, MAX_AXES};
 
+use crate::roles::Roles;
+
 /// What the guard does with a sample beyond a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GuardMode {
@@ -91,6 +93,8 @@ pub struct FineConfig {
     /// The rest at which all joints are enabled ends an epoch ([`tandem_rings::RestCause::Attached`]), so that planning starts
     /// where they really stand. Without it, what is queued begins at `position`.
     pub plans_from_rest: bool,
+    /// Inputs that mean something.
+    pub roles: Roles,
 }
 
 impl FineConfig {

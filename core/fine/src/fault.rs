@@ -17,6 +17,19 @@ pub enum Breach {
     Jerk,
 }
 
+/// What an input with a role is a fault by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputFault {
+    /// It is an emergency stop.
+    EmergencyStop,
+    /// The drives are not ready.
+    DrivesReady,
+    /// It is the end of an axis' way, and something moves.
+    Limit,
+    /// The motion waits for it and does not hear of it.
+    Awaited,
+}
+
 /// The cause of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
@@ -107,6 +120,20 @@ pub enum FaultKind {
     Driver,
     /// The operator's emergency stop.
     EmergencyStop,
+    /// An input with a role.
+    Input {
+        /// Which role.
+        role: InputFault,
+        /// Number of the input.
+        input: u32,
+        /// Nothing has been heard of it for longer than it may be old.
+        old: bool,
+    },
+    /// The spindle, which a door has stopped, does not turn as it did when it is told to.
+    SpindleSlow {
+        /// Time that it has for it, s.
+        within_s: f64,
+    },
     /// A fault on the soft side: the machine stopped on the path.
     Soft,
     /// Program time hardly passed though nothing asked for a stop, the queue was not starved and something was queued.

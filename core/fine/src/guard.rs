@@ -180,6 +180,7 @@ mod tests {
             disable_periods: 1,
             reset_drives: false,
             plans_from_rest: false,
+            roles: crate::roles::Roles::default(),
         })
     }
 

@@ -18,10 +18,12 @@ mod outputs;
 mod points;
 mod preview;
 mod ramp;
+mod roles;
 mod state;
 mod steps;
 mod tick;
 
 pub use config::{FineConfig, GuardMode, Joints, MissedLimits};
-pub use fault::{Breach, Fault, FaultKind};
+pub use fault::{Breach, Fault, FaultKind, InputFault};
+pub use roles::Roles;
 pub use tick::{Counters, FineLoop, Left};

@@ -13,6 +13,7 @@ mod progress;
 mod release;
 mod request;
 mod rest;
+mod roles;
 mod single_block;
 
 use std::sync::Arc;
@@ -46,6 +47,7 @@ use missed::Missed;
 use progress::Progress;
 use release::Release;
 use rest::Stop;
+use roles::RoleWatch;
 
 /// What the fine loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,6 +136,7 @@ pub struct FineLoop {
     keep_alive: KeepAlive,
     missed: Missed,
     progress: Progress,
+    roles: RoleWatch,
     outputs: Outputs,
     phase: Phase,
     state: MachineState,
@@ -200,6 +203,7 @@ impl FineLoop {
             keep_alive: KeepAlive::default(),
             missed: Missed::new(config),
             progress: Progress::new(config),
+            roles: RoleWatch::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
             state: MachineState::Fault,
@@ -230,6 +234,7 @@ impl FineLoop {
         self.cause = StopCause::None;
         self.watch_jog();
         self.take_requests();
+        self.watch_roles();
         let ended = self.outputs.ended;
         self.release.had_ended = ended;
         let waiting = matches!(self.phase, Phase::Waiting);
@@ -263,6 +268,7 @@ impl FineLoop {
             self.release = Release::default();
             self.governor = Governor::new(&self.config.limits.axes, self.config.lane_count(), self.config.period_s);
             self.progress = Progress::new(&self.config);
+            self.forget_roles();
             self.phase = Phase::Waiting;
         }
     }

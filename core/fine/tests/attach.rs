@@ -138,6 +138,7 @@ impl Bench {
             disable_periods: 100,
             reset_drives: false,
             plans_from_rest: true,
+            roles: tandem_fine::Roles::default(),
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 4096 });
         let mut fine = FineLoop::new(&config, end, drives, None);

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
+use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, Joints, MissedLimits, Roles};
 use tandem_rig::Random;
 use tandem_rings::{HostEnd, MachineState, Queued, Rest, RestCause, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
@@ -122,6 +122,7 @@ impl Bench {
             disable_periods: 100,
             reset_drives: false,
             plans_from_rest: true,
+            roles: Roles::default(),
         };
         let script = Script {
             takes: 1 + random.below(200),

@@ -37,6 +37,7 @@ impl TimeGoesTo {
             Self::Limit(by) => limited_by(by),
             Self::Dwell => "dwell",
             Self::Stop(cause) => match cause {
+                StopCause::HoldInput => "hold-input",
                 StopCause::ProgramStop => "program-stop",
                 StopCause::Edge => "input-edge",
                 StopCause::SoftFault => "soft-fault",

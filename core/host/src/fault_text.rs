@@ -5,6 +5,7 @@ use tandem_machine::Machine;
 use tandem_sdk::{Driver, JointState, PluginError};
 
 use crate::joints::JointSpace;
+use crate::roles;
 use crate::setup::code_text;
 
 /// Who is meant by the numbers of a fault.
@@ -89,6 +90,10 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             format!("driver {}: the exchange failed{words}", machine.driver.plugin)
         }
         FaultKind::EmergencyStop => "emergency stop".to_string(),
+        FaultKind::Input { role, input, old } => roles::fault_text(machine, *role, *input, *old),
+        FaultKind::SpindleSlow { within_s } => {
+            format!("the spindle, which a door had stopped, did not turn as it is told to within {within_s} s")
+        }
         FaultKind::Soft => soft.unwrap_or("stopped by the host").to_string(),
         FaultKind::NoProgress { periods, grown_s, asked } => format!(
             "the machine stands still though nothing stops it: in {periods} fine periods program time passed by {grown_s:e} s, \

@@ -35,6 +35,7 @@ mod realtime_latency;
 mod realtime_periods;
 mod record;
 mod registry;
+mod roles;
 mod rules;
 mod run;
 mod setup;

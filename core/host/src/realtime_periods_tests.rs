@@ -174,6 +174,7 @@ fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
         disable_periods: 5000,
         reset_drives: false,
         plans_from_rest: false,
+        roles: tandem_fine::Roles::default(),
     };
     let (mut rough, end, host) = bridge(Sizes { segments: 16, samples: 1 << 17 });
     if moves {

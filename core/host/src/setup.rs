@@ -16,6 +16,7 @@ use crate::homing::Homing;
 use crate::joints::JointSpace;
 use crate::policy::{Means, PolicyHost};
 use crate::registry::{PluginRefusal, Registry};
+use crate::roles;
 use crate::rules::refusal;
 use crate::run::Switches;
 use crate::strategy::FeedRunner;
@@ -148,6 +149,7 @@ fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
     for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
         context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
     }
+    context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
     context.analog = (0..machine.analog.len()).fold(0, |mask, input| mask | 1 << input);
     context.outputs = u64::MAX;
     context.spindle = 1;
@@ -261,5 +263,6 @@ pub fn fine_config(
         disable_periods: periods(driver.disable_s),
         reset_drives: switches.reset,
         plans_from_rest: true,
+        roles: roles::of(machine, switches),
     }
 }

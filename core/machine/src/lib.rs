@@ -21,6 +21,7 @@ mod axes;
 mod convert;
 mod error;
 mod homing;
+mod inputs;
 mod joints;
 mod keys;
 mod limits;
@@ -45,6 +46,7 @@ mod values;
 
 pub use error::{MachineError, Place, Problem};
 pub use homing::{AxisHoming, DriveHoming, HomingBy, SwitchHoming};
+pub use inputs::{Input, Role};
 pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;

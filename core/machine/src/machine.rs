@@ -7,6 +7,7 @@ use tandem_sdk::{Axes, AxisVector, Limits};
 use crate::axes::AxisSet;
 use crate::error::{MachineError, Place};
 use crate::homing::{self, AxisHoming};
+use crate::inputs::{self, Input};
 use crate::joints::{self, Joint};
 use crate::keys::keys;
 use crate::load::Loader;
@@ -73,6 +74,8 @@ pub struct Machine {
     pub analog: Vec<String>,
     /// Digital outputs that the file names.
     pub outputs: Vec<Output>,
+    /// Digital inputs that the file names.
+    pub inputs: Vec<Input>,
     /// Faults around the driver, as the file states them: the wrappers read them.
     pub faults: Option<toml::Table>,
     /// What the guard does.
@@ -117,6 +120,10 @@ impl Machine {
         let tables = Tables::read(&section);
         let moving = AxisSet::read(&section, &tables.motion);
         let moving = moving.map(|axes| Moving::read(&section, axes, &tables.motion, &problems));
+        // Tables that are wrong themselves say nothing of each other.
+        if let Some(moving) = moving.as_ref().filter(|_| problems.is_empty()) {
+            inputs::check(&section, &tables.inputs, &moving.homing, tables.probe.as_ref());
+        }
         let effective = text(&section, "format", &root);
         let moving = problems.verdict(moving)?;
         Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
@@ -173,6 +180,7 @@ struct Tables {
     driver: PluginChoice,
     analog: Vec<String>,
     outputs: Vec<Output>,
+    inputs: Vec<Input>,
     faults: Option<toml::Table>,
     guard: GuardMode,
     on_record_error: RecordErrorMode,
@@ -198,6 +206,7 @@ impl Tables {
             driver: required("driver"),
             analog: analog_names(&root.section("driver")),
             outputs: outputs::read(root),
+            inputs: inputs::read(root),
             faults: optional("faults").and_then(|s| s.table().map(plain)),
             guard: GuardMode::read(&root.section("guard")),
             on_record_error: RecordErrorMode::read(&root.section("recorder")),
@@ -237,6 +246,7 @@ impl Tables {
             driver: self.driver,
             analog: self.analog,
             outputs: self.outputs,
+            inputs: self.inputs,
             faults: self.faults,
             guard: self.guard,
             on_record_error: self.on_record_error,

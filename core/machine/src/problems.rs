@@ -67,6 +67,11 @@ impl Problems {
         }
     }
 
+    /// Whether nothing is wrong so far.
+    pub fn is_empty(&self) -> bool {
+        self.found.borrow().is_empty()
+    }
+
     /// Whether so much is wrong that looking further helps nobody.
     pub fn is_full(&self) -> bool {
         self.found.borrow().len() >= MOST_PROBLEMS

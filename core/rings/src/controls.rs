@@ -75,6 +75,8 @@ pub struct Status {
     pub line: AtomicU32,
     /// A [`crate::MachineState`] as its number.
     pub state: AtomicU32,
+    /// Inputs with a role that are tripped, a bit each.
+    pub tripped: AtomicU64,
     /// True while nothing moves and nothing is queued.
     pub idle: AtomicBool,
     /// Digital inputs as last read.

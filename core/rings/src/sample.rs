@@ -57,6 +57,10 @@ pub enum StopCause {
     None,
     /// Feed hold.
     Hold,
+    /// A door is open, or was: until the operator resumes and the spindle turns again.
+    Door,
+    /// An input asks for a feed hold, or has, and nobody has resumed.
+    HoldInput,
     /// The program waits for the operator.
     ProgramStop,
     /// The queue ran low.
@@ -77,6 +81,8 @@ impl StopCause {
         match self {
             Self::None => "none",
             Self::Hold => "hold",
+            Self::Door => "door",
+            Self::HoldInput => "hold input",
             Self::ProgramStop => "program stop",
             Self::Starvation => "starvation",
             Self::Edge => "input edge",

@@ -54,7 +54,8 @@ impl Attach {
 impl FineLoop {
     /// What the joints are told in this period: each where it stands until it holds, and from then on the same.
     pub(super) fn hold_still(&mut self) -> AxisVector {
-        self.setpoint.enable = u32::from(self.attach.stage == Stage::Enabling && self.fault.is_none());
+        let enables = self.attach.stage == Stage::Enabling && self.fault.is_none() && self.may_enable();
+        self.setpoint.enable = u32::from(enables);
         self.setpoint.reset = u32::from(self.attach.stage == Stage::Resetting && self.attach.periods == 0);
         self.attach.joints
     }

@@ -16,9 +16,10 @@ impl FineLoop {
         self.setpoint.tick = self.tick;
         self.setpoint.arm = self.arm;
         self.setpoint.outputs = self.outputs.bits;
-        self.setpoint.spindle_rad_per_s = self.outputs.spindle_rad_per_s;
+        self.setpoint.spindle_rad_per_s = self.spindle_rad_per_s();
         let last = Numbers::of(&self.feedback);
         let failed = self.ask_driver();
+        self.hear_roles(failed);
         // From the first motion on the drives hold, at rest too: what let go has moved.
         let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
         let own = self.handed_over();

@@ -58,7 +58,7 @@ impl FineLoop {
             _ if self.controls.soft_fault.load(Relaxed) => StopCause::SoftFault,
             (_, Some(RestCause::Abort)) => StopCause::Abort,
             (_, Some(RestCause::Edge | RestCause::Already)) => StopCause::Edge,
-            (Ask::Hold, _) if self.given.hold => StopCause::Hold,
+            (Ask::Hold, _) if self.given.hold => self.cause_of_hold(),
             (Ask::Hold, _) => StopCause::ProgramStop,
             (Ask::Stop, _) => StopCause::None,
             (Ask::Starve, _) => StopCause::Starvation,

@@ -130,6 +130,7 @@ impl Bench {
             disable_periods: 5000,
             reset_drives: false,
             plans_from_rest: false,
+            roles: tandem_fine::Roles::default(),
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));

@@ -190,6 +190,7 @@ impl Machine {
             disable_periods: 5000,
             reset_drives: false,
             plans_from_rest: false,
+            roles: tandem_fine::Roles::default(),
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
             linear: u32::MAX,

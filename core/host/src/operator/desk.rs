@@ -11,6 +11,7 @@ use tandem_sdk::{Axes, AxisVector};
 use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
 use crate::policy::PolicySummary;
+use crate::roles;
 
 use super::status::{Counters, Position, StatusLine};
 
@@ -19,6 +20,7 @@ use super::status::{Counters, Position, StatusLine};
 pub struct Desk {
     controls: Arc<Controls>,
     status: Arc<Status>,
+    machine: Machine,
     axes: Axes,
     max_feed_ratio: f64,
     latest: Mutex<Latest>,
@@ -59,6 +61,7 @@ impl Desk {
         Self {
             controls,
             status,
+            machine: machine.clone(),
             axes: machine.axes,
             max_feed_ratio: machine.motion.max_feed_ratio,
             latest: Mutex::new(latest),
@@ -110,6 +113,11 @@ impl Desk {
     }
 
     fn check(&self, command: Command) -> Result<(), String> {
+        if command == Command::Resume
+            && let Some(names) = roles::holding(&self.machine, self.status.tripped.load(Relaxed))
+        {
+            return Err(format!("{names} still holds the machine: resume when it is closed"));
+        }
         match command {
             Command::StallRough(_) => Err("stall-rough is for tests, from a command file".to_string()),
             command => command.check(self.max_feed_ratio),

@@ -94,6 +94,7 @@ impl Rig {
             disable_periods: 5000,
             reset_drives: false,
             plans_from_rest: false,
+            roles: tandem_fine::Roles::default(),
         };
         let options = "latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]";
         let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use crate::common::{fixtures, read};
-use tandem_machine::{FineThread, GuardMode, JerkMode, Machine, Place};
+use tandem_machine::{FineThread, GuardMode, JerkMode, Machine, Place, Role};
 
 fn full() -> Machine {
     read(&fixtures().join("good/full.toml"), &[]).unwrap()
@@ -168,6 +168,16 @@ fn homing_by_the_drive() {
     assert!(words.contains("homing.x.input: is of a switch that the host looks for"), "{words}");
     let words = set("{drive_method = 0}").unwrap_err().to_string();
     assert!(words.contains("homing.x.drive_method: must be from 1 to 127, not 0"), "{words}");
+}
+
+#[test]
+fn inputs() {
+    let machine = full();
+    let [vacuum, touch, lamp] = &machine.inputs[..] else { panic!("three inputs: {:?}", machine.inputs) };
+    assert_eq!((vacuum.name.as_str(), vacuum.input, vacuum.role), ("vacuum", 9, Some(Role::FeedHold)));
+    assert_eq!((vacuum.normally_closed, vacuum.max_age_s), (false, 0.025));
+    assert_eq!((touch.input, touch.role, touch.normally_closed), (5, Some(Role::Probe), true));
+    assert_eq!((lamp.role, lamp.max_age_s), (None, 0.01));
 }
 
 #[test]

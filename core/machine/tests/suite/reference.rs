@@ -34,7 +34,8 @@ fn every_default_is_the_one_that_is_documented() {
     // The defaults of an optional table show where the table is there.
     let policy = ("policy.script".to_owned(), "policy.wasm".to_owned());
     let output = ("outputs.vacuum.output".to_owned(), "7".to_owned());
-    let tables = [policy, output];
+    let input = ("inputs.vacuum.input".to_owned(), "9".to_owned());
+    let tables = [policy, output, input];
     let implicit = Machine::read(&minimal, &tables).unwrap();
     let words = |key: &&Key| key.default.starts_with(|c: char| c.is_ascii_digit()) || key.unit.contains(" or ");
     let stated = keys().iter().filter(words).filter(|k| k.default != "required" && is_read_here(k));
