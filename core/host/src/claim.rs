@@ -135,9 +135,16 @@ impl Look<'_> {
 
     /// Programs and lines are refused where it is not known where a joint is.
     fn at_known(&self, switches: Switches) -> Result<(), HostError> {
-        let known = self.attached.known | self.attached.homed;
+        let homing = self.machine.homing.iter().filter(|_| switches.home);
+        // Where axes are homed, joints are axes.
+        let homed = homing.fold(0, |joints, of| joints | 1 << of.axis);
+        let known = self.attached.known | self.attached.homed | homed;
         let unknown = self.named(|i| known >> i & 1 == 0);
-        match unknown.filter(|_| !switches.home && !switches.unhomed) {
+        match unknown.filter(|_| !switches.unhomed) {
+            Some(names) if switches.home => {
+                let cause = format!("it is not known where {names} stands, and no [homing.<axis>] table homes it");
+                Err(self.refuse(&cause))
+            }
             Some(names) => {
                 let cause = format!("it is not known where {names} stands: home the machine first, or run with --home");
                 Err(self.refuse(&cause))

@@ -99,6 +99,10 @@ impl Plugins {
         let stands = self.claim.attach(&machine, &joints, switches)?;
         if stands != machine.start {
             machine.start = stands;
+            // Who is outside of the travel is led back by hand; before homing nobody knows who is.
+            if !switches.unhomed && !switches.home {
+                joints.check_start(&machine)?;
+            }
             self.planner = setup::planner(&machine, registry)?;
         }
         Ok((machine, self))
@@ -119,6 +123,7 @@ impl Ready {
         claims: bool,
     ) -> Result<Self, HostError> {
         let mut plugins = Plugins::of(&machine, registry)?;
+        JointSpace::of(&machine, registry)?.check_start(&machine)?;
         // Only real drives know where a program on them begins.
         let asks_first = claims && plugins.claim.describe().simulated == 0;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
@@ -159,6 +164,9 @@ impl Ready {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let mut plugins = Plugins::of(&machine, registry)?;
+        if !switches.unhomed {
+            JointSpace::of(&machine, registry)?.check_start(&machine)?;
+        }
         plugins.check(&machine, registry, switches)?;
         plugins.add_faults(&machine, registry)?;
         feed(&machine, registry, None, 0.0)?;

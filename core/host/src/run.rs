@@ -83,6 +83,8 @@ pub struct Run {
     clock: Clock,
     /// Metal moves.
     real: bool,
+    /// Bit per axis of which it is not known where it is.
+    unknown_axes: u32,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -132,7 +134,8 @@ impl Run {
     /// # Errors
     /// Everything that refuses: plugins, what does not go together.
     pub fn home(machine: Machine, registry: &Registry, switches: Switches) -> Result<Self, HostError> {
-        let switches = Switches { home: true, ..switches };
+        // What it does not home stays as unknown as it is: nothing else moves.
+        let switches = Switches { home: true, unhomed: true, ..switches };
         let homing =
             |machine: &Machine| Box::new(Homing::new(machine, &machine.homing, None)) as Box<dyn Source + Send>;
         Self::open(Ready::of_source(machine, registry, None, homing, switches)?)
@@ -155,6 +158,7 @@ impl Run {
         let (rough_end, fine_end, host) = bridge(sizes);
         let mut fine_config = setup::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
         fine_config.record_drives = ready.records_drives;
+        let unknown_axes = joints.axes_moved_by(!(attached.known | attached.homed));
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = setup::advance_s(machine.rough_period_s, depth_s, segments);
@@ -181,6 +185,7 @@ impl Run {
             checked,
             clock: switches.clock.unwrap_or(if drives.simulated == 0 { Clock::Wall } else { Clock::Virtual }),
             real: drives.simulated == 0,
+            unknown_axes,
         })
     }
 
@@ -192,6 +197,11 @@ impl Run {
     /// The fine loop's status, to look at from other threads.
     pub fn status(&self) -> Arc<tandem_rings::Status> {
         Arc::clone(&self.host.status)
+    }
+
+    /// Bit per axis of which the drives do not know where it is: as they were when they were attached.
+    pub(crate) fn unknown_axes(&self) -> u32 {
+        self.unknown_axes
     }
 
     /// The clock that was asked for, or else the one that the driver goes with: real drives live in real time.

@@ -16,6 +16,8 @@ pub(crate) struct AxisSet {
     pub axes: Axes,
     pub limits: Limits,
     pub max_following_error: AxisVector,
+    /// Highest feed while it is not known where the axis is, mm/s or rad/s; not a number where none is stated.
+    pub unhomed_feed: AxisVector,
     pub start: AxisVector,
     pub home: AxisVector,
 }
@@ -25,6 +27,7 @@ struct Axis {
     rotary: bool,
     limits: AxisLimits,
     following: f64,
+    unhomed: f64,
     start: f64,
     home: f64,
 }
@@ -53,6 +56,7 @@ impl AxisSet {
             axes: Axes::new(&letters).ok()?,
             limits: Limits::new(&limits).ok()?,
             max_following_error: vector(|a| a.following),
+            unhomed_feed: vector(|a| a.unhomed),
             start: vector(|a| a.start),
             home: vector(|a| a.home),
         })
@@ -70,9 +74,23 @@ fn axis(axes: &Section<'_>, name: &str, motion: &Motion) -> Option<Axis> {
     let limits = limits(&section, units, None, difference(rotary, motion))?;
     let stated = if section.has(units.following) { section.positive(units.following) } else { Some(f64::INFINITY) };
     let following = stated.map(|most| most * units.scale);
+    let unhomed = if section.has(units.unhomed) { unhomed(&section, units, &limits) } else { Some(f64::NAN) };
     let start = position(&section, units.start, units, &limits, 0.0);
     let home = position(&section, units.home, units, &limits, start.unwrap_or(limits.min_mm));
-    Some(Axis { letter: letter?, rotary, limits, following: following?, start: start?, home: home? })
+    Some(Axis { letter: letter?, rotary, limits, following: following?, unhomed: unhomed?, start: start?, home: home? })
+}
+
+/// The stated feed of an axis of which it is not known where it is, mm/s or rad/s.
+fn unhomed(section: &Section<'_>, units: &Units, limits: &AxisLimits) -> Option<f64> {
+    let (per_minute, stated) = (units.scale / 60.0, section.positive(units.unhomed)?);
+    if stated * per_minute > limits.feed_mm_per_s * (1.0 + 1e-12) {
+        section.refuse(
+            units.unhomed,
+            format!("is more than the axis's highest feed, {}", limits.feed_mm_per_s / per_minute),
+        );
+        return None;
+    }
+    Some(stated * per_minute)
 }
 
 /// The letter of an axis, upper case.

@@ -5,6 +5,7 @@ use crate::joints::{index, letters};
 use crate::probe::LAST_INPUT;
 use crate::section::Section;
 use crate::shown::shorten;
+use crate::units::Units;
 
 /// How one axis finds its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,6 +142,10 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
         if feed.is_some_and(|feed| feed.abs() * per_minute > most * (1.0 + 1e-12)) {
             section.refuse(key, format!("is more than the axis's highest feed, {}", most / per_minute));
         }
+    }
+    let slowest = set.unhomed_feed[axis] / per_minute;
+    if search.is_some_and(|feed| feed.abs() > slowest * (1.0 + 1e-12)) {
+        section.refuse(keys.search, format!("is more than {} of axes.{name}, {slowest}", Units::of(rotary).unhomed));
     }
     let by = HomingBy::Switch(SwitchHoming {
         input: input?,

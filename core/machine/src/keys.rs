@@ -55,6 +55,8 @@ static MACHINE: &[Key] = &[
     key("axes.<axis>.max_jerk_deg_per_s3", "deg/s³", "no limit", "Highest jerk"),
     key("axes.<axis>.max_following_error_mm", "mm", "no limit", "Largest distance between command and feedback of a fine period; beyond it the machine faults"),
     key("axes.<axis>.max_following_error_deg", "deg", "no limit", "Largest distance between command and feedback of a fine period; beyond it the machine faults"),
+    key("axes.<axis>.unhomed_max_feed_mm_per_min", "mm/min", "the search feed of [homing], else a tenth of max_feed", "Highest speed of jogs and searches while it is not known where the axis is"),
+    key("axes.<axis>.unhomed_max_feed_deg_per_min", "deg/min", "the search feed of [homing], else a tenth of max_feed", "Highest speed of jogs and searches while it is not known where the axis is"),
     key("joints.<joint>.axis", "axis", "none", "Axis that the joint moves; two joints on one axis are a gantry. Without it the kinematics alone say what moves it"),
     key("joints.<joint>.kind", "linear or rotary", "linear", "Whether a joint without an axis slides (keys in mm) or turns (keys in deg)"),
     key("joints.<joint>.travel_mm", "mm", "the axis's; without one no end", "Lowest and highest position of a linear joint"),

@@ -56,6 +56,8 @@ pub struct Machine {
     /// Largest distance between command and feedback of each axis, mm or rad; infinite where none is stated. A joint that
     /// moves an axis takes it from there.
     pub max_following_error_mm: AxisVector,
+    /// Highest feed of each axis while it is neither known nor homed, mm/s or rad/s.
+    pub unhomed_max_feed_mm_per_s: AxisVector,
     /// Where a simulated machine stands at power-on, within the travel.
     pub start: AxisVector,
     /// Reference position, within the travel.
@@ -166,7 +168,22 @@ impl Moving {
             axes,
         }
     }
+
+    /// Highest feeds of axes that do not know where they are. Who states a search feed has said how fast that axis may look for
+    /// its place blindly; without one it is a tenth of the highest, at which a hand is quicker than the axis.
+    fn unhomed_feed(&self) -> AxisVector {
+        let switch = |axis: usize| self.homing.iter().find(|homing| homing.axis == axis).and_then(AxisHoming::switch);
+        let search = |axis: usize| switch(axis).map(|switch| switch.search_mm_per_s.abs());
+        AxisVector(std::array::from_fn(|axis| match self.axes.limits.axes().get(axis) {
+            Some(_) if self.axes.unhomed_feed[axis].is_finite() => self.axes.unhomed_feed[axis],
+            Some(limits) => search(axis).unwrap_or(UNHOMED_SHARE * limits.feed_mm_per_s),
+            None => 0.0,
+        }))
+    }
 }
+
+/// Share of the highest feed for an axis that does not know where it is.
+const UNHOMED_SHARE: f64 = 0.1;
 
 /// What the other tables say. Where one is wrong, which is reported, something stands in for it.
 struct Tables {
@@ -219,7 +236,8 @@ impl Tables {
 
     fn into_machine(self, path: &Path, moving: Moving, effective: String, places: Places) -> Machine {
         let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let AxisSet { axes, limits, max_following_error, start, home } = moving.axes;
+        let unhomed_max_feed_mm_per_s = moving.unhomed_feed();
+        let AxisSet { axes, limits, max_following_error, start, home, .. } = moving.axes;
         Machine {
             name: self.name.unwrap_or_else(stem),
             path: path.to_owned(),
@@ -235,6 +253,7 @@ impl Tables {
             axes,
             limits,
             max_following_error_mm: max_following_error,
+            unhomed_max_feed_mm_per_s,
             start,
             home,
             joints: moving.joints,

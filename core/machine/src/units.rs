@@ -13,6 +13,7 @@ pub struct Units {
     pub acceleration: &'static str,
     pub jerk: &'static str,
     pub following: &'static str,
+    pub unhomed: &'static str,
     /// From mm or degrees to mm or rad.
     pub scale: f64,
 }
@@ -26,6 +27,7 @@ static LINEAR: Units = Units {
     acceleration: "max_acceleration_mm_per_s2",
     jerk: "max_jerk_mm_per_s3",
     following: "max_following_error_mm",
+    unhomed: "unhomed_max_feed_mm_per_min",
     scale: 1.0,
 };
 
@@ -38,6 +40,7 @@ static ROTARY: Units = Units {
     acceleration: "max_acceleration_deg_per_s2",
     jerk: "max_jerk_deg_per_s3",
     following: "max_following_error_deg",
+    unhomed: "unhomed_max_feed_deg_per_min",
     scale: std::f64::consts::PI / 180.0,
 };
 
@@ -47,8 +50,18 @@ impl Units {
         if rotary { &ROTARY } else { &LINEAR }
     }
 
-    fn names(&self) -> [&'static str; 8] {
-        [self.travel, self.start, self.home, self.feed, self.rapid, self.acceleration, self.jerk, self.following]
+    fn names(&self) -> [&'static str; 9] {
+        [
+            self.travel,
+            self.start,
+            self.home,
+            self.feed,
+            self.rapid,
+            self.acceleration,
+            self.jerk,
+            self.following,
+            self.unhomed,
+        ]
     }
 }
 

@@ -34,6 +34,8 @@ struct Inner {
     waiting: VecDeque<Jog>,
     /// The end of what moves was asked for.
     ended_by_word: bool,
+    /// Bit per axis of which it is not known where it is.
+    unknown: u32,
     /// Blocks made so far.
     blocks: u32,
     /// The machine stands and takes jogs: it is enabled, and homed where that was asked for.
@@ -57,6 +59,7 @@ impl Jogs {
             moving: None,
             waiting: VecDeque::new(),
             ended_by_word: false,
+            unknown: 0,
             blocks: 0,
             ready: false,
             over: false,
@@ -76,8 +79,8 @@ impl Jogs {
     /// # Errors
     /// The jog is refused, in words; what moves goes on as it was.
     pub fn ask(&self, jog: Jog) -> Result<(), String> {
-        self.judge_feed(&jog)?;
         let mut inner = self.lock();
+        self.judge_feed(&jog, inner.unknown)?;
         let Some(controls) = inner.controls.clone().filter(|_| !inner.over) else {
             return Err("the machine is not enabled: it is in fault, or the session is over".to_string());
         };
@@ -142,10 +145,11 @@ impl Jogs {
         self.machine.axes.letter(axis).to_ascii_lowercase()
     }
 
-    /// A run begins with these atomics; it homes first, or is `ready`.
-    pub(super) fn enable(&self, controls: Arc<Controls>, ready: bool) {
+    /// A run begins with these atomics; it homes first, or is `ready`. Of the axes `unknown`, a bit each, it is not known where
+    /// they are, nor will it be then.
+    pub(super) fn enable(&self, controls: Arc<Controls>, ready: bool, unknown: u32) {
         let mut inner = self.lock();
-        (inner.controls, inner.ready) = (Some(controls), ready);
+        (inner.controls, inner.ready, inner.unknown) = (Some(controls), ready, unknown);
     }
 
     /// The run is over: the machine stands at `position`.
@@ -253,10 +257,14 @@ impl Jogs {
             Reach::On { positive: false } => low,
             Reach::By { distance_mm } => at + distance_mm,
         };
-        if matches!(jog.reach, Reach::On { .. }) && at == end {
-            return Err(format!("{name} stands at its travel limit, {}", self.shown(jog.axis, end)));
+        if let Reach::On { positive } = jog.reach
+            && (if positive { at >= high } else { at <= low })
+        {
+            let where_it_is = if at == end { "at" } else { "beyond" };
+            return Err(format!("{name} stands {where_it_is} its travel limit, {}", self.shown(jog.axis, end)));
         }
-        if !(low..=high).contains(&end) {
+        // Who stands outside of the travel may go inward, as far as he likes.
+        if !(low.min(at)..=high.max(at)).contains(&end) {
             let [end, low, high] = [end, low, high].map(|value| self.shown(jog.axis, value));
             return Err(format!(
                 "{name} would reach {end}, beyond its travel of {low} to {high} (machine coordinates)"
@@ -267,7 +275,15 @@ impl Jogs {
         Ok(target)
     }
 
-    fn judge_feed(&self, jog: &Jog) -> Result<(), String> {
+    fn judge_feed(&self, jog: &Jog, unknown: u32) -> Result<(), String> {
+        let slowest = self.machine.unhomed_max_feed_mm_per_s[jog.axis];
+        if unknown >> jog.axis & 1 == 1 && jog.feed_mm_per_s > slowest * (1.0 + 1e-12) {
+            let [asked, slowest] = [jog.feed_mm_per_s, slowest].map(|feed| self.shown(jog.axis, feed * 60.0));
+            let name = self.name(jog.axis);
+            return Err(format!(
+                "it is not known where {name} stands: until it is homed its feed is at most {slowest}/min, not {asked}/min"
+            ));
+        }
         let most = self.machine.limits.axes()[jog.axis].feed_mm_per_s;
         // Minutes, seconds and radians cost a digit.
         if jog.feed_mm_per_s <= most * (1.0 + 1e-12) {

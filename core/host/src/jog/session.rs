@@ -73,7 +73,9 @@ impl<'a> JogSession<'a> {
         let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
-        self.jogs.enable(run.controls(), !self.switches.home);
+        let homed =
+            if self.switches.home { self.machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis) } else { 0 };
+        self.jogs.enable(run.controls(), !self.switches.home, run.unknown_axes() & !homed);
         Ok(run)
     }
 

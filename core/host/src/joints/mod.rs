@@ -70,7 +70,7 @@ impl JointSpace {
     ///
     /// # Errors
     /// Kinematics that are not there, refuse their options or do not lead back; joints that do not fit them; a travel that
-    /// leaves an axis none, or that the machine starts outside of.
+    /// leaves an axis none.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         calling(Method::KinematicsConvert, || Self::found(machine, registry))
     }
@@ -84,7 +84,7 @@ impl JointSpace {
                 fold::narrow(machine, &mut limits, axis, joint, (1.0, 0.0))?;
             }
             let this = Self { joints, map: Map::Axes, axes, limits, lanes: vec![] };
-            return this.check_start(machine);
+            return this.check_health(machine);
         };
         let positions = positions(&machine.limits);
         let sound = linear::check(kinematics.as_ref(), joints.len(), axes, &positions);
@@ -98,7 +98,7 @@ impl JointSpace {
             let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
             Self { joints, map: Map::Curved(kinematics), axes, limits, lanes }
         };
-        this.check_start(machine)
+        this.check_health(machine)
     }
 
     /// How many there are.
@@ -242,16 +242,33 @@ impl JointSpace {
         Box::new(Carrier::new(planner, lanes, Travel::new(self, machine.axes)))
     }
 
-    fn check_start(self, machine: &Machine) -> Result<Self, HostError> {
+    /// Axes, a bit each, that are moved by any of `joints`, a bit each: all of them where only a plugin knows.
+    pub fn axes_moved_by(&self, joints: u32) -> u32 {
+        let all = (1 << self.axes) - 1;
+        let of = |joint: &Joint| joint.axis.map_or(all, |axis| 1 << axis);
+        let moved = self.joints.iter().enumerate().filter(|(i, _)| joints >> i & 1 == 1);
+        moved.fold(0, |axes, (_, joint)| axes | of(joint))
+    }
+
+    fn check_health(self, machine: &Machine) -> Result<Self, HostError> {
         let at = self.to_joints(&machine.start);
         self.health(&at).map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
+        Ok(self)
+    }
+
+    /// Whether the machine starts within the travel of its joints: programs do.
+    ///
+    /// # Errors
+    /// Which joint does not.
+    pub fn check_start(&self, machine: &Machine) -> Result<(), HostError> {
+        let at = self.to_joints(&machine.start);
         for (i, joint) in self.joints.iter().enumerate() {
             if let Some(words) = travel::beyond(joint, at[i]) {
                 let key = format!("joints.{}", joint.name);
                 return Err(refusal(machine, &key, format!("where the machine starts, {words}")));
             }
         }
-        Ok(self)
+        Ok(())
     }
 }
 

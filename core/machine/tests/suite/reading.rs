@@ -143,6 +143,7 @@ fn the_other_tables() {
     assert_eq!((x.axis, by_x.input, by_x.inverted), (0, 10, true));
     assert_eq!((by_x.search_mm_per_s, by_x.latch_mm_per_s), (-10.0, 1.0));
     assert_eq!((by_x.back_off_mm, by_x.switch_mm), (3.0, -305.0));
+    assert_eq!(machine.unhomed_max_feed_mm_per_s[0], 10.0, "the search feed");
     let probe = machine.probe.unwrap();
     assert_eq!((probe.input, probe.inverted), (5, true));
     assert!(close(machine.spindle.min_rad_per_s, 2.0 * PI) && close(machine.spindle.max_rad_per_s, 400.0 * PI));
@@ -164,6 +165,7 @@ fn homing_by_the_drive() {
     let [x] = machine.homing[..] else { panic!("one axis homes: {:?}", machine.homing) };
     assert_eq!(x.drive().map(|drive| (drive.method, drive.within_s)), Some((35, 4.0)));
     assert!(x.switch().is_none());
+    assert_eq!(machine.unhomed_max_feed_mm_per_s[0], 25.0, "a tenth of its feed");
     let words = set("{drive_method = 35, input = 3}").unwrap_err().to_string();
     assert!(words.contains("homing.x.input: is of a switch that the host looks for"), "{words}");
     let words = set("{drive_method = 0}").unwrap_err().to_string();
