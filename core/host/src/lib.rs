@@ -18,6 +18,7 @@ mod faults;
 mod hang;
 mod homing;
 pub mod jog;
+mod joint_words;
 mod joints;
 mod lateness;
 mod loading;
@@ -43,6 +44,7 @@ mod stops;
 mod strategy;
 mod summary;
 mod virtual_clock;
+mod waits;
 mod wall_clock;
 mod worst;
 

@@ -15,6 +15,7 @@ use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::{PolicySummary, Reloader};
 use crate::strategy::FeedRunner;
+use crate::waits::Waits;
 
 /// What is to happen where the program waits at rest for the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +89,8 @@ pub struct Pump<'a> {
     pub planner: String,
     /// How many analog inputs have a name.
     pub analog: usize,
+    /// What the machine waits for before it moves.
+    pub waits: Option<Waits>,
     /// What a file that cannot be written any further does to the motion.
     pub on_record_error: RecordErrorMode,
     commands: CommandLog,
@@ -123,6 +126,7 @@ impl<'a> Pump<'a> {
             skips_homing: false,
             planner: String::new(),
             analog: 0,
+            waits: None,
             on_record_error: RecordErrorMode::default(),
             commands,
             planning: Lateness::new(),
@@ -140,6 +144,7 @@ impl<'a> Pump<'a> {
         tandem_sdk::abi::beat();
         self.serve_policy();
         self.tell_plugin_log();
+        self.tell_waits();
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
         let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
         if let Err(error) = self.rough.step(&mut both) {
@@ -176,6 +181,13 @@ impl<'a> Pump<'a> {
     /// Tells what plugins have written to the log.
     pub fn tell_plugin_log(&mut self) {
         drain_plugin_log(&mut |line| self.observer.note(line));
+    }
+
+    /// Tells what the machine waits for, where that takes long enough for somebody to wonder.
+    fn tell_waits(&mut self) {
+        if let Some(note) = self.waits.as_mut().and_then(|waits| waits.look(&self.host)) {
+            self.observer.note(&note);
+        }
     }
 
     /// Passes a note on to the observer.

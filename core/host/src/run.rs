@@ -28,6 +28,7 @@ use crate::realtime_periods::Timing;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summary::{FORMAT, LatenessUs, PlanningUs, Summary};
+use crate::waits::Waits;
 use crate::wall_clock::Periods;
 use crate::{rules, setup, virtual_clock, wall_clock};
 
@@ -159,6 +160,7 @@ impl Run {
         let mut fine_config = setup::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
         fine_config.record_drives = ready.records_drives;
         let unknown_axes = joints.axes_moved_by(!(attached.known | attached.homed));
+        host.status.hexadecimal_codes.store(drives.hexadecimal_codes != 0, Relaxed);
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = setup::advance_s(machine.rough_period_s, depth_s, segments);
@@ -251,6 +253,7 @@ impl Run {
             observer.note(&note);
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
+        pump.waits = Some(Waits::new(&machine));
         (pump.skips_homing, pump.analog) = (self.switches.home, machine.analog.len());
         pump.on_record_error = machine.on_record_error;
         pump.planner.clone_from(&machine.planner.plugin);

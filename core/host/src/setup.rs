@@ -158,9 +158,14 @@ fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
 
 /// A drive's code as its manual writes it, with the driver's words for it.
 pub fn code_text(driver: &dyn Driver, code: u32) -> String {
-    let number = if driver.describe().hexadecimal_codes == 0 { code.to_string() } else { format!("{code:#06x}") };
+    let number = number_text(code, driver.describe().hexadecimal_codes != 0);
     let words = driver.explain(code);
     if words.as_str().is_empty() { number } else { format!("{number} ({})", words.as_str()) }
+}
+
+/// A drive's code alone, as its manual writes it.
+pub fn number_text(code: u32, hexadecimal: bool) -> String {
+    if hexadecimal { format!("{code:#06x}") } else { code.to_string() }
 }
 
 fn driver_refuses(machine: &Machine, error: &PluginError) -> HostError {

@@ -1,6 +1,9 @@
 //! The operator's commands and the fine loop's status, as atomics.
 
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
+
+use tandem_sdk::{JointState, MAX_AXES};
 
 use crate::{AtomicF64, Counts};
 
@@ -62,6 +65,23 @@ impl Default for Controls {
     }
 }
 
+/// State and fault code of one joint's drive, read together.
+#[derive(Debug, Default)]
+pub struct JointStatus(AtomicU64);
+
+impl JointStatus {
+    /// What the drive has said. Fine loop; does not allocate.
+    pub fn store(&self, state: JointState, code: u32) {
+        self.0.store(u64::from(state.0) << 32 | u64::from(code), Relaxed);
+    }
+
+    /// The last it has said. Any loop; does not allocate.
+    pub fn load(&self) -> (JointState, u32) {
+        let both = self.0.load(Relaxed);
+        (JointState((both >> 32) as u32), both as u32)
+    }
+}
+
 /// What the fine loop says of itself; for looking at, not for deciding.
 #[derive(Debug, Default)]
 pub struct Status {
@@ -75,6 +95,12 @@ pub struct Status {
     pub line: AtomicU32,
     /// A [`crate::MachineState`] as its number.
     pub state: AtomicU32,
+    /// State and fault code of each joint's drive.
+    pub joints: [JointStatus; MAX_AXES],
+    /// True while the drives are told to hold and not all of them do.
+    pub enabling: AtomicBool,
+    /// True where codes of the drives are written in hexadecimal. Set by the host.
+    pub hexadecimal_codes: AtomicBool,
     /// Inputs with a role that are tripped, a bit each.
     pub tripped: AtomicU64,
     /// True while nothing moves and nothing is queued.

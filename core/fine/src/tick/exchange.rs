@@ -149,6 +149,10 @@ impl FineLoop {
         status.line.store(self.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
+        for (joint, status) in status.joints.iter().enumerate().take(self.joints) {
+            status.store(self.feedback.state[joint], self.feedback.fault_code[joint]);
+        }
+        status.enabling.store(!self.attach.is_done() && self.fault.is_none(), Relaxed);
         status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
         self.report_counts();
     }

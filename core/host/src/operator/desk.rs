@@ -10,6 +10,7 @@ use tandem_sdk::{Axes, AxisVector};
 
 use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
+use crate::joint_words;
 use crate::policy::PolicySummary;
 use crate::roles;
 
@@ -212,6 +213,9 @@ impl Desk {
             progress: latest.progress,
             counters: Counters::of(status),
             policy: latest.policy.clone(),
+            joints: joint_words::lines(&self.machine, status),
+            enabling: joint_words::enabling(&self.machine, status),
+            held_by: roles::holding(&self.machine, status.tripped.load(Relaxed)),
             fault: latest.fault.clone(),
             stopped: latest.stopped.clone(),
         }

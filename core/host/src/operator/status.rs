@@ -6,6 +6,7 @@ use serde::{Serialize, Serializer};
 use tandem_rings::Status;
 use tandem_sdk::{Axes, AxisVector};
 
+use crate::joint_words::JointLine;
 use crate::policy::PolicySummary;
 
 /// The machine at one moment.
@@ -41,6 +42,12 @@ pub struct StatusLine {
     pub counters: Counters,
     /// What the policy script did, where the machine has one; some rough periods old.
     pub policy: Option<PolicySummary>,
+    /// State of each joint's drive.
+    pub joints: Vec<JointLine>,
+    /// While the drives are told to hold: which of the joints do not yet, and why, in words.
+    pub enabling: Option<String>,
+    /// Inputs with a role that hold the machine now, by their names.
+    pub held_by: Option<String>,
     /// The fault that stopped the machine, in words.
     pub fault: Option<String>,
     /// What else ended the run before its program was over: the operator's abort, in words.
