@@ -1,6 +1,6 @@
 //! What the drives' answer says of the drives.
 
-use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES};
+use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES, MAX_DIGITAL};
 
 use crate::fault::FaultKind;
 use crate::history::History;
@@ -43,6 +43,23 @@ impl Numbers {
         }
         fault
     }
+}
+
+/// Age of what is reported of each joint, fine periods; 0 where there is no such joint. Fine loop.
+pub fn ages(feedback: &Feedback, joints: usize) -> [u32; MAX_AXES] {
+    let mut ages = [0; MAX_AXES];
+    ages[..joints].copy_from_slice(&feedback.age_periods[..joints]);
+    ages
+}
+
+/// Bit per digital input that was not heard of in this exchange. Fine loop.
+pub fn old_inputs(feedback: &Feedback) -> u64 {
+    // What is true nearly always is looked at first.
+    if feedback.input_age_periods == [0; MAX_DIGITAL] {
+        return 0;
+    }
+    let ages = feedback.input_age_periods.iter().enumerate();
+    ages.fold(0, |old, (input, age)| old | u64::from(*age > 0) << input)
 }
 
 /// The fault that the drives report; one that has let go while the machine is `moving` is one too. Joints that are their drives'
@@ -110,6 +127,14 @@ mod tests {
         let (fault, feedback) = wrong(|f| f.spindle_angle_rad = f64::NAN);
         assert_eq!((fault, feedback.spindle_angle_rad), (Some(FaultKind::Feedback { joint: None }), 3.0));
         assert_eq!(wrong(|f| f.position[3] = f64::NAN).0, None, "there is no such joint");
+    }
+
+    #[test]
+    fn what_is_old_is_marked_input_by_input_and_joint_by_joint() {
+        let mut feedback = Feedback { age_periods: [3; MAX_AXES], ..Feedback::default() };
+        assert_eq!((old_inputs(&feedback), ages(&feedback, 2)), (0, [3, 3, 0, 0, 0, 0, 0, 0]));
+        (feedback.input_age_periods[0], feedback.input_age_periods[63]) = (1, u16::MAX);
+        assert_eq!(old_inputs(&feedback), 1 | 1 << 63);
     }
 
     #[test]

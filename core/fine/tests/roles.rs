@@ -573,3 +573,19 @@ fn a_spindle_that_does_not_turn_again_behind_a_door_is_a_fault() {
     }
     assert_eq!(bench.fault(), Some(FaultKind::SpindleSlow { within_s: 30.0 }));
 }
+
+#[test]
+fn samples_say_what_of_them_is_old() {
+    let mut bench = Bench::new(Role::FeedHold, Doing::Running, 9, true);
+    bench.attach();
+    bench.queue_move(StopOn::default());
+    bench.ticks(50);
+    while bench.host.samples.pop().is_ok() {}
+    bench.script.lock().unwrap().age[9] = 1;
+    bench.ticks(1);
+    let old = bench.host.samples.pop().unwrap();
+    assert_eq!((old.inputs, old.old_inputs, old.age_periods), (1 << 9, 1 << 9, [0; MAX_AXES]));
+    bench.script.lock().unwrap().age[9] = 0;
+    bench.ticks(1);
+    assert_eq!(bench.host.samples.pop().unwrap().old_inputs, 0);
+}

@@ -143,5 +143,9 @@ fn fine_sample(sample: &Sample) -> FineSample {
         programmed_feed_mm_per_s: sample.programmed_feed_mm_per_s,
         sigma: sample.sigma,
         spindle_rad_per_s: sample.spindle_rad_per_s,
+        analog: sample.analog,
+        inputs: sample.inputs,
+        old_inputs: sample.old_inputs,
+        age_periods: sample.age_periods,
     }
 }

@@ -17,7 +17,7 @@ pub struct Period {
     pub feed_mm_per_s: f64,
     /// Programmed feed, mm/s; infinite in a rapid.
     pub programmed_feed_mm_per_s: f64,
-    /// Distance between command and feedback, mean, mm.
+    /// Distance between command and feedback, mean over what was heard anew, mm; not a number where that is nothing.
     pub following_error_mm: f64,
     /// The same, its largest, mm.
     pub max_following_error_mm: f64,

@@ -1,6 +1,6 @@
 //! One fine period, as the fine loop reports it.
 
-use tandem_sdk::{AxisVector, MAX_ANALOG};
+use tandem_sdk::{AxisVector, MAX_ANALOG, MAX_AXES};
 
 use crate::Given;
 use crate::switched::Switched;
@@ -128,6 +128,12 @@ pub struct Sample {
     pub phase_ns: Option<i64>,
     /// Analog inputs of the driver.
     pub analog: [f64; MAX_ANALOG],
+    /// Digital inputs.
+    pub inputs: u64,
+    /// Bit per digital input of which nothing was heard in this period.
+    pub old_inputs: u64,
+    /// Age of the feedback of each joint, fine periods.
+    pub age_periods: [u32; MAX_AXES],
     /// Why the machine is being stopped, as this position was chosen.
     pub cause: StopCause,
     /// What the operator asked for in this period.

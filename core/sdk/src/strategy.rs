@@ -3,7 +3,7 @@
 use crate::abi::layout::layout;
 use std::marker::PhantomData;
 
-use crate::{Axes, AxisVector, PluginError, RawSlice};
+use crate::{Axes, AxisVector, MAX_ANALOG, MAX_AXES, PluginError, RawSlice};
 
 /// Most named signals a strategy publishes.
 pub const MAX_SIGNALS: usize = 8;
@@ -34,6 +34,22 @@ pub struct FineSample {
     pub sigma: f64,
     /// Spindle speed measured, rad/s.
     pub spindle_rad_per_s: f64,
+    /// Analog inputs, in units that the machine's builder knows.
+    pub analog: [f64; MAX_ANALOG],
+    /// Digital inputs, bit n is input n.
+    pub inputs: u64,
+    /// Bit per digital input of which nothing was heard in this period: what [`FineSample::inputs`] says of it is old.
+    pub old_inputs: u64,
+    /// Age of what was measured of each joint, in fine periods; 0 is new. What is old says nothing of this period.
+    pub age_periods: [u32; MAX_AXES],
+}
+
+impl FineSample {
+    /// Whether something was heard of every joint in this period: observers go on by such samples only. Any loop; does not
+    /// allocate.
+    pub fn is_new(&self) -> bool {
+        self.age_periods == [0; MAX_AXES]
+    }
 }
 
 layout!(FineSample {
@@ -47,7 +63,11 @@ layout!(FineSample {
     feed_mm_per_s,
     programmed_feed_mm_per_s,
     sigma,
-    spindle_rad_per_s
+    spindle_rad_per_s,
+    analog,
+    inputs,
+    old_inputs,
+    age_periods
 });
 
 /// What a strategy is told when it is opened.

@@ -90,13 +90,17 @@ impl ForceControl {
 
     /// Observers and guard, for one fine sample.
     fn sample(&mut self, sample: &FineSample) -> bool {
-        let follows = self.last_tick.replace(sample.tick).is_some_and(|last| sample.tick == last + 1);
-        for axis in &mut self.axes {
-            axis.step(sample, follows);
-        }
         let programmed = sample.programmed_feed_mm_per_s;
         if programmed.is_finite() && programmed > 0.0 {
             self.programmed_mm_per_s = programmed;
+        }
+        // What is old says nothing of this period: the observers go on behind it, as where a sample is missing.
+        if !sample.is_new() {
+            return false;
+        }
+        let follows = self.last_tick.replace(sample.tick).is_some_and(|last| sample.tick == last + 1);
+        for axis in &mut self.axes {
+            axis.step(sample, follows);
         }
         let now_nm = resultant_nm(self.axes.iter().map(|axis| (axis.torque_nm, axis.force_per_torque_per_m)));
         self.guard.trips(now_nm)

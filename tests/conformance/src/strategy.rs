@@ -167,6 +167,7 @@ impl Machine {
             programmed_feed_mm_per_s: 40.0,
             sigma: 1.0,
             spindle_rad_per_s: 300.0 + noise,
+            ..FineSample::default()
         }
     }
 }

@@ -114,6 +114,9 @@ impl FineLoop {
             switched: self.switched(),
             phase_ns: self.phase_ns(),
             analog: self.feedback.analog,
+            inputs: self.feedback.inputs,
+            old_inputs: answer::old_inputs(&self.feedback),
+            age_periods: answer::ages(&self.feedback, self.joints),
             cause: self.cause,
             given: self.given,
         };

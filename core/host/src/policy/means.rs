@@ -27,6 +27,11 @@ impl Means {
     pub fn of(&mut self, period: u64, samples: &[FineSample], strategy: Option<(f64, &[f64])>) -> Period {
         let count = samples.len().max(1) as f64;
         let mean = |value: &dyn Fn(&FineSample) -> f64| samples.iter().map(value).sum::<f64>() / count;
+        // Of what was not heard of in a period nothing is told; where that is all of it, that is no number.
+        let heard = samples.iter().filter(|sample| sample.is_new()).count() as f64;
+        let measured = |value: &dyn Fn(&FineSample) -> f64| {
+            samples.iter().filter(|sample| sample.is_new()).map(value).sum::<f64>() / heard
+        };
         let error = |sample: &FineSample| self.distance_mm(&(sample.command - sample.position));
         let (ratio, signals) = strategy.unwrap_or((1.0, &[]));
         let signal = |index: usize| self.signals[index].and_then(|at| signals.get(at)).copied().unwrap_or(f64::NAN);
@@ -37,15 +42,15 @@ impl Means {
             duration_s: count * self.fine_period_s,
             feed_mm_per_s,
             programmed_feed_mm_per_s: mean(&|sample| sample.programmed_feed_mm_per_s),
-            following_error_mm: mean(&error),
-            max_following_error_mm: samples.iter().map(error).fold(0.0, f64::max),
+            following_error_mm: measured(&error),
+            max_following_error_mm: samples.iter().filter(|sample| sample.is_new()).map(error).fold(f64::NAN, f64::max),
             cutting_torque_nm: signal(0),
             reference_torque_nm: signal(1),
             spindle_load: signal(2),
             spindle_rad_per_s: mean(&|sample| sample.spindle_rad_per_s),
             distance_left_mm: self.distance_left_mm,
             strategy_ratio: ratio,
-            current_a: AxisVector(std::array::from_fn(|axis| mean(&|sample| sample.current_a[axis].abs()))),
+            current_a: AxisVector(std::array::from_fn(|axis| measured(&|sample| sample.current_a[axis].abs()))),
         };
         self.distance_left_mm = (self.distance_left_mm - feed_mm_per_s * means.duration_s).max(0.0);
         Period { distance_left_mm: self.distance_left_mm, ..means }
@@ -79,5 +84,14 @@ mod tests {
         assert_eq!((period.cutting_torque_nm, period.reference_torque_nm, period.strategy_ratio), (1.5, 2.0, 0.5));
         assert!(period.spindle_load.is_nan() && period.current_a[0] == 2.0);
         assert!((period.distance_left_mm - 9.6).abs() < 1e-12);
+        // Of what is old nothing is told but that the feed was driven.
+        let old = |x| FineSample { age_periods: [0, 1, 0, 0, 0, 0, 0, 0], ..sample(300.0, x) };
+        let period = means.of(4, &[sample(100.0, 0.02), old(-0.04)], None);
+        assert!((period.following_error_mm - 0.02).abs() < 1e-15 && period.max_following_error_mm == 0.02);
+        assert_eq!((period.feed_mm_per_s, period.current_a[0]), (200.0, 2.0));
+        let period = means.of(5, &[old(0.02)], None);
+        assert!(
+            [period.following_error_mm, period.max_following_error_mm, period.current_a[0]].iter().all(|v| v.is_nan())
+        );
     }
 }
