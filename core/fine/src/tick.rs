@@ -335,8 +335,7 @@ impl FineLoop {
             Phase::Parted => (self.stand(), self.wait_parted()),
             Phase::HandedOver(hand) => {
                 let hand = *hand;
-                let input = self.hand_over(hand);
-                (self.stand(), input)
+                self.hand_over(hand)
             }
             Phase::Ramping(ramp) => {
                 self.cause = StopCause::Fault;
@@ -390,11 +389,7 @@ impl FineLoop {
         if self.fault.is_some() {
             return;
         }
-        if self.handed_over() != 0 {
-            let joint = self.handed_over().trailing_zeros() as usize;
-            self.phase = Phase::Parted;
-            self.take_back(joint);
-        }
+        self.end_hand_over();
         self.fault = Some(Fault { kind, tick: self.tick, line: self.cursor.segment().line });
         self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
     }

@@ -105,6 +105,7 @@ impl Bench {
             period_s: PERIOD_S,
             limits: Limits::new(&[axis; JOINTS]).unwrap(),
             joints: Joints::Axes,
+            linear: 0b11,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             order: 2,
             guard: GuardMode::Stop,
@@ -269,10 +270,14 @@ fn an_abort_and_an_emergency_stop_take_the_joint_back_where_it_is() {
         bench.hand_over(10.0);
         bench.ticks(3 + random.below(150));
         let controls = Arc::clone(&bench.host.controls);
-        if seed % 2 == 0 {
+        if seed % 3 == 0 {
             controls.emergency_stop.store(true, Relaxed);
             bench.ticks(20);
             assert_eq!(bench.fault(), Some(FaultKind::EmergencyStop));
+        } else if seed % 3 == 1 {
+            controls.soft_fault.store(true, Relaxed);
+            bench.ticks(20);
+            assert_eq!(bench.fault(), Some(FaultKind::Soft));
         } else {
             controls.abort.store(true, Relaxed);
             let rest = bench.rest(20).expect("a rest");

@@ -60,16 +60,8 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             let (driver, state) = (&machine.driver.plugin, state_text(*state));
             format!("driver {driver}: {joint} was not enabled within {within_s} s: its drive is {state}{code}")
         }
-        FaultKind::NotHomed { joint, state, code, within_s } => {
-            let (joint, state, code) = (names.joint(*joint), state_text(*state), names.code_if_any(*code));
-            let driver = &machine.driver.plugin;
-            format!("driver {driver}: {joint} was not homed by its drive within {within_s} s: it is {state}{code}")
-        }
-        FaultKind::State { joint, number } => {
-            let joint = names.joint(*joint);
-            let known = "0 (disabled) to 6 (lost) are known";
-            format!("driver {}: its exchange gives {number} as the state of {joint}: {known}", machine.driver.plugin)
-        }
+        FaultKind::NotHomed { joint, state, code, within_s } => names.not_homed(*joint, *state, *code, *within_s),
+        FaultKind::State { joint, number } => names.no_state(*joint, *number),
         FaultKind::Feedback { joint } => {
             let of = joint.map_or("the spindle".to_string(), |joint| names.joint(joint));
             format!("driver {}: the feedback of {of} is not a finite number", machine.driver.plugin)
@@ -91,9 +83,7 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
         }
         FaultKind::EmergencyStop => "emergency stop".to_string(),
         FaultKind::Input { role, input, old } => roles::fault_text(machine, *role, *input, *old),
-        FaultKind::SpindleSlow { within_s } => {
-            format!("the spindle, which a door had stopped, did not turn as it is told to within {within_s} s")
-        }
+        FaultKind::SpindleSlow { within_s } => roles::spindle_text(*within_s),
         FaultKind::Soft => soft.unwrap_or("stopped by the host").to_string(),
         FaultKind::NoProgress { periods, grown_s, asked } => format!(
             "the machine stands still though nothing stops it: in {periods} fine periods program time passed by {grown_s:e} s, \
@@ -140,6 +130,18 @@ impl Names<'_> {
             Some(named) => format!("joint {joint} ({})", named.name),
             None => format!("joint {joint}"),
         }
+    }
+
+    fn no_state(&self, joint: usize, number: u32) -> String {
+        let (driver, joint) = (&self.machine.driver.plugin, self.joint(joint));
+        let known = "0 (disabled) to 6 (lost) are known";
+        format!("driver {driver}: its exchange gives {number} as the state of {joint}: {known}")
+    }
+
+    fn not_homed(&self, joint: usize, state: JointState, code: u32, within_s: f64) -> String {
+        let (driver, joint, code) = (&self.machine.driver.plugin, self.joint(joint), self.code_if_any(code));
+        let state = state_text(state);
+        format!("driver {driver}: {joint} was not homed by its drive within {within_s} s: it is {state}{code}")
     }
 
     fn following(&self, joint: usize, error_mm: f64, limit_mm: f64) -> String {

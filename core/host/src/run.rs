@@ -84,8 +84,8 @@ pub struct Run {
     clock: Clock,
     /// Metal moves.
     real: bool,
-    /// Bit per axis of which it is not known where it is.
-    unknown_axes: u32,
+    /// Bit per axis of which the drives did not know where it is when they were attached.
+    pub(crate) unknown_axes: u32,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -199,11 +199,6 @@ impl Run {
     /// The fine loop's status, to look at from other threads.
     pub fn status(&self) -> Arc<tandem_rings::Status> {
         Arc::clone(&self.host.status)
-    }
-
-    /// Bit per axis of which the drives do not know where it is: as they were when they were attached.
-    pub(crate) fn unknown_axes(&self) -> u32 {
-        self.unknown_axes
     }
 
     /// The clock that was asked for, or else the one that the driver goes with: real drives live in real time.

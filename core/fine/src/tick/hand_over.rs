@@ -1,5 +1,7 @@
 //! A joint that its drive homes: handed over at rest, neither followed nor judged, and taken back where the drive says it is.
 
+use std::sync::atomic::Ordering::Relaxed;
+
 use tandem_rings::RestCause;
 use tandem_sdk::{AxisVector, JointState};
 
@@ -40,8 +42,13 @@ impl FineLoop {
         Some(Input::Run)
     }
 
-    /// One period of a joint in its drive's hands.
-    pub(super) fn hand_over(&mut self, mut hand: HandOver) -> Input {
+    /// One period of a joint in its drive's hands: where the axes stand, by the plan, and what it is to the machine's state.
+    pub(super) fn hand_over(&mut self, hand: HandOver) -> (AxisVector, Input) {
+        let input = self.look_at_hand(hand);
+        (self.stand(), input)
+    }
+
+    fn look_at_hand(&mut self, mut hand: HandOver) -> Input {
         let (bit, state) = (1_u32 << hand.joint, self.feedback.state[hand.joint]);
         let is_new = self.feedback.age_periods[hand.joint] == 0;
         hand.begun |= is_new && (state == JointState::Homing || self.feedback.homed & bit == 0);
@@ -61,8 +68,21 @@ impl FineLoop {
             self.fail(FaultKind::NotHomed { joint, state, code, within_s });
             return Input::Trip;
         }
+        if self.controls.soft_fault.load(Relaxed) {
+            self.fail(FaultKind::Soft);
+            return Input::Trip;
+        }
         self.phase = Phase::HandedOver(hand);
         if held { Input::Hold } else { Input::Run }
+    }
+
+    /// Before a fault: what a drive has in its hands is taken back as it is.
+    pub(super) fn end_hand_over(&mut self) {
+        if let Phase::HandedOver(hand) = &self.phase {
+            let joint = hand.joint;
+            self.phase = Phase::Parted;
+            self.take_back(joint);
+        }
     }
 
     /// Joints in their drives' hands, a bit each.
@@ -85,7 +105,7 @@ impl FineLoop {
     }
 
     /// The machine stands where the drive says that its joint is. What was sent before is no way from there to here.
-    pub(super) fn take_back(&mut self, joint: usize) {
+    fn take_back(&mut self, joint: usize) {
         self.setpoint.homing = 0;
         let mut joints = self.joints_of(self.guard.position());
         joints[joint] = self.feedback.position[joint];

@@ -75,7 +75,7 @@ impl<'a> JogSession<'a> {
         let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
         let homed =
             if self.switches.home { self.machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis) } else { 0 };
-        self.jogs.enable(run.controls(), !self.switches.home, run.unknown_axes() & !homed);
+        self.jogs.enable(run.controls(), !self.switches.home, run.unknown_axes & !homed);
         Ok(run)
     }
 
