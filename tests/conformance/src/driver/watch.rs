@@ -38,7 +38,7 @@ impl Watch {
 
     /// One more exchange.
     pub fn look(&mut self, setpoint: &Setpoint, feedback: &Feedback, report: &mut Report) {
-        self.judge_numbers(setpoint, feedback, report);
+        judge_numbers(setpoint, feedback, report);
         self.judge_latches(setpoint, feedback, report);
         for joint in 0..JOINTS {
             let step = (setpoint.position[joint] - self.aim[joint]).abs();
@@ -50,20 +50,6 @@ impl Watch {
         self.judge_inputs(setpoint.tick, feedback, report);
         self.aim = setpoint.position;
         self.last = Some(*feedback);
-    }
-
-    fn judge_numbers(&self, setpoint: &Setpoint, feedback: &Feedback, report: &mut Report) {
-        const CHECK: &str = "feedback";
-        report.judged(CHECK);
-        let tick = setpoint.tick;
-        let numbers = [feedback.position, feedback.speed, feedback.current_a];
-        if numbers.iter().any(|v| v.0[..JOINTS].iter().any(|v| !v.is_finite())) {
-            report.find(CHECK, format!("period {tick}: the feedback has a number that is not finite"));
-        }
-        if let Some(joint) = (0..JOINTS).find(|joint| !feedback.state[*joint].is_known()) {
-            let number = feedback.state[joint].0;
-            report.find(CHECK, format!("period {tick}: the state of joint {joint} is {number}, which stands for none"));
-        }
     }
 
     /// Old feedback says how old it is, and what is new is not what was said before.
@@ -85,7 +71,7 @@ impl Watch {
         if ages[1] == 0 && is_same && has_moved {
             report.find(CHECK, format!("period {tick}: joint {joint} moves, and the old feedback is told as new"));
         }
-        self.judge_lost(joint, tick, now, report);
+        judge_lost(joint, tick, now, report);
     }
 
     /// Inputs grow older with the periods too, and an old one is what it was.
@@ -107,16 +93,6 @@ impl Watch {
                     format!("period {tick}: input {input} is {age} periods old and not what was told then"),
                 );
             }
-        }
-    }
-
-    fn judge_lost(&self, joint: usize, tick: u64, now: &Feedback, report: &mut Report) {
-        const CHECK: &str = "lost joints";
-        report.judged(CHECK);
-        let age = now.age_periods[joint];
-        if age > MOST_AGE && now.state[joint] != JointState::Lost {
-            let words = format!("joint {joint} was last heard of {age} periods ago, and is not told as lost");
-            report.find(CHECK, format!("period {tick}: {words}"));
         }
     }
 
@@ -148,5 +124,29 @@ impl Watch {
                 find(format!("it came {} s before the feedback", latch.before_s));
             }
         }
+    }
+}
+
+fn judge_numbers(setpoint: &Setpoint, feedback: &Feedback, report: &mut Report) {
+    const CHECK: &str = "feedback";
+    report.judged(CHECK);
+    let tick = setpoint.tick;
+    let numbers = [feedback.position, feedback.speed, feedback.current_a];
+    if numbers.iter().any(|v| v.0[..JOINTS].iter().any(|v| !v.is_finite())) {
+        report.find(CHECK, format!("period {tick}: the feedback has a number that is not finite"));
+    }
+    if let Some(joint) = (0..JOINTS).find(|joint| !feedback.state[*joint].is_known()) {
+        let number = feedback.state[joint].0;
+        report.find(CHECK, format!("period {tick}: the state of joint {joint} is {number}, which stands for none"));
+    }
+}
+
+fn judge_lost(joint: usize, tick: u64, now: &Feedback, report: &mut Report) {
+    const CHECK: &str = "lost joints";
+    report.judged(CHECK);
+    let age = now.age_periods[joint];
+    if age > MOST_AGE && now.state[joint] != JointState::Lost {
+        let words = format!("joint {joint} was last heard of {age} periods ago, and is not told as lost");
+        report.find(CHECK, format!("period {tick}: {words}"));
     }
 }
