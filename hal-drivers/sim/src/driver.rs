@@ -57,6 +57,8 @@ pub struct SimulatedDrives {
     started: Instant,
     /// The setpoint that the drives heard last.
     heard: Setpoint,
+    /// 1 where a reset is still to be sent.
+    unheard_reset: u32,
     /// Exchanges since the start.
     exchanges: u64,
     /// What was last heard of each joint.
@@ -84,6 +86,7 @@ impl SimulatedDrives {
             bus_clock: None,
             started: Instant::now(),
             heard: Setpoint::default(),
+            unheard_reset: 0,
             exchanges: 0,
             told: [Motion::default(); MAX_AXES],
             silent_periods: [0; MAX_AXES],
@@ -157,13 +160,26 @@ impl SimulatedDrives {
         self.spindle = Spindle::new(options.spindle_time_constant_s, period_s);
         self.watchdog = Watchdog::new(options.watchdog_periods);
         self.bus_clock = options.bus_clock.as_ref().map(|clock| BusClock::new(clock, period_s, options.seed));
-        (self.heard, self.exchanges, self.quick_stopping) = (Setpoint::default(), 0, false);
+        (self.heard, self.unheard_reset, self.exchanges) = (Setpoint::default(), 0, 0);
+        self.quick_stopping = false;
         self.faults.start();
         self.faults.step(0, 0, &mut self.powers);
         self.mechanics.begin();
         let [_, at] = self.real_way();
         self.switches.start(&at);
         self.started = Instant::now();
+    }
+
+    /// The drives hear the setpoint, unless its frame is lost. A reset that is lost goes with the next frame: the host sends it
+    /// once.
+    fn hand_over(&mut self, setpoint: &Setpoint, frame: Frame) {
+        let reset = setpoint.reset | self.unheard_reset;
+        if frame == Frame::Lost {
+            self.unheard_reset = reset;
+        } else {
+            self.heard = Setpoint { reset, ..*setpoint };
+            self.unheard_reset = 0;
+        }
     }
 
     /// Lives through the periods up to and with this exchange. Fine loop.
@@ -208,7 +224,9 @@ impl SimulatedDrives {
     fn advance(&mut self, to: &AxisVector) {
         let follow = self.heard.enable != 0 && !self.quick_stopping;
         let powers = &mut self.powers[..self.joint_count];
-        powers.iter_mut().for_each(|power| power.command(follow));
+        for power in powers.iter_mut() {
+            power.command(follow);
+        }
         self.mechanics.step(powers, to, self.spindle.speed);
         for (joint, power) in powers.iter_mut().enumerate() {
             power.settle(self.mechanics.is_at_rest(joint));
@@ -359,9 +377,7 @@ impl Driver for SimulatedDrives {
             return Err(PluginError::fixed("sim: exchange is refused: the setpoint is not a finite number"));
         }
         let frame = self.wire.send(setpoint.tick);
-        if frame != Frame::Lost {
-            self.heard = *setpoint;
-        }
+        self.hand_over(setpoint, frame);
         self.exchanges += 1;
         self.mechanics.begin();
         self.live();

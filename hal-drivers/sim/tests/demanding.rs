@@ -173,6 +173,21 @@ fn lost_frames_age_what_is_told_and_beyond_the_patience_all_joints_are_lost() {
     assert_eq!(bench.enable(), 1);
 }
 
+/// The host sends a reset for one period: the driver sees to it that the drives hear it.
+#[test]
+fn a_reset_whose_frame_is_lost_comes_with_the_next_one() {
+    let fault = "[[faults]]\njoint = 1\ntick = 20\ncode = 9\n";
+    let mut bench = Bench::new(&format!("lost_frames = {{ ticks = [30], periods = 2 }}\n{fault}"));
+    bench.enable();
+    while bench.setpoint.tick < 29 {
+        bench.period();
+    }
+    assert_eq!(bench.feedback.state[1], JointState::Fault);
+    bench.setpoint.reset = 1;
+    let states: Vec<_> = (30..=32).map(|_| bench.period().state[1]).collect();
+    assert_eq!(states, [JointState::Fault, JointState::Fault, JointState::Enabled]);
+}
+
 #[test]
 fn a_latch_is_told_where_it_was_armed_by_the_drives_that_caught_it() {
     let switch = "[[switches]]\ninput = 3\njoint = 0\nabove_mm = 1.0125\n";
