@@ -158,8 +158,8 @@ mod tests {
     #[test]
     fn without_delays_it_follows_and_lets_go_at_once() {
         let told = [(true, true), (true, false), (false, false), (false, true), (true, true)];
-        use JointState as State;
-        let said = [State::Enabled, State::Enabled, State::QuickStop, State::Disabled, State::Enabled];
+        let (on, off) = (JointState::Enabled, JointState::Disabled);
+        let said = [on, on, JointState::QuickStop, off, on];
         assert_eq!(states(&mut Power::new(0, 0), &told), said);
     }
 
