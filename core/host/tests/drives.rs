@@ -210,8 +210,7 @@ fn jog(asked: &[(f64, f64)]) -> Vec<String> {
     let session = JogSession::new(machine(&[]), &registry, switches, Box::new(hand)).unwrap();
     let (outcome, _) = drive(session.enable().unwrap(), &[]);
     assert_eq!(outcome.summary.fault, None);
-    let said = said.lock().unwrap().clone();
-    said
+    said.lock().unwrap().clone()
 }
 
 #[test]

@@ -13,6 +13,7 @@ use crate::state::Input;
 
 /// A joint in its drive's hands.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools)] // independent facts of two sides that answer each other a period later
 pub(super) struct HandOver {
     joint: usize,
     /// Time that the drive has, s, and fine periods of it that are over: a hold interrupts it.

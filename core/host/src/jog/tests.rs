@@ -26,7 +26,7 @@ impl Rig {
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
         let jogs = Jogs::new(&machine, setup::planner(&machine, &registry).unwrap());
         let controls = Arc::<Controls>::default();
-        jogs.enable(Arc::clone(&controls), true);
+        jogs.enable(Arc::clone(&controls), true, 0);
         Self { jogs, controls }
     }
 
@@ -140,7 +140,7 @@ fn a_machine_that_is_not_enabled_is_not_jogged() {
     let rig = Rig::new();
     rig.jogs.disable(AxisVector::from_slice(&[250.0]));
     assert!(rig.on('x', false).unwrap_err().contains("not enabled"));
-    rig.jogs.enable(Arc::clone(&rig.controls), false);
+    rig.jogs.enable(Arc::clone(&rig.controls), false, 0);
     assert!(rig.on('x', false).unwrap_err().contains("not ready"));
     assert!(rig.begins().is_none());
     assert_eq!(rig.on('x', true).unwrap_err(), "x stands at its travel limit, 250 mm");
