@@ -25,7 +25,7 @@ pub const MAX_AGE: u16 = 5;
 pub const PROBE: u32 = 7;
 
 /// The drives, as the test makes them.
-struct Script {
+pub struct Script {
     pub inputs: u64,
     pub age: [u16; 64],
     pub enabled_for: u64,
