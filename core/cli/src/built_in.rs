@@ -2,6 +2,9 @@
 
 use tandem_host::Registry;
 
+/// The driver that stands in for real ones where the machine names nothing: as it comes, its drives are ideal.
+pub const IDEAL_DRIVES: &str = "sim";
+
 /// A registry with everything that is linked in.
 pub fn registry() -> Result<Registry, String> {
     let mut registry = Registry::default();

@@ -9,7 +9,7 @@ use tandem_estimate::diagnose::{Evidence, Fitted, LEAST_R2, LinearFit, MOST_RMS,
 use tandem_estimate::experiment::{Experiment, Measured};
 use tandem_estimate::polygon::Timed;
 use tandem_estimate::{Choice, measurements, model_file};
-use tandem_host::Output;
+use tandem_host::{Output, with_stand_ins};
 use tandem_machine::Machine;
 
 use crate::args::{self, Form};
@@ -81,8 +81,11 @@ fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box
     let experiment = Experiment::new(machine, BLOCKS_MEASURED)?;
     left_out(&experiment);
     let registry = built_in::registry()?;
-    let clock = clock::of(options.clock, machine, &registry);
-    Ok(experiment.run(machine, &registry, clock)?)
+    let (machine, notes) = with_stand_ins(machine, &registry, None)
+        .map_err(|refused| format!("{refused}: state one, or give its times with --from"))?;
+    notes.iter().for_each(|note| say!("{note}"));
+    let clock = clock::of(options.clock, &machine, &registry);
+    Ok(experiment.run(&machine, &registry, clock)?)
 }
 
 fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {

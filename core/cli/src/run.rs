@@ -132,6 +132,7 @@ const SUMMARY_ROOM_BYTES: u64 = 16 * 1024;
 impl Sinks {
     fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run, clock: Clock) -> Result<Self, String> {
         let signals = run.signals();
+        let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
         let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
         let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
         let events = options.events.as_ref().map(|path| EventsCsv::create(path, machine.fine_period_s));

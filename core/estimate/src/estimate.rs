@@ -3,6 +3,7 @@
 use tandem_gcode::{CheckReport, Program};
 use tandem_host::{Clock, HostError, Registry, Run, RunObserver, Switches, each_block};
 use tandem_machine::Machine;
+use tandem_rings::{Rest, RestCause};
 use tandem_sdk::{Block, BlockKind, BlockReport, Limits};
 
 use crate::choice::Choice;
@@ -22,6 +23,8 @@ pub struct Estimate {
     pub estimated_s: f64,
     /// Where it goes.
     pub tally: Tally,
+    /// How often an edge did not come, and was assumed where the motion towards it ended.
+    pub assumed_edges: u64,
 }
 
 /// Why there is no estimate.
@@ -74,7 +77,13 @@ fn closed(
         return Err(HostError::Check(Box::new(report)).into());
     }
     model.finish(&mut add);
-    Ok(Estimate { program: program.name().to_string(), model: name, estimated_s: tally.all.time_s, tally })
+    Ok(Estimate {
+        program: program.name().to_string(),
+        model: name,
+        estimated_s: tally.all.time_s,
+        tally,
+        assumed_edges: 0,
+    })
 }
 
 fn simulate(
@@ -86,21 +95,32 @@ fn simulate(
     let name = program.name().to_string();
     let switches = Switches { clock: Some(Clock::Virtual), ..switches };
     let run = Run::prepare(machine.clone(), registry, program, switches)?;
-    let mut watch = Watch { limits: machine.limits, tally: Tally::default() };
+    let mut watch = Watch { limits: machine.limits, tally: Tally::default(), missed: 0 };
     let summary = run.drive(Clock::Virtual, &[], &mut watch)?.summary;
     if let Some(cause) = summary.fault.or(summary.stopped) {
         return Err(EstimateError::Stopped { program: name, cause });
     }
-    Ok(Estimate { program: name, model: "simulate", estimated_s: summary.motion_time_s, tally: watch.tally })
+    Ok(Estimate {
+        program: name,
+        model: "simulate",
+        estimated_s: summary.motion_time_s,
+        tally: watch.tally,
+        assumed_edges: if switches.assumes_edges { watch.missed } else { 0 },
+    })
 }
 
 /// Takes the planner's own report of each block; samples pass by.
 struct Watch {
     limits: Limits,
     tally: Tally,
+    missed: u64,
 }
 
 impl RunObserver for Watch {
+    fn rest(&mut self, rest: &Rest) {
+        self.missed += u64::from(rest.cause == RestCause::Missed);
+    }
+
     fn block(&mut self, block: &Block, report: &BlockReport) {
         let element = Element::new(block, &self.limits);
         let cut = !matches!(block.kind, BlockKind::Dwell | BlockKind::Rapid);

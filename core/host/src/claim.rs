@@ -3,55 +3,54 @@
 use tandem_machine::Machine;
 use tandem_sdk::{Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS};
 
+use crate::drives::{Drives, Roster};
 use crate::error::HostError;
+use crate::faults::{self, Faults};
 use crate::joints::JointSpace;
 use crate::rules::refusal;
 use crate::run::Switches;
 use crate::setup;
 
-/// A driver, and what it said when its drives were claimed. A claim that is dropped stops the driver.
+/// The drivers of a machine, and what they said when their drives were claimed. A claim that is dropped stops them.
 pub struct Claim {
-    driver: Option<Box<dyn Driver>>,
+    drives: Option<Drives>,
+    faults: Option<Faults>,
     attached: Option<Attached>,
 }
 
 impl Claim {
-    /// A driver whose drives are not claimed.
-    pub fn new(driver: Box<dyn Driver>) -> Self {
-        Self { driver: Some(driver), attached: None }
+    /// Drivers whose drives are not claimed.
+    pub fn new(drives: Drives) -> Self {
+        Self { drives: Some(drives), faults: None, attached: None }
     }
 
-    /// What the driver says of itself.
+    /// Who is who among the drivers.
+    pub fn roster(&self) -> Roster {
+        self.drives.as_ref().map_or_else(|| Roster::of_one(DriverDescription::real()), Drives::roster)
+    }
+
+    /// What the drivers together say of themselves.
     pub fn describe(&self) -> DriverDescription {
-        self.driver.as_ref().map_or(DriverDescription::real(), |driver| driver.describe())
+        self.roster().describe()
     }
 
     /// Whether the drives could be claimed, as far as that can be told without them.
     ///
     /// # Errors
-    /// What the driver refuses.
+    /// What a driver refuses.
     pub fn check(&self, machine: &Machine, joints: &JointSpace) -> Result<(), HostError> {
-        self.driver.as_ref().map_or(Ok(()), |driver| setup::check_driver(machine, driver.as_ref(), joints))
+        self.drives.as_ref().map_or(Ok(()), |drives| drives.check(machine, joints))
     }
 
-    /// Puts something around the driver, before its drives are claimed.
-    ///
-    /// # Errors
-    /// Those of `around`.
-    pub fn wrap(
-        &mut self,
-        around: impl FnOnce(Box<dyn Driver>) -> Result<Box<dyn Driver>, HostError>,
-    ) -> Result<(), HostError> {
-        if let Some(driver) = self.driver.take() {
-            self.driver = Some(around(driver)?);
-        }
-        Ok(())
+    /// Puts `faults` around the drivers, once their drives are claimed.
+    pub fn add_faults(&mut self, faults: Option<Faults>) {
+        self.faults = faults;
     }
 
-    /// Claims the drives, once: brings the bus up. The answer is where the axes stand, mm or rad.
+    /// Claims the drives, once: brings the buses up. The answer is where the axes stand, mm or rad.
     ///
     /// # Errors
-    /// The drives cannot be reached, one of them has a fault that is not to be reset, or what the driver says of them makes no
+    /// The drives cannot be reached, one of them has a fault that is not to be reset, or what a driver says of them makes no
     /// sense.
     pub fn attach(
         &mut self,
@@ -59,78 +58,116 @@ impl Claim {
         joints: &JointSpace,
         switches: Switches,
     ) -> Result<AxisVector, HostError> {
-        let Some(driver) = &mut self.driver else { return Ok(machine.start) };
-        let attached = setup::open(machine, driver.as_mut(), joints)?;
+        let Some(drives) = &mut self.drives else { return Ok(machine.start) };
+        let attached = drives.open(machine, joints)?;
         self.attached = Some(attached);
-        let look = Look { machine, joints, attached: &attached, driver: driver.as_ref() };
+        let look = Look { machine, joints, attached: &attached, drives, roster: drives.roster() };
         look.at_numbers()?;
         look.at_states(switches.reset)?;
+        look.at_skew()?;
         look.at_known(switches)?;
         Ok(look.axes())
     }
 
-    /// The driver, and what it said.
+    /// The driver for the fine loop, and what the drives said.
     pub fn into_parts(mut self) -> Option<(Box<dyn Driver>, Attached)> {
         let attached = self.attached.take()?;
-        self.driver.take().map(|driver| (driver, attached))
+        let driver = self.drives.take()?.into_driver();
+        match self.faults.take() {
+            Some(faults) => Some((faults::wrap(driver, faults), attached)),
+            None => Some((driver, attached)),
+        }
     }
 }
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        if let (Some(driver), Some(_)) = (&mut self.driver, &self.attached) {
+        if let (Some(drives), Some(_)) = (&mut self.drives, &self.attached) {
             // What refuses the run is told; that the drives could not be let go of either would hide it.
-            let _ = driver.stop();
+            let _ = drives.stop();
         }
     }
 }
 
-/// Looks at what a driver says of its joints.
+/// Looks at what the drivers say of the joints.
 struct Look<'a> {
     machine: &'a Machine,
     joints: &'a JointSpace,
     attached: &'a Attached,
-    driver: &'a dyn Driver,
+    drives: &'a Drives,
+    roster: Roster,
 }
 
 impl Look<'_> {
-    fn refuse(&self, cause: &str) -> HostError {
-        refusal(self.machine, "driver.plugin", format!("driver {}: {cause}", self.machine.driver.plugin))
-    }
-
-    /// Names of the joints that `which` says, or none.
-    fn named(&self, which: impl Fn(usize) -> bool) -> Option<String> {
-        let names: Vec<_> = (0..self.joints.count()).filter(|i| which(*i)).map(|i| self.joints.name(i)).collect();
-        (!names.is_empty()).then(|| names.join(", "))
+    /// What is wrong with the joints that `which` says: `cause` makes a sentence of their names, for the driver of the first.
+    fn refuse(&self, which: impl Fn(usize) -> bool, cause: impl Fn(&str) -> String) -> Result<(), HostError> {
+        let Some(first) = (0..self.joints.count()).find(|i| which(*i)) else { return Ok(()) };
+        let driver = self.roster.of_joint(first);
+        let of_driver = |joint: &usize| which(*joint) && self.roster.of_joint(*joint).section == driver.section;
+        let names: Vec<_> = (0..self.joints.count()).filter(of_driver).map(|i| self.joints.name(i)).collect();
+        let words = format!("driver {}: {}", driver.title, cause(&names.join(", ")));
+        Err(refusal(self.machine, &format!("{}.plugin", driver.section), words))
     }
 
     fn at_numbers(&self) -> Result<(), HostError> {
         let attached = self.attached;
-        if let Some(names) = self.named(|i| !attached.position[i].is_finite()) {
-            return Err(self.refuse(&format!("its start gives no finite number as the position of {names}")));
-        }
-        if let Some(names) = self.named(|i| !attached.state[i].is_known()) {
-            return Err(self.refuse(&format!("its start gives a number as the state of {names} that stands for none")));
-        }
-        if let Some(names) = self.named(|i| attached.delay_periods[i] > MAX_DELAY_PERIODS) {
-            let cause = format!("the feedback of {names} is more than {MAX_DELAY_PERIODS} fine periods behind");
-            return Err(self.refuse(&cause));
+        self.refuse(
+            |i| !attached.position[i].is_finite(),
+            |names| format!("its start gives no finite number as the position of {names}"),
+        )?;
+        self.refuse(
+            |i| !attached.state[i].is_known(),
+            |names| format!("its start gives a number as the state of {names} that stands for none"),
+        )?;
+        self.refuse(
+            |i| attached.delay_periods[i] > MAX_DELAY_PERIODS,
+            |names| format!("the feedback of {names} is more than {MAX_DELAY_PERIODS} fine periods behind"),
+        )
+    }
+
+    fn at_states(&self, reset: bool) -> Result<(), HostError> {
+        let is = |state: JointState| move |i: usize| self.attached.state[i] == state;
+        self.refuse(is(JointState::Lost), |names| format!("the drive of {names} cannot be reached"))?;
+        let faulty = (0..self.joints.count()).find(|i| is(JointState::Fault)(*i)).filter(|_| !reset);
+        self.refuse(
+            |i| Some(i) == faulty,
+            |name| {
+                let joint = faulty.unwrap_or_default();
+                let hexadecimal = self.roster.of_joint(joint).description.hexadecimal_codes != 0;
+                let code = self.attached.fault_code[joint];
+                let code = setup::code_text(hexadecimal, code, &self.drives.explain(joint, code));
+                format!("the drive of {name} stands in fault {code}; --reset clears it")
+            },
+        )
+    }
+
+    /// The joints of a gantry keep their skew until they are squared, unless it is so large that moving them would bend something.
+    fn at_skew(&self) -> Result<(), HostError> {
+        let known = |joint: usize| self.attached.known >> joint & 1 == 1;
+        for axis in 0..self.machine.axes.count() {
+            let moves = |joint: &usize| self.joints.joints[*joint].axis == Some(axis) && known(*joint);
+            let joints: Vec<usize> = (0..self.joints.count()).filter(moves).collect();
+            let at = |joint: &usize| self.attached.position[*joint];
+            let low = joints.iter().min_by(|a, b| at(a).total_cmp(&at(b)));
+            let high = joints.iter().max_by(|a, b| at(a).total_cmp(&at(b)));
+            let (Some(low), Some(high)) = (low, high) else { continue };
+            if at(high) - at(low) > self.machine.max_skew_mm[axis] && self.joints.are_stated_by_axes() {
+                return Err(self.too_skew(axis, *low, *high));
+            }
         }
         Ok(())
     }
 
-    fn at_states(&self, reset: bool) -> Result<(), HostError> {
-        let is = |state: JointState| self.named(|i| self.attached.state[i] == state);
-        if let Some(names) = is(JointState::Lost) {
-            return Err(self.refuse(&format!("the drive of {names} cannot be reached")));
-        }
-        let faulty = (0..self.joints.count()).find(|i| self.attached.state[*i] == JointState::Fault);
-        if let Some(joint) = faulty.filter(|_| !reset) {
-            let (name, code) = (self.joints.name(joint), self.attached.fault_code[joint]);
-            let code = setup::code_text(self.driver, code);
-            return Err(self.refuse(&format!("the drive of {name} stands in fault {code}; --reset clears it")));
-        }
-        Ok(())
+    fn too_skew(&self, axis: usize, low: usize, high: usize) -> HostError {
+        let rotary = self.machine.axes.is_rotary(axis);
+        let (scale, unit) = if rotary { (1f64.to_degrees(), "deg") } else { (1.0, "mm") };
+        let letter = self.machine.axes.letter(axis).to_ascii_lowercase();
+        let at = |joint: usize| {
+            format!("{} stands at {:.4} {unit}", self.joints.name(joint), self.attached.position[joint] * scale)
+        };
+        let most = self.machine.max_skew_mm[axis] * scale;
+        let cause = format!("the gantry is skew: {}, {}; at most {most} {unit} are allowed", at(low), at(high));
+        refusal(self.machine, &format!("axes.{letter}.max_skew_{unit}"), cause)
     }
 
     /// Programs and lines are refused where it is not known where a joint is.
@@ -139,18 +176,16 @@ impl Look<'_> {
         // Where axes are homed, joints are axes.
         let homed = homing.fold(0, |joints, of| joints | 1 << of.axis);
         let known = self.attached.known | self.attached.homed | homed;
-        let unknown = self.named(|i| known >> i & 1 == 0);
-        match unknown.filter(|_| !switches.unhomed) {
-            Some(names) if switches.home => {
-                let cause = format!("it is not known where {names} stands, and no [homing.<axis>] table homes it");
-                Err(self.refuse(&cause))
-            }
-            Some(names) => {
-                let cause = format!("it is not known where {names} stands: home the machine first, or run with --home");
-                Err(self.refuse(&cause))
-            }
-            None => Ok(()),
-        }
+        self.refuse(
+            |i| known >> i & 1 == 0 && !switches.unhomed,
+            |names| {
+                if switches.home {
+                    format!("it is not known where {names} stands, and no [homing.<axis>] table homes it")
+                } else {
+                    format!("it is not known where {names} stands: home the machine first, or run with --home")
+                }
+            },
+        )
     }
 
     /// Where the axes stand: where the machine file has them, if the joints are there.

@@ -82,7 +82,7 @@ impl Driver for Timed {
         self.driver.stop()
     }
 
-    fn explain(&self, code: u32) -> Words {
-        self.driver.explain(code)
+    fn explain(&self, joint: u32, code: u32) -> Words {
+        self.driver.explain(joint, code)
     }
 }

@@ -4,6 +4,7 @@ use tandem_fine::{Breach, Fault, FaultKind};
 use tandem_machine::Machine;
 use tandem_sdk::{Driver, JointState, PluginError};
 
+use crate::drives::Roster;
 use crate::joints::JointSpace;
 use crate::roles;
 use crate::setup::code_text;
@@ -13,6 +14,7 @@ struct Names<'a> {
     machine: &'a Machine,
     joints: &'a JointSpace,
     drives: &'a dyn Driver,
+    roster: &'a Roster,
 }
 
 /// What others know of a fault.
@@ -24,13 +26,16 @@ pub struct Known<'a> {
     pub driver: Option<&'a PluginError>,
     /// Knows what the drives' codes mean.
     pub drives: &'a dyn Driver,
+    /// Who is who among the drivers.
+    pub roster: &'a Roster,
     /// What made the fine loop late.
     pub late: Option<&'a str>,
 }
 
 /// What happened, who did it, where.
 pub fn describe(machine: &Machine, joints: &JointSpace, fault: &Fault, known: Known<'_>) -> String {
-    let (t_s, names) = (fault.tick as f64 * machine.fine_period_s, Names { machine, joints, drives: known.drives });
+    let names = Names { machine, joints, drives: known.drives, roster: known.roster };
+    let t_s = fault.tick as f64 * machine.fine_period_s;
     format!("{} (line {}, tick {}, {t_s:.3} s)", cause(&names, &fault.kind, known), fault.line, fault.tick)
 }
 
@@ -40,31 +45,31 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
     match kind {
         FaultKind::Guard { breach, axis, value, limit } => names.guard(*breach, *axis, *value, *limit),
         FaultKind::Drive { joint, code } => {
-            let (joint, code) = (names.joint(*joint), code_text(names.drives, *code));
-            format!("driver {}: the drive of {joint} reports fault {code}", machine.driver.plugin)
+            let (driver, named, code) = (names.driver(*joint), names.joint(*joint), names.code(*joint, *code));
+            format!("driver {driver}: the drive of {named} reports fault {code}")
         }
         FaultKind::Lost { joint, code } => {
-            let (joint, code) = (names.joint(*joint), names.code_if_any(*code));
-            format!(
-                "driver {}: the drive of {joint} is lost: the driver does not reach it{code}",
-                machine.driver.plugin
-            )
+            let (driver, named, code) = (names.driver(*joint), names.joint(*joint), names.code_if_any(*joint, *code));
+            format!("driver {driver}: the drive of {named} is lost: the driver does not reach it{code}")
         }
         FaultKind::LetGo { joint, state } => {
-            let (joint, state) = (names.joint(*joint), state_text(*state));
-            format!("driver {}: the drive of {joint} has let go: it is {state}", machine.driver.plugin)
+            let (driver, named, state) = (names.driver(*joint), names.joint(*joint), state_text(*state));
+            format!("driver {driver}: the drive of {named} has let go: it is {state}")
         }
         FaultKind::NotEnabled { joint, state, code } => {
-            let (joint, code, within_s) =
-                (names.joint(*joint), names.code_if_any(*code), names.drives.describe().enable_s);
-            let (driver, state) = (&machine.driver.plugin, state_text(*state));
-            format!("driver {driver}: {joint} was not enabled within {within_s} s: its drive is {state}{code}")
+            let (driver, named, code) = (names.driver(*joint), names.joint(*joint), names.code_if_any(*joint, *code));
+            let (within_s, state) = (names.drives.describe().enable_s, state_text(*state));
+            format!("driver {driver}: {named} was not enabled within {within_s} s: its drive is {state}{code}")
         }
         FaultKind::NotHomed { joint, state, code, within_s } => names.not_homed(*joint, *state, *code, *within_s),
         FaultKind::State { joint, number } => names.no_state(*joint, *number),
-        FaultKind::Feedback { joint } => {
-            let of = joint.map_or("the spindle".to_string(), |joint| names.joint(joint));
-            format!("driver {}: the feedback of {of} is not a finite number", machine.driver.plugin)
+        FaultKind::Feedback { joint: Some(joint) } => {
+            let (driver, named) = (names.driver(*joint), names.joint(*joint));
+            format!("driver {driver}: the feedback of {named} is not a finite number")
+        }
+        FaultKind::Feedback { joint: None } => {
+            let driver = &names.roster.of_spindle().title;
+            format!("driver {driver}: the feedback of the spindle is not a finite number")
         }
         FaultKind::Following { joint, error_mm, limit_mm } => names.following(*joint, *error_mm, *limit_mm),
         FaultKind::Kinematics { joint } => {
@@ -79,7 +84,7 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
         }
         FaultKind::Driver => {
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
-            format!("driver {}: the exchange failed{words}", machine.driver.plugin)
+            format!("driver {}: the exchange failed{words}", names.roster.failed().title)
         }
         FaultKind::EmergencyStop => "emergency stop".to_string(),
         FaultKind::Input { role, input, old } => roles::fault_text(machine, *role, *input, *old),
@@ -119,9 +124,20 @@ pub fn state_text(state: JointState) -> &'static str {
 }
 
 impl Names<'_> {
+    /// What the driver of a joint is called.
+    fn driver(&self, joint: usize) -> &str {
+        &self.roster.of_joint(joint).title
+    }
+
+    /// A code of a joint's drive, with the words for it.
+    fn code(&self, joint: usize, code: u32) -> String {
+        let hexadecimal = self.roster.of_joint(joint).description.hexadecimal_codes != 0;
+        code_text(hexadecimal, code, &self.drives.explain(joint as u32, code))
+    }
+
     /// The code of a drive behind other words; nothing where it has none.
-    fn code_if_any(&self, code: u32) -> String {
-        if code == 0 { String::new() } else { format!(", fault {}", code_text(self.drives, code)) }
+    fn code_if_any(&self, joint: usize, code: u32) -> String {
+        if code == 0 { String::new() } else { format!(", fault {}", self.code(joint, code)) }
     }
 
     /// A joint by its number, and by its name where the machine file has given it one.
@@ -133,13 +149,13 @@ impl Names<'_> {
     }
 
     fn no_state(&self, joint: usize, number: u32) -> String {
-        let (driver, joint) = (&self.machine.driver.plugin, self.joint(joint));
+        let (driver, joint) = (self.driver(joint), self.joint(joint));
         let known = "0 (disabled) to 6 (lost) are known";
         format!("driver {driver}: its exchange gives {number} as the state of {joint}: {known}")
     }
 
     fn not_homed(&self, joint: usize, state: JointState, code: u32, within_s: f64) -> String {
-        let (driver, joint, code) = (&self.machine.driver.plugin, self.joint(joint), self.code_if_any(code));
+        let (driver, code, joint) = (self.driver(joint), self.code_if_any(joint, code), self.joint(joint));
         let state = state_text(state);
         format!("driver {driver}: {joint} was not homed by its drive within {within_s} s: it is {state}{code}")
     }
@@ -148,7 +164,7 @@ impl Names<'_> {
         let turns = self.joints.joints.get(joint).is_some_and(|joint| joint.rotary);
         let (error, limit, unit) =
             if turns { (error_mm.to_degrees(), limit_mm.to_degrees(), "deg") } else { (error_mm, limit_mm, "mm") };
-        let (driver, joint) = (&self.machine.driver.plugin, self.joint(joint));
+        let (driver, joint) = (self.driver(joint), self.joint(joint));
         format!("driver {driver}: {joint} is {error:.6} {unit} away from its command, limit {limit:.6} {unit}")
     }
 

@@ -10,7 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tandem_machine::Machine;
+use tandem_machine::{DriverChoice, Machine};
 use tandem_rings::{Controls, Status};
 use tandem_sdk::PluginKind;
 use tandem_sdk::abi::{Method, Watched, Whereabouts, watch_this_thread};
@@ -85,7 +85,7 @@ impl HangWatch {
         let names = Names {
             planner: machine.planner.plugin.clone(),
             strategy: machine.feed_strategy.as_ref().map(|choice| choice.plugin.clone()).unwrap_or_default(),
-            driver: machine.driver.plugin.clone(),
+            driver: machine.drivers.iter().map(DriverChoice::title).collect::<Vec<_>>().join(", "),
             kinematics: machine.kinematics.plugin.clone(),
         };
         let shared = Arc::new(Shared {

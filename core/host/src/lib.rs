@@ -10,6 +10,7 @@ mod command_file;
 mod command_log;
 mod curve_watch;
 mod density;
+mod drives;
 mod dry_run;
 mod error;
 mod exchange_time;
@@ -40,6 +41,7 @@ mod roles;
 mod rules;
 mod run;
 mod setup;
+mod stand_in;
 mod stops;
 mod strategy;
 mod summary;
@@ -52,6 +54,7 @@ pub use block_times::{BlockTimes, TimeGoesTo};
 pub use command::{Command, Timed};
 pub use command_file::parse_commands;
 pub use curve_watch::{CurveWatch, OnCurve};
+pub use drives::attached_driver;
 pub use error::HostError;
 pub use hang::at_hang;
 pub use joints::JointPeaks;
@@ -72,6 +75,7 @@ pub use record::{
 pub use registry::{PluginRefusal, Registry};
 pub use run::{Clock, Outcome, Run, Switches};
 pub use setup::moves_metal;
+pub use stand_in::with_stand_ins;
 pub use stops::Stop;
 pub use summary::{
     ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PlanningRow, PlanningUs, Summary,

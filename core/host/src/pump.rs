@@ -87,8 +87,8 @@ pub struct Pump<'a> {
     pub skips_homing: bool,
     /// The planner's name, or the file that it came from: for a fault's words.
     pub planner: String,
-    /// How many analog inputs have a name.
-    pub analog: usize,
+    /// Numbers of the analog inputs that have a name.
+    pub analog: Vec<usize>,
     /// What the machine waits for before it moves.
     pub waits: Option<Waits>,
     /// What a file that cannot be written any further does to the motion.
@@ -125,7 +125,7 @@ impl<'a> Pump<'a> {
             aborted: None,
             skips_homing: false,
             planner: String::new(),
-            analog: 0,
+            analog: vec![],
             waits: None,
             on_record_error: RecordErrorMode::default(),
             commands,
@@ -213,7 +213,7 @@ impl<'a> Pump<'a> {
                 self.observer.command(&command);
             }
             let deviation_mm = self.monitor.sample(sample);
-            let (signals, count) = signals(self.feed.as_ref(), self.analog, sample);
+            let (signals, count) = signals(self.feed.as_ref(), &self.analog, sample);
             self.observer.sample(sample, deviation_mm, &signals[..count]);
             if let (Some(feed), None) = (&mut self.feed, &self.soft_error)
                 && let Some(note) = feed.sample(sample, ratios, requests)
@@ -290,13 +290,13 @@ impl<'a> Pump<'a> {
     }
 }
 
-/// The strategy's last signals, and after them the `analog` named inputs.
-fn signals(feed: Option<&FeedRunner>, analog: usize, sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
+/// The strategy's last signals, and after them the `analog` inputs that have a name.
+fn signals(feed: Option<&FeedRunner>, analog: &[usize], sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
     let mut signals = feed.and_then(|s| s.answer).map_or([0.0; MAX_SIGNALS], |a| a.signals);
     let own = feed.map_or(0, |s| s.signals().len());
-    let count = (own + analog).min(MAX_SIGNALS);
-    for (to, from) in signals[own..count].iter_mut().zip(sample.analog) {
-        *to = from;
+    let count = (own + analog.len()).min(MAX_SIGNALS);
+    for (to, from) in signals[own..count].iter_mut().zip(analog) {
+        *to = sample.analog[*from];
     }
     (signals, count)
 }

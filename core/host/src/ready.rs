@@ -9,6 +9,7 @@ use tandem_sdk::{Block, Planner};
 
 use crate::claim::Claim;
 use crate::density::Density;
+use crate::drives::Drives;
 use crate::error::HostError;
 use crate::hang::HangWatch;
 use crate::joints::JointSpace;
@@ -60,7 +61,7 @@ impl Plugins {
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         let watch = HangWatch::of(machine);
         let planner = setup::planner(machine, registry)?;
-        Ok(Self { watch, planner, claim: Claim::new(setup::driver(machine, registry)?) })
+        Ok(Self { watch, planner, claim: Claim::new(Drives::of(machine, registry)?) })
     }
 
     /// Whether they go with each other, and with what is asked of them.
@@ -68,12 +69,12 @@ impl Plugins {
     /// # Errors
     /// What does not go together, with its place in the machine file.
     pub fn check(&self, machine: &Machine, registry: &Registry, switches: Switches) -> Result<(), HostError> {
-        let (joints, driver) = (JointSpace::of(machine, registry)?, self.claim.describe());
-        rules::check(machine, &self.planner.describe(), driver)?;
+        let (joints, drivers) = (JointSpace::of(machine, registry)?, self.claim.roster());
+        rules::check(machine, &self.planner.describe(), &drivers)?;
         rules::check_homing(machine, &joints, switches)?;
         // A driver that has panicked says so here, and of what it is nothing is known.
         self.claim.check(machine, &joints)?;
-        rules::check_real(machine, &joints, &driver, switches.clock)
+        rules::check_real(machine, &joints, &drivers, switches.clock)
     }
 
     /// Puts the machine's faults around the driver.
@@ -82,7 +83,8 @@ impl Plugins {
     /// What `[faults]` says wrongly.
     pub fn add_faults(&mut self, machine: &Machine, registry: &Registry) -> Result<(), HostError> {
         let joints = JointSpace::of(machine, registry)?;
-        self.claim.wrap(|driver| faults::wrap(machine, driver, &joints))
+        self.claim.add_faults(faults::read(machine, &joints)?);
+        Ok(())
     }
 
     /// Claims the drives: the machine starts where they stand. Host; allocates.

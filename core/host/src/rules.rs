@@ -1,24 +1,23 @@
 //! What does not go together: refusals before a run starts.
 
-use tandem_machine::{GuardMode, JerkMode, Machine, Place};
-use tandem_sdk::{DriverDescription, MAX_SIGNALS, PlannerDescription};
+use tandem_machine::{Analog, GuardMode, JerkMode, Machine, Place};
+use tandem_sdk::{MAX_SIGNALS, PlannerDescription};
 
+use crate::drives::{Entry, Roster};
 use crate::error::HostError;
 use crate::joints::JointSpace;
 use crate::run::{Clock, Switches};
 
 /// Checks planner, driver and guard against each other.
-pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDescription) -> Result<(), HostError> {
+pub fn check(machine: &Machine, planner: &PlannerDescription, drivers: &Roster) -> Result<(), HostError> {
     let refuse = |key: &str, cause: String| Err(refusal(machine, key, cause));
-    let simulated = driver.simulated != 0;
     let name = &machine.planner.plugin;
     if !(2..=3).contains(&planner.order) {
         let cause = format!("{name} describes plans of order {}: 2 and 3 are known", planner.order);
         return refuse("planner.plugin", cause);
     }
-    if machine.guard == GuardMode::Count && !simulated {
-        let cause =
-            format!("\"count\" sends samples beyond the limits: not with {}, which moves metal", machine.driver.plugin);
+    if let Some(real) = drivers.real().filter(|_| machine.guard == GuardMode::Count) {
+        let cause = format!("\"count\" sends samples beyond the limits: not with {}, which moves metal", real.title);
         return refuse("guard.mode", cause);
     }
     if planner.breaks_limits != 0 && machine.guard != GuardMode::Count {
@@ -38,32 +37,32 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, driver: DriverDesc
 }
 
 /// Real drives live in real time.
-pub fn refuse_virtual(machine: &Machine) -> HostError {
-    let cause = format!("{} moves metal: it is refused on the virtual clock", machine.driver.plugin);
-    refusal(machine, "driver.plugin", cause)
+pub fn refuse_virtual(machine: &Machine, real: &Entry) -> HostError {
+    let cause = format!("{} moves metal: it is refused on the virtual clock", real.title);
+    refusal(machine, &format!("{}.plugin", real.section), cause)
 }
 
 /// Checks the clock that is asked for, and what real drives need on top.
 pub fn check_real(
     machine: &Machine,
     joints: &JointSpace,
-    driver: &DriverDescription,
+    drivers: &Roster,
     clock: Option<Clock>,
 ) -> Result<(), HostError> {
-    if driver.simulated != 0 {
-        return Ok(());
-    }
+    let Some(real) = drivers.real() else { return Ok(()) };
     if clock == Some(Clock::Virtual) {
-        return Err(refuse_virtual(machine));
+        return Err(refuse_virtual(machine, real));
     }
-    let unwatched = joints.joints.iter().find(|joint| joint.max_following_error_mm.is_infinite());
-    match unwatched.filter(|_| driver.watches_following == 0) {
-        Some(joint) => {
+    let watched = |driver: &Entry| driver.description.simulated != 0 || driver.description.watches_following != 0;
+    let each = (0..).zip(&joints.joints).map(|(i, joint)| (drivers.of_joint(i), joint));
+    let mut unwatched = each.filter(|(driver, joint)| !watched(driver) && joint.max_following_error_mm.is_infinite());
+    match unwatched.next() {
+        Some((driver, joint)) => {
             let table = if machine.joints.is_empty() { "axes" } else { "joints" };
             let unit = if joint.rotary { "deg" } else { "mm" };
             let cause = format!(
                 "real drives need max_following_error_{unit}: {} watches no following error by itself",
-                machine.driver.plugin
+                driver.title
             );
             Err(refusal(machine, &format!("{table}.{}", joint.name.to_ascii_lowercase()), cause))
         }
@@ -90,15 +89,14 @@ pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) 
 
 /// Checks that trace and report have room for all signals, and that each has its own name.
 pub fn check_signals(machine: &Machine, of_strategy: &[&str]) -> Result<(), HostError> {
+    let analog = if machine.has("analog") { "analog" } else { "driver.analog" };
     let count = of_strategy.len() + machine.analog.len();
     if count > MAX_SIGNALS {
         let cause = format!("{count} signals with those of the feed strategy: a trace has room for {MAX_SIGNALS}");
-        return Err(refusal(machine, "driver.analog", cause));
+        return Err(refusal(machine, analog, cause));
     }
-    match machine.analog.iter().find(|name| of_strategy.contains(&name.as_str())) {
-        Some(name) => {
-            Err(refusal(machine, "driver.analog", format!("{name}: the feed strategy has a signal of this name")))
-        }
+    match machine.analog.iter().map(Analog::signal).find(|name| of_strategy.contains(&name.as_str())) {
+        Some(name) => Err(refusal(machine, analog, format!("{name}: the feed strategy has a signal of this name"))),
         None => Ok(()),
     }
 }
@@ -114,6 +112,8 @@ pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostEr
 
 #[cfg(test)]
 mod tests {
+    use tandem_sdk::DriverDescription;
+
     use super::*;
 
     #[test]
@@ -122,7 +122,8 @@ mod tests {
         let machine = Machine::read(&path, &[]).unwrap();
         for (order, known) in [(0, false), (1, false), (2, true), (3, true), (4, false), (250, false)] {
             let planner = PlannerDescription { order, ..PlannerDescription::order_2() };
-            let words = check(&machine, &planner, DriverDescription::simulated()).err().map(|e| e.to_string());
+            let words =
+                check(&machine, &planner, &Roster::of_one(DriverDescription::simulated())).err().map(|e| e.to_string());
             let told = words.is_some_and(|words| words.contains(&format!("plans of order {order}: 2 and 3 are known")));
             assert_eq!(told, !known, "{order}");
         }
@@ -141,7 +142,7 @@ mod tests {
         ] {
             let set = ("guard.mode".to_string(), guard.to_string());
             let machine = Machine::read(&path, &[set]).unwrap();
-            let answer = check(&machine, &planner, driver);
+            let answer = check(&machine, &planner, &Roster::of_one(driver));
             assert_eq!(answer.is_ok(), runs, "{guard} {driver:?}: {:?}", answer.err().map(|e| e.to_string()));
         }
     }

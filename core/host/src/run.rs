@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
-use tandem_machine::{JerkMode, Machine};
+use tandem_machine::{Analog, JerkMode, Machine};
 use tandem_rings::{HostEnd, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
 use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
 
 use crate::command::Timed;
+use crate::drives::Roster;
 use crate::error::HostError;
 use crate::exchange_time::{self, ExchangeTimes};
 use crate::fault_text::{Known, describe};
@@ -60,6 +61,8 @@ pub struct Switches {
     pub unhomed: bool,
     /// Faults in which drives stand are reset before they are enabled.
     pub reset: bool,
+    /// Edges that do not come are assumed where the motion towards them ends: something stands in for real drives.
+    pub assumes_edges: bool,
     /// The clock that is asked for; none where it follows the driver.
     pub clock: Option<Clock>,
 }
@@ -82,8 +85,8 @@ pub struct Run {
     switches: Switches,
     watch: Option<HangWatch>,
     clock: Clock,
-    /// Metal moves.
-    real: bool,
+    /// Who is who among the drivers.
+    roster: Roster,
     /// Bit per axis of which the drives did not know where it is when they were attached.
     pub(crate) unknown_axes: u32,
     /// What the first pass found: totals.
@@ -146,7 +149,8 @@ impl Run {
     fn open(ready: Ready) -> Result<Self, HostError> {
         let Ready { watch, machine, program, source, policy, planner, claim, feed, joints, checked, switches, .. } =
             ready;
-        let drives = claim.describe();
+        let roster = claim.roster();
+        let drives = roster.describe();
         let Some((driver, attached)) = claim.into_parts() else {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
@@ -186,7 +190,7 @@ impl Run {
             exchange,
             checked,
             clock: switches.clock.unwrap_or(if drives.simulated == 0 { Clock::Wall } else { Clock::Virtual }),
-            real: drives.simulated == 0,
+            roster,
             unknown_axes,
         })
     }
@@ -217,9 +221,9 @@ impl Run {
     }
 
     /// Names of the feed strategy's signals, and after them those of the analog inputs.
-    pub fn signals(&self) -> Vec<&str> {
+    pub fn signals(&self) -> Vec<String> {
         let own = self.feed.as_ref().map_or(&[][..], FeedRunner::signals);
-        own.iter().copied().chain(self.machine.analog.iter().map(String::as_str)).collect()
+        own.iter().map(|name| (*name).to_string()).chain(self.machine.analog.iter().map(Analog::signal)).collect()
     }
 
     /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
@@ -228,10 +232,15 @@ impl Run {
     /// The computer refuses: a thread cannot be started. Real drives are refused on the virtual clock.
     pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
         let started = Instant::now();
-        if self.real && clock == Clock::Virtual {
-            let refused = rules::refuse_virtual(&self.machine);
+        if let Some(real) = self.roster.real().filter(|_| clock == Clock::Virtual) {
+            let refused = rules::refuse_virtual(&self.machine, real);
             let _ = self.fine.into_driver().stop();
             return Err(refused);
+        }
+        let threads = if clock == Clock::Wall { self.roster.begin_threads() } else { Ok(()) };
+        if let Err(error) = threads {
+            let _ = self.fine.into_driver().stop();
+            return Err(HostError::System(format!("a slow driver has no thread: {error}")));
         }
         let machine = self.machine;
         if let Some(watch) = &self.watch {
@@ -249,7 +258,8 @@ impl Run {
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
         pump.waits = Some(Waits::new(&machine));
-        (pump.skips_homing, pump.analog) = (self.switches.home, machine.analog.len());
+        pump.skips_homing = self.switches.home;
+        pump.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
         pump.on_record_error = machine.on_record_error;
         pump.planner.clone_from(&machine.planner.plugin);
         let mut measured = None;
@@ -279,6 +289,7 @@ impl Run {
             soft: pump.soft_cause(),
             driver: fine.plugin_error(),
             drives: fine.driver(),
+            roster: &self.roster,
             late: late.as_deref(),
         };
         summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
@@ -289,7 +300,7 @@ impl Run {
         let stopped = fine.into_driver().stop();
         drop(pump);
         if let Err(error) = stopped {
-            not_let_go(&machine, &error, &mut summary, observer);
+            not_let_go(&self.roster, &error, &mut summary, observer);
         }
         // What plugins say when they are stopped and dropped.
         drain_plugin_log(&mut |line| observer.note(line));
@@ -308,8 +319,8 @@ fn tell_times(summary: &mut Summary, measured: Option<&(Timing, PageFaults)>, ex
 }
 
 /// The driver could not release the drives: that is the fault of a run that has no other, and is told beside any other.
-fn not_let_go(machine: &Machine, error: &PluginError, summary: &mut Summary, observer: &mut dyn RunObserver) {
-    let words = format!("driver {}: the drives were not let go of: {error}", machine.driver.plugin);
+fn not_let_go(roster: &Roster, error: &PluginError, summary: &mut Summary, observer: &mut dyn RunObserver) {
+    let words = format!("driver {}: the drives were not let go of: {error}", roster.titles());
     match &summary.fault {
         None => summary.fault = Some(words),
         Some(_) => observer.note(&format!("error: {words}")),

@@ -2,12 +2,12 @@
 
 use tandem_fine::{FineConfig, MissedLimits};
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
-use tandem_machine::{AxisHoming, GuardMode, Machine};
+use tandem_machine::{AxisHoming, DriverChoice, GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Name, Planner,
-    PlannerContext, PlannerDescription, PluginError, StrategyContext, size_of_contract,
+    Attached, AxisLimits, AxisVector, DriverContext, DriverDescription, FeedStrategy, Name, Planner, PlannerContext,
+    PlannerDescription, StrategyContext, Words, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
@@ -19,6 +19,7 @@ use crate::registry::{PluginRefusal, Registry};
 use crate::roles;
 use crate::rules::refusal;
 use crate::run::Switches;
+use crate::stand_in::AssumedEdges;
 use crate::strategy::FeedRunner;
 
 /// Greatest time constant that a program may ask for where the machine states no range, s.
@@ -73,6 +74,7 @@ pub fn behind_homing(machine: &Machine, source: Box<dyn Source + Send>, switches
 fn program(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
     match machine.operator.dry_run_feed_mm_per_s.filter(|_| switches.dry_run) {
         Some(feed_mm_per_s) => Box::new(DryRun::new(stream, machine.axes, feed_mm_per_s)),
+        None if switches.assumes_edges => Box::new(AssumedEdges(stream)),
         None => Box::new(stream),
     }
 }
@@ -110,31 +112,18 @@ pub fn refused(machine: &Machine, section: &str, refused: PluginRefusal) -> Host
     refusal(machine, &key, refused.cause)
 }
 
-/// Makes the machine's driver; it is not open yet.
-pub fn driver(machine: &Machine, registry: &Registry) -> Result<Box<dyn Driver>, HostError> {
-    registry.driver(&machine.driver).map_err(|e| refused(machine, "driver", e))
-}
-
-/// Whether real drives are behind the machine's driver; not where the driver cannot be made, which every run refuses. Host.
+/// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. Host.
 pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
-    driver(machine, registry).is_ok_and(|driver| driver.describe().simulated == 0)
+    machine.drivers.iter().any(|driver| is_real(driver, registry))
 }
 
-/// Whether the drives could be claimed, as far as that can be told without them.
-pub fn check_driver(machine: &Machine, driver: &dyn Driver, joints: &JointSpace) -> Result<(), HostError> {
-    let context = driver_context(machine, joints);
-    let known = joints.health(&context.start_position);
-    known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
-    driver.check(&context).map_err(|e| driver_refuses(machine, &e))
+/// Whether real drives are behind `driver`; not where it cannot be made.
+pub fn is_real(driver: &DriverChoice, registry: &Registry) -> bool {
+    registry.driver(&driver.choice).is_ok_and(|driver| driver.describe().simulated == 0)
 }
 
-/// Claims the drives: where they stand.
-pub fn open(machine: &Machine, driver: &mut dyn Driver, joints: &JointSpace) -> Result<Attached, HostError> {
-    let opened = driver.open(&driver_context(machine, joints)).and_then(|()| driver.start());
-    opened.map_err(|e| driver_refuses(machine, &e))
-}
-
-fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
+/// What a driver is told that has the whole machine.
+pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
     let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
     context.start_position = joints.to_joints(&machine.start);
     for (described, joint) in context.joints.iter_mut().zip(&joints.joints) {
@@ -150,27 +139,21 @@ fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
         context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
     }
     context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
-    context.analog = (0..machine.analog.len()).fold(0, |mask, input| mask | 1 << input);
+    context.analog = machine.analog.iter().fold(0, |mask, analog| mask | 1 << analog.input);
     context.outputs = u64::MAX;
     context.spindle = 1;
     context
 }
 
-/// A drive's code as its manual writes it, with the driver's words for it.
-pub fn code_text(driver: &dyn Driver, code: u32) -> String {
-    let number = number_text(code, driver.describe().hexadecimal_codes != 0);
-    let words = driver.explain(code);
+/// A drive's code as its manual writes it, with the driver's `words` for it.
+pub fn code_text(hexadecimal: bool, code: u32, words: &Words) -> String {
+    let number = number_text(code, hexadecimal);
     if words.as_str().is_empty() { number } else { format!("{number} ({})", words.as_str()) }
 }
 
 /// A drive's code alone, as its manual writes it.
 pub fn number_text(code: u32, hexadecimal: bool) -> String {
     if hexadecimal { format!("{code:#06x}") } else { code.to_string() }
-}
-
-fn driver_refuses(machine: &Machine, error: &PluginError) -> HostError {
-    let cause = format!("driver {}: {}", machine.driver.plugin, error.message());
-    refused(machine, "driver", PluginRefusal { option: error.option().map(str::to_string), cause })
 }
 
 /// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.

@@ -104,7 +104,7 @@ impl Driver for Cell {
     fn stop(&mut self) -> Result<(), PluginError> {
         Ok(())
     }
-    fn explain(&self, code: u32) -> tandem_sdk::Words {
+    fn explain(&self, _joint: u32, code: u32) -> tandem_sdk::Words {
         tandem_sdk::Words::new(if code == 0x7210 { "overvoltage" } else { "" })
     }
 }

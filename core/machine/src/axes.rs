@@ -10,6 +10,10 @@ use crate::units::{Units, refuse_other_kind};
 /// The letters that axes may have, as the file writes them.
 const LETTERS: &str = "xyzabcuvw";
 
+/// How far apart the joints of an axis may be found where the file states nothing, mm or deg: more than a gantry that was squared
+/// is out by after it stood without torque, and less than bends the bridge of an ordinary one.
+const MAX_SKEW: f64 = 1.0;
+
 /// The axes of a machine, what they may do and where they stand.
 #[derive(Clone, Debug)]
 pub(crate) struct AxisSet {
@@ -18,6 +22,7 @@ pub(crate) struct AxisSet {
     pub max_following_error: AxisVector,
     /// Highest feed while it is not known where the axis is, mm/s or rad/s; not a number where none is stated.
     pub unhomed_feed: AxisVector,
+    pub max_skew: AxisVector,
     pub start: AxisVector,
     pub home: AxisVector,
 }
@@ -28,6 +33,7 @@ struct Axis {
     limits: AxisLimits,
     following: f64,
     unhomed: f64,
+    skew: f64,
     start: f64,
     home: f64,
 }
@@ -57,6 +63,7 @@ impl AxisSet {
             limits: Limits::new(&limits).ok()?,
             max_following_error: vector(|a| a.following),
             unhomed_feed: vector(|a| a.unhomed),
+            max_skew: vector(|a| a.skew),
             start: vector(|a| a.start),
             home: vector(|a| a.home),
         })
@@ -75,9 +82,20 @@ fn axis(axes: &Section<'_>, name: &str, motion: &Motion) -> Option<Axis> {
     let stated = if section.has(units.following) { section.positive(units.following) } else { Some(f64::INFINITY) };
     let following = stated.map(|most| most * units.scale);
     let unhomed = if section.has(units.unhomed) { unhomed(&section, units, &limits) } else { Some(f64::NAN) };
+    let skew = if section.has(units.skew) { section.positive(units.skew) } else { Some(MAX_SKEW) };
+    let skew = skew.map(|most| most * units.scale);
     let start = position(&section, units.start, units, &limits, 0.0);
     let home = position(&section, units.home, units, &limits, start.unwrap_or(limits.min_mm));
-    Some(Axis { letter: letter?, rotary, limits, following: following?, unhomed: unhomed?, start: start?, home: home? })
+    Some(Axis {
+        letter: letter?,
+        rotary,
+        limits,
+        following: following?,
+        unhomed: unhomed?,
+        skew: skew?,
+        start: start?,
+        home: home?,
+    })
 }
 
 /// The stated feed of an axis of which it is not known where it is, mm/s or rad/s.

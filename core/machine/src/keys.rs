@@ -3,7 +3,7 @@
 /// A key of a configuration file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
-    /// Dotted path. `<axis>` and `<joint>` stand for a name; a last part in angle brackets for anything, at any depth.
+    /// Dotted path. A part in angle brackets stands for a name; a last part for anything that a plugin reads, at any depth.
     pub path: &'static str,
     /// Unit, or kind of value where it has none.
     pub unit: &'static str,
@@ -57,6 +57,8 @@ static MACHINE: &[Key] = &[
     key("axes.<axis>.max_following_error_deg", "deg", "no limit", "Largest distance between command and feedback of a fine period; beyond it the machine faults"),
     key("axes.<axis>.unhomed_max_feed_mm_per_min", "mm/min", "the search feed, else max_feed / 10", "Highest speed while it is not known where the axis is"),
     key("axes.<axis>.unhomed_max_feed_deg_per_min", "deg/min", "the search feed, else max_feed / 10", "Highest speed while it is not known where the axis is"),
+    key("axes.<axis>.max_skew_mm", "mm", "1", "How far apart the joints of a gantry may stand when their drives are claimed; beyond it the machine is refused"),
+    key("axes.<axis>.max_skew_deg", "deg", "1", "How far apart the joints of a gantry may stand when their drives are claimed; beyond it the machine is refused"),
     key("joints.<joint>.axis", "axis", "none", "Axis that the joint moves; two joints on one axis are a gantry. Without it the kinematics alone say what moves it"),
     key("joints.<joint>.kind", "linear or rotary", "linear", "Whether a joint without an axis slides (keys in mm) or turns (keys in deg)"),
     key("joints.<joint>.travel_mm", "mm", "the axis's; without one no end", "Lowest and highest position of a linear joint"),
@@ -81,6 +83,8 @@ static MACHINE: &[Key] = &[
     key("feed_strategy.options.<option>", "plugin's", "none", "Options of the feed strategy"),
     key("driver.plugin", "name or file", "required", "Driver of the drives, simulated or not"),
     key("driver.options.<option>", "plugin's", "none", "Options of the driver"),
+    key("driver.stand_in.plugin", "plugin", "ideal drives", "Driver that stands in for one with real drives where nothing may move: estimate, calibrate"),
+    key("driver.stand_in.options.<option>", "plugin's", "none", "Options of the driver that stands in"),
     key("driver.analog", "names", "[]", "Names of the driver's analog inputs from 0 on, at most 4: signals of trace and report"),
     key("outputs.<name>.output", "number", "required", "Number of the digital output that is called so, 0 to 61"),
     key("outputs.<name>.on_fault", "off or keep", "off", "What an emergency stop does with the output at once, and a fault when the axes are at rest"),
@@ -88,6 +92,17 @@ static MACHINE: &[Key] = &[
     key("inputs.<name>.role", "word", "none", "emergency-stop, drives-ready, door, feed-hold, limit, home, probe: what it does where it trips"),
     key("inputs.<name>.normally_closed", "boolean", "true", "The input is 1 as long as nothing trips it; false: it is 0"),
     key("inputs.<name>.max_age_ms", "ms", "10", "Age above which an input with a role counts as tripped"),
+    key("drivers.<driver>.plugin", "name or file", "required", "One driver of several: each has a part of the machine. Instead of [driver], which has all of it"),
+    key("drivers.<driver>.options.<option>", "plugin's", "none", "Options of the driver"),
+    key("drivers.<driver>.joints", "names", "[]", "Joints that it moves; a joint that is an axis is called as its axis is. The first one is the driver's joint 0"),
+    key("drivers.<driver>.inputs", "numbers", "[]", "Digital inputs that it has, 0 to 63. The first one is the driver's input 0"),
+    key("drivers.<driver>.outputs", "numbers", "[]", "Digital outputs that it has, 0 to 63; 62 is mist, 63 flood coolant. The first one is the driver's output 0"),
+    key("drivers.<driver>.analog", "numbers", "[]", "Analog inputs that it has, 0 to 3. The first one is the driver's analog input 0"),
+    key("drivers.<driver>.spindle", "boolean", "false", "It turns the spindle"),
+    key("drivers.<driver>.stand_in.plugin", "plugin", "ideal drives", "Driver that stands in for one with real drives where nothing may move: estimate, calibrate"),
+    key("drivers.<driver>.stand_in.options.<option>", "plugin's", "none", "Options of the driver that stands in"),
+    key("analog.<analog>.input", "number", "required", "Analog input that has this name, 0 to 3: a signal of trace and report"),
+    key("analog.<analog>.unit", "text", "none", "Unit of its values: stands behind the name of the signal"),
     key("faults.<fault>", "wrapper's", "none", "Seeded faults around the driver"),
     key("guard.mode", "stop or count", "stop", "What a sample beyond a limit does: stops the machine, or is counted (simulated drives only)"),
     key("recorder.on_error", "continue or hold", "continue", "Whether the motion goes on or comes to rest where a file of the run cannot be written: a full disk"),

@@ -19,6 +19,7 @@
 
 mod axes;
 mod convert;
+mod drivers;
 mod error;
 mod homing;
 mod inputs;
@@ -40,10 +41,12 @@ mod problems;
 mod schema;
 mod section;
 mod shown;
+mod signals;
 mod tools;
 mod units;
 mod values;
 
+pub use drivers::{DriverChoice, Owned};
 pub use error::{MachineError, Place, Problem};
 pub use homing::{AxisHoming, DriveHoming, HomingBy, SwitchHoming};
 pub use inputs::{Input, Role};
@@ -54,4 +57,5 @@ pub use motion::{FineThread, JerkMode, Motion};
 pub use outputs::Output;
 pub use parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle};
 pub use probe::Probe;
+pub use signals::Analog;
 pub use tools::{Tool, ToolTable};

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use tandem_sdk::{Axes, AxisVector, Limits};
 
 use crate::axes::AxisSet;
+use crate::drivers::{self, DriverChoice, Wanted};
 use crate::error::{MachineError, Place};
 use crate::homing::{self, AxisHoming};
 use crate::inputs::{self, Input};
@@ -21,6 +22,7 @@ use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
 use crate::schema::check;
 use crate::section::Section;
+use crate::signals::{self, Analog};
 use crate::tools::ToolTable;
 
 /// A machine as `machine.toml` describes it, in internal units: mm, s, rad. A rotary axis is in rad wherever a name
@@ -58,6 +60,8 @@ pub struct Machine {
     pub max_following_error_mm: AxisVector,
     /// Highest feed of each axis while it is neither known nor homed, mm/s or rad/s.
     pub unhomed_max_feed_mm_per_s: AxisVector,
+    /// How far apart the joints of each axis may stand when their drives are claimed, mm or rad.
+    pub max_skew_mm: AxisVector,
     /// Where a simulated machine stands at power-on, within the travel.
     pub start: AxisVector,
     /// Reference position, within the travel.
@@ -70,14 +74,14 @@ pub struct Machine {
     pub planner: PluginChoice,
     /// Feed strategy, if there is one.
     pub feed_strategy: Option<PluginChoice>,
-    /// Driver.
-    pub driver: PluginChoice,
-    /// Names of the driver's analog inputs from 0 on, for trace and report.
-    pub analog: Vec<String>,
+    /// Drivers, at least one: either one that has the whole machine, or each with its part of it.
+    pub drivers: Vec<DriverChoice>,
+    /// Digital inputs that have a name.
+    pub inputs: Vec<Input>,
     /// Digital outputs that the file names.
     pub outputs: Vec<Output>,
-    /// Digital inputs that the file names.
-    pub inputs: Vec<Input>,
+    /// Analog inputs that have a name, for trace and report, in the order of their numbers.
+    pub analog: Vec<Analog>,
     /// Faults around the driver, as the file states them: the wrappers read them.
     pub faults: Option<toml::Table>,
     /// What the guard does.
@@ -126,6 +130,9 @@ impl Machine {
         if let Some(moving) = moving.as_ref().filter(|_| problems.is_empty()) {
             inputs::check(&section, &tables.inputs, &moving.homing, tables.probe.as_ref());
         }
+        if let Some(moving) = moving.as_ref().filter(|_| !section.has("driver")) {
+            tables.wanted(&section, moving).check(&tables.drivers);
+        }
         let effective = text(&section, "format", &root);
         let moving = problems.verdict(moving)?;
         Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
@@ -140,6 +147,11 @@ impl Machine {
     /// a machine file gives this machine again.
     pub fn effective_toml(&self) -> &str {
         &self.effective
+    }
+
+    /// Whether the key at a dotted path was written.
+    pub fn has(&self, key: &str) -> bool {
+        self.places.has(key)
     }
 
     /// Where the key at a dotted path was written, else the table around it, else the beginning of the file: for
@@ -194,10 +206,10 @@ struct Tables {
     kinematics: PluginChoice,
     planner: PluginChoice,
     feed_strategy: Option<PluginChoice>,
-    driver: PluginChoice,
-    analog: Vec<String>,
-    outputs: Vec<Output>,
+    drivers: Vec<DriverChoice>,
     inputs: Vec<Input>,
+    outputs: Vec<Output>,
+    analog: Vec<Analog>,
     faults: Option<toml::Table>,
     guard: GuardMode,
     on_record_error: RecordErrorMode,
@@ -220,10 +232,10 @@ impl Tables {
             kinematics: kinematics.unwrap_or_else(|| PluginChoice::named("identity")),
             planner: required("planner"),
             feed_strategy: optional("feed_strategy").and_then(|s| PluginChoice::read(&s)),
-            driver: required("driver"),
-            analog: analog_names(&root.section("driver")),
-            outputs: outputs::read(root),
+            drivers: drivers::read(root),
             inputs: inputs::read(root),
+            outputs: outputs::read(root),
+            analog: signals::analog(root, analog_names(&root.section("driver"))),
             faults: optional("faults").and_then(|s| s.table().map(plain)),
             guard: GuardMode::read(&root.section("guard")),
             on_record_error: RecordErrorMode::read(&root.section("recorder")),
@@ -234,10 +246,31 @@ impl Tables {
         }
     }
 
+    /// What the drivers together must have.
+    fn wanted<'a>(&self, root: &'a Section<'a>, moving: &Moving) -> Wanted<'a> {
+        let letter = |axis| moving.axes.axes.letter(axis).to_ascii_lowercase().to_string();
+        let axes: Vec<_> = (0..moving.axes.axes.count()).map(letter).collect();
+        let homing = moving
+            .homing
+            .iter()
+            .filter_map(|homing| homing.switch().map(|switch| (switch.input, format!("homing.{}", axes[homing.axis]))));
+        let probe = self.probe.iter().map(|probe| (probe.input, "probe".to_owned()));
+        let named = self.inputs.iter().map(|input| (input.input, format!("inputs.{}", input.name)));
+        let outputs = self.outputs.iter().map(|output| (output.output, format!("outputs.{}", output.name)));
+        let analog = self.analog.iter().map(|analog| (analog.input, format!("analog.{}", analog.name)));
+        Wanted {
+            joints: drivers::joint_names(&axes, &moving.joints, self.kinematics.plugin == "identity"),
+            inputs: homing.chain(probe).chain(named).collect(),
+            outputs: outputs.collect(),
+            analog: analog.collect(),
+            root,
+        }
+    }
+
     fn into_machine(self, path: &Path, moving: Moving, effective: String, places: Places) -> Machine {
         let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let unhomed_max_feed_mm_per_s = moving.unhomed_feed();
-        let AxisSet { axes, limits, max_following_error, start, home, .. } = moving.axes;
+        let AxisSet { axes, limits, max_following_error, max_skew, start, home, .. } = moving.axes;
         Machine {
             name: self.name.unwrap_or_else(stem),
             path: path.to_owned(),
@@ -254,6 +287,7 @@ impl Tables {
             limits,
             max_following_error_mm: max_following_error,
             unhomed_max_feed_mm_per_s,
+            max_skew_mm: max_skew,
             start,
             home,
             joints: moving.joints,
@@ -262,10 +296,10 @@ impl Tables {
             kinematics: self.kinematics,
             planner: self.planner,
             feed_strategy: self.feed_strategy,
-            driver: self.driver,
-            analog: self.analog,
-            outputs: self.outputs,
+            drivers: self.drivers,
             inputs: self.inputs,
+            outputs: self.outputs,
+            analog: self.analog,
             faults: self.faults,
             guard: self.guard,
             on_record_error: self.on_record_error,

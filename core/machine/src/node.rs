@@ -52,6 +52,11 @@ impl Node {
         if let Value::Text(text) = &self.value { Some(text) } else { None }
     }
 
+    /// The number, where it is a whole one that is not negative.
+    pub fn whole(&self) -> Option<u32> {
+        if let Value::Integer(number) = self.value { u32::try_from(number).ok() } else { None }
+    }
+
     /// The elements, where it is an array.
     pub fn array(&self) -> Option<&[Node]> {
         if let Value::Array(array) = &self.value { Some(array) } else { None }

@@ -8,6 +8,7 @@ use tandem_sdk::MAX_ANALOG;
 use crate::node::{Node, Table, plain};
 use crate::paths::is_library;
 use crate::section::Section;
+use crate::signals::is_name;
 
 /// A plugin that the machine asks for.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +23,7 @@ pub struct PluginChoice {
 
 impl PluginChoice {
     /// The plugin called `name`, without options.
-    pub(crate) fn named(name: &str) -> Self {
+    pub fn named(name: &str) -> Self {
         let library = is_library(name).then(|| PathBuf::from(name));
         Self { plugin: name.to_owned(), library, options: String::new() }
     }
@@ -43,9 +44,8 @@ pub(crate) fn analog_names(driver: &Section<'_>) -> Vec<String> {
         driver.refuse("analog", format!("must be an array of at most {MAX_ANALOG} names"));
         return vec![];
     };
-    let letters = |name: &str| name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
     let twice = |name: &&&str| names.iter().filter(|other| other == name).count() > 1;
-    let wrong = names.iter().find(|name| name.is_empty() || !letters(name)).or_else(|| names.iter().find(twice));
+    let wrong = names.iter().find(|name| !is_name(name)).or_else(|| names.iter().find(twice));
     if let Some(wrong) = wrong {
         driver.refuse("analog", format!("{wrong:?}: a name is lower case with underscores, and stands once"));
         return vec![];

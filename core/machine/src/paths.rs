@@ -7,8 +7,16 @@ use crate::node::{Table, Value};
 /// Keys whose value names a file, wherever it is stated from.
 const FILES: [(&str, &str); 2] = [("policy", "script"), ("tools", "table")];
 
-/// Tables that choose a plugin.
-const PLUGINS: [&str; 4] = ["kinematics", "planner", "feed_strategy", "driver"];
+/// Tables that choose a plugin; `*` stands for any name.
+const PLUGINS: [&[&str]; 7] = [
+    &["kinematics"],
+    &["planner"],
+    &["feed_strategy"],
+    &["driver"],
+    &["driver", "stand_in"],
+    &["drivers", "*"],
+    &["drivers", "*", "stand_in"],
+];
 
 /// `name` relative to the directory of `file`.
 pub fn beside(file: &Path, name: &str) -> PathBuf {
@@ -17,16 +25,30 @@ pub fn beside(file: &Path, name: &str) -> PathBuf {
 
 /// Makes the files that `table` names independent of the file `path` it was read from and of the current directory.
 pub fn resolve_paths(table: &mut Table, path: &Path) {
-    let plugins = PLUGINS.map(|table| (table, "plugin"));
-    for (section, key) in plugins.iter().chain(&FILES) {
-        let section = table.get_mut(*section).map(|node| &mut node.value);
-        let Some(Value::Table(section)) = section else { continue };
-        let Some(Value::Text(text)) = section.get_mut(*key).map(|node| &mut node.value) else { continue };
-        let is_file = if *key == "plugin" { is_library(text) } else { !text.is_empty() };
-        if is_file {
-            let file = beside(path, text);
-            *text = std::path::absolute(&file).unwrap_or(file).display().to_string();
+    for (section, key) in FILES {
+        each_table(table, &[section], &mut |section| resolve(section, key, path));
+    }
+    for section in PLUGINS {
+        each_table(table, section, &mut |section| resolve(section, "plugin", path));
+    }
+}
+
+/// Hands every table at `parts` inside `table` to `work`.
+fn each_table(table: &mut Table, parts: &[&str], work: &mut dyn FnMut(&mut Table)) {
+    let Some((first, rest)) = parts.split_first() else { return work(table) };
+    for (_, node) in table.iter_mut().filter(|(name, _)| *first == "*" || first == name) {
+        if let Value::Table(inner) = &mut node.value {
+            each_table(inner, rest, work);
         }
+    }
+}
+
+fn resolve(section: &mut Table, key: &str, path: &Path) {
+    let Some(Value::Text(text)) = section.get_mut(key).map(|node| &mut node.value) else { return };
+    let is_file = if key == "plugin" { is_library(text) } else { !text.is_empty() };
+    if is_file {
+        let file = beside(path, text);
+        *text = std::path::absolute(&file).unwrap_or(file).display().to_string();
     }
 }
 

@@ -39,6 +39,11 @@ impl Places {
         self.origins.insert(path, node.origin);
     }
 
+    /// Whether `key` was written.
+    pub fn has(&self, key: &str) -> bool {
+        self.origins.contains_key(key)
+    }
+
     /// Where `key` was written, else the table around it, else the beginning of the machine's file.
     pub fn of(&self, key: &str) -> Place {
         let parents = std::iter::successors(Some(key), |key| key.rsplit_once('.').map(|(parent, _)| parent));

@@ -25,9 +25,12 @@ pub fn is_placeholder(part: &str) -> bool {
     part.starts_with('<')
 }
 
+/// Last parts of a key's path that stand for whatever a plugin, script or wrapper reads.
+const OPEN: [&str; 3] = ["<option>", "<parameter>", "<fault>"];
+
 /// Whether a key's path ends in something that a plugin or script reads.
 pub fn is_open(pattern: &str) -> bool {
-    pattern.ends_with('>') && !pattern.ends_with("<axis>") && !pattern.ends_with("<joint>")
+    OPEN.iter().any(|open| pattern.ends_with(open))
 }
 
 /// Whether a path begins like a key's path, over the shorter of the two.

@@ -1,5 +1,6 @@
 //! Reading one table: every value is checked as it is read, and what is wrong is noted.
 
+use crate::error::Place;
 use crate::node::{Node, Table, Value};
 use crate::problems::{Origin, Problems};
 use crate::shown::dotted;
@@ -73,6 +74,26 @@ impl<'a> Section<'a> {
     pub fn refuse(&self, key: &str, what: impl Into<String>) {
         let origin = self.node(key).map_or(self.origin, |n| n.origin);
         self.problems.report(origin, &self.path_of(key), what);
+    }
+
+    /// Notes that `node`, which is inside the value of `key`, is wrong.
+    pub fn refuse_node(&self, key: &str, node: &Node, what: impl Into<String>) {
+        self.problems.report(node.origin, &self.path_of(key), what);
+    }
+
+    /// Notes that the table at a dotted path inside this one is wrong; told at this one where there is none.
+    pub fn refuse_dotted(&self, path: &str, what: impl Into<String>) {
+        path.split('.').fold(self.clone(), |section, key| section.section(key)).refuse_whole(what);
+    }
+
+    /// Where `key` is written, else this table.
+    pub fn place(&self, key: &str) -> Place {
+        self.problems.place(self.node(key).map_or(self.origin, |node| node.origin))
+    }
+
+    /// Where `node` is written.
+    pub fn place_of(&self, node: &Node) -> Place {
+        self.problems.place(node.origin)
     }
 
     /// Notes that the table as a whole is wrong.

@@ -14,6 +14,7 @@ pub struct Units {
     pub jerk: &'static str,
     pub following: &'static str,
     pub unhomed: &'static str,
+    pub skew: &'static str,
     /// From mm or degrees to mm or rad.
     pub scale: f64,
 }
@@ -28,6 +29,7 @@ static LINEAR: Units = Units {
     jerk: "max_jerk_mm_per_s3",
     following: "max_following_error_mm",
     unhomed: "unhomed_max_feed_mm_per_min",
+    skew: "max_skew_mm",
     scale: 1.0,
 };
 
@@ -41,6 +43,7 @@ static ROTARY: Units = Units {
     jerk: "max_jerk_deg_per_s3",
     following: "max_following_error_deg",
     unhomed: "unhomed_max_feed_deg_per_min",
+    skew: "max_skew_deg",
     scale: std::f64::consts::PI / 180.0,
 };
 
@@ -50,7 +53,7 @@ impl Units {
         if rotary { &ROTARY } else { &LINEAR }
     }
 
-    fn names(&self) -> [&'static str; 9] {
+    fn names(&self) -> [&'static str; 10] {
         [
             self.travel,
             self.start,
@@ -61,6 +64,7 @@ impl Units {
             self.jerk,
             self.following,
             self.unhomed,
+            self.skew,
         ]
     }
 }

@@ -406,7 +406,7 @@ impl Driver for SimulatedDrives {
         Ok(())
     }
 
-    fn explain(&self, code: u32) -> Words {
+    fn explain(&self, _joint: u32, code: u32) -> Words {
         self.faults.explain(code)
     }
 }

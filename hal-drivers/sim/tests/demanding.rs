@@ -110,7 +110,7 @@ fn a_fault_has_its_code_and_its_words_and_stays_until_it_is_reset() {
         }
         assert_eq!((bench.feedback.state[1], bench.feedback.fault_code[1]), (JointState::Fault, 0x7210), "{again}");
         assert_eq!(bench.feedback.state[0], JointState::Enabled);
-        assert_eq!(bench.driver.explain(0x7210).as_str(), "brake chopper");
+        assert_eq!(bench.driver.explain(0, 0x7210).as_str(), "brake chopper");
         for enable in [0, 1, 0, 1] {
             bench.setpoint.enable = enable;
             assert_eq!(bench.period().state[1], JointState::Fault);

@@ -129,7 +129,7 @@ impl Driver for Drives {
         Ok(())
     }
 
-    fn explain(&self, code: u32) -> Words {
+    fn explain(&self, _joint: u32, code: u32) -> Words {
         assert!(!self.is("does not know its codes") || code < 10, "code {code}?");
         Words::default()
     }

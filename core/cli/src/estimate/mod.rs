@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
 use tandem_estimate::{Choice, Estimate, model_file, program_errors};
-use tandem_host::Switches;
+use tandem_host::{Switches, with_stand_ins};
 use tandem_machine::Machine;
 
 use crate::{REFUSED, args, built_in, program};
@@ -20,14 +20,23 @@ use crate::{REFUSED, args, built_in, program};
 pub fn estimate(options: &args::Estimate) -> Result<u8, Box<dyn Error>> {
     let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let choice = choice(&options.model, &machine)?;
-    let switches = Switches { block_delete: options.machine.block_delete, ..Switches::default() };
+    let (machine, notes) = with_stand_ins(&machine, &built_in::registry()?, Some(built_in::IDEAL_DRIVES))?;
+    notes.iter().for_each(|note| say!("{note}"));
+    let (block_delete, assumes_edges) = (options.machine.block_delete, !notes.is_empty());
+    let switches = Switches { block_delete, assumes_edges, ..Switches::default() };
     let one = |path: &Path| one(path, &machine, switches, &choice);
     let results = in_parallel(&options.programs, &one);
     let mut estimates = vec![];
     let mut refused = false;
     for result in results {
         match result {
-            Ok(estimate) => estimates.push(estimate),
+            Ok(estimate) => {
+                if estimate.assumed_edges > 0 {
+                    let (program, count) = (&estimate.program, estimate.assumed_edges);
+                    say!("{program}: {count} edges of inputs were assumed at the end of the motion towards them");
+                }
+                estimates.push(estimate);
+            }
             Err(cause) => {
                 refused = true;
                 say!("{cause}");

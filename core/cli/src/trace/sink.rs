@@ -27,6 +27,7 @@ impl TraceSink {
     /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine, program: &str, run: &Run, dry_run: bool) -> Result<Self, String> {
         let signals = run.signals();
+        let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
         if !is_binary_name(path) {
             return TraceCsv::create(path, machine, &signals).map(Self::Csv);
         }

@@ -23,19 +23,23 @@ use crate::error::HostError;
 use crate::joints::JointSpace;
 use crate::rules::refusal;
 use entry::Refusal;
-use options::{Faults, Joints};
+pub use options::Faults;
+use options::Joints;
 use wrapper::Wrapper;
 
-/// Puts the machine's faults around `driver`, which is not open yet; without `[faults]` it is given back as it is.
-/// Host; allocates.
+/// The machine's faults; none without `[faults]`. Host; allocates.
 ///
 /// # Errors
 /// What `[faults]` says wrongly, with its place in the machine file.
-pub fn wrap(machine: &Machine, driver: Box<dyn Driver>, joints: &JointSpace) -> Result<Box<dyn Driver>, HostError> {
-    let Some(table) = &machine.faults else { return Ok(driver) };
+pub fn read(machine: &Machine, joints: &JointSpace) -> Result<Option<Faults>, HostError> {
+    let Some(table) = &machine.faults else { return Ok(None) };
     let joints = Joints { rotary: joints.rotary(), count: joints.count() };
-    let faults = Faults::read(table, &joints).map_err(|Refusal { key, cause }| refusal(machine, &key, cause))?;
+    Faults::read(table, &joints).map(Some).map_err(|Refusal { key, cause }| refusal(machine, &key, cause))
+}
+
+/// Puts `faults` around `driver`, before its first exchange. Host; allocates.
+pub fn wrap(driver: Box<dyn Driver>, faults: Faults) -> Box<dyn Driver> {
     let seed = faults.seed;
     let around = |inner, (index, plan)| Box::new(Wrapper::new(inner, plan, seed, index)) as Box<dyn Driver>;
-    Ok((0..).zip(faults.wrap).fold(driver, around))
+    (0..).zip(faults.wrap).fold(driver, around)
 }

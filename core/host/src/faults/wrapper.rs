@@ -126,7 +126,7 @@ impl Driver for Wrapper {
         self.inner.stop()
     }
 
-    fn explain(&self, code: u32) -> Words {
-        self.inner.explain(code)
+    fn explain(&self, joint: u32, code: u32) -> Words {
+        self.inner.explain(joint, code)
     }
 }

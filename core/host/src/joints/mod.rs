@@ -59,6 +59,8 @@ pub(crate) struct JointSpace {
     pub joints: Vec<Joint>,
     map: Map,
     axes: usize,
+    /// There are no kinematics but those of axes with several joints.
+    are_own: bool,
     /// Limits of the axes with the joints folded in, then of the lanes.
     pub limits: Limits,
     /// What each lane behind the axes is: index of a joint.
@@ -76,14 +78,14 @@ impl JointSpace {
     }
 
     fn found(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
-        let axes = machine.axes.count();
+        let (axes, are_own) = (machine.axes.count(), machine.kinematics.plugin == "identity");
         let (joints, kinematics) = stated::joints(machine, registry)?;
         let Some(kinematics) = kinematics else {
             let mut limits = machine.limits;
             for (axis, joint) in joints.iter().enumerate() {
                 fold::narrow(machine, &mut limits, axis, joint, (1.0, 0.0))?;
             }
-            let this = Self { joints, map: Map::Axes, axes, limits, lanes: vec![] };
+            let this = Self { joints, map: Map::Axes, axes, are_own, limits, lanes: vec![] };
             return this.check_health(machine);
         };
         let positions = positions(&machine.limits);
@@ -93,10 +95,10 @@ impl JointSpace {
         let this = if let Some((weights, offsets)) = linear {
             let folded = fold::fold(machine, &joints, &weights, &offsets)?;
             let map = Map::Linear(Linear::new(weights, offsets, kinematics), folded.carried);
-            Self { joints, map, axes, limits: folded.limits, lanes: folded.lanes }
+            Self { joints, map, axes, are_own, limits: folded.limits, lanes: folded.lanes }
         } else {
             let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
-            Self { joints, map: Map::Curved(kinematics), axes, limits, lanes }
+            Self { joints, map: Map::Curved(kinematics), axes, are_own, limits, lanes }
         };
         this.check_health(machine)
     }
@@ -109,6 +111,11 @@ impl JointSpace {
     /// Whether each axis is its joint.
     pub fn are_axes(&self) -> bool {
         matches!(self.map, Map::Axes)
+    }
+
+    /// Whether each joint is an axis, some of which may have more than one: no kinematics of their own.
+    pub fn are_stated_by_axes(&self) -> bool {
+        self.are_own
     }
 
     /// Whether joints are no linear function of the axes: their limits are guarded, not planned.

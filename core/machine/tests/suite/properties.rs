@@ -161,7 +161,7 @@ fn the_configuration_in_force_reads_as_the_same_machine() {
     assert_eq!(again.effective_toml(), machine.effective_toml());
     assert_eq!(again.start[0], 17.0);
     let said = |m: &Machine| {
-        format!("{:?}", (m.axes, m.limits, m.home, &m.joints, &m.planner, &m.driver, &m.tools, &m.policy))
+        format!("{:?}", (m.axes, m.limits, m.home, &m.joints, &m.planner, &m.drivers, &m.tools, &m.policy))
     };
     assert_eq!(said(&again), said(&machine));
 }

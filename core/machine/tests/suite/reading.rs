@@ -119,7 +119,11 @@ fn plugins() {
     let library = fixtures().join("good/plugins/libsmooth.so");
     assert_eq!(machine.planner.library.as_ref(), Some(&library), "relative to the file that states it");
     assert_eq!(PathBuf::from(&machine.planner.plugin), library);
-    assert_eq!(machine.driver.library, Some(fixtures().join("good/shared/driver.so")), "also in an included file");
+    assert_eq!(
+        machine.drivers[0].choice.library,
+        Some(fixtures().join("good/shared/driver.so")),
+        "also in an included file"
+    );
     let options: toml::Table = machine.planner.options.parse().unwrap();
     let stated = "zeta = 1\nalpha = [1, 2.5, \"three\"]\ninner = { deep = { deeper = true } }".parse();
     assert_eq!(options, stated.unwrap());
@@ -211,4 +215,29 @@ fn places() {
 #[test]
 fn the_name_defaults_to_that_of_the_file() {
     assert_eq!(read(&fixtures().join("parts/mill.toml"), &[]).unwrap().name, "mill");
+}
+
+#[test]
+fn each_of_several_drivers_has_its_part_of_the_machine_in_its_own_order() {
+    let machine = read(&fixtures().join("good/drivers.toml"), &[]).unwrap();
+    let bus = &machine.drivers[0];
+    assert_eq!(
+        (bus.name.as_deref(), bus.section(), bus.title()),
+        (Some("bus"), "drivers.bus".into(), "bus (sim)".into())
+    );
+    let owns = bus.owns.as_ref().unwrap();
+    assert_eq!(
+        (&owns.joints[..], &owns.inputs[..], owns.spindle),
+        (&["z".to_owned(), "x".to_owned()][..], &[3, 1][..], false)
+    );
+    let spindle = &machine.drivers[1];
+    let library = fixtures().join("good/spindle.so");
+    assert_eq!(spindle.choice.library.as_ref(), Some(&library), "beside the file");
+    assert_eq!(spindle.stand_in.as_ref().unwrap().options.trim(), "seed = 7");
+    assert!(spindle.owns.as_ref().unwrap().spindle);
+    assert_eq!(machine.analog[0].signal(), "force_N");
+    assert_eq!((&machine.inputs[0].name[..], machine.outputs[0].output), ("door", 5));
+    let one = read(&fixtures().join("parts/mill.toml"), &["driver.stand_in.plugin=sim"]).unwrap();
+    assert_eq!((one.drivers.len(), &one.drivers[0].owns, one.drivers[0].section()), (1, &None, "driver".to_owned()));
+    assert_eq!(one.drivers[0].stand_in.as_ref().unwrap().plugin, "sim");
 }

@@ -9,7 +9,9 @@ use tandem_machine::{Key, Machine, Place, keys, markdown, tool_keys};
 fn path(key: &Key) -> String {
     let rotary = key.path.contains("_deg");
     let (axis, joint) = if rotary { ("c", "c1") } else { ("x", "x2") };
-    key.path.replace("<axis>", axis).replace("<joint>", joint).replace("<name>", "vacuum")
+    let names =
+        [("<axis>", axis), ("<joint>", joint), ("<driver>", "servo"), ("<input>", "door"), ("<name>", "vacuum")];
+    names.iter().fold(key.path.replace("<analog>", "force"), |path, (from, to)| path.replace(from, to))
 }
 
 fn is_read_here(key: &Key) -> bool {

@@ -28,7 +28,7 @@ table! {
         exchange: unsafe extern "C" fn(*mut c_void, *const Setpoint, *mut Feedback, *mut (), Errors) -> u32,
         quick_stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
         stop: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
-        explain: unsafe extern "C" fn(*const c_void, u32, *mut Words, Errors) -> u32,
+        explain: unsafe extern "C" fn(*const c_void, u32, u32, *mut Words, Errors) -> u32,
     }
 }
 
@@ -149,9 +149,15 @@ unsafe extern "C" fn stop<T: Driver>(this: *mut c_void, answer: *mut (), error: 
     unsafe { fault.guard("stop", answer, error, || plugin.stop()) }
 }
 
-unsafe extern "C" fn explain<T: Driver>(this: *const c_void, code: u32, answer: *mut Words, error: Errors) -> u32 {
+unsafe extern "C" fn explain<T: Driver>(
+    this: *const c_void,
+    joint: u32,
+    code: u32,
+    answer: *mut Words,
+    error: Errors,
+) -> u32 {
     let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("explain", answer, error, || Ok(this.plugin.explain(code))) }
+    unsafe { this.fault.guard("explain", answer, error, || Ok(this.plugin.explain(joint, code))) }
 }
 
 /// The host's side: a driver behind its table.
@@ -222,9 +228,9 @@ impl Driver for Linked {
         ask(Method::DriverStop, |answer, error| unsafe { (self.table.stop)(self.handle.instance, answer, error) })
     }
 
-    fn explain(&self, code: u32) -> Words {
+    fn explain(&self, joint: u32, code: u32) -> Words {
         let asked = ask(Method::DriverExplain, |answer, error| unsafe {
-            (self.table.explain)(self.handle.instance, code, answer, error)
+            (self.table.explain)(self.handle.instance, joint, code, answer, error)
         });
         asked.unwrap_or_default()
     }

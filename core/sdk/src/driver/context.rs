@@ -136,8 +136,9 @@ pub struct DriverDescription {
     pub slow: u32,
     /// 1 where codes are written in hexadecimal, as `CiA 402` has them; 0 for decimal.
     pub hexadecimal_codes: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
+    /// 1 where its feedback says how far an exchange was from where the bus wants it ([`crate::Feedback::phase_ns`]): the wall clock
+    /// follows it, so at most one driver of a machine may.
+    pub gives_phase: u32,
     /// Longest time that enabling all joints takes, brakes included, s; past it the host gives up and says which joint is not.
     pub enable_s: f64,
     /// Longest time from `enable = 0` to the last joint's [`crate::JointState::Disabled`], s. The exchange goes on until then.
@@ -150,7 +151,7 @@ layout!(DriverDescription {
     watches_following,
     slow,
     hexadecimal_codes,
-    reserved,
+    gives_phase,
     enable_s,
     disable_s
 });
@@ -173,7 +174,7 @@ impl DriverDescription {
             watches_following: 0,
             slow: 0,
             hexadecimal_codes: 0,
-            reserved: 0,
+            gives_phase: 0,
             enable_s: ORDINARY_S,
             disable_s: ORDINARY_S,
         }

@@ -144,7 +144,7 @@ fn judge_words(driver: &dyn Driver, report: &mut Report) {
     const CHECK: &str = "words for codes";
     report.judged(CHECK);
     for code in [0, 1, 0x7210, 0xDEAD_BEEF, u32::MAX] {
-        let _words = driver.explain(code);
+        let _words = driver.explain(0, code);
     }
     // What has panicked is not asked again, and says so.
     if let Err(error) = driver.check(&context())

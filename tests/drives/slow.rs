@@ -1,0 +1,50 @@
+//! A device on a slow line beside drives that answer in every period.
+
+use tandem_host::{Clock, Run, Switches};
+
+use crate::double::log;
+use crate::{machine, program, registry};
+
+/// Four joints on a bus, and a spindle whose driver takes `slow_ms` an answer; fine periods of 10 ms.
+fn with_spindle(name: &str, spindle: &str) -> String {
+    format!(
+        "[loops]\nfine_period_ms = 10\nrough_period_ms = 80\nmax_missed_periods = 100000\n\
+         [drivers.bus]\nplugin = \"double\"\noptions = {{ name = \"{name}-bus\" }}\njoints = [\"x\", \"y\", \"z\", \"a\"]\n\
+         [drivers.line]\nplugin = \"double\"\noptions = {{ name = \"{name}-line\"{spindle} }}\nspindle = true\n"
+    )
+}
+
+const TURNS: &str = "G21 G90 G94 F600\nM3 S1000\nG1 X20\nM2\n";
+
+/// 200 ms an answer, and after six of them none: the exchange with the others waits for neither.
+#[test]
+fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
+    let text = with_spindle("slow", ", slow_ms = 200, silent_after = 6");
+    let run = Run::prepare(machine(&text), &registry(), program(TURNS), Switches::default()).unwrap();
+    let summary = run.drive(Clock::Wall, &[], &mut ()).unwrap().summary;
+    let (bus, line) = (log("slow-bus"), log("slow-line"));
+    assert!(bus.exchanges > 200, "two seconds of motion: {}", bus.exchanges);
+    assert!((2..=6).contains(&line.exchanges), "{} answers", line.exchanges);
+    assert!(line.turned, "it was told to turn");
+    let exchange = summary.exchange_us.unwrap();
+    assert!(exchange.max < 150_000.0, "an answer takes 200 ms: {exchange:?}");
+    let fault = summary.fault.unwrap();
+    assert!(fault.contains("its device does not answer"), "it cannot be let go of: {fault}");
+}
+
+#[test]
+fn on_the_virtual_clock_a_slow_driver_is_called_in_line() {
+    let text = with_spindle("in-line", ", slow_ms = 1");
+    let run = Run::prepare(machine(&text), &registry(), program(TURNS), Switches::default()).unwrap();
+    assert_eq!(run.drive(Clock::Virtual, &[], &mut ()).unwrap().summary.fault, None);
+    let (bus, line) = (log("in-line-bus"), log("in-line-line"));
+    assert_eq!(bus.exchanges, line.exchanges);
+}
+
+#[test]
+fn a_slow_device_that_is_to_move_a_joint_is_refused() {
+    let text = "[driver]\nplugin = \"double\"\noptions = { name = \"slow-joint\", slow_ms = 1 }\n";
+    let refused =
+        Run::prepare(machine(text), &registry(), program(TURNS), Switches::default()).err().unwrap().to_string();
+    assert!(refused.contains("takes longer than a fine period to answer: it can move no joint"), "{refused}");
+}
