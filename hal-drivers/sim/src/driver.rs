@@ -311,7 +311,8 @@ const MARGIN_S: f64 = 1.0;
 
 impl Driver for SimulatedDrives {
     fn describe(&self) -> DriverDescription {
-        let ideal = DriverDescription::simulated();
+        let gives_phase = u32::from(self.options.bus_clock.is_some());
+        let ideal = DriverDescription { gives_phase, ..DriverDescription::simulated() };
         let (enable_s, brake_s) = (&self.options.enable_s, &self.options.brake_s);
         if enable_s.is_empty() && brake_s.is_empty() {
             return ideal;
