@@ -45,6 +45,7 @@ pub fn log(name: &str) -> Log {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[allow(clippy::struct_excessive_bools)] // independent switches of a double
 struct Plan {
     name: String,
     #[serde(default)]

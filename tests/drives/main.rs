@@ -31,14 +31,12 @@ fn machine(drivers: &str) -> Machine {
 fn try_machine(drivers: &str) -> Result<Machine, String> {
     let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
     for axis in ["x", "y", "z", "a"] {
-        text += &format!(
-            "[axes.{axis}]\n{}",
-            if axis == "a" {
-                "kind = \"rotary\"\ntravel_deg = [-360, 360]\nmax_feed_deg_per_min = 7200\nmax_acceleration_deg_per_s2 = 900\n"
-            } else {
-                "travel_mm = [-250, 250]\nmax_feed_mm_per_min = 6000\nmax_acceleration_mm_per_s2 = 800\n"
-            }
-        );
+        let keys = if axis == "a" {
+            "kind = \"rotary\"\ntravel_deg = [-360, 360]\nmax_feed_deg_per_min = 7200\nmax_acceleration_deg_per_s2 = 900\n"
+        } else {
+            "travel_mm = [-250, 250]\nmax_feed_mm_per_min = 6000\nmax_acceleration_mm_per_s2 = 800\n"
+        };
+        text.extend(["[axes.", axis, "]\n", keys]);
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("machine.toml");

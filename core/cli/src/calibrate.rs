@@ -83,7 +83,9 @@ fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box
     let registry = built_in::registry()?;
     let (machine, notes) = with_stand_ins(machine, &registry, None)
         .map_err(|refused| format!("{refused}: state one, or give its times with --from"))?;
-    notes.iter().for_each(|note| say!("{note}"));
+    for note in &notes {
+        say!("{note}");
+    }
     let clock = clock::of(options.clock, &machine, &registry);
     Ok(experiment.run(&machine, &registry, clock)?)
 }

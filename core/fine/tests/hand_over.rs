@@ -162,7 +162,7 @@ impl Bench {
         let event = Event {
             program_time_s: self.start_s,
             epoch: self.epoch,
-            ..Event::new(EventKind::HomeByDrive, 0, 0, HOMED as i32, within_s)
+            ..Event::new(EventKind::HomeByDrive, 0, 0, (HOMED as u32).cast_signed(), within_s)
         };
         self.rough.segments.push(Queued::Event(event)).unwrap();
         self.rough.depth.wall_s.store(f64::INFINITY);

@@ -21,7 +21,9 @@ pub fn estimate(options: &args::Estimate) -> Result<u8, Box<dyn Error>> {
     let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
     let choice = choice(&options.model, &machine)?;
     let (machine, notes) = with_stand_ins(&machine, &built_in::registry()?, Some(built_in::IDEAL_DRIVES))?;
-    notes.iter().for_each(|note| say!("{note}"));
+    for note in &notes {
+        say!("{note}");
+    }
     let (block_delete, assumes_edges) = (options.machine.block_delete, !notes.is_empty());
     let switches = Switches { block_delete, assumes_edges, ..Switches::default() };
     let one = |path: &Path| one(path, &machine, switches, &choice);

@@ -36,7 +36,7 @@ impl Part {
         (own.enable, own.reset, own.tick) = (whole.enable, whole.reset, whole.tick);
         own.homing = if whole.homing == 0 { 0 } else { self.share.own_bits(whole.homing) };
         own.outputs = self.share.outputs.to_own(whole.outputs);
-        own.arm = self.share.own_arm(&whole.arm);
+        own.arm = self.share.own_arm(whole.arm);
         for (i, joint) in self.share.joints().iter().enumerate() {
             own.position[i] = whole.position[*joint];
             own.velocity[i] = whole.velocity[*joint];

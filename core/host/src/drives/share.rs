@@ -89,7 +89,7 @@ impl Share {
 
     /// What the driver is to catch: nothing where the input is not its. Any loop; does not allocate.
     #[inline]
-    pub fn own_arm(&self, arm: &Arm) -> Arm {
+    pub fn own_arm(&self, arm: Arm) -> Arm {
         let input = if arm.edge == 0 { None } else { self.inputs.own(arm.input) };
         input.map_or(Arm::default(), |input| Arm { input, edge: arm.edge })
     }
