@@ -1,5 +1,5 @@
-//! Attaching: from drives without torque to joints that hold, from a fault back to work. The drives of these tests start anywhere,
-//! enable one after the other, sag while they do, and fail in any state.
+//! Attaching: from drives without torque to joints that hold, from a fault back to work. The drives of these tests start
+//! anywhere, enable one after the other, sag while they do, and fail in any state.
 
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};

@@ -141,7 +141,8 @@ impl Look<'_> {
         )
     }
 
-    /// The joints of a gantry keep their skew until they are squared, unless it is so large that moving them would bend something.
+    /// The joints of a gantry keep their skew until they are squared, unless it is so large that moving them would bend
+    /// something.
     fn at_skew(&self) -> Result<(), HostError> {
         let known = |joint: usize| self.attached.known >> joint & 1 == 1;
         for axis in 0..self.machine.axes.count() {

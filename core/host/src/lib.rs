@@ -44,6 +44,7 @@ mod setup;
 mod stand_in;
 mod stops;
 mod strategy;
+mod summarise;
 mod summary;
 mod virtual_clock;
 mod waits;

@@ -22,7 +22,8 @@ impl Analog {
     }
 }
 
-/// Reads `[analog.*]`, or else the names of `driver.analog`, in the order of their numbers; what is wrong is reported and left out.
+/// Reads `[analog.*]`, or else the names of `driver.analog`, in the order of their numbers; what is wrong is reported and left
+/// out.
 pub(crate) fn analog(root: &Section<'_>, names: Vec<String>) -> Vec<Analog> {
     if root.has("analog") && !names.is_empty() {
         root.refuse("analog", "driver.analog names the analog inputs already: one of the two");

@@ -16,6 +16,7 @@ use crate::options::{Options, Switch};
 use crate::power::Power;
 use crate::spindle::Spindle;
 use crate::switches::Switches;
+use crate::times::{MARGIN_S, longest, periods};
 use crate::watchdog::Watchdog;
 use crate::wire::{Frame, Wire};
 
@@ -36,8 +37,7 @@ enum Life {
 /// Joints stand where their options or [`DriverContext::start_position`] have them at power-on, which is the first start after an
 /// opening; a driver that is started again finds them where they were left. While `enable` is 0 they do not follow: they run out
 /// at the quick-stop deceleration and rest where they come to rest. After [`Driver::quick_stop`] they ramp to rest, are then
-/// reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle follows its command in
-/// every state.
+/// reported disabled, and follow again after an exchange with `enable = 0` or `reset = 1`. The spindle always follows.
 ///
 /// Where no new setpoint comes, joints go on at the velocity of the last one; after more than
 /// [`Options::watchdog_periods`] such periods in a row they ramp to rest at the quick-stop deceleration and report
@@ -295,19 +295,6 @@ impl SimulatedDrives {
         if wanted.contains(&self.life) { Ok(()) } else { Err(PluginError::fixed(call[self.life as usize])) }
     }
 }
-
-/// Whole fine periods that `seconds` take; more than there will ever be where they never end.
-fn periods(seconds: f64, period_s: f64) -> u64 {
-    (seconds / period_s - 1e-6).ceil().max(0.0) as u64
-}
-
-/// The longest of the times that end.
-fn longest(seconds: &[f64]) -> f64 {
-    seconds.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max)
-}
-
-/// Time beyond the delays of drives within which they are up or down for certain, s: a second to come to rest in, lost frames.
-const MARGIN_S: f64 = 1.0;
 
 impl Driver for SimulatedDrives {
     fn describe(&self) -> DriverDescription {

@@ -44,6 +44,7 @@ pub mod servo;
 mod shape;
 mod spindle;
 mod switches;
+mod times;
 mod watchdog;
 mod wire;
 

@@ -71,8 +71,8 @@ tandem_sdk::options! {
         pub latches: bool = true,
         /// Numbers of the joints whose drives catch it, from 0; empty: all. A drive knows its own joint alone.
         pub latch_joints: Vec<usize> = Vec::new(),
-        /// What the encoders know at power-on. Incremental ones count from 0, wherever their joints stand, and say that nothing is
-        /// known.
+        /// What the encoders know at power-on. Incremental ones count from 0, wherever their joints stand, and say that nothing
+        /// is known.
         pub encoder: Encoder = Encoder::Absolute,
         /// Where the joints stand at power-on, from joint 0, mm (rad for a rotary joint); joints beyond the list stand where the
         /// machine file has them.
@@ -86,8 +86,8 @@ tandem_sdk::options! {
         /// Time from being told to hold until there is torque, s, from joint 0; the last entry stands for all joints after it.
         /// inf: that joint never comes up.
         pub enable_s: Vec<f64> = Vec::new(),
-        /// Time that a brake takes to open and to close, s, from joint 0; the last entry stands for all joints after it. 0: the joint
-        /// has no brake.
+        /// Time that a brake takes to open and to close, s, from joint 0; the last entry stands for all joints after it. 0: the
+        /// joint has no brake.
         pub brake_s: Vec<f64> = Vec::new(),
         /// Speed at which gravity pulls a joint along that has neither torque nor a brake, mm/s (rad/s), below 0 downwards; from
         /// joint 0, joints beyond the list are not pulled.
@@ -104,8 +104,8 @@ tandem_sdk::options! {
         pub patience_periods: u32 = 3,
         /// Fine periods that an answer takes from the drives, 0 to 15.
         pub delay_periods: u32 = 0,
-        /// A clock of the bus that is not the host's: the drives tell how far each exchange was from its tick. On the virtual clock
-        /// nobody steers by it.
+        /// A clock of the bus that is not the host's: the drives tell how far each exchange was from its tick. On the virtual
+        /// clock nobody steers by it.
         pub bus_clock: Option<BusClockOptions> = None,
         /// How far at most the joints stand from where the drives say at power-on, mm (rad for a rotary joint): each by a
         /// random part of it. Switches are where they are; only homing finds out.

@@ -209,18 +209,8 @@ impl<const L: usize> Route<L> {
             let fastest = along(limits, &direction);
             let fastest = if speed > 0.0 { fastest.min(feed / speed.sqrt()) } else { fastest };
             let turn_s = 2.0 * (fastest / jerk).sqrt() + fastest / acceleration;
-            let s = self.end;
-            self.chords.push(Chord {
-                start: from,
-                direction,
-                s,
-                length,
-                feed,
-                tolerance,
-                speed: fastest,
-                turn_s,
-                turn,
-            });
+            let (start, s, speed) = (from, self.end, fastest);
+            self.chords.push(Chord { start, direction, s, length, feed, tolerance, speed, turn_s, turn });
             self.end += length;
             from = *point;
             before = Some(direction);

@@ -18,8 +18,8 @@ const OTHER_FEED: f64 = 0.99;
 const TIMELY_S: f64 = 3e-4;
 /// Half a box along the path at most, as a multiple of the tolerance: where a single axis moves nothing else bounds it.
 const LONGEST: f64 = 150.0;
-/// Steps of the grid in whose way, and in that of the time in which the speed is built up, a box is of use: a slow motion has next
-/// to no jerk, and would go anywhere in a wider one.
+/// Steps of the grid in whose way, and in that of the time in which the speed is built up, a box is of use: a slow motion has
+/// next to no jerk, and would go anywhere in a wider one.
 const SWING_STEPS: f64 = 4.0;
 /// Half a box along the path at most, in the same way.
 const LONGEST_SWING: f64 = 10.0;

@@ -189,8 +189,8 @@ impl Made {
         }
     }
 
-    /// The driver as it is, or behind slots where its device is slow. A joint needs a setpoint in every fine period, so a slow device
-    /// moves none.
+    /// The driver as it is, or behind slots where its device is slow. A joint needs a setpoint in every fine period, so a slow
+    /// device moves none.
     fn behind_slots(self, machine: &Machine, roster: &mut Roster) -> Result<Self, HostError> {
         if self.driver.describe().slow == 0 {
             return Ok(self);

@@ -136,8 +136,8 @@ pub struct DriverDescription {
     pub slow: u32,
     /// 1 where codes are written in hexadecimal, as `CiA 402` has them; 0 for decimal.
     pub hexadecimal_codes: u32,
-    /// 1 where its feedback says how far an exchange was from where the bus wants it ([`crate::Feedback::phase_ns`]): the wall clock
-    /// follows it, so at most one driver of a machine may.
+    /// 1 where its feedback says how far an exchange was from where the bus wants it ([`crate::Feedback::phase_ns`]): the wall
+    /// clock follows it, so at most one driver of a machine may.
     pub gives_phase: u32,
     /// Longest time that enabling all joints takes, brakes included, s; past it the host gives up and says which joint is not.
     pub enable_s: f64,
