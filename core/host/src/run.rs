@@ -274,12 +274,8 @@ impl Run {
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
             Clock::Wall => {
-                let timed = wall_clock::drive(
-                    &mut pump,
-                    fine,
-                    periods(&machine),
-                    self.watch.as_ref().map(HangWatch::for_fine),
-                )?;
+                let watch = self.watch.as_ref().map(HangWatch::for_fine);
+                let timed = wall_clock::drive(&mut pump, fine, periods(&machine), watch)?;
                 (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
             }
         }

@@ -1,7 +1,8 @@
 //! A device that takes longer than a fine period to answer: called on a thread of its own, and never waited for.
 //!
-//! Two slots of one entry lie between the fine loop and the thread: what is told, and what was answered. Whoever writes replaces
-//! what has not been read, so neither side ever waits; the slots are `crossbeam_queue::ArrayQueue`s, which take no lock and no memory.
+//! Two slots of one entry lie between the fine loop and the thread: what is told, and what was answered. Whoever writes
+//! replaces what has not been read, so neither side ever waits; the slots are `crossbeam_queue::ArrayQueue`s, which take
+//! no lock and no memory.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};

@@ -114,9 +114,9 @@ pub trait Driver: Send {
     /// What could not be released or written: a run that was good so far ends with this as its fault.
     fn stop(&mut self) -> Result<(), PluginError>;
 
-    /// What a fault code of the drive of `joint` means, in words without the code itself; no words where it is not known. Drives
-    /// of several makers on one bus give one code different meanings. Host, between exchanges or after them; may allocate. A driver
-    /// whose drives have no codes leaves it out.
+    /// What a fault code of the drive of `joint` means, in words without the code itself; no words where it is not known.
+    /// Drives of several makers on one bus give one code different meanings. Host, between exchanges or after them; may
+    /// allocate. A driver whose drives have no codes leaves it out.
     fn explain(&self, _joint: u32, _code: u32) -> Words {
         Words::default()
     }
