@@ -11,6 +11,10 @@ use crate::{
 const TRIED: usize = 8;
 /// Steps towards the foot of a point.
 const STEPS: usize = 12;
+/// A step so short, as a share of the piece, is no longer a step.
+const SETTLED: f64 = 1e-9;
+/// Thirds that are left out of the surroundings of a point to which its steps do not lead.
+const THIRDS: usize = 60;
 /// Halvings towards the first point within reach: a slightly later one is within reach too.
 const HALVINGS: usize = 12;
 /// Chords whose sum is the length of a piece.
@@ -176,7 +180,25 @@ impl Curve {
                 share /= 2.0;
             }
         }
-        best
+        if self.step(point, best).abs() < SETTLED { best } else { self.narrowed(point, best) }
+    }
+
+    /// `best` or a nearer point beside it, found without its steps: where the point is near the center of curvature they hardly
+    /// get on.
+    fn narrowed(&self, point: &Position, best: f64) -> f64 {
+        let off_mm = |fraction: f64| distance(&self.at(fraction), point);
+        let beside = 1.0 / TRIED as f64;
+        let (mut low, mut high) = ((best - beside).max(0.0), (best + beside).min(1.0));
+        for _ in 0..THIRDS {
+            let third = (high - low) / 3.0;
+            if off_mm(low + third) < off_mm(high - third) {
+                high -= third;
+            } else {
+                low += third;
+            }
+        }
+        let found = f64::midpoint(low, high);
+        if off_mm(found) < off_mm(best) { found } else { best }
     }
 
     /// The step towards the place where the line to the point is square to the curve, as if the curve were straight.
