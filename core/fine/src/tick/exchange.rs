@@ -41,17 +41,17 @@ impl FineLoop {
 
     /// Where the joints are told to be, with what the setpoint says of their motion.
     fn next_joints(&mut self, axes: &AxisVector) -> AxisVector {
-        if !self.attach.is_done() {
+        let still = if !self.attach.is_done() {
+            Some(self.hold_still())
+        } else if self.handed_over() != 0 {
+            Some(self.hold_the_others(axes))
+        } else {
+            None
+        };
+        if let Some(joints) = still {
             // They are told to be where they stand: that is no motion, though the numbers may change.
-            let joints = self.hold_still();
-            (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
-            self.setpoint.acceleration = AxisVector::ZERO;
-            return joints;
-        }
-        if self.handed_over() != 0 {
-            let joints = self.hold_the_others(axes);
-            (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
-            self.setpoint.acceleration = AxisVector::ZERO;
+            self.setpoint.position = joints;
+            (self.setpoint.velocity, self.setpoint.acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
             return joints;
         }
         self.setpoint.homing = 0;
