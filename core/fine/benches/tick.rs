@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use divan::counter::ItemsCount;
-use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
+use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits,
@@ -122,29 +122,11 @@ fn config(order: u32) -> FineConfig {
         speed_difference_mm_per_s: 0.0,
     };
     FineConfig {
-        period_s: 1e-3,
-        limits: Limits::new(&[axis; 3]).unwrap(),
         // The queue starts at speed: the guard is to look at it, not to stop it.
-        linear: u32::MAX,
-        joints: tandem_fine::Joints::Axes,
         speed_difference_mm_per_s: [1000.0; 8],
         order,
         guard: if order == 3 { GuardMode::Count } else { GuardMode::Stop },
-        position: AxisVector::ZERO,
-        max_feed_ratio: 1.0,
-        max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-        missed: MissedLimits::default(),
-        kept_outputs: 0,
-        pause_at_stops: false,
-        dry_run: false,
-        unhomed: 0,
-        record_drives: false,
-        attached: Attached::default(),
-        enable_periods: 5000,
-        disable_periods: 5000,
-        reset_drives: false,
-        plans_from_rest: false,
-        roles: tandem_fine::Roles::default(),
+        ..FineConfig::new(1e-3, Limits::new(&[axis; 3]).unwrap())
     }
 }
 

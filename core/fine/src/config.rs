@@ -98,6 +98,35 @@ pub struct FineConfig {
 }
 
 impl FineConfig {
+    /// A machine whose joints are its axes, at rest at zero, with a plan of order 2 that steps nowhere; nothing is switched,
+    /// awaited or judged beyond `limits`, and what is queued begins there. Host; does not allocate.
+    pub fn new(period_s: f64, limits: Limits) -> Self {
+        Self {
+            period_s,
+            limits,
+            linear: u32::MAX,
+            joints: Joints::Axes,
+            speed_difference_mm_per_s: [0.0; MAX_AXES],
+            order: 2,
+            guard: GuardMode::Stop,
+            position: AxisVector::ZERO,
+            max_feed_ratio: 1.0,
+            max_following_error_mm: AxisVector([f64::INFINITY; MAX_AXES]),
+            missed: MissedLimits::default(),
+            kept_outputs: 0,
+            pause_at_stops: false,
+            dry_run: false,
+            unhomed: 0,
+            record_drives: false,
+            attached: Attached::default(),
+            enable_periods: 5000,
+            disable_periods: 5000,
+            reset_drives: false,
+            plans_from_rest: false,
+            roles: Roles::default(),
+        }
+    }
+
     /// Number of axes.
     pub fn axis_count(&self) -> usize {
         match self.joints {

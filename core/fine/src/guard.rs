@@ -144,8 +144,8 @@ impl Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{GuardMode, Joints, MissedLimits};
-    use tandem_sdk::{Attached, AxisLimits, Limits};
+
+    use tandem_sdk::{AxisLimits, Limits};
 
     /// A machine that may step by 2 mm/s, accelerate by 1000 mm/s², and moves at most 1 m.
     fn guard() -> Guard {
@@ -159,28 +159,10 @@ mod tests {
             speed_difference_mm_per_s: 2.0,
         };
         Guard::new(&FineConfig {
-            period_s: 0.001,
-            limits: Limits::new(&[axis; 3]).unwrap(),
-            linear: u32::MAX,
-            joints: Joints::Axes,
             speed_difference_mm_per_s: [2.0; MAX_AXES],
-            order: 2,
-            guard: GuardMode::Stop,
-            position: AxisVector::ZERO,
-            max_feed_ratio: 1.0,
-            max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-            missed: MissedLimits::default(),
-            kept_outputs: 0,
-            pause_at_stops: false,
-            dry_run: false,
-            unhomed: 0,
-            record_drives: false,
-            attached: Attached::default(),
             enable_periods: 1,
             disable_periods: 1,
-            reset_drives: false,
-            plans_from_rest: false,
-            roles: crate::roles::Roles::default(),
+            ..FineConfig::new(0.001, Limits::new(&[axis; 3]).unwrap())
         })
     }
 

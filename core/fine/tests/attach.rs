@@ -4,7 +4,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
+use tandem_fine::{FaultKind, FineConfig, FineLoop};
 use tandem_rig::Random;
 use tandem_rings::{HostEnd, MachineState, Queued, RestCause, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
@@ -117,28 +117,12 @@ impl Bench {
             speed_difference_mm_per_s: 0.0,
         };
         let config = FineConfig {
-            period_s: PERIOD_S,
-            limits: Limits::new(&[axis; JOINTS]).unwrap(),
-            joints: Joints::Axes,
-            speed_difference_mm_per_s: [0.0; MAX_AXES],
-            order: 2,
-            guard: GuardMode::Stop,
-            position: AxisVector::ZERO,
-            linear: u32::MAX,
-            max_feed_ratio: 1.0,
             max_following_error_mm: AxisVector([0.01; MAX_AXES]),
-            missed: MissedLimits::default(),
-            kept_outputs: 0,
-            pause_at_stops: false,
-            dry_run: false,
-            unhomed: 0,
-            record_drives: false,
             attached,
             enable_periods,
             disable_periods: 100,
-            reset_drives: false,
             plans_from_rest: true,
-            roles: tandem_fine::Roles::default(),
+            ..FineConfig::new(PERIOD_S, Limits::new(&[axis; JOINTS]).unwrap())
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 4096 });
         let mut fine = FineLoop::new(&config, end, drives, None);

@@ -3,9 +3,9 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-use tandem_fine::{FaultKind, FineConfig, FineLoop, GuardMode, MissedLimits};
+use tandem_fine::{FaultKind, FineConfig, FineLoop};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
-use tandem_sdk::{Attached, AxisLimits, AxisVector, Driver, DriverContext, Limits, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{AxisLimits, AxisVector, Driver, DriverContext, Limits, Segment, SegmentFlags};
 
 use super::{Body, PeriodClock, Timing, run};
 use crate::wall_clock::FineBody;
@@ -152,30 +152,7 @@ fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
         jerk_mm_per_s3: f64::INFINITY,
         speed_difference_mm_per_s: 0.0,
     };
-    let config = FineConfig {
-        period_s: 0.001,
-        limits: Limits::new(&[axis; 3]).unwrap(),
-        linear: u32::MAX,
-        joints: tandem_fine::Joints::Axes,
-        speed_difference_mm_per_s: [0.0; MAX_AXES],
-        order: 2,
-        guard: GuardMode::Stop,
-        position: AxisVector::ZERO,
-        max_feed_ratio: 1.0,
-        max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-        missed: MissedLimits::default(),
-        kept_outputs: 0,
-        pause_at_stops: false,
-        dry_run: false,
-        unhomed: 0,
-        record_drives: false,
-        attached: Attached::default(),
-        enable_periods: 5000,
-        disable_periods: 5000,
-        reset_drives: false,
-        plans_from_rest: false,
-        roles: tandem_fine::Roles::default(),
-    };
+    let config = FineConfig::new(0.001, Limits::new(&[axis; 3]).unwrap());
     let (mut rough, end, host) = bridge(Sizes { segments: 16, samples: 1 << 17 });
     if moves {
         rough.segments.push(Queued::Segment { start_s: 0.0, segment: cruise() }).unwrap();

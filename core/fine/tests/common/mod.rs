@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints, MissedLimits};
+use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event, EventKind, Feedback,
-    JointState, Kinematics, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint, StopOn,
+    JointState, Kinematics, Limits, PluginError, Segment, SegmentFlags, Setpoint, StopOn,
 };
 
 /// Fine period, s.
@@ -109,28 +109,11 @@ impl Bench {
             speed_difference_mm_per_s: 0.0,
         };
         let config = FineConfig {
-            period_s: PERIOD_S,
-            limits: Limits::new(&[axis; 6][..entries]).unwrap(),
             joints,
-            speed_difference_mm_per_s: [0.0; MAX_AXES],
-            order: 2,
             guard,
-            position: AxisVector::ZERO,
-            linear: u32::MAX,
             max_feed_ratio,
-            max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-            missed: MissedLimits::default(),
             kept_outputs: 1 << KEPT_OUTPUT,
-            pause_at_stops: false,
-            dry_run: false,
-            unhomed: 0,
-            record_drives: false,
-            attached: Attached::default(),
-            enable_periods: 5000,
-            disable_periods: 5000,
-            reset_drives: false,
-            plans_from_rest: false,
-            roles: tandem_fine::Roles::default(),
+            ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 6][..entries]).unwrap())
         };
         let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
         let failing = Arc::new(AtomicBool::new(false));

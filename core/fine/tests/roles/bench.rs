@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{Fault, FaultKind, FineConfig, FineLoop, GuardMode, Joints, MissedLimits, Roles};
+use tandem_fine::{Fault, FaultKind, FineConfig, FineLoop, Roles};
 use tandem_rig::Random;
 use tandem_rings::{HostEnd, MachineState, Queued, RestCause, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
@@ -140,28 +140,14 @@ pub fn config(roles: Roles, unhomed: u32) -> FineConfig {
         speed_difference_mm_per_s: 0.0,
     };
     FineConfig {
-        period_s: PERIOD_S,
-        limits: Limits::new(&[axis; JOINTS]).unwrap(),
-        joints: Joints::Axes,
         linear: 0b11,
-        speed_difference_mm_per_s: [0.0; MAX_AXES],
-        order: 2,
-        guard: GuardMode::Stop,
-        position: AxisVector::ZERO,
-        max_feed_ratio: 1.0,
         max_following_error_mm: AxisVector([0.01; MAX_AXES]),
-        missed: MissedLimits::default(),
-        kept_outputs: 0,
-        pause_at_stops: false,
-        dry_run: false,
         unhomed,
-        record_drives: false,
-        attached: Attached::default(),
         enable_periods: 500,
         disable_periods: 100,
-        reset_drives: false,
         plans_from_rest: true,
         roles,
+        ..FineConfig::new(PERIOD_S, Limits::new(&[axis; JOINTS]).unwrap())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
+use tandem_fine::{FineConfig, FineLoop};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
@@ -176,30 +176,8 @@ impl Machine {
             jerk_mm_per_s3: LIMITS.jerk,
             speed_difference_mm_per_s: 0.0,
         };
-        let config = FineConfig {
-            period_s: PERIOD_S,
-            limits: Limits::new(&[axis; 2]).unwrap(),
-            joints: tandem_fine::Joints::Axes,
-            speed_difference_mm_per_s: [0.0; MAX_AXES],
-            order: 3,
-            dry_run: false,
-            unhomed: 0,
-            record_drives: false,
-            attached: Attached::default(),
-            enable_periods: 5000,
-            disable_periods: 5000,
-            reset_drives: false,
-            plans_from_rest: false,
-            roles: tandem_fine::Roles::default(),
-            guard: GuardMode::Stop,
-            position: AxisVector::ZERO,
-            linear: u32::MAX,
-            max_feed_ratio,
-            max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-            missed: MissedLimits::default(),
-            kept_outputs: 0,
-            pause_at_stops: false,
-        };
+        let config =
+            FineConfig { order: 3, max_feed_ratio, ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 2]).unwrap()) };
         let (mut rough, end, host) = bridge(Sizes { segments: 4096, samples: 4096 });
         let mut from = 0.0;
         let cuts = plan.cuts();

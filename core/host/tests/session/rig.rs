@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
-use tandem_fine::{FineConfig, FineLoop, GuardMode, MissedLimits};
+use tandem_fine::{FineConfig, FineLoop};
 use tandem_gcode::Item;
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughError, RoughLoop, Source};
 use tandem_sdk::{
-    Attached, Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, MAX_AXES,
-    PlannerContext, StopOn, size_of_contract,
+    Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, PlannerContext, StopOn,
+    size_of_contract,
 };
 
 /// Fine period, s.
@@ -72,30 +72,7 @@ impl Rig {
         };
         let limits = Limits::new(&[axis; 3]).unwrap();
         let (rough_end, fine_end, host) = bridge(Sizes::default());
-        let config = FineConfig {
-            period_s: PERIOD_S,
-            limits,
-            linear: u32::MAX,
-            joints: tandem_fine::Joints::Axes,
-            speed_difference_mm_per_s: [0.0; MAX_AXES],
-            order: 2,
-            guard: GuardMode::Stop,
-            position: AxisVector::ZERO,
-            max_feed_ratio: 1.0,
-            max_following_error_mm: AxisVector([f64::INFINITY; 8]),
-            missed: MissedLimits::default(),
-            kept_outputs: 0,
-            pause_at_stops: false,
-            dry_run: false,
-            unhomed: 0,
-            record_drives: false,
-            attached: Attached::default(),
-            enable_periods: 5000,
-            disable_periods: 5000,
-            reset_drives: false,
-            plans_from_rest: false,
-            roles: tandem_fine::Roles::default(),
-        };
+        let config = FineConfig::new(PERIOD_S, limits);
         let options = "latches = false\nswitches = [{ input = 0, joint = 0, above_mm = 12.5 }]";
         let mut driver = tandem_sim::PLUGIN.driver(options).unwrap();
         driver.open(&DriverContext::new(3, PERIOD_S)).unwrap();
