@@ -74,6 +74,7 @@ impl Plugins {
         rules::check_homing(machine, &joints, switches)?;
         // A driver that has panicked says so here, and of what it is nothing is known.
         self.claim.check(machine, &joints)?;
+        rules::check_times(machine, &drivers)?;
         rules::check_real(machine, &joints, &drivers, switches.clock)
     }
 

@@ -1,7 +1,7 @@
 //! What does not go together: refusals before a run starts.
 
 use tandem_machine::{Analog, GuardMode, JerkMode, Machine, Place};
-use tandem_sdk::{MAX_SIGNALS, PlannerDescription};
+use tandem_sdk::{MAX_ENABLE_S, MAX_SIGNALS, PlannerDescription};
 
 use crate::drives::{Entry, Roster};
 use crate::error::HostError;
@@ -32,6 +32,23 @@ pub fn check(machine: &Machine, planner: &PlannerDescription, drivers: &Roster) 
             "the machine states a jerk limit and {name} keeps none; with motion.jerk = \"report\" it is only reported"
         );
         return refuse("planner.plugin", cause);
+    }
+    Ok(())
+}
+
+/// Checks the times that drivers state for enabling and disabling: the host waits for as long.
+pub fn check_times(machine: &Machine, drivers: &Roster) -> Result<(), HostError> {
+    for driver in drivers.all() {
+        let described = driver.description;
+        for (key, seconds) in [("enable_s", described.enable_s), ("disable_s", described.disable_s)] {
+            if !(seconds > 0.0 && seconds <= MAX_ENABLE_S) {
+                let cause = format!(
+                    "driver {} says that its {key} is {seconds} s: more than 0 and at most {MAX_ENABLE_S} s is a time to wait for",
+                    driver.title
+                );
+                return Err(refusal(machine, &format!("{}.plugin", driver.section), cause));
+            }
+        }
     }
     Ok(())
 }
@@ -126,6 +143,29 @@ mod tests {
                 check(&machine, &planner, &Roster::of_one(DriverDescription::simulated())).err().map(|e| e.to_string());
             let told = words.is_some_and(|words| words.contains(&format!("plans of order {order}: 2 and 3 are known")));
             assert_eq!(told, !known, "{order}");
+        }
+    }
+
+    #[test]
+    fn a_time_that_nobody_can_wait_for_is_refused_with_its_key() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let machine = Machine::read(&path, &[]).unwrap();
+        let words = |description| check_times(&machine, &Roster::of_one(description)).err().map(|e| e.to_string());
+        for described in [DriverDescription::simulated(), DriverDescription::real()] {
+            assert_eq!(words(described), None);
+            for most in [f64::MIN_POSITIVE, MAX_ENABLE_S] {
+                assert_eq!(words(DriverDescription { enable_s: most, disable_s: most, ..described }), None);
+            }
+            for absurd in [f64::INFINITY, f64::NAN, -1.0, 0.0, -0.0, 600.1, 1e300, f64::NEG_INFINITY] {
+                for (key, description) in [
+                    ("enable_s", DriverDescription { enable_s: absurd, ..described }),
+                    ("disable_s", DriverDescription { disable_s: absurd, ..described }),
+                ] {
+                    let told = words(description).unwrap_or_default();
+                    assert!(told.contains("driver.plugin: driver driver says that its"), "{absurd}: {told}");
+                    assert!(told.contains(&format!("{key} is {absurd} s")), "{absurd}: {told}");
+                }
+            }
         }
     }
 

@@ -36,7 +36,7 @@ pub use axis::{Axes, AxisVector, MAX_AXES};
 pub use block::{ArcGeometry, Block, BlockKind, NurbsData, NurbsGeometry, OwnedBlock, PathMode};
 pub use driver::{
     Arm, Attached, Driver, DriverContext, DriverDescription, Feedback, JointDescription, JointState, Latch, MAX_ANALOG,
-    MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_LATCHES, Name, Setpoint,
+    MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_ENABLE_S, MAX_LATCHES, Name, Setpoint,
 };
 pub use error::PluginError;
 pub use event::{Event, EventKind};

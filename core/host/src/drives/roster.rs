@@ -46,7 +46,8 @@ impl Roster {
         Self::new(Entry { title, section, description, joints: None, spindle: true }, vec![])
     }
 
-    fn all(&self) -> impl Iterator<Item = &Entry> {
+    /// Each of them.
+    pub fn all(&self) -> impl Iterator<Item = &Entry> {
         std::iter::once(&self.first).chain(&self.others)
     }
 

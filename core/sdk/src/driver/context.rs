@@ -140,8 +140,10 @@ pub struct DriverDescription {
     /// clock follows it, so at most one driver of a machine may.
     pub gives_phase: u32,
     /// Longest time that enabling all joints takes, brakes included, s; past it the host gives up and says which joint is not.
+    /// More than 0 and at most [`MAX_ENABLE_S`], or the driver is refused.
     pub enable_s: f64,
     /// Longest time from `enable = 0` to the last joint's [`crate::JointState::Disabled`], s. The exchange goes on until then.
+    /// More than 0 and at most [`MAX_ENABLE_S`], or the driver is refused.
     pub disable_s: f64,
 }
 
@@ -155,6 +157,10 @@ layout!(DriverDescription {
     enable_s,
     disable_s
 });
+
+/// Longest time that a driver may ask a host to wait for, s: ten minutes. What brings a bus up is done in
+/// [`crate::Driver::start`] and has no limit; contactors and brakes are done within seconds.
+pub const MAX_ENABLE_S: f64 = 600.0;
 
 /// Time that a driver which states nothing else has for enabling and for disabling, s: contactors, self-tests and brakes of
 /// ordinary drives take less than a second.

@@ -51,7 +51,7 @@ mod context;
 mod exchange;
 mod state;
 
-pub use context::{DriverContext, DriverDescription, JointDescription, Name};
+pub use context::{DriverContext, DriverDescription, JointDescription, MAX_ENABLE_S, Name};
 pub use exchange::{Arm, Feedback, Latch, MAX_ANALOG, MAX_DIGITAL, MAX_LATCHES, Setpoint};
 pub use state::{Attached, JointState, MAX_DELAY_PERIODS};
 

@@ -3,7 +3,9 @@
 mod host;
 mod watch;
 
-use tandem_sdk::{AxisVector, Driver, DriverContext, DriverDescription, Feedback, Plugin, PluginError, Setpoint};
+use tandem_sdk::{
+    AxisVector, Driver, DriverContext, DriverDescription, Feedback, MAX_ENABLE_S, Plugin, PluginError, Setpoint,
+};
 
 use crate::machine::FINE_PERIOD_S;
 use crate::report::Report;
@@ -44,7 +46,7 @@ fn judge_description(described: &DriverDescription, report: &mut Report) {
     const CHECK: &str = "times for enabling and disabling";
     report.judged(CHECK);
     for (key, seconds) in [("enable_s", described.enable_s), ("disable_s", described.disable_s)] {
-        if !(seconds.is_finite() && seconds > 0.0) {
+        if !(seconds > 0.0 && seconds <= MAX_ENABLE_S) {
             report.find(CHECK, format!("{key} is {seconds}: no time in which it could be done"));
         }
     }
