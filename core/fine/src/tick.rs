@@ -357,6 +357,9 @@ impl FineLoop {
             self.fail(FaultKind::Soft);
             return Input::Trip;
         }
+        if self.given.abort && !self.attach.is_done() {
+            return self.give_up_enabling();
+        }
         if self.state != MachineState::Standstill {
             return Input::Rest;
         }

@@ -228,6 +228,38 @@ fn a_joint_that_gravity_pulls_sinks_only_until_it_holds() {
 }
 
 #[test]
+fn the_operator_stops_joints_that_are_on_their_way_to_holding() {
+    for (seed, abort) in (1..=40).flat_map(|seed| [(seed, false), (seed, true)]) {
+        let mut random = Random::new(seed);
+        let enable_after = std::array::from_fn(|joint| if joint == 1 { u64::MAX } else { random.below(60) });
+        let mut bench = Bench::new(Script { enable_after, position: somewhere(&mut random), ..Script::default() }, 500);
+        assert_eq!(bench.attach(random.below(100)), None);
+        let controls = Arc::clone(&bench.host.controls);
+        if abort { &controls.abort } else { &controls.emergency_stop }.store(true, Relaxed);
+        let before = bench.script.lock().unwrap().told.len();
+        while !bench.fine.is_over() {
+            bench.fine.tick();
+            let told = &bench.script.lock().unwrap().told;
+            assert_eq!(told[before..].iter().map(|(setpoint, _)| setpoint.enable).max(), Some(0), "in the next period");
+            assert!(told.len() - before <= 3, "they let go at once, and so does the run");
+        }
+        assert!(!bench.fine.is_attaching());
+        let kind = bench.fine.fault().map(|fault| fault.kind);
+        let rest = bench.rough.rests.pop().map(|rest| rest.cause);
+        if abort {
+            assert_eq!((kind, rest, controls.abort.load(Relaxed)), (None, Ok(RestCause::Abort), false), "seed {seed}");
+        } else {
+            assert_eq!(
+                (kind, rest.is_err(), bench.state()),
+                (Some(FaultKind::EmergencyStop), true, MachineState::Fault)
+            );
+        }
+        assert!(bench.rough.rests.pop().is_err(), "it is told once");
+        bench.assert_bumpless();
+    }
+}
+
+#[test]
 fn a_joint_that_is_never_enabled_is_named_with_its_state() {
     let script = Script { enable_after: [0, u64::MAX, 0], ..Script::default() };
     let mut bench = Bench::new(script, 500);

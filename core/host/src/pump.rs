@@ -145,15 +145,29 @@ impl<'a> Pump<'a> {
         self.serve_policy();
         self.tell_plugin_log();
         self.tell_waits();
-        let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
-        let mut both = Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing };
-        if let Err(error) = self.rough.step(&mut both) {
+        let (rough, mut both) = self.with_both();
+        if let Err(error) = rough.step(&mut both) {
             let words = error.with_planner(&self.planner);
             self.fail(words);
         }
         let taken_ns = started.elapsed().as_nanos();
         self.planning.record_many(taken_ns as u64, 1);
         self.planning_ns += taken_ns;
+    }
+
+    /// The rough loop, and who looks at what it does.
+    fn with_both(&mut self) -> (&mut RoughLoop, Both<'_>) {
+        let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
+        (&mut self.rough, Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing })
+    }
+
+    /// Takes the rests that have been reported, where no rough period follows to do it: the machine may be over.
+    pub fn take_rests(&mut self) {
+        let (rough, mut both) = self.with_both();
+        if let Err(error) = rough.take_rests(&mut both) {
+            let words = error.with_planner(&self.planner);
+            self.fail(words);
+        }
     }
 
     /// Puts a new policy script in place, if there is one.

@@ -285,7 +285,7 @@ impl Run {
         let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
-        summary.stopped = pump.aborted.map(|rest| format!("stopped by the operator at line {}", rest.line));
+        summary.stopped = pump.aborted.map(|rest| stopped(rest.line));
         tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
         let known = Known {
@@ -309,6 +309,14 @@ impl Run {
         drain_plugin_log(&mut |line| observer.note(line));
         summary.wall_time_s = started.elapsed().as_secs_f64();
         Ok(Outcome { summary, fault, position, left })
+    }
+}
+
+/// Where the operator's abort has stopped the program.
+fn stopped(line: u32) -> String {
+    match line {
+        0 => "stopped by the operator before the first line".to_string(),
+        line => format!("stopped by the operator at line {line}"),
     }
 }
 

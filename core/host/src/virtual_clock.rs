@@ -1,5 +1,7 @@
 //! Both loops in lockstep on one thread, as fast as the processor allows.
 
+use std::iter::Peekable;
+use std::slice::Iter;
 use std::thread;
 use std::time::Duration;
 
@@ -16,31 +18,30 @@ const PATIENCE_S: f64 = 60.0;
 pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, commands: &[Timed]) {
     let patience = (PATIENCE_S / pump.period_s()).round() as u64;
     let mut progress = Progress::default();
-    let mut commands = commands.iter().peekable();
+    let mut commands = Commands { all: commands.iter().peekable(), stalled: 0 };
     let mut tick = 0;
-    let mut stalled = 0;
     while fine.is_attaching() {
+        // The operator's stops act before the joints hold too.
+        commands.give(pump, fine);
         calling(Method::FinePeriod, || fine.tick());
         beat();
     }
-    // A fault on the way has its samples too.
+    // A fault on the way has its samples too, and an abort its rest.
     pump.drain();
+    if fine.is_over() {
+        pump.take_rests();
+    }
     while !fine.is_over() {
-        if stalled == 0 {
+        if commands.stalled == 0 {
             pump.step();
         }
-        stalled = u64::saturating_sub(stalled, 1);
+        commands.stalled = commands.stalled.saturating_sub(1);
         for _ in 0..fine_per_rough {
             // As on the wall clock, no sample follows the last.
             if fine.is_over() {
                 break;
             }
-            while let Some(timed) = commands.next_if(|timed| timed.tick <= fine.next_tick()) {
-                pump.give(timed);
-                if let Command::StallRough(periods) = timed.command {
-                    stalled += periods;
-                }
-            }
+            commands.give(pump, fine);
             calling(Method::FinePeriod, || fine.tick());
             beat();
             tick += 1;
@@ -54,8 +55,27 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         if stuck_ticks > 0 && pump.is_attended() {
             // Somebody at a keyboard lives in real time.
             thread::sleep(Duration::from_secs_f64(pump.period_s() * f64::from(fine_per_rough)));
-        } else if commands.peek().is_none() && stuck_ticks > patience {
+        } else if commands.all.peek().is_none() && stuck_ticks > patience {
             pump.give_up();
+        }
+    }
+}
+
+/// The commands that are left of a command file.
+struct Commands<'a> {
+    all: Peekable<Iter<'a, Timed>>,
+    /// Rough periods in which the rough loop is to do nothing.
+    stalled: u64,
+}
+
+impl Commands<'_> {
+    /// Before a fine period: gives what acts in it.
+    fn give(&mut self, pump: &mut Pump<'_>, fine: &FineLoop) {
+        while let Some(timed) = self.all.next_if(|timed| timed.tick <= fine.next_tick()) {
+            pump.give(timed);
+            if let Command::StallRough(periods) = timed.command {
+                self.stalled += periods;
+            }
         }
     }
 }

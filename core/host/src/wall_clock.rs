@@ -66,6 +66,7 @@ pub fn drive(
     }
     let timed = thread.join()?;
     pump.drain();
+    pump.take_rests();
     Ok(Ended { body: timed.body.fine, timing: timed.timing, page_faults: timed.page_faults })
 }
 

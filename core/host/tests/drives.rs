@@ -31,6 +31,8 @@ struct Hardware {
     homed: u32,
     homing_for: u64,
     inputs: u64,
+    /// The drives never come up.
+    never_enables: bool,
     /// Exchanges between which the door is open.
     open: std::ops::Range<u64>,
     told: Vec<Setpoint>,
@@ -76,6 +78,7 @@ impl Driver for Cell {
                 let state = match setpoint.enable {
                     _ if drives.faulty == Some(joint) => JointState::Fault,
                     0 => JointState::Disabled,
+                    _ if drives.never_enables => JointState::Enabling,
                     _ if homes && drives.homed >> joint & 1 == 0 => JointState::Homing,
                     _ => JointState::Enabled,
                 };
@@ -289,6 +292,33 @@ fn a_reset_in_a_session_reaches_the_drives() {
         let (outcome, _) = drive(session.enable().unwrap(), &[]);
         assert_eq!((outcome.summary.fault, hardware().resets), (None, 1), "round {round}");
     }
+}
+
+/// They waited until the joints held, which they may never do.
+#[test]
+fn commands_of_the_first_tick_act_while_the_drives_are_enabled() {
+    let at_once = |command, text: &str| {
+        set(|drives| drives.never_enables = true);
+        drive(prepare(text, &[], Switches::default()).unwrap(), &[Timed { tick: 0, command }]).0.summary
+    };
+    let stopped = at_once(Command::EmergencyStop, WORK);
+    assert!(stopped.fault.is_some_and(|words| words.contains("emergency stop")));
+    assert!(hardware().told.len() <= 3 && hardware().told.iter().all(|told| told.enable == 0));
+    let aborted = at_once(Command::Abort, WORK);
+    assert_eq!(
+        (aborted.fault, aborted.stopped.as_deref()),
+        (None, Some("stopped by the operator before the first line"))
+    );
+    assert!(hardware().told.len() <= 3 && hardware().told.iter().all(|told| told.enable == 0));
+    // A hold lets them hold: they are waited for, and the machine stands then.
+    let held = at_once(Command::Hold, WORK);
+    assert!(held.fault.is_some_and(|words| words.contains("is enabling")), "they never come up");
+    set(|_| ());
+    let hold = [Timed { tick: 0, command: Command::Hold }, Timed { tick: 700, command: Command::Abort }];
+    let (outcome, watch) = drive(prepare(WORK, &[], Switches::default()).unwrap(), &hold);
+    assert_eq!(outcome.summary.fault, None);
+    let moved = hardware().told.iter().any(|told| told.velocity != AxisVector::ZERO);
+    assert!(!moved && watch.causes[1..700].iter().all(|cause| *cause == StopCause::Hold));
 }
 
 #[test]

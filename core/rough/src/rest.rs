@@ -8,8 +8,11 @@ use crate::Observer;
 use crate::rough::{RoughError, RoughLoop};
 
 impl RoughLoop {
-    /// Takes the rests that the fine loop has reported.
-    pub(crate) fn take_rests(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
+    /// Takes the rests that the fine loop has reported. A rough period begins with it.
+    ///
+    /// # Errors
+    /// The program cannot go on from a rest.
+    pub fn take_rests(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         while let Some(rest) = self.queue.take_rest() {
             self.planner.reset(&rest.position);
             self.queue.restart(&rest);

@@ -6,6 +6,7 @@ use super::rest::Stop;
 use super::{FineLoop, Phase};
 use crate::config::{FineConfig, Joints};
 use crate::fault::FaultKind;
+use crate::state::Input;
 
 /// How far the joints may be from where the kinematics have them without it being a skew, mm or rad: rounding.
 const ROUNDING: f64 = 1e-9;
@@ -54,7 +55,8 @@ impl Attach {
 impl FineLoop {
     /// What the joints are told in this period: each where it stands until it holds, and from then on the same.
     pub(super) fn hold_still(&mut self) -> AxisVector {
-        let enables = self.attach.stage == Stage::Enabling && self.fault.is_none() && self.may_enable();
+        let may_hold = self.fault.is_none() && !self.is_letting_go() && self.may_enable();
+        let enables = self.attach.stage == Stage::Enabling && may_hold;
         self.setpoint.enable = u32::from(enables);
         self.setpoint.reset = u32::from(self.attach.stage == Stage::Resetting && self.attach.periods == 0);
         self.attach.joints
@@ -62,7 +64,7 @@ impl FineLoop {
 
     /// Behind an exchange: which joints hold, and where those stand that do not.
     pub(super) fn watch_attach(&mut self) {
-        if self.attach.is_done() || self.fault.is_some() {
+        if self.attach.is_done() || self.fault.is_some() || self.is_letting_go() {
             return;
         }
         self.attach.periods += 1;
@@ -93,6 +95,14 @@ impl FineLoop {
         let late = states[..self.joints].iter().position(|state| *state != JointState::Enabled);
         let joint = late.unwrap_or_default();
         self.fail(FaultKind::NotEnabled { joint, state: states[joint], code: self.feedback.fault_code[joint] });
+    }
+
+    /// The operator aborts before the joints hold: they are not told to any more, and nothing follows.
+    pub(super) fn give_up_enabling(&mut self) -> Input {
+        let input = self.part(Stop::abort());
+        let reported = matches!(self.phase, Phase::Parted);
+        (self.outputs.ended, self.release.had_ended) = (reported, reported);
+        input
     }
 
     /// Whether the drives' faults count: before they are reset they are what the reset is for.

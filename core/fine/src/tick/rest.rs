@@ -143,6 +143,9 @@ impl FineLoop {
             self.fail(FaultKind::Soft);
             return Input::Trip;
         }
+        if self.outputs.ended {
+            return Input::Rest;
+        }
         if self.given.abort {
             return self.part(Stop::abort());
         }
