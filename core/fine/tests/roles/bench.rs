@@ -1,19 +1,16 @@
 //! A fine loop whose drives report inputs as a test wants them, in every state of the machine.
 
+use std::ops::{Deref, DerefMut};
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex};
 
-use tandem_fine::{Fault, FaultKind, FineConfig, FineLoop, Roles};
+use tandem_fine::{FaultKind, FineConfig, Roles};
 use tandem_rig::Random;
-use tandem_rings::{HostEnd, MachineState, Queued, RestCause, RoughEnd, Sizes, bridge};
-use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event, EventKind, Feedback,
-    JointState, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint, StopOn,
-};
+use tandem_rings::{MachineState, RestCause};
+use tandem_sdk::{AxisVector, Edge, EventKind, StopOn};
 
-const PERIOD_S: f64 = 0.001;
+use crate::demanding::{self, ACCELERATION_MM_PER_S2, FEED_MM_PER_S, Script};
+
 const JOINTS: usize = 2;
-const ACCELERATION_MM_PER_S2: f64 = 1000.0;
 const SPINDLE_RAD_PER_S: f64 = 100.0;
 /// Exchanges that the drives need to hold.
 pub const ENABLE: u64 = 20;
@@ -23,52 +20,6 @@ pub const SPIN_UP: u32 = 40;
 pub const MAX_AGE: u16 = 5;
 /// Input that probing waits for.
 pub const PROBE: u32 = 7;
-
-/// The drives, as the test makes them.
-pub struct Script {
-    pub inputs: u64,
-    pub age: [u16; 64],
-    pub enabled_for: u64,
-    pub spun_for: u32,
-    pub faulty: bool,
-    pub told: Vec<Setpoint>,
-}
-
-pub struct Drives(pub Arc<Mutex<Script>>);
-
-impl Driver for Drives {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::real()
-    }
-    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
-        Ok(())
-    }
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::default())
-    }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        let mut script = self.0.lock().unwrap();
-        script.told.push(*setpoint);
-        script.enabled_for = if setpoint.enable == 0 { 0 } else { script.enabled_for + 1 };
-        script.spun_for = if setpoint.spindle_rad_per_s == 0.0 { 0 } else { script.spun_for + 1 };
-        let state = match script.enabled_for {
-            _ if script.faulty => JointState::Fault,
-            0 => JointState::Disabled,
-            1..ENABLE => JointState::Enabling,
-            _ => JointState::Enabled,
-        };
-        feedback.state[..JOINTS].fill(state);
-        feedback.position = setpoint.position;
-        (feedback.inputs, feedback.input_age_periods) = (script.inputs, script.age);
-        let turns = setpoint.spindle_rad_per_s == 0.0 || script.spun_for > SPIN_UP;
-        feedback.spindle_at_speed = u32::from(turns);
-        Ok(())
-    }
-    fn quick_stop(&mut self) {}
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
@@ -118,37 +69,33 @@ impl Doing {
 }
 
 pub struct Bench {
-    pub fine: FineLoop,
-    pub rough: RoughEnd,
-    pub host: HostEnd,
-    pub script: Arc<Mutex<Script>>,
-    pub epoch: u32,
-    pub x_mm: f64,
-    pub start_s: f64,
+    machine: demanding::Bench,
     pub closed: bool,
     pub input: u32,
 }
 
-pub fn config(roles: Roles, unhomed: u32) -> FineConfig {
-    let axis = AxisLimits {
-        min_mm: -1000.0,
-        max_mm: 1000.0,
-        feed_mm_per_s: 100.0,
-        rapid_mm_per_s: 100.0,
-        acceleration_mm_per_s2: ACCELERATION_MM_PER_S2,
-        jerk_mm_per_s3: f64::INFINITY,
-        speed_difference_mm_per_s: 0.0,
-    };
-    FineConfig {
-        linear: 0b11,
-        max_following_error_mm: AxisVector([0.01; MAX_AXES]),
-        unhomed,
-        enable_periods: 500,
-        disable_periods: 100,
-        plans_from_rest: true,
-        roles,
-        ..FineConfig::new(PERIOD_S, Limits::new(&[axis; JOINTS]).unwrap())
+impl Deref for Bench {
+    type Target = demanding::Bench;
+
+    fn deref(&self) -> &Self::Target {
+        &self.machine
     }
+}
+
+impl DerefMut for Bench {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.machine
+    }
+}
+
+pub fn config(roles: Roles, unhomed: u32) -> FineConfig {
+    FineConfig { unhomed, roles, ..demanding::config(JOINTS) }
+}
+
+/// Drives that need their time, and these levels of the inputs.
+pub fn script(inputs: u64) -> Script {
+    let (joints, spin_up) = (JOINTS, SPIN_UP);
+    Script { inputs, spin_up, enable_after: [ENABLE - 1; tandem_sdk::MAX_AXES], ..Script::new(joints) }
 }
 
 impl Bench {
@@ -167,74 +114,30 @@ impl Bench {
         roles.normally_closed = if closed { bit } else { 0 };
         roles.max_age_periods[input as usize] = MAX_AGE;
         let inputs = if closed { bit } else { 0 };
-        let script = Script { inputs, age: [0; 64], enabled_for: 0, spun_for: 0, faulty: false, told: vec![] };
-        let script = Arc::new(Mutex::new(script));
-        let (rough, end, host) = bridge(Sizes { segments: 64, samples: 1 << 14 });
         let config = config(roles, u32::from(doing == Doing::Homing));
-        let mut fine = FineLoop::new(&config, end, Box::new(Drives(Arc::clone(&script))), None);
-        fine.reset();
-        Self { fine, rough, host, script, epoch: 0, x_mm: 0.0, start_s: 0.0, closed, input }
+        Self { machine: demanding::Bench::new(&config, script(inputs)), closed, input }
     }
 
-    pub fn ticks(&mut self, count: u64) {
-        (0..count).for_each(|_| self.fine.tick());
-    }
-
-    pub fn fault(&self) -> Option<FaultKind> {
-        self.fine.fault().map(|fault: Fault| fault.kind)
-    }
-
-    pub fn state(&self) -> MachineState {
-        MachineState::from_number(self.host.status.state.load(Relaxed))
+    /// The same machine whose inputs have these roles.
+    pub fn with_roles(roles: Roles, unhomed: u32, input: u32, inputs: u64) -> Self {
+        Self { machine: demanding::Bench::new(&config(roles, unhomed), script(inputs)), closed: inputs != 0, input }
     }
 
     /// Ticks until all joints hold.
     pub fn attach(&mut self) {
-        for _ in 0..2 * ENABLE {
-            self.fine.tick();
-            if let Ok(rest) = self.rough.rests.pop() {
-                assert_eq!(rest.cause, RestCause::Attached);
-                self.go_on(rest.epoch, rest.program_time_s);
-                return;
-            }
+        match self.rest(2 * ENABLE) {
+            Some(rest) => assert_eq!(rest.cause, RestCause::Attached),
+            None => panic!("not enabled: {:?}", self.fault()),
         }
-        panic!("not enabled: {:?}", self.fault());
-    }
-
-    pub fn go_on(&mut self, epoch: u32, start_s: f64) {
-        (self.epoch, self.start_s) = (epoch + 1, start_s);
-        self.rough.depth.begin(self.epoch, start_s);
-    }
-
-    pub fn piece(&mut self, motion: [f64; 3], duration_s: f64, last: bool, stop_on: StopOn) {
-        let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
-        segment.coefficients[0] = [motion[0], motion[1], motion[2], 0.0, 0.0, 0.0];
-        segment.path = segment.coefficients[0];
-        segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
-        (segment.epoch, segment.feed_mm_per_s, segment.stop_on) = (self.epoch, 100.0, stop_on);
-        segment.stop_deceleration_mm_per_s2 = 500.0;
-        self.rough.segments.push(Queued::Segment { start_s: self.start_s, segment }).unwrap();
-        self.x_mm = segment.position(duration_s)[0];
-        self.start_s += duration_s;
-        self.rough.depth.stop_deceleration_mm_per_s2.store(500.0);
-        self.rough.depth.wall_s.store(f64::INFINITY);
-        self.rough.depth.required_s.store(0.0);
     }
 
     /// Queues 0.2 s of acceleration, 1 s at 100 mm/s and 0.2 s to rest.
     pub fn queue_move(&mut self, stop_on: StopOn) {
-        self.piece([self.x_mm, 0.0, 250.0], 0.2, false, stop_on);
-        self.piece([self.x_mm, 100.0, 0.0], 1.0, false, stop_on);
-        self.piece([self.x_mm, 100.0, -250.0], 0.2, true, stop_on);
+        self.queue(0, 0.2, 1.0, stop_on);
     }
 
     pub fn queue_spindle(&mut self) {
-        let event = Event {
-            program_time_s: self.start_s,
-            epoch: self.epoch,
-            ..Event::new(EventKind::Spindle, 1, 0, 0, SPINDLE_RAD_PER_S)
-        };
-        self.rough.segments.push(Queued::Event(event)).unwrap();
+        self.queue_event(EventKind::Spindle, 0, SPINDLE_RAD_PER_S);
     }
 
     /// Brings the machine to where it does that.
@@ -252,7 +155,7 @@ impl Bench {
         let (some, no_edge) = (10 + random.below(1200), StopOn::default());
         match doing {
             Doing::Dwelling => {
-                self.piece([self.x_mm, 0.0, 0.0], 2.0, true, no_edge);
+                self.piece([AxisVector::ZERO; 2], 2.0, true, no_edge);
                 self.ticks(some);
                 return;
             }
@@ -269,7 +172,7 @@ impl Bench {
                 self.ticks(400);
             }
             Doing::Ramping => {
-                self.script.lock().unwrap().faulty = true;
+                self.script().fault = Some(0);
                 self.ticks(1 + random.below(20));
             }
             _ => {}
@@ -277,31 +180,28 @@ impl Bench {
     }
 
     pub fn trip(&mut self, old: bool) {
-        let mut script = self.script.lock().unwrap();
-        if old { script.age[self.input as usize] = MAX_AGE + 1 } else { script.inputs ^= 1 << self.input }
+        let input = self.input;
+        let mut script = self.script();
+        if old { script.input_age[input as usize] = MAX_AGE + 1 } else { script.inputs ^= 1 << input }
     }
 
     pub fn release(&mut self) {
-        let mut script = self.script.lock().unwrap();
-        script.age = [0; 64];
-        script.inputs = if self.closed { 1 << self.input } else { 0 };
-    }
-
-    pub fn told(&self) -> Setpoint {
-        *self.script.lock().unwrap().told.last().unwrap()
+        let inputs = if self.closed { 1 << self.input } else { 0 };
+        let mut script = self.script();
+        (script.input_age, script.inputs) = ([0; 64], inputs);
     }
 
     /// Ticks until nothing moves.
-    pub fn rest(&mut self) {
+    pub fn come_to_rest(&mut self) {
         self.ticks(400);
         assert_eq!(self.told().velocity, AxisVector::ZERO);
     }
 
     /// No setpoint went beyond a limit.
     pub fn assert_limits(&self) {
-        for told in &self.script.lock().unwrap().told {
+        for (told, _) in &self.script().told {
             let most = ACCELERATION_MM_PER_S2 * (1.0 + 1e-6) + 1e-6;
-            assert!(told.velocity[0].abs() <= 100.0 * (1.0 + 1e-6), "{told:?}");
+            assert!(told.velocity[0].abs() <= FEED_MM_PER_S * (1.0 + 1e-6), "{told:?}");
             assert!(told.acceleration[0].abs() <= most, "{told:?}");
         }
     }

@@ -1,14 +1,18 @@
 //! Inputs with a role: each in every state of the machine, with fresh and with old samples, at ticks drawn from a seed.
 
 mod bench;
+#[allow(dead_code)] // what other tests need of it
+#[path = "../demanding/mod.rs"]
+mod demanding;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use bench::{ALL, Bench, Doing, Drives, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP, config};
-use tandem_fine::{FaultKind, FineLoop, InputFault, Roles};
+use bench::{ALL, Bench, Doing, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP};
+use demanding::FAULT_CODE;
+use tandem_fine::{FaultKind, InputFault, Roles};
 use tandem_rig::Random;
-use tandem_rings::{MachineState, RestCause, Sizes, StopCause, bridge};
+use tandem_rings::{MachineState, RestCause, StopCause};
 use tandem_sdk::{AxisVector, MAX_AXES, StopOn};
 
 /// Every role in every state, fresh and old.
@@ -33,7 +37,7 @@ fn each(mut judge: impl FnMut(Bench, Doing, bool, &mut Random), of: Role) {
     }
 }
 
-const DRIVE_FAULT: FaultKind = FaultKind::Drive { joint: 0, code: 0 };
+const DRIVE_FAULT: FaultKind = FaultKind::Drive { joint: 0, code: FAULT_CODE };
 
 #[test]
 fn an_emergency_stop_is_one_in_every_state() {
@@ -45,11 +49,11 @@ fn an_emergency_stop_is_one_in_every_state() {
             bench.assert_ends_by(if doing == Doing::Ramping { DRIVE_FAULT } else { kind });
             bench.assert_limits();
             // It is pressed still: the drives are not told to hold once more.
-            bench.script.lock().unwrap().faulty = false;
+            bench.script().fault = None;
             bench.fine.reset();
-            let from = bench.script.lock().unwrap().told.len();
+            let from = bench.script().told.len();
             bench.assert_ends_by(kind);
-            assert!(bench.script.lock().unwrap().told[from..].iter().all(|told| told.enable == 0));
+            assert!(bench.script().told[from..].iter().all(|(told, _)| told.enable == 0));
             bench.release();
             bench.fine.reset();
             bench.ticks(2 * ENABLE);
@@ -94,7 +98,7 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
         bench.queue_spindle();
         bench.queue_move(StopOn::default());
     }
-    bench.rest();
+    bench.come_to_rest();
     let at = bench.told().position;
     assert_eq!((bench.fault(), bench.state()), (None, MachineState::Holding));
     // Neither a resume before it is released nor the release alone lets anything move.
@@ -110,13 +114,13 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
         let known = [cause, StopCause::None].contains(&sample.cause) || doing == Doing::Holding;
         assert!(known, "{:?} at {}", sample.cause, sample.tick);
     }
-    let from = bench.script.lock().unwrap().told.len();
+    let from = bench.script().told.len();
     controls.hold.store(false, Relaxed);
     bench.ticks(2500);
     assert_eq!(bench.fault(), None);
-    let script = bench.script.lock().unwrap();
-    let moved = script.told[from..].iter().position(|told| told.velocity != AxisVector::ZERO);
-    let turned = script.told[from..].iter().position(|told| told.spindle_rad_per_s != 0.0);
+    let script = bench.script();
+    let moved = script.told[from..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO);
+    let turned = script.told[from..].iter().position(|(told, _)| told.spindle_rad_per_s != 0.0);
     assert_eq!(moved.is_some(), ![Doing::Dwelling, Doing::AtRest].contains(&doing));
     if let (Some(moved), true, false) = (moved, door, [Doing::Enabling, Doing::Waiting].contains(&doing)) {
         assert!(moved - turned.unwrap() >= SPIN_UP as usize, "{turned:?} {moved}");
@@ -191,13 +195,8 @@ fn an_axis_that_stands_on_its_limit_may_leave_it_by_hand_and_while_it_is_homed()
 #[test]
 fn a_limit_that_is_a_home_switch_is_none_while_axes_are_homed() {
     for homed in [false, true] {
-        let mut bench = Bench::new(Role::Limit, Doing::Homing, 9, true);
         let roles = Roles { limit: 1 << 9, home_switches: 1 << 9, normally_closed: 1 << 9, ..Roles::default() };
-        let (rough, end, host) = bridge(Sizes { segments: 64, samples: 1 << 14 });
-        let drives = Box::new(Drives(Arc::clone(&bench.script)));
-        (bench.rough, bench.host) = (rough, host);
-        bench.fine = FineLoop::new(&config(roles, u32::from(!homed)), end, drives, None);
-        bench.fine.reset();
+        let mut bench = Bench::with_roles(roles, u32::from(!homed), 9, 1 << 9);
         bench.attach();
         bench.queue_move(StopOn::default());
         bench.ticks(200);
@@ -216,7 +215,7 @@ fn a_switch_that_motion_waits_for_and_does_not_hear_of_is_a_fault() {
                 bench.assert_limits();
             }
             (Doing::Probing, false) => {
-                bench.rest();
+                bench.come_to_rest();
                 assert_eq!(bench.rough.rests.pop().map(|rest| rest.cause), Ok(RestCause::Edge));
             }
             _ => {
@@ -233,7 +232,7 @@ fn a_switch_that_motion_waits_for_and_does_not_hear_of_is_a_fault() {
 fn an_input_that_is_old_but_not_too_old_asks_for_nothing() {
     for role in ROLES {
         let mut bench = Bench::new(role, Doing::Running, 9, true);
-        bench.script.lock().unwrap().age = [MAX_AGE; 64];
+        bench.script().input_age = [MAX_AGE; 64];
         bench.attach();
         bench.queue_move(StopOn::default());
         bench.ticks(1500);
@@ -246,12 +245,12 @@ fn a_spindle_that_does_not_turn_again_behind_a_door_is_a_fault() {
     let mut bench = Bench::new(Role::Door, Doing::Running, 9, true);
     bench.begin(Doing::Running, &mut Random::new(3));
     bench.trip(false);
-    bench.rest();
+    bench.come_to_rest();
     bench.release();
     bench.ticks(5);
     bench.host.controls.hold.store(false, Relaxed);
     for _ in 0..30_010 {
-        bench.script.lock().unwrap().spun_for = 0;
+        bench.script().spun_for = 0;
         bench.fine.tick();
     }
     assert_eq!(bench.fault(), Some(FaultKind::SpindleSlow { within_s: 30.0 }));
@@ -264,11 +263,11 @@ fn samples_say_what_of_them_is_old() {
     bench.queue_move(StopOn::default());
     bench.ticks(50);
     while bench.host.samples.pop().is_ok() {}
-    bench.script.lock().unwrap().age[9] = 1;
+    bench.script().input_age[9] = 1;
     bench.ticks(1);
     let old = bench.host.samples.pop().unwrap();
     assert_eq!((old.inputs, old.old_inputs, old.age_periods), (1 << 9, 1 << 9, [0; MAX_AXES]));
-    bench.script.lock().unwrap().age[9] = 0;
+    bench.script().input_age[9] = 0;
     bench.ticks(1);
     assert_eq!(bench.host.samples.pop().unwrap().old_inputs, 0);
 }
