@@ -42,7 +42,7 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
     let last = elements.len().min(followed.end.element + 1) - 1;
     let passed = |index: usize| index < last || !options.ends_early || !elements[index].exact_stop;
     let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end && passed(index));
-    let vertices = reached.map(|(index, element)| {
+    let vertices = reached.filter_map(|(index, element)| {
         while link + 1 < followed.places.len() && followed.places[link + 1] <= end_of(index) {
             link += 1;
         }
@@ -50,9 +50,14 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
         let mut off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + deviation_mm));
         if off_mm > limit_mm && followed.misses.is_empty() {
             let ranges = ranges.get_or_insert_with(|| follow::ranges(elements, followed, options).unwrap_or_default());
+            // Where the path comes by again, a run that ended early may have ended the first time.
+            if options.ends_early && ranges.last().is_some_and(|(first, _)| *first < end_of(index)) {
+                return None;
+            }
             off_mm = off_mm.min(laid.distance_of_all_mm(index, ranges));
         }
-        Vertex { line: element.line, sample: followed.samples[link], off_mm, limit_mm, exact_stop: element.exact_stop }
+        let (line, exact_stop) = (element.line, element.exact_stop);
+        Some(Vertex { line, sample: followed.samples[link], off_mm, limit_mm, exact_stop })
     });
     vertices.collect()
 }

@@ -77,6 +77,19 @@ fn a_run_that_ends_early_is_judged_as_far_as_it_went() {
 }
 
 #[test]
+fn a_run_that_ends_early_beside_a_later_part_of_the_path_has_not_passed_what_lies_between() {
+    let early = Options { ends_early: true, ..Options::default() };
+    // It ends on the way back, and exactly on the way that follows.
+    let program = "G61\nG1 X0.01 F3000\nX0.005\nX0.01 Y0.0000001\nX20 Y15\n";
+    let samples = stop_at_all(&[at(0.0, 0.0, 0.0), at(0.01, 0.0, 0.0), at(0.0075, 5e-8, 0.0)], 50.0, 990.0);
+    assert_passes(&judge(&trace(&samples), program, &smooth_machine(), &early));
+    // Further on nothing is left to doubt.
+    let cut = [at(0.0, 0.0, 0.0), at(19.995, 0.0, 0.0), at(20.0, 0.005, 0.0), at(20.0, 8.0, 0.0)];
+    let verdict = judge(&trace(&stop_at_all(&cut, 50.0, 990.0)), "G61\nG1 X20 F3000\nY15\n", &smooth_machine(), &early);
+    assert_finds(&verdict, &[Kind::VertexMissed]);
+}
+
+#[test]
 fn a_reversal_and_a_crossing_fool_nobody() {
     let points = [(0.0, 0.0), (20.0, 0.0), (5.0, 0.0), (5.0, 5.0), (10.0, 5.0), (10.0, -5.0), (0.0, 0.0), (20.0, 0.0)];
     let points = points.map(|(x, y)| at(x, y, 0.0));

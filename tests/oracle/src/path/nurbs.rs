@@ -17,7 +17,7 @@ const SETTLED: f64 = 1e-9;
 const THIRDS: usize = 60;
 /// Halvings towards the first point within reach: a slightly later one is within reach too.
 const HALVINGS: usize = 12;
-/// Chords whose sum is the length of a piece.
+/// Chords whose sum is nearly the length of a piece.
 const CHORDS: usize = 64;
 /// A piece turns by less than this between its chords, rad.
 const GREATEST_TURN_RAD: f64 = 0.2;
@@ -104,7 +104,9 @@ impl Nurbs {
 impl Curve {
     fn new(nurbs: &Rc<Nurbs>, span: usize, from: f64, to: f64) -> Self {
         let mut curve = Self { nurbs: Rc::clone(nurbs), span, from, to, length_mm: 0.0 };
-        curve.length_mm = curve.chords_mm(CHORDS);
+        // What chords leave out goes with the square of their length: that of twice as long ones shows how much it is.
+        let (sum_mm, coarse_mm) = (curve.chords_mm(CHORDS), curve.chords_mm(CHORDS / 2));
+        curve.length_mm = sum_mm + (sum_mm - coarse_mm) / 3.0;
         curve
     }
 

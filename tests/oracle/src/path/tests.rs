@@ -70,7 +70,7 @@ proptest! {
         prop_assert!(distance(&shape.reversed().at(fraction), &shape.at(1.0 - fraction)) < 1e-12);
         prop_assert!((shape.reversed().length_mm() - shape.length_mm()).abs() < 1e-12);
         let length_mm: f64 = fractions().skip(1).zip(fractions()).map(|(to, from)| distance(&shape.at(to), &shape.at(from))).sum();
-        prop_assert!((length_mm - shape.length_mm()).abs() < 1e-6 * length_mm.max(1.0));
+        prop_assert!((length_mm - shape.length_mm()).abs() < 1e-7 * length_mm.max(1.0));
     }
 }
 
