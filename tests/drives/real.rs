@@ -129,7 +129,7 @@ fn a_drive_that_never_enables_is_named() {
     let text = real("never", ", never_enables = true") + "[loops]\nmax_missed_periods = 100000\n";
     let run = Run::prepare(machine(&text), &registry(), short(), Switches::default()).unwrap();
     let fault = run.drive(Clock::Wall, &[], &mut ()).unwrap().summary.fault.unwrap();
-    assert!(fault.contains("driver double: joint 0 was not enabled within 0.1 s: its drive is enabling"), "{fault}");
+    assert!(fault.contains("driver double: axis X was not enabled within 0.1 s: its drive is enabling"), "{fault}");
 }
 
 /// A faulted drive stayed faulted through a new run; its code was decimal, without words.
@@ -150,7 +150,7 @@ fn a_drive_that_is_lost_in_motion_is_a_fault() {
     let text = real("lost", ", fails_at = 20, how = \"lost\"") + "[loops]\nmax_missed_periods = 100000\n";
     let run = Run::prepare(machine(&text), &registry(), short(), Switches::default()).unwrap();
     let fault = run.drive(Clock::Wall, &[], &mut ()).unwrap().summary.fault.unwrap();
-    assert!(fault.starts_with("driver double: the drive of joint 0 is lost"), "{fault}");
+    assert!(fault.starts_with("driver double: the drive of axis X is lost"), "{fault}");
 }
 
 /// A driver was told nothing of the joints that it moves.

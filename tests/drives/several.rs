@@ -76,7 +76,7 @@ fn where_one_of_two_fails_the_others_ramp_to_rest_within_their_limits() {
         let (title, other) = if fails == 0 { ("bus (double)", "arm") } else { ("arm (double)", "bus") };
         assert!(words.starts_with(&format!("driver {title}: ")), "{case}: {words}");
         if how == "fault" {
-            let (joint, driver) = if fails == 0 { ("joint 2", "bus") } else { ("joint 3", "arm") };
+            let (joint, driver) = if fails == 0 { ("axis Z", "bus") } else { ("axis A", "arm") };
             let told = format!(
                 "the drive of {joint} reports fault 0x7210 (following error of amplifier 0 of {name}-{driver})"
             );

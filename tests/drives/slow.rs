@@ -1,9 +1,10 @@
 //! A device on a slow line beside drives that answer in every period.
 
 use tandem_host::{Clock, Run, Switches};
+use tandem_rings::StopCause;
 
 use crate::double::log;
-use crate::{machine, program, registry};
+use crate::{Samples, machine, program, registry};
 
 /// Four joints on a bus, and a spindle whose driver takes `slow_ms` an answer; fine periods of 10 ms.
 fn with_spindle(name: &str, spindle: &str) -> String {
@@ -21,8 +22,13 @@ const TURNS: &str = "G21 G90 G94 F600\nM3 S1000\nG1 X20\nM2\n";
 fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
     let text = with_spindle("slow", ", slow_ms = 200, silent_after = 6");
     let run = Run::prepare(machine(&text), &registry(), program(TURNS), Switches::default()).unwrap();
-    let summary = run.drive(Clock::Wall, &[], &mut ()).unwrap().summary;
+    let mut samples = Samples::default();
+    let summary = run.drive(Clock::Wall, &[], &mut samples).unwrap().summary;
     let (bus, line) = (log("slow-bus"), log("slow-line"));
+    let waits =
+        samples.0.iter().position(|sample| sample.cause == StopCause::Spindle).expect("its answer takes 200 ms");
+    let moves = samples.0.iter().position(|sample| sample.command[0] > 0.0).expect("it comes");
+    assert!(waits < moves && samples.0[moves..].iter().all(|sample| sample.cause != StopCause::Spindle));
     assert!(bus.exchanges > 200, "two seconds of motion: {}", bus.exchanges);
     assert!((2..=6).contains(&line.exchanges), "{} answers", line.exchanges);
     assert!(line.turned, "it was told to turn");
@@ -30,6 +36,19 @@ fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
     assert!(exchange.max < 150_000.0, "an answer takes 200 ms: {exchange:?}");
     let fault = summary.fault.unwrap();
     assert!(fault.contains("its device does not answer"), "it cannot be let go of: {fault}");
+}
+
+/// The device answers once, before it is told to turn.
+#[test]
+fn a_slow_spindle_that_falls_silent_ends_the_run_by_its_name_before_anything_cuts() {
+    let text = with_spindle("dumb", ", slow_ms = 200, silent_after = 1") + "[spindle]\nat_speed_within_s = 1\n";
+    let run = Run::prepare(machine(&text), &registry(), program(TURNS), Switches::default()).unwrap();
+    let mut samples = Samples::default();
+    let fault = run.drive(Clock::Wall, &[], &mut samples).unwrap().summary.fault.unwrap();
+    assert!(fault.contains("driver line (double): the spindle is not at speed within 1 s"), "{fault}");
+    assert!(samples.0.iter().all(|sample| sample.command[0] == 0.0));
+    let waits = samples.0.iter().filter(|sample| sample.cause == StopCause::Spindle).count();
+    assert!((95..=100).contains(&waits), "a hundred periods, but for those that no answer could have come in: {waits}");
 }
 
 #[test]

@@ -199,7 +199,7 @@ fn drives_that_fail_in_motion_are_told_by_name() {
     let program = "G21 G91\nF3000\nG1 X50 Y20\nM2\n";
     let cases = [
         ("faults=[{joint=1,tick=300,code=29200,text=\"brake chopper\"}]", "brake chopper"),
-        ("faults=[{joint=0,tick=300,lost=true}]", "joint 0"),
+        ("faults=[{joint=0,tick=300,lost=true}]", "axis X"),
         ("lost_frames={ticks=[300],periods=5},patience_periods=4", "lost"),
     ];
     for (options, words) in cases {

@@ -132,7 +132,7 @@ fn drives_that_hear_nothing_for_too_long_stop_by_themselves() {
         ("{kind = \"delay\", periods = 6, from_tick = 300}", 305),
     ] {
         let done = faulty("square.ngc", fault, &[]);
-        assert_eq!(assert_stopped(&done, "joint 0 reports fault 1"), first, "{fault}");
+        assert_eq!(assert_stopped(&done, "axis X reports fault 1"), first, "{fault}");
         let patient = faulty("square.ngc", fault, &["driver.options.watchdog_periods=20"]);
         assert_eq!(patient.status(), 0, "{fault}: {}", patient.errors());
     }
@@ -155,11 +155,11 @@ fn the_feedback_shows_the_ramp_of_drives_whose_host_is_silent() {
 
 #[test]
 fn feedback_that_is_no_number_is_a_fault_of_the_driver() {
-    for (value, joint) in [("nan", 0), ("inf", 2)] {
+    for (value, joint, axis) in [("nan", 0, 'X'), ("inf", 2, 'Z')] {
         for tick in [1, 250, 700] {
             let wrap = format!("{{kind = \"corrupt\", value = \"{value}\", joint = {joint}, from_tick = {tick}}}");
             let done = faulty("square.ngc", &wrap, &[]);
-            let words = format!("the feedback of joint {joint} is not a finite number");
+            let words = format!("the feedback of axis {axis} is not a finite number");
             assert_eq!(assert_stopped(&done, &words), tick);
         }
     }

@@ -30,7 +30,7 @@ fn drives_that_lag_too_far_behind_are_a_fault_in_that_period() {
         assert_eq!(done.status(), 3);
         let tick = errors_mm.iter().position(|error| *error > limit_mm).unwrap();
         let words = format!(
-            "fault: driver sim: joint 1 is {:.6} mm away from its command, limit {limit_mm:.6} mm (line 7, tick {tick},",
+            "fault: driver sim: axis Y is {:.6} mm away from its command, limit {limit_mm:.6} mm (line 7, tick {tick},",
             errors_mm[tick]
         );
         assert!(done.errors().contains(&words), "{words:?} is not in {}", done.errors());

@@ -1,5 +1,6 @@
 //! Spindle, coolant and outputs in the trace and in the file of events: who switched what, and when.
 
+use std::f64::consts::PI;
 use std::path::Path;
 use std::process::Command;
 
@@ -118,4 +119,93 @@ fn what_is_switched_otherwise_is_a_difference_but_none_of_commands() {
     let (status, said) = diff(&[]);
     assert!(status == Some(1) && said.contains("outputs: 0x88 in A, 0x2000000000000080 in B"), "{said}");
     assert_eq!(diff(&["--commands-only"]).0, Some(0));
+}
+
+/// A spindle that needs 3.76 of its time constants of 0.2 s to 1000 rpm, and ten rapids of 5 mm do not take as long.
+const SPUN: [&str; 2] = ["--set", "driver.options.spindle_time_constant_s=0.2"];
+
+#[test]
+fn a_cut_waits_for_the_spindle_on_both_clocks_and_its_time_is_told() {
+    let text = "G21 G90 F3000\nM3 S1000\nG0 X5\nG1 X10\nG2 X20 I5\nM2\n";
+    let plain = Scenario::text(text).events().run();
+    let slow = Scenario::text(text).with(&SPUN).events().run();
+    assert_eq!((plain.status(), slow.status()), (0, 0), "{}", slow.errors());
+    let waits = |done: &Done| events(done).into_iter().filter(|row| row.2 == "waits for spindle").collect::<Vec<_>>();
+    assert!(waits(&plain).is_empty(), "a spindle that is there at once");
+    let [begin, end] = &waits(&slow)[..] else { panic!("{:?}", events(&slow)) };
+    assert_eq!((begin.3, end.3, begin.4.as_str(), begin.1), (1.0, 0.0, "spindle", 3));
+    let told = events(&slow)[0].0;
+    // It says that it is there 2 % and ten turns a minute off.
+    let spun_s = 0.2 * (1.0 / (0.02 + 1.0 / (1000.0 * PI / 30.0))).ln();
+    assert_eq!(end.0 - told, (spun_s * 1000.0).ceil() as u64);
+    let x = slow.column("x_cmd_mm");
+    let stands = |from: u64, to: u64| x[from as usize..to as usize].iter().all(|x| *x == 5.0);
+    assert!(
+        begin.0 > told + 50 && stands(begin.0, end.0) && x[end.0 as usize + 1] > 5.0,
+        "the rapid goes on, the cut does not"
+    );
+    // The wait is in the time of the run, and all parts of that are the whole.
+    let by = slow.summary()["limited_by_s"].as_object().unwrap().clone();
+    let sum: f64 = by.values().map(|part| part.as_f64().unwrap()).sum();
+    let waited_s = (end.0 - begin.0) as f64 * 0.001;
+    assert!(
+        (by["spindle"].as_f64().unwrap() - waited_s).abs() < 1e-9 && (sum - slow.number("motion_time_s")).abs() < 1e-6,
+        "{by:?}"
+    );
+    assert!((slow.number("motion_time_s") - plain.number("motion_time_s") - waited_s).abs() < 0.0021, "{by:?}");
+    assert!(slow.judge(|_| {}).passed());
+    assert!(slow.errors().contains("waits for the spindle: "), "{}", slow.errors());
+    let unhurried = ["--set", "loops.max_missed_periods=1000", "--set", "loops.max_missed_share=1"];
+    let wall = Scenario::text(text).with(&SPUN).with(&unhurried).with(&["--clock", "wall"]).run();
+    assert!(wall.cells("x_cmd_mm") == slow.cells("x_cmd_mm"), "{}", wall.errors());
+    let program = slow.file("program.ngc");
+    std::fs::write(&program, text).unwrap();
+    let mut estimate = Command::new(env!("CARGO_BIN_EXE_tandem"));
+    let output = estimate.arg("estimate").arg(&program).arg("--machine").arg(mill()).args(SPUN).arg("--json").output();
+    let told: serde_json::Value = serde_json::from_slice(&output.unwrap().stdout).unwrap();
+    let estimated_s = told["estimated_s"].as_f64().or_else(|| told[0]["estimated_s"].as_f64()).unwrap();
+    assert_eq!(estimated_s, slow.number("motion_time_s"));
+}
+
+#[test]
+fn a_spindle_that_does_not_come_to_its_speed_ends_the_run_by_its_name() {
+    let text = "G21 G90 F3000\nM3 S1000\nG1 X10\nM2\n";
+    let never = ["--set", "driver.options.spindle_time_constant_s=60", "--set", "spindle.at_speed_within_s=1.5"];
+    let done = Scenario::text(text).with(&never).run();
+    assert_eq!(done.status(), 3);
+    let fault = done.summary()["fault"].as_str().unwrap().to_string();
+    let expected = "driver sim: the spindle is not at speed within 1.5 s (spindle.at_speed_within_s): 25 of 1000 rpm";
+    assert!(fault.starts_with(expected), "{fault}");
+    assert!(done.column("x_cmd_mm").iter().all(|x| *x == 0.0));
+    // A minute without motion is no reason to give up, and a dry run turns nothing that it could wait for.
+    let long = ["--set", "driver.options.spindle_time_constant_s=60", "--set", "spindle.at_speed_within_s=300"];
+    let patient = Scenario::text(text).with(&long).run();
+    assert!(patient.status() == 0 && patient.number("motion_time_s") > 180.0, "{}", patient.errors());
+    assert_eq!(Scenario::text(text).with(&never).with(&["--dry-run"]).run().status(), 0);
+    for nonsense in ["0", "-1", "0.05", "601", "inf", "nan", "\"soon\""] {
+        let refused = Scenario::text(text).with(&["--set", &format!("spindle.at_speed_within_s={nonsense}")]).run();
+        assert!(
+            refused.status() == 1 && refused.errors().contains("spindle.at_speed_within_s"),
+            "{}",
+            refused.errors()
+        );
+    }
+}
+
+/// The simulated door stands in the way of X between 2 and 4 mm: input 5 is on there, which is open for a normally open one.
+#[test]
+fn a_door_that_stops_the_spindle_is_named() {
+    let door = [
+        "--set",
+        "inputs.guard={input=5,role=\"door\",normally_closed=false}",
+        "--set",
+        "driver.options.switches=[{input=5,low_mm=[2,-1,-1],high_mm=[2.2,1,1]}]",
+    ];
+    let text = "G21 G90 F3000\nM3 S1000\nG1 X10\nM2\n";
+    let done = Scenario::text(text).with(&door).events().commands("400,resume\n").run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let expected = ["2 spindle 1000 program", "3 spindle 0 door", "3 spindle 1000 door", "4 spindle 0 program"];
+    let switched = words(&done).into_iter().filter(|row| !row.contains("waits for"));
+    assert_eq!(switched.collect::<Vec<_>>(), expected);
+    assert_eq!(events(&done).iter().filter(|row| row.4 == "door").nth(1).unwrap().0, 400);
 }

@@ -1,9 +1,10 @@
 //! Live progress on a terminal: state, line, feed, override, time left. Quiet in a pipe.
 
+use std::f64::consts::PI;
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
 
-use tandem_rings::{MachineState, Sample};
+use tandem_rings::{MachineState, Sample, StopCause};
 
 /// How often the line is written.
 const EVERY: Duration = Duration::from_millis(100);
@@ -75,12 +76,24 @@ impl Progress {
         let _ = write!(
             stderr(),
             "\r\x1b[K{}  line {}  F{feed:.0}  override {:.0} %  done {:.0} %, {left_s:.0} s left",
-            sample.state.name(),
+            state(sample),
             sample.line,
             sample.ratio * 100.0,
             share * 100.0
         );
         let _ = stderr().flush();
+    }
+}
+
+/// What the machine does; what it waits for where that is the spindle.
+fn state(sample: &Sample) -> String {
+    let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / PI;
+    match sample.cause {
+        StopCause::Spindle => {
+            let (turns, told) = (rpm(sample.spindle_rad_per_s), rpm(sample.switched.spindle_rad_per_s));
+            format!("waits for the spindle: {turns:.0} of {told:.0} rpm")
+        }
+        _ => sample.state.name().to_string(),
     }
 }
 

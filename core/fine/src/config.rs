@@ -93,6 +93,8 @@ pub struct FineConfig {
     /// The rest at which all joints are enabled ends an epoch ([`tandem_rings::RestCause::Attached`]), so that planning starts
     /// where they really stand. Without it, what is queued begins at `position`.
     pub plans_from_rest: bool,
+    /// Time that the spindle has to come to the speed that it was told while a cut waits for it, s.
+    pub at_speed_within_s: f64,
     /// Inputs that mean something.
     pub roles: Roles,
 }
@@ -123,6 +125,7 @@ impl FineConfig {
             disable_periods: 5000,
             reset_drives: false,
             plans_from_rest: false,
+            at_speed_within_s: f64::INFINITY,
             roles: Roles::default(),
         }
     }

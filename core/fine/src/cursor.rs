@@ -2,9 +2,11 @@
 
 mod look;
 
+pub use look::is_cut;
+
 use rtrb::Consumer;
 use tandem_rings::Queued;
-use tandem_sdk::{AxisVector, Event, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, Segment, SegmentFlags};
 
 use crate::points::Points;
 use crate::steps::{Recent, Steps};
@@ -209,21 +211,21 @@ impl Cursor {
         last
     }
 
-    /// Moves on by `delta_s` of program time. Events on the way are given to `event`, which says whether the machine is to
-    /// stay at the rest where it met one.
-    pub fn advance(&mut self, delta_s: f64, event: impl FnMut(&Event) -> bool) -> Reached {
+    /// Moves on by `delta_s` of program time. Events on the way, and the segments that begin at a rest, are given to `meet`,
+    /// which says whether the machine is to stay at the rest where it met one: behind the event, or in front of the segment.
+    pub fn advance(&mut self, delta_s: f64, meet: impl FnMut(&Queued) -> bool) -> Reached {
         if delta_s == 0.0 {
             self.recent.pass(None);
             return if self.resting { Reached::Rest } else { Reached::Inside };
         }
-        let reached = self.go(delta_s, event);
+        let reached = self.go(delta_s, meet);
         let crossed = self.crossed.take();
         self.recent.pass(crossed.as_ref());
         self.look_at_path();
         reached
     }
 
-    fn go(&mut self, mut left_s: f64, mut event: impl FnMut(&Event) -> bool) -> Reached {
+    fn go(&mut self, mut left_s: f64, mut meet: impl FnMut(&Queued) -> bool) -> Reached {
         let asked_s = left_s;
         loop {
             if !self.resting {
@@ -245,21 +247,24 @@ impl Cursor {
                 let over_s = wanted_s - (duration_s - self.local_s);
                 (left_s, self.owed_s) = (over_s.max(0.0), over_s.min(0.0));
             }
-            if !self.next(&mut event) {
+            if !self.next(&mut meet) {
                 return if self.resting { Reached::Rest } else { Reached::Wall };
             }
         }
     }
 
-    /// Steps to the start of the next segment; `false` where there is none, or an event keeps the machine at its rest.
-    fn next(&mut self, event: &mut impl FnMut(&Event) -> bool) -> bool {
+    /// Steps to the start of the next segment; `false` where there is none, or something keeps the machine at its rest.
+    fn next(&mut self, meet: &mut impl FnMut(&Queued) -> bool) -> bool {
         let (mut found, mut stay) = (false, false);
         while !found && !stay {
             // Looked at in its slot: a segment is large, and is copied once.
             let Ok(queued) = self.entries.peek() else { break };
             match queued {
-                Queued::Event(it) if it.epoch >= self.epoch => stay = event(it) && self.resting,
+                Queued::Event(it) if it.epoch >= self.epoch => stay = meet(queued) && self.resting,
                 Queued::Segment { start_s, segment } if segment.epoch >= self.epoch => {
+                    if self.resting && meet(queued) {
+                        return false;
+                    }
                     self.epoch = segment.epoch;
                     (self.start_s, self.local_s) = (*start_s, 0.0);
                     if segment.flags.contains(SegmentFlags::STEPS) && !self.resting {

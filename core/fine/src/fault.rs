@@ -129,10 +129,14 @@ pub enum FaultKind {
         /// Nothing has been heard of it for longer than it may be old.
         old: bool,
     },
-    /// The spindle, which a door has stopped, does not turn as it did when it is told to.
+    /// A cut waits, and the spindle has not come to the speed that it was told in the time that it has for it.
     SpindleSlow {
-        /// Time that it has for it, s.
+        /// The time, s.
         within_s: f64,
+        /// The speed that it was told, rad/s.
+        told_rad_per_s: f64,
+        /// The speed that its driver reports, rad/s.
+        turns_rad_per_s: f64,
     },
     /// A fault on the soft side: the machine stopped on the path.
     Soft,

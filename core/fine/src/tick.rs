@@ -15,6 +15,7 @@ mod request;
 mod rest;
 mod roles;
 mod single_block;
+mod spindle;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -48,6 +49,7 @@ use progress::Progress;
 use release::Release;
 use rest::Stop;
 use roles::RoleWatch;
+use spindle::SpinUp;
 
 /// What the fine loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -137,6 +139,7 @@ pub struct FineLoop {
     missed: Missed,
     progress: Progress,
     roles: RoleWatch,
+    spin_up: SpinUp,
     outputs: Outputs,
     phase: Phase,
     state: MachineState,
@@ -204,6 +207,7 @@ impl FineLoop {
             missed: Missed::new(config),
             progress: Progress::new(config),
             roles: RoleWatch::default(),
+            spin_up: SpinUp::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             phase: Phase::Waiting,
             state: MachineState::Fault,

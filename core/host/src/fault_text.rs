@@ -8,6 +8,7 @@ use crate::drives::Roster;
 use crate::joints::JointSpace;
 use crate::roles;
 use crate::setup::code_text;
+use crate::spindle;
 
 /// Who is meant by the numbers of a fault.
 struct Names<'a> {
@@ -67,10 +68,7 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             let (driver, named) = (names.driver(*joint), names.joint(*joint));
             format!("driver {driver}: the feedback of {named} is not a finite number")
         }
-        FaultKind::Feedback { joint: None } => {
-            let driver = &names.roster.of_spindle().title;
-            format!("driver {driver}: the feedback of the spindle is not a finite number")
-        }
+        FaultKind::Feedback { joint: None } => names.spindle("the feedback of the spindle is not a finite number"),
         FaultKind::Following { joint, error_mm, limit_mm } => names.following(*joint, *error_mm, *limit_mm),
         FaultKind::Kinematics { joint } => {
             let (joint, plugin) = (names.joint(*joint), &machine.kinematics.plugin);
@@ -88,7 +86,9 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
         }
         FaultKind::EmergencyStop => "emergency stop".to_string(),
         FaultKind::Input { role, input, old } => roles::fault_text(machine, *role, *input, *old),
-        FaultKind::SpindleSlow { within_s } => roles::spindle_text(*within_s),
+        FaultKind::SpindleSlow { within_s, told_rad_per_s, turns_rad_per_s } => {
+            names.spindle_slow(*within_s, *told_rad_per_s, *turns_rad_per_s)
+        }
         FaultKind::Soft => soft.unwrap_or("stopped by the host").to_string(),
         FaultKind::NoProgress { periods, grown_s, asked } => format!(
             "the machine stands still though nothing stops it: in {periods} fine periods program time passed by {grown_s:e} s, \
@@ -140,12 +140,25 @@ impl Names<'_> {
         if code == 0 { String::new() } else { format!(", fault {}", self.code(joint, code)) }
     }
 
-    /// A joint by its number, and by its name where the machine file has given it one.
+    /// A joint as the machine file has it: the axis that it is, or its number with its name.
     fn joint(&self, joint: usize) -> String {
         match self.joints.joints.get(joint).filter(|_| !self.machine.joints.is_empty()) {
             Some(named) => format!("joint {joint} ({})", named.name),
+            None if joint < self.machine.axes.count() && self.joints.are_axes() => {
+                format!("axis {}", self.machine.axes.letter(joint))
+            }
             None => format!("joint {joint}"),
         }
+    }
+
+    /// What is wrong with the spindle, behind its driver's name.
+    fn spindle(&self, what: &str) -> String {
+        format!("driver {}: {what}", self.roster.of_spindle().title)
+    }
+
+    fn spindle_slow(&self, within_s: f64, told_rad_per_s: f64, turns_rad_per_s: f64) -> String {
+        let of = spindle::speeds(turns_rad_per_s, told_rad_per_s);
+        self.spindle(&format!("the spindle is not at speed within {within_s} s (spindle.at_speed_within_s): {of}"))
     }
 
     fn no_state(&self, joint: usize, number: u32) -> String {

@@ -41,6 +41,7 @@ mod roles;
 mod rules;
 mod run;
 mod setup;
+mod spindle;
 mod stand_in;
 mod stops;
 mod strategy;

@@ -63,11 +63,6 @@ pub fn fault_text(machine: &Machine, role: InputFault, input: u32, old: bool) ->
     format!("{what}: {who} is {}", if named.is_none_or(|named| named.normally_closed) { "open" } else { "closed" })
 }
 
-/// The spindle is a fault behind a door, in words.
-pub fn spindle_text(within_s: f64) -> String {
-    format!("the spindle, which a door had stopped, did not turn as it is told to within {within_s} s")
-}
-
 /// The inputs among those `tripped`, a bit each, that hold the machine, in words; none where none does.
 pub fn holding(machine: &Machine, tripped: u64) -> Option<String> {
     let holds = |named: &&Input| {

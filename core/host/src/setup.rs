@@ -251,6 +251,7 @@ pub fn fine_config(
         disable_periods: periods(driver.disable_s),
         reset_drives: switches.reset,
         plans_from_rest: true,
+        at_speed_within_s: machine.spindle.at_speed_within_s,
         roles: roles::of(machine, switches),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::iter::Peekable;
 use std::slice::Iter;
+use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
 use std::time::Duration;
 
@@ -48,7 +49,8 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
         }
         pump.drain();
         pump.serve_stop();
-        if pump.is_waiting() {
+        // What waits for the spindle ends by itself, after the machine's own time.
+        if pump.is_waiting() || pump.host.status.spindle.waits.load(Relaxed) {
             progress.tick = tick;
         }
         let stuck_ticks = progress.ticks_without(pump.host.status.program_time_s.load(), tick);

@@ -5,9 +5,10 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_machine::Machine;
 use tandem_rings::HostEnd;
 
-use crate::{joint_words, roles};
+use crate::{joint_words, roles, spindle};
 
-/// Time for which nobody wonders why the drives do not hold yet, s: contactors and brakes of small drives need less.
+/// Time for which nobody wonders why the drives do not hold yet, or a cut does not begin, s: contactors, brakes of small drives
+/// and small spindles need less.
 const UNNOTED_S: f64 = 0.5;
 
 /// What was waited for when somebody last looked.
@@ -17,12 +18,14 @@ pub struct Waits {
     enabling_periods: u64,
     enabling: Option<String>,
     held_by: Option<String>,
+    /// Rough periods in which a cut waited for the spindle.
+    spindle_periods: u64,
 }
 
 impl Waits {
     /// Nothing yet. Host; allocates.
     pub fn new(machine: &Machine) -> Self {
-        Self { machine: machine.clone(), enabling_periods: 0, enabling: None, held_by: None }
+        Self { machine: machine.clone(), enabling_periods: 0, enabling: None, held_by: None, spindle_periods: 0 }
     }
 
     /// A rough period: words, where what the machine waits for is new.
@@ -36,6 +39,12 @@ impl Waits {
             if let Some(names) = news {
                 return Some(format!("input {names} holds the machine: close it, then resume"));
             }
+        }
+        let waits = status.spindle.waits.load(Relaxed);
+        self.spindle_periods = if waits { self.spindle_periods + 1 } else { 0 };
+        let unnoted_periods = (UNNOTED_S / self.machine.rough_period_s).ceil() as u64;
+        if self.spindle_periods == unnoted_periods.max(1) {
+            return spindle::awaited(status).map(|words| format!("waits for {words} …"));
         }
         if !status.enabling.load(Relaxed) {
             (self.enabling_periods, self.enabling) = (0, None);

@@ -265,7 +265,7 @@ fn a_fault_that_outlives_a_run_is_reset_by_the_operator_and_only_then() {
     set(|drives| drives.faults_at = 300);
     let (outcome, _) = drive(prepare(WORK, &[], Switches::default()).unwrap(), &[]);
     let words = outcome.summary.fault.unwrap();
-    assert!(words.contains("the drive of joint 1 reports fault 0x7210 (overvoltage)"), "{words}");
+    assert!(words.contains("the drive of axis Y reports fault 0x7210 (overvoltage)"), "{words}");
     for _ in 0..3 {
         let words = refusal(WORK, &[], Switches::default());
         assert!(words.contains("the drive of y stands in fault 0x7210 (overvoltage); --reset clears it"), "{words}");

@@ -115,6 +115,7 @@ static MACHINE: &[Key] = &[
     key("policy.lowest_feed_ratio", "ratio", "0.05", "Share of the programmed feed below which the script cannot go, by cap, by ratio or by both"),
     key("policy.ratio_change_per_s", "1/s", "10", "How fast the script may change the feed ratio"),
     key("policy.parameters.<parameter>", "script's", "none", "Parameters of the policy script"),
+    key("spindle.at_speed_within_s", "s", "30", "Time for which a cut waits for the spindle; 0.1 to 600"),
     key("spindle.max_rpm", "rpm", "no limit", "Highest spindle speed"),
     key("spindle.min_rpm", "rpm", "0", "Lowest spindle speed that turns"),
     key("probe.input", "number", "required", "Digital input of the probe, 0 to 63; without the table there is no probe"),

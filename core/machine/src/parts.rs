@@ -182,7 +182,16 @@ pub struct Spindle {
     pub min_rad_per_s: f64,
     /// Highest speed, rad/s; infinite where the machine states none.
     pub max_rad_per_s: f64,
+    /// Time that it has to come to the speed that it is told while a cut waits for it, s.
+    pub at_speed_within_s: f64,
 }
+
+/// Time to come to speed where the file states none, s. Heavy spindles need ten; one that needs more than three times that has
+/// failed, and nobody is to stand before a machine that will cut some time.
+const AT_SPEED_WITHIN_S: f64 = 30.0;
+
+/// What can be stated for it, s. In less no drive has answered, let alone turned; the largest vertical lathes need minutes.
+const AT_SPEED_RANGE_S: [f64; 2] = [0.1, 600.0];
 
 impl Spindle {
     /// Reads `[spindle]`.
@@ -191,7 +200,16 @@ impl Spindle {
         if let Some(max) = max.filter(|max| *max < min) {
             spindle.refuse("min_rpm", format!("the lowest speed, {min}, is above the highest, {max}"));
         }
+        let within_s = spindle.positive("at_speed_within_s").unwrap_or(AT_SPEED_WITHIN_S);
+        let [least, most] = AT_SPEED_RANGE_S;
+        if !(least..=most).contains(&within_s) {
+            spindle.refuse("at_speed_within_s", format!("must be from {least} to {most}, not {within_s}"));
+        }
         let rad_per_s = |rpm: f64| rpm * 2.0 * PI / 60.0;
-        Self { min_rad_per_s: rad_per_s(min), max_rad_per_s: max.map_or(f64::INFINITY, rad_per_s) }
+        Self {
+            min_rad_per_s: rad_per_s(min),
+            max_rad_per_s: max.map_or(f64::INFINITY, rad_per_s),
+            at_speed_within_s: within_s,
+        }
     }
 }

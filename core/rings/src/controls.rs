@@ -82,6 +82,17 @@ impl JointStatus {
     }
 }
 
+/// The spindle, as the fine loop last knew it.
+#[derive(Debug, Default)]
+pub struct SpindleStatus {
+    /// True while a cut waits for it to come to its speed.
+    pub waits: AtomicBool,
+    /// Speed that it was told last, rad/s; 0 behind an open door.
+    pub told_rad_per_s: AtomicF64,
+    /// Speed that its driver reports, rad/s.
+    pub turns_rad_per_s: AtomicF64,
+}
+
 /// What the fine loop says of itself; for looking at, not for deciding.
 #[derive(Debug, Default)]
 pub struct Status {
@@ -103,6 +114,8 @@ pub struct Status {
     pub hexadecimal_codes: AtomicBool,
     /// Inputs with a role that are tripped, a bit each.
     pub tripped: AtomicU64,
+    /// What the spindle does.
+    pub spindle: SpindleStatus,
     /// True while nothing moves and nothing is queued.
     pub idle: AtomicBool,
     /// Digital inputs as last read.

@@ -57,10 +57,12 @@ pub enum StopCause {
     None,
     /// Feed hold.
     Hold,
-    /// A door is open, or was: until the operator resumes and the spindle turns again.
+    /// A door is open, or was, and nobody has resumed.
     Door,
     /// An input asks for a feed hold, or has, and nobody has resumed.
     HoldInput,
+    /// A cut waits for the spindle to come to its speed.
+    Spindle,
     /// The program waits for the operator.
     ProgramStop,
     /// The queue ran low.
@@ -83,6 +85,7 @@ impl StopCause {
             Self::Hold => "hold",
             Self::Door => "door",
             Self::HoldInput => "hold input",
+            Self::Spindle => "spindle",
             Self::ProgramStop => "program stop",
             Self::Starvation => "starvation",
             Self::Edge => "input edge",

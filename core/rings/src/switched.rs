@@ -11,6 +11,8 @@ pub enum SwitchedBy {
     /// A word of the program.
     #[default]
     Program,
+    /// A door: the spindle stops where it opens, and turns again behind the operator's resume.
+    Door,
     /// The operator's abort.
     Abort,
     /// A fault, when the axes are at rest.
@@ -24,6 +26,7 @@ impl SwitchedBy {
     pub fn name(self) -> &'static str {
         match self {
             Self::Program => "program",
+            Self::Door => "door",
             Self::Abort => "abort",
             Self::Fault => "fault",
             Self::EmergencyStop => "emergency stop",

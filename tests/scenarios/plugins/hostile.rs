@@ -223,7 +223,7 @@ fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
     for (section, method, calls, words) in [
         ("planner", "advance", [1, 2, 3], "advance emits a segment with a number that is not finite"),
         ("feed_strategy", "update", [1, 2, 30], "update answers"),
-        ("driver", "exchange", [1, 20, 500], "the feedback of joint"),
+        ("driver", "exchange", [1, 20, 500], "the feedback of axis"),
     ] {
         for call in calls {
             let mischief = Mischief::of(section, "not-a-number", method, call);
@@ -256,7 +256,7 @@ fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
 fn a_number_that_stands_for_no_state_of_a_drive_ends_in_a_fault_that_names_it() {
     for call in [1, 20, 500] {
         let words = Mischief::of("driver", "foreign", "exchange", call).words();
-        let said = "its exchange gives 250 as the state of joint 2: 0 (disabled) to 6 (lost) are known";
+        let said = "its exchange gives 250 as the state of axis Z: 0 (disabled) to 6 (lost) are known";
         assert!(words.contains("hostile") && words.contains(said), "{call}: {words:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Looking ahead in the queue without moving.
 
 use tandem_rings::Queued;
-use tandem_sdk::{Segment, StopOn};
+use tandem_sdk::{Edge, Segment, SegmentFlags, StopOn};
 
 use super::{Cursor, ends};
 use crate::course::{Course, Place};
@@ -40,6 +40,14 @@ impl Cursor {
             _ => true,
         });
         awaited
+    }
+
+    /// Whether what comes next, with nothing to switch before it, is a cut; elsewhere than at a rest, whether here is one.
+    pub fn is_cutting(&mut self) -> bool {
+        if !self.resting {
+            return is_cut(&self.segment);
+        }
+        matches!(self.entries.peek(), Ok(Queued::Segment { segment, .. }) if segment.epoch >= self.epoch && is_cut(segment))
     }
 
     /// Shows the queued entries from `number` on, at most `most` of them, until `look` says stop (`false`); gives the
@@ -124,4 +132,10 @@ impl Cursor {
             Err(_) => look(Course::new(&self.segment, [&[], &[]], axes).begin(local_s)),
         }
     }
+}
+
+/// Whether the tool may cut in it: a motion at a feed that waits for no input.
+pub fn is_cut(segment: &Segment) -> bool {
+    let moves = segment.path[1..].iter().any(|coefficient| *coefficient != 0.0);
+    moves && !segment.flags.contains(SegmentFlags::RAPID) && segment.stop_on.edge == Edge::None
 }

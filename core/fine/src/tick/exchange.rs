@@ -20,6 +20,7 @@ impl FineLoop {
         let last = Numbers::of(&self.feedback);
         let failed = self.ask_driver();
         self.hear_roles(failed);
+        self.hear_spindle();
         // From the first motion on the drives hold, at rest too: what let go has moved.
         let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
         let own = self.handed_over();
@@ -152,6 +153,9 @@ impl FineLoop {
         status.line.store(self.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
+        status.spindle.waits.store(self.spin_up.waits && self.fault.is_none(), Relaxed);
+        status.spindle.told_rad_per_s.store(self.setpoint.spindle_rad_per_s);
+        status.spindle.turns_rad_per_s.store(self.feedback.spindle_rad_per_s);
         for (joint, status) in status.joints.iter().enumerate().take(self.joints) {
             status.store(self.feedback.state[joint], self.feedback.fault_code[joint]);
         }

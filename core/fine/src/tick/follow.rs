@@ -2,12 +2,13 @@
 
 use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
-use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
+use tandem_rings::{Queued, STOP_JERK_SHARE, STOP_SHARE};
 use tandem_sdk::{AxisVector, EventKind};
 
+use super::spindle::SpinUp;
 use super::{FineLoop, Phase};
 use crate::config::GuardMode;
-use crate::cursor::Reached;
+use crate::cursor::{Reached, is_cut};
 use crate::fault::FaultKind;
 use crate::guard::Checked;
 use crate::outputs::Waits;
@@ -30,6 +31,9 @@ impl FineLoop {
         self.look_for_stop();
         self.stop_between_lines();
         let ask = self.ask();
+        if self.is_spindle_slow() {
+            return self.next_position();
+        }
         self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
             self.governor.jump(if ask == Ask::Run { self.most_rate() } else { 0.0 });
@@ -51,8 +55,16 @@ impl FineLoop {
         }
         let delta_s = self.govern(ask);
         let waits = self.waits();
-        let reached = self.cursor.advance(delta_s, |event| {
+        let reached = self.cursor.advance(delta_s, |queued| {
+            let event = match queued {
+                Queued::Segment { segment, .. } => return self.spin_up.is_awaited() && is_cut(segment),
+                Queued::Event(event) => event,
+            };
+            let told_rad_per_s = self.outputs.spindle_rad_per_s;
             self.outputs.apply(event, waits);
+            if self.outputs.spindle_rad_per_s != told_rad_per_s {
+                self.spin_up = SpinUp::begin();
+            }
             // At home one sample rests, so that a record begins with it.
             let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed | EventKind::HomeByDrive);
             self.outputs.stop_requested || homing
@@ -102,6 +114,7 @@ impl FineLoop {
 
     /// What is asked of the rate of program time, before ratios.
     fn ask(&mut self) -> Ask {
+        self.spin_up.waits = false;
         if self.outputs.stop_requested {
             self.controls.program_hold.store(true, Relaxed);
             self.given.program_hold = true;
@@ -114,6 +127,8 @@ impl FineLoop {
             Ask::Stop
         } else if self.starved {
             Ask::Starve
+        } else if self.waits_for_spindle() {
+            Ask::Hold
         } else {
             Ask::Run
         }

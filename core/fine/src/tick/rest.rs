@@ -59,6 +59,7 @@ impl FineLoop {
             (_, Some(RestCause::Abort)) => StopCause::Abort,
             (_, Some(RestCause::Edge | RestCause::Already)) => StopCause::Edge,
             (Ask::Hold, _) if self.given.hold => self.cause_of_hold(),
+            (Ask::Hold, _) if self.spin_up.waits => StopCause::Spindle,
             (Ask::Hold, _) => StopCause::ProgramStop,
             (Ask::Stop, _) => StopCause::None,
             (Ask::Starve, _) => StopCause::Starvation,

@@ -2,19 +2,13 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::StopCause;
+use tandem_rings::{StopCause, SwitchedBy};
 use tandem_sdk::{AxisVector, Edge};
 
+use super::spindle::SpinUp;
 use super::{FineLoop, Phase};
 use crate::fault::{FaultKind, InputFault};
 use crate::roles::Tripped;
-
-/// Longest time that a spindle which a door has stopped may take to turn as fast as before, s. Heavy ones need ten; one that
-/// needs more than three times that has failed, and nobody is to stand before a machine that will cut some time.
-const SPIN_UP_S: f64 = 30.0;
-
-/// Exchanges behind which the drives have answered to a spindle that is switched on again: the one that tells them, and one.
-const ANSWERED: u64 = 2;
 
 /// What inputs with a role have asked for.
 #[derive(Debug, Default)]
@@ -27,8 +21,6 @@ pub(super) struct RoleWatch {
     door: bool,
     /// A feed-hold input is tripped, or was and nobody has resumed since.
     hold: bool,
-    /// Fine periods since the spindle turns on again behind a door; none where nothing waits for it.
-    spin_up_periods: Option<u64>,
 }
 
 impl FineLoop {
@@ -51,7 +43,10 @@ impl FineLoop {
         self.status.tripped.store(tripped.all, Relaxed);
         self.obey_stops(&tripped);
         // The spindle of an open door is off, whatever the axes do.
-        self.roles.door |= tripped.all & self.config.roles.door != 0;
+        if tripped.all & self.config.roles.door != 0 && !self.roles.door {
+            self.roles.door = true;
+            self.switch_by_door();
+        }
         if self.fault.is_none() && self.attach.is_done() && !self.outputs.ended {
             self.obey_holds(&tripped);
         }
@@ -102,27 +97,18 @@ impl FineLoop {
         }
         if !self.given.hold {
             // The operator has resumed: what was switched off comes first.
-            let turns = self.roles.door && self.outputs.spindle_rad_per_s != 0.0;
-            self.roles.spin_up_periods = if turns { Some(0) } else { self.roles.spin_up_periods };
+            if self.roles.door {
+                self.switch_by_door();
+                self.spin_up = SpinUp::begin();
+            }
             (self.roles.door, self.roles.hold) = (false, false);
         }
-        if self.roles.door {
-            self.roles.spin_up_periods = None;
-        }
-        self.wait_for_spindle();
     }
 
-    /// Nothing cuts before the spindle turns as it did.
-    fn wait_for_spindle(&mut self) {
-        let Some(periods) = self.roles.spin_up_periods else { return };
-        let turns = periods >= ANSWERED && self.feedback.spindle_at_speed != 0;
-        if turns || self.outputs.spindle_rad_per_s == 0.0 {
-            self.roles.spin_up_periods = None;
-        } else if periods as f64 * self.config.period_s > SPIN_UP_S {
-            self.fail(FaultKind::SpindleSlow { within_s: SPIN_UP_S });
-        } else {
-            self.roles.spin_up_periods = Some(periods + 1);
-            self.given.hold = true;
+    /// A door stops the spindle, or lets it turn again: where it turns, that is what switches last.
+    fn switch_by_door(&mut self) {
+        if self.outputs.spindle_rad_per_s != 0.0 {
+            self.outputs.by = SwitchedBy::Door;
         }
     }
 
@@ -133,7 +119,7 @@ impl FineLoop {
 
     /// Which hold it is that the machine rests by.
     pub(super) fn cause_of_hold(&self) -> StopCause {
-        if self.roles.door || self.roles.spin_up_periods.is_some() {
+        if self.roles.door {
             StopCause::Door
         } else if self.roles.hold {
             StopCause::HoldInput
@@ -144,6 +130,6 @@ impl FineLoop {
 
     /// Once more, behind a fault.
     pub(super) fn forget_roles(&mut self) {
-        self.roles = RoleWatch::default();
+        (self.roles, self.spin_up) = (RoleWatch::default(), SpinUp::default());
     }
 }

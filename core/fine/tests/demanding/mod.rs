@@ -117,7 +117,13 @@ impl Script {
         } else {
             (self.enabled_for, self.disabled_for) = (self.enabled_for + 1, 0);
         }
-        self.spun_for = if setpoint.spindle_rad_per_s == 0.0 { 0 } else { self.spun_for + 1 };
+        let before = self.told.iter().nth_back(1).map_or(0.0, |(told, _)| told.spindle_rad_per_s);
+        let speed = setpoint.spindle_rad_per_s;
+        self.spun_for = match speed {
+            0.0 => 0,
+            _ if speed == before => self.spun_for + 1,
+            _ => 1,
+        };
         let begins = setpoint.homing != 0 && self.homing_for == 0;
         self.homing_for = if setpoint.homing == 0 { 0 } else { self.homing_for + 1 };
         if begins {
@@ -244,6 +250,8 @@ pub struct Bench {
     /// Where what is queued ends.
     pub position: AxisVector,
     pub start_s: f64,
+    /// What is queued is a rapid.
+    pub rapid: bool,
 }
 
 impl Bench {
@@ -260,7 +268,7 @@ impl Bench {
         let drives = Box::new(Drives(Arc::clone(&script)));
         let mut fine = FineLoop::new(&FineConfig { attached, ..*config }, end, drives, kinematics);
         fine.reset();
-        Self { fine, rough, host, script, epoch: 0, position: AxisVector::ZERO, start_s: 0.0 }
+        Self { fine, rough, host, script, epoch: 0, position: AxisVector::ZERO, start_s: 0.0, rapid: false }
     }
 
     pub fn script(&self) -> MutexGuard<'_, Script> {
@@ -305,6 +313,9 @@ impl Bench {
         }
         segment.path = segment.coefficients[0];
         segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
+        if self.rapid {
+            segment.flags = segment.flags.with(SegmentFlags::RAPID);
+        }
         (segment.epoch, segment.feed_mm_per_s, segment.stop_on) = (self.epoch, FEED_MM_PER_S, stop_on);
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
         self.rough.segments.push(Queued::Segment { start_s: self.start_s, segment }).unwrap();

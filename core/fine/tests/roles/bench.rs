@@ -11,9 +11,11 @@ use tandem_sdk::{AxisVector, Edge, EventKind, StopOn};
 use crate::demanding::{self, ACCELERATION_MM_PER_S2, FEED_MM_PER_S, Script};
 
 const JOINTS: usize = 2;
-const SPINDLE_RAD_PER_S: f64 = 100.0;
+pub const SPINDLE_RAD_PER_S: f64 = 100.0;
 /// Exchanges that the drives need to hold.
 pub const ENABLE: u64 = 20;
+/// Time that the spindle has, s.
+pub const AT_SPEED_WITHIN_S: f64 = 5.0;
 /// Exchanges that the spindle needs to turn.
 pub const SPIN_UP: u32 = 40;
 /// Age that no input may be above, periods.
@@ -89,7 +91,7 @@ impl DerefMut for Bench {
 }
 
 pub fn config(roles: Roles, unhomed: u32) -> FineConfig {
-    FineConfig { unhomed, roles, ..demanding::config(JOINTS) }
+    FineConfig { unhomed, roles, at_speed_within_s: AT_SPEED_WITHIN_S, ..demanding::config(JOINTS) }
 }
 
 /// Drives that need their time, and these levels of the inputs.
@@ -137,7 +139,11 @@ impl Bench {
     }
 
     pub fn queue_spindle(&mut self) {
-        self.queue_event(EventKind::Spindle, 0, SPINDLE_RAD_PER_S);
+        self.queue_speed(SPINDLE_RAD_PER_S);
+    }
+
+    pub fn queue_speed(&mut self, rad_per_s: f64) {
+        self.queue_event(EventKind::Spindle, 0, rad_per_s);
     }
 
     /// Brings the machine to where it does that.
@@ -152,7 +158,8 @@ impl Bench {
             return;
         }
         self.queue_spindle();
-        let (some, no_edge) = (10 + random.below(1200), StopOn::default());
+        // The spindle turns by then, and what waits for it has begun.
+        let (some, no_edge) = (u64::from(SPIN_UP) + 10 + random.below(1200), StopOn::default());
         match doing {
             Doing::Dwelling => {
                 self.piece([AxisVector::ZERO; 2], 2.0, true, no_edge);

@@ -4,11 +4,12 @@ mod bench;
 #[allow(dead_code)] // what other tests need of it
 #[path = "../demanding/mod.rs"]
 mod demanding;
+mod spindle;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use bench::{ALL, Bench, Doing, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP};
+use bench::{ALL, AT_SPEED_WITHIN_S, Bench, Doing, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP, SPINDLE_RAD_PER_S};
 use demanding::FAULT_CODE;
 use tandem_fine::{FaultKind, InputFault, Roles};
 use tandem_rig::Random;
@@ -111,7 +112,7 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     assert_eq!((bench.told().position, controls.hold.load(Relaxed)), (at, true));
     while let Ok(sample) = bench.host.samples.pop() {
         let cause = if door { StopCause::Door } else { StopCause::HoldInput };
-        let known = [cause, StopCause::None].contains(&sample.cause) || doing == Doing::Holding;
+        let known = [cause, StopCause::None, StopCause::Spindle].contains(&sample.cause) || doing == Doing::Holding;
         assert!(known, "{:?} at {}", sample.cause, sample.tick);
     }
     let from = bench.script().told.len();
@@ -122,7 +123,9 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     let moved = script.told[from..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO);
     let turned = script.told[from..].iter().position(|(told, _)| told.spindle_rad_per_s != 0.0);
     assert_eq!(moved.is_some(), ![Doing::Dwelling, Doing::AtRest].contains(&doing));
-    if let (Some(moved), true, false) = (moved, door, [Doing::Enabling, Doing::Waiting].contains(&doing)) {
+    // Probing cuts nothing, and waits for no spindle.
+    let waits = door && ![Doing::Enabling, Doing::Waiting, Doing::Probing].contains(&doing);
+    if let (Some(moved), true) = (moved, waits) {
         assert!(moved - turned.unwrap() >= SPIN_UP as usize, "{turned:?} {moved}");
     }
     drop(script);
@@ -249,11 +252,13 @@ fn a_spindle_that_does_not_turn_again_behind_a_door_is_a_fault() {
     bench.release();
     bench.ticks(5);
     bench.host.controls.hold.store(false, Relaxed);
-    for _ in 0..30_010 {
+    for _ in 0..5010 {
         bench.script().spun_for = 0;
         bench.fine.tick();
     }
-    assert_eq!(bench.fault(), Some(FaultKind::SpindleSlow { within_s: 30.0 }));
+    let (told_rad_per_s, turns_rad_per_s) = (SPINDLE_RAD_PER_S, 0.0);
+    let slow = FaultKind::SpindleSlow { within_s: AT_SPEED_WITHIN_S, told_rad_per_s, turns_rad_per_s };
+    assert_eq!(bench.fault(), Some(slow));
 }
 
 #[test]

@@ -200,7 +200,7 @@ impl Made {
                 format!("driver {} takes longer than a fine period to answer: it can move no joint", self.title);
             return Err(refusal(machine, &self.section, cause));
         }
-        let slow = Slow::new(self.driver);
+        let slow = Slow::new(self.driver, machine.spindle.at_speed_within_s);
         roster.slow.push(slow.switch());
         Ok(Self { driver: Box::new(slow), ..self })
     }

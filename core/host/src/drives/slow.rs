@@ -13,8 +13,6 @@ use std::time::Duration;
 use crossbeam_queue::ArrayQueue;
 use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
 
-/// Time after which the last answer says nothing of the spindle any more, s: several answers of a slow line.
-const SPINDLE_PATIENCE_S: f64 = 1.0;
 /// How long the thread sleeps where nothing new was told: a fraction of any answer that needs a thread.
 const IDLE: Duration = Duration::from_millis(1);
 /// How long a thread has to come back when the driver is stopped: several answers of a slow line.
@@ -57,6 +55,8 @@ pub struct Slow {
     /// Period of the setpoint that was answered last.
     answered: u64,
     feedback: Feedback,
+    /// Time after which the last answer says nothing of the spindle any more, s, and in fine periods.
+    patience_s: f64,
     patience_periods: u64,
 }
 
@@ -71,8 +71,9 @@ impl std::fmt::Debug for Switch {
 }
 
 impl Slow {
-    /// `driver`, in line until its switch gives it a thread.
-    pub fn new(driver: Box<dyn Driver>) -> Self {
+    /// `driver`, in line until its switch gives it a thread. Of a spindle that has said nothing for `patience_s`, the time in
+    /// which it is to come to its speed, nothing is known.
+    pub fn new(driver: Box<dyn Driver>, patience_s: f64) -> Self {
         let description = driver.describe();
         let shared = Shared {
             driver: Mutex::new(driver),
@@ -91,7 +92,8 @@ impl Slow {
             last: Setpoint::default(),
             answered: 0,
             feedback: Feedback::default(),
-            patience_periods: 1000,
+            patience_s,
+            patience_periods: 0,
         }
     }
 
@@ -195,7 +197,7 @@ impl Driver for Slow {
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.patience_periods = (SPINDLE_PATIENCE_S / context.fine_period_s).ceil() as u64;
+        self.patience_periods = (self.patience_s / context.fine_period_s).ceil() as u64;
         self.driver().map_or_else(|| Err(does_not_answer()), |mut driver| driver.open(context))
     }
 

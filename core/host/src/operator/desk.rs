@@ -10,9 +10,9 @@ use tandem_sdk::{Axes, AxisVector};
 
 use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
-use crate::joint_words;
 use crate::policy::PolicySummary;
 use crate::roles;
+use crate::{joint_words, spindle};
 
 use super::status::{Counters, Position, StatusLine};
 
@@ -215,6 +215,7 @@ impl Desk {
             policy: latest.policy.clone(),
             joints: joint_words::lines(&self.machine, status),
             enabling: joint_words::enabling(&self.machine, status),
+            waits_for: spindle::awaited(status),
             held_by: roles::holding(&self.machine, status.tripped.load(Relaxed)),
             fault: latest.fault.clone(),
             stopped: latest.stopped.clone(),

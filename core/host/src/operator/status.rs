@@ -48,6 +48,8 @@ pub struct StatusLine {
     pub enabling: Option<String>,
     /// Inputs with a role that hold the machine now, by their names.
     pub held_by: Option<String>,
+    /// What the motion waits for beside the operator, in words: the spindle, with its speed and that which it is told.
+    pub waits_for: Option<String>,
     /// The fault that stopped the machine, in words.
     pub fault: Option<String>,
     /// What else ended the run before its program was over: the operator's abort, in words.

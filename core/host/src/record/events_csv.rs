@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use tandem_fine::Left;
-use tandem_rings::{FLOOD, MIST, Sample, Switched, SwitchedBy};
+use tandem_rings::{FLOOD, MIST, Sample, StopCause, Switched, SwitchedBy};
 use tandem_sdk::{Event, EventKind};
 
 use super::failure::RecordError;
@@ -20,6 +20,8 @@ pub struct EventsCsv {
     last: Switched,
     /// Words of the program that have not been seen to switch.
     ahead: VecDeque<Word>,
+    /// A cut waits for the spindle.
+    waits: bool,
     /// It has been told that no further row can be written.
     failed: bool,
 }
@@ -64,6 +66,8 @@ struct Period {
     block: u64,
     line: u32,
     switched: Switched,
+    /// A cut waits for the spindle.
+    waits: bool,
 }
 
 impl EventsCsv {
@@ -74,7 +78,8 @@ impl EventsCsv {
     pub fn create(path: &Path, fine_period_s: f64) -> Result<Self, String> {
         let mut out = Output::create(path)?;
         writeln!(out, "time_s,tick,line,word,value,by").map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { out, period_s: fine_period_s, last: Switched::default(), ahead: VecDeque::new(), failed: false })
+        let (last, ahead) = (Switched::default(), VecDeque::new());
+        Ok(Self { out, period_s: fine_period_s, last, ahead, waits: false, failed: false })
     }
 
     /// An event of the program is on its way to the drives.
@@ -90,7 +95,8 @@ impl EventsCsv {
     /// Once: no further row can be written.
     pub fn sample(&mut self, sample: &Sample) -> Result<(), RecordError> {
         let Sample { tick, block, line, switched, .. } = *sample;
-        let written = self.period(&Period { tick, block, line, switched }).map_err(|error| error.at(sample));
+        let waits = sample.cause == StopCause::Spindle;
+        let written = self.period(&Period { tick, block, line, switched, waits }).map_err(|error| error.at(sample));
         // What stands before a block that is over has switched, or was so already.
         while self.ahead.pop_front_if(|word| word.before_block < block).is_some() {}
         written
@@ -106,12 +112,12 @@ impl EventsCsv {
             return Ok(());
         }
         let Left { tick, block, line, switched } = *left;
-        self.period(&Period { tick, block, line, switched })?;
+        self.period(&Period { tick, block, line, switched, waits: false })?;
         self.out.finish_record("events")
     }
 
     fn period(&mut self, period: &Period) -> Result<(), RecordError> {
-        if self.failed || period.switched == self.last {
+        if self.failed || (period.switched == self.last && period.waits == self.waits) {
             return Ok(());
         }
         self.rows(period).map_err(|error| {
@@ -126,6 +132,10 @@ impl EventsCsv {
         if now.spindle_rad_per_s != last.spindle_rad_per_s {
             self.row(period, What::Spindle, now.spindle_rad_per_s)?;
         }
+        if std::mem::replace(&mut self.waits, period.waits) != period.waits {
+            let (time_s, waits) = (TraceCsv::t_s(period.tick, self.period_s), u8::from(period.waits));
+            writeln!(self.out, "{time_s},{},{},waits for spindle,{waits},spindle", period.tick, period.line)?;
+        }
         for output in (0..u64::BITS).filter(|output| now.is_on(*output) != last.is_on(*output)) {
             self.row(period, What::Output(output), f64::from(u8::from(now.is_on(output))))?;
         }
@@ -133,7 +143,7 @@ impl EventsCsv {
     }
 
     fn row(&mut self, period: &Period, what: What, value: f64) -> std::io::Result<()> {
-        let Period { tick, block, line, switched } = period;
+        let Period { tick, block, line, switched, .. } = period;
         let by_word = (switched.by == SwitchedBy::Program).then(|| self.line_of(what, value, *block)).flatten();
         let (time_s, line) = (TraceCsv::t_s(*tick, self.period_s), by_word.unwrap_or(*line));
         let (word, shown) = match what {
