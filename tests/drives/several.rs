@@ -2,7 +2,7 @@
 
 use std::env;
 
-use tandem_host::{Clock, Run, Switches, attached_driver};
+use tandem_host::{Clock, Run, Switches, attached_driver, check_program};
 use tandem_rig::Random;
 use tandem_sdk::{Feedback, JointState, Setpoint};
 
@@ -151,4 +151,31 @@ fn composing_allocates_nothing_also_where_one_fails() {
     let states = &feedback.state[..4];
     assert_eq!(states, [JointState::Lost, JointState::Lost, JointState::Lost, JointState::Enabled]);
     assert!(feedback.age_periods[0] >= 50 && feedback.age_periods[3] == 0, "{:?}", feedback.age_periods);
+}
+
+/// A word that switches or reads a line which nobody has did nothing, and nobody was told.
+#[test]
+fn a_line_that_no_driver_has_is_refused_with_its_word_and_with_what_there_is() {
+    let tables = "[drivers.bus]\nplugin = \"double\"\noptions = { name = \"lines\" }\n\
+                  joints = [\"x\", \"y\", \"z\", \"a\"]\ninputs = [4]\n\
+                  [drivers.io]\nplugin = \"double\"\noptions = { name = \"lines-io\" }\noutputs = [0, 7, 63]\n\
+                  [outputs.clamp]\noutput = 7\n";
+    let all = "[driver]\nplugin = \"double\"\noptions = { name = \"lines-all\" }\n";
+    let told = |drivers: &str, line: &str| {
+        let text = format!("G21 G90\n{line}\nM2\n");
+        let report = check_program(machine(drivers), &registry(), program(&text), Switches::default()).unwrap();
+        report.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    for (line, words) in [
+        ("M62 P1", "no driver has output 1; there are 0, 7 (clamp)"),
+        ("M65 P61", "no driver has output 61; there are 0, 7 (clamp)"),
+        ("M66 P5 L0", "no driver has input 5; there are 4"),
+    ] {
+        let found = told(tables, line);
+        assert!(found.contains(words) && found.contains(":2:5"), "{line}: {found}");
+        assert_eq!(told(all, line), "", "one driver has the whole machine");
+    }
+    for line in ["M63 P0", "M64 P7", "M66 P4 L0", "M8"] {
+        assert_eq!(told(tables, line), "", "{line}");
+    }
 }

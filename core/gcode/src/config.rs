@@ -24,6 +24,29 @@ pub struct ProbeInput {
     pub inverted: bool,
 }
 
+/// Digital lines of one direction that somebody has: the others are wired to nobody.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lines {
+    /// Bit n is line n.
+    pub mask: u64,
+    /// What there is, in words: numbers, and names where they have one.
+    pub shown: String,
+}
+
+impl Lines {
+    /// All of them.
+    pub fn all() -> Self {
+        Self { mask: u64::MAX, shown: String::new() }
+    }
+
+    /// Why line `number` cannot be used, where nobody has it; `what` it is, as in "output".
+    pub(crate) fn refusal(&self, what: &str, number: u32) -> Option<String> {
+        let there =
+            if self.shown.is_empty() { "there is none".to_owned() } else { format!("there are {}", self.shown) };
+        (self.mask >> number & 1 == 0).then(|| format!("no driver has {what} {number}; {there}"))
+    }
+}
+
 /// The machine as a part program sees it. A run starts from this alone and writes nothing back.
 #[derive(Clone, Debug)]
 pub struct Config {
@@ -45,6 +68,10 @@ pub struct Config {
     pub block_delete: bool,
     /// The probe, where the machine has one.
     pub probe: Option<ProbeInput>,
+    /// Outputs that M62 to M65 may switch.
+    pub outputs: Lines,
+    /// Inputs that M66 may read.
+    pub inputs: Lines,
 }
 
 impl Config {
@@ -60,6 +87,8 @@ impl Config {
             time_constant_s: (0.0, f64::INFINITY),
             block_delete: false,
             probe: None,
+            outputs: Lines::all(),
+            inputs: Lines::all(),
         }
     }
 }

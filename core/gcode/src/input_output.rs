@@ -21,6 +21,9 @@ impl Interpreter {
         let missing =
             || self.orders.fault(Group::InputOutput, "word-missing", "P, the number of the output, is missing");
         let number = self.words.integer(b'P', 0..=MOST_OUTPUT)?.ok_or_else(missing)?;
+        if let Some(refusal) = self.config.outputs.refusal("output", number) {
+            return Err(self.words.fault(b'P', "output", refusal));
+        }
         let on = matches!(code, 620 | 640);
         let bit = 1 << number;
         if self.state.outputs_set & bit == 0 || (self.state.outputs & bit != 0) != on {
@@ -36,7 +39,10 @@ impl Interpreter {
 
     fn wait_for_input(&mut self, out: &mut Vec<Item>) -> Checked<()> {
         let input = match (self.words.integer(b'P', 0..=63)?, self.words.integer(b'E', 0..=63)?) {
-            (Some(number), None) => Input::Digital(number),
+            (Some(number), None) => match self.config.inputs.refusal("input", number) {
+                Some(refusal) => return Err(self.words.fault(b'P', "input", refusal)),
+                None => Input::Digital(number),
+            },
             (_, Some(_)) => return Err(self.wait_fault("M66 E: there are no analogue inputs, only digital ones (P)")),
             (None, None) => return Err(self.wait_fault("M66 needs P, the number of a digital input")),
         };

@@ -73,7 +73,7 @@ mod travel;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
-pub use config::{Config, ProbeInput, Tool};
+pub use config::{Config, Lines, ProbeInput, Tool};
 pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult};

@@ -22,6 +22,7 @@ pub mod jog;
 mod joint_words;
 mod joints;
 mod lateness;
+mod lines;
 mod loading;
 mod manual;
 mod monitor;

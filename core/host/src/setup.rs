@@ -14,6 +14,7 @@ use crate::dry_run::DryRun;
 use crate::error::HostError;
 use crate::homing::Homing;
 use crate::joints::JointSpace;
+use crate::lines;
 use crate::policy::{Means, PolicyHost};
 use crate::registry::{PluginRefusal, Registry};
 use crate::roles;
@@ -37,6 +38,8 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
         *travel = (axis.min_mm, axis.max_mm);
     }
     config.probe = machine.probe.map(|probe| ProbeInput { input: probe.input, inverted: probe.inverted });
+    let (outputs, inputs) = lines::of(machine);
+    (config.outputs, config.inputs) = (outputs, inputs);
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config
 }
