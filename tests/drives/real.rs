@@ -80,6 +80,25 @@ fn an_estimate_assumes_the_edges_that_its_stand_in_does_not_have() {
     assert!(found.estimated_s > 1.4, "ten millimetres down and five up at 10 mm/s: {}", found.estimated_s);
 }
 
+/// What is 1 as long as nothing trips it is so on ideal drives: an inverted probe is not touched from the start, and no door of a
+/// closed chain is open.
+#[test]
+fn ideal_drives_that_stand_in_trip_no_input_that_is_inverted_or_normally_closed() {
+    let tables = "[probe]\ninput = 3\ninvert = true\n[inputs.guard]\ninput = 9\nrole = \"door\"\n\
+                  [inputs.button]\ninput = 10\nrole = \"emergency-stop\"\n";
+    let several = "[drivers.bus]\nplugin = \"double\"\noptions = { name = \"levels\", real = true }\n\
+                   joints = [\"x\", \"y\", \"z\", \"a\"]\ninputs = [9, 10, 3]\n";
+    let text = "G21 G90 G94 F600\nG38.2 Z-10\nG1 X#5061 Z[#5063 + 5]\nM2\n";
+    for drivers in [real("levels", ""), several.to_string()] {
+        let (replaced, _) = with_stand_ins(&machine(&(drivers + tables)), &registry(), Some("sim")).unwrap();
+        let choice = Choice::named("simulate", &replaced).unwrap();
+        let switches = Switches { assumes_edges: true, ..Switches::default() };
+        let found = estimate(&replaced, &registry(), program(text), switches, &choice).unwrap();
+        assert_eq!(found.assumed_edges, 1);
+        assert!(found.estimated_s > 1.4, "{}", found.estimated_s);
+    }
+}
+
 /// A check makes drivers, so that their options are judged, and opens none.
 #[test]
 fn a_check_makes_drivers_and_opens_none() {

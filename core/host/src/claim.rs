@@ -8,7 +8,7 @@ use crate::error::HostError;
 use crate::faults::{self, Faults};
 use crate::joints::JointSpace;
 use crate::rules::refusal;
-use crate::run::Switches;
+use crate::run::{Clock, Switches};
 use crate::setup;
 
 /// The drivers of a machine, and what they said when their drives were claimed. A claim that is dropped stops them.
@@ -59,7 +59,9 @@ impl Claim {
         switches: Switches,
     ) -> Result<AxisVector, HostError> {
         let Some(drives) = &mut self.drives else { return Ok(machine.start) };
-        let attached = drives.open(machine, joints)?;
+        let is_real = drives.roster().describe().simulated == 0;
+        let real_time = switches.clock.map_or(is_real, |clock| clock == Clock::Wall);
+        let attached = drives.open(machine, joints, real_time)?;
         self.attached = Some(attached);
         let look = Look { machine, joints, attached: &attached, drives, roster: drives.roster() };
         look.at_numbers()?;

@@ -1,10 +1,10 @@
 //! Machines without their real drives: for commands that move nothing.
 
 use tandem_gcode::Item;
-use tandem_machine::{DriverChoice, Machine, PluginChoice};
+use tandem_machine::{AxisHoming, DriverChoice, Machine, PluginChoice};
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::Edge;
+use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Edge, Feedback, PluginError, Setpoint, Words};
 
 use crate::error::HostError;
 use crate::registry::Registry;
@@ -28,12 +28,13 @@ pub fn with_stand_ins(
             continue;
         }
         let (title, section) = (driver.title(), driver.section());
+        let inputs_at_rest = if driver.stand_in.is_none() { inputs_at_rest(&machine) } else { 0 };
         let stand_in = driver.stand_in.clone().or_else(|| ideal.map(PluginChoice::named));
         let Some(choice) = stand_in else {
             let cause = format!("driver {title} moves metal, and nothing stands in for it");
             return Err(refusal(&machine, &format!("{section}.stand_in"), cause));
         };
-        let replaced = DriverChoice { choice, ..driver.clone() };
+        let replaced = DriverChoice { choice, inputs_at_rest, ..driver.clone() };
         if setup::is_real(&replaced, registry) {
             let cause = format!("{} moves metal itself", replaced.choice.plugin);
             return Err(refusal(&machine, &format!("{section}.stand_in.plugin"), cause));
@@ -42,6 +43,62 @@ pub fn with_stand_ins(
         machine.drivers[index] = replaced;
     }
     Ok((machine, notes))
+}
+
+/// Inputs that are 1 as long as nothing trips them: an inverted probe or home switch, and what is normally closed.
+fn inputs_at_rest(machine: &Machine) -> u64 {
+    let probe = machine.probe.filter(|probe| probe.inverted).map(|probe| probe.input);
+    let switches = machine.homing.iter().filter_map(AxisHoming::switch).filter(|switch| switch.inverted);
+    let roles = machine.inputs.iter().filter(|input| input.role.is_some() && input.normally_closed);
+    let all = probe.into_iter().chain(switches.map(|switch| switch.input)).chain(roles.map(|input| input.input));
+    all.fold(0, |mask, input| mask | 1 << input.min(63))
+}
+
+/// Drives whose inputs in `levels` are 1 whatever they say.
+pub struct AtRest {
+    pub driver: Box<dyn Driver>,
+    /// A bit per input, as the driver numbers them.
+    pub levels: u64,
+}
+
+impl Driver for AtRest {
+    fn describe(&self) -> DriverDescription {
+        self.driver.describe()
+    }
+
+    fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
+        self.driver.check(context)
+    }
+
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        self.driver.open(context)
+    }
+
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        self.driver.start()
+    }
+
+    fn send(&mut self, setpoint: &Setpoint) {
+        self.driver.send(setpoint);
+    }
+
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        let exchanged = self.driver.exchange(setpoint, feedback);
+        feedback.inputs |= self.levels;
+        exchanged
+    }
+
+    fn quick_stop(&mut self) {
+        self.driver.quick_stop();
+    }
+
+    fn stop(&mut self) -> Result<(), PluginError> {
+        self.driver.stop()
+    }
+
+    fn explain(&self, joint: u32, code: u32) -> Words {
+        self.driver.explain(joint, code)
+    }
 }
 
 /// A stream whose motion towards an edge ends at its end, with the edge there, where the edge does not come: what stands in for

@@ -22,6 +22,9 @@ pub struct DriverChoice {
     pub stand_in: Option<PluginChoice>,
     /// What it has of the machine; none where it has everything.
     pub owns: Option<Owned>,
+    /// Inputs of the machine, a bit each, that are 1 whatever it says. No file states it: ideal drives that stand in for real ones
+    /// have nothing wired to them, and what is 1 as long as nothing trips it is so there.
+    pub inputs_at_rest: u64,
 }
 
 /// What one of several drivers has of the machine, in the driver's own order: its joint 0 is the first of `joints`, its input 0
@@ -58,7 +61,7 @@ impl DriverChoice {
     fn read_one(section: &Section<'_>) -> Option<Self> {
         let stand_in = stand_in(section);
         let choice = PluginChoice::read(section)?;
-        Some(Self { name: None, choice, stand_in, owns: None })
+        Some(Self { name: None, choice, stand_in, owns: None, inputs_at_rest: 0 })
     }
 
     /// Reads `[drivers.<name>]`; `None` where it is wrong, which is reported.
@@ -73,7 +76,7 @@ impl DriverChoice {
         };
         let stand_in = stand_in(section);
         let choice = PluginChoice::read(section)?;
-        Some(Self { name: Some(name.to_owned()), choice, stand_in, owns: Some(owns) })
+        Some(Self { name: Some(name.to_owned()), choice, stand_in, owns: Some(owns), inputs_at_rest: 0 })
     }
 }
 
@@ -86,7 +89,10 @@ fn stand_in(section: &Section<'_>) -> Option<PluginChoice> {
 /// Reads `[driver]`, or else all of `[drivers.*]`. What is wrong is reported; there is one driver at least in any case.
 pub(crate) fn read(root: &Section<'_>) -> Vec<DriverChoice> {
     let (one, several) = (root.section("driver"), root.section("drivers"));
-    let nothing = || DriverChoice { name: None, choice: PluginChoice::named(""), stand_in: None, owns: None };
+    let nothing = || {
+        let choice = PluginChoice::named("");
+        DriverChoice { name: None, choice, stand_in: None, owns: None, inputs_at_rest: 0 }
+    };
     if !root.has("drivers") {
         return vec![DriverChoice::read_one(&one).unwrap_or_else(nothing)];
     }

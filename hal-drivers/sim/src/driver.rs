@@ -54,6 +54,7 @@ pub struct SimulatedDrives {
     faults: DriveFaults,
     wire: Wire,
     bus_clock: Option<BusClock>,
+    bus_start: Duration,
     started: Instant,
     /// The setpoint that the drives heard last.
     heard: Setpoint,
@@ -84,6 +85,7 @@ impl SimulatedDrives {
             faults: DriveFaults::new(&options.faults),
             wire: Wire::new(&options, &Feedback::default(), period_s),
             bus_clock: None,
+            bus_start: Duration::ZERO,
             started: Instant::now(),
             heard: Setpoint::default(),
             unheard_reset: 0,
@@ -130,13 +132,10 @@ impl SimulatedDrives {
         let switches = self.options.switches.iter().map(|switch| ("switches", last_joint(switch)));
         let faults = self.options.faults.iter().map(|fault| ("faults", fault.joint));
         let latches = self.options.latch_joints.iter().map(|joint| ("latch_joints", *joint));
-        match switches.chain(faults).chain(latches).find(|(_, joint)| *joint >= count) {
-            Some((key, joint)) => {
-                let words = format!("joint = {joint}: the machine has joints 0 to {}", count - 1);
-                Err(PluginError::of_option(key, words))
-            }
-            None => Ok(()),
-        }
+        let wrong = switches.chain(faults).chain(latches).find(|(_, joint)| *joint >= count);
+        wrong.map_or(Ok(()), |(key, joint)| {
+            Err(PluginError::of_option(key, format!("joint = {joint}: the machine has joints 0 to {}", count - 1)))
+        })
     }
 
     /// The drives get their power: nobody has told them anything yet.
@@ -326,7 +325,8 @@ impl Driver for SimulatedDrives {
         self.refuse_unless(&[Life::Closed, Life::Stopped], REFUSED)?;
         self.check_machine(context)?;
         self.joint_count = context.joint_count as usize;
-        self.period_s = context.fine_period_s;
+        let bus_start_s = if context.real_time != 0 { self.options.bus_start_s } else { 0.0 };
+        (self.period_s, self.bus_start) = (context.fine_period_s, Duration::from_secs_f64(bus_start_s));
         self.power_on(&context.start_position);
         self.life = Life::Opened;
         Ok(())
@@ -340,7 +340,7 @@ impl Driver for SimulatedDrives {
             "",
         ];
         self.refuse_unless(&[Life::Opened, Life::Stopped], REFUSED)?;
-        std::thread::sleep(Duration::from_secs_f64(self.options.bus_start_s));
+        std::thread::sleep(self.bus_start);
         self.begin();
         let mut first = Feedback::default();
         (0..self.joint_count).for_each(|joint| self.tell(joint, &mut first));

@@ -30,7 +30,7 @@
 //! (`lost_frames`), is late or has a clock of its own. `docs/simulation.md` has all of it.
 //!
 //! Everything is computed from the setpoints and the fine period, and what is random comes from a seed, so a run repeats bit for
-//! bit. Only `bus_start_s` and `bus_clock` look at a clock, and no command depends on them.
+//! bit. Only `bus_start_s`, in real time, and `bus_clock` look at a clock, and no command depends on them.
 
 mod bus_clock;
 mod driver;

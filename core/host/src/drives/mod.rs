@@ -13,6 +13,7 @@ use crate::joints::JointSpace;
 use crate::registry::{PluginRefusal, Registry};
 use crate::rules::refusal;
 use crate::setup;
+use crate::stand_in::AtRest;
 use composite::{Composite, Part};
 pub use roster::{Entry, Roster};
 use share::Share;
@@ -75,13 +76,13 @@ impl Drives {
         self.all.iter().try_for_each(check)
     }
 
-    /// Claims the drives: where all joints stand. Where one driver cannot start, those that have started are stopped. Host; may
-    /// allocate.
+    /// Claims the drives: where all joints stand. Where one driver cannot start, those that have started are stopped. In
+    /// `real_time` a simulated bus takes the time that it takes. Host; may allocate.
     ///
     /// # Errors
     /// Why the drives cannot be reached, with the place of their driver in the machine file.
-    pub fn open(&mut self, machine: &Machine, joints: &JointSpace) -> Result<Attached, HostError> {
-        let whole = setup::driver_context(machine, joints);
+    pub fn open(&mut self, machine: &Machine, joints: &JointSpace, real_time: bool) -> Result<Attached, HostError> {
+        let whole = DriverContext { real_time: u32::from(real_time), ..setup::driver_context(machine, joints) };
         for made in &mut self.all {
             let context = made.context(&whole);
             made.driver.open(&context).map_err(|e| made.refuses(machine, &e))?;
@@ -144,7 +145,7 @@ impl Drives {
 /// What refuses a run too.
 pub fn attached_driver(machine: &Machine, registry: &Registry) -> Result<(Box<dyn Driver>, Attached), HostError> {
     let mut drives = Drives::of(machine, registry)?;
-    let attached = drives.open(machine, &JointSpace::of(machine, registry)?)?;
+    let attached = drives.open(machine, &JointSpace::of(machine, registry)?, false)?;
     Ok((drives.into_driver(), attached))
 }
 
@@ -163,6 +164,8 @@ fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result
         }
         None => None,
     };
+    let levels = share.as_ref().map_or(choice.inputs_at_rest, |share| share.inputs.to_own(choice.inputs_at_rest));
+    let driver = if levels == 0 { driver } else { Box::new(AtRest { driver, levels }) };
     Ok(Made { driver, title: choice.title(), section, share })
 }
 

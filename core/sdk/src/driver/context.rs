@@ -79,6 +79,10 @@ pub struct DriverContext {
     pub analog: u32,
     /// 1 where the spindle is this driver's.
     pub spindle: u32,
+    /// 1 where the loops run in real time. On the virtual clock, 0, what takes a simulated driver time costs the computer none.
+    pub real_time: u32,
+    /// Reserved, zero.
+    pub reserved: u32,
 }
 
 layout!(DriverContext {
@@ -91,7 +95,9 @@ layout!(DriverContext {
     inputs,
     outputs,
     analog,
-    spindle
+    spindle,
+    real_time,
+    reserved
 });
 
 impl DriverContext {
@@ -116,6 +122,8 @@ impl DriverContext {
             outputs: 0,
             analog: 0,
             spindle: 0,
+            real_time: 0,
+            reserved: 0,
         }
     }
 }
