@@ -397,6 +397,7 @@ impl FineLoop {
             return;
         }
         self.end_hand_over();
+        self.arm = Arm::default();
         self.fault = Some(Fault { kind, tick: self.tick, line: self.cursor.segment().line });
         self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
     }

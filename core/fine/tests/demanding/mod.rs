@@ -64,6 +64,8 @@ pub struct Script {
     pub homing_for: u64,
     pub homed: u32,
     pub position: AxisVector,
+    /// Where the joints were behind each exchange.
+    pub been: Vec<AxisVector>,
     /// Every setpoint, with the feedback that was known before it.
     pub told: Vec<(Setpoint, Feedback)>,
     pub resets: u32,
@@ -97,6 +99,7 @@ impl Script {
             homing_for: 0,
             homed: 0,
             position: AxisVector::ZERO,
+            been: vec![],
             told: vec![],
             resets: 0,
         }
@@ -105,6 +108,12 @@ impl Script {
     /// What was told last.
     pub fn last(&self) -> Setpoint {
         self.told.last().expect("an exchange").0
+    }
+
+    /// Somebody moves the joints by hand, long enough ago for the drives to know.
+    pub fn move_to(&mut self, position: AxisVector) {
+        self.position = position;
+        self.been.clear();
     }
 
     fn take(&mut self, setpoint: &Setpoint) {
@@ -202,10 +211,9 @@ impl Driver for Drives {
             script.drive(joint, setpoint, feedback);
         }
         feedback.homed = script.homed | (script.was_homed & !setpoint.homing);
-        feedback.position = match script.behind {
-            0 => script.position,
-            behind => script.told[script.told.len().saturating_sub(1 + behind)].0.position,
-        };
+        let position = script.position;
+        script.been.push(position);
+        feedback.position = script.been[script.been.len().saturating_sub(1 + script.behind)];
         (feedback.inputs, feedback.input_age_periods) = (script.inputs, script.input_age);
         feedback.latches[0] = script.latch(setpoint);
         let turns = setpoint.spindle_rad_per_s == 0.0 || script.spun_for > script.spin_up;
