@@ -65,6 +65,10 @@ pub fn old_inputs(feedback: &Feedback) -> u64 {
 /// The fault that the drives report; one that has let go while the machine is `moving` is one too. Joints that are their drives'
 /// `own`, a bit each, may move as those will. Fine loop.
 pub fn reported(feedback: &Feedback, joints: usize, moving: bool, own: u32) -> Option<FaultKind> {
+    // What is true nearly always is looked at first.
+    if feedback.state[..joints].iter().all(|state| *state == JointState::Enabled) {
+        return None;
+    }
     let first = |state: JointState| feedback.state[..joints].iter().position(|s| *s == state);
     let foreign = feedback.state[..joints].iter().position(|state| !state.is_known());
     if let Some(joint) = foreign {
@@ -80,25 +84,20 @@ pub fn reported(feedback: &Feedback, joints: usize, moving: bool, own: u32) -> O
     faulty.or_else(lost).or_else(let_go)
 }
 
-/// Where each joint was told to be when it did what is reported now: `delay_periods` before the last of what was `sent`. Fine
-/// loop.
-pub fn aims(sent: &History, delay_periods: &[u32; MAX_AXES]) -> AxisVector {
-    AxisVector(std::array::from_fn(|joint| sent.at(delay_periods[joint])[joint]))
-}
-
-/// The fault that a joint which follows is further from its `command` than its limit in `most_mm` allows; what is old is not
-/// judged, nor is a joint that is its drive's `own`, a bit each. Fine loop.
+/// The fault that a joint which follows is further from where it was told to be than its limit in `most_mm` allows: what is
+/// reported answers what was `sent` its `delay_periods` before the last. What is old is not judged, nor is a joint that is its
+/// drive's `own`, a bit each. Fine loop.
 pub fn following(
     feedback: &Feedback,
-    command: &AxisVector,
+    (sent, delay_periods): (&History, &[u32; MAX_AXES]),
     joints: usize,
     most_mm: &AxisVector,
     own: u32,
 ) -> Option<FaultKind> {
-    let error = |joint: usize| (command[joint] - feedback.position[joint]).abs();
-    let holds = |joint: &usize| feedback.state[*joint] == JointState::Enabled && feedback.age_periods[*joint] == 0;
-    let followed = |joint: &usize| own >> *joint & 1 == 0 && holds(joint);
-    let lost = (0..joints).filter(followed).find(|joint| error(*joint) > most_mm[*joint]);
+    let error = |joint: usize| (sent.at(delay_periods[joint])[joint] - feedback.position[joint]).abs();
+    let holds = |joint: usize| feedback.state[joint] == JointState::Enabled && feedback.age_periods[joint] == 0;
+    let judged = |joint: &usize| most_mm[*joint] < f64::INFINITY && own >> *joint & 1 == 0 && holds(*joint);
+    let lost = (0..joints).filter(judged).find(|joint| error(*joint) > most_mm[*joint]);
     lost.map(|joint| FaultKind::Following { joint, error_mm: error(joint), limit_mm: most_mm[joint] })
 }
 
@@ -140,13 +139,17 @@ mod tests {
     #[test]
     fn a_joint_that_follows_must_be_near_its_command() {
         let mut feedback = Feedback { state: [JointState::Enabled; 8], ..Feedback::default() };
-        let (command, most_mm) =
-            (AxisVector([0.5; 8]), AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]));
+        let most_mm = AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]);
+        let mut sent = History::new(&AxisVector([7.0; 8]));
+        sent.push(&AxisVector([0.5; 8]));
+        let command = (&sent, &[0; MAX_AXES]);
         let fault = Some(FaultKind::Following { joint: 2, error_mm: 0.5, limit_mm: 0.25 });
-        assert_eq!(following(&feedback, &command, 3, &most_mm, 0), fault, "at the limit it is not beyond it");
-        assert_eq!(following(&feedback, &command, 3, &most_mm, 1 << 2), None, "its drive has it");
+        assert_eq!(following(&feedback, command, 3, &most_mm, 0), fault, "at the limit it is not beyond it");
+        assert_eq!(following(&feedback, command, 3, &most_mm, 1 << 2), None, "its drive has it");
+        let before = Some(FaultKind::Following { joint: 1, error_mm: 7.0, limit_mm: 0.5 });
+        assert_eq!(following(&feedback, (&sent, &[0, 1, 0, 0, 0, 0, 0, 0]), 3, &most_mm, 0), before, "a period ago");
         feedback.state[2] = JointState::Disabled;
-        assert_eq!(following(&feedback, &command, 3, &most_mm, 0), None, "what is off follows nothing");
+        assert_eq!(following(&feedback, command, 3, &most_mm, 0), None, "what is off follows nothing");
     }
 
     #[test]

@@ -30,8 +30,8 @@ impl FineLoop {
         let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
         let resets = self.is_resetting();
         let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
-        let aims = answer::aims(&self.sent, &self.config.attached.delay_periods);
-        let far = || answer::following(&self.feedback, &aims, self.joints, &self.config.max_following_error_mm, own);
+        let sent = (&self.sent, &self.config.attached.delay_periods);
+        let far = || answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own);
         if let Some(kind) = fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go)) {
             self.fail(kind);
         }
