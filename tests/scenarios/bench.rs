@@ -1,11 +1,13 @@
 //! Runs in this process, through the same host and plugins as the command: thousands of disturbed runs in seconds.
 
 use std::cell::RefCell;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed, TraceCsv};
 use tandem_machine::Machine;
 use tandem_oracle::{Options, Row, Trace, Verdict, judge};
+use tandem_rig::{CASES_VARIABLE, record_case};
 use tandem_rings::{MachineState, Sample};
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, PluginError,
@@ -64,35 +66,50 @@ impl Bench {
         if self.machine == mill() && settings.iter().all(|(key, _)| key != "planner.plugin") {
             settings.push(("planner.plugin".to_string(), "watched".to_string()));
         }
-        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
-        self.drive(&settings, &commands).unwrap()
+        self.drive(&settings, commands).unwrap()
     }
 
     /// Runs it with commands as the machine file says, unless something refuses.
     pub fn try_commands(&self, commands: &str) -> Result<Ran, HostError> {
-        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
-        self.drive(&[], &commands)
+        self.drive(&[], commands)
     }
 
     /// Runs it with the built-in plugins and further settings of the machine, unless something refuses.
     pub fn try_run(&self, settings: &[(String, String)]) -> Result<Ran, HostError> {
-        self.drive(settings, &[])
+        self.drive(settings, "")
     }
 
     /// The same with commands.
     pub fn try_run_with(&self, settings: &[(String, String)], commands: &str) -> Result<Ran, HostError> {
-        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
-        self.drive(settings, &commands)
+        self.drive(settings, commands)
     }
 
-    fn drive(&self, settings: &[(String, String)], commands: &[Timed]) -> Result<Ran, HostError> {
+    fn drive(&self, settings: &[(String, String)], commands: &str) -> Result<Ran, HostError> {
+        self.record(settings, commands);
+        let commands: Vec<Timed> = commands.lines().map(|line| Timed::parse(line).unwrap()).collect();
         let machine = Machine::read(&self.machine, settings).unwrap();
         let program = tandem_gcode::Program::open(&self.program).unwrap();
         let run = Run::prepare(machine, &registry(), program, Switches::default())?;
         let mut kept = Kept::default();
         EMITTED.take();
-        let outcome = run.drive(Clock::Virtual, commands, &mut kept)?;
+        let outcome = run.drive(Clock::Virtual, &commands, &mut kept)?;
         Ok(Ran { samples: kept.0, outcome, segments: EMITTED.take() })
+    }
+
+    /// Keeps the case for the comparison of two builds, where one is asked for: as the command would run it.
+    fn record(&self, settings: &[(String, String)], commands: &str) {
+        if std::env::var_os(CASES_VARIABLE).is_none() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("commands.csv");
+        std::fs::write(&file, commands).unwrap();
+        let files = ["--machine".as_ref(), self.machine.as_os_str(), "--commands".as_ref(), file.as_os_str()];
+        let settings =
+            settings.iter().filter(|(_, value)| value != "watched").map(|(key, value)| format!("{key}={value}"));
+        let settings: Vec<String> = settings.flat_map(|setting| ["--set".to_string(), setting]).collect();
+        let run = ["run".as_ref(), self.program.as_os_str()].into_iter().chain(files);
+        record_case(run.chain(settings.iter().map(OsStr::new)), "");
     }
 
     /// The oracle's verdict: samples on the path to 2 nm, corners cut by no more than a chord between two samples.

@@ -1,5 +1,6 @@
 //! Running the `tandem` binary and judging its trace.
 
+use std::ffi::OsStr;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -7,6 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 use tandem_oracle::{Machine, Options, Trace, Verdict, judge};
+use tandem_rig::record_case;
 use tempfile::TempDir;
 
 /// The folder of the workspace.
@@ -90,6 +92,7 @@ impl Scenario {
 
     /// Runs it.
     pub fn run(self) -> Done {
+        self.record();
         let at = |name: &str| self.folder.path().join(name);
         let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
             .arg("run")
@@ -107,6 +110,13 @@ impl Scenario {
             .and_then(wait)
             .unwrap();
         Done { output, folder: self.folder, program: self.program, machine: self.machine }
+    }
+
+    /// Keeps the case for the comparison of two builds, where one is asked for.
+    fn record(&self) {
+        let arguments =
+            [OsStr::new("run"), self.program.as_os_str(), OsStr::new("--machine"), self.machine.as_os_str()];
+        record_case(arguments.into_iter().chain(self.arguments.iter().map(OsStr::new)), self.input);
     }
 }
 

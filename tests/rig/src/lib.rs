@@ -7,6 +7,7 @@ mod collected;
 mod drive;
 mod machine;
 mod random;
+mod record;
 
 pub use blocks::{arc, line, lines, numbered, program};
 pub use cases::{assert_close, case, numbers, points};
@@ -14,6 +15,7 @@ pub use collected::Collected;
 pub use drive::{Away, Offer, drive, feed, stream};
 pub use machine::{axis, context};
 pub use random::Random;
+pub use record::{CASES_VARIABLE, record_case};
 
 /// Of a feed, mm/min per mm/s.
 pub const MM_PER_MIN: f64 = 60.0;

@@ -60,6 +60,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("tests/conformance", &["tandem-sdk"]),
+    ("tests/net", &["tandem-campaign", "tandem-oracle"]),
     ("tests/oracle", &[]),
     ("tests/rig", &["tandem-sdk"]),
     ("tests/third-party", &["tandem-sdk"]),
