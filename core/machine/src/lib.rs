@@ -54,6 +54,7 @@ pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};
 pub use machine::Machine;
 pub use motion::{FineThread, JerkMode, Motion};
+pub use nearest::meant;
 pub use outputs::Output;
 pub use parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle};
 pub use probe::Probe;

@@ -36,6 +36,17 @@ impl Nearest {
     }
 }
 
+/// The name among `known` that `name` was probably meant to be; none where no one is near.
+pub fn meant<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
+    let nearest = known.iter().map(|known| (distance(name, known), *known)).min_by_key(|(edits, _)| *edits);
+    nearest.filter(|(edits, _)| is_close(name, *edits)).map(|(_, known)| known)
+}
+
+/// Whether a name so many edits away was probably meant: a third of its letters may be wrong, two always.
+fn is_close(name: &str, edits: usize) -> bool {
+    edits <= (name.chars().count() / 3).max(2)
+}
+
 struct Candidate {
     cost: usize,
     nearest: Nearest,
@@ -76,8 +87,8 @@ fn candidate(pattern: &str, name: &str, table: &[&str]) -> Candidate {
     }
     let edits = distance(name, last);
     let cost = if same_table { edits } else { edits + OTHER_TABLE };
-    let close = edits <= (name.chars().count() / 3).max(2);
-    Candidate { cost, nearest: Nearest { path: written(parents, last, table), same_table, close } }
+    let nearest = Nearest { path: written(parents, last, table), same_table, close: is_close(name, edits) };
+    Candidate { cost, nearest }
 }
 
 /// The path as it would be written: placeholders take the names of the table in which the unknown key stands.

@@ -10,10 +10,8 @@ mod profile;
 pub mod retime;
 mod segment;
 pub mod tube;
-mod vector;
 
 pub use geometry::{half_angle_turn_rad, one_minus_cos};
 pub use path::Path;
 pub use profile::Profile;
 pub use segment::{Builder, SpeedPiece, hermite, state};
-pub use vector::{from_nalgebra, to_nalgebra};

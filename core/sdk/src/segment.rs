@@ -23,8 +23,6 @@ impl SegmentFlags {
     pub const BLOCK_ENDS: Self = Self(8);
     /// Nothing moves (a dwell).
     pub const DWELL: Self = Self(16);
-    /// Part of a plan to rest that the next `advance` replaces.
-    pub const TAIL: Self = Self(32);
     /// Order 3: velocity or acceleration step where this begins. Put in by the host.
     pub const STEPS: Self = Self(64);
 
