@@ -2,7 +2,7 @@
 
 use tandem_sdk::BlockKind;
 
-use crate::instance::Asks;
+use crate::window::Asks;
 
 /// What a script may ask for on this machine.
 #[derive(Clone, Copy, Debug, PartialEq)]

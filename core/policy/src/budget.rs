@@ -1,5 +1,10 @@
 //! What a script may use.
 
+/// Largest module, bytes.
+pub const MOST_BYTES: usize = 1 << 20;
+/// Stack that a script may use, bytes.
+pub const SOFT_STACK_BYTES: usize = 128 * 1024;
+
 /// Computing, memory and stack that one script may use. Fuel is counted in WASM instructions, so that the bound is the
 /// same on every computer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,12 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wasmtime::{Config, Module, Store};
 
+use crate::budget::{MOST_BYTES, SOFT_STACK_BYTES};
 use crate::error::Refusal;
-use crate::limits::SOFT_STACK_BYTES;
 use crate::script::Script;
 
-/// Largest module, bytes.
-pub const MOST_BYTES: usize = 1 << 20;
 /// Compiled scripts that are kept.
 const KEPT: usize = 4;
 

@@ -3,6 +3,9 @@
 /// Why bytes are no policy script for this machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
+    /// This build has no engine for scripts.
+    #[error("this tandem was built without policy scripts: build it with the feature scripts")]
+    NoScripts,
     /// The file is too large to be compiled.
     #[error("{bytes} bytes: a policy script has at most {most}")]
     TooLarge {

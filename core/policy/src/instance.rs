@@ -9,10 +9,7 @@ use crate::layout::Layout;
 use crate::limits::Limits;
 use crate::parameters::{Parameter, resolve};
 use crate::script::Script;
-use crate::window::Record;
-
-/// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
-pub type Asks = [f64; 3];
+use crate::window::{Asks, Record};
 
 /// A live script. After an error of a call it must not be called again.
 pub struct Instance {

@@ -7,35 +7,49 @@
 //!
 //! Everything here runs on the soft side. Calls of [`Policy::offer`], [`Policy::decide`] and [`Policy::period`] allocate
 //! nothing as long as nothing goes wrong and nothing is noted. The same calls give the same answers on every computer.
+//!
+//! Without the feature `scripts` nothing of the WASM engine is built, and every script is refused.
+
+#![cfg_attr(not(feature = "scripts"), allow(dead_code, reason = "what only the WASM engine calls"))]
 
 pub mod abi;
 mod bounds;
 mod budget;
 mod counters;
+#[cfg(feature = "scripts")]
 mod engine;
 mod error;
 mod facts;
+#[cfg(feature = "scripts")]
 mod instance;
 mod layout;
+#[cfg(feature = "scripts")]
 mod limits;
 mod notes;
 mod parameters;
 mod period;
 mod policy;
+#[cfg(feature = "scripts")]
 mod script;
 mod shape;
 mod window;
+#[cfg(not(feature = "scripts"))]
+mod without;
 
 pub use bounds::{Bounds, Tuning};
-pub use budget::Budget;
+pub use budget::{Budget, MOST_BYTES, SOFT_STACK_BYTES};
 pub use counters::Counters;
-pub use engine::{Engine, MOST_BYTES};
+#[cfg(feature = "scripts")]
+pub use engine::Engine;
 pub use error::{Refusal, Trouble};
 pub use facts::Facts;
+#[cfg(feature = "scripts")]
 pub use instance::Instance;
-pub use limits::SOFT_STACK_BYTES;
 pub use parameters::{Parameter, Values};
 pub use period::Period;
 pub use policy::{MAX_STRIKES, Policy};
+#[cfg(feature = "scripts")]
 pub use script::Script;
 pub use window::Record;
+#[cfg(not(feature = "scripts"))]
+pub use without::{Engine, Instance, Script};

@@ -4,8 +4,6 @@ use wasmtime::{ResourceLimiter, Result, bail};
 
 use crate::budget::Budget;
 
-/// Stack that a script may use, bytes.
-pub const SOFT_STACK_BYTES: usize = 128 * 1024;
 /// Elements of all tables together.
 const MOST_ELEMENTS: usize = 4096;
 

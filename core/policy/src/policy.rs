@@ -7,12 +7,11 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 use crate::error::{Refusal, Trouble};
 use crate::facts::Facts;
-use crate::instance::{Asks, Instance};
 use crate::notes::Notes;
 use crate::parameters::Values;
 use crate::period::Period;
-use crate::script::Script;
-use crate::window::Window;
+use crate::window::{Asks, Window};
+use crate::{Instance, Script};
 
 /// Calls that go wrong before a script is not called any more.
 pub const MAX_STRIKES: u32 = 3;

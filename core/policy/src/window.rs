@@ -10,6 +10,9 @@ use crate::shape::{Direction, HalfTurn, LinearAxes, Shape, half_turn, turns_rad}
 /// One block as it crosses into the script, laid out as [`abi::block`] says.
 pub type Record = [u8; at::BYTES];
 
+/// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
+pub type Asks = [f64; 3];
+
 /// The blocks of a window as they cross into the script.
 #[derive(Debug)]
 pub struct Window {
