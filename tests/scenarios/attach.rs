@@ -3,6 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use tandem_rig::Random;
+
 use crate::harness::{Done, Scenario, judge_trace, overlapping, root};
 
 /// What the drives ask for: they come up one after the other, the last joint has no brake and sinks until it is held, encoders
@@ -59,17 +61,6 @@ const MACHINES: [Machine; 5] = [
     },
 ];
 
-/// A row of numbers from 0 to 1 that repeats.
-fn shares(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// A run that begins at `place`, with a first move that is relative or absolute.
 struct Attached {
     done: Done,
@@ -78,8 +69,8 @@ struct Attached {
 }
 
 fn attach(machine: &Machine, seed: u64, relative: bool, settings: &[&str]) -> Attached {
-    let mut share = shares(seed);
-    let place: Vec<_> = machine.axes.iter().map(|(_, low, high)| low + (high - low) * share()).collect();
+    let mut random = Random::new(seed);
+    let place: Vec<_> = machine.axes.iter().map(|(_, low, high)| random.between(*low, *high)).collect();
     let joints: Vec<_> = (machine.joints)(&place).iter().map(ToString::to_string).collect();
     let first = if relative { "G91\nG1 X7 Y-5\nG90\n" } else { "" };
     let middle: Vec<_> = machine.axes[..2].iter().map(|(_, low, high)| f64::midpoint(*low, *high)).collect();

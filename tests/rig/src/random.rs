@@ -17,6 +17,22 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
     }
 
+    /// From the clock, or from `TANDEM_SEED`, to see a failure again; says which.
+    ///
+    /// # Panics
+    /// The variable holds no number.
+    pub fn from_the_clock() -> Self {
+        let clock = || std::time::UNIX_EPOCH.elapsed().unwrap_or_default().subsec_nanos().into();
+        let seed = std::env::var("TANDEM_SEED").map_or_else(|_| clock(), |seed| seed.parse().unwrap());
+        println!("TANDEM_SEED={seed}");
+        Self::new(seed)
+    }
+
+    /// Any bytes, so many.
+    pub fn bytes(&mut self, count: usize) -> Vec<u8> {
+        (0..count).map(|_| self.below(256) as u8).collect()
+    }
+
     /// From 0 to below 1.
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64

@@ -3,10 +3,10 @@
 
 use arbitrary::Unstructured;
 use tandem_policy::MAX_STRIKES;
+use tandem_rig::Random;
 use wasm_smith::{Config, Module};
 
 use crate::hostile::{assert_within_the_machine, live};
-use crate::random::Random;
 use crate::{chain, start};
 
 /// What a policy exports but for its layout: the bodies are random.

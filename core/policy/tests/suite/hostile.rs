@@ -1,9 +1,9 @@
 //! Scripts that mean harm: contained every time, and the same every time.
 
 use tandem_policy::{Bounds, Period, Policy, Refusal};
+use tandem_rig::Random;
 use tandem_sdk::Block;
 
-use crate::random::Random;
 use crate::{chain, decide, each, read, start};
 
 /// Windows and periods in turn; what came out.
@@ -124,11 +124,11 @@ fn truncated_and_random_bytes_are_refused_or_run_within_their_budget() {
     for _ in 0..200 {
         let mut bytes = whole.clone();
         for _ in 0..=random.below(4) {
-            let at = random.below(bytes.len());
-            bytes[at] = random.number() as u8;
+            let at = random.below(bytes.len() as u64) as usize;
+            bytes[at] = random.below(256) as u8;
         }
         try_out(&bytes);
-        let noise = random.below(200);
+        let noise = random.below(200) as usize;
         try_out(&random.bytes(noise));
     }
 }

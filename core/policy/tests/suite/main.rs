@@ -3,7 +3,6 @@
 mod generated;
 mod hostile;
 mod layouts;
-mod random;
 mod refusals;
 mod reload;
 mod scripts;
