@@ -1,4 +1,4 @@
-//! Rules that the compiler does not know: dependency directions, sizes, links, names in the documentation.
+//! Rules that the compiler does not know: dependency directions, links, names in the documentation.
 //!
 //! `UPDATE_DOCS=1 cargo test -p tandem-tidy` rewrites the generated parts of the documentation.
 
@@ -6,7 +6,7 @@ mod dependencies;
 mod generated;
 mod life_of_a_block;
 mod links;
-mod sizes;
+mod places;
 mod source;
 mod tree;
 
