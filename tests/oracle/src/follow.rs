@@ -131,8 +131,7 @@ fn nearest_between(elements: &[Element], low: Place, high: Place, sample: &Posit
     for (index, element) in elements.iter().enumerate().take(high.element + 1).skip(low.element) {
         let from = if index == low.element { low.fraction } else { 0.0 };
         let to = if index == high.element { high.fraction } else { 1.0 };
-        let (fraction, off_mm) = element.shape.nearest(sample, from, to);
-        if off_mm < best.1 {
+        if let Some((fraction, off_mm)) = element.shape.nearer(sample, (from, to), best.1) {
             best = (Place { element: index, fraction }, off_mm);
         }
     }

@@ -12,6 +12,9 @@ pub use nurbs::{Curve, Nurbs};
 
 use crate::{Position, geometry::distance};
 
+/// A piece is no longer than this times its length, which of a curve is known to a ten-millionth.
+const LONGER: f64 = 1.0001;
+
 /// The whole path in the order of travel.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
@@ -97,14 +100,32 @@ impl Shape {
         (fraction, distance(&self.at(fraction), point))
     }
 
+    /// The same, where it is nearer than `off_mm`.
+    pub fn nearer(&self, point: &Position, (low, high): (f64, f64), off_mm: f64) -> Option<(f64, f64)> {
+        if self.is_beyond(distance(&self.at(low), point), off_mm) {
+            return None;
+        }
+        Some(self.nearest(point, low, high)).filter(|found| found.1 < off_mm)
+    }
+
+    /// Whether what is `from_mm` away from one of its points is further than `reach_mm` from all of them: then the piece, which
+    /// is not that long, need not be looked at closely.
+    fn is_beyond(&self, from_mm: f64, reach_mm: f64) -> bool {
+        from_mm > reach_mm + LONGER * self.length_mm()
+    }
+
     /// The first fraction from `low` on that lies within a distance of the point.
     pub fn first_within(&self, point: &Position, reach_mm: f64, low: f64) -> Option<f64> {
+        let low_mm = distance(&self.at(low), point);
+        if low_mm <= reach_mm {
+            return Some(low);
+        }
+        if self.is_beyond(low_mm, reach_mm) {
+            return None;
+        }
         let (nearest, off_mm) = self.nearest(point, low, 1.0);
         if off_mm > reach_mm {
             return None;
-        }
-        if distance(&self.at(low), point) <= reach_mm {
-            return Some(low);
         }
         let first = match self {
             Self::Line(line) => line.entry(point, reach_mm),

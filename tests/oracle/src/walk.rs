@@ -99,8 +99,7 @@ impl<'a> Walker<'a> {
     pub fn end(&self, from: Place, sample: &Position) -> Place {
         let (mut best, mut best_mm, mut low) = (from, f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
-            let (fraction, off_mm) = element.shape.nearest(sample, low, 1.0);
-            if off_mm < best_mm {
+            if let Some((fraction, off_mm)) = element.shape.nearer(sample, (low, 1.0), best_mm) {
                 (best, best_mm) = (Place { element: index, fraction }, off_mm);
             }
             let to_vertex_mm = distance(&element.shape.at(1.0), sample);
@@ -146,7 +145,7 @@ impl<'a> Walker<'a> {
             if let Some(fraction) = element.shape.first_within(sample, self.tolerance_mm(element), low) {
                 return Ok(Place { element: index, fraction });
             }
-            nearest_mm = nearest_mm.min(element.shape.nearest(sample, low, 1.0).1);
+            nearest_mm = element.shape.nearer(sample, (low, 1.0), nearest_mm).map_or(nearest_mm, |(_, off_mm)| off_mm);
             if !may_pass(&element.shape.at(1.0)) {
                 break;
             }
