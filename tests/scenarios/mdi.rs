@@ -111,6 +111,33 @@ fn a_fault_is_left_with_reset_from_where_the_machine_stands() {
     assert_eq!(unreset.output.status.code(), Some(3));
 }
 
+/// Cells of the last row of a trace, by their names.
+fn last(said: &Said, names: [&str; 3]) -> [String; 3] {
+    let mut reader = csv::Reader::from_path(said.folder.path().join("trace.csv")).unwrap();
+    let heads = reader.headers().unwrap().clone();
+    let row = reader.records().last().unwrap().unwrap();
+    names.map(|name| row[heads.iter().position(|head| head == name).unwrap()].to_string())
+}
+
+/// A clamp opened with the reset of a fault, and M3 behind one was taken for a spindle that turns already.
+#[test]
+fn what_a_fault_leaves_on_stays_on_in_the_next_run_and_what_it_switched_off_is_switched_on_anew() {
+    let fails = ["--clock", "virtual", "--set", "faults.wrap=[{kind=\"fail\",at_call=500}]"];
+    let clamp = ["--set", "outputs.clamp={output=7,on_fault=\"keep\"}"];
+    let before = "G91\nM64 P7\nM64 P3\nM3 S1000\nM8\nG1 X50 F600\n!reset\n";
+    let columns = ["outputs", "coolant", "spindle_set_rpm"];
+    let run = |behind: &str| {
+        let said = say(&(before.to_string() + behind), &[&fails[..], &clamp[..]].concat());
+        assert!(said.errors().contains("!reset goes on"), "{}", said.errors());
+        let [outputs, coolant, rpm] = last(&said, columns);
+        (outputs, coolant, rpm.parse::<f64>().unwrap().round())
+    };
+    assert_eq!(run("G0 Y2\n"), ("0x80".to_string(), "off".to_string(), 0.0));
+    // The session's end switches off what runs, behind the last sample.
+    assert_eq!(run("M3 S1000\nM8\nM64 P3\nG0 Y2\n"), ("0x88".to_string(), "flood".to_string(), 1000.0));
+    assert_eq!(run("M65 P7\nG0 Y2\n"), ("0x0".to_string(), "off".to_string(), 0.0));
+}
+
 /// In real time with a socket, typed to bit by bit.
 fn live() -> (Running, std::process::ChildStdin) {
     let start = |folder: &Path| -> Child {

@@ -146,6 +146,14 @@ impl Interpreter {
         self.state.at_rest = true;
     }
 
+    /// Manual input: an abort, a fault or an emergency stop has switched spindle and coolant off, and outputs as the machine file
+    /// says; what the next line asks for is sent, whatever it was before.
+    pub fn set_switched_off(&mut self) {
+        self.state.spindle.direction = 0;
+        (self.state.mist, self.state.flood) = (false, false);
+        self.state.outputs_set = 0;
+    }
+
     /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out. It becomes #5399.
     pub fn provide_input(&mut self, value: f64) {
         self.state.input = value;

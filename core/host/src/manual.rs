@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use tandem_fine::Left;
 use tandem_gcode::{Interpreter, Item, ProbeResult};
 use tandem_machine::Machine;
-use tandem_rings::{Rest, RestCause};
+use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, Planner};
 
@@ -46,6 +47,8 @@ pub struct Session<'a> {
     machine: Machine,
     registry: &'a Registry,
     switches: Switches,
+    /// What the last run has left on.
+    switched: Switched,
     manual: Arc<Mutex<Manual>>,
 }
 
@@ -65,7 +68,7 @@ impl<'a> Session<'a> {
         let judge = setup::planner(&machine, registry)?;
         let manual =
             Manual { machine: machine.clone(), judge, interpreter, dialogue, lines: 0, standing: 0, busy: false };
-        Ok(Self { machine, registry, switches, manual: Arc::new(Mutex::new(manual)) })
+        Ok(Self { machine, registry, switches, switched: Switched::default(), manual: Arc::new(Mutex::new(manual)) })
     }
 
     /// Enables the machine where it stands: a run that takes lines until there are no more, or a fault ends it.
@@ -74,7 +77,10 @@ impl<'a> Session<'a> {
     /// The plugins refuse, or do not go together.
     pub fn enable(&self) -> Result<Run, HostError> {
         let source = Box::new(Lines(Arc::clone(&self.manual)));
-        Run::of_source(self.machine.clone(), self.registry, "manual input".to_string(), source, self.switches)
+        let name = "manual input".to_string();
+        let mut run = Run::of_source(self.machine.clone(), self.registry, name, source, self.switches)?;
+        run.begin_switched(&self.switched);
+        Ok(run)
     }
 
     /// The operator acknowledges the fault that ended the last run: the next one resets its drives.
@@ -82,11 +88,12 @@ impl<'a> Session<'a> {
         self.switches.reset = true;
     }
 
-    /// The machine has come to rest at `position` after a fault: the next line starts there.
-    pub fn stands_at(&mut self, position: AxisVector) {
-        self.machine.start = position;
+    /// The machine has come to rest at `position` after a fault, and `left` is on still: the next run goes on from there.
+    pub fn stands_at(&mut self, position: AxisVector, left: &Left) {
+        (self.machine.start, self.switched) = (position, left.switched);
         let mut manual = lock(&self.manual);
         manual.interpreter.set_position(position);
+        manual.interpreter.set_switched_off();
         (manual.busy, manual.standing) = (false, 0);
     }
 }
@@ -189,6 +196,9 @@ impl Source for Lines {
         match rest.cause {
             RestCause::Abort | RestCause::Corrected | RestCause::Attached => {
                 manual.interpreter.set_position(rest.position);
+                if rest.cause == RestCause::Abort {
+                    manual.interpreter.set_switched_off();
+                }
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
                 manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });

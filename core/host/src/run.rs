@@ -7,7 +7,7 @@ use std::time::Instant;
 use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::{Analog, Machine};
-use tandem_rings::{HostEnd, Sizes, bridge};
+use tandem_rings::{HostEnd, Sizes, Switched, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
 use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
 
@@ -194,6 +194,11 @@ impl Run {
             roster,
             unknown_axes,
         })
+    }
+
+    /// What is on when the run begins: what the run before it in a session has left. Host, before it is driven.
+    pub(crate) fn begin_switched(&mut self, switched: &Switched) {
+        self.fine.begin_switched(switched);
     }
 
     /// The operator's end of the run, to give commands from other threads.

@@ -50,7 +50,7 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         shared.take_keys();
         sinks.end(&outcome.summary);
         tell_warnings(&outcome.summary);
-        session.stands_at(outcome.position);
+        session.stands_at(outcome.position, &outcome.left);
         session.reset_drives();
         let Some(fault) = &outcome.summary.fault else { break };
         faulted = true;

@@ -127,6 +127,12 @@ impl FineLoop {
         }
     }
 
+    /// What is on when the loop begins: a session goes on as the run before it has left the machine. Host, before the first tick.
+    pub fn begin_switched(&mut self, switched: &Switched) {
+        (self.outputs.bits, self.outputs.spindle_rad_per_s) = (switched.outputs, switched.spindle_rad_per_s);
+        self.outputs.by = switched.by;
+    }
+
     /// What was sent last.
     pub(super) fn switched(&self) -> Switched {
         Switched {
