@@ -176,3 +176,26 @@ fn a_line_can_be_held_and_aborted_and_the_next_one_goes_on() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(String::from_utf8_lossy(&output.stdout).lines().count(), 2);
 }
+
+/// The client's word does what the typed one does, and is refused where there is nothing to take back.
+#[test]
+fn a_client_takes_back_the_fault_that_a_session_stands_in() {
+    let (session, mut typed) = live();
+    let mut client = session.connect();
+    assert!(client.ask("{\"lease\":\"take\"}")["ok"].is_object());
+    let refused = client.ask("{\"command\":\"reset\"}").to_string();
+    assert!(refused.contains("there is no fault to reset"), "{refused}");
+    writeln!(typed, "G1 X200 F600").unwrap();
+    client.wait("it moves", is_moving);
+    assert!(client.ask("{\"command\":\"reset\"}").to_string().contains("there is no fault to reset"));
+    client.command("emergency-stop");
+    client.wait("it stands in fault", |status| status["fault"].is_string() && status["state"] == "fault");
+    assert!(client.ask("{\"command\":\"reset\"}")["ok"].is_object());
+    // The session opens its sockets anew.
+    assert!(client.hear()["ended"]["fault"].is_string());
+    while !client.hear().is_null() {}
+    let mut client = session.connect();
+    writeln!(typed, "G1 X0 F6000").unwrap();
+    client.wait("it moves again", is_moving);
+    drop(typed);
+}

@@ -24,6 +24,8 @@ pub enum Command {
     EmergencyStop,
     /// Stop on the path, drop what is queued, and end the program.
     Abort,
+    /// Takes a fault back in a session that stands in one: its drives are reset and it goes on from there.
+    Reset,
     /// Loads the policy script anew, and takes it out of quarantine.
     ReloadPolicy,
     /// A test's doing: the rough loop does nothing for so many rough periods. Virtual clock only.
@@ -43,7 +45,8 @@ impl Command {
             Self::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
             Self::Abort => controls.abort.store(true, Relaxed),
             Self::ReloadPolicy => controls.reload_policy.store(true, Relaxed),
-            Self::StallRough(_) => {}
+            // A reset is the session's, between two runs: the desk takes it.
+            Self::Reset | Self::StallRough(_) => {}
         }
     }
 }
@@ -85,6 +88,7 @@ impl fmt::Display for Timed {
             Command::SingleBlock(on) => write!(f, "single-block,{}", u8::from(on)),
             Command::EmergencyStop => write!(f, "emergency-stop"),
             Command::Abort => write!(f, "abort"),
+            Command::Reset => write!(f, "reset"),
             Command::ReloadPolicy => write!(f, "reload-policy"),
             Command::StallRough(periods) => write!(f, "stall-rough,{periods}"),
         }
@@ -103,6 +107,7 @@ impl Command {
             Self::SingleBlock(_) => "single-block",
             Self::EmergencyStop => "emergency-stop",
             Self::Abort => "abort",
+            Self::Reset => "reset",
             Self::ReloadPolicy => "reload-policy",
             Self::StallRough(_) => "stall-rough",
         }
@@ -145,6 +150,7 @@ impl Command {
             "resume" => Self::Resume,
             "emergency-stop" => Self::EmergencyStop,
             "abort" => Self::Abort,
+            "reset" => Self::Reset,
             "reload-policy" => Self::ReloadPolicy,
             "feed-override" => return number().map(Self::FeedOverride),
             "rapid-override" => return number().map(Self::RapidOverride),
@@ -154,7 +160,7 @@ impl Command {
             _ => {
                 return Err(format!(
                     "no command is called {name:?}: hold, resume, feed-override, rapid-override, optional-stop, \
-                     single-block, abort, emergency-stop, reload-policy, stall-rough"
+                     single-block, abort, emergency-stop, reset, reload-policy, stall-rough"
                 ));
             }
         };

@@ -1,6 +1,6 @@
 //! Command files: what the operator does, by tick.
 
-use crate::command::Timed;
+use crate::command::{Command, Timed};
 
 /// Errors of a command file that are told one by one.
 const MAX_ERRORS: usize = 100;
@@ -16,7 +16,12 @@ pub fn parse_commands(name: &str, text: &str, max_feed_ratio: f64) -> Result<Vec
     let told = |(_, line): &(usize, &str)| !line.trim().is_empty() && !line.starts_with('#');
     for (number, line) in (1..).zip(text.lines()).filter(told) {
         let at = |cause: String| format!("{name}:{number}: {cause}");
-        let allowed = |timed: Timed| timed.command.check(max_feed_ratio).map(|()| timed);
+        let allowed = |timed: Timed| match timed.command {
+            Command::Reset => {
+                Err("a fault ends its run, so there is none to reset in it: run --reset does before it".into())
+            }
+            command => command.check(max_feed_ratio).map(|()| timed),
+        };
         match (Timed::parse(line).and_then(allowed), commands.last()) {
             (Err(cause), _) => errors.push(at(cause)),
             (Ok(now), Some(last)) if now.tick < last.tick => {
@@ -43,10 +48,11 @@ mod tests {
 
     #[test]
     fn every_wrong_line_is_named() {
-        let text = "# by hand\n5,hold\n\n4,resume\n6,feed-override,1.3\n7,hodl\n";
+        let text = "# by hand\n5,hold\n\n4,resume\n6,feed-override,1.3\n7,hodl\n8,reset\n";
         let errors = parse_commands("c.csv", text, 1.2).unwrap_err();
         let lines: Vec<&str> = errors.lines().collect();
-        assert_eq!(lines.len(), 3, "{errors}");
+        assert_eq!(lines.len(), 4, "{errors}");
+        assert!(lines[3].starts_with("c.csv:7: a fault ends its run"), "{errors}");
         assert!(lines[0].starts_with("c.csv:4: tick 4 comes after tick 5"), "{errors}");
         assert!(lines[1].starts_with("c.csv:5: a feed override of 1.3"), "{errors}");
         assert!(lines[2].starts_with("c.csv:6: no command is called"), "{errors}");

@@ -45,7 +45,15 @@ impl Script {
     fn is_reset(&mut self) -> bool {
         self.wait = Wait::Nothing;
         loop {
-            let NextLine::Line(text) = self.input.next(true) else { return false };
+            let text = match self.input.next(false) {
+                NextLine::Line(text) => text,
+                NextLine::Over => return false,
+                NextLine::Later if self.shared.is_reset_by_client() => return true,
+                NextLine::Later => {
+                    thread::sleep(LOOK);
+                    continue;
+                }
+            };
             self.lines += 1;
             match parse(&text) {
                 Ok(Line::Reset) => return true,
@@ -135,7 +143,7 @@ impl Hand {
             return script.is_reset();
         }
         self.shared.reset.store(false, Relaxed);
-        while !self.shared.reset.load(Relaxed) {
+        while !self.shared.reset.load(Relaxed) && !self.shared.is_reset_by_client() {
             if self.shared.is_over() {
                 return false;
             }

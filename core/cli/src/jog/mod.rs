@@ -44,15 +44,20 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         let run = session.enable()?;
         sinks.begin(options, &machine, session.jogs(), &run)?;
         let outcome = run.drive(clock, &[], &mut sinks)?;
-        sinks.end(outcome.summary.clone());
+        sinks.begin_fault(&outcome.summary);
         for warning in outcome.summary.warnings() {
             shared.say(&format!("warning: {warning}"));
         }
         session.stands_at(outcome.position);
         session.reset_drives();
-        let Some(fault) = outcome.summary.fault else { break false };
+        let Some(fault) = outcome.summary.fault.clone() else {
+            sinks.end(outcome.summary);
+            break false;
+        };
         shared.say(&format!("fault: {fault}; {} goes on from here", if shared.keys { "r" } else { RESET }));
-        if !waits_for_reset(&hand, &shared, real_time)? {
+        let goes_on = waits_for_reset(&hand, &shared, real_time);
+        sinks.end(outcome.summary);
+        if !goes_on? {
             break true;
         }
     };
@@ -114,6 +119,13 @@ impl Sinks {
         self.operator = Some(operator);
         self.first_tick = self.next_tick;
         Ok(())
+    }
+
+    /// Behind a run: clients may take its fault back, where it has one.
+    fn begin_fault(&mut self, summary: &Summary) {
+        if let (Some(operator), Some(fault)) = (&mut self.operator, &summary.fault) {
+            operator.begin_fault(fault);
+        }
     }
 
     fn end(&mut self, mut summary: Summary) {

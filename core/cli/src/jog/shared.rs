@@ -59,6 +59,11 @@ impl Shared {
         inner.desk.clone().map(|desk| (desk, inner.stops.clone()))
     }
 
+    /// Whether a client has taken back the fault that the session stands in.
+    pub fn is_reset_by_client(&self) -> bool {
+        self.inner().desk.as_ref().is_some_and(|desk| desk.is_reset())
+    }
+
     /// Whether the session is to end.
     pub fn is_over(&self) -> bool {
         self.quit.load(Relaxed) || self.inner().stops.are_asked()

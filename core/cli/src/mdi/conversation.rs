@@ -3,6 +3,8 @@
 use std::io::{Write, stdout};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use tandem_host::operator::{Desk, Position};
 use tandem_host::{Dialogue, NextLine};
@@ -11,6 +13,9 @@ use tandem_sdk::{Axes, AxisVector};
 use super::RESET;
 use super::input::Input;
 use crate::operator::{Keyboard, Operator, Stops};
+
+/// How often clients are looked after while the machine is in fault.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// What the conversation shares with the command: it outlives faults.
 pub struct Shared {
@@ -59,15 +64,20 @@ impl Shared {
         drop(keyboard);
     }
 
-    /// After a fault: waits for the word that takes it back; `false` where it does not come.
+    /// After a fault: waits for the word that takes it back, typed or from a client; `false` where it does not come.
     pub fn is_reset(&self) -> bool {
         self.fault.store(true, Relaxed);
         loop {
             let mut inner = self.inner();
             inner.prompt(self.keys);
-            let next = inner.input.next(true);
-            inner.prompted = false;
+            let next = inner.input.next(false);
+            inner.prompted &= next == NextLine::Later;
+            let is_reset = inner.desk.as_ref().is_some_and(|desk| desk.is_reset());
             drop(inner);
+            if is_reset {
+                self.fault.store(false, Relaxed);
+                return true;
+            }
             match next {
                 NextLine::Line(line) if is_farewell(&line) => return false,
                 NextLine::Line(line) if line.trim() == RESET => {
@@ -78,7 +88,8 @@ impl Shared {
                 NextLine::Line(_) => {
                     self.refuse(&format!("the machine is in fault; {RESET} goes on, quit ends the session"));
                 }
-                NextLine::Later | NextLine::Over => return false,
+                NextLine::Later => thread::sleep(LOOK),
+                NextLine::Over => return false,
             }
         }
     }

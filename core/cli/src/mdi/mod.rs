@@ -42,19 +42,23 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     let clock = if real_time { Clock::Wall } else { Clock::Virtual };
     let mut sinks =
         Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: vec![], broken: Broken::default() };
-    let mut faulted = false;
-    while !faulted || shared.is_reset() {
+    loop {
         let run = session.enable()?;
         sinks.begin(options, &machine, &run, Presence { real_time, pause: false, keys: false }, &shared)?;
         let outcome = run.drive(clock, &[], &mut sinks)?;
         shared.take_keys();
-        sinks.end(&outcome.summary);
+        sinks.begin_fault(&outcome.summary);
         tell_warnings(&outcome.summary);
         session.stands_at(outcome.position, &outcome.left);
         session.reset_drives();
-        let Some(fault) = &outcome.summary.fault else { break };
-        faulted = true;
-        say!("fault: {fault}; {RESET} goes on from here");
+        if let Some(fault) = &outcome.summary.fault {
+            say!("fault: {fault}; {RESET} goes on from here");
+        }
+        let goes_on = outcome.summary.fault.is_some() && shared.is_reset();
+        sinks.end(&outcome.summary);
+        if !goes_on {
+            break;
+        }
     }
     let Sinks { trace, mut broken, .. } = sinks;
     broken.note(trace.map_or(Ok(()), TraceSink::finish));
@@ -94,6 +98,13 @@ impl Sinks {
         self.operator = Some(operator);
         self.first_tick = self.next_tick;
         Ok(())
+    }
+
+    /// Behind a run: clients may take its fault back, where it has one.
+    fn begin_fault(&mut self, summary: &tandem_host::Summary) {
+        if let (Some(operator), Some(fault)) = (&mut self.operator, &summary.fault) {
+            operator.begin_fault(fault);
+        }
     }
 
     fn end(&mut self, summary: &tandem_host::Summary) {

@@ -129,6 +129,13 @@ impl Operator {
         self.desk.end_wait();
     }
 
+    /// The run is over by `fault`, and its session stands in it: clients may take it back.
+    pub fn begin_fault(&mut self, fault: &str) {
+        self.keyboard = None;
+        self.signals = None;
+        self.desk.begin_fault(fault);
+    }
+
     /// The run is over: the terminal is as it was, and the clients are told why.
     pub fn end(&mut self, summary: &Summary) {
         self.keyboard = None;

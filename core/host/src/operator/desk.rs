@@ -28,6 +28,8 @@ pub struct Desk {
     /// An answer to a program stop: set by a resume, taken by the run.
     go_on: AtomicBool,
     clients: AtomicUsize,
+    /// What a session in fault waits for: set by a reset, taken by the session.
+    reset: AtomicBool,
     /// Where jogs are asked for, in a session that jogs.
     jogs: Option<Arc<Jogs>>,
 }
@@ -42,6 +44,8 @@ struct Latest {
     waits_on_line: Option<u32>,
     fault: Option<String>,
     stopped: Option<String>,
+    /// The session stands in that fault until somebody takes it back.
+    waits_for_reset: bool,
     ended: bool,
     policy: Option<PolicySummary>,
 }
@@ -56,6 +60,7 @@ impl Desk {
             waits_on_line: None,
             fault: None,
             stopped: None,
+            waits_for_reset: false,
             ended: false,
             policy: None,
         };
@@ -68,6 +73,7 @@ impl Desk {
             latest: Mutex::new(latest),
             go_on: AtomicBool::new(false),
             clients: AtomicUsize::new(0),
+            reset: AtomicBool::new(false),
             jogs: None,
         }
     }
@@ -87,6 +93,9 @@ impl Desk {
         self.check(command)?;
         if command == Command::Resume {
             self.go_on.store(true, Release);
+        }
+        if command == Command::Reset {
+            self.reset.store(true, Release);
         }
         command.give(&self.controls);
         if let (Command::Abort, Some(jogs)) = (command, &self.jogs) {
@@ -120,9 +129,34 @@ impl Desk {
             return Err(format!("{names} still holds the machine: resume when it is closed"));
         }
         match command {
+            Command::Reset => self.check_reset(),
             Command::StallRough(_) => Err("stall-rough is for tests, from a command file".to_string()),
             command => command.check(self.max_feed_ratio),
         }
+    }
+
+    /// A fault can be taken back where a session stands in it, and nowhere else.
+    fn check_reset(&self) -> Result<(), String> {
+        if self.latest().waits_for_reset {
+            return Ok(());
+        }
+        let words = match MachineState::from_number(self.status.state.load(Relaxed)) {
+            MachineState::Stopping => "the machine is still being brought to rest",
+            MachineState::Fault => "the fault ends this run: the next one resets the drives with --reset",
+            _ => "there is no fault to reset",
+        };
+        Err(words.to_string())
+    }
+
+    /// The session stands in `fault`: from now on a reset is taken. Host.
+    pub fn begin_fault(&self, fault: &str) {
+        let mut latest = self.latest();
+        (latest.fault, latest.waits_for_reset) = (Some(fault.to_string()), true);
+    }
+
+    /// Whether somebody has taken back the fault that the session stands in. Host.
+    pub fn is_reset(&self) -> bool {
+        self.reset.swap(false, Acquire)
     }
 
     /// The highest feed override that the machine allows.
@@ -180,7 +214,7 @@ impl Desk {
     pub fn end(&self, fault: Option<&str>, stopped: Option<&str>) {
         let mut latest = self.latest();
         (latest.fault, latest.stopped) = (fault.map(str::to_string), stopped.map(str::to_string));
-        latest.ended = true;
+        (latest.ended, latest.waits_for_reset) = (true, false);
     }
 
     /// Clients that could give commands over a socket now.
