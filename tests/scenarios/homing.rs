@@ -155,3 +155,33 @@ fn manual_input_begins_at_home() {
     assert!(said.ends_with("x_mm 5.3000  y_mm 0.0000  z_mm -5.3600\n"), "{said}{}", errors(&again));
     assert_eq!(mdi(&[], b"G0 X1\n").status.code(), Some(1));
 }
+
+/// Z runs into something 10 mm before its switch.
+#[test]
+fn an_axis_that_something_stops_is_pushed_with_the_torque_that_homing_may_have() {
+    let folder = TempDir::new().unwrap();
+    let options = "driver.options={hard_stops=[{joint=2,above_mm=91.5}],switches=[{input=12,joint=2,above_mm=101.5}]}";
+    // How far Z was told to be beyond where it stood, mm, before its drive gave up.
+    let pushed = |limit: &[&str]| {
+        let trace = folder.path().join("home.csv");
+        let own = ["--axis", "z", "--set", options, "--set", "axes.z.max_following_error_mm=50", "--trace"];
+        let output = home(&[&own[..], &[&*trace.to_string_lossy()], limit].concat());
+        let expected = "the drive of axis Z reports fault 2 (more torque than it may have: something is in its way)";
+        assert!(output.status.code() == Some(3) && errors(&output).contains(expected), "{}", errors(&output));
+        let mut reader = csv::Reader::from_path(&trace).unwrap();
+        let heads = reader.headers().unwrap().clone();
+        let at = |name: &str| heads.iter().position(|head| head == name).unwrap();
+        let (command, feedback, state) = (at("z_cmd_mm"), at("z_fb_mm"), at("state"));
+        let number = |cell: &str| cell.parse::<f64>().unwrap();
+        let rows = reader.records().map(Result::unwrap).filter(|row| &row[state] == "running");
+        rows.map(|row| number(&row[command]) - number(&row[feedback])).fold(0.0, f64::max)
+    };
+    // Rated torque for a millimetre; 1800 mm/min are 0.03 mm a period.
+    for (limit, most_mm) in [("20", 0.2), ("75", 0.75)] {
+        let pushed_mm = pushed(&["--set", &format!("homing.z.max_torque_percent={limit}")]);
+        assert!((most_mm - 0.03..=most_mm + 0.031).contains(&pushed_mm), "{limit} %: {pushed_mm}");
+    }
+    assert!(pushed(&[]) > 2.9, "three times the rated torque");
+    let refused = home(&["--set", "homing.z.max_torque_percent=301"]);
+    assert!(errors(&refused).contains("max_torque_percent: must be at most 300, not 301"), "{}", errors(&refused));
+}

@@ -80,6 +80,8 @@ pub struct FineConfig {
     /// Bit per axis that is to be homed first: its travel does not count until then, and no sample is published before
     /// all of them are homed.
     pub unhomed: u32,
+    /// Bit per joint whose drive keeps to a torque limit while its axis is not homed.
+    pub homing_limits: u32,
     /// Samples are published from the start, and in the coordinates of the drives: a record of homing itself.
     pub record_drives: bool,
     /// Where the joints stand, as the driver has told.
@@ -119,6 +121,7 @@ impl FineConfig {
             pause_at_stops: false,
             dry_run: false,
             unhomed: 0,
+            homing_limits: 0,
             record_drives: false,
             attached: Attached::default(),
             enable_periods: 5000,

@@ -140,6 +140,7 @@ pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
         machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |mask, switch| mask | bit(switch.input));
     for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
         context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
+        context.joints[homing.axis].homing_torque_percent = homing.max_torque_percent.unwrap_or(f64::INFINITY);
     }
     context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
     context.analog = machine.analog.iter().fold(0, |mask, analog| mask | 1 << analog.input);
@@ -229,6 +230,7 @@ pub fn fine_config(
     switches: Switches,
 ) -> FineConfig {
     let periods = |seconds: f64| (seconds / machine.fine_period_s).ceil() as u64;
+    let limited = machine.homing.iter().filter(|homing| homing.max_torque_percent.is_some());
     FineConfig {
         period_s: machine.fine_period_s,
         limits: joints.limits,
@@ -248,6 +250,7 @@ pub fn fine_config(
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
         unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },
+        homing_limits: limited.fold(0, |mask, homing| mask | 1 << homing.axis),
         record_drives: false,
         attached: *attached,
         enable_periods: periods(driver.enable_s),

@@ -14,6 +14,8 @@ pub struct AxisHoming {
     pub axis: usize,
     /// Axes home one after the other, the lowest number first; where numbers are equal, in the order of the axes.
     pub sequence: u32,
+    /// Torque that its drive keeps to meanwhile, percent of the rated one, where the file states it.
+    pub max_torque_percent: Option<f64>,
     /// By whom.
     pub by: HomingBy,
 }
@@ -77,6 +79,9 @@ const DRIVE_WITHIN_S: f64 = 60.0;
 /// Greatest number of a homing method: `CiA 402` has an 8-bit number for it, of which the negative ones are the makers' own.
 const LAST_METHOD: u32 = 127;
 
+/// Greatest torque that can be stated as a limit, percent of the rated one: what servo drives give for seconds.
+const MOST_TORQUE_PERCENT: f64 = 300.0;
+
 /// The keys of `[homing.<axis>]`, which carry their unit in their name.
 struct Keys {
     search: &'static str,
@@ -118,8 +123,14 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
     let rotary = set.axes.is_rotary(axis);
     let (keys, other) = if rotary { (ROTARY, LINEAR) } else { (LINEAR, ROTARY) };
     refuse_other_unit(section, &keys, &other, rotary);
+    let max_torque_percent = section.positive("max_torque_percent").filter(|percent| {
+        if *percent > MOST_TORQUE_PERCENT {
+            section.refuse("max_torque_percent", format!("must be at most {MOST_TORQUE_PERCENT}, not {percent}"));
+        }
+        *percent <= MOST_TORQUE_PERCENT
+    });
     if section.has("drive_method") {
-        return by_drive(section, axis, &keys);
+        return by_drive(section, axis, max_torque_percent, &keys);
     }
     if section.has("drive_within_s") {
         section.refuse("drive_within_s", "goes with drive_method");
@@ -155,11 +166,11 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
         back_off_mm: back_off? * keys.scale,
         switch_mm: switch? * keys.scale,
     });
-    Some(AxisHoming { axis, sequence: sequence.unwrap_or(0), by })
+    Some(AxisHoming { axis, sequence: sequence.unwrap_or(0), max_torque_percent, by })
 }
 
 /// An axis that its drive homes: the keys of a switch say nothing then.
-fn by_drive(section: &Section<'_>, axis: usize, keys: &Keys) -> Option<AxisHoming> {
+fn by_drive(section: &Section<'_>, axis: usize, max_torque_percent: Option<f64>, keys: &Keys) -> Option<AxisHoming> {
     let method = section.whole("drive_method", 1, LAST_METHOD)?.cast_signed();
     for key in ["input", "invert", keys.search, keys.latch, keys.back_off, keys.switch] {
         if section.has(key) {
@@ -171,7 +182,7 @@ fn by_drive(section: &Section<'_>, axis: usize, keys: &Keys) -> Option<AxisHomin
     }
     let sequence = section.whole("sequence", 0, u32::MAX).unwrap_or(0);
     let within_s = section.positive("drive_within_s").unwrap_or(DRIVE_WITHIN_S);
-    Some(AxisHoming { axis, sequence, by: HomingBy::Drive(DriveHoming { method, within_s }) })
+    Some(AxisHoming { axis, sequence, max_torque_percent, by: HomingBy::Drive(DriveHoming { method, within_s }) })
 }
 
 fn refuse_other_unit(section: &Section<'_>, keys: &Keys, other: &Keys, rotary: bool) {

@@ -121,6 +121,7 @@ static MACHINE: &[Key] = &[
     key("probe.input", "number", "required", "Digital input of the probe, 0 to 63; without the table there is no probe"),
     key("probe.invert", "boolean", "false", "The input is 0 where the probe touches"),
     key("operator.dry_run_feed_mm_per_min", "mm/min", "the programmed feed", "Feed of all feed motion in a dry run"),
+    key("homing.<axis>.max_torque_percent", "% of the rated torque", "the drive's own limit", "Torque that the drive keeps to while the axis is homed, up to 300"),
     key("homing.<axis>.sequence", "number", "in the order of the axes", "Axes home one after the other, the lowest number first"),
     key("homing.<axis>.input", "number", "required", "Digital input of the home switch, 0 to 63"),
     key("homing.<axis>.invert", "boolean", "false", "The input is 0 on the switch"),

@@ -10,9 +10,10 @@ use tandem_sdk::{
 use crate::bus_clock::BusClock;
 use crate::encoder::{Encoders, PowerOn, attached};
 use crate::faults::DriveFaults;
+use crate::hard_stop::HardStops;
 use crate::joint::Motion;
 use crate::mechanics::Mechanics;
-use crate::options::{Options, Switch};
+use crate::options::Options;
 use crate::power::Power;
 use crate::spindle::Spindle;
 use crate::switches::Switches;
@@ -52,6 +53,7 @@ pub struct SimulatedDrives {
     powers: [Power; MAX_AXES],
     encoders: Encoders,
     faults: DriveFaults,
+    stops: HardStops,
     wire: Wire,
     bus_clock: Option<BusClock>,
     bus_start: Duration,
@@ -83,6 +85,7 @@ impl SimulatedDrives {
             powers: [Power::new(0, 0); MAX_AXES],
             encoders: Encoders::new(&options),
             faults: DriveFaults::new(&options.faults),
+            stops: HardStops::new(&options.hard_stops),
             wire: Wire::new(&options, &Feedback::default(), period_s),
             bus_clock: None,
             bus_start: Duration::ZERO,
@@ -128,14 +131,7 @@ impl SimulatedDrives {
         if !context.start_position.is_finite() {
             return Err(PluginError::fixed("sim: the start position is not a finite number"));
         }
-        let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
-        let switches = self.options.switches.iter().map(|switch| ("switches", last_joint(switch)));
-        let faults = self.options.faults.iter().map(|fault| ("faults", fault.joint));
-        let latches = self.options.latch_joints.iter().map(|joint| ("latch_joints", *joint));
-        let wrong = switches.chain(faults).chain(latches).find(|(_, joint)| *joint >= count);
-        wrong.map_or(Ok(()), |(key, joint)| {
-            Err(PluginError::of_option(key, format!("joint = {joint}: the machine has joints 0 to {}", count - 1)))
-        })
+        self.options.check_joint_numbers(count)
     }
 
     /// The drives get their power: nobody has told them anything yet.
@@ -226,7 +222,8 @@ impl SimulatedDrives {
         for power in powers.iter_mut() {
             power.command(follow);
         }
-        self.mechanics.step(powers, to, self.spindle.speed);
+        let to = self.stops.press(to, &self.shift, self.heard.limited, powers);
+        self.mechanics.step(powers, &to, self.spindle.speed);
         for (joint, power) in powers.iter_mut().enumerate() {
             power.settle(self.mechanics.is_at_rest(joint));
         }
@@ -327,6 +324,7 @@ impl Driver for SimulatedDrives {
         self.joint_count = context.joint_count as usize;
         let bus_start_s = if context.real_time != 0 { self.options.bus_start_s } else { 0.0 };
         (self.period_s, self.bus_start) = (context.fine_period_s, Duration::from_secs_f64(bus_start_s));
+        self.stops.open(context);
         self.power_on(&context.start_position);
         self.life = Life::Opened;
         Ok(())

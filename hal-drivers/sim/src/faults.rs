@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use tandem_sdk::{MAX_AXES, PluginError, Words};
 
 use crate::WATCHDOG_FAULT;
+use crate::hard_stop::TORQUE_FAULT;
 use crate::options::refusal;
 use crate::power::Power;
 
@@ -86,6 +87,7 @@ impl DriveFaults {
         match stated {
             Some(fault) => Words::new(fault.text.as_str()),
             None if code == WATCHDOG_FAULT => Words::fixed("the host was silent too long"),
+            None if code == TORQUE_FAULT => Words::fixed("more torque than it may have: something is in its way"),
             None => Words::default(),
         }
     }

@@ -6,6 +6,7 @@ use tandem_sdk::{MAX_AXES, PluginError, PluginOptions};
 use crate::bus_clock::BusClockOptions;
 use crate::encoder::Encoder;
 use crate::faults::DriveFault;
+use crate::hard_stop::HardStop;
 use crate::servo::{CuttingOptions, ServoOptions};
 use crate::shape::{Bore, Shape};
 use crate::wire::{self, Frames};
@@ -92,10 +93,12 @@ tandem_sdk::options! {
         /// Speed at which gravity pulls a joint along that has neither torque nor a brake, mm/s (rad/s), below 0 downwards; from
         /// joint 0, joints beyond the list are not pulled.
         pub sag_mm_per_s: Vec<f64> = Vec::new(),
-        /// Time that the start of the bus takes, s, by the computer's clock, whatever the clock of the run.
+        /// Time that the start of the bus takes, s, where the run is in real time; none on the virtual clock.
         pub bus_start_s: f64 = 0.0,
         /// Drives that go into a fault, or fall out of the bus.
         pub faults: Vec<DriveFault> = Vec::new(),
+        /// Ends of the way that joints run into.
+        pub hard_stops: Vec<HardStop> = Vec::new(),
         /// Frames that get lost: the drives get no setpoint, the driver no answer.
         pub lost_frames: Option<Frames> = None,
         /// Answers that are not there in time; the setpoints are.
@@ -147,6 +150,22 @@ impl Options {
         self.check_servo()
     }
 
+    /// Whether a machine with `count` joints has all that are named.
+    ///
+    /// # Errors
+    /// The option that names another one.
+    pub(crate) fn check_joint_numbers(&self, count: usize) -> Result<(), PluginError> {
+        let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
+        let switches = self.switches.iter().map(|switch| ("switches", last_joint(switch)));
+        let faults = self.faults.iter().map(|fault| ("faults", fault.joint));
+        let stops = self.hard_stops.iter().map(|stop| ("hard_stops", stop.joint));
+        let latches = self.latch_joints.iter().map(|joint| ("latch_joints", *joint));
+        let wrong = switches.chain(faults).chain(stops).chain(latches).find(|(_, joint)| *joint >= count);
+        wrong.map_or(Ok(()), |(key, joint)| {
+            Err(PluginError::of_option(key, format!("joint = {joint}: the machine has joints 0 to {}", count - 1)))
+        })
+    }
+
     /// Encoders, delays and brakes.
     fn check_joints(&self) -> Result<(), PluginError> {
         all_within("start_mm", &self.start_mm, -1e6, 1e6)?;
@@ -170,6 +189,7 @@ impl Options {
         within("patience_periods", f64::from(self.patience_periods), 0.0, 1e3)?;
         wire::check(self)?;
         self.faults.iter().try_for_each(DriveFault::check)?;
+        self.hard_stops.iter().try_for_each(HardStop::check)?;
         self.bus_clock.as_ref().map_or(Ok(()), BusClockOptions::check)
     }
 

@@ -15,6 +15,8 @@ impl FineLoop {
         let joints = self.next_joints(axes);
         self.setpoint.tick = self.tick;
         self.setpoint.arm = self.arm;
+        // Where axes are homed, joints are axes.
+        self.setpoint.limited = self.outputs.unhomed & self.config.homing_limits;
         self.setpoint.outputs = self.outputs.bits;
         self.setpoint.spindle_rad_per_s = self.spindle_rad_per_s();
         let last = Numbers::of(&self.feedback);

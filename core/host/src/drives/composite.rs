@@ -35,6 +35,7 @@ impl Part {
         let own = &mut self.setpoint;
         (own.enable, own.reset, own.tick) = (whole.enable, whole.reset, whole.tick);
         own.homing = if whole.homing == 0 { 0 } else { self.share.own_bits(whole.homing) };
+        own.limited = if whole.limited == 0 { 0 } else { self.share.own_bits(whole.limited) };
         own.outputs = self.share.outputs.to_own(whole.outputs);
         own.arm = self.share.own_arm(whole.arm);
         for (i, joint) in self.share.joints().iter().enumerate() {

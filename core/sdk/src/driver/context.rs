@@ -49,11 +49,14 @@ pub struct JointDescription {
     pub rotary: u32,
     /// Method by which the drive itself homes it (`CiA 402` numbers); 0 where the host homes it, or nobody does.
     pub homing_method: i32,
+    /// Torque that its drive keeps to while it is homed ([`crate::Setpoint::limited`]), percent of the rated one; infinite where
+    /// none is stated.
+    pub homing_torque_percent: f64,
     /// What it may do.
     pub limits: AxisLimits,
 }
 
-layout!(JointDescription { name, rotary, homing_method, limits });
+layout!(JointDescription { name, rotary, homing_method, homing_torque_percent, limits });
 
 /// What a driver is told when it is opened.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +112,7 @@ impl DriverContext {
             name: Name::new(NAMES[i]),
             rotary: 0,
             homing_method: 0,
+            homing_torque_percent: f64::INFINITY,
             limits: AxisLimits::unlimited(),
         };
         Self {

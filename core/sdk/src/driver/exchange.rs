@@ -37,6 +37,11 @@ pub struct Setpoint {
     /// Bit per joint that is handed over to its drive for homing, by the method of its description; until the drive says in
     /// [`Feedback::homed`] that it is, its setpoint does not count.
     pub homing: u32,
+    /// Bit per joint that is being homed with a torque limit: its drive keeps to
+    /// [`crate::JointDescription::homing_torque_percent`], and has its own limit back where the bit is 0.
+    pub limited: u32,
+    /// Reserved, zero.
+    pub reserved: u32,
     /// Number of the fine period.
     pub tick: u64,
     /// Digital outputs, bit n is output n.
@@ -58,6 +63,8 @@ layout!(Setpoint {
     enable,
     reset,
     homing,
+    limited,
+    reserved,
     tick,
     outputs,
     arm,
@@ -74,6 +81,8 @@ impl Default for Setpoint {
             enable: 0,
             reset: 0,
             homing: 0,
+            limited: 0,
+            reserved: 0,
             tick: 0,
             outputs: 0,
             arm: Arm::default(),
