@@ -77,7 +77,12 @@ impl<'a> Course<'a> {
     }
 }
 
-impl Place<'_> {
+impl<'a> Place<'a> {
+    /// The segment here and the time in it, s; `None` where nothing moves.
+    pub fn segment(&self) -> Option<(&'a Segment, f64)> {
+        self.segment.map(|segment| (segment, self.local_s))
+    }
+
     /// How the plan moves here.
     pub fn motion(&self) -> Motion {
         let mut motion = Motion::default();

@@ -6,9 +6,11 @@
 //! admissible where the plan is, so the interval for σ̇ is never empty.
 
 mod below;
+mod early;
 mod smooth;
 mod steady;
 
+use early::Early;
 pub use smooth::Aim;
 use steady::Steadying;
 
@@ -31,6 +33,8 @@ pub struct Governor {
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
+    /// Where jerk is not limited: the rates from which the feeds ahead can be met.
+    early: Early,
     /// Where jerk is limited: the way that was begun last, and one that is being tried.
     begun: Steadying,
     tried: Steadying,
@@ -45,6 +49,7 @@ impl Governor {
             period_s,
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             axes,
+            early: Early::new(Points::new(limits, axes)),
             begun: Steadying::new(),
             tried: Steadying::new(),
         }

@@ -25,12 +25,12 @@ const PRECISION: f64 = 1e-9;
 /// Share of the feed that is aimed at: the mean over a period may be that much higher than its ends.
 const AIMED: f64 = 1.0 - 1e-6;
 /// Places ahead at which the rate is tried out.
-const PLACES: usize = 40;
-/// How much farther each place lies behind the one before: together they reach over two hundred times the first distance,
-/// longer than a machine takes to its feed.
-const FARTHER: f64 = 1.07;
-/// The first distance, as a share of the longest time in which an axis builds its acceleration up; one period at least.
-const NEAREST: f64 = 1.0 / 48.0;
+const PLACES: usize = 96;
+/// How much farther each place lies behind the one before. The first lies a period away, for a plan of small features turns
+/// within a few; together they reach over ninety thousand periods, longer than a machine takes to its feed.
+const FARTHER: f64 = 1.1;
+/// Least rate for whose periods the first distance is taken: nearer to a rest the places would not reach far enough.
+const SLOWEST: f64 = 0.02;
 /// Share of the limits of jerk and acceleration that is counted on there: between the places more may be used.
 const LEFT: f64 = 0.9;
 /// Tries in which σ̈ is sought for these places.
@@ -79,9 +79,9 @@ impl Governor {
     /// below the limit.
     fn below(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, limit) = (self.period_s, AIMED * aim.speed_mm_per_s);
+        let Some(from) = here.place.pace() else { return most };
         let jerk = outlook.path_jerk_mm_per_s3.min(limit * MOST_CHANGE / (h * h));
         let curve = Curve { jerk_mm_per_s3: SHARE * outlook.share * jerk, reserve_s: RESERVE * h };
-        let Some(from) = here.place.pace() else { return most };
         let is_below = here.sigma * from.speed <= aim.speed_mm_per_s;
         let mut change = most;
         for _ in 0..ROUNDS {
@@ -109,7 +109,7 @@ impl Governor {
     fn in_time(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, sigma) = (self.period_s, here.sigma);
         let mut ahead = [Ahead::default(); PLACES];
-        let (mut place, mut step_s, mut count) = (here.place, (NEAREST * outlook.horizon_s).max(h * sigma), 0);
+        let (mut place, mut step_s, mut count) = (here.place, h * sigma.max(SLOWEST), 0);
         place.go(h * sigma);
         for next in &mut ahead {
             place.go(step_s);

@@ -31,6 +31,9 @@ struct Asked {
 /// rounds that seek the rate leave a thousandth where the plan changes by half in a period.
 const ABOVE: f64 = 0.01;
 
+/// Share of the path coordinate by which a difference of two of them is rounded.
+const ROUNDED_SHARE: f64 = 2.0 * f64::EPSILON;
+
 /// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
 const REST_ROUNDS: u32 = 8;
 
@@ -104,22 +107,35 @@ impl FineLoop {
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
         let limit = self.plan_limit().min(self.most_rate());
         self.ask_for_rate(limit);
+        if ask == Ask::Run {
+            self.look_at_feeds(ratios);
+        }
         let wanted = if ask == Ask::Run { self.ratio_target(ratios, way_speed_mm_per_s) } else { 0.0 };
         let target = wanted.min(limit);
         let unchanged = target == self.governor.sigma();
         let sigma = if unchanged { target } else { self.governor.choose(target, &self.points) };
-        // Where the limits stand against the feed, it is looked at more closely.
-        if ask == Ask::Run && sigma > target && !self.cursor.is_resting() && !self.is_feed_kept(sigma, ratios) {
+        // Where the limits stand against the feed, or the plan changes too much in the period, it is looked at more closely.
+        let moves = self.governor.sigma() > 0.0 && !self.cursor.is_resting();
+        if ask == Ask::Run && moves && !self.is_feed_kept(sigma, ratios) {
             return self.govern_in_pieces(ratios, way_speed_mm_per_s, limit);
         }
         self.governor.take(sigma)
+    }
+
+    /// Notes from which rates ratio × programmed feed can be kept ahead.
+    fn look_at_feeds(&mut self, ratios: &Ratios) {
+        let Self { cursor, governor, config, .. } = self;
+        governor.look_no_more();
+        if ratios.feed < config.max_feed_ratio {
+            cursor.on_course((config.lane_count(), config.linear), |place| governor.look_ahead(place, ratios.feed));
+        }
     }
 
     /// Whether a period that ends at the rate `sigma` keeps ratio × programmed feed, at its end and in its mean.
     fn is_feed_kept(&mut self, sigma: f64, ratios: &Ratios) -> bool {
         let mean = f64::midpoint(self.governor.sigma(), sigma);
         let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, f64::INFINITY);
-        sigma <= asked.at_end && mean <= asked.mean
+        sigma <= asked.at_end * (1.0 + FEED_TOLERANCE) && mean <= asked.mean * (1.0 + FEED_TOLERANCE)
     }
 
     /// Limits of jerk too: σ̈ is constant in the period.
@@ -219,16 +235,18 @@ impl FineLoop {
 
     /// The same from rest, where any rate is as good to begin with: one that is kept over the period.
     fn ratio_from_rest(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
-        let mut sigma = 1.0;
+        let mut sigma: f64 = 1.0;
         // The faster the plan is left, the lower the rate it leaves: their geometric mean is the answer where speed grows
         // with time, and halves what is wrong with it in each round where it grows with the square of time.
-        for round in 0..REST_ROUNDS {
+        for round in 0..2 * REST_ROUNDS {
             let asked = self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
             let next = asked.at_end.min(asked.mean);
-            if next == sigma || round + 1 == REST_ROUNDS {
+            if next == sigma || round + 1 == 2 * REST_ROUNDS {
                 break;
             }
-            sigma = if asked.rapid { next } else { (sigma * next).sqrt() };
+            // Where the period goes on over a corner neither is so, and what is found last must not be too fast.
+            let settles = !asked.rapid && round < REST_ROUNDS;
+            sigma = if settles { (sigma * next).sqrt() } else { sigma.min(next) };
         }
         self.governor.jump(sigma);
         sigma
@@ -238,13 +256,19 @@ impl FineLoop {
     fn asked_of_period(&mut self, delta_s: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> Asked {
         let from_mm = self.cursor.path_mm();
         let ahead = self.cursor.ahead(delta_s);
-        let allowed_mm_per_s = ratios.feed * ahead.most_feed_mm_per_s;
-        let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s);
+        let keeps = ratios.feed >= self.config.max_feed_ratio;
+        let allowed_mm_per_s = if keeps { f64::INFINITY } else { ratios.feed * ahead.most_feed_mm_per_s };
+        let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s).min(self.governor.rate_in_time(delta_s));
         if ahead.rapid {
             let at_end = ratios.rapid.min(of_places);
             return Asked { at_end, mean: f64::INFINITY, allowed_mm_per_s, rapid: true };
         }
-        let mean_mm_per_s = if delta_s > 0.0 { (ahead.path_mm - from_mm) / delta_s } else { ahead.speed_mm_per_s };
+        if keeps {
+            // The plan itself does.
+            return Asked { at_end: of_places, mean: f64::INFINITY, allowed_mm_per_s, rapid: false };
+        }
+        let way_mm = ahead.path_mm - from_mm - ROUNDED_SHARE * ahead.path_mm;
+        let mean_mm_per_s = if delta_s > 0.0 { way_mm / delta_s } else { ahead.speed_mm_per_s };
         Asked {
             at_end: within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s).min(of_places),
             mean: within(allowed_mm_per_s, mean_mm_per_s),
@@ -327,5 +351,5 @@ pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
     if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed { allowed / planned_mm_per_s } else { 1.0 }
 }
 
-/// Relative tolerance on the feed: differences of path coordinates of 1e6 mm have this rounding.
+/// Relative tolerance on the feed.
 pub(super) const FEED_TOLERANCE: f64 = 1e-7;

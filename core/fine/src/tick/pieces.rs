@@ -45,7 +45,8 @@ impl FineLoop {
             let whole_s = segment.duration_s - from_s;
             let piece_s = whole_s.min(laid.sigma * laid.left_s);
             if piece_s > 0.0 {
-                let target = piece_target(segment, from_s, piece_s, laid.sigma, ratios, way_speed_mm_per_s).min(limit);
+                let target = piece_target(segment, from_s, piece_s, laid.sigma, ratios, way_speed_mm_per_s);
+                let target = target.min(governor.rate_in_time(laid.passed_s + piece_s)).min(limit);
                 points.clear();
                 points.add(segment, from_s, whole_s.min(laid.sigma.max(target) * laid.left_s));
                 let shortest_s = laid.left_s.min(whole_s / laid.sigma.max(target));
