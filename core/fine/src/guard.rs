@@ -12,6 +12,10 @@ const JERK_TOLERANCE: f64 = 1e-2;
 /// Samples whose third difference contains a sample that was sent with a relaxed jerk.
 const RELAXED_SAMPLES: u32 = 4;
 
+/// Beyond the end of the travel by no more than this, mm, is inside: the polynomials of a segment are fitted to an arc as closely,
+/// and an arc may end, or turn round, at the very end.
+const FITTED_MM: f64 = 1e-8;
+
 /// Checks samples against the ones already sent.
 #[derive(Debug)]
 pub struct Guard {
@@ -115,7 +119,8 @@ impl Guard {
         }
         // Who stands outside of the travel may go inward only.
         let (lowest, highest) = (limits.min_mm.min(self.position[axis]), limits.max_mm.max(self.position[axis]));
-        if travels && (next < lowest - rounding || next > highest + rounding) {
+        let forgiven = FITTED_MM + rounding;
+        if travels && (next < lowest - forgiven || next > highest + forgiven) {
             let nearest = if next < lowest { limits.min_mm } else { limits.max_mm };
             return breach(Breach::Position, next, nearest);
         }
@@ -206,7 +211,9 @@ mod tests {
         guard.position[2] = 500.0;
         let mut at = guard.position;
         assert!(guard.check(&at, 0).breach.is_none(), "the end of the travel is travel");
-        at[2] += 1e-9;
+        at[2] += FITTED_MM;
+        assert!(guard.check(&at, 0).breach.is_none(), "so closely an arc is fitted");
+        at[2] += FITTED_MM;
         let found = guard.check(&at, 0).breach;
         assert!(matches!(found, Some(FaultKind::Guard { breach: Breach::Position, axis: 2, limit: 500.0, .. })));
         assert!(guard.check(&at, 0b100).breach.is_none(), "an axis that is not homed has no travel yet");

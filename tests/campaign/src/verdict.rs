@@ -14,8 +14,9 @@ const MOST_MEMORY_MB: f64 = 200.0;
 /// Distance from the path that rounding and inverse functions are forgiven, mm.
 const ON_THE_PATH_MM: f64 = 2e-6;
 
-/// Beyond the end of the travel by less than this, mm, is rounding: of sums in a filter, or of a length turned into a place.
-const ROUNDED_MM: f64 = 1e-9;
+/// Beyond the end of the travel by less than this, mm, is rounding: of sums in a filter, of a length turned into a place, or of
+/// an arc, to which polynomials are fitted as closely; the fine loop's guard forgives as much.
+const ROUNDED_MM: f64 = 1.1e-8;
 /// A programmed feed exceeded by less than this share is told apart from one that is exceeded for all to see.
 const LITTLE_FEED: f64 = 1e-3;
 
