@@ -1,6 +1,6 @@
 //! What the drives' answer says of the drives.
 
-use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES, MAX_DIGITAL};
+use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES};
 
 use crate::fault::FaultKind;
 use crate::history::History;
@@ -55,7 +55,7 @@ pub fn ages(feedback: &Feedback, joints: usize) -> [u32; MAX_AXES] {
 /// Bit per digital input that was not heard of in this exchange. Fine loop.
 pub fn old_inputs(feedback: &Feedback) -> u64 {
     // What is true nearly always is looked at first.
-    if feedback.input_age_periods == [0; MAX_DIGITAL] {
+    if feedback.input_age_periods.iter().fold(0, |any, age| any | age) == 0 {
         return 0;
     }
     let ages = feedback.input_age_periods.iter().enumerate();

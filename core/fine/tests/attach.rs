@@ -11,7 +11,7 @@ use demanding::{Bench, FAULT_CODE, Script, config};
 use tandem_fine::{FaultKind, FineConfig};
 use tandem_rig::Random;
 use tandem_rings::{MachineState, RestCause};
-use tandem_sdk::{Attached, AxisVector, JointState, MAX_AXES, StopOn};
+use tandem_sdk::{Arm, Attached, AxisVector, Edge, EventKind, Feedback, JointState, MAX_AXES, Setpoint, StopOn};
 
 /// One increment of the encoders, mm.
 const COUNT_MM: f64 = 1e-3;
@@ -52,6 +52,7 @@ fn joints_are_enabled_where_they_stand_and_motion_starts_there() {
         let mut bench = three(Script { enable_after, position, ..Script::new(JOINTS) }, 1000);
         let rest = attach(&mut bench, 400).unwrap_or_else(|| panic!("seed {seed}: not enabled"));
         assert_eq!(rest.0[..JOINTS], position.0[..JOINTS], "seed {seed}");
+        assert_eq!(bench.fine.next_tick(), 0, "ticks are counted from the first motion on");
         queue_move(&mut bench);
         bench.ticks(250);
         assert_eq!(bench.fine.fault(), None, "seed {seed}");
@@ -80,7 +81,10 @@ fn the_operator_stops_joints_that_are_on_their_way_to_holding() {
     for (seed, abort) in (1..=40).flat_map(|seed| [(seed, false), (seed, true)]) {
         let mut random = Random::new(seed);
         let enable_after = std::array::from_fn(|joint| if joint == 1 { u64::MAX } else { random.below(60) });
-        let mut bench = three(Script { enable_after, position: somewhere(&mut random), ..Script::new(JOINTS) }, 500);
+        let position = somewhere(&mut random);
+        // Drives that are told to let go say for some time that they hold.
+        let brake_for = [random.below(10); MAX_AXES];
+        let mut bench = three(Script { enable_after, brake_for, position, ..Script::new(JOINTS) }, 500);
         assert_eq!(attach(&mut bench, random.below(100)), None);
         let controls = Arc::clone(&bench.host.controls);
         if abort { &controls.abort } else { &controls.emergency_stop }.store(true, Relaxed);
@@ -89,7 +93,7 @@ fn the_operator_stops_joints_that_are_on_their_way_to_holding() {
             bench.fine.tick();
             let told = &bench.script().told;
             assert_eq!(told[before..].iter().map(|(setpoint, _)| setpoint.enable).max(), Some(0), "in the next period");
-            assert!(told.len() - before <= 3, "they let go at once, and so does the run");
+            assert!(told.len() as u64 - before as u64 <= 3 + brake_for[0], "they let go at once, and so does the run");
         }
         assert!(!bench.fine.is_attaching());
         let kind = bench.fault();
@@ -105,6 +109,19 @@ fn the_operator_stops_joints_that_are_on_their_way_to_holding() {
         assert!(bench.rough.rests.pop().is_err(), "it is told once");
         bench.assert_bumpless(COUNT_MM);
     }
+}
+
+#[test]
+fn a_joint_that_lets_go_again_before_all_hold_is_waited_for_once_more() {
+    let mut bench =
+        three(Script { enable_after: after([5, 20, 0]), sag_mm: [0.01; MAX_AXES], ..Script::new(JOINTS) }, 500);
+    assert_eq!(attach(&mut bench, 10), None);
+    bench.script().enable_after[0] = 40;
+    assert_eq!(attach(&mut bench, 25), None, "the others hold, it does not");
+    let rest = attach(&mut bench, 10).expect("all hold");
+    assert_eq!(rest.0[..JOINTS], bench.script().position.0[..JOINTS]);
+    assert!(rest[0] < -0.3, "it has sunk meanwhile: {}", rest[0]);
+    bench.assert_bumpless(0.011);
 }
 
 #[test]
@@ -203,5 +220,76 @@ fn following_error_is_judged_against_the_command_that_the_feedback_answers() {
         bench.ticks(250);
         let followed = bench.fine.fault().map(|f| matches!(f.kind, FaultKind::Following { .. }));
         assert_eq!(followed, faults.then_some(true), "{behind} behind, {told} told");
+    }
+}
+
+#[test]
+fn exchanges_go_on_until_every_brake_is_closed_and_no_longer() {
+    for seed in 1..=50 {
+        let mut random = Random::new(seed);
+        // Now and then a brake takes longer than its driver has said.
+        let brake_for: [u64; MAX_AXES] = std::array::from_fn(|_| random.below(130));
+        let mut bench = three(Script { brake_for, position: somewhere(&mut random), ..Script::new(JOINTS) }, 500);
+        attach(&mut bench, 10).unwrap();
+        bench.queue_event(EventKind::ProgramEnd, 0, 0.0);
+        while !bench.fine.is_over() {
+            bench.ticks(1);
+        }
+        assert_eq!(bench.fault(), None, "seed {seed}");
+        let script = bench.script();
+        let letting_go = script.told.iter().rev().take_while(|(told, _)| told.enable == 0).count() as u64;
+        let slowest = brake_for[..JOINTS].iter().max().unwrap() + 1;
+        assert_eq!(letting_go, slowest.min(100), "seed {seed}: {brake_for:?}");
+        assert!(script.told.iter().all(|(told, _)| told.velocity == AxisVector::ZERO), "seed {seed}");
+    }
+}
+
+#[test]
+fn an_edge_is_armed_before_the_motion_and_a_joint_that_did_not_catch_it_is_found_between_its_samples() {
+    for seed in 1..=50 {
+        let mut random = Random::new(seed);
+        let script = Script { catches: true, position: somewhere(&mut random), ..Script::new(JOINTS) };
+        let mut bench = three(script, 500);
+        attach(&mut bench, 10).unwrap();
+        let both = |amount: f64| AxisVector::from_slice(&[amount, amount]);
+        let stop_on = StopOn { input: 9, edge: Edge::Rising, miss_is_fault: 0 };
+        bench.piece([AxisVector::ZERO, both(250.0)], 0.1, false, stop_on);
+        bench.piece([both(50.0), AxisVector::ZERO], 1.0, false, stop_on);
+        bench.piece([both(50.0), both(-250.0)], 0.1, true, stop_on);
+        bench.ticks(20 + random.below(900));
+        let before = bench.script().position;
+        bench.script().inputs = 1 << 9;
+        bench.ticks(1);
+        let at_edge = bench.script().position;
+        let rest = bench.rest(200).expect("it comes to rest");
+        let latch = rest.latch.expect("a place of the edge");
+        assert_eq!((rest.cause, latch[0]), (RestCause::Edge, at_edge[0]), "seed {seed}: its drive has caught it");
+        let between = (before[1] + at_edge[1]) / 2.0;
+        assert!((latch[1] - between).abs() < 1e-9 && latch[2] == at_edge[2], "seed {seed}: {latch:?} {at_edge:?}");
+        bench.ticks(3);
+        let script = bench.script();
+        let arms = |(told, _): &(Setpoint, Feedback)| told.arm == Arm { input: 9, edge: 1 };
+        let armed = script.told.iter().position(arms).expect("armed");
+        let moved = script.told.iter().position(|(told, _)| told.velocity != AxisVector::ZERO).expect("moved");
+        assert!(armed < moved, "seed {seed}: armed in {armed}, moved in {moved}");
+        assert_eq!(script.last().arm, Arm::default(), "seed {seed}: it is disarmed at rest");
+    }
+}
+
+#[test]
+fn drives_whose_line_is_cut_are_not_waited_for() {
+    for ticks in [0, 50, 190, 230] {
+        let mut bench = three(Script { brake_for: [50; MAX_AXES], ..Script::new(JOINTS) }, 500);
+        attach(&mut bench, 10).unwrap();
+        queue_move(&mut bench);
+        bench.ticks(ticks);
+        bench.script().cut = true;
+        bench.ticks(1);
+        assert_eq!(bench.fault(), Some(FaultKind::Driver), "in that period");
+        while bench.state() != MachineState::Fault {
+            bench.ticks(1);
+        }
+        bench.ticks(2);
+        assert!(bench.fine.is_over(), "{ticks}: nothing is known of brakes");
     }
 }

@@ -46,12 +46,14 @@ pub enum Doing {
     Dwelling,
     Probing,
     Homing,
+    /// A drive homes its joint.
+    HandedOver,
     Jogging,
     Ramping,
     AtRest,
 }
 
-pub const ALL: [Doing; 10] = [
+pub const ALL: [Doing; 11] = [
     Doing::Enabling,
     Doing::Waiting,
     Doing::Running,
@@ -59,6 +61,7 @@ pub const ALL: [Doing; 10] = [
     Doing::Dwelling,
     Doing::Probing,
     Doing::Homing,
+    Doing::HandedOver,
     Doing::Jogging,
     Doing::Ramping,
     Doing::AtRest,
@@ -164,6 +167,13 @@ impl Bench {
             Doing::Dwelling => {
                 self.piece([AxisVector::ZERO; 2], 2.0, true, no_edge);
                 self.ticks(some);
+                return;
+            }
+            Doing::HandedOver => {
+                self.script().homing_takes = u64::MAX;
+                self.queue_event(EventKind::HomeByDrive, 0, 100.0);
+                self.ticks(some);
+                assert_eq!(self.told().homing, 1);
                 return;
             }
             Doing::Probing => self.queue_move(StopOn { input: PROBE, edge: Edge::Rising, miss_is_fault: 0 }),

@@ -101,6 +101,7 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     }
     bench.come_to_rest();
     let at = bench.told().position;
+    assert_eq!(bench.told().homing, 0, "a drive that homes its joint is interrupted");
     assert_eq!((bench.fault(), bench.state()), (None, MachineState::Holding));
     // Neither a resume before it is released nor the release alone lets anything move.
     for _ in 0..3 {
@@ -122,7 +123,9 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     let script = bench.script();
     let moved = script.told[from..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO);
     let turned = script.told[from..].iter().position(|(told, _)| told.spindle_rad_per_s != 0.0);
-    assert_eq!(moved.is_some(), ![Doing::Dwelling, Doing::AtRest].contains(&doing));
+    assert_eq!(moved.is_some(), ![Doing::Dwelling, Doing::AtRest, Doing::HandedOver].contains(&doing));
+    let homed = script.told[from..].iter().any(|(told, _)| told.homing != 0);
+    assert_eq!(homed, doing == Doing::HandedOver, "its drive begins anew");
     // Probing cuts nothing, and waits for no spindle.
     let waits = door && ![Doing::Enabling, Doing::Waiting, Doing::Probing].contains(&doing);
     if let (Some(moved), true) = (moved, waits) {
