@@ -43,7 +43,7 @@ pub fn check_times(machine: &Machine, drivers: &Roster) -> Result<(), HostError>
         for (key, seconds) in [("enable_s", described.enable_s), ("disable_s", described.disable_s)] {
             if !(seconds > 0.0 && seconds <= MAX_ENABLE_S) {
                 let cause = format!(
-                    "driver {} says that its {key} is {seconds} s: more than 0 and at most {MAX_ENABLE_S} s is a time to wait for",
+                    "driver {} says that its {key} is {seconds} s; it is to be more than 0 and at most {MAX_ENABLE_S} s",
                     driver.title
                 );
                 return Err(refusal(machine, &format!("{}.plugin", driver.section), cause));
