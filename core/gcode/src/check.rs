@@ -9,8 +9,8 @@ use crate::diagnostic::{Diagnostic, Severity};
 use crate::fault::{Fault, Span};
 use crate::interpreter::Interpreter;
 use crate::item::Item;
-use crate::lines::{Lines, Next, Pass};
-use crate::source::{Program, ProgramError};
+use crate::program::lines::{Lines, Next, Pass};
+use crate::program::{Program, ProgramError};
 
 /// Most errors that are listed.
 pub const MAX_DIAGNOSTICS: usize = 1000;

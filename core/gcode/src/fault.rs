@@ -20,12 +20,12 @@ pub(crate) struct Fault {
     pub code: &'static str,
     pub message: String,
     /// The line, where it is not the one that is read.
-    pub line: Option<Box<Line>>,
+    pub line: Option<Box<SourceLine>>,
 }
 
 /// A line that was read before.
 #[derive(Debug)]
-pub(crate) struct Line {
+pub(crate) struct SourceLine {
     pub number: u32,
     pub text: Vec<u8>,
 }

@@ -5,20 +5,21 @@ use std::sync::Arc;
 
 use tandem_sdk::AxisVector;
 
-use crate::bezier::Tail;
 use crate::config::Config;
-use crate::curve::Curve;
 use crate::diagnostic::Diagnostic;
-use crate::expression::Context;
 use crate::fault::{Checked, Fault, Span};
-use crate::item::Item;
-use crate::letters::{AXIS_MASK, Letters};
-use crate::orders::Orders;
-use crate::parameters::Parameters;
-use crate::parse::parse;
-use crate::scan::Scanner;
-use crate::state::{Motion, State};
-use crate::words::{Target, Words};
+use crate::item::{Item, ProbeResult};
+use crate::line::Line;
+use crate::state::State;
+use crate::state::letters::{AXIS_MASK, Letters};
+use crate::state::parameters::Parameters;
+use crate::syntax::expression::Context;
+use crate::syntax::line_words::{LineWords, Target};
+use crate::syntax::parse::{O_WORDS, parse};
+use crate::syntax::scan::Scanner;
+use crate::words::coolant::Coolant;
+use crate::words::orders::Orders;
+use crate::words::{curve, probe, stop};
 
 /// Longest line, bytes.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -31,7 +32,6 @@ enum Phase {
     /// The first line was `%`: another one must close the program.
     Opened,
     Running,
-    Ended,
 }
 
 impl Phase {
@@ -45,28 +45,21 @@ impl Phase {
 /// The state of one part program and of the machine as the program knows it.
 #[derive(Clone)]
 pub struct Interpreter {
-    pub(crate) config: Config,
-    pub(crate) letters: Letters,
-    pub(crate) state: State,
-    pub(crate) words: Words,
-    pub(crate) orders: Orders,
-    pub(crate) parameters: Parameters,
+    config: Config,
+    letters: Letters,
+    state: State,
+    parameters: Parameters,
+    /// The words of the current line, and what they order.
+    words: LineWords,
+    orders: Orders,
     file: Arc<str>,
     phase: Phase,
     /// The line of the `%` that ended the program, and whether one had opened it.
     ended_by_percent: Option<(u32, bool)>,
     /// Whether a word of the program has been read; a program number may only come before.
     begun: bool,
-    /// The curve whose lines are being read.
-    pub(crate) curve: Option<Curve>,
-    /// How the last G5 ended.
-    pub(crate) bezier_tail: Option<Tail>,
-    /// The axis words of the current line have been used up.
-    pub(crate) moved: bool,
     /// A value of the current line follows from what the first pass has assumed.
-    pub(crate) reads_assumed: Cell<bool>,
-    /// Axes whose position was assumed before the current line.
-    assumed_start: u32,
+    reads_assumed: Cell<bool>,
 }
 
 impl Interpreter {
@@ -75,18 +68,14 @@ impl Interpreter {
         Self {
             letters: Letters::new(&config.axes),
             state: State::new(&config),
-            words: Words::default(),
-            orders: Orders::new(),
             parameters: Parameters::new(),
+            words: LineWords::default(),
+            orders: Orders::new(),
             file: "program".into(),
             phase: Phase::Fresh,
             ended_by_percent: None,
             begun: false,
-            curve: None,
-            bezier_tail: None,
-            moved: false,
             reads_assumed: Cell::new(false),
-            assumed_start: 0,
             config,
         }
     }
@@ -98,7 +87,7 @@ impl Interpreter {
 
     /// Whether the program has ended: further lines are passed over.
     pub fn ended(&self) -> bool {
-        self.phase == Phase::Ended
+        self.state.ended
     }
 
     /// The line of the `%` that ended the program, and whether one had opened it; `None` where something else ended it.
@@ -127,54 +116,54 @@ impl Interpreter {
 
     /// Manual input: lines are taken again after M2 or M30.
     pub fn go_on(&mut self) {
-        if self.ended() {
-            self.phase = Phase::Running;
-        }
+        self.state.ended = false;
     }
 
     /// The programmed position, machine coordinates, mm or rad.
     pub fn position(&self) -> AxisVector {
-        self.state.position
+        self.state.path.position
     }
 
     /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.
     pub fn set_position(&mut self, position: AxisVector) {
-        self.state.position = position;
-        self.state.last_end = position;
-        self.state.uncertain = 0;
-        self.state.assumed.position = 0;
-        self.state.at_rest = true;
+        self.state.path.set(position);
     }
 
     /// Manual input: an abort, a fault or an emergency stop has switched spindle and coolant off, and outputs as the machine file
     /// says; what the next line asks for is sent, whatever it was before.
     pub fn set_switched_off(&mut self) {
         self.state.spindle.direction = 0;
-        (self.state.mist, self.state.flood) = (false, false);
-        self.state.outputs_set = 0;
+        self.state.coolant = Coolant::default();
+        self.state.outputs.forget();
     }
 
     /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out. It becomes #5399.
     pub fn provide_input(&mut self, value: f64) {
-        self.state.input = value;
-        self.state.assumed.input = false;
+        self.state.outputs.answer = value;
+        self.state.outputs.answer_assumed = false;
     }
 
     /// The first pass: M66 is taken to have timed out, and what follows from that to be unknown.
     pub(crate) fn assume_input(&mut self) {
-        self.state.input = -1.0;
-        self.state.assumed.input = true;
+        self.state.outputs.answer = -1.0;
+        self.state.outputs.answer_assumed = true;
+    }
+
+    /// What became of the probe. #5061 to #5069 get the touched position in program coordinates and units, the
+    /// programmed end where nothing touched; #5070 says which. The program goes on from where the machine rests.
+    pub fn provide_probe(&mut self, result: &ProbeResult) {
+        probe::provide(&mut self.state, &mut self.parameters, &self.letters, result);
+    }
+
+    /// The first pass: the probe is taken to touch at its end, and what follows from that to be unknown.
+    pub(crate) fn assume_probe(&mut self) {
+        let named = self.letters.axes_of(self.words.present & AXIS_MASK);
+        probe::assume(&mut self.state, &mut self.parameters, &self.letters, named);
     }
 
     /// Whether what the last line does follows from an assumed answer, so that only the run can judge its numbers.
-    pub(crate) fn is_assumed(&self) -> bool {
-        let named = self.letters.axes_of(self.words.present & AXIS_MASK) & self.state.assumed.position;
-        // Where a line ends is its axis words; an arc and a probe also depend on where they begin.
-        let moves = match self.orders.motion {
-            Some(Motion::Rapid | Motion::Line) | None => named != 0,
-            Some(_) => (self.assumed_start | self.state.assumed.position) != 0,
-        };
-        self.reads_assumed.get() || self.moved && moves
+    pub(crate) fn is_assumed(&mut self) -> bool {
+        self.execution(&mut Vec::new()).is_assumed()
     }
 
     /// Interprets line `number` (from 1), given without its line end, and appends what it orders to `out`. Blocks are
@@ -184,15 +173,18 @@ impl Interpreter {
     /// The first error of the line; `out` is then as before. The interpreter can go on with the next line (to find
     /// more errors), at the programmed end of this one where that is known.
     pub fn line(&mut self, number: u32, text: &[u8], out: &mut Vec<Item>) -> Result<(), Diagnostic> {
-        if self.phase == Phase::Ended {
+        if self.state.ended {
             return Ok(());
         }
-        let before = (out.len(), self.state.next_index, self.state.at_rest);
+        let items_before = out.len();
+        let (next_index, at_rest) = (self.state.path.next_index, self.state.path.at_rest);
         self.state.line = number;
         self.run(text, out).map_err(|fault| {
-            out.truncate(before.0);
-            (self.state.next_index, self.state.at_rest) = (before.1, before.2);
-            self.state.last_end = self.state.position;
+            out.truncate(items_before);
+            let path = &mut self.state.path;
+            path.next_index = next_index;
+            path.at_rest = at_rest;
+            path.last_end = path.position;
             Diagnostic::new(&self.file, number, text, fault)
         })
     }
@@ -202,26 +194,32 @@ impl Interpreter {
     /// # Errors
     /// A program that `%` has opened and nothing has closed: it is truncated.
     pub fn finish(&mut self, out: &mut Vec<Item>) -> Result<(), Diagnostic> {
-        match self.phase {
-            Phase::Ended => Ok(()),
-            Phase::Opened => {
-                self.phase = Phase::Ended;
-                let why = "the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
-                Err(Diagnostic::whole_line(&self.file, self.state.line.max(1), b"", "truncated", why.into()))
-            }
-            Phase::Fresh | Phase::Running => {
-                let open = self.no_curve_open();
-                self.end(out);
-                open.map_err(|fault| Diagnostic::new(&self.file, self.state.line.max(1), b"", fault))
-            }
+        if self.state.ended {
+            return Ok(());
         }
+        let last_line = self.state.line.max(1);
+        if self.phase == Phase::Opened {
+            self.state.ended = true;
+            let why = "the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
+            return Err(Diagnostic::whole_line(&self.file, last_line, b"", "truncated", why.into()));
+        }
+        let open = self.state.curves.end();
+        stop::end(&mut self.execution(out));
+        open.map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
     }
 
-    /// Switches off what still runs and ends the stream.
-    pub(crate) fn end(&mut self, out: &mut Vec<Item>) {
-        self.switch_off(out);
-        out.push(Item::End);
-        self.phase = Phase::Ended;
+    /// The current line with the state that it changes.
+    #[inline]
+    fn execution<'a>(&'a mut self, out: &'a mut Vec<Item>) -> Line<'a> {
+        Line {
+            config: &self.config,
+            letters: &self.letters,
+            words: &self.words,
+            orders: &self.orders,
+            state: &mut self.state,
+            out,
+            reads_assumed: &self.reads_assumed,
+        }
     }
 
     fn run(&mut self, text: &[u8], out: &mut Vec<Item>) -> Checked<()> {
@@ -230,9 +228,8 @@ impl Interpreter {
         }
         let Some(from) = self.lead(text, out)? else { return Ok(()) };
         self.words.clear();
-        self.moved = false;
+        self.state.path.begin_line();
         self.reads_assumed.set(false);
-        self.assumed_start = self.state.assumed.position;
         let context = Context {
             parameters: &self.parameters,
             state: &self.state,
@@ -240,33 +237,51 @@ impl Interpreter {
             reads_assumed: &self.reads_assumed,
         };
         let parsed = parse(text, from, &context, &mut self.words);
-        let goes_on = self.goes_on();
-        if let Ok(true) = goes_on {
-            let done = parsed.and_then(|()| self.assign()).and_then(|()| self.curve_line(out));
-            self.note_curve_line(text);
-            if let (Err(_), Some(curve)) = (&done, &mut self.curve) {
-                curve.broken = true;
-            }
-            return done;
-        }
-        let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
-        let complete = parsed.is_ok();
-        let done = parsed.and(goes_on).and(sorted).and_then(|()| self.obey(out));
-        self.note_curve_line(text);
+        let of_curve = self.state.curves.goes_on(&self.words);
+        let done = match of_curve {
+            Ok(true) => self.curve_line(parsed, out),
+            Ok(false) => self.obey(parsed, out),
+            Err(fault) => self.obey(parsed.and(Err(fault)), out),
+        };
+        self.state.curves.note(self.state.line, text);
+        done
+    }
+
+    /// Executes a line of an open curve, if it could be read.
+    fn curve_line(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
+        let done = parsed.and_then(|()| self.assign()).and_then(|()| {
+            self.orders.clear();
+            curve::curve_line(&mut self.execution(out))
+        });
         if done.is_err() {
-            self.recover(complete);
+            self.state.curves.spoil();
         }
         done
     }
 
-    fn obey(&mut self, out: &mut Vec<Item>) -> Checked<()> {
-        self.assign()?;
-        if self.words.has(b'O') && self.begun {
-            return Err(self.words.fault(b'O', "o-word", crate::parse::O_WORDS));
+    /// Executes any other line, if it could be read; otherwise takes over what can be.
+    fn obey(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
+        let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
+        let complete = parsed.is_ok();
+        let done = parsed.and(sorted).and_then(|()| self.assign()).and_then(|()| {
+            self.refuse_late_number()?;
+            self.execution(out).execute()
+        });
+        if done.is_err() {
+            // What the line would have assigned exists, so that no later line complains of that.
+            let _ = self.assign();
+            self.execution(out).recover(complete);
         }
-        self.begun |=
-            self.words.present != 0 || !self.words.g.as_slice().is_empty() || !self.words.m.as_slice().is_empty();
-        self.execute(out)
+        done
+    }
+
+    /// A program number stands before all words.
+    fn refuse_late_number(&mut self) -> Checked<()> {
+        if self.words.has(b'O') && self.begun {
+            return Err(self.words.fault(b'O', "o-word", O_WORDS));
+        }
+        self.begun |= !self.words.is_empty();
+        Ok(())
     }
 
     /// Deals with what may stand at the start of a line. Where the words begin; `None` where there are none.
@@ -299,16 +314,11 @@ impl Interpreter {
             self.phase = Phase::Opened;
         } else {
             self.ended_by_percent = Some((self.state.line, self.phase == Phase::Opened));
-            let open = self.no_curve_open();
-            self.end(out);
+            let open = self.state.curves.end();
+            stop::end(&mut self.execution(out));
             open?;
         }
         Ok(None)
-    }
-
-    /// After an erroneous line: what it would have assigned exists, so that no later line complains of that.
-    pub(crate) fn assign_anyway(&mut self) {
-        let _ = self.assign();
     }
 
     fn assign(&mut self) -> Checked<()> {

@@ -36,40 +36,23 @@
 
 #![allow(clippy::doc_markdown, reason = "LinuxCNC is a name, not code")]
 
-mod arc;
-mod arc_motion;
-mod bezier;
+#[cfg(test)]
+extern crate self as tandem_gcode;
+
 mod check;
 mod config;
-mod curve;
-mod curve_lines;
-mod curve_places;
 mod diagnostic;
-mod execute;
-mod expression;
 mod fault;
-mod function;
-mod input_output;
 mod interpreter;
 mod item;
-mod letters;
-mod lines;
-mod machine;
-mod motion;
-mod number;
-mod offsets;
-mod orders;
-mod parameters;
-mod parse;
-mod probe;
-mod scan;
-mod source;
+mod line;
+mod program;
 mod state;
 mod stream;
-mod table;
-mod table_g;
-mod table_m;
-mod travel;
+mod syntax;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod testing;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
@@ -77,6 +60,6 @@ pub use config::{Config, Lines, ProbeInput, Tool};
 pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult};
-pub use source::{Program, ProgramError};
+pub use program::{Program, ProgramError};
 pub use stream::Stream;
-pub use table::docs;
+pub use words::docs;

@@ -7,8 +7,8 @@ use tandem_sdk::AxisVector;
 use crate::config::Config;
 use crate::interpreter::Interpreter;
 use crate::item::{Item, ProbeResult};
-use crate::lines::{Lines, Next, Pass};
-use crate::source::{Program, ProgramError};
+use crate::program::lines::{Lines, Next, Pass};
+use crate::program::{Program, ProgramError};
 
 /// A checked program, read again through the same file and handed out as far as it is asked for. Each chunk of text is
 /// compared with what the first pass read before a line of it is interpreted.

@@ -55,6 +55,21 @@ pub fn only_blocks(items: &[Item]) -> Vec<Block> {
     items.iter().filter_map(block).collect()
 }
 
+/// Compares the items of a program with one short line each.
+pub fn assert_items(program: &str, expected: &[&str]) {
+    assert_eq!(shown(&run(program)), expected, "{program}");
+}
+
+/// The ends of all blocks in X, Y, Z.
+pub fn ends(program: &str) -> Vec<[String; 3]> {
+    blocks(program).iter().map(|b| [b.end[0], b.end[1], b.end[2]].map(short)).collect()
+}
+
+/// The last block of a program.
+pub fn last(program: &str) -> Block {
+    *blocks(program).last().expect("a block")
+}
+
 /// The messages of a program, without the excerpts.
 pub fn messages(text: &str) -> Vec<String> {
     let (_, errors) = run_on(mill(), text);

@@ -1,10 +1,10 @@
 //! The text of a line to its words.
 
-use crate::expression::{Context, Parameter};
+use super::expression::{Context, Parameter};
+use super::line_words::{Assignment, Code, LineWords, Target};
+use super::scan::Scanner;
 use crate::fault::{Checked, Fault, Span};
-use crate::parameters::{predefined_name, read_only};
-use crate::scan::Scanner;
-use crate::words::{Assignment, Code, Target, Words};
+use crate::state::parameters::{predefined_name, read_only};
 
 /// Largest magnitude of a word: more is a slip, and would lose the precision of positions.
 const MAX_VALUE: f64 = 1e9;
@@ -13,7 +13,7 @@ const MAX_VALUE: f64 = 1e9;
 ///
 /// # Errors
 /// The first thing that is no word; the words before it have been read.
-pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut Words) -> Checked<()> {
+pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut LineWords) -> Checked<()> {
     let mut scanner = Scanner::new(text, from);
     loop {
         scanner.skip_ignorable()?;
@@ -27,7 +27,7 @@ pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut Wor
 }
 
 #[inline]
-fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
     let start = scanner.at();
     if letter == b'T' && starts_time_constant(scanner) {
         return time_constant(scanner, context, words);
@@ -77,7 +77,7 @@ pub(crate) const O_WORDS: &str =
     "O-words (subprograms, IF, WHILE, REPEAT) are not supported: let the CAM system write the program out flat";
 
 /// `O1234` alone is the number of a program and harmless; with a word after it, it is flow control.
-fn program_number(scanner: &mut Scanner, start: usize, value: f64, words: &mut Words) -> Checked<()> {
+fn program_number(scanner: &mut Scanner, start: usize, value: f64, words: &mut LineWords) -> Checked<()> {
     scanner.skip_ignorable()?;
     if scanner.at_end() {
         return words.add(b'O', value, scanner.since(start));
@@ -95,7 +95,7 @@ fn starts_time_constant(scanner: &Scanner) -> bool {
     !scanner.peek_at(2 + blanks).is_ascii_alphabetic()
 }
 
-fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
     let start = scanner.at();
     scanner.advance(2);
     scanner.skip_blanks();
@@ -113,7 +113,7 @@ fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut Words) ->
     Ok(())
 }
 
-fn assignment(scanner: &mut Scanner, context: &Context, words: &mut Words) -> Checked<()> {
+fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
     let start = scanner.at();
     let parameter = context.parameter(scanner, 0)?;
     let target = match parameter {

@@ -2,13 +2,13 @@
 
 use std::cell::Cell;
 
+use super::function::{self, Operator};
+use super::number;
+use super::scan::Scanner;
 use crate::fault::{Checked, Fault, Span};
-use crate::function::{self, Operator};
-use crate::letters::Letters;
-use crate::number;
-use crate::parameters::{LAST, Parameters};
-use crate::scan::Scanner;
 use crate::state::State;
+use crate::state::letters::Letters;
+use crate::state::parameters::{LAST, Parameters};
 
 /// Most brackets, signs and `#` within each other.
 const MAX_DEPTH: usize = 32;

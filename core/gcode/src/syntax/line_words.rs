@@ -1,7 +1,7 @@
 //! The words of one line.
 
 use crate::fault::{Checked, Fault, Span};
-use crate::letters::index;
+use crate::state::letters::index;
 
 /// Most G words, and most M words, of a line.
 const MAX_CODES: usize = 16;
@@ -39,7 +39,7 @@ impl Codes {
     }
 }
 
-/// What a `#…=` assigns to: a number, or a range of [`Words::names`].
+/// What a `#…=` assigns to: a number, or a range of [`LineWords::names`].
 #[derive(Clone, Debug)]
 pub(crate) enum Target {
     Numbered(usize),
@@ -56,7 +56,7 @@ pub(crate) struct Assignment {
 
 /// The words of one line. Kept from line to line so that nothing is allocated.
 #[derive(Clone, Default)]
-pub(crate) struct Words {
+pub(crate) struct LineWords {
     /// Bit per letter that the line has, G and M apart.
     pub present: u32,
     values: [f64; 26],
@@ -69,7 +69,7 @@ pub(crate) struct Words {
     pub names: Vec<u8>,
 }
 
-impl Words {
+impl LineWords {
     pub fn clear(&mut self) {
         self.present = 0;
         self.g.count = 0;
@@ -77,6 +77,12 @@ impl Words {
         self.time_constant = None;
         self.assignments.clear();
         self.names.clear();
+    }
+
+    /// Whether the line holds no word.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.present == 0 && self.g.count == 0 && self.m.count == 0
     }
 
     /// Adds a word other than G and M.

@@ -3,6 +3,8 @@
 //! Memory is bounded whatever the size of the program: one chunk of 64 KiB, and 8 bytes (a hash) for each chunk of the
 //! file. A program of a million lines of 30 bytes needs 64 KiB + 4 KiB.
 
+pub(crate) mod lines;
+
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;

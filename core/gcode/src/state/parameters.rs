@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::letters::{AXIS_LETTERS, Letters};
-use crate::state::State;
+use tandem_sdk::AxisVector;
+
+use super::State;
+use super::letters::{AXIS_LETTERS, Letters};
 
 /// Highest number of a parameter.
 pub(crate) const LAST: usize = 5602;
@@ -87,22 +89,22 @@ pub(crate) fn read_only(number: usize) -> Option<&'static str> {
 /// Values that the interpreter keeps itself. Offsets and stored positions are in mm and degrees whatever the program's
 /// units, the current position is in program units.
 fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
-    let offsets = &state.offsets;
-    let fixed = |vector: &tandem_sdk::AxisVector, nth: usize| Some(in_mm(letters, nth, |axis| vector[axis]));
+    let coordinates = &state.coordinates;
+    let fixed = |vector: &AxisVector, nth: usize| Some(in_mm(letters, nth, |axis| vector[axis]));
     match number {
-        5161..=5169 => fixed(&state.reference[0], number - 5161),
-        5181..=5189 => fixed(&state.reference[1], number - 5181),
-        5210 => Some(f64::from(u8::from(offsets.g92 != tandem_sdk::AxisVector::ZERO))),
-        5211..=5219 => fixed(&offsets.g92_stored, number - 5211),
-        5220 => Some((offsets.active + 1) as f64),
+        5161..=5169 => fixed(&coordinates.reference[0], number - 5161),
+        5181..=5189 => fixed(&coordinates.reference[1], number - 5181),
+        5210 => Some(f64::from(u8::from(*coordinates.g92() != AxisVector::ZERO))),
+        5211..=5219 => fixed(coordinates.g92_stored(), number - 5211),
+        5220 => Some((coordinates.active() + 1) as f64),
         5221..=5390 => match (number - 5221) % 20 {
-            nth @ 0..=8 => fixed(&offsets.systems[(number - 5221) / 20], nth),
+            nth @ 0..=8 => fixed(coordinates.origin((number - 5221) / 20), nth),
             _ => Some(0.0),
         },
-        5399 => Some(state.input),
-        5400 => Some(f64::from(state.tool)),
-        5401..=5409 => fixed(&offsets.tool, number - 5401),
-        5410 => Some(state.find_tool(state.tool).map_or(0.0, |tool| tool.diameter_mm)),
+        5399 => Some(state.outputs.answer),
+        5400 => Some(f64::from(state.tools.in_spindle)),
+        5401..=5409 => fixed(coordinates.tool(), number - 5401),
+        5410 => Some(state.tools.find(state.tools.in_spindle).map_or(0.0, |tool| tool.diameter_mm)),
         5420..=5428 => Some(position(state, letters, number - 5420)),
         _ => None,
     }
@@ -112,13 +114,13 @@ fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
 fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
     let axis = |nth: usize| AXIS_LETTERS.as_bytes().get(nth).and_then(|letter| letters.axis(*letter));
     let of = |mask: u32, nth: usize| axis(nth).is_some_and(|axis| mask >> axis & 1 != 0);
-    let assumed = &state.assumed;
+    let (offsets, position) = (state.coordinates.assumed, state.path.assumed);
     match number {
-        5211..=5219 => of(assumed.offsets, number - 5211),
-        5221..=5390 => of(assumed.offsets, (number - 5221) % 20),
-        5399 => assumed.input,
-        5401..=5409 => of(assumed.offsets, number - 5401),
-        5420..=5428 => of(assumed.offsets | assumed.position, number - 5420),
+        5211..=5219 => of(offsets, number - 5211),
+        5221..=5390 => of(offsets, (number - 5221) % 20),
+        5399 => state.outputs.answer_assumed,
+        5401..=5409 => of(offsets, number - 5401),
+        5420..=5428 => of(offsets | position, number - 5420),
         _ => false,
     }
 }
@@ -126,7 +128,7 @@ fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
 fn is_position_assumed(name: &[u8], state: &State, letters: &Letters) -> bool {
     let [b'_', letter] = name else { return false };
     let axis = letters.axis(letter.to_ascii_uppercase());
-    axis.is_some_and(|axis| (state.assumed.offsets | state.assumed.position) >> axis & 1 != 0)
+    axis.is_some_and(|axis| (state.coordinates.assumed | state.path.assumed) >> axis & 1 != 0)
 }
 
 /// A value of the `nth` of the letters XYZABCUVW in mm or degrees; zero where the machine lacks that axis.
@@ -147,15 +149,15 @@ pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> 
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
         b"_line" => f64::from(state.line),
-        b"_metric" => flag(state.unit_mm == 1.0),
-        b"_imperial" => flag(state.unit_mm != 1.0),
-        b"_absolute" => flag(state.absolute),
-        b"_incremental" => flag(!state.absolute),
-        b"_feed" => state.feed.linear_mm_per_s * 60.0 / state.unit_mm,
+        b"_metric" => flag(state.modes.unit_mm == 1.0),
+        b"_imperial" => flag(state.modes.unit_mm != 1.0),
+        b"_absolute" => flag(state.modes.absolute),
+        b"_incremental" => flag(!state.modes.absolute),
+        b"_feed" => state.modes.feed.linear_mm_per_s * 60.0 / state.modes.unit_mm,
         b"_rpm" => state.spindle.speed_rad_per_s * 30.0 / std::f64::consts::PI,
-        b"_coord_system" => 540.0 + 10.0 * state.offsets.active as f64,
-        b"_current_tool" => f64::from(state.tool),
-        b"_selected_tool" => state.selected_tool.map_or(-1.0, f64::from),
+        b"_coord_system" => 540.0 + 10.0 * state.coordinates.active() as f64,
+        b"_current_tool" => f64::from(state.tools.in_spindle),
+        b"_selected_tool" => state.tools.selected.map_or(-1.0, f64::from),
         [b'_', letter] => {
             let letter = letter.to_ascii_uppercase();
             let nth = AXIS_LETTERS.bytes().position(|l| l == letter)?;

@@ -3,7 +3,7 @@
 use tandem_motion::nurbs::{Nurbs, NurbsError};
 use tandem_sdk::NurbsData;
 
-use crate::fault::{Fault, Line, Span};
+use crate::fault::{Fault, SourceLine, Span};
 
 /// The lines of a curve, one for each control point; those of knots that stand alone follow.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +31,7 @@ impl Places {
         let words = words(text);
         let word = words.iter().find(|span| text[span.start as usize].eq_ignore_ascii_case(&letter));
         fault.span = word.or(words.first()).copied().unwrap_or_default();
-        fault.line = Some(Box::new(Line { number, text: text.to_vec() }));
+        fault.line = Some(Box::new(SourceLine { number, text: text.to_vec() }));
         fault
     }
 }

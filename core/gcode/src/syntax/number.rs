@@ -1,7 +1,7 @@
 //! Decimal numbers: a sign, digits, a point, digits. There are no exponents in part programs.
 
+use super::scan::Scanner;
 use crate::fault::{Checked, Fault};
-use crate::scan::Scanner;
 
 /// Most characters of a number.
 const MAX_LENGTH: usize = 64;

@@ -4,10 +4,10 @@ use std::hash::{DefaultHasher, Hasher};
 use std::io::Read;
 use std::sync::Arc;
 
+use super::{Program, ProgramError};
 use crate::diagnostic::Diagnostic;
 use crate::fault::{Fault, Span};
 use crate::interpreter::MAX_LINE_BYTES;
-use crate::source::{Program, ProgramError};
 
 const CHUNK: usize = 64 * 1024;
 const BOM: &[u8] = b"\xef\xbb\xbf";

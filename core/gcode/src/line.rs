@@ -1,0 +1,316 @@
+//! One line as it is executed: its words take effect in their order, and what they have in common is here.
+
+use std::cell::Cell;
+use std::fmt::Write as _;
+
+use tandem_sdk::{AxisVector, Block, BlockKind, Event, EventKind};
+
+use crate::config::Config;
+use crate::fault::{Checked, Fault, Span, show};
+use crate::item::Item;
+use crate::state::letters::{AXIS_MASK, Letters};
+use crate::state::{MotionMode, State};
+use crate::syntax::line_words::LineWords;
+use crate::words::orders::Orders;
+use crate::words::{Action, Group, Shape, modes, motion, spindle, tool};
+
+/// Rounding that a travel limit forgives, mm or rad.
+const TRAVEL_ROUNDING: f64 = 1e-9;
+/// Groups that take effect before F, and those between T and S. The units and the feed mode of a line hold for all its
+/// words, unlike in LinuxCNC: `G20 F10` is 10 inches a minute.
+const BEFORE_FEED: u32 = Group::Units.bit() | Group::FeedMode.bit();
+const BEFORE_SPEED: u32 = Group::InputOutput.bit() | Group::ToolChange.bit();
+const BEFORE_MOTION: u32 = (Group::Motion.bit() - 1) & !(BEFORE_FEED | BEFORE_SPEED);
+/// Modes that later lines are read with.
+const MODES: u32 = Group::Plane.bit()
+    | Group::Distance.bit()
+    | Group::ArcDistance.bit()
+    | Group::ToolLength.bit()
+    | Group::CoordinateSystem.bit();
+
+/// A line that is being executed: what it says, the state that it changes, and where its items go.
+pub(crate) struct Line<'a> {
+    pub config: &'a Config,
+    pub letters: &'a Letters,
+    pub words: &'a LineWords,
+    pub orders: &'a Orders,
+    pub state: &'a mut State,
+    pub out: &'a mut Vec<Item>,
+    /// A value of the line follows from what the first pass has assumed.
+    pub reads_assumed: &'a Cell<bool>,
+}
+
+impl Line<'_> {
+    /// Obeys the words in LinuxCNC's order.
+    #[inline]
+    pub fn execute(&mut self) -> Checked<()> {
+        self.act(BEFORE_FEED)?;
+        modes::feed(self)?;
+        modes::time_constant(self)?;
+        if self.words.has(b'T') {
+            tool::select(self)?;
+        }
+        self.act(BEFORE_SPEED)?;
+        if self.words.has(b'S') && !self.orders.has(Group::Spindle) {
+            spindle::speed(self)?;
+        }
+        self.act(BEFORE_MOTION)?;
+        self.set_motion();
+        match self.orders.motion {
+            Some(MotionMode::Word(word)) => {
+                if let Action::Move(_, act) | Action::MoveOnce(_, act) = word.action {
+                    act(self)?;
+                }
+            }
+            Some(MotionMode::Refused) => self.advance(),
+            Some(MotionMode::None) | None => {}
+        }
+        self.act(Group::Stop.bit())
+    }
+
+    /// Lets the words of `groups` act, one group after the other.
+    #[inline]
+    fn act(&mut self, groups: u32) -> Checked<()> {
+        let mut pending = self.orders.present() & groups;
+        while pending != 0 {
+            let word = self.orders.word(pending.trailing_zeros() as usize);
+            pending &= pending - 1;
+            if let Action::Act(act) = word.action {
+                act(self)?;
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn set_motion(&mut self) {
+        if let Some(word) = self.orders.get(Group::Motion) {
+            match word.action {
+                Action::Move(..) => self.state.motion = MotionMode::Word(word),
+                Action::MoveOnce(..) => {}
+                Action::Act(_) | Action::Refuse(_) => self.state.motion = MotionMode::None,
+            }
+        } else if self.orders.has(Group::CycleCancel) {
+            self.state.motion = MotionMode::None;
+        }
+    }
+
+    /// After an erroneous line: takes over what can be, so that the next lines are judged fairly. `complete` says
+    /// whether all words of the line have been read.
+    #[cold]
+    pub fn recover(&mut self, complete: bool) {
+        // Errors of what follows have been reported already, or do not matter now.
+        let _ = self.act(BEFORE_FEED).and_then(|()| modes::feed(self)).and_then(|()| self.act(MODES));
+        self.set_motion();
+        if matches!(self.orders.motion, Some(MotionMode::Refused)) {
+            self.state.motion = MotionMode::Refused;
+        }
+        if !complete {
+            self.state.path.uncertain |= (1 << self.letters.count()) - 1;
+        }
+        if self.orders.axes_taken {
+            self.state.path.uncertain |= self.letters.axes_of(self.words.present & AXIS_MASK);
+        } else if !self.state.path.moved {
+            self.advance();
+        }
+    }
+
+    /// Whether what the line does follows from an assumed answer, so that only the run can judge its numbers.
+    pub fn is_assumed(&self) -> bool {
+        let path = &self.state.path;
+        let named = self.letters.axes_of(self.words.present & AXIS_MASK) & path.assumed;
+        let shape = match self.orders.motion {
+            Some(MotionMode::Word(word)) => word.shape(),
+            _ => None,
+        };
+        // Where a straight line ends is its axis words; what is bent and a probe also depend on where they begin.
+        let moves = match (shape, self.orders.motion) {
+            (Some(Shape::Straight), _) | (_, None) => named != 0,
+            _ => (path.assumed_start | path.assumed) != 0,
+        };
+        self.reads_assumed.get() || path.moved && moves
+    }
+
+    /// The axes that the line names, with their values in inner units.
+    pub fn named_axes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        (0..self.letters.count()).filter_map(|axis| {
+            let value = self.words.get(self.letters.letter(axis))?;
+            Some((axis, value * self.state.modes.scale(self.letters, axis)))
+        })
+    }
+
+    /// Whether G53 stands in the line: its axis words are machine coordinates.
+    #[inline]
+    pub fn in_machine_coordinates(&self) -> bool {
+        self.orders.get(Group::NonModal).is_some_and(|word| word.tenths == 530)
+    }
+
+    /// Takes the axis words into the programmed position.
+    #[inline]
+    pub fn advance(&mut self) {
+        let machine = self.in_machine_coordinates();
+        let absolute = machine || self.state.modes.absolute;
+        for axis in 0..self.letters.count() {
+            let Some(value) = self.words.get(self.letters.letter(axis)) else { continue };
+            let value = value * self.state.modes.scale(self.letters, axis);
+            let base = match (machine, absolute) {
+                (true, _) => 0.0,
+                (_, true) => self.state.coordinates.total()[axis],
+                _ => self.state.path.position[axis],
+            };
+            self.state.path.position[axis] = base + value;
+            if absolute {
+                self.state.path.uncertain &= !(1 << axis);
+            }
+            self.assume_target(axis, machine, absolute);
+        }
+        self.state.path.moved = true;
+    }
+
+    /// Whether the programmed position of `axis` now follows from what the first pass has assumed.
+    #[inline]
+    fn assume_target(&mut self, axis: usize, machine: bool, absolute: bool) {
+        let bit = 1 << axis;
+        let path = &mut self.state.path;
+        let base = match (machine, absolute) {
+            (true, _) => 0,
+            (_, true) => self.state.coordinates.assumed,
+            _ => path.assumed,
+        };
+        path.assumed &= !bit;
+        if self.reads_assumed.get() {
+            path.assumed |= bit;
+        }
+        path.assumed |= base & bit;
+    }
+
+    #[inline]
+    pub fn moves_linear(&self, displacement: &AxisVector) -> bool {
+        (0..self.letters.count()).any(|axis| displacement[axis] != 0.0 && !self.letters.is_rotary(axis))
+    }
+
+    /// The feed of a path of `length_mm`, mm/s or rad/s.
+    #[inline]
+    pub fn feed(&self, length_mm: f64, linear: bool) -> Checked<f64> {
+        let feed = &self.state.modes.feed;
+        if feed.inverse_time {
+            return match self.words.get(b'F') {
+                Some(inverse) if inverse > 0.0 => Ok(length_mm * inverse / 60.0),
+                _ => Err(self.no_inverse_time()),
+            };
+        }
+        let feed = if linear { feed.linear_mm_per_s } else { feed.rotary_rad_per_s };
+        if feed > 0.0 { Ok(feed) } else { Err(self.no_feed()) }
+    }
+
+    /// The motion word whose path this line makes, where it is no straight line and no arc.
+    fn special_motion(&self) -> Option<&'static crate::words::Word> {
+        match self.orders.motion {
+            Some(MotionMode::Word(word)) if !matches!(word.shape(), Some(Shape::Straight | Shape::Arc)) => Some(word),
+            _ => None,
+        }
+    }
+
+    #[cold]
+    fn no_inverse_time(&self) -> Fault {
+        let curve = self.special_motion().is_some_and(|word| word.shape() == Some(Shape::Curve));
+        let why = if curve {
+            "with G93 every curve needs its F, in its first line"
+        } else {
+            "with G93 every line with G1, G2 or G3 needs its F"
+        };
+        self.motion_fault("feed-missing", why)
+    }
+
+    #[cold]
+    fn no_feed(&self) -> Fault {
+        let why = if self.words.has(b'F') { "the feed is zero" } else { "the feed is missing: no F has been set" };
+        let who = self.special_motion().map_or("G1, G2 and G3 need".into(), |word| format!("{} needs", word.code));
+        self.motion_fault("feed-missing", format!("{why}; {who} one"))
+    }
+
+    /// Appends a block.
+    #[inline]
+    #[allow(clippy::large_types_passed_by_value, reason = "built in place: a reference would copy once more")]
+    pub fn push(&mut self, block: Block) {
+        self.state.path.advance_to(block.end);
+        self.out.push(Item::Block(block));
+    }
+
+    /// Appends an event before the next block.
+    pub fn event(&mut self, kind: EventKind, index: u32, value: f64) {
+        let (line, before_block) = (self.state.line, self.state.path.next_index);
+        self.out.push(Item::Event(Event::new(kind, line, before_block, index.cast_signed(), value)));
+    }
+
+    /// Brings the machine to rest: an event that needs it follows.
+    pub fn rest(&mut self) {
+        if !self.state.path.at_rest {
+            self.dwell(0.0);
+        }
+    }
+
+    /// Rest for `dwell_s`.
+    pub fn dwell(&mut self, dwell_s: f64) {
+        let block = Block { kind: BlockKind::Dwell, dwell_s, ..self.state.blank_block() };
+        self.push(block);
+        self.state.path.at_rest = true;
+    }
+
+    /// Whether `low` to `high`, machine coordinates, lies within the travel of `axis`.
+    #[inline]
+    pub fn check_travel(&self, axis: usize, low: f64, high: f64) -> Checked<()> {
+        let (min, max) = self.config.travel_mm[axis];
+        if low >= min - TRAVEL_ROUNDING && high <= max + TRAVEL_ROUNDING || self.state.path.uncertain >> axis & 1 != 0 {
+            return Ok(());
+        }
+        Err(self.beyond_travel(axis, if high > max + TRAVEL_ROUNDING { high } else { low }))
+    }
+
+    #[cold]
+    fn beyond_travel(&self, axis: usize, value: f64) -> Fault {
+        let rotary = self.letters.is_rotary(axis);
+        let shown = |v: f64| show(if rotary { v.to_degrees() } else { v });
+        let unit = if rotary { "deg" } else { "mm" };
+        let letter = self.letters.letter(axis);
+        let name = letter as char;
+        let (min, max) = self.config.travel_mm[axis];
+        let travel = format!("{} to {} {unit}", shown(min), shown(max));
+        let mut message =
+            format!("{name} would reach {} {unit}, beyond its travel of {travel} (machine coordinates", shown(value));
+        let offset = self.state.coordinates.total()[axis];
+        if offset != 0.0 {
+            let _ = write!(message, "; the offset in force is {} {unit}", shown(offset));
+        }
+        message.push(')');
+        if self.words.has(letter) {
+            self.words.fault(letter, "travel", message)
+        } else if self.orders.axes_taken {
+            self.orders.fault(Group::NonModal, "travel", message)
+        } else {
+            self.motion_fault("travel", message)
+        }
+    }
+
+    /// A fault at the motion word, or at the first axis word where the motion is modal.
+    pub fn motion_fault(&self, code: &'static str, message: impl Into<String>) -> Fault {
+        match self.words.first_of(AXIS_MASK) {
+            _ if self.orders.has(Group::Motion) => self.orders.fault(Group::Motion, code, message),
+            Some((_, span)) => Fault::new(span, code, message),
+            None => Fault::new(Span::new(0, 1), code, message),
+        }
+    }
+
+    /// Motions other than G0 and G1 do not go with G53.
+    pub fn refuse_machine_coordinates(&self) -> Checked<()> {
+        if self.in_machine_coordinates() {
+            return Err(self.orders.fault(Group::NonModal, "conflict", "G53 goes with G0 and G1 only"));
+        }
+        Ok(())
+    }
+
+    /// A rapid from where the last block ended to the programmed position.
+    pub fn rapid(&mut self) -> Checked<()> {
+        motion::straight(self, BlockKind::Rapid)
+    }
+}

@@ -1,0 +1,93 @@
+//! What is in force between two lines, as parts that each own their state.
+
+pub(crate) mod coordinates;
+pub(crate) mod letters;
+pub(crate) mod parameters;
+pub(crate) mod path;
+pub(crate) mod tools;
+
+use tandem_sdk::{Block, PathMode};
+
+use crate::config::Config;
+use crate::words::Word;
+use crate::words::coolant::Coolant;
+use crate::words::curve::Curves;
+use crate::words::modes::Modes;
+use crate::words::outputs::Outputs;
+use crate::words::overrides::Permits;
+use crate::words::spindle::Spindle;
+
+use coordinates::Coordinates;
+use path::Path;
+use tools::Tools;
+
+/// What axis words without a motion word do.
+#[derive(Clone, Copy)]
+pub(crate) enum MotionMode {
+    /// After power-on and G80: nothing, they are an error.
+    None,
+    /// After a refused motion word: they are passed over, the refusal has been reported.
+    Refused,
+    /// What this motion word does.
+    Word(&'static Word),
+}
+
+/// Everything modal.
+#[derive(Clone)]
+pub(crate) struct State {
+    /// The line that is read, from 1.
+    pub line: u32,
+    pub motion: MotionMode,
+    pub modes: Modes,
+    pub coordinates: Coordinates,
+    pub path: Path,
+    pub tools: Tools,
+    pub spindle: Spindle,
+    pub coolant: Coolant,
+    pub permits: Permits,
+    pub outputs: Outputs,
+    pub curves: Curves,
+    /// The program is over.
+    pub ended: bool,
+}
+
+impl State {
+    pub fn new(config: &Config) -> Self {
+        Self {
+            line: 0,
+            motion: MotionMode::None,
+            modes: Modes::default(),
+            coordinates: Coordinates::new(config.reference),
+            path: Path::new(config.start),
+            tools: Tools::new(config),
+            spindle: Spindle::default(),
+            coolant: Coolant::default(),
+            permits: Permits::default(),
+            outputs: Outputs::default(),
+            curves: Curves::default(),
+            ended: false,
+        }
+    }
+
+    /// The position in program coordinates and program units.
+    pub fn program_position(&self, letters: &letters::Letters, axis: usize) -> f64 {
+        let position = self.path.position[axis] - self.coordinates.total()[axis];
+        position / self.modes.scale(letters, axis)
+    }
+
+    /// The block that comes next, at rest where the last one ended, with all that is in force.
+    pub fn blank_block(&self) -> Block {
+        Block {
+            path_mode: if self.modes.exact_stop { PathMode::ExactStop } else { PathMode::Continuous },
+            line: self.line,
+            index: self.path.next_index,
+            time_constant_s: self.modes.time_constant_s,
+            path_tolerance_mm: self.modes.tolerance_mm,
+            offset: *self.coordinates.total(),
+            tool: self.tools.in_spindle,
+            override_enabled: u32::from(self.permits.feed_override()),
+            spindle_rad_per_s: self.spindle.command_rad_per_s(),
+            ..Block::at(self.path.last_end)
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Words that move coordinate systems or go to stored positions: G10, G53 to G59.3, G92, G28 and G30.
+
+use tandem_sdk::AxisVector;
+
+use super::{Action, Group, Word, nothing, tool};
+use crate::config::Tool;
+use crate::fault::Checked;
+use crate::line::Line;
+use crate::state::coordinates::SYSTEMS;
+use crate::state::letters::AXIS_MASK;
+
+pub(super) const WORDS: &[Word] = &[
+    Word::new(
+        "G10",
+        Group::NonModal,
+        "LPRXYZABCUVW",
+        "L1 tool table, L2 and L20 coordinate systems",
+        Action::Act(set_data),
+        "G10 L2 P1 X10",
+    ),
+    Word::new("G53", Group::NonModal, "", "machine coordinates, in this line", Action::Act(nothing), "G53 G0 X1"),
+    Word::new("G54", Group::CoordinateSystem, "", "coordinate system 1", Action::Act(|line| select(line, 0)), "G54"),
+    Word::new("G55", Group::CoordinateSystem, "", "coordinate system 2", Action::Act(|line| select(line, 1)), "G55"),
+    Word::new("G56", Group::CoordinateSystem, "", "coordinate system 3", Action::Act(|line| select(line, 2)), "G56"),
+    Word::new("G57", Group::CoordinateSystem, "", "coordinate system 4", Action::Act(|line| select(line, 3)), "G57"),
+    Word::new("G58", Group::CoordinateSystem, "", "coordinate system 5", Action::Act(|line| select(line, 4)), "G58"),
+    Word::new("G59", Group::CoordinateSystem, "", "coordinate system 6", Action::Act(|line| select(line, 5)), "G59"),
+    Word::new(
+        "G59.1",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 7",
+        Action::Act(|line| select(line, 6)),
+        "G59.1",
+    ),
+    Word::new(
+        "G59.2",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 8",
+        Action::Act(|line| select(line, 7)),
+        "G59.2",
+    ),
+    Word::new(
+        "G59.3",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 9",
+        Action::Act(|line| select(line, 8)),
+        "G59.3",
+    ),
+    Word::new(
+        "G92",
+        Group::NonModal,
+        "XYZABCUVW",
+        "the current position gets these coordinates",
+        Action::Act(set_position_offset),
+        "G92 X0",
+    ),
+    Word::new("G92.1", Group::NonModal, "", "clear the offsets of G92", Action::Act(clear_g92), "G92.1"),
+    Word::new("G92.2", Group::NonModal, "", "suspend the offsets of G92", Action::Act(suspend_g92), "G92.2"),
+    Word::new("G92.3", Group::NonModal, "", "restore the offsets of G92", Action::Act(restore_g92), "G92.3"),
+    Word::new(
+        "G28",
+        Group::NonModal,
+        "XYZABCUVW",
+        "rapid to the first reference position, through a point",
+        Action::Act(|line| go_to_reference(line, 0)),
+        "G28 Z2",
+    ),
+    Word::new(
+        "G28.1",
+        Group::NonModal,
+        "",
+        "store the first reference position",
+        Action::Act(|l| store(l, 0)),
+        "G28.1",
+    ),
+    Word::new(
+        "G30",
+        Group::NonModal,
+        "XYZABCUVW",
+        "rapid to the second reference position, through a point",
+        Action::Act(|line| go_to_reference(line, 1)),
+        "G30 Z2",
+    ),
+    Word::new(
+        "G30.1",
+        Group::NonModal,
+        "",
+        "store the second reference position",
+        Action::Act(|l| store(l, 1)),
+        "G30.1",
+    ),
+];
+
+fn select(line: &mut Line, system: usize) -> Checked<()> {
+    line.state.coordinates.select(system);
+    Ok(())
+}
+
+fn clear_g92(line: &mut Line) -> Checked<()> {
+    line.state.coordinates.clear_g92();
+    Ok(())
+}
+
+fn suspend_g92(line: &mut Line) -> Checked<()> {
+    line.state.coordinates.suspend_g92();
+    Ok(())
+}
+
+fn restore_g92(line: &mut Line) -> Checked<()> {
+    line.state.coordinates.restore_g92();
+    Ok(())
+}
+
+/// G92: the offset that gives the current position the named coordinates.
+fn set_position_offset(line: &mut Line) -> Checked<()> {
+    if line.words.present & AXIS_MASK == 0 {
+        return Err(line.orders.fault(Group::NonModal, "axis-missing", "G92 needs at least one axis word"));
+    }
+    let coordinates = &line.state.coordinates;
+    let mut g92 = *coordinates.g92();
+    for (axis, value) in line.named_axes() {
+        g92[axis] += line.state.path.position[axis] - coordinates.total()[axis] - value;
+    }
+    assume_offsets(line, true);
+    line.state.coordinates.set_g92(g92);
+    Ok(())
+}
+
+/// Whether the offsets of the named axes now follow from what the first pass has assumed.
+fn assume_offsets(line: &mut Line, from_position: bool) {
+    let named = line.letters.axes_of(line.words.present & AXIS_MASK);
+    let coordinates = &mut line.state.coordinates;
+    let of_position = if from_position { line.state.path.assumed | coordinates.assumed } else { 0 };
+    coordinates.assumed |= named & if line.reads_assumed.get() { u32::MAX } else { of_position };
+}
+
+/// G10.
+fn set_data(line: &mut Line) -> Checked<()> {
+    match line.words.integer(b'L', 0..=999)? {
+        Some(1) => set_tool(line),
+        Some(2) => set_system(line, false),
+        Some(20) => set_system(line, true),
+        Some(other) => {
+            let message = format!("G10 L{other} is not supported; L1 (tools), L2 and L20 (coordinate systems) are");
+            Err(line.words.fault(b'L', "refused", message))
+        }
+        None => Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs L1, L2 or L20")),
+    }
+}
+
+/// G10 L2 sets the origin of a system; L20 sets it so that the current position gets the named coordinates.
+fn set_system(line: &mut Line, from_position: bool) -> Checked<()> {
+    if line.words.get(b'R').is_some_and(|angle| angle != 0.0) {
+        return Err(line.words.fault(b'R', "refused", "rotated coordinate systems (G10 R) are not supported"));
+    }
+    let Some(number) = line.words.integer(b'P', 0..=SYSTEMS as u32)? else {
+        let message = "G10 needs P, the coordinate system (0 to 9)";
+        return Err(line.orders.fault(Group::NonModal, "word-missing", message));
+    };
+    let coordinates = &line.state.coordinates;
+    let system = if number == 0 { coordinates.active() } else { number as usize - 1 };
+    let mut origin = *coordinates.origin(system);
+    for (axis, value) in line.named_axes() {
+        origin[axis] = if from_position {
+            line.state.path.position[axis] - coordinates.g92()[axis] - coordinates.tool()[axis] - value
+        } else if line.state.modes.absolute {
+            value
+        } else {
+            origin[axis] + value
+        };
+    }
+    assume_offsets(line, from_position);
+    line.state.coordinates.set_origin(system, origin);
+    Ok(())
+}
+
+/// G10 L1: a row of the tool table, for this run only.
+fn set_tool(line: &mut Line) -> Checked<()> {
+    let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
+        return Err(line.orders.fault(Group::NonModal, "word-missing", "G10 L1 needs P, the number of the tool"));
+    };
+    let blank = Tool { number, pocket: None, offset: AxisVector::ZERO, diameter_mm: 0.0 };
+    let mut tool = line.state.tools.find(number).copied().unwrap_or(blank);
+    for (axis, value) in line.named_axes() {
+        tool.offset[axis] = value;
+    }
+    assume_offsets(line, false);
+    if let Some(radius) = line.words.not_negative(b'R')? {
+        tool.diameter_mm = 2.0 * radius * line.state.modes.unit_mm;
+    }
+    if line.state.tools.set(tool) { Ok(()) } else { Err(line.words.fault(b'P', "tool", "the tool table is full")) }
+}
+
+/// G28.1 and G30.1.
+fn store(line: &mut Line, which: usize) -> Checked<()> {
+    line.state.coordinates.reference[which] = line.state.path.position;
+    Ok(())
+}
+
+/// G28 and G30: a rapid to the programmed point, then one of the named axes (or all) to the reference position.
+fn go_to_reference(line: &mut Line, which: usize) -> Checked<()> {
+    let named = line.words.present & AXIS_MASK;
+    line.advance();
+    line.rapid()?;
+    for axis in 0..line.letters.count() {
+        if named == 0 || line.words.has(line.letters.letter(axis)) {
+            line.state.path.position[axis] = line.state.coordinates.reference[which][axis];
+            line.state.path.uncertain &= !(1 << axis);
+        }
+    }
+    line.rapid()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{ends, last, short};
+
+    #[test]
+    fn offsets_add_up() {
+        assert_eq!(ends("G10 L2 P1 X10 Y20\nG0 X1 Y1"), [["11", "21", "0"]]);
+        assert_eq!(ends("G0 X50\nG10 L20 P1 X0\nG0 X1"), [["50", "0", "0"], ["51", "0", "0"]]);
+        assert_eq!(ends("G10 L2 P9 X5\nG59.3 G0 X1\nG54 X1"), [["6", "0", "0"], ["1", "0", "0"]]);
+        assert_eq!(ends("G91 G10 L2 P1 X5\nG10 L2 P0 X5\nG90 G0 X0"), [["10", "0", "0"]]);
+        assert_eq!(
+            ends("G0 X10\nG92 X0 Y5\nX1 Y6\nG92.2\nX1\nG92.3\nX1\nG92.1\nX2")[1..],
+            [["11", "1", "0"], ["1", "1", "0"], ["11", "1", "0"], ["2", "1", "0"]]
+        );
+        assert_eq!(ends("G10 L2 P1 X10\nG92 X5\nG53 G0 X7\nX0"), [["7", "0", "0"], ["-5", "0", "0"]]);
+        // L20 leaves G92 and the tool out of the origin: the current position is what it says.
+        assert_eq!(ends("G43 H1 G0 Z5\nG92 X3\nG10 L20 P1 X1 Z2\nG0 X2 Z4")[1..], [["1", "0", "27"]]);
+        assert_eq!(short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]), "25");
+        assert_eq!(ends("G10 L1 P7 Z3 R4\nG43 H7 G0 Z#5410"), [["0", "0", "3"]]);
+    }
+
+    #[test]
+    fn reference_positions() {
+        assert_eq!(ends("G0 X5 Y5 Z5\nG28.1\nG0 X9 Y9 Z9\nG28 Z20")[2..], [["9", "9", "20"], ["9", "9", "5"]]);
+        assert_eq!(ends("G0 X5 Y5 Z5\nG30.1\nG0 X9\nG30")[2..], [["5", "5", "5"]]);
+        assert_eq!(ends("G0 X5 Z5\nG91 G28 Z0")[1..], [["5", "0", "0"]]);
+        // A motion word beside G28 only sets the mode.
+        assert_eq!(ends("F60 G0 X5 Z5\nG1 G91 G28 Z0\nX1")[1..], [["5", "0", "0"], ["6", "0", "0"]]);
+    }
+}

@@ -1,0 +1,88 @@
+//! G0, G1 and G80: straight lines.
+
+use tandem_sdk::{Block, BlockKind};
+
+use super::{Action, Group, Shape, Word};
+use crate::fault::Checked;
+use crate::line::Line;
+
+pub(super) const WORDS: &[Word] = &[
+    Word::new("G0", Group::Motion, "XYZABCUVW", "rapid", Action::Move(Shape::Straight, rapid), "G0 X1"),
+    Word::new(
+        "G1",
+        Group::Motion,
+        "XYZABCUVW",
+        "straight line at the feed",
+        Action::Move(Shape::Straight, feed),
+        "G1 X1",
+    ),
+    Word::new(
+        "G80",
+        Group::CycleCancel,
+        "",
+        "canned cycle off; alone it also ends the motion mode",
+        Action::Act(super::nothing),
+        "G80",
+    ),
+];
+
+#[inline]
+fn rapid(line: &mut Line) -> Checked<()> {
+    line.advance();
+    straight(line, BlockKind::Rapid)
+}
+
+#[inline]
+fn feed(line: &mut Line) -> Checked<()> {
+    line.advance();
+    straight(line, BlockKind::Line)
+}
+
+/// A straight line from where the last block ended to the programmed position.
+#[inline]
+pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
+    let end = line.state.path.block_end();
+    let displacement = end - line.state.path.last_end;
+    let length_mm = line.config.axes.path_length(&displacement);
+    let feed_mm_per_s = match kind {
+        BlockKind::Rapid => f64::INFINITY,
+        _ => line.feed(length_mm, line.moves_linear(&displacement))?,
+    };
+    if length_mm == 0.0 {
+        return Ok(());
+    }
+    for axis in 0..line.letters.count() {
+        if displacement[axis] != 0.0 {
+            line.check_travel(axis, end[axis], end[axis])?;
+        }
+    }
+    let block = Block { kind, end, length_mm, feed_mm_per_s, ..line.state.blank_block() };
+    line.push(block);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{assert_items, blocks};
+
+    #[test]
+    fn no_motion_no_block() {
+        assert_items("F60 G1\nG1 X0 Y0\nG0 X0\nG91 X0\nG64 G17", &["End"]);
+        // The rounding of offsets is no motion either.
+        assert_eq!(blocks("G10 L2 P1 X0.1\nG92 Y1\nG0 X0.2\nG53 X0.3\nX0.2").len(), 1);
+    }
+
+    #[test]
+    fn the_motion_mode_holds_until_another_motion_word() {
+        assert_items(
+            "F60 G1 X1\nY2\nG80 G0 X0\nY0",
+            &[
+                "1: Line 0 to 1 0 0 0 length 1 feed 1",
+                "2: Line 1 to 1 2 0 0 length 2 feed 1",
+                "3: Rapid 2 to 0 2 0 0",
+                "4: Rapid 3 to 0 0 0 0",
+                "End",
+            ],
+        );
+    }
+}

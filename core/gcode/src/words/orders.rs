@@ -1,0 +1,254 @@
+//! The G and M words of a line, sorted by group and checked against each other and against the other words.
+
+use super::{Action, GROUPS, Group, Shape, Word, written};
+use crate::fault::{Checked, Fault, Span};
+use crate::state::MotionMode;
+use crate::state::letters::{AXIS_MASK, Letters, index, mask};
+use crate::syntax::line_words::{Code, LineWords};
+
+/// Letters that any line may have.
+const ALWAYS: u32 = mask("NOFST");
+const ARC_LETTERS: u32 = mask("IJKR");
+
+/// What a line orders.
+#[derive(Clone)]
+pub(crate) struct Orders {
+    present: u32,
+    words: [(&'static Word, Span); GROUPS],
+    /// The motion that the line makes with its axis words, where it makes one.
+    pub motion: Option<MotionMode>,
+    /// A non-modal word (G10, G28, G92, …) takes the axis words.
+    pub axes_taken: bool,
+}
+
+impl Orders {
+    pub fn new() -> Self {
+        let filler = (&super::motion::WORDS[0], Span::default());
+        Self { present: 0, words: [filler; GROUPS], motion: None, axes_taken: false }
+    }
+
+    /// Forgets the words of the line before.
+    pub fn clear(&mut self) {
+        self.present = 0;
+        self.motion = None;
+        self.axes_taken = false;
+    }
+
+    /// The groups that have a word in the line, as a set.
+    #[inline]
+    pub fn present(&self) -> u32 {
+        self.present
+    }
+
+    /// The word of the group with number `group`, which is present.
+    #[inline]
+    pub fn word(&self, group: usize) -> &'static Word {
+        self.words[group].0
+    }
+
+    #[inline]
+    pub fn has(&self, group: Group) -> bool {
+        self.present & group.bit() != 0
+    }
+
+    /// The word of `group`.
+    #[inline]
+    pub fn get(&self, group: Group) -> Option<&'static Word> {
+        self.has(group).then(|| self.words[group as usize].0)
+    }
+
+    /// How the word is written whose path the line makes.
+    pub fn motion_code(&self) -> &'static str {
+        match self.motion {
+            Some(MotionMode::Word(word)) => word.code,
+            _ => "the motion",
+        }
+    }
+
+    /// A fault at the word of `group`.
+    pub fn fault(&self, group: Group, code: &'static str, message: impl Into<String>) -> Fault {
+        Fault::new(self.words[group as usize].1, code, message)
+    }
+
+    /// Sorts the words of a line; `modal` is the motion mode before it. After a fault what is not at fault is sorted
+    /// all the same, so that reading can go on.
+    #[inline]
+    pub fn sort(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {
+        self.clear();
+        let mut claims = Claims::default();
+        let g = self.sort_kind(b'G', words.g.as_slice(), words, &mut claims);
+        let m = self.sort_kind(b'M', words.m.as_slice(), words, &mut claims);
+        let motion = self.choose_motion(words, modal, &mut claims);
+        g.and(m).and(motion)?;
+        let foreign = words.present & AXIS_MASK & !letters.mask;
+        if words.present & (ALWAYS | claims.letters) != words.present || foreign != 0 {
+            return Err(misplaced(words, claims.letters, letters));
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn sort_kind(&mut self, letter: u8, codes: &[Code], words: &LineWords, claims: &mut Claims) -> Checked<()> {
+        let mut result = Ok(());
+        for code in codes {
+            let added = self.add(letter, *code, words, claims);
+            result = result.and(added);
+        }
+        result
+    }
+
+    fn add(&mut self, letter: u8, code: Code, words: &LineWords, claims: &mut Claims) -> Checked<()> {
+        let Some(word) = super::find(letter, code.tenths) else { return Err(unknown(letter as char, code)) };
+        if let Action::Refuse(why) = word.action {
+            self.axes_taken |= word.group == Group::NonModal;
+            if word.group == Group::Motion {
+                self.motion = Some(MotionMode::Refused);
+            }
+            let message = format!("{} ({}): {why}", word.code, word.meaning);
+            return Err(Fault::new(code.span, "refused", message));
+        }
+        if let Some(other) = self.get(word.group) {
+            return Err(conflict(word, other, code.span));
+        }
+        self.present |= word.group.bit();
+        self.words[word.group as usize] = (word, code.span);
+        claims.add(word, words)
+    }
+
+    /// Decides who takes the axis words: a non-modal word, else the motion word, else the motion mode.
+    #[inline]
+    fn choose_motion(&mut self, words: &LineWords, modal: MotionMode, claims: &mut Claims) -> Checked<()> {
+        let non_modal = self.get(Group::NonModal);
+        self.axes_taken |= non_modal.is_some_and(|word| word.mask & AXIS_MASK != 0);
+        let refused = self.motion.filter(|motion| matches!(motion, MotionMode::Refused));
+        let word = self.get(Group::Motion);
+        if word.is_some_and(|word| word.shape().is_none()) {
+            return Err(self.fault(Group::Motion, "nurbs", super::curve::NONE_OPEN));
+        }
+        if self.axes_taken {
+            return self.check_taken(word, non_modal, words);
+        }
+        let motion = word.map(MotionMode::Word).or(refused).unwrap_or(modal);
+        if !begins(motion, words, word.is_some()) {
+            return Ok(());
+        }
+        self.motion = Some(motion);
+        match motion {
+            MotionMode::None => Err(no_motion(words)),
+            MotionMode::Refused => {
+                claims.letters = u32::MAX;
+                Ok(())
+            }
+            MotionMode::Word(_) if word.is_some() => Ok(()),
+            MotionMode::Word(modal) => claims.add(modal, words),
+        }
+    }
+
+    /// G28 and G30 go well with a motion word, which then only sets the mode; the others do not.
+    fn check_taken(
+        &self,
+        motion: Option<&'static Word>,
+        non_modal: Option<&'static Word>,
+        words: &LineWords,
+    ) -> Checked<()> {
+        let Some((motion, taker)) = motion.zip(non_modal) else { return Ok(()) };
+        let probes = motion.shape() == Some(Shape::Probe);
+        let has_axes = words.present & AXIS_MASK != 0;
+        let only_sets_mode = matches!(taker.tenths, 280 | 300);
+        if probes || has_axes && !only_sets_mode {
+            let message = format!("the axis words belong to {}, not to a motion: split the line", taker.code);
+            return Err(self.fault(Group::Motion, "conflict", message));
+        }
+        Ok(())
+    }
+}
+
+/// Whether the words of a line begin a motion; `stands` says whether its word is in the line.
+#[inline]
+fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
+    if words.present & AXIS_MASK != 0 {
+        return true;
+    }
+    let MotionMode::Word(word) = motion else { return false };
+    match word.shape() {
+        Some(Shape::Arc) => stands || words.present & ARC_LETTERS != 0,
+        Some(Shape::Probe | Shape::Curve) => stands,
+        Some(Shape::Straight) | None => false,
+    }
+}
+
+#[cold]
+fn conflict(word: &Word, other: &Word, span: Span) -> Fault {
+    let message = if word.tenths == other.tenths {
+        format!("{} stands in this line twice", word.code)
+    } else {
+        format!("{} and {} exclude each other in a line (group: {})", word.code, other.code, word.group.name())
+    };
+    Fault::new(span, "conflict", message)
+}
+
+/// The letters that the words of the line take.
+#[derive(Default)]
+struct Claims {
+    letters: u32,
+}
+
+impl Claims {
+    /// A letter that two words of the line could take belongs to neither: the author must split the line.
+    #[inline]
+    fn add(&mut self, word: &Word, words: &LineWords) -> Checked<()> {
+        let both = self.letters & word.mask & words.present & !AXIS_MASK;
+        self.letters |= word.mask;
+        let Some((shared, span)) = words.first_of(both) else { return Ok(()) };
+        let word = word.code;
+        let message = format!("{word} takes {}, but so does another word of this line: split it", shared as char);
+        Err(Fault::new(span, "ambiguous", message))
+    }
+}
+
+#[cold]
+fn unknown(letter: char, code: Code) -> Fault {
+    let word = written(letter, code.tenths);
+    let message = match code.tenths {
+        1000..=1999 if letter == 'M' => format!("{word}: user-defined commands are not supported"),
+        _ => format!("{word} is not known"),
+    };
+    Fault::new(code.span, "unknown-code", message)
+}
+
+#[cold]
+fn no_motion(words: &LineWords) -> Fault {
+    let span = words.first_of(AXIS_MASK).map(|(_, span)| span).unwrap_or_default();
+    Fault::new(span, "motion-missing", "no motion mode is in force: G0, G1, G2 or G3 is missing")
+}
+
+/// The first word that the machine or the line has no use for.
+#[cold]
+fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> Fault {
+    let foreign = AXIS_MASK & !letters.mask;
+    let useless = !(ALWAYS | claimed) | foreign;
+    let (letter, span) = words.first_of(useless).unwrap_or_default();
+    let name = letter as char;
+    if letter.is_ascii_uppercase() && foreign >> index(letter) & 1 != 0 {
+        return no_axis(letter, span, letters);
+    }
+    let takers = takers(letter);
+    if takers.is_empty() {
+        return Fault::new(span, "unknown-word", format!("the word {name} is not known"));
+    }
+    let exponent = words.exponent(letter);
+    Fault::new(span, "unused-word", format!("nothing in this line takes the word {name} ({takers} would){exponent}"))
+}
+
+/// An axis that the machine lacks.
+#[cold]
+pub(crate) fn no_axis(letter: u8, span: Span, letters: &Letters) -> Fault {
+    Fault::new(span, "axis", format!("this machine has no axis {}; it has {}", letter as char, letters.list()))
+}
+
+/// The supported words that take `letter`.
+fn takers(letter: u8) -> String {
+    let takes = |word: &&&Word| word.takes.as_bytes().contains(&letter);
+    let words = super::all();
+    words.iter().filter(takes).map(|word| word.code).collect::<Vec<_>>().join(", ")
+}

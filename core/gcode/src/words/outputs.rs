@@ -1,0 +1,142 @@
+//! M62 to M66: digital outputs, and waiting for inputs.
+
+use tandem_sdk::EventKind;
+
+use super::{Action, Group, Word};
+use crate::fault::{Checked, Fault};
+use crate::item::{Input, InputMode, InputWait, Item};
+use crate::line::Line;
+
+pub(super) const WORDS: &[Word] = &[
+    Word::new("M62", Group::InputOutput, "P", "digital output P on, with the motion", WITH_MOTION_ON, "M62 P1"),
+    Word::new("M63", Group::InputOutput, "P", "digital output P off, with the motion", WITH_MOTION_OFF, "M63 P1"),
+    Word::new("M64", Group::InputOutput, "P", "digital output P on, at rest", AT_REST_ON, "M64 P1"),
+    Word::new("M65", Group::InputOutput, "P", "digital output P off, at rest", AT_REST_OFF, "M65 P1"),
+    Word::new("M66", Group::InputOutput, "PELQ", "wait for digital input P", Action::Act(wait), "M66 P3 L1 Q2"),
+];
+
+const WITH_MOTION_ON: Action = Action::Act(|line| switch(line, true, false));
+const WITH_MOTION_OFF: Action = Action::Act(|line| switch(line, false, false));
+const AT_REST_ON: Action = Action::Act(|line| switch(line, true, true));
+const AT_REST_OFF: Action = Action::Act(|line| switch(line, false, true));
+
+/// Highest output of M62 to M65; the two above it are mist and flood coolant.
+const MAX_OUTPUT: u32 = 61;
+
+/// What the program has set, and the answer of M66.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Outputs {
+    /// Bit per output that the program has set.
+    set: u64,
+    /// Bit per output that is on.
+    on: u64,
+    /// Answer of the last M66 (#5399).
+    pub answer: f64,
+    /// The first pass has assumed that answer.
+    pub answer_assumed: bool,
+}
+
+impl Outputs {
+    /// Sets an output; whether that may change it.
+    fn set(&mut self, number: u32, on: bool) -> bool {
+        let bit = 1 << number;
+        let changes = self.set & bit == 0 || (self.on & bit != 0) != on;
+        self.set |= bit;
+        self.on = if on { self.on | bit } else { self.on & !bit };
+        changes
+    }
+
+    /// What they are is no longer known: whatever the program sets next is sent.
+    pub fn forget(&mut self) {
+        self.set = 0;
+    }
+}
+
+/// M64 and M65 do not wait for motion: the machine is at rest when they switch, as in LinuxCNC, whose queue has run empty
+/// by then.
+fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
+    let missing = || line.orders.fault(Group::InputOutput, "word-missing", "P, the number of the output, is missing");
+    let number = line.words.integer(b'P', 0..=MAX_OUTPUT)?.ok_or_else(missing)?;
+    if let Some(refusal) = line.config.outputs.refusal("output", number) {
+        return Err(line.words.fault(b'P', "output", refusal));
+    }
+    if line.state.outputs.set(number, on) {
+        if at_rest {
+            line.rest();
+        }
+        line.event(EventKind::DigitalOutput, number, f64::from(u8::from(on)));
+    }
+    Ok(())
+}
+
+fn wait(line: &mut Line) -> Checked<()> {
+    let input = match (line.words.integer(b'P', 0..=63)?, line.words.integer(b'E', 0..=63)?) {
+        (Some(number), None) => match line.config.inputs.refusal("input", number) {
+            Some(refusal) => return Err(line.words.fault(b'P', "input", refusal)),
+            None => Input::Digital(number),
+        },
+        (_, Some(_)) => return Err(wait_fault(line, "M66 E: there are no analogue inputs, only digital ones (P)")),
+        (None, None) => return Err(wait_fault(line, "M66 needs P, the number of a digital input")),
+    };
+    let mode = match line.words.integer(b'L', 0..=4)? {
+        None | Some(0) => InputMode::Immediate,
+        Some(1) => InputMode::Rise,
+        Some(2) => InputMode::Fall,
+        Some(3) => InputMode::High,
+        Some(_) => InputMode::Low,
+    };
+    let timeout_s = line.words.not_negative(b'Q')?.unwrap_or(0.0);
+    if mode != InputMode::Immediate && timeout_s == 0.0 {
+        return Err(wait_fault(line, "M66 needs Q, the longest wait in seconds, greater than zero"));
+    }
+    line.rest();
+    let (number, before_block) = (line.state.line, line.state.path.next_index);
+    line.out.push(Item::Wait(InputWait { line: number, before_block, input, mode, timeout_s }));
+    Ok(())
+}
+
+fn wait_fault(line: &Line, message: &str) -> Fault {
+    line.orders.fault(Group::InputOutput, "input", message)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::assert_items;
+
+    #[test]
+    fn outputs_that_do_not_go_with_the_motion_switch_at_rest() {
+        assert_items(
+            "F60\nG1 X1\nM62 P1\nX2\nM64 P2\nX3\nM64 P2\nX4\nM63 P1\nX5\nM65 P2\nX6",
+            &[
+                "2: Line 0 to 1 0 0 0 length 1 feed 1",
+                "3: DigitalOutput 1 1 before 1",
+                "4: Line 1 to 2 0 0 0 length 1 feed 1",
+                "5: Dwell 2 to 2 0 0 0 for 0",
+                "5: DigitalOutput 2 1 before 3",
+                "6: Line 3 to 3 0 0 0 length 1 feed 1",
+                "8: Line 4 to 4 0 0 0 length 1 feed 1",
+                "9: DigitalOutput 1 0 before 5",
+                "10: Line 5 to 5 0 0 0 length 1 feed 1",
+                "11: Dwell 6 to 5 0 0 0 for 0",
+                "11: DigitalOutput 2 0 before 7",
+                "12: Line 7 to 6 0 0 0 length 1 feed 1",
+                "End",
+            ],
+        );
+    }
+
+    #[test]
+    fn inputs_are_waited_for_at_rest() {
+        assert_items(
+            "G0 X1\nM66 P3 L1 Q2\nM66 P1 L0\nG0 X#5399",
+            &[
+                "1: Rapid 0 to 1 0 0 0",
+                "2: Dwell 1 to 1 0 0 0 for 0",
+                "2: Wait Digital(3) Rise 2 before 2",
+                "3: Wait Digital(1) Immediate 0 before 2",
+                "4: Rapid 2 to 0 0 0 0",
+                "End",
+            ],
+        );
+    }
+}

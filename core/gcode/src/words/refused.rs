@@ -1,0 +1,75 @@
+//! Words that are known and refused, with the reason.
+
+use super::Group::{
+    CutterRadius, CycleReturn, FeedMode, InputOutput, LatheDiameter, Motion, NonModal, Plane, Polar, Rotation, Scaling,
+    Spindle, SpindleMode, Stop, ToolChange, ToolLength, User,
+};
+use super::Word;
+
+const COMPENSATION: &str = "cutter radius compensation is not supported: let the CAM system write the tool centre path";
+const CYCLES: &str = "canned cycles are not supported: let the CAM system write them out";
+const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
+const LATHE: &str = "lathe modes are not supported: X is a length as it is programmed";
+const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
+const SUBPROGRAMS: &str = "subprograms are not supported: let the CAM system write the program out flat";
+const ANALOG: &str = "analogue outputs are not supported";
+const MODAL: &str = "saving and restoring the modal state is not supported";
+
+pub(super) const WORDS: &[Word] = &[
+    Word::refused("G6.1", Motion, "NURBS", "write G6.2 (a control point and a knot a line) or G5.2"),
+    Word::refused("G7", LatheDiameter, "diameter mode", LATHE),
+    Word::refused("G8", LatheDiameter, "radius mode", LATHE),
+    Word::refused("G9", NonModal, "exact stop in this line only", "not supported: use G61.1 and G64"),
+    Word::refused("G16", Polar, "polar coordinates", FRAMES),
+    Word::refused("G17.1", Plane, "arcs in the plane UV", "arcs lie in XY, ZX or YZ"),
+    Word::refused("G18.1", Plane, "arcs in the plane WU", "arcs lie in XY, ZX or YZ"),
+    Word::refused("G19.1", Plane, "arcs in the plane VW", "arcs lie in XY, ZX or YZ"),
+    Word::refused("G33", Motion, "synchronous motion", SYNCHRONOUS),
+    Word::refused("G33.1", Motion, "rigid tapping", SYNCHRONOUS),
+    Word::refused("G41", CutterRadius, "cutter radius compensation, left", COMPENSATION),
+    Word::refused("G41.1", CutterRadius, "cutter radius compensation, left", COMPENSATION),
+    Word::refused("G42", CutterRadius, "cutter radius compensation, right", COMPENSATION),
+    Word::refused("G42.1", CutterRadius, "cutter radius compensation, right", COMPENSATION),
+    Word::refused("G43.1", ToolLength, "dynamic tool length offset", "not supported: use G43 with the tool table"),
+    Word::refused("G43.2", ToolLength, "additional tool length offset", "not supported: use G43 with the tool table"),
+    Word::refused("G44", ToolLength, "negative tool length offset", "not supported: use G43 with the tool table"),
+    Word::refused("G51", Scaling, "scaling", FRAMES),
+    Word::refused("G52", NonModal, "local coordinate system", "not supported: use G92 or G10 L2"),
+    Word::refused("G65", NonModal, "macro call", "macros are not supported"),
+    Word::refused("G66", NonModal, "modal macro call", "macros are not supported"),
+    Word::refused("G68", Rotation, "rotation", FRAMES),
+    Word::refused("G68.2", Rotation, "tilted plane", FRAMES),
+    Word::refused("G73", Motion, "drilling, chip breaking", CYCLES),
+    Word::refused("G74", Motion, "left-hand tapping", CYCLES),
+    Word::refused("G76", Motion, "threading", CYCLES),
+    Word::refused("G81", Motion, "drilling", CYCLES),
+    Word::refused("G82", Motion, "drilling with dwell", CYCLES),
+    Word::refused("G83", Motion, "peck drilling", CYCLES),
+    Word::refused("G84", Motion, "tapping", CYCLES),
+    Word::refused("G85", Motion, "boring", CYCLES),
+    Word::refused("G86", Motion, "boring", CYCLES),
+    Word::refused("G87", Motion, "back boring", CYCLES),
+    Word::refused("G88", Motion, "boring", CYCLES),
+    Word::refused("G89", Motion, "boring", CYCLES),
+    Word::refused("G95", FeedMode, "feed a revolution", SYNCHRONOUS),
+    Word::refused("G96", SpindleMode, "constant surface speed", "not supported: program the spindle speed"),
+    Word::refused("G98", CycleReturn, "cycle return to the old level", CYCLES),
+    Word::refused("G99", CycleReturn, "cycle return to R", CYCLES),
+    Word::refused("M19", Spindle, "oriented spindle stop", "orienting the spindle is not supported"),
+    Word::refused("M29", Spindle, "rigid tapping mode", "motion synchronous with the spindle is not supported"),
+    Word::refused("M60", Stop, "pallet change", "pallets are not supported"),
+    Word::refused(
+        "M61",
+        ToolChange,
+        "set the number of the tool",
+        "not supported: the configuration says which tool is in",
+    ),
+    Word::refused("M67", InputOutput, "analogue output with the motion", ANALOG),
+    Word::refused("M68", InputOutput, "analogue output", ANALOG),
+    Word::refused("M70", User, "save the modal state", MODAL),
+    Word::refused("M71", User, "drop the saved modal state", MODAL),
+    Word::refused("M72", User, "restore the modal state", MODAL),
+    Word::refused("M73", User, "save and restore the modal state", MODAL),
+    Word::refused("M98", User, "subprogram call", SUBPROGRAMS),
+    Word::refused("M99", User, "subprogram return", SUBPROGRAMS),
+];
