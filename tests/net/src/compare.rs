@@ -108,7 +108,7 @@ impl Comparison<'_> {
     /// Everything is the same but for messages that are declared.
     fn exact(&self, finding: &mut Finding) {
         let differences = &mut finding.differences;
-        self.texts(differences, |text| text.to_string());
+        self.texts(differences, str::to_string);
         if self.old.trace != self.new.trace {
             differences.push(format!("trace: {}", self.trace_difference()));
         }

@@ -65,7 +65,7 @@ pub fn run(case: &Case, binary: &Path, folder: &Path) -> Result<Ran, String> {
     }
     command.stdin(File::open(folder.join("input")).map_err(wrong)?);
     command.stdout(Stdio::from(create("stdout")?)).stderr(Stdio::from(create("stderr")?));
-    let status = wait(command).map_err(|e| format!("{}: {e}", binary.display()))?;
+    let status = wait(&mut command).map_err(|e| format!("{}: {e}", binary.display()))?;
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap_or_default();
     let text = |name: &str| String::from_utf8_lossy(&bytes(name)).into_owned();
     Ok(Ran {
@@ -80,7 +80,7 @@ pub fn run(case: &Case, binary: &Path, folder: &Path) -> Result<Ran, String> {
     })
 }
 
-fn wait(mut command: Command) -> std::io::Result<Option<i32>> {
+fn wait(command: &mut Command) -> std::io::Result<Option<i32>> {
     let (mut child, begun) = (command.spawn()?, Instant::now());
     while begun.elapsed() < PATIENCE {
         if let Some(status) = child.try_wait()? {
