@@ -1,11 +1,11 @@
 //! The drives while they are claimed: brought up, told where they stand, and let go of whatever happens.
 
+use tandem_faults::Faults;
 use tandem_machine::Machine;
 use tandem_sdk::{Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS};
 
 use crate::drives::{Drives, Roster};
 use crate::error::HostError;
-use crate::faults::{self, Faults};
 use crate::joints::JointSpace;
 use crate::rules::refusal;
 use crate::run::{Clock, Switches};
@@ -43,8 +43,8 @@ impl Claim {
     }
 
     /// Puts `faults` around the drivers, once their drives are claimed.
-    pub fn add_faults(&mut self, faults: Option<Faults>) {
-        self.faults = faults;
+    pub fn add_faults(&mut self, faults: Faults) {
+        self.faults = Some(faults);
     }
 
     /// Claims the drives, once: brings the buses up. The answer is where the axes stand, mm or rad.
@@ -76,7 +76,7 @@ impl Claim {
         let attached = self.attached.take()?;
         let driver = self.drives.take()?.into_driver();
         match self.faults.take() {
-            Some(faults) => Some((faults::wrap(driver, faults), attached)),
+            Some(faults) => Some((tandem_faults::wrap(driver, faults), attached)),
             None => Some((driver, attached)),
         }
     }

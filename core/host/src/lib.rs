@@ -8,6 +8,9 @@ mod claim;
 mod command;
 mod command_file;
 mod command_log;
+#[cfg(test)]
+#[path = "../../../tests/counting_allocator.rs"]
+mod counting_allocator;
 mod curve_watch;
 mod density;
 mod drives;
@@ -15,7 +18,6 @@ mod dry_run;
 mod error;
 mod exchange_time;
 mod fault_text;
-mod faults;
 mod hang;
 mod homing;
 pub mod jog;

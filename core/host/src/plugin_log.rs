@@ -55,6 +55,18 @@ pub fn drain_plugin_log(each: &mut dyn FnMut(&str)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::counting_allocator::{HeapUse, heap_use_of};
+
+    #[test]
+    fn a_line_for_the_log_takes_no_memory() {
+        listen();
+        let used = heap_use_of(|| {
+            for joint in 0..20 {
+                tandem_sdk::log!(Warning, "joint {joint}: {} frames lost, the last one {:.3} s ago", 3 * joint, 0.25);
+            }
+        });
+        assert_eq!(used, HeapUse::default());
+    }
 
     #[test]
     fn lines_come_in_order_and_what_is_lost_is_counted() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use tandem_faults::{Faults, Joints};
 use tandem_gcode::{CheckReport, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
@@ -17,7 +18,7 @@ use crate::policy::PolicyHost;
 use crate::registry::Registry;
 use crate::run::Switches;
 use crate::strategy::FeedRunner;
-use crate::{faults, rules, setup};
+use crate::{rules, setup};
 
 /// Everything that a run needs, made and checked; the drives are not claimed. Whatever refuses a run without asking the
 /// drives refuses it here, so that a check finds all of it.
@@ -83,8 +84,11 @@ impl Plugins {
     /// # Errors
     /// What `[faults]` says wrongly.
     pub fn add_faults(&mut self, machine: &Machine, registry: &Registry) -> Result<(), HostError> {
+        let Some(table) = &machine.faults else { return Ok(()) };
         let joints = JointSpace::of(machine, registry)?;
-        self.claim.add_faults(faults::read(machine, &joints)?);
+        let joints = Joints { rotary: joints.rotary(), count: joints.count() };
+        let faults = Faults::read(table, &joints).map_err(|wrong| rules::refusal(machine, &wrong.key, wrong.cause))?;
+        self.claim.add_faults(faults);
         Ok(())
     }
 

@@ -22,6 +22,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "core/host",
         &[
+            "tandem-faults",
             "tandem-fine",
             "tandem-gcode",
             "tandem-machine",
@@ -37,6 +38,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["tandem-gcode", "tandem-host", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"],
     ),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
+    // It reads a table of the machine file, and no hardware.
+    ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),
     ("hal-drivers", &["tandem-sdk"]),
     ("scripts", &[]),
     (

@@ -3,11 +3,11 @@
 use tandem_sdk::{AxisVector, MAX_AXES};
 use toml::{Table, Value};
 
-use super::entry::{Entry, Refusal};
-use super::kind::{Corruption, Kind, MOST_DELAY, Mask};
-use super::nearest::unknown;
-use super::schedule::{Rate, When};
-use super::wrapper::Plan;
+use crate::entry::{Entry, Refusal};
+use crate::kind::{Corruption, Kind, MOST_DELAY, Mask};
+use crate::nearest::unknown;
+use crate::schedule::{Rate, When};
+use crate::wrapper::Plan;
 
 /// Keys of every kind but `delay`.
 const COMMON: &[&str] = &["kind", "from_tick", "until_tick", "probability", "every", "at_call", "periods"];
@@ -36,13 +36,16 @@ pub struct Joints {
 #[derive(Debug, PartialEq)]
 pub struct Faults {
     /// Seed of all wrappers.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The wrappers, the one next to the drives first.
-    pub wrap: Vec<Plan>,
+    pub(crate) wrap: Vec<Plan>,
 }
 
 impl Faults {
     /// Reads the table. Host; allocates.
+    ///
+    /// # Errors
+    /// The first key that makes no sense on a machine with these `joints`, and why.
     pub fn read(table: &Table, joints: &Joints) -> Result<Self, Refusal> {
         let whole = Entry { table, path: "faults".to_string() };
         whole.permit(&["seed", "wrap"], |_| false)?;

@@ -7,9 +7,9 @@ use tandem_sdk::{
     Setpoint,
 };
 
-use super::entry::Refusal;
-use super::options::{Faults, Joints};
-use super::wrapper::Wrapper;
+use crate::entry::Refusal;
+use crate::options::{Faults, Joints};
+use crate::wrapper::Wrapper;
 
 /// The ticks that the drives got, shared with the test.
 pub type Ticks = Arc<Mutex<Vec<u64>>>;

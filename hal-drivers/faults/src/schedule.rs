@@ -1,6 +1,6 @@
 //! Which exchanges a fault hits.
 
-use super::random::Random;
+use crate::random::Random;
 
 /// How often, within the window.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,9 +4,9 @@ use tandem_sdk::{
     Attached, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_LATCHES, PluginError, Setpoint, Words,
 };
 
-use super::kind::{Kind, Line, freeze};
-use super::random::Random;
-use super::schedule::{Schedule, When};
+use crate::kind::{Kind, Line, freeze};
+use crate::random::Random;
+use crate::schedule::{Schedule, When};
 
 /// One entry of `[[faults.wrap]]`, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 
 use toml::{Table, Value};
 
-use super::nearest::unknown;
+use crate::nearest::unknown;
 
 /// What is wrong, and the dotted path of the key concerned.
 #[derive(Debug, PartialEq)]
