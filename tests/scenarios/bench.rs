@@ -4,9 +4,10 @@ use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed, TraceCsv};
+use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_oracle::{Options, Row, Trace, Verdict, judge};
+use tandem_recorder::TraceCsv;
 use tandem_rig::{CASES_VARIABLE, record_case};
 use tandem_rings::{MachineState, Sample};
 use tandem_sdk::{

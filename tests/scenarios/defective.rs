@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use tandem_host::{Clock, Outcome, Registry, Run, RunObserver, TraceCsv};
+use tandem_host::{Clock, Outcome, Registry, Run, RunObserver};
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_oracle::Kind;
+use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, Plugin,

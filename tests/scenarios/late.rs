@@ -5,8 +5,9 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_gcode::Program;
-use tandem_host::{Clock, Registry, Run, Summary, Switches};
+use tandem_host::{Clock, Registry, Run, Switches};
 use tandem_machine::Machine;
+use tandem_recorder::Summary;
 use tandem_sdk::{
     Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint,
     local_plugin,

@@ -5,8 +5,9 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use tandem_gcode::Program;
-use tandem_host::{Clock, Registry, Run, RunObserver, Summary, Switches, Timed};
+use tandem_host::{Clock, Registry, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
+use tandem_recorder::Summary;
 use tandem_rings::Sample;
 use tempfile::TempDir;
 

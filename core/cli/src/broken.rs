@@ -1,6 +1,6 @@
 //! Files of a run that could not be written to their end.
 
-use tandem_host::RecordError;
+use tandem_recorder::RecordError;
 
 use crate::operator::tell;
 

@@ -9,8 +9,9 @@ use tandem_estimate::diagnose::{Evidence, Fitted, LEAST_R2, LinearFit, MOST_RMS,
 use tandem_estimate::experiment::{Experiment, Measured};
 use tandem_estimate::polygon::Timed;
 use tandem_estimate::{Choice, measurements, model_file};
-use tandem_host::{Output, with_stand_ins};
+use tandem_host::with_stand_ins;
 use tandem_machine::Machine;
+use tandem_recorder::Output;
 
 use crate::args::{self, Form};
 use crate::{FAULT, REFUSED, built_in, clock};

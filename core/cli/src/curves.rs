@@ -1,7 +1,7 @@
 //! Curvature and chord error along NURBS curves, for the report.
 
-use tandem_host::CurveWatch;
 use tandem_machine::Machine;
+use tandem_recorder::CurveWatch;
 use tandem_report::Signal;
 use tandem_rings::Sample;
 use tandem_sdk::Block;

@@ -5,9 +5,10 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
+use tandem_host::Run;
 use tandem_host::operator::Counters;
-use tandem_host::{Run, flush_outputs};
 use tandem_machine::Machine;
+use tandem_recorder::flush_outputs;
 use tandem_rings::Status;
 
 use crate::operator::restore_terminal;
@@ -70,7 +71,7 @@ impl LastWords {
     fn write(&self, fault: &str) {
         let status = &self.status;
         let summary = json!({
-            "format": tandem_host::SUMMARY_FORMAT,
+            "format": tandem_recorder::SUMMARY_FORMAT,
             "program": self.program,
             "machine": self.machine,
             "planner": self.planner,

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use tandem_force_control::fit::{Fit, Point, stribeck};
 use tandem_force_control::inertia::{Differences, Rls};
 use tandem_gcode::Program;
-use tandem_host::{Output, Run, RunObserver, Switches};
+use tandem_host::{Run, RunObserver, Switches};
 use tandem_machine::Machine;
+use tandem_recorder::Output;
 use tandem_rings::Sample;
 
 use crate::warnings::tell_warnings;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, PlanningRow, RecordError, Summary};
 use tandem_machine::{JerkMode, Machine};
+use tandem_recorder::{Output, PlanningRow, RecordError, Summary};
 use tandem_report::{Axis, Ended, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport};

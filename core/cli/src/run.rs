@@ -4,11 +4,9 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use tandem_host::{
-    BlocksCsv, Clock, EventsCsv, HostError, Left, Outcome, Output, PolicySummary, RecordError, Run, RunObserver, Stop,
-    StopAnswer, Summary, Switches, Timed, parse_commands,
-};
+use tandem_host::{Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer, Switches, Timed, parse_commands};
 use tandem_machine::Machine;
+use tandem_recorder::{BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, Stop, Summary};
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
 

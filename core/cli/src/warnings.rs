@@ -1,6 +1,6 @@
 //! What is to be known of a run whatever its end.
 
-use tandem_host::Summary;
+use tandem_recorder::Summary;
 
 /// Says it on standard error, a line each.
 pub fn tell_warnings(summary: &Summary) {

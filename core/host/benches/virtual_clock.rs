@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use divan::counter::ItemsCount;
 use tandem_gcode::Program;
-use tandem_host::{Clock, Registry, Run, Summary};
+use tandem_host::{Clock, Registry, Run};
 use tandem_machine::Machine;
+use tandem_recorder::Summary;
 
 fn main() {
     divan::main();

@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
+use tandem_recorder::ExchangeUs;
 use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
 
-use crate::summary::ExchangeUs;
 use crate::wall_clock::now_ns;
 
 /// What was measured, shared with who reads it.

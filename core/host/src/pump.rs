@@ -4,16 +4,15 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
 use tandem_machine::RecordErrorMode;
+use tandem_recorder::{Lateness, Monitor, PolicySummary};
 use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
 use crate::command::{Command, Timed};
 use crate::command_log::CommandLog;
-use crate::lateness::Lateness;
-use crate::monitor::Monitor;
 use crate::plugin_log::drain_plugin_log;
-use crate::policy::{PolicySummary, Reloader};
+use crate::policy::Reloader;
 use crate::strategy::FeedRunner;
 use crate::waits::Waits;
 

@@ -11,8 +11,8 @@ use rustix::process::{Resource, getrlimit};
 use rustix::thread::{
     CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity, set_current_timer_slack,
 };
-use serde::Serialize;
 use tandem_machine::FineThread;
+use tandem_recorder::PageFaults;
 
 /// Where Linux takes the longest wake-up time that is bearable.
 const WAKE_UP_TIME: &str = "/dev/cpu_dma_latency";
@@ -130,29 +130,12 @@ fn touch_stack() {
     black_box(&stack);
 }
 
-/// Page faults of a thread.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct PageFaults {
-    /// Pages read from a disk.
-    pub major: u64,
-    /// Pages that only had to be mapped.
-    pub minor: u64,
-}
-
-impl PageFaults {
-    /// Those of the calling thread until now. Fine thread, before and after the periods; does not allocate.
-    pub fn of_this_thread() -> Self {
-        // SAFETY: the structure holds numbers only, for which all zeros is a value.
-        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
-        // SAFETY: the pointer is to a structure of the right type that outlives the call.
-        let status = unsafe { libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage) };
-        debug_assert_eq!(status, 0, "the arguments are constants that Linux knows");
-        Self { major: usage.ru_majflt.unsigned_abs(), minor: usage.ru_minflt.unsigned_abs() }
-    }
-
-    /// Those since `earlier`.
-    #[must_use]
-    pub fn since(self, earlier: Self) -> Self {
-        Self { major: self.major - earlier.major, minor: self.minor - earlier.minor }
-    }
+/// Page faults of the calling thread until now. Fine thread, before and after the periods; does not allocate.
+pub fn page_faults_of_this_thread() -> PageFaults {
+    // SAFETY: the structure holds numbers only, for which all zeros is a value.
+    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+    // SAFETY: the pointer is to a structure of the right type that outlives the call.
+    let status = unsafe { libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage) };
+    debug_assert_eq!(status, 0, "the arguments are constants that Linux knows");
+    PageFaults { major: usage.ru_majflt.unsigned_abs(), minor: usage.ru_minflt.unsigned_abs() }
 }

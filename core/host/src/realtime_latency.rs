@@ -4,9 +4,9 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_machine::FineThread;
+use tandem_recorder::PageFaults;
 
 use crate::error::HostError;
-use crate::realtime::PageFaults;
 use crate::realtime_periods::{Body, Timing};
 use crate::wall_clock::TimedThread;
 

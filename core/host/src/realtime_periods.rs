@@ -1,7 +1,8 @@
 //! One call a period, with absolute deadlines, on any clock.
 
+use tandem_recorder::Lateness;
+
 use crate::hang::FineRuns;
-use crate::lateness::Lateness;
 use crate::phase::PhaseSteering;
 
 /// A clock that can wait. Times are ns from any origin.

@@ -7,6 +7,7 @@ use std::time::Instant;
 use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::{Analog, Machine};
+use tandem_recorder::{LatenessUs, Monitor, PageFaults, Summary};
 use tandem_rings::{HostEnd, Sizes, Switched, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
 use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
@@ -18,18 +19,15 @@ use crate::exchange_time::{self, ExchangeTimes};
 use crate::fault_text::{Known, describe};
 use crate::hang::HangWatch;
 use crate::homing::Homing;
-use crate::joints::{JointSpace, JointWatch};
-use crate::monitor::Monitor;
+use crate::joints::JointSpace;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
 use crate::pump::{Pump, RunObserver};
 use crate::ready::Ready;
-use crate::realtime::PageFaults;
 use crate::realtime_periods::Timing;
 use crate::registry::Registry;
 use crate::strategy::FeedRunner;
 use crate::summarise::summarise;
-use crate::summary::{LatenessUs, Summary};
 use crate::waits::Waits;
 use crate::wall_clock::Periods;
 use crate::{rules, setup, virtual_clock, wall_clock};
@@ -261,7 +259,7 @@ impl Run {
         let mut fine = self.fine;
         let mut monitor = Monitor::new(&machine, self.leaves_path);
         monitor.worst.allow_steps(&self.speed_difference_mm_per_s);
-        monitor.joints = JointWatch::new(&self.joints, machine.fine_period_s);
+        monitor.joints = self.joints.watch(machine.fine_period_s);
         let mut reloader = self.policy.as_ref().map(PolicyHost::reloader);
         if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
             && let Err(note) = reloader.watch()

@@ -4,12 +4,11 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_fine::FineLoop;
 use tandem_machine::{JerkMode, Machine};
+use tandem_recorder::{JointWatch, PlanningUs, SUMMARY_FORMAT, Summary};
 use tandem_sdk::AxisVector;
 
-use crate::joints::JointWatch;
 use crate::pump::Pump;
 use crate::run::Clock;
-use crate::summary::{FORMAT, PlanningUs, Summary};
 
 /// The summary of what `pump` and `fine` saw; what only the clock or the host knows is added to it.
 pub fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {
@@ -22,7 +21,7 @@ pub fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>
     };
     let (linear, rotary) = (|values: &AxisVector| of(false, values), |values: &AxisVector| of(true, values));
     Summary {
-        format: FORMAT,
+        format: SUMMARY_FORMAT,
         program: program.to_string(),
         machine: machine.name.clone(),
         planner: machine.planner.plugin.clone(),

@@ -10,12 +10,13 @@ use rustix::thread::{ClockId, clock_nanosleep_absolute};
 use rustix::time::{Timespec, clock_gettime};
 use tandem_fine::FineLoop;
 use tandem_machine::FineThread;
+use tandem_recorder::PageFaults;
 use tandem_rings::{Sizes, sample_ring};
 
 use crate::error::HostError;
 use crate::hang::{FineRuns, FineWatch};
 use crate::pump::Pump;
-use crate::realtime::{PageFaults, ProcessGrants, prepare_thread};
+use crate::realtime::{ProcessGrants, page_faults_of_this_thread, prepare_thread};
 use crate::realtime_periods::{Body, PeriodClock, Timing, run};
 
 const NS_PER_S: i64 = 1_000_000_000;
@@ -165,10 +166,10 @@ fn live<B: Body>(mut body: B, period_ns: i64, asks: FineThread, notes: &SyncSend
     // The first reading maps the kernel's page of clock data: no lock on memory covers it.
     clock.now_ns();
     let runs = body.begin();
-    let before = PageFaults::of_this_thread();
+    let before = page_faults_of_this_thread();
     run(&mut clock, period_ns, &mut body, &mut timing);
     drop(runs);
-    let page_faults = PageFaults::of_this_thread().since(before);
+    let page_faults = page_faults_of_this_thread().since(before);
     Ended { body, timing, page_faults }
 }
 

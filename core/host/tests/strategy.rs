@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use tandem_gcode::Program;
-use tandem_host::{Clock, Registry, Run, RunObserver, Summary, Switches, Timed};
+use tandem_host::{Clock, Registry, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
+use tandem_recorder::Summary;
 use tandem_rings::Sample;
 use tandem_sdk::{Answer, FeedStrategy, MAX_SIGNALS, PluginError, RawOptions, Request, StrategyContext, Window};
 

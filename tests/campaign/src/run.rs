@@ -3,9 +3,10 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 
-use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches, TraceCsv};
+use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_oracle::{Joints, Row, axis_index};
+use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 
 use crate::bound::Bound;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use tandem_estimate::Estimate;
-use tandem_host::Output;
 use tandem_machine::Machine;
+use tandem_recorder::Output;
 use tandem_report::{EstimateReport, EstimatedField, EstimatedProgram};
 
 /// Draws all programs, one below the other.

@@ -10,8 +10,9 @@ use std::sync::Arc;
 
 use tandem_host::jog::{JogSession, Jogs};
 use tandem_host::operator::Desk;
-use tandem_host::{Clock, Run, RunObserver, Summary, Switches, Timed};
+use tandem_host::{Clock, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
+use tandem_recorder::Summary;
 use tandem_rings::Sample;
 
 use crate::broken::Broken;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tandem_host::Lateness;
+use tandem_recorder::Lateness;
 
 /// What `cyclictest` counted, over all of its threads.
 pub struct Cyclictest {

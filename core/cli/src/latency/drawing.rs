@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use tandem_host::{Latency, Lateness, LatenessUs, Output, Row};
+use tandem_host::Latency;
+use tandem_recorder::{Lateness, LatenessUs, Output, Row};
 use tandem_report::{LatencyBin, LatencyReport, LatencySeries};
 
 use super::cyclictest::Cyclictest;

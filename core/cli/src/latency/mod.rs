@@ -9,7 +9,8 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::time::Duration;
 
-use tandem_host::{Latency, Lateness, LatenessUs, measure_latency};
+use tandem_host::{Latency, measure_latency};
+use tandem_recorder::{Lateness, LatenessUs};
 
 use crate::args;
 use cyclictest::Cyclictest;

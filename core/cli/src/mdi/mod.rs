@@ -101,13 +101,13 @@ impl Sinks {
     }
 
     /// Behind a run: clients may take its fault back, where it has one.
-    fn begin_fault(&mut self, summary: &tandem_host::Summary) {
+    fn begin_fault(&mut self, summary: &tandem_recorder::Summary) {
         if let (Some(operator), Some(fault)) = (&mut self.operator, &summary.fault) {
             operator.begin_fault(fault);
         }
     }
 
-    fn end(&mut self, summary: &tandem_host::Summary) {
+    fn end(&mut self, summary: &tandem_recorder::Summary) {
         if let Some(mut operator) = self.operator.take() {
             operator.end(summary);
         }

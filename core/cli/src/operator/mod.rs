@@ -12,8 +12,9 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_host::operator::{Desk, Listen, Server};
-use tandem_host::{PolicySummary, Run, StopAnswer, Summary};
+use tandem_host::{Run, StopAnswer};
 use tandem_machine::Machine;
+use tandem_recorder::{PolicySummary, Summary};
 use tandem_rings::Sample;
 
 use crate::args;

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_host::{Output, TraceCsv};
+use tandem_recorder::{Output, TraceCsv};
 use tandem_trace::has_switched;
 
 use super::binary::Binary;

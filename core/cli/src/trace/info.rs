@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::Path;
 
-use tandem_host::TraceCsv;
+use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 use tandem_sdk::{AxisVector, MAX_AXES};
 use tandem_trace::Header;

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use tandem_host::{SWITCHED_COLUMNS, TraceCsv, outputs_word, rpm};
+use tandem_recorder::{SWITCHED_COLUMNS, TraceCsv, outputs_word, rpm};
 use tandem_trace::{MAGIC, Record, has_switched};
 
 use super::binary::Binary;

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use tandem_host::{Output, RecordError, Run, Timed, TraceCsv};
+use tandem_host::{Run, Timed};
 use tandem_machine::Machine;
+use tandem_recorder::{Output, RecordError, TraceCsv};
 use tandem_rings::Sample;
 use tandem_trace::{Header, Writer};
 

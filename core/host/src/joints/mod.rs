@@ -8,11 +8,13 @@
 mod carrier;
 mod fold;
 mod linear;
-mod peaks;
 mod stated;
 mod travel;
 
+use std::sync::Arc;
+
 use tandem_machine::Machine;
+use tandem_recorder::{JointWatch, WatchedJoint};
 use tandem_sdk::abi::{Method, calling};
 use tandem_sdk::{
     AxisLimits, AxisVector, JointLanes, Kinematics, KinematicsContext, Limits, MAX_AXES, Planner, PlannerDescription,
@@ -25,8 +27,6 @@ use crate::rules::refusal;
 use crate::setup;
 use carrier::Carrier;
 use linear::{Linear, positions};
-pub use peaks::JointPeaks;
-pub(crate) use peaks::JointWatch;
 use travel::Travel;
 
 /// One joint.
@@ -221,6 +221,17 @@ impl JointSpace {
     /// Which joints turn.
     pub fn rotary(&self) -> [bool; MAX_AXES] {
         std::array::from_fn(|i| self.joints.get(i).is_some_and(|joint| joint.rotary))
+    }
+
+    /// What watches them in a run; none where the joints are the axes. Host; allocates.
+    pub fn watch(self: &Arc<Self>, fine_period_s: f64) -> Option<JointWatch> {
+        if self.are_axes() {
+            return None;
+        }
+        let watched = |joint: &Joint| WatchedJoint { name: joint.name.clone(), rotary: joint.rotary };
+        let space = Arc::clone(self);
+        let to_joints = move |axes: &AxisVector| space.to_joints(axes);
+        Some(JointWatch::new(self.joints.iter().map(watched).collect(), to_joints, fine_period_s))
     }
 
     /// The map for the fine loop; none where the joints are the axes.

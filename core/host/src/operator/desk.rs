@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_machine::Machine;
+use tandem_recorder::PolicySummary;
 use tandem_rings::{Controls, MachineState, Sample, Status};
 use tandem_sdk::{Axes, AxisVector};
 
 use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
-use crate::policy::PolicySummary;
 use crate::roles;
 use crate::{joint_words, spindle};
 

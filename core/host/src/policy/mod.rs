@@ -4,7 +4,6 @@
 mod means;
 mod reload;
 mod setup;
-mod summary;
 mod tuner;
 
 use std::path::PathBuf;
@@ -12,13 +11,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_machine::Machine;
 use tandem_policy::{Engine, Period, Policy};
+use tandem_recorder::PolicySummary;
 use tandem_sdk::Planner;
 
 pub use means::Means;
 pub use reload::Reloader;
 use reload::{Stamp, stamp};
 pub use setup::PolicySetup;
-pub use summary::PolicySummary;
 pub use tuner::Tuner;
 
 use crate::error::HostError;
@@ -76,7 +75,30 @@ impl PolicyHost {
 
     /// What the script did, for the summary.
     pub fn summary(&self) -> PolicySummary {
-        PolicySummary::new(&self.path, &self.lock())
+        let policy = self.lock();
+        let counters = policy.counters();
+        PolicySummary {
+            name: self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            windows: counters.windows,
+            blocks: counters.blocks,
+            periods: counters.periods,
+            time_constants_changed: counters.time_constants,
+            tolerances_changed: counters.tolerances,
+            feeds_capped: counters.feed_caps,
+            ratios_changed: counters.ratios,
+            requests_limited: counters.limited,
+            requests_refused: counters.refused_by_planner,
+            traps: counters.troubles(),
+            out_of_fuel: counters.out_of_fuel,
+            memory_refusals: counters.memory_refusals,
+            stack_overflows: counters.stack_overflows,
+            not_finite: counters.not_finite,
+            quarantined: policy.is_quarantined(),
+            reloads: counters.reloads,
+            refused_reloads: counters.refused_reloads,
+            most_window_fuel: counters.most_window_fuel,
+            most_period_fuel: counters.most_period_fuel,
+        }
     }
 
     /// A panic while the lock is held has ended the run; what follows only reports.

@@ -6,8 +6,9 @@ use std::thread;
 use std::time::{Duration, SystemTime};
 
 use tandem_policy::{Instance, Script};
+use tandem_recorder::PolicySummary;
 
-use super::{PolicyHost, PolicySummary};
+use super::PolicyHost;
 
 /// How often the file is looked at.
 const LOOK: Duration = Duration::from_secs(1);

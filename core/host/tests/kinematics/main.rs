@@ -5,9 +5,10 @@ mod failing;
 use std::path::{Path, PathBuf};
 
 use tandem_gcode::Program;
-use tandem_host::{Clock, HostError, JointPeaks, Outcome, Registry, Run, RunObserver, Switches};
+use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switches};
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
+use tandem_recorder::JointPeaks;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockReport, Kinematics, KinematicsContext, NoOptions, Planner,
     PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,

@@ -18,6 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/rings", &["tandem-sdk"]),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),
     ("core/trace", &["tandem-rings", "tandem-sdk"]),
+    ("core/recorder", &["tandem-fine", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"]),
     ("core/rough", &["tandem-gcode", "tandem-rings", "tandem-sdk"]),
     (
         "core/host",
@@ -28,6 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-machine",
             "tandem-motion",
             "tandem-policy",
+            "tandem-recorder",
             "tandem-rings",
             "tandem-rough",
             "tandem-sdk",
@@ -54,6 +56,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-machine",
             "tandem-nurbs",
             "tandem-oracle",
+            "tandem-recorder",
             "tandem-rig",
             "tandem-rings",
             "tandem-sdk",

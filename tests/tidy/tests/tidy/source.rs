@@ -111,5 +111,5 @@ fn items_are_found() {
     assert!(has_method(text, "One", "own") && has_method(text, "Pump", "taken") && has_method(text, "Three", "asked"));
     assert!(has_method(text, "Pump", "given"));
     assert!(!has_method(text, "Two", "own") && !has_method(text, "One", "taken") && !has_method(text, "One", "free"));
-    assert_eq!(module("tandem_host", "record/mod.rs"), "tandem_host::record");
+    assert_eq!(module("tandem_recorder", "record/mod.rs"), "tandem_recorder::record");
 }

@@ -1,12 +1,10 @@
 //! The greatest speeds of the joints in a run.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use serde::Serialize;
 use tandem_sdk::AxisVector;
 
-use super::JointSpace;
 use crate::monitor::raise;
 
 /// What one joint did, as finite differences of the samples: the largest magnitudes. What it is called names its unit.
@@ -46,24 +44,41 @@ impl JointPeaks {
     }
 }
 
+/// A joint that is watched.
+#[derive(Clone, Debug)]
+pub struct WatchedJoint {
+    /// Its name.
+    pub name: String,
+    /// Whether it turns.
+    pub rotary: bool,
+}
+
+/// Where the joints stand while the axes stand somewhere, mm or rad.
+type ToJoints = Box<dyn Fn(&AxisVector) -> AxisVector + Send>;
+
 /// Watches the joints of a run, with rest before the first sample.
 pub struct JointWatch {
-    space: Arc<JointSpace>,
+    joints: Vec<WatchedJoint>,
+    to_joints: ToJoints,
     rate: f64,
     last: Option<[AxisVector; 3]>,
     peaks: [AxisVector; 3],
 }
 
 impl JointWatch {
-    /// Nothing seen yet; none where the joints are the axes.
-    pub fn new(space: &Arc<JointSpace>, period_s: f64) -> Option<Self> {
+    /// Nothing seen yet of `joints`, which stand at `to_joints` of where the axes stand. Host; allocates.
+    pub fn new(
+        joints: Vec<WatchedJoint>,
+        to_joints: impl Fn(&AxisVector) -> AxisVector + Send + 'static,
+        period_s: f64,
+    ) -> Self {
         let peaks = [AxisVector::ZERO; 3];
-        (!space.are_axes()).then(|| Self { space: Arc::clone(space), rate: 1.0 / period_s, last: None, peaks })
+        Self { joints, to_joints: Box::new(to_joints), rate: 1.0 / period_s, last: None, peaks }
     }
 
     /// A sample was sent.
     pub fn sample(&mut self, command: &AxisVector) {
-        let joints = self.space.to_joints(command);
+        let joints = (self.to_joints)(command);
         let [position, velocity, acceleration] = self.last.unwrap_or([joints, AxisVector::ZERO, AxisVector::ZERO]);
         let speed = (joints - position) * self.rate;
         let change = (speed - velocity) * self.rate;
@@ -76,7 +91,7 @@ impl JointWatch {
 
     /// Peaks by the names of the joints.
     pub fn peaks(&self) -> BTreeMap<String, JointPeaks> {
-        let each = self.space.joints.iter().enumerate().map(|(i, joint)| {
+        let each = self.joints.iter().enumerate().map(|(i, joint)| {
             let peaks = self.peaks.map(|peak| peak[i]);
             (joint.name.clone(), if joint.rotary { JointPeaks::rotary(peaks) } else { JointPeaks::linear(peaks) })
         });

@@ -1,9 +1,6 @@
 //! What the policy script did, as the summary of a run says it.
 
-use std::path::Path;
-
 use serde::Serialize;
-use tandem_policy::Policy;
 
 /// The policy script of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -48,33 +45,4 @@ pub struct PolicySummary {
     pub most_window_fuel: u64,
     /// Most fuel that a rough period used.
     pub most_period_fuel: u64,
-}
-
-impl PolicySummary {
-    /// What `policy`, loaded from `path`, did until now.
-    pub(crate) fn new(path: &Path, policy: &Policy) -> Self {
-        let counters = policy.counters();
-        Self {
-            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            windows: counters.windows,
-            blocks: counters.blocks,
-            periods: counters.periods,
-            time_constants_changed: counters.time_constants,
-            tolerances_changed: counters.tolerances,
-            feeds_capped: counters.feed_caps,
-            ratios_changed: counters.ratios,
-            requests_limited: counters.limited,
-            requests_refused: counters.refused_by_planner,
-            traps: counters.troubles(),
-            out_of_fuel: counters.out_of_fuel,
-            memory_refusals: counters.memory_refusals,
-            stack_overflows: counters.stack_overflows,
-            not_finite: counters.not_finite,
-            quarantined: policy.is_quarantined(),
-            reloads: counters.reloads,
-            refused_reloads: counters.refused_reloads,
-            most_window_fuel: counters.most_window_fuel,
-            most_period_fuel: counters.most_period_fuel,
-        }
-    }
 }

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::joints::JointPeaks;
+use crate::joint_peaks::JointPeaks;
 use crate::lateness::Lateness;
-use crate::policy::PolicySummary;
-use crate::realtime::PageFaults;
+use crate::policy_summary::PolicySummary;
 use crate::record::RecordError;
 use crate::stops::Stop;
 
@@ -180,6 +179,23 @@ impl Summary {
             "overruns {overruns}, missed periods {missed_periods}, in motion {missed_in_motion}, \
              latest wake-up {late_us:.0} µs"
         ))
+    }
+}
+
+/// Page faults of a thread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PageFaults {
+    /// Pages read from a disk.
+    pub major: u64,
+    /// Pages that only had to be mapped.
+    pub minor: u64,
+}
+
+impl PageFaults {
+    /// Those since `earlier`.
+    #[must_use]
+    pub fn since(self, earlier: Self) -> Self {
+        Self { major: self.major - earlier.major, minor: self.minor - earlier.minor }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::summary::{OfLimit, OfLimits};
 
 /// Per axis the worst sample for velocity, acceleration and jerk.
 #[derive(Debug)]
-pub(crate) struct Worst {
+pub struct Worst {
     limits: [AxisLimits; MAX_AXES],
     axes: usize,
     period_s: f64,

@@ -5,7 +5,7 @@ use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport};
 
 use crate::block_times::{BlockTimes, TimeGoesTo};
-use crate::joints::JointWatch;
+use crate::joint_peaks::JointWatch;
 use crate::path_watch::PathWatch;
 use crate::stops::StopWatch;
 use crate::worst::Worst;
@@ -29,7 +29,8 @@ pub struct Monitor {
     /// The time of the motion by what held it down, s.
     pub limited_by_s: Vec<(TimeGoesTo, f64)>,
     times: BlockTimes,
-    pub(crate) worst: Worst,
+    /// What each axis used most of its limits.
+    pub worst: Worst,
     /// The last position sent.
     pub position: AxisVector,
     /// What each stop took.
@@ -37,7 +38,7 @@ pub struct Monitor {
     watch: PathWatch,
     axes: Axes,
     /// What the joints do, where they are not the axes.
-    pub(crate) joints: Option<JointWatch>,
+    pub joints: Option<JointWatch>,
 }
 
 impl Monitor {
