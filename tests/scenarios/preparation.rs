@@ -62,7 +62,7 @@ fn by_run(machine: &Machine) -> String {
 }
 
 fn switches(machine: &Machine) -> Switches {
-    Switches { home: machine.require_homing, ..Switches::default() }
+    Switches { home: machine.require_homing.then_some(tandem_session::HOMING), ..Switches::default() }
 }
 
 /// The machine files of the examples, each with a few lines changed, dropped or added: what `check` takes the run takes,

@@ -5,6 +5,7 @@ use std::io::Write;
 
 use tandem_host::{Switches, check_program};
 use tandem_machine::Machine;
+use tandem_session::HOMING;
 
 use crate::args::Check;
 use crate::{REFUSED, built_in, program};
@@ -15,7 +16,8 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     // A machine that is to be homed first is run with --home: there is no other run to ask about.
-    let home = options.home || machine.require_homing && !machine.homing.is_empty();
+    let homes = options.home || machine.require_homing && !machine.homing.is_empty();
+    let home = homes.then_some(HOMING);
     let switches = Switches { block_delete: options.machine.block_delete, home, ..Switches::default() };
     let report = check_program(machine, &built_in::registry()?, program, switches)?;
     if report.is_ok() {

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 use tandem_host::Run;
-use tandem_host::operator::Counters;
 use tandem_machine::Machine;
 use tandem_recorder::flush_outputs;
 use tandem_rings::Status;
+use tandem_session::operator::Counters;
 
 use crate::operator::restore_terminal;
 use crate::{FAULT, operator};

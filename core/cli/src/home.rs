@@ -6,6 +6,7 @@ use tandem_host::{Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rings::Sample;
 use tandem_sdk::{Event, EventKind};
+use tandem_session::HOMING;
 
 use crate::broken::Broken;
 use crate::report::Collector;
@@ -26,7 +27,7 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
     let registry = built_in::registry()?;
     let clock = clock::of(options.clock, &machine, &registry);
     let switches = Switches { reset: options.reset, clock: Some(clock), ..Switches::default() };
-    let run = Run::home(machine.clone(), &registry, switches)?;
+    let run = Run::home(machine.clone(), &registry, HOMING, switches)?;
     let trace = options.trace.as_ref().map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
     let report = options.report.as_ref().map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
     let (corrections, broken) = (Corrections::new(&machine), Broken::default());

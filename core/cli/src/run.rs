@@ -9,6 +9,7 @@ use tandem_machine::Machine;
 use tandem_recorder::{BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, Stop, Summary};
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Event, EventKind};
+use tandem_session::HOMING;
 
 use crate::broken::Broken;
 use crate::home::Corrections;
@@ -62,7 +63,7 @@ fn switches(options: &args::Run, clock: Clock) -> Switches {
         pause_at_stops: options.pause || (attended && !options.dry),
         optional_stop: options.pause || options.optional_stop,
         dry_run: options.dry,
-        home: options.home,
+        home: options.home.then_some(HOMING),
         reset: options.reset,
         clock: Some(clock),
         ..Switches::default()

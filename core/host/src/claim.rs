@@ -175,14 +175,14 @@ impl Look<'_> {
 
     /// Programs and lines are refused where it is not known where a joint is.
     fn at_known(&self, switches: Switches) -> Result<(), HostError> {
-        let homing = self.machine.homing.iter().filter(|_| switches.home);
+        let homing = self.machine.homing.iter().filter(|_| switches.home.is_some());
         // Where axes are homed, joints are axes.
         let homed = homing.fold(0, |joints, of| joints | 1 << of.axis);
         let known = self.attached.known | self.attached.homed | homed;
         self.refuse(
             |i| known >> i & 1 == 0 && !switches.unhomed,
             |names| {
-                if switches.home {
+                if switches.home.is_some() {
                     format!("it is not known where {names} stands, and no [homing.<axis>] table homes it")
                 } else {
                     format!("it is not known where {names} stands: home the machine first, or run with --home")

@@ -107,7 +107,7 @@ impl Plugins {
         if stands != machine.start {
             machine.start = stands;
             // Who is outside of the travel is led back by hand; before homing nobody knows who is.
-            if !switches.unhomed && !switches.home {
+            if !switches.unhomed && switches.home.is_none() {
                 joints.check_start(&machine)?;
             }
             self.planner = setup::planner(&machine, registry)?;
@@ -306,7 +306,10 @@ fn first_pass(
 }
 
 /// Whether the machine and its planner can drive `block`.
-pub(crate) fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
+///
+/// # Errors
+/// Why not.
+pub fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
     let spindle_rad_per_s = machine.spindle.max_rad_per_s;
     if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
         return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));

@@ -90,15 +90,15 @@ pub fn check_real(
 /// Checks what homing asks of the machine, and what the machine asks of homing.
 pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) -> Result<(), HostError> {
     let refuse = |key: &str, cause: &str| Err(refusal(machine, key, cause));
-    if switches.home && machine.homing.is_empty() {
+    if switches.home.is_some() && machine.homing.is_empty() {
         return refuse("homing", "no axis has a [homing.<axis>] table: there is nothing to home");
     }
-    if switches.home && !joints.are_axes() {
+    if switches.home.is_some() && !joints.are_axes() {
         let key = if machine.kinematics.plugin == "identity" { "joints" } else { "kinematics.plugin" };
         let cause = "--home is refused: each axis is homed by a drive of its own, so not with kinematics or gantries";
         return refuse(key, cause);
     }
-    if machine.require_homing && !switches.home && !machine.homing.is_empty() {
+    if machine.require_homing && switches.home.is_none() && !machine.homing.is_empty() {
         return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");
     }
     Ok(())

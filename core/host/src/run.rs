@@ -18,7 +18,6 @@ use crate::error::HostError;
 use crate::exchange_time::{self, ExchangeTimes};
 use crate::fault_text::{Known, describe};
 use crate::hang::HangWatch;
-use crate::homing::Homing;
 use crate::joints::JointSpace;
 use crate::plugin_log::drain_plugin_log;
 use crate::policy::PolicyHost;
@@ -41,8 +40,12 @@ pub enum Clock {
     Wall,
 }
 
+/// Makes the source of a run that moves by itself before it hands out another source, if any, as homing does. It is given the
+/// machine as it stands.
+pub type Lead = fn(&Machine, Option<Box<dyn Source + Send>>) -> Box<dyn Source + Send>;
+
 /// The switches of the operator's panel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent switches of a panel
 pub struct Switches {
     /// Lines that begin with `/` are left out.
@@ -54,8 +57,8 @@ pub struct Switches {
     /// No spindle, coolant or user output is switched, nothing waits for the operator, and feed motion runs at the
     /// machine's dry-run feed.
     pub dry_run: bool,
-    /// The axes that the machine file tells how to are homed before the program.
-    pub home: bool,
+    /// What homes the axes that the machine file tells how to, before the program; none where nothing is homed.
+    pub home: Option<Lead>,
     /// Joints of which it is not known where they are may move: jogging.
     pub unhomed: bool,
     /// Faults in which drives stand are reset before they are enabled.
@@ -87,7 +90,7 @@ pub struct Run {
     /// Who is who among the drivers.
     roster: Roster,
     /// Bit per axis of which the drives did not know where it is when they were attached.
-    pub(crate) unknown_axes: u32,
+    unknown_axes: u32,
     /// What the first pass found: totals.
     pub checked: CheckReport,
 }
@@ -120,7 +123,10 @@ impl Run {
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
-    pub(crate) fn of_source(
+    ///
+    /// # Errors
+    /// Everything that refuses: plugins, what does not go together.
+    pub fn of_source(
         machine: Machine,
         registry: &Registry,
         name: String,
@@ -131,17 +137,15 @@ impl Run {
         Self::open(Ready::of_source(machine, registry, Some(name), behind, switches)?)
     }
 
-    /// A run that homes the axes of [`Machine::homing`] and nothing else. Its samples are in the coordinates of the
+    /// A run that homes the axes of [`Machine::homing`], which `homing` does, and nothing else. Its samples are in the coordinates of the
     /// drives, which homing does not change.
     ///
     /// # Errors
     /// Everything that refuses: plugins, what does not go together.
-    pub fn home(machine: Machine, registry: &Registry, switches: Switches) -> Result<Self, HostError> {
+    pub fn home(machine: Machine, registry: &Registry, homing: Lead, switches: Switches) -> Result<Self, HostError> {
         // What it does not home stays as unknown as it is: nothing else moves.
-        let switches = Switches { home: true, unhomed: true, ..switches };
-        let homing =
-            |machine: &Machine| Box::new(Homing::new(machine, &machine.homing, None)) as Box<dyn Source + Send>;
-        Self::open(Ready::of_source(machine, registry, None, homing, switches)?)
+        let switches = Switches { home: Some(homing), unhomed: true, ..switches };
+        Self::open(Ready::of_source(machine, registry, None, |machine| homing(machine, None), switches)?)
     }
 
     /// Makes the loops around drives that are claimed.
@@ -195,7 +199,7 @@ impl Run {
     }
 
     /// What is on when the run begins: what the run before it in a session has left. Host, before it is driven.
-    pub(crate) fn begin_switched(&mut self, switched: &Switched) {
+    pub fn begin_switched(&mut self, switched: &Switched) {
         self.fine.begin_switched(switched);
     }
 
@@ -212,6 +216,11 @@ impl Run {
     /// The clock that was asked for, or else the one that the driver goes with: real drives live in real time.
     pub fn clock(&self) -> Clock {
         self.clock
+    }
+
+    /// Bit per axis of which the drives did not know where it is when they were attached.
+    pub fn unknown_axes(&self) -> u32 {
+        self.unknown_axes
     }
 
     /// Whether the planner makes use of velocity steps where blocks meet.
@@ -268,7 +277,7 @@ impl Run {
         }
         let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
         pump.waits = Some(Waits::new(&machine));
-        pump.skips_homing = self.switches.home;
+        pump.skips_homing = self.switches.home.is_some();
         pump.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
         pump.on_record_error = machine.on_record_error;
         pump.planner.clone_from(&machine.planner.plugin);
@@ -300,7 +309,7 @@ impl Run {
         };
         summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
-        let sent = self.switches.home || fine.joints_went_alone();
+        let sent = self.switches.home.is_some() || fine.joints_went_alone();
         let position = if sent { fine.sent() } else { pump.monitor.position };
         let left = fine.left();
         let stopped = fine.into_driver().stop();

@@ -6,13 +6,12 @@ use tandem_machine::{AxisHoming, DriverChoice, GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, DriverContext, DriverDescription, FeedStrategy, Name, Planner, PlannerContext,
-    PlannerDescription, StrategyContext, Words, size_of_contract,
+    Attached, AxisLimits, AxisVector, DriverContext, DriverDescription, FeedStrategy, Limits, Name, Planner,
+    PlannerContext, PlannerDescription, StrategyContext, Words, size_of_contract,
 };
 
 use crate::dry_run::DryRun;
 use crate::error::HostError;
-use crate::homing::Homing;
 use crate::joints::JointSpace;
 use crate::lines;
 use crate::policy::{Means, PolicyHost};
@@ -47,7 +46,7 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
 /// Where the program starts: axes that are homed before it are at home.
 fn start(machine: &Machine, switches: Switches) -> AxisVector {
     let mut start = machine.start;
-    for homing in machine.homing.iter().filter(|_| switches.home) {
+    for homing in machine.homing.iter().filter(|_| switches.home.is_some()) {
         start[homing.axis] = machine.home[homing.axis];
     }
     start
@@ -70,7 +69,10 @@ pub fn source(
 
 /// `source`, behind homing where that is asked for.
 pub fn behind_homing(machine: &Machine, source: Box<dyn Source + Send>, switches: Switches) -> Box<dyn Source + Send> {
-    if switches.home { Box::new(Homing::new(machine, &machine.homing, Some(source))) } else { source }
+    match switches.home {
+        Some(homing) => homing(machine, Some(source)),
+        None => source,
+    }
 }
 
 /// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
@@ -86,7 +88,10 @@ fn tool(tool: &tandem_machine::Tool) -> Tool {
     Tool { number: tool.number, pocket: Some(tool.pocket), offset: tool.offset, diameter_mm: tool.diameter_mm }
 }
 
-/// Opens the machine's planner. It keeps the limits of the joints, and their travel.
+/// Opens the machine's planner. It keeps the limits of the joints, and their travel. Host; allocates.
+///
+/// # Errors
+/// The planner is not there or refuses its options; or what is wrong with the joints.
 pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
     let joints = JointSpace::of(machine, registry)?;
     let context = PlannerContext {
@@ -104,6 +109,14 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
     let choice = &machine.planner;
     let planner = registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))?;
     Ok(joints.carried(planner, machine))
+}
+
+/// The limits of the machine's axes, as narrow as its joints make them. Host; allocates.
+///
+/// # Errors
+/// What is wrong with the joints or their kinematics.
+pub fn axis_limits(machine: &Machine, registry: &Registry) -> Result<Limits, HostError> {
+    Ok(JointSpace::of(machine, registry)?.of_axes())
 }
 
 /// A plugin's refusal with the place in the machine file: of the option that is wrong, or of the plugin's name.
@@ -249,7 +262,11 @@ pub fn fine_config(
         kept_outputs: machine.kept_outputs(),
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
-        unhomed: if switches.home { machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis) } else { 0 },
+        unhomed: if switches.home.is_some() {
+            machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis)
+        } else {
+            0
+        },
         homing_limits: limited.fold(0, |mask, homing| mask | 1 << homing.axis),
         record_drives: false,
         attached: *attached,

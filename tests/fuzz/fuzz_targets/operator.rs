@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use tandem_host::operator::{Desk, Listen, Server};
+use tandem_session::operator::{Desk, Listen, Server};
 use tandem_machine::Machine;
 
 struct Open {

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use tandem_host::NextLine;
-use tandem_host::jog::{JogHand, JogRest, JogWords, Jogs, ReachWords};
+use tandem_session::NextLine;
+use tandem_session::jog::{JogHand, JogRest, JogWords, Jogs, ReachWords};
 
 use super::line::{Line, parse};
 use super::shared::Shared;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_host::jog::{JogWords, Jogs, ReachWords};
+use tandem_session::jog::{JogWords, Jogs, ReachWords};
 
 use super::shared::Shared;
 use crate::operator::press;

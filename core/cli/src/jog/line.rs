@@ -1,7 +1,7 @@
 //! The lines of a pipe: `x+ 600`, `x-0.1 600`, `stop`, `wait 0.5`, `where`, `quit`, and the operator's commands.
 
 use tandem_host::Command;
-use tandem_host::jog::{JogWords, ReachWords};
+use tandem_session::jog::{JogWords, ReachWords};
 
 use crate::mdi::conversation::is_farewell;
 

@@ -8,12 +8,13 @@ mod shared;
 use std::error::Error;
 use std::sync::Arc;
 
-use tandem_host::jog::{JogSession, Jogs};
-use tandem_host::operator::Desk;
 use tandem_host::{Clock, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_recorder::Summary;
 use tandem_rings::Sample;
+use tandem_session::HOMING;
+use tandem_session::jog::{JogSession, Jogs};
+use tandem_session::operator::Desk;
 
 use crate::broken::Broken;
 use crate::operator::{Keyboard, Operator, Presence, Signals, is_on_terminal};
@@ -35,8 +36,13 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
     let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
     let clock = if real_time { Clock::Wall } else { Clock::Virtual };
-    let (home, reset) = (options.session.home, options.session.reset);
-    let switches = Switches { home, reset, unhomed: true, clock: Some(clock), ..Switches::default() };
+    let switches = Switches {
+        home: options.session.home.then_some(HOMING),
+        reset: options.session.reset,
+        unhomed: true,
+        clock: Some(clock),
+        ..Switches::default()
+    };
     let hand = Hand::new(Arc::clone(&shared), script);
     let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(hand.clone()))?;
     let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;

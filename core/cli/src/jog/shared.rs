@@ -4,10 +4,10 @@ use std::io::{Write, stderr, stdout};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tandem_host::jog::{JogEnd, JogRest, Jogs};
-use tandem_host::operator::{Desk, Position};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector};
+use tandem_session::jog::{JogEnd, JogRest, Jogs};
+use tandem_session::operator::{Desk, Position};
 
 use crate::operator::{Operator, Stops, tell};
 

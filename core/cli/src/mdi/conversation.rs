@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use tandem_host::operator::{Desk, Position};
-use tandem_host::{Dialogue, NextLine};
 use tandem_sdk::{Axes, AxisVector};
+use tandem_session::operator::{Desk, Position};
+use tandem_session::{Dialogue, NextLine};
 
 use super::RESET;
 use super::input::Input;

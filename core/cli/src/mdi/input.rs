@@ -4,7 +4,7 @@ use std::io::stdin;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
-use tandem_host::NextLine;
+use tandem_session::NextLine;
 
 /// Reads a line only while one is asked for, so that keys pressed during motion are nobody's line.
 #[derive(Default)]

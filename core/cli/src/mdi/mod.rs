@@ -6,9 +6,10 @@ pub mod input;
 use std::error::Error;
 use std::sync::Arc;
 
-use tandem_host::{Clock, Run, RunObserver, Session, StopAnswer, Switches, Timed};
+use tandem_host::{Clock, Run, RunObserver, StopAnswer, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
+use tandem_session::{HOMING, Session};
 
 use crate::broken::Broken;
 use crate::operator::{Operator, Presence, is_on_terminal};
@@ -31,7 +32,7 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     let switches = Switches {
         block_delete: options.machine.block_delete,
         pause_at_stops: attended,
-        home: options.session.home,
+        home: options.session.home.then_some(HOMING),
         reset: options.session.reset,
         clock: Some(if real_time { Clock::Wall } else { Clock::Virtual }),
         ..Switches::default()

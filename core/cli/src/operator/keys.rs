@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio;
 use tandem_host::Command;
-use tandem_host::operator::Desk;
+use tandem_session::operator::Desk;
 
 use super::signals::Stops;
 use super::tell;

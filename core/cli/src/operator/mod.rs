@@ -11,11 +11,11 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
 use std::time::Duration;
 
-use tandem_host::operator::{Desk, Listen, Server};
 use tandem_host::{Run, StopAnswer};
 use tandem_machine::Machine;
 use tandem_recorder::{PolicySummary, Summary};
 use tandem_rings::Sample;
+use tandem_session::operator::{Desk, Listen, Server};
 
 use crate::args;
 

@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use rustix::process::Signal;
 use signal_hook::iterator::{Handle, Signals as Received};
 use tandem_host::Command;
-use tandem_host::operator::Desk;
+use tandem_session::operator::Desk;
 
 use super::tell;
 

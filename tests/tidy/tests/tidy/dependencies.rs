@@ -36,6 +36,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "core/session",
+        &[
+            "tandem-gcode",
+            "tandem-host",
+            "tandem-machine",
+            "tandem-recorder",
+            "tandem-rings",
+            "tandem-rough",
+            "tandem-sdk",
+        ],
+    ),
+    (
         "core/estimate",
         &["tandem-gcode", "tandem-host", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"],
     ),

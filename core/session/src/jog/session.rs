@@ -3,17 +3,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::Item;
+use tandem_host::{HostError, Registry, Run, Switches, axis_limits, planner};
 use tandem_machine::Machine;
 use tandem_rings::Rest;
 use tandem_rough::Source;
 use tandem_sdk::AxisVector;
 
 use super::{JogRest, Jogs};
-use crate::error::HostError;
-use crate::joints::JointSpace;
-use crate::registry::Registry;
-use crate::run::{Run, Switches};
-use crate::setup;
 
 /// The operator's side of a session. Called on the soft side.
 pub trait JogHand: Send {
@@ -54,8 +50,8 @@ impl<'a> JogSession<'a> {
         hand: Box<dyn JogHand>,
     ) -> Result<Self, HostError> {
         let mut machine = machine;
-        let judge = setup::planner(&machine, registry)?;
-        machine.limits = JointSpace::of(&machine, registry)?.of_axes();
+        let judge = planner(&machine, registry)?;
+        machine.limits = axis_limits(&machine, registry)?;
         let jogs = Arc::new(Jogs::new(&machine, judge));
         Ok(Self { machine, registry, switches, jogs, hand: Arc::new(Mutex::new(hand)) })
     }
@@ -73,9 +69,12 @@ impl<'a> JogSession<'a> {
         let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
-        let homed =
-            if self.switches.home { self.machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis) } else { 0 };
-        self.jogs.enable(run.controls(), !self.switches.home, run.unknown_axes & !homed);
+        let homed = if self.switches.home.is_some() {
+            self.machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis)
+        } else {
+            0
+        };
+        self.jogs.enable(run.controls(), self.switches.home.is_none(), run.unknown_axes() & !homed);
         Ok(run)
     }
 

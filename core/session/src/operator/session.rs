@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::json;
+use tandem_host::Command;
 
 use super::desk::Desk;
 use super::lease::{ANSWER_WITHIN, Lease};
@@ -10,7 +11,6 @@ use super::places::MAX_OWNERS;
 use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
 use super::token;
-use crate::command::Command;
 use crate::jog::JogWords;
 
 /// What a line led to.

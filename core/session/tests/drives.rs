@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use tandem_gcode::Program;
-use tandem_host::jog::{Jog, JogHand, JogRest, JogSession, Jogs, Reach};
 use tandem_host::{Clock, Command, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::{Sample, StopCause};
@@ -13,6 +12,7 @@ use tandem_sdk::{
     Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, NoOptions, PluginError,
     Setpoint, local_plugin,
 };
+use tandem_session::jog::{Jog, JogHand, JogRest, JogSession, Jogs, Reach};
 
 const AXES: usize = 3;
 
@@ -234,7 +234,7 @@ fn an_axis_that_does_not_know_where_it_is_is_jogged_slowly_and_runs_no_program()
     set(|drives| drives.known = 0b110);
     let words = refusal(WORK, &[], Switches::default());
     assert!(words.contains("it is not known where x stands: home the machine first, or run with --home"), "{words}");
-    let home = Switches { home: true, ..Switches::default() };
+    let home = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
     let words = refusal(WORK, &[("homing.y", "{drive_method = 35}")], home);
     assert!(words.contains("it is not known where x stands, and no [homing.<axis>] table homes it"), "{words}");
     let said = jog(&[(5.0, 1600.0), (5.0, 1500.0)]);
@@ -247,12 +247,13 @@ fn an_axis_that_does_not_know_where_it_is_is_jogged_slowly_and_runs_no_program()
 fn a_drive_homes_its_axis_and_the_program_begins_there() {
     set(|drives| (drives.position[0], drives.known) = (123.0, 0b110));
     let homing = [("homing.x", "{drive_method = 35}"), ("axes.x.home_mm", "4")];
-    let (outcome, _) = drive(Run::home(machine(&homing), &registry(), Switches::default()).unwrap(), &[]);
+    let (outcome, _) =
+        drive(Run::home(machine(&homing), &registry(), tandem_session::HOMING, Switches::default()).unwrap(), &[]);
     assert_eq!((outcome.summary.fault, hardware().methods), (None, [35, 0, 0]));
     assert!((hardware().position[0] - 4.0).abs() < 1e-9, "{:?}", hardware().position);
     assert!(outcome.summary.max_velocity_mm_s["x"] <= 250.0 * (1.0 + 1e-6), "{:?}", outcome.summary.max_velocity_mm_s);
     set(|drives| (drives.position[0], drives.known) = (-300.0, 0b110));
-    let home = Switches { home: true, ..Switches::default() };
+    let home = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
     let (outcome, _) = drive(prepare(WORK, &homing, home).unwrap(), &[]);
     assert_eq!(outcome.summary.fault, None);
     assert!((hardware().position[0] - 60.0).abs() < 1e-9, "{:?}", hardware().position);

@@ -2,18 +2,12 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tandem_fine::Left;
 use tandem_gcode::{Interpreter, Item, ProbeResult};
+use tandem_host::{HostError, Left, Registry, Run, Switches, check_block, interpreter_config, planner};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, Planner};
-
-use crate::error::HostError;
-use crate::ready::check_block;
-use crate::registry::Registry;
-use crate::run::{Run, Switches};
-use crate::setup;
 
 /// What the operator says next.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,9 +57,9 @@ impl<'a> Session<'a> {
         switches: Switches,
         dialogue: Box<dyn Dialogue>,
     ) -> Result<Self, HostError> {
-        let mut interpreter = Interpreter::new(setup::interpreter_config(&machine, switches));
+        let mut interpreter = Interpreter::new(interpreter_config(&machine, switches));
         interpreter.set_file("input");
-        let judge = setup::planner(&machine, registry)?;
+        let judge = planner(&machine, registry)?;
         let manual =
             Manual { machine: machine.clone(), judge, interpreter, dialogue, lines: 0, standing: 0, busy: false };
         Ok(Self { machine, registry, switches, switched: Switched::default(), manual: Arc::new(Mutex::new(manual)) })

@@ -5,12 +5,12 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::Item;
+use tandem_host::check_block;
 use tandem_machine::Machine;
 use tandem_rings::{Controls, Rest};
 use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, Planner};
 
 use super::{Jog, JogEnd, JogRest, Reach};
-use crate::ready::check_block;
 
 /// Steps that may wait behind the one that moves.
 const MOST_WAITING: usize = 16;

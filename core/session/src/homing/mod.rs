@@ -8,6 +8,7 @@ mod tests;
 use std::collections::VecDeque;
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
+use tandem_host::Lead;
 use tandem_machine::{AxisHoming, Machine, SwitchHoming};
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
@@ -17,6 +18,9 @@ use axis::{Axis, Step};
 
 /// How long a switch may bounce behind the back-off, s.
 const BOUNCE_S: f64 = 0.2;
+
+/// Homes the axes of [`Machine::homing`], then hands out the program, if any: for [`tandem_host::Switches::home`].
+pub const HOMING: Lead = |machine, program| Box::new(Homing::new(machine, &machine.homing, program));
 
 /// Homes axes one after the other, then hands out another stream.
 pub struct Homing {

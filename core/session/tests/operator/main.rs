@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
-use tandem_host::jog::{JogHand, JogRest, JogSession, Jogs};
-use tandem_host::operator::{Desk, Listen, Server};
 use tandem_host::{Registry, Switches};
 use tandem_machine::Machine;
+use tandem_session::jog::{JogHand, JogRest, JogSession, Jogs};
+use tandem_session::operator::{Desk, Listen, Server};
 
 /// An answer that does not come is a failure after this; nothing else depends on it.
 const NEVER: Duration = Duration::from_mins(1);

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_gcode::Item;
+use tandem_host::{Registry, planner};
 use tandem_machine::Machine;
 use tandem_rings::{Controls, Rest, RestCause};
 use tandem_sdk::{AxisVector, StopOn};
 
 use super::{JogEnd, JogRest, JogWords, Jogs, ReachWords};
-use crate::registry::Registry;
-use crate::setup;
 
 struct Rig {
     jogs: Jogs,
@@ -24,7 +23,7 @@ impl Rig {
         let machine = Machine::read(&path, &[]).unwrap();
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
-        let jogs = Jogs::new(&machine, setup::planner(&machine, &registry).unwrap());
+        let jogs = Jogs::new(&machine, planner(&machine, &registry).unwrap());
         let controls = Arc::<Controls>::default();
         jogs.enable(Arc::clone(&controls), true, 0);
         Self { jogs, controls }

@@ -3,11 +3,10 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use serde::{Serialize, Serializer};
+use tandem_host::joint_words::JointLine;
 use tandem_recorder::PolicySummary;
 use tandem_rings::Status;
 use tandem_sdk::{Axes, AxisVector};
-
-use crate::joint_words::JointLine;
 
 /// The machine at one moment.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,15 +4,13 @@ use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use tandem_host::{Command, awaited_spindle, holding_inputs, joint_words};
 use tandem_machine::Machine;
 use tandem_recorder::PolicySummary;
 use tandem_rings::{Controls, MachineState, Sample, Status};
 use tandem_sdk::{Axes, AxisVector};
 
-use crate::command::Command;
 use crate::jog::{JogWords, Jogs};
-use crate::roles;
-use crate::{joint_words, spindle};
 
 use super::status::{Counters, Position, StatusLine};
 
@@ -124,7 +122,7 @@ impl Desk {
 
     fn check(&self, command: Command) -> Result<(), String> {
         if command == Command::Resume
-            && let Some(names) = roles::holding(&self.machine, self.status.tripped.load(Relaxed))
+            && let Some(names) = holding_inputs(&self.machine, self.status.tripped.load(Relaxed))
         {
             return Err(format!("{names} still holds the machine: resume when it is closed"));
         }
@@ -249,8 +247,8 @@ impl Desk {
             policy: latest.policy.clone(),
             joints: joint_words::lines(&self.machine, status),
             enabling: joint_words::enabling(&self.machine, status),
-            waits_for: spindle::awaited(status),
-            held_by: roles::holding(&self.machine, status.tripped.load(Relaxed)),
+            waits_for: awaited_spindle(status),
+            held_by: holding_inputs(&self.machine, status.tripped.load(Relaxed)),
             fault: latest.fault.clone(),
             stopped: latest.stopped.clone(),
         }

@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::Deserialize;
 use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use tandem_host::Command;
 
 use super::reply::Problem;
-use crate::command::Command;
 use crate::jog::{JogWords, ReachWords};
 
 /// Lowest rate of a subscription, Hz: a line in a minute and a half. What is slower asks for a status when it wants one.

@@ -1,0 +1,12 @@
+//! The operator's side of a machine: manual input, jogging, homing, and the hub where keys and sockets give commands.
+//!
+//! Each of them is a source of blocks that a run of the host pulls ([`tandem_rough::Source`]), and goes on by what the machine
+//! answers. The host knows none of them.
+
+mod homing;
+pub mod jog;
+mod mdi;
+pub mod operator;
+
+pub use homing::{HOMING, Homing};
+pub use mdi::{Dialogue, NextLine, Session};
