@@ -1,7 +1,7 @@
 //! Why a run does not start, or cannot go on.
 
 use tandem_gcode::{CheckReport, ProgramError};
-use tandem_machine::MachineError;
+use tandem_machine::{Machine, MachineError, Place};
 
 /// A refusal: nothing has moved.
 #[derive(Debug, thiserror::Error)]
@@ -26,4 +26,13 @@ pub enum HostError {
     /// The computer: a thread or a file.
     #[error("{0}")]
     System(String),
+}
+
+/// A refusal with the place in the machine file.
+pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
+    let place = match machine.place(key) {
+        place @ Place::Override(_) => place.to_string(),
+        place => format!("{place}: {key}"),
+    };
+    HostError::Setup { place, cause: cause.into() }
 }

@@ -1,19 +1,18 @@
 //! The drivers of a machine: each with its part of it, and all of them as the one that the fine loop calls.
 
+mod at_rest;
 mod composite;
 mod roster;
 mod share;
 mod slow;
 
-use tandem_machine::{DriverChoice, Machine};
-use tandem_sdk::{Attached, Driver, DriverContext, PluginError, Words};
+use tandem_machine::{AxisHoming, DriverChoice, Machine};
+use tandem_sdk::{Attached, Driver, DriverContext, Name, PluginError, Words};
 
-use crate::error::HostError;
+use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
-use crate::registry::{PluginRefusal, Registry};
-use crate::rules::refusal;
-use crate::setup;
-use crate::stand_in::AtRest;
+use crate::plugins::registry::{PluginRefusal, Registry};
+use at_rest::AtRest;
 use composite::{Composite, Part};
 pub use roster::{Entry, Roster};
 use share::Share;
@@ -69,7 +68,7 @@ impl Drives {
     /// # Errors
     /// What a driver refuses, with its place in the machine file.
     pub fn check(&self, machine: &Machine, joints: &JointSpace) -> Result<(), HostError> {
-        let whole = setup::driver_context(machine, joints);
+        let whole = driver_context(machine, joints);
         let known = joints.health(&whole.start_position);
         known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
         let check = |made: &Made| made.driver.check(&made.context(&whole)).map_err(|e| made.refuses(machine, &e));
@@ -82,7 +81,7 @@ impl Drives {
     /// # Errors
     /// Why the drives cannot be reached, with the place of their driver in the machine file.
     pub fn open(&mut self, machine: &Machine, joints: &JointSpace, real_time: bool) -> Result<Attached, HostError> {
-        let whole = DriverContext { real_time: u32::from(real_time), ..setup::driver_context(machine, joints) };
+        let whole = DriverContext { real_time: u32::from(real_time), ..driver_context(machine, joints) };
         for made in &mut self.all {
             let context = made.context(&whole);
             made.driver.open(&context).map_err(|e| made.refuses(machine, &e))?;
@@ -151,7 +150,7 @@ pub fn attached_driver(machine: &Machine, registry: &Registry) -> Result<(Box<dy
 
 fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result<Made, HostError> {
     let section = choice.section();
-    let driver = registry.driver(&choice.choice).map_err(|e| setup::refused(machine, &section, e))?;
+    let driver = registry.driver(&choice.choice).map_err(|e| e.at(machine, &section))?;
     let share = match &choice.owns {
         Some(owned) => {
             let joints = JointSpace::of(machine, registry)?;
@@ -211,6 +210,30 @@ impl Made {
     fn refuses(&self, machine: &Machine, error: &PluginError) -> HostError {
         let cause = format!("driver {}: {}", self.title, error.message());
         let option = error.option().map(str::to_string);
-        setup::refused(machine, &self.section, PluginRefusal { option, cause })
+        PluginRefusal { option, cause }.at(machine, &self.section)
     }
+}
+
+/// What a driver is told that has the whole machine.
+pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
+    let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
+    context.start_position = joints.to_joints(&machine.start);
+    for (described, joint) in context.joints.iter_mut().zip(&joints.joints) {
+        described.name = Name::new(&joint.name);
+        described.rotary = u32::from(joint.rotary);
+        described.limits = joint.limits;
+    }
+    let bit = |input: u32| 1_u64 << input.min(63);
+    context.inputs = machine.probe.map_or(0, |probe| bit(probe.input));
+    context.inputs |=
+        machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |mask, switch| mask | bit(switch.input));
+    for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
+        context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
+        context.joints[homing.axis].homing_torque_percent = homing.max_torque_percent.unwrap_or(f64::INFINITY);
+    }
+    context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
+    context.analog = machine.analog.iter().fold(0, |mask, analog| mask | 1 << analog.input);
+    context.outputs = u64::MAX;
+    context.spindle = 1;
+    context
 }

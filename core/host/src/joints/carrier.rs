@@ -1,10 +1,12 @@
 //! A planner on a machine whose joints are not its axes.
 
+use tandem_machine::Machine;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, JointLanes, Planner, PlannerDescription,
     PluginError, RawSlice, Segment, SegmentSink,
 };
 
+use super::space::JointSpace;
 use super::travel::Travel;
 
 /// Hands blocks on with the lanes of the joints filled, refuses those in which a joint leaves its travel, and fills the
@@ -18,8 +20,14 @@ pub struct Carrier {
 }
 
 impl Carrier {
-    pub fn new(planner: Box<dyn Planner>, lanes: Option<&'static JointLanes>, travel: Travel) -> Self {
-        Self { planner, lanes, travel, points: Vec::new() }
+    /// `planner` as it is where the joints are the axes; else one that keeps their travel too, and carries their lanes. Host;
+    /// allocates.
+    pub fn around(planner: Box<dyn Planner>, joints: JointSpace, machine: &Machine) -> Box<dyn Planner> {
+        if joints.are_axes() {
+            return planner;
+        }
+        let lanes = joints.lanes();
+        Box::new(Self { planner, lanes, travel: Travel::new(joints, machine.axes), points: Vec::new() })
     }
 }
 

@@ -5,9 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use tandem_machine::Machine;
 use tandem_sdk::{AxisLimits, AxisVector, JointLanes, Limits, MAX_AXES};
 
-use super::Joint;
-use crate::error::HostError;
-use crate::rules::refusal;
+use super::joint::Joint;
+use crate::error::{HostError, refusal};
 
 /// Weights below this share of a joint's largest are rounding.
 const ROUNDING: f64 = 1e-12;

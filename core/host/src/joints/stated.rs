@@ -1,12 +1,11 @@
 //! Which joints there are: what the machine file states, beside what the kinematics have.
 
 use tandem_machine::Machine;
-use tandem_sdk::{AxisVector, Kinematics, MAX_AXES};
+use tandem_sdk::{AxisVector, Kinematics, KinematicsContext, MAX_AXES};
 
-use super::{Joint, plugin};
-use crate::error::HostError;
-use crate::registry::Registry;
-use crate::rules::refusal;
+use super::joint::Joint;
+use crate::error::{HostError, refusal};
+use crate::plugins::registry::Registry;
 
 /// Joints, and the map to them; no map where each axis is its joint.
 type Stated = (Vec<Joint>, Option<Box<dyn Kinematics>>);
@@ -120,4 +119,10 @@ impl Kinematics for Gantry {
         }
         AxisVector(std::array::from_fn(|axis| if counts[axis] > 1.0 { axes[axis] / counts[axis] } else { axes[axis] }))
     }
+}
+
+/// The machine's kinematics, as its plugin makes it.
+fn plugin(machine: &Machine, registry: &Registry) -> Result<Box<dyn Kinematics>, HostError> {
+    let made = registry.kinematics(&machine.kinematics, &KinematicsContext::new(machine.axes));
+    made.map_err(|e| e.at(machine, "kinematics"))
 }

@@ -6,10 +6,8 @@ use tandem_motion::Path;
 use tandem_motion::nurbs::Nurbs;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PluginError};
 
-use super::{Joint, JointSpace, Map};
-
-/// Rounding that a travel limit forgives, mm or rad.
-const ROUNDING: f64 = 1e-9;
+use super::joint::beyond;
+use super::space::{JointSpace, Map};
 
 /// Places tried on a knot span of a curve, and on a path where the joints are no linear function of the axes.
 const TRIED: u32 = 64;
@@ -90,26 +88,6 @@ fn turns(block: &Block, weights: &AxisVector) -> Vec<f64> {
         [level.acos(), -level.acos()].map(|angle| (sign * (angle - phase - arc.start_angle_rad)).rem_euclid(TAU));
     let inside = both.into_iter().filter(|angle| *angle <= swept);
     inside.flat_map(|angle| [angle, angle + TAU * ((swept - angle) / TAU).floor()]).collect()
-}
-
-/// What is wrong with `joint` at `position`, if it is outside its travel.
-pub fn beyond(joint: &Joint, position: f64) -> Option<String> {
-    let (low, high) = (joint.limits.min_mm, joint.limits.max_mm);
-    if position >= low - ROUNDING && position <= high + ROUNDING {
-        return None;
-    }
-    let unit = if joint.rotary { "deg" } else { "mm" };
-    let shown = |value: f64| {
-        let value = if joint.rotary { value.to_degrees() } else { value };
-        (value * 1e6).round() / 1e6
-    };
-    Some(format!(
-        "joint {} would reach {} {unit}, beyond its travel of {} to {} {unit}",
-        joint.name,
-        shown(position),
-        shown(low),
-        shown(high)
-    ))
 }
 
 #[cfg(test)]

@@ -1,108 +1,14 @@
 //! The policy script of the machine: made from the machine file, asked by the rough loop and once a rough period, loaded
 //! anew when its file changes.
 
+mod host;
 mod means;
 mod reload;
 mod setup;
 mod tuner;
 
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use tandem_machine::Machine;
-use tandem_policy::{Engine, Period, Policy};
-use tandem_recorder::PolicySummary;
-use tandem_sdk::Planner;
-
+pub use host::PolicyHost;
 pub use means::Means;
 pub use reload::Reloader;
-use reload::{Stamp, stamp};
 pub use setup::PolicySetup;
 pub use tuner::Tuner;
-
-use crate::error::HostError;
-use crate::rules::refusal;
-
-/// The script at work, shared by the rough loop and the pump, which run on one thread.
-#[derive(Clone)]
-pub struct PolicyHost {
-    engine: Engine,
-    path: PathBuf,
-    /// The file as it was when it was read.
-    stamp: Option<Stamp>,
-    policy: Arc<Mutex<Policy>>,
-}
-
-impl PolicyHost {
-    /// Compiles and starts the machine's script, if it names one.
-    pub fn open(machine: &Machine) -> Result<Option<Self>, HostError> {
-        let Some(choice) = &machine.policy else { return Ok(None) };
-        let refuse = |cause: String| refusal(machine, "policy.script", cause);
-        let path = choice.script.clone();
-        let stamp = stamp(&path);
-        let bytes = std::fs::read(&path).map_err(|e| refuse(format!("{}: {e}", path.display())))?;
-        let named = |e: tandem_policy::Refusal| refuse(format!("{}: {e}", path.display()));
-        let engine = Engine::new().map_err(named)?;
-        let script = engine.compile(&bytes).map_err(named)?;
-        let PolicySetup { values, budget, bounds, facts } = PolicySetup::of(machine)?;
-        let policy = Policy::new(script, values, budget, bounds, &facts);
-        let policy = policy.map_err(|e| match e {
-            e @ tandem_policy::Refusal::Parameters(_) => refusal(machine, "policy.parameters", e.to_string()),
-            e => refuse(format!("{}: {e}", path.display())),
-        })?;
-        Ok(Some(Self { engine, path, stamp, policy: Arc::new(Mutex::new(policy)) }))
-    }
-
-    /// What tunes blocks; `checker` is a planner of the same making that only checks.
-    pub fn tuner(&self, checker: Box<dyn Planner>) -> Tuner {
-        Tuner::new(self.clone(), checker)
-    }
-
-    /// What loads the script anew.
-    pub fn reloader(&self) -> Reloader {
-        Reloader::new(self.clone())
-    }
-
-    /// The ratio after a rough period; `None` where the script asks for none.
-    pub fn period(&self, period: &Period) -> Option<f64> {
-        self.lock().period(period)
-    }
-
-    /// What the script did, for the observer; the rest of a run's notes is in [`Self::summary`].
-    fn take_notes(&self) -> Vec<String> {
-        self.lock().take_notes()
-    }
-
-    /// What the script did, for the summary.
-    pub fn summary(&self) -> PolicySummary {
-        let policy = self.lock();
-        let counters = policy.counters();
-        PolicySummary {
-            name: self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            windows: counters.windows,
-            blocks: counters.blocks,
-            periods: counters.periods,
-            time_constants_changed: counters.time_constants,
-            tolerances_changed: counters.tolerances,
-            feeds_capped: counters.feed_caps,
-            ratios_changed: counters.ratios,
-            requests_limited: counters.limited,
-            requests_refused: counters.refused_by_planner,
-            traps: counters.troubles(),
-            out_of_fuel: counters.out_of_fuel,
-            memory_refusals: counters.memory_refusals,
-            stack_overflows: counters.stack_overflows,
-            not_finite: counters.not_finite,
-            quarantined: policy.is_quarantined(),
-            reloads: counters.reloads,
-            refused_reloads: counters.refused_reloads,
-            most_window_fuel: counters.most_window_fuel,
-            most_period_fuel: counters.most_period_fuel,
-        }
-    }
-
-    /// A panic while the lock is held has ended the run; what follows only reports.
-    fn lock(&self) -> MutexGuard<'_, Policy> {
-        self.policy.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}

@@ -1,14 +1,13 @@
 //! A new script in the place of the one that runs: read and compiled off the loops, put in place between two windows.
 
-use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use tandem_policy::{Instance, Script};
 use tandem_recorder::PolicySummary;
 
-use super::PolicyHost;
+use super::host::{PolicyHost, stamp};
 
 /// How often the file is looked at.
 const LOOK: Duration = Duration::from_secs(1);
@@ -115,15 +114,6 @@ fn look(host: &PolicyHost, asked: &Receiver<()>, found: &Sender<Candidate>) {
             }
         }
     }
-}
-
-/// What changes with a file: when it was written, and its size.
-pub type Stamp = (SystemTime, u64);
-
-/// The stamp of a file that can be read.
-pub fn stamp(path: &Path) -> Option<Stamp> {
-    let data = std::fs::metadata(path).ok()?;
-    Some((data.modified().ok()?, data.len()))
 }
 
 #[cfg(test)]

@@ -5,8 +5,7 @@ use tandem_policy::{Bounds, Budget, Facts, Values};
 use tandem_sdk::Axes;
 use toml::Value;
 
-use crate::error::HostError;
-use crate::rules::refusal;
+use crate::error::{HostError, refusal};
 
 /// Parameters, budget, bounds and what the script is told of the machine.
 #[derive(Clone, Debug)]

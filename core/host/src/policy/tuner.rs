@@ -3,7 +3,7 @@
 use tandem_rough::BlockPolicy;
 use tandem_sdk::{Block, Planner};
 
-use super::PolicyHost;
+use super::host::PolicyHost;
 
 /// Tunes blocks as the script asks, as far as the planner takes them.
 pub struct Tuner {

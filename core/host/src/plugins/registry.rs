@@ -1,12 +1,13 @@
 //! Plugins by kind and name, or by the file that holds them.
 
-use tandem_machine::PluginChoice;
+use tandem_machine::{DriverChoice, Machine, PluginChoice};
 use tandem_sdk::{
     Driver, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext, Plugin, PluginError, PluginKind,
     StrategyContext,
 };
 
-use crate::{loading, plugin_log};
+use crate::error::{HostError, refusal};
+use crate::plugins::{loading, plugin_log};
 
 /// The plugins a host knows. It names none itself: they are registered from outside, or loaded by path.
 pub struct Registry {
@@ -20,6 +21,17 @@ pub struct PluginRefusal {
     pub option: Option<String>,
     /// What is wrong, with the plugin's kind and name.
     pub cause: String,
+}
+
+impl PluginRefusal {
+    /// The refusal with its place in the machine file: of the option that is wrong, or of the plugin's name in `section`.
+    pub(crate) fn at(self, machine: &Machine, section: &str) -> HostError {
+        let key = match self.option {
+            Some(option) => format!("{section}.options.{option}"),
+            None => format!("{section}.plugin"),
+        };
+        refusal(machine, &key, self.cause)
+    }
 }
 
 impl Default for Registry {
@@ -140,4 +152,14 @@ fn wrong_kind(kind: PluginKind, all: &[Plugin]) -> String {
 fn refused(plugin: Plugin, error: &PluginError) -> PluginRefusal {
     let cause = format!("{} {}: {}", plugin.kind().name(), plugin.name(), error.message());
     PluginRefusal { option: error.option().map(str::to_string), cause }
+}
+
+/// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. Host.
+pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
+    machine.drivers.iter().any(|driver| is_real(driver, registry))
+}
+
+/// Whether real drives are behind `driver`; not where it cannot be made.
+pub fn is_real(driver: &DriverChoice, registry: &Registry) -> bool {
+    registry.driver(&driver.choice).is_ok_and(|driver| driver.describe().simulated == 0)
 }

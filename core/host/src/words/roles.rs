@@ -3,7 +3,7 @@
 use tandem_fine::{InputFault, Roles};
 use tandem_machine::{AxisHoming, Input, Machine, Role};
 
-use crate::run::Switches;
+use crate::switches::Switches;
 
 /// What the fine loop judges of the machine's inputs.
 pub fn of(machine: &Machine, switches: Switches) -> Roles {

@@ -8,17 +8,18 @@ use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Planner};
 
-use crate::claim::Claim;
-use crate::density::Density;
 use crate::drives::Drives;
-use crate::error::HostError;
-use crate::hang::HangWatch;
+use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
+use crate::plugins::hang::HangWatch;
+use crate::plugins::registry::Registry;
 use crate::policy::PolicyHost;
-use crate::registry::Registry;
-use crate::run::Switches;
-use crate::strategy::FeedRunner;
-use crate::{rules, setup};
+use crate::setup::claim::Claim;
+use crate::setup::density::Density;
+use crate::setup::parts;
+use crate::setup::rules;
+use crate::soft::strategy::FeedRunner;
+use crate::switches::Switches;
 
 /// Everything that a run needs, made and checked; the drives are not claimed. Whatever refuses a run without asking the
 /// drives refuses it here, so that a check finds all of it.
@@ -61,7 +62,7 @@ impl Plugins {
     /// One of them is not there, or refuses its options.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         let watch = HangWatch::of(machine);
-        let planner = setup::planner(machine, registry)?;
+        let planner = parts::planner(machine, registry)?;
         Ok(Self { watch, planner, claim: Claim::new(Drives::of(machine, registry)?) })
     }
 
@@ -87,7 +88,7 @@ impl Plugins {
         let Some(table) = &machine.faults else { return Ok(()) };
         let joints = JointSpace::of(machine, registry)?;
         let joints = Joints { rotary: joints.rotary(), count: joints.count() };
-        let faults = Faults::read(table, &joints).map_err(|wrong| rules::refusal(machine, &wrong.key, wrong.cause))?;
+        let faults = Faults::read(table, &joints).map_err(|wrong| refusal(machine, &wrong.key, wrong.cause))?;
         self.claim.add_faults(faults);
         Ok(())
     }
@@ -110,7 +111,7 @@ impl Plugins {
             if !switches.unhomed && switches.home.is_none() {
                 joints.check_start(&machine)?;
             }
-            self.planner = setup::planner(&machine, registry)?;
+            self.planner = parts::planner(&machine, registry)?;
         }
         Ok((machine, self))
     }
@@ -152,8 +153,8 @@ impl Ready {
             None => Passed::of(&machine, registry, &plugins, &mut program, switches)?,
         };
         let name = program.name().to_string();
-        let stream = Stream::new(program, &setup::interpreter_config(&machine, switches))?;
-        let source = setup::source(&machine, registry, stream, switches, policy.as_ref())?;
+        let stream = Stream::new(program, &parts::interpreter_config(&machine, switches))?;
+        let source = parts::source(&machine, registry, stream, switches, policy.as_ref())?;
         let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
         Ok(Self { entries: passed.entries, ..ready })
     }
@@ -231,7 +232,7 @@ impl Passed {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let joints = JointSpace::of(machine, registry)?;
-        let depth_s = setup::queue_depth_s(machine, &joints, plugins.planner.describe().order);
+        let depth_s = parts::queue_depth_s(machine, &joints, plugins.planner.describe().order);
         let mut density = Density::new(machine, depth_s);
         let report = first_pass(machine, plugins.planner.as_ref(), program, switches, &mut density)?;
         if report.is_ok() {
@@ -249,7 +250,7 @@ fn feed(
     policy: Option<&PolicyHost>,
     length_mm: f64,
 ) -> Result<Option<FeedRunner>, HostError> {
-    let feed = setup::feed(machine, registry, &JointSpace::of(machine, registry)?, policy, length_mm)?;
+    let feed = parts::feed(machine, registry, &JointSpace::of(machine, registry)?, policy, length_mm)?;
     rules::check_signals(machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
     Ok(feed)
 }
@@ -283,7 +284,7 @@ pub fn each_block(
     switches: Switches,
     per_block: &mut dyn FnMut(&Block),
 ) -> Result<CheckReport, HostError> {
-    let config = setup::interpreter_config(machine, switches);
+    let config = parts::interpreter_config(machine, switches);
     Ok(check(program, &config, &mut |block| {
         per_block(block);
         Ok(())
@@ -298,7 +299,7 @@ fn first_pass(
     switches: Switches,
     density: &mut Density,
 ) -> Result<CheckReport, HostError> {
-    let config = setup::interpreter_config(machine, switches);
+    let config = parts::interpreter_config(machine, switches);
     Ok(check(program, &config, &mut |block| {
         density.block(block);
         check_block(machine, planner, block)

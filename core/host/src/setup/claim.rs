@@ -5,11 +5,10 @@ use tandem_machine::Machine;
 use tandem_sdk::{Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS};
 
 use crate::drives::{Drives, Roster};
-use crate::error::HostError;
+use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
-use crate::rules::refusal;
-use crate::run::{Clock, Switches};
-use crate::setup;
+use crate::switches::{Clock, Switches};
+use crate::words::joint_words::code_text;
 
 /// The drivers of a machine, and what they said when their drives were claimed. A claim that is dropped stops them.
 pub struct Claim {
@@ -137,7 +136,7 @@ impl Look<'_> {
                 let joint = faulty.unwrap_or_default();
                 let hexadecimal = self.roster.of_joint(joint).description.hexadecimal_codes != 0;
                 let code = self.attached.fault_code[joint];
-                let code = setup::code_text(hexadecimal, code, &self.drives.explain(joint, code));
+                let code = code_text(hexadecimal, code, &self.drives.explain(joint, code));
                 format!("the drive of {name} stands in fault {code}; --reset clears it")
             },
         )

@@ -5,7 +5,9 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_machine::Machine;
 use tandem_rings::HostEnd;
 
-use crate::{joint_words, roles, spindle};
+use crate::words::joint_words;
+use crate::words::roles;
+use crate::words::spindle;
 
 /// Time for which nobody wonders why the drives do not hold yet, or a cut does not begin, s: contactors, brakes of small drives
 /// and small spindles need less.

@@ -9,8 +9,8 @@ use std::time::Duration;
 use tandem_fine::FineLoop;
 use tandem_sdk::abi::{Method, beat, calling};
 
-use crate::command::{Command, Timed};
-use crate::pump::Pump;
+use crate::soft::command::{Command, Timed};
+use crate::soft::pump::Pump;
 
 /// Machine time, s, without any passing of program time after which a run without further commands is given up.
 const PATIENCE_S: f64 = 60.0;

@@ -6,9 +6,9 @@ use tandem_sdk::{Driver, JointState, PluginError};
 
 use crate::drives::Roster;
 use crate::joints::JointSpace;
-use crate::roles;
-use crate::setup::code_text;
-use crate::spindle;
+use crate::words::joint_words::{code_text, state_text};
+use crate::words::roles;
+use crate::words::spindle;
 
 /// Who is meant by the numbers of a fault.
 struct Names<'a> {
@@ -106,20 +106,6 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
                  `tandem latency` shows what this computer keeps"
             )
         }
-    }
-}
-
-/// A joint's state as people read it.
-pub fn state_text(state: JointState) -> &'static str {
-    match state {
-        JointState::Disabled => "disabled",
-        JointState::Enabling => "enabling",
-        JointState::Enabled => "enabled",
-        JointState::Homing => "homing",
-        JointState::QuickStop => "in its quick stop",
-        JointState::Fault => "in fault",
-        JointState::Lost => "lost",
-        _ => "in no known state",
     }
 }
 

@@ -9,12 +9,12 @@ use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
-use crate::command::{Command, Timed};
-use crate::command_log::CommandLog;
-use crate::plugin_log::drain_plugin_log;
+use crate::plugins::plugin_log::drain_plugin_log;
 use crate::policy::Reloader;
-use crate::strategy::FeedRunner;
-use crate::waits::Waits;
+use crate::soft::command::{Command, Timed};
+use crate::soft::command_log::CommandLog;
+use crate::soft::strategy::FeedRunner;
+use crate::soft::waits::Waits;
 
 /// What is to happen where the program waits at rest for the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

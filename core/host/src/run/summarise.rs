@@ -7,8 +7,8 @@ use tandem_machine::{JerkMode, Machine};
 use tandem_recorder::{JointWatch, PlanningUs, SUMMARY_FORMAT, Summary};
 use tandem_sdk::AxisVector;
 
-use crate::pump::Pump;
-use crate::run::Clock;
+use crate::soft::pump::Pump;
+use crate::switches::Clock;
 
 /// The summary of what `pump` and `fine` saw; what only the clock or the host knows is added to it.
 pub fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {

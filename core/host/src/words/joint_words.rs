@@ -6,10 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use serde::Serialize;
 use tandem_machine::Machine;
 use tandem_rings::Status;
-use tandem_sdk::{JointState, MAX_AXES};
-
-use crate::fault_text::state_text;
-use crate::setup::number_text;
+use tandem_sdk::{JointState, MAX_AXES, Words};
 
 /// One joint's drive at one moment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -57,6 +54,31 @@ pub fn enabling(machine: &Machine, status: &Status) -> Option<String> {
     };
     let missing: Vec<_> = lines(machine, status).iter().filter(|line| line.state != holds).map(word).collect();
     (!missing.is_empty()).then(|| format!("enabling {}", missing.join(", ")))
+}
+
+/// A joint's state as people read it.
+pub fn state_text(state: JointState) -> &'static str {
+    match state {
+        JointState::Disabled => "disabled",
+        JointState::Enabling => "enabling",
+        JointState::Enabled => "enabled",
+        JointState::Homing => "homing",
+        JointState::QuickStop => "in its quick stop",
+        JointState::Fault => "in fault",
+        JointState::Lost => "lost",
+        _ => "in no known state",
+    }
+}
+
+/// A drive's code as its manual writes it, with the driver's `words` for it.
+pub fn code_text(hexadecimal: bool, code: u32, words: &Words) -> String {
+    let number = number_text(code, hexadecimal);
+    if words.as_str().is_empty() { number } else { format!("{number} ({})", words.as_str()) }
+}
+
+/// A drive's code alone, as its manual writes it.
+pub fn number_text(code: u32, hexadecimal: bool) -> String {
+    if hexadecimal { format!("{code:#06x}") } else { code.to_string() }
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! What does not go together: refusals before a run starts.
 
-use tandem_machine::{Analog, GuardMode, JerkMode, Machine, Place};
+use tandem_machine::{Analog, GuardMode, JerkMode, Machine};
 use tandem_sdk::{MAX_ENABLE_S, MAX_SIGNALS, PlannerDescription};
 
 use crate::drives::{Entry, Roster};
-use crate::error::HostError;
+use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
-use crate::run::{Clock, Switches};
+use crate::switches::{Clock, Switches};
 
 /// Checks planner, driver and guard against each other.
 pub fn check(machine: &Machine, planner: &PlannerDescription, drivers: &Roster) -> Result<(), HostError> {
@@ -116,15 +116,6 @@ pub fn check_signals(machine: &Machine, of_strategy: &[&str]) -> Result<(), Host
         Some(name) => Err(refusal(machine, analog, format!("{name}: the feed strategy has a signal of this name"))),
         None => Ok(()),
     }
-}
-
-/// A refusal with the place in the machine file.
-pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
-    let place = match machine.place(key) {
-        place @ Place::Override(_) => place.to_string(),
-        place => format!("{place}: {key}"),
-    };
-    HostError::Setup { place, cause: cause.into() }
 }
 
 #[cfg(test)]

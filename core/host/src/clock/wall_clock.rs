@@ -13,11 +13,11 @@ use tandem_machine::FineThread;
 use tandem_recorder::PageFaults;
 use tandem_rings::{Sizes, sample_ring};
 
+use crate::clock::periods::{Body, PeriodClock, Timing, run};
+use crate::clock::realtime::{ProcessGrants, page_faults_of_this_thread, prepare_thread};
 use crate::error::HostError;
-use crate::hang::{FineRuns, FineWatch};
-use crate::pump::Pump;
-use crate::realtime::{ProcessGrants, page_faults_of_this_thread, prepare_thread};
-use crate::realtime_periods::{Body, PeriodClock, Timing, run};
+use crate::plugins::hang::{FineRuns, FineWatch};
+use crate::soft::pump::Pump;
 
 const NS_PER_S: i64 = 1_000_000_000;
 

@@ -1,5 +1,7 @@
 //! One run of one program on one machine.
 
+mod summarise;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
@@ -12,62 +14,28 @@ use tandem_rings::{HostEnd, Sizes, Switched, bridge};
 use tandem_rough::{RoughConfig, RoughLoop, Source};
 use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
 
-use crate::command::Timed;
+use crate::clock::exchange_time::{self, ExchangeTimes};
+use crate::clock::periods::Timing;
+use crate::clock::virtual_clock;
+use crate::clock::wall_clock;
+use crate::clock::wall_clock::Periods;
 use crate::drives::Roster;
 use crate::error::HostError;
-use crate::exchange_time::{self, ExchangeTimes};
-use crate::fault_text::{Known, describe};
-use crate::hang::HangWatch;
 use crate::joints::JointSpace;
-use crate::plugin_log::drain_plugin_log;
-use crate::policy::PolicyHost;
-use crate::pump::{Pump, RunObserver};
-use crate::ready::Ready;
-use crate::realtime_periods::Timing;
-use crate::registry::Registry;
-use crate::strategy::FeedRunner;
-use crate::summarise::summarise;
-use crate::waits::Waits;
-use crate::wall_clock::Periods;
-use crate::{rules, setup, virtual_clock, wall_clock};
-
-/// Which clock drives the loops.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// Lockstep, as fast as the processor allows.
-    Virtual,
-    /// Real time.
-    Wall,
-}
-
-/// Makes the source of a run that moves by itself before it hands out another source, if any, as homing does. It is given the
-/// machine as it stands.
-pub type Lead = fn(&Machine, Option<Box<dyn Source + Send>>) -> Box<dyn Source + Send>;
-
-/// The switches of the operator's panel.
-#[derive(Clone, Copy, Debug, Default)]
-#[allow(clippy::struct_excessive_bools)] // independent switches of a panel
-pub struct Switches {
-    /// Lines that begin with `/` are left out.
-    pub block_delete: bool,
-    /// M0 and M6 wait for the operator.
-    pub pause_at_stops: bool,
-    /// M1 waits for the operator, until the switch is turned off.
-    pub optional_stop: bool,
-    /// No spindle, coolant or user output is switched, nothing waits for the operator, and feed motion runs at the
-    /// machine's dry-run feed.
-    pub dry_run: bool,
-    /// What homes the axes that the machine file tells how to, before the program; none where nothing is homed.
-    pub home: Option<Lead>,
-    /// Joints of which it is not known where they are may move: jogging.
-    pub unhomed: bool,
-    /// Faults in which drives stand are reset before they are enabled.
-    pub reset: bool,
-    /// Edges that do not come are assumed where the motion towards them ends: something stands in for real drives.
-    pub assumes_edges: bool,
-    /// The clock that is asked for; none where it follows the driver.
-    pub clock: Option<Clock>,
-}
+use crate::plugins::hang::HangWatch;
+use crate::plugins::plugin_log::drain_plugin_log;
+use crate::plugins::registry::Registry;
+use crate::policy::{PolicyHost, Reloader};
+use crate::setup::parts;
+use crate::setup::ready::Ready;
+use crate::setup::rules;
+use crate::soft::command::Timed;
+use crate::soft::pump::{Pump, RunObserver};
+use crate::soft::strategy::FeedRunner;
+use crate::soft::waits::Waits;
+use crate::switches::{Clock, Lead, Switches};
+use crate::words::fault_text::{Known, describe};
+use summarise::summarise;
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
 pub struct Run {
@@ -133,7 +101,7 @@ impl Run {
         source: Box<dyn Source + Send>,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let behind = |machine: &Machine| setup::behind_homing(machine, source, switches);
+        let behind = |machine: &Machine| parts::behind_homing(machine, source, switches);
         Self::open(Ready::of_source(machine, registry, Some(name), behind, switches)?)
     }
 
@@ -158,19 +126,19 @@ impl Run {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
         let description = planner.describe();
-        let depth_s = setup::queue_depth_s(&machine, &joints, description.order);
+        let depth_s = parts::queue_depth_s(&machine, &joints, description.order);
         let cuts = 2.0 * depth_s / machine.rough_period_s;
         let segments = Sizes::segments_for(ready.entries as f64 + cuts);
         // As lockstep needs it: the samples of each rough period are taken behind it.
         let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, segments };
         let (rough_end, fine_end, host) = bridge(sizes);
-        let mut fine_config = setup::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
+        let mut fine_config = parts::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
         fine_config.record_drives = ready.records_drives;
         let unknown_axes = joints.axes_moved_by(!(attached.known | attached.homed));
         host.status.hexadecimal_codes.store(drives.hexadecimal_codes != 0, Relaxed);
         host.controls.optional_stop.store(switches.optional_stop, Relaxed);
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
-        rough_config.advance_s = setup::advance_s(machine.rough_period_s, depth_s, segments);
+        rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
         let exchange = Arc::new(ExchangeTimes::default());
         let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
@@ -269,7 +237,7 @@ impl Run {
         let mut monitor = Monitor::new(&machine, self.leaves_path);
         monitor.worst.allow_steps(&self.speed_difference_mm_per_s);
         monitor.joints = self.joints.watch(machine.fine_period_s);
-        let mut reloader = self.policy.as_ref().map(PolicyHost::reloader);
+        let mut reloader = self.policy.clone().map(Reloader::new);
         if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
             && let Err(note) = reloader.watch()
         {

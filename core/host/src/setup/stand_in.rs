@@ -4,12 +4,10 @@ use tandem_gcode::Item;
 use tandem_machine::{AxisHoming, DriverChoice, Machine, PluginChoice};
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Edge, Feedback, PluginError, Setpoint, Words};
+use tandem_sdk::Edge;
 
-use crate::error::HostError;
-use crate::registry::Registry;
-use crate::rules::refusal;
-use crate::setup;
+use crate::error::{HostError, refusal};
+use crate::plugins::registry::{Registry, is_real};
 
 /// `machine` with each real driver replaced by what stands in for it: its `stand_in`, else `ideal` drives. What replaces what is
 /// told in words, none where nothing is real. Host; allocates.
@@ -24,7 +22,7 @@ pub fn with_stand_ins(
     let (mut machine, mut notes) = (machine.clone(), vec![]);
     for index in 0..machine.drivers.len() {
         let driver = &machine.drivers[index];
-        if !setup::is_real(driver, registry) {
+        if !is_real(driver, registry) {
             continue;
         }
         let (title, section) = (driver.title(), driver.section());
@@ -35,7 +33,7 @@ pub fn with_stand_ins(
             return Err(refusal(&machine, &format!("{section}.stand_in"), cause));
         };
         let replaced = DriverChoice { choice, inputs_at_rest, ..driver.clone() };
-        if setup::is_real(&replaced, registry) {
+        if is_real(&replaced, registry) {
             let cause = format!("{} moves metal itself", replaced.choice.plugin);
             return Err(refusal(&machine, &format!("{section}.stand_in.plugin"), cause));
         }
@@ -52,53 +50,6 @@ fn inputs_at_rest(machine: &Machine) -> u64 {
     let roles = machine.inputs.iter().filter(|input| input.role.is_some() && input.normally_closed);
     let all = probe.into_iter().chain(switches.map(|switch| switch.input)).chain(roles.map(|input| input.input));
     all.fold(0, |mask, input| mask | 1 << input.min(63))
-}
-
-/// Drives whose inputs in `levels` are 1 whatever they say.
-pub struct AtRest {
-    pub driver: Box<dyn Driver>,
-    /// A bit per input, as the driver numbers them.
-    pub levels: u64,
-}
-
-impl Driver for AtRest {
-    fn describe(&self) -> DriverDescription {
-        self.driver.describe()
-    }
-
-    fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
-        self.driver.check(context)
-    }
-
-    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.driver.open(context)
-    }
-
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        self.driver.start()
-    }
-
-    fn send(&mut self, setpoint: &Setpoint) {
-        self.driver.send(setpoint);
-    }
-
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        let exchanged = self.driver.exchange(setpoint, feedback);
-        feedback.inputs |= self.levels;
-        exchanged
-    }
-
-    fn quick_stop(&mut self) {
-        self.driver.quick_stop();
-    }
-
-    fn stop(&mut self) -> Result<(), PluginError> {
-        self.driver.stop()
-    }
-
-    fn explain(&self, joint: u32, code: u32) -> Words {
-        self.driver.explain(joint, code)
-    }
 }
 
 /// A stream whose motion towards an edge ends at its end, with the edge there, where the edge does not come: what stands in for

@@ -8,7 +8,7 @@ use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{AxisLimits, AxisVector, Driver, DriverContext, Limits, Segment, SegmentFlags};
 
 use super::{Body, PeriodClock, Timing, run};
-use crate::wall_clock::FineBody;
+use crate::clock::wall_clock::FineBody;
 
 const PERIOD_NS: i64 = 1_000_000;
 

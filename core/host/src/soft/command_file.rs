@@ -1,6 +1,6 @@
 //! Command files: what the operator does, by tick.
 
-use crate::command::{Command, Timed};
+use crate::soft::command::{Command, Timed};
 
 /// Errors of a command file that are told one by one.
 const MAX_ERRORS: usize = 100;

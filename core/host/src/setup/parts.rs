@@ -2,25 +2,24 @@
 
 use tandem_fine::{FineConfig, MissedLimits};
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
-use tandem_machine::{AxisHoming, DriverChoice, GuardMode, Machine};
+use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, DriverContext, DriverDescription, FeedStrategy, Limits, Name, Planner,
-    PlannerContext, PlannerDescription, StrategyContext, Words, size_of_contract,
+    Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, Planner, PlannerContext,
+    PlannerDescription, StrategyContext, size_of_contract,
 };
 
-use crate::dry_run::DryRun;
 use crate::error::HostError;
-use crate::joints::JointSpace;
-use crate::lines;
-use crate::policy::{Means, PolicyHost};
-use crate::registry::{PluginRefusal, Registry};
-use crate::roles;
-use crate::rules::refusal;
-use crate::run::Switches;
-use crate::stand_in::AssumedEdges;
-use crate::strategy::FeedRunner;
+use crate::joints::{Carrier, JointSpace};
+use crate::plugins::registry::Registry;
+use crate::policy::{Means, PolicyHost, Tuner};
+use crate::setup::dry_run::DryRun;
+use crate::setup::lines;
+use crate::setup::stand_in::AssumedEdges;
+use crate::soft::strategy::FeedRunner;
+use crate::switches::Switches;
+use crate::words::roles;
 
 /// Greatest time constant that a program may ask for where the machine states no range, s.
 const MOST_TIME_CONSTANT_S: f64 = 1.0;
@@ -62,7 +61,7 @@ pub fn source(
 ) -> Result<Box<dyn Source + Send>, HostError> {
     let mut source = program(machine, stream, switches);
     if let Some(policy) = policy {
-        source = Box::new(Tuned::new(source, policy.tuner(planner(machine, registry)?)));
+        source = Box::new(Tuned::new(source, Tuner::new(policy.clone(), planner(machine, registry)?)));
     }
     Ok(behind_homing(machine, source, switches))
 }
@@ -107,8 +106,8 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
         joint_lanes: joints.lanes(),
     };
     let choice = &machine.planner;
-    let planner = registry.planner(choice, &context).map_err(|e| refused(machine, "planner", e))?;
-    Ok(joints.carried(planner, machine))
+    let planner = registry.planner(choice, &context).map_err(|e| e.at(machine, "planner"))?;
+    Ok(Carrier::around(planner, joints, machine))
 }
 
 /// The limits of the machine's axes, as narrow as its joints make them. Host; allocates.
@@ -117,60 +116,6 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
 /// What is wrong with the joints or their kinematics.
 pub fn axis_limits(machine: &Machine, registry: &Registry) -> Result<Limits, HostError> {
     Ok(JointSpace::of(machine, registry)?.of_axes())
-}
-
-/// A plugin's refusal with the place in the machine file: of the option that is wrong, or of the plugin's name.
-pub fn refused(machine: &Machine, section: &str, refused: PluginRefusal) -> HostError {
-    let key = match refused.option {
-        Some(option) => format!("{section}.options.{option}"),
-        None => format!("{section}.plugin"),
-    };
-    refusal(machine, &key, refused.cause)
-}
-
-/// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. Host.
-pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
-    machine.drivers.iter().any(|driver| is_real(driver, registry))
-}
-
-/// Whether real drives are behind `driver`; not where it cannot be made.
-pub fn is_real(driver: &DriverChoice, registry: &Registry) -> bool {
-    registry.driver(&driver.choice).is_ok_and(|driver| driver.describe().simulated == 0)
-}
-
-/// What a driver is told that has the whole machine.
-pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
-    let mut context = DriverContext::new(joints.count(), machine.fine_period_s);
-    context.start_position = joints.to_joints(&machine.start);
-    for (described, joint) in context.joints.iter_mut().zip(&joints.joints) {
-        described.name = Name::new(&joint.name);
-        described.rotary = u32::from(joint.rotary);
-        described.limits = joint.limits;
-    }
-    let bit = |input: u32| 1_u64 << input.min(63);
-    context.inputs = machine.probe.map_or(0, |probe| bit(probe.input));
-    context.inputs |=
-        machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |mask, switch| mask | bit(switch.input));
-    for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
-        context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
-        context.joints[homing.axis].homing_torque_percent = homing.max_torque_percent.unwrap_or(f64::INFINITY);
-    }
-    context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
-    context.analog = machine.analog.iter().fold(0, |mask, analog| mask | 1 << analog.input);
-    context.outputs = u64::MAX;
-    context.spindle = 1;
-    context
-}
-
-/// A drive's code as its manual writes it, with the driver's `words` for it.
-pub fn code_text(hexadecimal: bool, code: u32, words: &Words) -> String {
-    let number = number_text(code, hexadecimal);
-    if words.as_str().is_empty() { number } else { format!("{number} ({})", words.as_str()) }
-}
-
-/// A drive's code alone, as its manual writes it.
-pub fn number_text(code: u32, hexadecimal: bool) -> String {
-    if hexadecimal { format!("{code:#06x}") } else { code.to_string() }
 }
 
 /// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.
@@ -210,7 +155,7 @@ fn strategy(
         joints_are_axes: u32::from(joints.are_axes()),
     };
     let made = registry.strategy(choice, &context);
-    made.map(Some).map_err(|e| refused(machine, "feed_strategy", e))
+    made.map(Some).map_err(|e| e.at(machine, "feed_strategy"))
 }
 
 /// Share of an axis' acceleration that planners leave along the path where it turns, at least.

@@ -1,7 +1,5 @@
 //! Plugins from shared libraries.
 
-mod whole;
-
 use std::ffi::{CString, OsStr};
 use std::path::Path;
 
@@ -9,7 +7,7 @@ use libloading::Library;
 use tandem_sdk::Plugin;
 use tandem_sdk::abi::{self, SYMBOL_PREFIX};
 
-use crate::plugin_log;
+use crate::plugins::{plugin_log, whole};
 
 /// What every version of the symbol begins with.
 const ANY_VERSION: &str = "tandem_plugin_v";

@@ -2,7 +2,7 @@
 
 use tandem_rings::{Given, Sample};
 
-use crate::command::{Command, Timed};
+use crate::soft::command::{Command, Timed};
 
 /// Compares what the operator asks for from sample to sample.
 #[derive(Debug)]

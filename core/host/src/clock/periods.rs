@@ -2,8 +2,8 @@
 
 use tandem_recorder::Lateness;
 
-use crate::hang::FineRuns;
-use crate::phase::PhaseSteering;
+use crate::clock::phase::PhaseSteering;
+use crate::plugins::hang::FineRuns;
 
 /// A clock that can wait. Times are ns from any origin.
 pub trait PeriodClock {
@@ -99,9 +99,9 @@ fn whole(ns: i64, period_ns: i64) -> i64 {
 }
 
 #[cfg(test)]
-#[path = "realtime_periods_tests.rs"]
+#[path = "periods_tests.rs"]
 mod tests;
 
 #[cfg(test)]
-#[path = "realtime_bus_tests.rs"]
+#[path = "bus_tests.rs"]
 mod bus_tests;

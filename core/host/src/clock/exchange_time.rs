@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_recorder::ExchangeUs;
 use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
 
-use crate::wall_clock::now_ns;
+use crate::clock::wall_clock::now_ns;
 
 /// What was measured, shared with who reads it.
 #[derive(Debug, Default)]

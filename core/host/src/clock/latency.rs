@@ -6,9 +6,9 @@ use std::time::Duration;
 use tandem_machine::FineThread;
 use tandem_recorder::PageFaults;
 
+use crate::clock::periods::{Body, Timing};
+use crate::clock::wall_clock::TimedThread;
 use crate::error::HostError;
-use crate::realtime_periods::{Body, Timing};
-use crate::wall_clock::TimedThread;
 
 /// What was measured.
 #[derive(Debug)]
