@@ -22,8 +22,8 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
 use tandem_rings::{
-    Controls, Depth, FineEnd, Given, MachineState, Ratio, Rest, Sample, Status, StopCause, StrategyRequest, Switched,
-    SwitchedBy,
+    Controls, Depth, FineEnd, MachineState, OperatorInputs, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
+    Switched, SwitchedBy,
 };
 use tandem_sdk::{Arm, AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
 
@@ -112,7 +112,7 @@ pub struct FineLoop {
     kinematics: Option<Box<dyn Kinematics>>,
     joints: usize,
     controls: Arc<Controls>,
-    given: Given,
+    given: OperatorInputs,
     cause: StopCause,
     status: Arc<Status>,
     depth: Arc<Depth>,
@@ -182,7 +182,7 @@ impl FineLoop {
             joints: joints::count(config, kinematics.as_deref()),
             kinematics,
             controls: end.controls,
-            given: Given::default(),
+            given: OperatorInputs::default(),
             cause: StopCause::None,
             status: end.status,
             depth: end.depth,
@@ -234,7 +234,7 @@ impl FineLoop {
 
     /// One fine period: fine thread, no allocation, bounded work.
     pub fn tick(&mut self) {
-        self.given = Given::of(&self.controls);
+        self.given = OperatorInputs::of(&self.controls);
         self.cause = StopCause::None;
         self.watch_jog();
         self.take_requests();

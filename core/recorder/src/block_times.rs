@@ -6,8 +6,6 @@ use std::collections::VecDeque;
 use tandem_rings::{MachineState, Sample, StopCause};
 use tandem_sdk::{Block, BlockKind, BlockReport, LimitedBy};
 
-use crate::record::limited_by;
-
 /// What the time of a sample went to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeGoesTo {
@@ -149,6 +147,22 @@ impl BlockTimes {
         } else {
             Some(TimeGoesTo::Governor)
         }
+    }
+}
+
+/// What held the feed down, as it is written.
+pub(crate) fn limited_by(reason: LimitedBy) -> &'static str {
+    match reason {
+        LimitedBy::Feed => "feed",
+        LimitedBy::Acceleration => "acceleration",
+        LimitedBy::Curvature => "curvature",
+        LimitedBy::Junction => "junction",
+        LimitedBy::Velocity => "velocity",
+        LimitedBy::Buffer => "buffer",
+        LimitedBy::TimeConstant => "time-constant",
+        LimitedBy::Tolerance => "tolerance",
+        LimitedBy::Jerk => "jerk",
+        LimitedBy::Policy => "policy",
     }
 }
 

@@ -7,7 +7,7 @@
 mod atomics;
 mod controls;
 mod counts;
-mod given;
+mod operator_inputs;
 mod request;
 mod rest;
 mod sample;
@@ -16,7 +16,7 @@ mod switched;
 pub use atomics::{AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
 pub use controls::{Controls, JogControls, JointStatus, SpindleStatus, Status};
 pub use counts::Counts;
-pub use given::Given;
+pub use operator_inputs::OperatorInputs;
 pub use request::{RequestKind, StrategyRequest};
 pub use rest::{Rest, RestCause};
 pub use sample::{MachineState, Sample, StopCause};

@@ -2,7 +2,7 @@
 
 use tandem_sdk::{AxisVector, MAX_ANALOG, MAX_AXES};
 
-use crate::Given;
+use crate::OperatorInputs;
 use crate::switched::Switched;
 
 /// What the machine is doing.
@@ -140,5 +140,5 @@ pub struct Sample {
     /// Why the machine is being stopped, as this position was chosen.
     pub cause: StopCause,
     /// What the operator asked for in this period.
-    pub given: Given,
+    pub given: OperatorInputs,
 }

@@ -9,4 +9,4 @@ mod mdi;
 pub mod operator;
 
 pub use homing::{HOMING, Homing};
-pub use mdi::{Dialogue, NextLine, Session};
+pub use mdi::{MdiInput, MdiSession, NextLine};

@@ -22,7 +22,7 @@ pub enum NextLine {
 
 /// The operator's side of manual input. Called on the soft side, at rest; on the virtual clock it may wait, and machine
 /// time stands still meanwhile.
-pub trait Dialogue: Send {
+pub trait MdiInput: Send {
     /// What the operator says next.
     fn next_line(&mut self) -> NextLine;
 
@@ -37,7 +37,7 @@ pub trait Dialogue: Send {
 }
 
 /// Manual input on one machine. Modal state, offsets and parameters stay between lines, and through faults.
-pub struct Session<'a> {
+pub struct MdiSession<'a> {
     machine: Machine,
     registry: &'a Registry,
     switches: Switches,
@@ -46,7 +46,7 @@ pub struct Session<'a> {
     manual: Arc<Mutex<Manual>>,
 }
 
-impl<'a> Session<'a> {
+impl<'a> MdiSession<'a> {
     /// A session that nothing has been said in. Host.
     ///
     /// # Errors
@@ -55,13 +55,12 @@ impl<'a> Session<'a> {
         machine: Machine,
         registry: &'a Registry,
         switches: Switches,
-        dialogue: Box<dyn Dialogue>,
+        input: Box<dyn MdiInput>,
     ) -> Result<Self, HostError> {
         let mut interpreter = Interpreter::new(interpreter_config(&machine, switches));
         interpreter.set_file("input");
         let judge = planner(&machine, registry)?;
-        let manual =
-            Manual { machine: machine.clone(), judge, interpreter, dialogue, lines: 0, standing: 0, busy: false };
+        let manual = Manual { machine: machine.clone(), judge, interpreter, input, lines: 0, standing: 0, busy: false };
         Ok(Self { machine, registry, switches, switched: Switched::default(), manual: Arc::new(Mutex::new(manual)) })
     }
 
@@ -101,7 +100,7 @@ struct Manual {
     /// A planner that only judges blocks.
     judge: Box<dyn Planner>,
     interpreter: Interpreter,
-    dialogue: Box<dyn Dialogue>,
+    input: Box<dyn MdiInput>,
     lines: u32,
     /// How often in a row everything was driven.
     standing: u32,
@@ -153,7 +152,7 @@ impl Source for Lines {
         if manual.busy {
             manual.busy = false;
             let position = manual.interpreter.position();
-            manual.dialogue.done(&position);
+            manual.input.done(&position);
         }
         true
     }
@@ -161,7 +160,7 @@ impl Source for Lines {
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         let mut manual = lock(&self.0);
         loop {
-            let text = match manual.dialogue.next_line() {
+            let text = match manual.input.next_line() {
                 NextLine::Line(text) => text,
                 NextLine::Later => return Ok(true),
                 // What still runs is switched off, as at the end of a program.
@@ -171,11 +170,11 @@ impl Source for Lines {
             };
             manual.lines += 1;
             if let Err(why) = manual.interpret(&text, items) {
-                manual.dialogue.refused(&why);
+                manual.input.refused(&why);
                 continue;
             }
             (manual.busy, manual.standing) = (true, 0);
-            manual.dialogue.begins();
+            manual.input.begins();
             return Ok(true);
         }
     }
@@ -204,6 +203,6 @@ impl Source for Lines {
 }
 
 fn lock(manual: &Mutex<Manual>) -> MutexGuard<'_, Manual> {
-    // A panic in the dialogue leaves the interpreter as it was before the line.
+    // A panic in the input leaves the interpreter as it was before the line.
     manual.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -12,7 +12,7 @@ use tandem_sdk::{
     Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, NoOptions, PluginError,
     Setpoint, local_plugin,
 };
-use tandem_session::jog::{Jog, JogHand, JogRest, JogSession, Jogs, Reach};
+use tandem_session::jog::{Jog, JogController, JogInput, JogRest, JogSession, Reach};
 
 const AXES: usize = 3;
 
@@ -179,8 +179,8 @@ struct Script {
     said: Arc<Mutex<Vec<String>>>,
 }
 
-impl JogHand for Script {
-    fn period(&mut self, jogs: &Jogs) {
+impl JogInput for Script {
+    fn period(&mut self, jogs: &JogController) {
         if !jogs.is_ready() || !jogs.is_still() {
             return;
         }
@@ -193,7 +193,7 @@ impl JogHand for Script {
     fn is_waiting(&self) -> bool {
         false
     }
-    fn rested(&mut self, _: &Jogs, _: &JogRest) {}
+    fn rested(&mut self, _: &JogController, _: &JogRest) {}
     fn refused(&mut self, why: &str) {
         self.said.lock().unwrap().push(why.to_string());
     }

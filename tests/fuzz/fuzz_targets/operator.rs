@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use tandem_session::operator::{Desk, Listen, Server};
+use tandem_session::operator::{OperatorHub, Listen, Server};
 use tandem_machine::Machine;
 
 struct Open {
@@ -20,9 +20,9 @@ struct Open {
 static OPEN: LazyLock<Open> = LazyLock::new(|| {
     let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let machine = Machine::read(&machine, &[]).expect("the example");
-    let desk = Arc::new(Desk::new(&machine, Arc::default(), Arc::default()));
+    let hub = Arc::new(OperatorHub::new(&machine, Arc::default(), Arc::default()));
     let path = std::env::temp_dir().join(format!("tandem-fuzz-operator-{}", std::process::id()));
-    let server = Server::start(desk, &Listen { unix: Some(path.clone()), ..Listen::default() }).expect("a socket");
+    let server = Server::start(hub, &Listen { unix: Some(path.clone()), ..Listen::default() }).expect("a socket");
     Open { path, _server: server }
 });
 

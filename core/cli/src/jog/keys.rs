@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_session::jog::{JogWords, Jogs, ReachWords};
+use tandem_session::jog::{JogController, JogMessage, ReachMessage};
 
 use super::shared::Shared;
 use crate::operator::press;
@@ -33,17 +33,17 @@ enum Key {
 }
 
 /// The keys of a session.
-pub struct Panel {
+pub struct JogKeys {
     shared: Arc<Shared>,
-    jogs: Arc<Jogs>,
+    jogs: Arc<JogController>,
     feed: usize,
     /// None: as long as the key is held.
     step: Option<f64>,
 }
 
-impl Panel {
+impl JogKeys {
     /// Continuous, at a moderate feed.
-    pub fn new(shared: Arc<Shared>, jogs: Arc<Jogs>) -> Self {
+    pub fn new(shared: Arc<Shared>, jogs: Arc<JogController>) -> Self {
         Self { shared, jogs, feed: FIRST_FEED, step: None }
     }
 
@@ -82,18 +82,18 @@ impl Panel {
     }
 
     fn command(&self, key: u8) {
-        let Some((desk, stops)) = self.shared.desk() else { return };
-        if let Some(words) = press(key, &desk, &stops) {
+        let Some((hub, stops)) = self.shared.hub() else { return };
+        if let Some(words) = press(key, &hub, &stops) {
             self.shared.say(&words);
         }
     }
 
     fn jog(&self, axis: char, positive: bool) {
         let reach = match self.step {
-            None => ReachWords::On { positive },
-            Some(step) => ReachWords::By(if positive { step } else { -step }),
+            None => ReachMessage::On { positive },
+            Some(step) => ReachMessage::By(if positive { step } else { -step }),
         };
-        let words = JogWords { axis, reach, feed_per_min: FEEDS[self.feed], degrees: None };
+        let words = JogMessage { axis, reach, feed_per_min: FEEDS[self.feed], degrees: None };
         let asked = words.on(&self.jogs.machine().axes).and_then(|jog| self.jogs.ask(jog));
         if let Err(why) = asked {
             self.shared.say(&why);

@@ -1,7 +1,7 @@
 //! The lines of a pipe: `x+ 600`, `x-0.1 600`, `stop`, `wait 0.5`, `where`, `quit`, and the operator's commands.
 
 use tandem_host::Command;
-use tandem_session::jog::{JogWords, ReachWords};
+use tandem_session::jog::{JogMessage, ReachMessage};
 
 use crate::mdi::conversation::is_farewell;
 
@@ -9,7 +9,7 @@ use crate::mdi::conversation::is_farewell;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Line {
     /// A jog, or its keep-alive.
-    Jog(JogWords),
+    Jog(JogMessage),
     /// Lets go of what moves; the next line waits for the rest.
     Stop,
     /// The next line waits so long, s.
@@ -63,7 +63,7 @@ pub fn parse(text: &str) -> Result<Line, Wrong> {
             None => Command::parse(first, second).map(Line::Command).map_err(|why| unknown(first, why)),
             Some(Err(why)) => return Err(wrong(column(first), why)),
             Some(Ok((axis, reach))) => {
-                feed(second).map(|feed_per_min| Line::Jog(JogWords { axis, reach, feed_per_min, degrees: None }))
+                feed(second).map(|feed_per_min| Line::Jog(JogMessage { axis, reach, feed_per_min, degrees: None }))
             }
         },
     };
@@ -81,7 +81,7 @@ fn unknown(word: &str, why: String) -> String {
 }
 
 /// `x+` or `x-0.1`; `None` where it does not look like one.
-fn motion(word: &str) -> Option<Result<(char, ReachWords), String>> {
+fn motion(word: &str) -> Option<Result<(char, ReachMessage), String>> {
     let mut chars = word.chars();
     let axis = chars.next().filter(char::is_ascii_alphabetic)?;
     let positive = match chars.next()? {
@@ -91,10 +91,10 @@ fn motion(word: &str) -> Option<Result<(char, ReachWords), String>> {
     };
     let distance = chars.as_str();
     if distance.is_empty() {
-        return Some(Ok((axis, ReachWords::On { positive })));
+        return Some(Ok((axis, ReachMessage::On { positive })));
     }
     let number = number(distance).map(|distance| if positive { distance } else { -distance });
-    Some(number.map(|distance| (axis, ReachWords::By(distance))))
+    Some(number.map(|distance| (axis, ReachMessage::By(distance))))
 }
 
 fn feed(word: Option<&str>) -> Result<f64, String> {
@@ -119,17 +119,17 @@ fn number(word: &str) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    fn jog(axis: char, reach: ReachWords, feed_per_min: f64) -> Line {
-        Line::Jog(JogWords { axis, reach, feed_per_min, degrees: None })
+    fn jog(axis: char, reach: ReachMessage, feed_per_min: f64) -> Line {
+        Line::Jog(JogMessage { axis, reach, feed_per_min, degrees: None })
     }
 
     #[test]
     fn every_line() {
         for (text, line) in [
-            ("x+ 600", jog('x', ReachWords::On { positive: true }, 600.0)),
-            (" Y-  0.5 ", jog('Y', ReachWords::On { positive: false }, 0.5)),
-            ("x+0.1 600", jog('x', ReachWords::By(0.1), 600.0)),
-            ("a-90 1800", jog('a', ReachWords::By(-90.0), 1800.0)),
+            ("x+ 600", jog('x', ReachMessage::On { positive: true }, 600.0)),
+            (" Y-  0.5 ", jog('Y', ReachMessage::On { positive: false }, 0.5)),
+            ("x+0.1 600", jog('x', ReachMessage::By(0.1), 600.0)),
+            ("a-90 1800", jog('a', ReachMessage::By(-90.0), 1800.0)),
             ("stop", Line::Stop),
             ("wait 0.5", Line::Wait(0.5)),
             ("where", Line::Where),

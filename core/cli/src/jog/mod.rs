@@ -1,6 +1,6 @@
 //! `tandem jog`: single axes by hand.
 
-mod hand;
+mod input;
 mod keys;
 mod line;
 mod shared;
@@ -13,16 +13,16 @@ use tandem_machine::Machine;
 use tandem_recorder::Summary;
 use tandem_rings::Sample;
 use tandem_session::HOMING;
-use tandem_session::jog::{JogSession, Jogs};
-use tandem_session::operator::Desk;
+use tandem_session::jog::{JogController, JogSession};
+use tandem_session::operator::OperatorHub;
 
 use crate::broken::Broken;
 use crate::operator::{Keyboard, Operator, Presence, Signals, is_on_terminal};
 use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in};
 
-use hand::{Hand, Script};
-use keys::Panel;
+use input::{Inputs, Script};
+use keys::JogKeys;
 use shared::Shared;
 
 /// The word that takes back a fault.
@@ -43,8 +43,8 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         clock: Some(clock),
         ..Switches::default()
     };
-    let hand = Hand::new(Arc::clone(&shared), script);
-    let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(hand.clone()))?;
+    let input = Inputs::new(Arc::clone(&shared), script);
+    let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(input.clone()))?;
     let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
     let mut sinks = Sinks::new(Arc::clone(&shared));
     let faulted = loop {
@@ -62,7 +62,7 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
             break false;
         };
         shared.say(&format!("fault: {fault}; {} goes on from here", if shared.keys { "r" } else { RESET }));
-        let goes_on = waits_for_reset(&hand, &shared, real_time);
+        let goes_on = waits_for_reset(&input, &shared, real_time);
         sinks.end(outcome.summary);
         if !goes_on? {
             break true;
@@ -75,17 +75,17 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     Ok(if faulted || broken.is_any() { FAULT } else { u8::from(shared.has_refused()) * REFUSED })
 }
 
-fn take_keys(shared: &Arc<Shared>, jogs: &Arc<Jogs>) -> Result<Keyboard, String> {
-    let mut panel = Panel::new(Arc::clone(shared), Arc::clone(jogs));
+fn take_keys(shared: &Arc<Shared>, jogs: &Arc<JogController>) -> Result<Keyboard, String> {
+    let mut panel = JogKeys::new(Arc::clone(shared), Arc::clone(jogs));
     panel.explain();
     Keyboard::begin_with(move |bytes| panel.take(bytes))
 }
 
 /// Signals of the run that is over are gone: meanwhile others end the session.
-fn waits_for_reset(hand: &Hand, shared: &Shared, real_time: bool) -> Result<bool, String> {
-    let desk = shared.desk().filter(|_| real_time && shared.keys);
-    let _signals = desk.map(|(desk, stops)| Signals::catch_with(desk, stops)).transpose()?;
-    Ok(hand.is_reset())
+fn waits_for_reset(input: &Inputs, shared: &Shared, real_time: bool) -> Result<bool, String> {
+    let hub = shared.hub().filter(|_| real_time && shared.keys);
+    let _signals = hub.map(|(hub, stops)| Signals::catch_with(hub, stops)).transpose()?;
+    Ok(input.is_reset())
 }
 
 /// What is kept of all runs of a session.
@@ -115,13 +115,19 @@ impl Sinks {
         }
     }
 
-    fn begin(&mut self, options: &args::Jog, machine: &Machine, jogs: &Arc<Jogs>, run: &Run) -> Result<(), String> {
+    fn begin(
+        &mut self,
+        options: &args::Jog,
+        machine: &Machine,
+        jogs: &Arc<JogController>,
+        run: &Run,
+    ) -> Result<(), String> {
         if let (None, Some(path)) = (&self.trace, &options.session.trace) {
             self.trace = Some(TraceSink::create(path, machine, "jogging", run, false)?);
         }
-        let desk = Desk::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
+        let hub = OperatorHub::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
         let presence = Presence { real_time: options.session.clock == args::Clock::Wall, pause: false, keys: false };
-        let operator = Operator::at(Arc::new(desk), &options.session.operator, presence)?;
+        let operator = Operator::at(Arc::new(hub), &options.session.operator, presence)?;
         self.shared.follow(&operator);
         self.operator = Some(operator);
         self.first_tick = self.next_tick;

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector};
-use tandem_session::jog::{JogEnd, JogRest, Jogs};
-use tandem_session::operator::{Desk, Position};
+use tandem_session::jog::{JogController, JogEnd, JogRest};
+use tandem_session::operator::{OperatorHub, Position};
 
 use crate::operator::{Operator, Stops, tell};
 
@@ -26,7 +26,7 @@ pub struct Shared {
 
 struct Inner {
     position: AxisVector,
-    desk: Option<Arc<Desk>>,
+    hub: Option<Arc<OperatorHub>>,
     stops: Stops,
     /// What the terminal was told last: a key that repeats is told once.
     said: String,
@@ -35,7 +35,7 @@ struct Inner {
 impl Shared {
     /// Nothing said yet, at `position`.
     pub fn new(keys: bool, axes: Axes, position: AxisVector) -> Self {
-        let inner = Inner { position, desk: None, stops: Stops::default(), said: String::new() };
+        let inner = Inner { position, hub: None, stops: Stops::default(), said: String::new() };
         Self {
             keys,
             axes,
@@ -46,22 +46,22 @@ impl Shared {
         }
     }
 
-    /// From now on commands go to this operator's desk.
+    /// From now on commands go to this operator's hub.
     pub fn follow(&self, operator: &Operator) {
         let mut inner = self.inner();
-        inner.desk = Some(Arc::clone(operator.desk()));
+        inner.hub = Some(Arc::clone(operator.hub()));
         inner.stops = operator.stops().unwrap_or_default();
     }
 
-    /// The desk of the run, and how it is stopped.
-    pub fn desk(&self) -> Option<(Arc<Desk>, Stops)> {
+    /// The hub of the run, and how it is stopped.
+    pub fn hub(&self) -> Option<(Arc<OperatorHub>, Stops)> {
         let inner = self.inner();
-        inner.desk.clone().map(|desk| (desk, inner.stops.clone()))
+        inner.hub.clone().map(|hub| (hub, inner.stops.clone()))
     }
 
     /// Whether a client has taken back the fault that the session stands in.
     pub fn is_reset_by_client(&self) -> bool {
-        self.inner().desk.as_ref().is_some_and(|desk| desk.is_reset())
+        self.inner().hub.as_ref().is_some_and(|hub| hub.is_reset())
     }
 
     /// Whether the session is to end.
@@ -90,7 +90,7 @@ impl Shared {
     }
 
     /// A jog is over.
-    pub fn rested(&self, jogs: &Jogs, rest: &JogRest) {
+    pub fn rested(&self, jogs: &JogController, rest: &JogRest) {
         self.inner().position = rest.position;
         let name = jogs.name(rest.axis);
         match rest.end {

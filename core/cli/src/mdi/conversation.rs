@@ -7,8 +7,8 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_sdk::{Axes, AxisVector};
-use tandem_session::operator::{Desk, Position};
-use tandem_session::{Dialogue, NextLine};
+use tandem_session::operator::{OperatorHub, Position};
+use tandem_session::{MdiInput, NextLine};
 
 use super::RESET;
 use super::input::Input;
@@ -31,7 +31,7 @@ pub struct Shared {
 struct Inner {
     input: Input,
     prompted: bool,
-    desk: Option<Arc<Desk>>,
+    hub: Option<Arc<OperatorHub>>,
     stops: Option<Stops>,
     keyboard: Option<Keyboard>,
 }
@@ -52,10 +52,10 @@ impl Shared {
         }
     }
 
-    /// Keys of the next motion go to this operator's desk.
+    /// Keys of the next motion go to this operator's hub.
     pub fn follow(&self, operator: &Operator) {
         let mut inner = self.inner();
-        (inner.desk, inner.stops) = (Some(Arc::clone(operator.desk())), operator.stops());
+        (inner.hub, inner.stops) = (Some(Arc::clone(operator.hub())), operator.stops());
     }
 
     /// Gives the terminal back to lines.
@@ -72,7 +72,7 @@ impl Shared {
             inner.prompt(self.keys);
             let next = inner.input.next(false);
             inner.prompted &= next == NextLine::Later;
-            let is_reset = inner.desk.as_ref().is_some_and(|desk| desk.is_reset());
+            let is_reset = inner.hub.as_ref().is_some_and(|hub| hub.is_reset());
             drop(inner);
             if is_reset {
                 self.fault.store(false, Relaxed);
@@ -144,7 +144,7 @@ impl Conversation {
     }
 }
 
-impl Dialogue for Conversation {
+impl MdiInput for Conversation {
     fn next_line(&mut self) -> NextLine {
         let mut inner = self.shared.inner();
         if inner.stops.as_ref().is_some_and(Stops::are_asked) {
@@ -170,9 +170,9 @@ impl Dialogue for Conversation {
 
     fn begins(&mut self) {
         let mut inner = self.shared.inner();
-        if let (true, Some(desk), Some(stops)) = (self.shared.keys, &inner.desk, &inner.stops) {
+        if let (true, Some(hub), Some(stops)) = (self.shared.keys, &inner.hub, &inner.stops) {
             // Without keys the line is driven all the same.
-            inner.keyboard = Keyboard::begin(Arc::clone(desk), stops.clone()).ok();
+            inner.keyboard = Keyboard::begin(Arc::clone(hub), stops.clone()).ok();
         }
     }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tandem_host::{Clock, Run, RunObserver, StopAnswer, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
-use tandem_session::{HOMING, Session};
+use tandem_session::{HOMING, MdiSession};
 
 use crate::broken::Broken;
 use crate::operator::{Operator, Presence, is_on_terminal};
@@ -39,7 +39,7 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     };
     let shared = Arc::new(Shared::new(real_time, keys));
     let conversation = Conversation::new(Arc::clone(&shared), machine.axes);
-    let mut session = Session::new(machine.clone(), &registry, switches, Box::new(conversation))?;
+    let mut session = MdiSession::new(machine.clone(), &registry, switches, Box::new(conversation))?;
     let clock = if real_time { Clock::Wall } else { Clock::Virtual };
     let mut sinks =
         Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: vec![], broken: Broken::default() };

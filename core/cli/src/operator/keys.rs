@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio;
 use tandem_host::Command;
-use tandem_session::operator::Desk;
+use tandem_session::operator::OperatorHub;
 
 use super::signals::Stops;
 use super::tell;
@@ -36,17 +36,17 @@ impl Keyboard {
         say!("{HELP}");
     }
 
-    /// Takes the terminal: its keys command the run at `desk`.
+    /// Takes the terminal: its keys command the run at `hub`.
     ///
     /// # Errors
     /// The system's words.
-    pub fn begin(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
+    pub fn begin(hub: Arc<OperatorHub>, stops: Stops) -> Result<Self, String> {
         Self::begin_with(move |keys| {
             // An arrow or function key is no letter.
             if keys[0] == ESCAPE && keys.len() > 1 {
                 return;
             }
-            for words in keys.iter().filter_map(|key| press(*key, &desk, &stops)) {
+            for words in keys.iter().filter_map(|key| press(*key, &hub, &stops)) {
                 tell(&words);
             }
         })
@@ -91,25 +91,25 @@ fn listen(mut take: impl FnMut(&[u8]), over: &AtomicBool) {
 }
 
 /// What a key does, and what is said of it.
-pub fn press(key: u8, desk: &Desk, stops: &Stops) -> Option<String> {
-    let controls = desk.controls();
+pub fn press(key: u8, hub: &OperatorHub, stops: &Stops) -> Option<String> {
+    let controls = hub.controls();
     let on = |switch: &AtomicBool| switch.load(Ordering::Relaxed);
     let (command, words) = match key {
         b' ' if on(&controls.hold) => (Command::Resume, "resume".to_string()),
         b' ' => (Command::Hold, "feed hold; space resumes".to_string()),
         b'\r' | b'\n' => (Command::Resume, "on".to_string()),
-        b'+' | b'=' => step(desk, STEP),
-        b'-' => step(desk, -STEP),
+        b'+' | b'=' => step(hub, STEP),
+        b'-' => step(hub, -STEP),
         b's' => (Command::SingleBlock(!on(&controls.single_block)), switched("single block", &controls.single_block)),
         b'o' => {
             (Command::OptionalStop(!on(&controls.optional_stop)), switched("optional stop", &controls.optional_stop))
         }
         b'q' => (Command::Abort, "abort: stopping on the path".to_string()),
         b'e' => (Command::EmergencyStop, "emergency stop".to_string()),
-        CTRL_C => return Some(stops.ask(desk)),
+        CTRL_C => return Some(stops.ask(hub)),
         _ => return None,
     };
-    Some(desk.give(command).map_or_else(|refusal| refusal, |_| words))
+    Some(hub.give(command).map_or_else(|refusal| refusal, |_| words))
 }
 
 fn switched(what: &str, switch: &AtomicBool) -> String {
@@ -117,8 +117,8 @@ fn switched(what: &str, switch: &AtomicBool) -> String {
 }
 
 /// The feed override a step on, within what the machine allows.
-fn step(desk: &Desk, by: f64) -> (Command, String) {
-    let (now, most) = (desk.controls().feed_override.load(), desk.max_feed_ratio());
+fn step(hub: &OperatorHub, by: f64) -> (Command, String) {
+    let (now, most) = (hub.controls().feed_override.load(), hub.max_feed_ratio());
     // Whole per cents: steps up and down end where they began.
     let asked = ((now + by) * 100.0).round() / 100.0;
     let next = asked.clamp(0.0, most);
@@ -137,17 +137,17 @@ mod tests {
     use std::sync::atomic::Ordering::Relaxed;
     use tandem_machine::Machine;
 
-    fn desk() -> Desk {
+    fn hub() -> OperatorHub {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let machine = Machine::read(&path, &[("motion.max_feed_ratio".to_string(), "1.15".to_string())]).unwrap();
-        Desk::new(&machine, Arc::default(), Arc::default())
+        OperatorHub::new(&machine, Arc::default(), Arc::default())
     }
 
     #[test]
     fn every_key() {
-        let (desk, stops) = (desk(), Stops::default());
-        let type_in = |keys: &str| keys.bytes().filter_map(|key| press(key, &desk, &stops)).collect::<Vec<_>>();
-        let controls = desk.controls();
+        let (hub, stops) = (hub(), Stops::default());
+        let type_in = |keys: &str| keys.bytes().filter_map(|key| press(key, &hub, &stops)).collect::<Vec<_>>();
+        let controls = hub.controls();
         assert_eq!(type_in(" "), ["feed hold; space resumes"]);
         assert!(controls.hold.load(Relaxed));
         assert_eq!(type_in(" "), ["resume"]);
@@ -155,10 +155,10 @@ mod tests {
         assert_eq!(type_in("s"), ["single block on"]);
         assert!(controls.single_block.load(Relaxed));
         assert_eq!(type_in("so"), ["single block off", "optional stop on"]);
-        desk.begin_wait(7);
-        assert!(!desk.answered());
+        hub.begin_wait(7);
+        assert!(!hub.answered());
         type_in("\n");
-        assert!(desk.answered());
+        assert!(hub.answered());
         assert!(type_in("xyz\x1b").is_empty());
         type_in("q");
         assert!(controls.abort.load(Relaxed) && !controls.emergency_stop.load(Relaxed));
@@ -168,11 +168,11 @@ mod tests {
 
     #[test]
     fn the_override_stays_within_the_machine_and_says_so() {
-        let (desk, stops) = (desk(), Stops::default());
-        let said = |key: u8| press(key, &desk, &stops).unwrap();
+        let (hub, stops) = (hub(), Stops::default());
+        let said = |key: u8| press(key, &hub, &stops).unwrap();
         assert_eq!(said(b'+'), "feed override 110 %");
         assert_eq!(said(b'+'), "feed override 115 %: the most that motion.max_feed_ratio allows");
-        assert_eq!(desk.controls().feed_override.load(), 1.15);
+        assert_eq!(hub.controls().feed_override.load(), 1.15);
         assert_eq!(said(b'-'), "feed override 105 %");
         let down: Vec<String> = (0..12).map(|_| said(b'-')).collect();
         assert_eq!(down[11], "feed override 0 %: the least there is");
@@ -181,10 +181,10 @@ mod tests {
 
     #[test]
     fn ctrl_c_aborts_and_then_stops_at_once() {
-        let (desk, stops) = (desk(), Stops::default());
-        press(CTRL_C, &desk, &stops);
-        assert!(desk.controls().abort.load(Relaxed) && !desk.controls().emergency_stop.load(Relaxed));
-        press(CTRL_C, &desk, &stops);
-        assert!(desk.controls().emergency_stop.load(Relaxed));
+        let (hub, stops) = (hub(), Stops::default());
+        press(CTRL_C, &hub, &stops);
+        assert!(hub.controls().abort.load(Relaxed) && !hub.controls().emergency_stop.load(Relaxed));
+        press(CTRL_C, &hub, &stops);
+        assert!(hub.controls().emergency_stop.load(Relaxed));
     }
 }

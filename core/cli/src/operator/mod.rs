@@ -15,7 +15,7 @@ use tandem_host::{Run, StopAnswer};
 use tandem_machine::Machine;
 use tandem_recorder::{PolicySummary, Summary};
 use tandem_rings::Sample;
-use tandem_session::operator::{Desk, Listen, Server};
+use tandem_session::operator::{Listen, OperatorHub, Server};
 
 use crate::args;
 
@@ -41,7 +41,7 @@ pub struct Presence {
 /// Everything through which a run is told what to do. Dropping it gives the terminal back and tells clients that the run
 /// is over.
 pub struct Operator {
-    desk: Arc<Desk>,
+    hub: Arc<OperatorHub>,
     // The order matters: keys and signals go before the clients are told.
     keyboard: Option<Keyboard>,
     signals: Option<Signals>,
@@ -59,25 +59,25 @@ impl Operator {
     /// # Errors
     /// The socket, the token file or the terminal with the cause.
     pub fn begin(options: &args::Operator, machine: &Machine, run: &Run, presence: Presence) -> Result<Self, String> {
-        Self::at(Arc::new(Desk::new(machine, run.controls(), run.status())), options, presence)
+        Self::at(Arc::new(OperatorHub::new(machine, run.controls(), run.status())), options, presence)
     }
 
-    /// The same at a desk that is there.
+    /// The same at a hub that is there.
     ///
     /// # Errors
     /// As [`Operator::begin`].
-    pub fn at(desk: Arc<Desk>, options: &args::Operator, presence: Presence) -> Result<Self, String> {
+    pub fn at(hub: Arc<OperatorHub>, options: &args::Operator, presence: Presence) -> Result<Self, String> {
         let Presence { real_time, pause, keys } = presence;
-        let server = serve(options, &desk)?;
-        let signals = real_time.then(|| Signals::catch(Arc::clone(&desk))).transpose()?;
+        let server = serve(options, &hub)?;
+        let signals = real_time.then(|| Signals::catch(Arc::clone(&hub))).transpose()?;
         let stops = signals.as_ref().map(Signals::stops);
-        let keyboard = stops.filter(|_| keys).map(|stops| Keyboard::begin(Arc::clone(&desk), stops)).transpose()?;
-        Ok(Self { desk, keyboard, signals, server, enter: Enter::default(), real_time, pause })
+        let keyboard = stops.filter(|_| keys).map(|stops| Keyboard::begin(Arc::clone(&hub), stops)).transpose()?;
+        Ok(Self { hub, keyboard, signals, server, enter: Enter::default(), real_time, pause })
     }
 
-    /// The desk, for keys that come and go.
-    pub fn desk(&self) -> &Arc<Desk> {
-        &self.desk
+    /// The hub, for keys that come and go.
+    pub fn hub(&self) -> &Arc<OperatorHub> {
+        &self.hub
     }
 
     /// How often a stop was asked for by Ctrl-C or a signal; `None` on the virtual clock.
@@ -88,30 +88,30 @@ impl Operator {
     /// A sample was sent; `progress` is the share of the path that is driven.
     pub fn sample(&self, sample: &Sample, progress: f64) {
         if self.server.is_some() {
-            self.desk.sample(sample, progress);
+            self.hub.sample(sample, progress);
         }
     }
 
     /// What the policy script did until now.
     pub fn policy(&self, summary: &PolicySummary) {
         if self.server.is_some() {
-            self.desk.policy(summary);
+            self.hub.policy(summary);
         }
     }
 
     /// Whether somebody can give commands now.
     pub fn is_attended(&self) -> bool {
-        self.keyboard.is_some() || self.desk.clients() > 0
+        self.keyboard.is_some() || self.hub.clients() > 0
     }
 
     /// The program waits on `line`: whether it goes on.
     pub fn program_stop(&mut self, line: u32) -> StopAnswer {
-        if self.desk.waits_on_line() != Some(line) {
+        if self.hub.waits_on_line() != Some(line) {
             if !self.is_asked_to_wait() && !self.is_attended() {
                 say!("line {line}: no operator is there, the run goes on");
                 return StopAnswer::GoOn;
             }
-            self.desk.begin_wait(line);
+            self.hub.begin_wait(line);
             say!("line {line}: the program waits; Enter goes on");
         }
         let mut answer = self.look();
@@ -120,38 +120,38 @@ impl Operator {
             answer = self.look();
         }
         if answer != StopAnswer::Wait {
-            self.desk.end_wait();
+            self.hub.end_wait();
         }
         answer
     }
 
     /// The machine came to a rest that ended what the program waited for.
     pub fn rest(&self) {
-        self.desk.end_wait();
+        self.hub.end_wait();
     }
 
     /// The run is over by `fault`, and its session stands in it: clients may take it back.
     pub fn begin_fault(&mut self, fault: &str) {
         self.keyboard = None;
         self.signals = None;
-        self.desk.begin_fault(fault);
+        self.hub.begin_fault(fault);
     }
 
     /// The run is over: the terminal is as it was, and the clients are told why.
     pub fn end(&mut self, summary: &Summary) {
         self.keyboard = None;
         self.signals = None;
-        self.desk.end(summary.fault.as_deref(), summary.stopped.as_deref());
+        self.hub.end(summary.fault.as_deref(), summary.stopped.as_deref());
         self.server = None;
     }
 
     /// Whether stops wait also where nobody is seen to be there: somebody has asked for that.
     fn is_asked_to_wait(&self) -> bool {
-        self.pause || self.desk.controls().optional_stop.load(Relaxed)
+        self.pause || self.hub.controls().optional_stop.load(Relaxed)
     }
 
     fn look(&mut self) -> StopAnswer {
-        if self.desk.answered() || self.desk.is_stopping() {
+        if self.hub.answered() || self.hub.is_stopping() {
             return StopAnswer::GoOn;
         }
         if self.keyboard.is_some() || !self.is_asked_to_wait() {
@@ -173,13 +173,13 @@ pub fn tell(words: &str) {
 }
 
 /// Opens the sockets, and says where clients find them.
-fn serve(options: &args::Operator, desk: &Arc<Desk>) -> Result<Option<Server>, String> {
+fn serve(options: &args::Operator, hub: &Arc<OperatorHub>) -> Result<Option<Server>, String> {
     if options.is_nowhere() {
         return Ok(None);
     }
     let listen =
         Listen { unix: options.listen.clone(), tcp: options.listen_tcp, token_file: options.token_file.clone() };
-    let server = Server::start(Arc::clone(desk), &listen)?;
+    let server = Server::start(Arc::clone(hub), &listen)?;
     if let Some(path) = &options.listen {
         say!("operators: {}", path.display());
     }

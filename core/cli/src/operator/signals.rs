@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use rustix::process::Signal;
 use signal_hook::iterator::{Handle, Signals as Received};
 use tandem_host::Command;
-use tandem_session::operator::Desk;
+use tandem_session::operator::OperatorHub;
 
 use super::tell;
 
@@ -46,13 +46,13 @@ impl Stops {
     }
 
     /// Asks once more.
-    pub fn ask(&self, desk: &Desk) -> String {
+    pub fn ask(&self, hub: &OperatorHub) -> String {
         let (command, words) = match self.0.fetch_add(1, Ordering::Relaxed) {
             0 => (Command::Abort, "abort: stopping on the path; once more is an emergency stop"),
             _ => (Command::EmergencyStop, "emergency stop"),
         };
         // Stopping is never refused.
-        desk.give(command).map_or_else(|refusal| refusal, |_| words.to_string())
+        hub.give(command).map_or_else(|refusal| refusal, |_| words.to_string())
     }
 }
 
@@ -68,15 +68,15 @@ impl Signals {
     ///
     /// # Errors
     /// The system's words.
-    pub fn catch(desk: Arc<Desk>) -> Result<Self, String> {
-        Self::catch_with(desk, Stops::default())
+    pub fn catch(hub: Arc<OperatorHub>) -> Result<Self, String> {
+        Self::catch_with(hub, Stops::default())
     }
 
     /// The same, counted on in `stops`.
     ///
     /// # Errors
     /// The system's words.
-    pub fn catch_with(desk: Arc<Desk>, stops: Stops) -> Result<Self, String> {
+    pub fn catch_with(hub: Arc<OperatorHub>, stops: Stops) -> Result<Self, String> {
         let named = STOPS.iter().chain(&IGNORED).map(|signal| signal.as_raw());
         let mut received = Received::new(named.chain(REAL_TIME)).map_err(|e| format!("signals: {e}"))?;
         let handle = received.handle();
@@ -84,7 +84,7 @@ impl Signals {
         let thread = thread::spawn(move || {
             let is_ignored = |signal: &i32| IGNORED.iter().any(|ignored| ignored.as_raw() == *signal);
             for _ in received.forever().filter(|signal| !is_ignored(signal)) {
-                tell(&asked.ask(&desk));
+                tell(&asked.ask(&hub));
             }
         });
         Ok(Self { stops, handle, thread: Some(thread) })

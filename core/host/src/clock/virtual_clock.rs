@@ -10,31 +10,31 @@ use tandem_fine::FineLoop;
 use tandem_sdk::abi::{Method, beat, calling};
 
 use crate::soft::command::{Command, Timed};
-use crate::soft::pump::Pump;
+use crate::soft::soft_loop::SoftLoop;
 
 /// Machine time, s, without any passing of program time after which a run without further commands is given up.
 const PATIENCE_S: f64 = 60.0;
 
 /// Drives the run to its end. `commands` are in order of their ticks.
-pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, commands: &[Timed]) {
-    let patience = (PATIENCE_S / pump.period_s()).round() as u64;
+pub fn drive(soft_loop: &mut SoftLoop<'_>, fine: &mut FineLoop, fine_per_rough: u32, commands: &[Timed]) {
+    let patience = (PATIENCE_S / soft_loop.period_s()).round() as u64;
     let mut progress = Progress::default();
     let mut commands = Commands { all: commands.iter().peekable(), stalled: 0 };
     let mut tick = 0;
     while fine.is_attaching() {
         // The operator's stops act before the joints hold too.
-        commands.give(pump, fine);
+        commands.give(soft_loop, fine);
         calling(Method::FinePeriod, || fine.tick());
         beat();
     }
     // A fault on the way has its samples too, and an abort its rest.
-    pump.drain();
+    soft_loop.drain();
     if fine.is_over() {
-        pump.take_rests();
+        soft_loop.take_rests();
     }
     while !fine.is_over() {
         if commands.stalled == 0 {
-            pump.step();
+            soft_loop.step();
         }
         commands.stalled = commands.stalled.saturating_sub(1);
         for _ in 0..fine_per_rough {
@@ -42,23 +42,23 @@ pub fn drive(pump: &mut Pump<'_>, fine: &mut FineLoop, fine_per_rough: u32, comm
             if fine.is_over() {
                 break;
             }
-            commands.give(pump, fine);
+            commands.give(soft_loop, fine);
             calling(Method::FinePeriod, || fine.tick());
             beat();
             tick += 1;
         }
-        pump.drain();
-        pump.serve_stop();
+        soft_loop.drain();
+        soft_loop.serve_stop();
         // What waits for the spindle ends by itself, after the machine's own time.
-        if pump.is_waiting() || pump.host.status.spindle.waits.load(Relaxed) {
+        if soft_loop.is_waiting() || soft_loop.host.status.spindle.waits.load(Relaxed) {
             progress.tick = tick;
         }
-        let stuck_ticks = progress.ticks_without(pump.host.status.program_time_s.load(), tick);
-        if stuck_ticks > 0 && pump.is_attended() {
+        let stuck_ticks = progress.ticks_without(soft_loop.host.status.program_time_s.load(), tick);
+        if stuck_ticks > 0 && soft_loop.is_attended() {
             // Somebody at a keyboard lives in real time.
-            thread::sleep(Duration::from_secs_f64(pump.period_s() * f64::from(fine_per_rough)));
+            thread::sleep(Duration::from_secs_f64(soft_loop.period_s() * f64::from(fine_per_rough)));
         } else if commands.all.peek().is_none() && stuck_ticks > patience {
-            pump.give_up();
+            soft_loop.give_up();
         }
     }
 }
@@ -72,9 +72,9 @@ struct Commands<'a> {
 
 impl Commands<'_> {
     /// Before a fine period: gives what acts in it.
-    fn give(&mut self, pump: &mut Pump<'_>, fine: &FineLoop) {
+    fn give(&mut self, soft_loop: &mut SoftLoop<'_>, fine: &FineLoop) {
         while let Some(timed) = self.all.next_if(|timed| timed.tick <= fine.next_tick()) {
-            pump.give(timed);
+            soft_loop.give(timed);
             if let Command::StallRough(periods) = timed.command {
                 self.stalled += periods;
             }

@@ -17,7 +17,7 @@ use crate::clock::periods::{Body, PeriodClock, Timing, run};
 use crate::clock::realtime::{ProcessGrants, page_faults_of_this_thread, prepare_thread};
 use crate::error::HostError;
 use crate::plugins::hang::{FineRuns, FineWatch};
-use crate::soft::pump::Pump;
+use crate::soft::soft_loop::SoftLoop;
 
 const NS_PER_S: i64 = 1_000_000_000;
 
@@ -44,7 +44,7 @@ pub struct Ended<B> {
 
 /// Drives the run to its end in real time; gives the fine loop back.
 pub fn drive(
-    pump: &mut Pump<'_>,
+    soft_loop: &mut SoftLoop<'_>,
     mut fine: FineLoop,
     periods: Periods,
     watch: Option<FineWatch>,
@@ -52,28 +52,28 @@ pub fn drive(
     // Here the recorder may look away for seconds.
     let (to_host, from_fine) = sample_ring(Sizes::default().samples);
     fine.hand_out_through(to_host);
-    pump.host.samples = from_fine;
-    fill_first(pump);
+    soft_loop.host.samples = from_fine;
+    fill_first(soft_loop);
     let body = FineBody { fine, watch };
     let thread = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
     for note in &thread.notes {
-        pump.note(note);
+        soft_loop.note(note);
     }
     while !thread.is_over() {
-        pump.step();
-        pump.drain();
-        pump.serve_stop();
+        soft_loop.step();
+        soft_loop.drain();
+        soft_loop.serve_stop();
         thread::sleep(Duration::from_nanos(periods.rough_ns.unsigned_abs()));
     }
     let timed = thread.join()?;
-    pump.drain();
-    pump.take_rests();
+    soft_loop.drain();
+    soft_loop.take_rests();
     Ok(Ended { body: timed.body.fine, timing: timed.timing, page_faults: timed.page_faults })
 }
 
 /// Fills the queue before the first fine period, so that its first tick is the first tick on either clock.
-fn fill_first(pump: &mut Pump<'_>) {
-    pump.step();
+fn fill_first(soft_loop: &mut SoftLoop<'_>) {
+    soft_loop.step();
 }
 
 /// The fine loop as the body of its thread.

@@ -19,7 +19,7 @@ use share::Share;
 use slow::Slow;
 
 /// A driver, made and not open yet.
-struct Made {
+struct UnopenedDriver {
     driver: Box<dyn Driver>,
     title: String,
     section: String,
@@ -29,7 +29,7 @@ struct Made {
 
 /// The drivers of a machine.
 pub struct Drives {
-    all: Vec<Made>,
+    all: Vec<UnopenedDriver>,
     roster: Roster,
 }
 
@@ -39,7 +39,7 @@ impl Drives {
     /// # Errors
     /// One is not there, refuses its options, or names a joint that is none; two pace the loop.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
-        let all: Vec<Made> =
+        let all: Vec<UnopenedDriver> =
             machine.drivers.iter().map(|choice| made(machine, registry, choice)).collect::<Result<_, _>>()?;
         let mut entries = all.iter().map(entry);
         let first = entries.next().ok_or_else(|| refusal(machine, "drivers", "a machine has at least one driver"))?;
@@ -71,7 +71,8 @@ impl Drives {
         let whole = driver_context(machine, joints);
         let known = joints.health(&whole.start_position);
         known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
-        let check = |made: &Made| made.driver.check(&made.context(&whole)).map_err(|e| made.refuses(machine, &e));
+        let check =
+            |made: &UnopenedDriver| made.driver.check(&made.context(&whole)).map_err(|e| made.refuses(machine, &e));
         self.all.iter().try_for_each(check)
     }
 
@@ -115,7 +116,7 @@ impl Drives {
 
     /// What a code of the drive of `joint` means. Host; may allocate.
     pub fn explain(&self, joint: usize, code: u32) -> Words {
-        let of = |made: &Made| match &made.share {
+        let of = |made: &UnopenedDriver| match &made.share {
             Some(share) => share.own_joint(joint).map(|own| made.driver.explain(own as u32, code)),
             None => Some(made.driver.explain(joint as u32, code)),
         };
@@ -148,7 +149,7 @@ pub fn attached_driver(machine: &Machine, registry: &Registry) -> Result<(Box<dy
     Ok((drives.into_driver(), attached))
 }
 
-fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result<Made, HostError> {
+fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result<UnopenedDriver, HostError> {
     let section = choice.section();
     let driver = registry.driver(&choice.choice).map_err(|e| e.at(machine, &section))?;
     let share = match &choice.owns {
@@ -165,10 +166,10 @@ fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result
     };
     let levels = share.as_ref().map_or(choice.inputs_at_rest, |share| share.inputs.to_own(choice.inputs_at_rest));
     let driver = if levels == 0 { driver } else { Box::new(AtRest { driver, levels }) };
-    Ok(Made { driver, title: choice.title(), section, share })
+    Ok(UnopenedDriver { driver, title: choice.title(), section, share })
 }
 
-fn entry(made: &Made) -> Entry {
+fn entry(made: &UnopenedDriver) -> Entry {
     Entry {
         title: made.title.clone(),
         section: made.section.clone(),
@@ -178,7 +179,7 @@ fn entry(made: &Made) -> Entry {
     }
 }
 
-impl Made {
+impl UnopenedDriver {
     fn context(&self, whole: &DriverContext) -> DriverContext {
         self.share.as_ref().map_or(*whole, |share| share.context(whole))
     }

@@ -19,7 +19,7 @@ const IDLE: Duration = Duration::from_millis(1);
 const END: Duration = Duration::from_secs(2);
 
 /// What the thread is told: the setpoint of a period.
-struct Told {
+struct Message {
     period: u64,
     setpoint: Setpoint,
 }
@@ -35,7 +35,7 @@ struct Answer {
 struct Shared {
     /// Taken by the thread while there is one, else by who calls in line: nobody waits for it.
     driver: Mutex<Box<dyn Driver>>,
-    told: ArrayQueue<Told>,
+    message: ArrayQueue<Message>,
     answered: ArrayQueue<Answer>,
     /// The driver is called on its own thread; else in line, as on the virtual clock.
     has_thread: AtomicBool,
@@ -77,7 +77,7 @@ impl Slow {
         let description = driver.describe();
         let shared = Shared {
             driver: Mutex::new(driver),
-            told: ArrayQueue::new(1),
+            message: ArrayQueue::new(1),
             answered: ArrayQueue::new(1),
             has_thread: AtomicBool::new(false),
             ends: AtomicBool::new(false),
@@ -112,11 +112,11 @@ impl Slow {
         if setpoint.spindle_rad_per_s.to_bits() != self.last.spindle_rad_per_s.to_bits() {
             self.spindle_since = self.period;
         }
-        let told = Told { period: self.period, setpoint: *setpoint };
-        let replaced = self.shared.told.force_push(told);
-        if replaced.is_some_and(|told| told.setpoint.reset != 0) && setpoint.reset == 0 {
+        let message = Message { period: self.period, setpoint: *setpoint };
+        let replaced = self.shared.message.force_push(message);
+        if replaced.is_some_and(|message| message.setpoint.reset != 0) && setpoint.reset == 0 {
             let setpoint = Setpoint { reset: 1, ..*setpoint };
-            let _ = self.shared.told.force_push(Told { period: self.period, setpoint });
+            let _ = self.shared.message.force_push(Message { period: self.period, setpoint });
         }
         self.last = *setpoint;
     }
@@ -162,7 +162,7 @@ impl Shared {
             if self.stops_quickly.swap(false, Relaxed) {
                 driver.quick_stop();
             }
-            let Some(Told { period, setpoint }) = self.told.pop() else {
+            let Some(Message { period, setpoint }) = self.message.pop() else {
                 thread::sleep(IDLE);
                 continue;
             };

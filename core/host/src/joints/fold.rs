@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-12;
 /// Limits of axes and lanes, the lanes, and which joint each is.
 pub struct Folded {
     pub limits: Limits,
-    pub carried: Option<&'static JointLanes>,
+    pub coupled: Option<&'static JointLanes>,
     pub lanes: Vec<usize>,
 }
 
@@ -43,13 +43,13 @@ pub fn fold(machine: &Machine, joints: &[Joint], weights: &[AxisVector], offsets
         }
     }
     let all: Vec<AxisLimits> = limits.axes().iter().copied().chain(behind).collect();
-    let carried = if rows.is_empty() {
+    let coupled = if rows.is_empty() {
         None
     } else {
         Some(lasting(JointLanes::new(axes, &rows)).map_err(|e| refusal(machine, "joints", e))?)
     };
     let limits = Limits::new(&all).map_err(|e| refusal(machine, "joints", e))?;
-    Ok(Folded { limits, carried, lanes })
+    Ok(Folded { limits, coupled, lanes })
 }
 
 /// The machine's limits with those of all joints behind them, for the guard.

@@ -5,7 +5,7 @@
 //! governor and guard treat like an axis ([`tandem_sdk::JointLanes`]). Other kinematics are planned by the limits of the axes
 //! alone; the guard judges their joints.
 
-mod carrier;
+mod coupled;
 mod fold;
 mod joint;
 mod linear;
@@ -13,5 +13,5 @@ mod space;
 mod stated;
 mod travel;
 
-pub use carrier::Carrier;
+pub use coupled::CoupledJoints;
 pub use space::JointSpace;

@@ -63,7 +63,7 @@ impl JointSpace {
         let linear = Linear::of(kinematics.as_ref(), joints.len(), axes, &positions);
         let this = if let Some((weights, offsets)) = linear {
             let folded = fold::fold(machine, &joints, &weights, &offsets)?;
-            let map = Map::Linear(Linear::new(weights, offsets, kinematics), folded.carried);
+            let map = Map::Linear(Linear::new(weights, offsets, kinematics), folded.coupled);
             Self { joints, map, axes, are_own, limits: folded.limits, lanes: folded.lanes }
         } else {
             let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());

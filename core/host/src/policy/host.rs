@@ -11,7 +11,7 @@ use tandem_recorder::PolicySummary;
 use super::setup::PolicySetup;
 use crate::error::{HostError, refusal};
 
-/// The script at work, shared by the rough loop and the pump, which run on one thread.
+/// The script at work, shared by the rough loop and what is asked once a rough period, which run on one thread.
 #[derive(Clone)]
 pub struct PolicyHost {
     pub(super) engine: Engine,

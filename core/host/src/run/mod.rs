@@ -22,6 +22,7 @@ use crate::clock::wall_clock::Periods;
 use crate::drives::Roster;
 use crate::error::HostError;
 use crate::joints::JointSpace;
+use crate::messages::fault_text::{Known, describe};
 use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
@@ -30,11 +31,10 @@ use crate::setup::parts;
 use crate::setup::ready::Ready;
 use crate::setup::rules;
 use crate::soft::command::Timed;
-use crate::soft::pump::{Pump, RunObserver};
+use crate::soft::soft_loop::{RunObserver, SoftLoop};
 use crate::soft::strategy::FeedRunner;
 use crate::soft::waits::Waits;
 use crate::switches::{Clock, Lead, Switches};
-use crate::words::fault_text::{Known, describe};
 use summarise::summarise;
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
@@ -243,33 +243,33 @@ impl Run {
         {
             observer.note(&note);
         }
-        let mut pump = Pump::new(self.rough, self.host, self.feed, reloader, monitor, observer);
-        pump.waits = Some(Waits::new(&machine));
-        pump.skips_homing = self.switches.home.is_some();
-        pump.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
-        pump.on_record_error = machine.on_record_error;
-        pump.planner.clone_from(&machine.planner.plugin);
+        let mut soft_loop = SoftLoop::new(self.rough, self.host, self.feed, reloader, monitor, observer);
+        soft_loop.waits = Some(Waits::new(&machine));
+        soft_loop.skips_homing = self.switches.home.is_some();
+        soft_loop.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
+        soft_loop.on_record_error = machine.on_record_error;
+        soft_loop.planner.clone_from(&machine.planner.plugin);
         let mut measured = None;
         self.exchange.measures.store(clock == Clock::Wall, Relaxed);
         match clock {
-            Clock::Virtual => virtual_clock::drive(&mut pump, &mut fine, machine.fine_periods_per_rough, commands),
+            Clock::Virtual => virtual_clock::drive(&mut soft_loop, &mut fine, machine.fine_periods_per_rough, commands),
             Clock::Wall => {
                 let watch = self.watch.as_ref().map(HangWatch::for_fine);
-                let timed = wall_clock::drive(&mut pump, fine, periods(&machine), watch)?;
+                let timed = wall_clock::drive(&mut soft_loop, fine, periods(&machine), watch)?;
                 (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
             }
         }
-        pump.tell_policy_notes();
-        pump.tell_plugin_log();
+        soft_loop.tell_policy_notes();
+        soft_loop.tell_plugin_log();
         let fault = fine.fault();
-        let mut summary = summarise(&machine, &self.program, clock, &pump, &fine);
+        let mut summary = summarise(&machine, &self.program, clock, &soft_loop, &fine);
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
-        summary.stopped = pump.aborted.map(|rest| stopped(rest.line));
+        summary.stopped = soft_loop.aborted.map(|rest| stopped(rest.line));
         tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
         let known = Known {
-            soft: pump.soft_cause(),
+            soft: soft_loop.soft_cause(),
             driver: fine.plugin_error(),
             drives: fine.driver(),
             roster: &self.roster,
@@ -278,10 +278,10 @@ impl Run {
         summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = self.switches.home.is_some() || fine.joints_went_alone();
-        let position = if sent { fine.sent() } else { pump.monitor.position };
+        let position = if sent { fine.sent() } else { soft_loop.monitor.position };
         let left = fine.left();
         let stopped = fine.into_driver().stop();
-        drop(pump);
+        drop(soft_loop);
         if let Err(error) = stopped {
             not_let_go(&self.roster, &error, &mut summary, observer);
         }

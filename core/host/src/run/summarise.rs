@@ -7,12 +7,12 @@ use tandem_machine::{JerkMode, Machine};
 use tandem_recorder::{JointWatch, PlanningUs, SUMMARY_FORMAT, Summary};
 use tandem_sdk::AxisVector;
 
-use crate::soft::pump::Pump;
+use crate::soft::soft_loop::SoftLoop;
 use crate::switches::Clock;
 
-/// The summary of what `pump` and `fine` saw; what only the clock or the host knows is added to it.
-pub fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>, fine: &FineLoop) -> Summary {
-    let (monitor, counters) = (&pump.monitor, fine.counters());
+/// The summary of what `soft_loop` and `fine` saw; what only the clock or the host knows is added to it.
+pub fn summarise(machine: &Machine, program: &str, clock: Clock, soft_loop: &SoftLoop<'_>, fine: &FineLoop) -> Summary {
+    let (monitor, counters) = (&soft_loop.monitor, fine.counters());
     let axes = &machine.axes;
     let of = |rotary: bool, values: &AxisVector| {
         let shown = |i: usize| if rotary { values[i].to_degrees() } else { values[i] };
@@ -61,13 +61,13 @@ pub fn summarise(machine: &Machine, program: &str, clock: Clock, pump: &Pump<'_>
         starvations: counters.starvations,
         queue_limited_samples: counters.queue_limited_samples,
         late_ratios: counters.late_ratios,
-        lost_samples: pump.host.status.lost_samples.load(Relaxed),
+        lost_samples: soft_loop.host.status.lost_samples.load(Relaxed),
         record_errors: vec![],
         end_position_mm: linear(&monitor.position),
         end_position_deg: rotary(&monitor.position),
         wall_time_s: 0.0,
-        planning_ns_per_block: pump.planning_ns as f64 / monitor.blocks.max(1) as f64,
-        planning_us: PlanningUs::from(&pump.planning),
+        planning_ns_per_block: soft_loop.planning_ns as f64 / monitor.blocks.max(1) as f64,
+        planning_us: PlanningUs::from(&soft_loop.planning),
         limited_by_s: monitor
             .limited_by_s
             .iter()

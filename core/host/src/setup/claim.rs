@@ -7,8 +7,8 @@ use tandem_sdk::{Attached, AxisVector, Driver, DriverDescription, JointState, MA
 use crate::drives::{Drives, Roster};
 use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
+use crate::messages::drive_states::code_text;
 use crate::switches::{Clock, Switches};
-use crate::words::joint_words::code_text;
 
 /// The drivers of a machine, and what they said when their drives were claimed. A claim that is dropped stops them.
 pub struct Claim {

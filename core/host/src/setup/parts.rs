@@ -11,7 +11,8 @@ use tandem_sdk::{
 };
 
 use crate::error::HostError;
-use crate::joints::{Carrier, JointSpace};
+use crate::joints::{CoupledJoints, JointSpace};
+use crate::messages::roles;
 use crate::plugins::registry::Registry;
 use crate::policy::{Means, PolicyHost, Tuner};
 use crate::setup::dry_run::DryRun;
@@ -19,7 +20,6 @@ use crate::setup::lines;
 use crate::setup::stand_in::AssumedEdges;
 use crate::soft::strategy::FeedRunner;
 use crate::switches::Switches;
-use crate::words::roles;
 
 /// Greatest time constant that a program may ask for where the machine states no range, s.
 const MOST_TIME_CONSTANT_S: f64 = 1.0;
@@ -107,7 +107,7 @@ pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner
     };
     let choice = &machine.planner;
     let planner = registry.planner(choice, &context).map_err(|e| e.at(machine, "planner"))?;
-    Ok(Carrier::around(planner, joints, machine))
+    Ok(CoupledJoints::around(planner, joints, machine))
 }
 
 /// The limits of the machine's axes, as narrow as its joints make them. Host; allocates.

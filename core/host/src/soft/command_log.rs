@@ -1,22 +1,22 @@
 //! The operator's commands as the samples show them: each with the tick in which it acted.
 
-use tandem_rings::{Given, Sample};
+use tandem_rings::{OperatorInputs, Sample};
 
 use crate::soft::command::{Command, Timed};
 
 /// Compares what the operator asks for from sample to sample.
 #[derive(Debug)]
 pub struct CommandLog {
-    last: Given,
+    last: OperatorInputs,
 }
 
 impl CommandLog {
     /// Nothing has changed against `given`.
-    pub fn new(given: Given) -> Self {
+    pub fn new(given: OperatorInputs) -> Self {
         Self { last: given }
     }
 
-    /// The commands that acted in the period of `sample`. Given again as a command file they have the same effect.
+    /// The commands that acted in the period of `sample`. OperatorInputs again as a command file they have the same effect.
     pub fn sample(&mut self, sample: &Sample) -> impl Iterator<Item = Timed> + use<> {
         let (tick, last, now) = (sample.tick, self.last, sample.given);
         self.last = now;
@@ -26,7 +26,7 @@ impl CommandLog {
 }
 
 /// The commands that make `now` of `last`.
-fn changes(last: &Given, now: &Given) -> impl Iterator<Item = Command> + use<> {
+fn changes(last: &OperatorInputs, now: &OperatorInputs) -> impl Iterator<Item = Command> + use<> {
     // An abort ends the hold by itself.
     let resumed = last.hold && !now.hold && !last.abort;
     let changes = [
@@ -48,15 +48,15 @@ mod tests {
 
     #[test]
     fn each_change_is_told_once_in_its_tick() {
-        let mut log = CommandLog::new(Given::default());
+        let mut log = CommandLog::new(OperatorInputs::default());
         let mut told = |tick, given| log.sample(&Sample { tick, given, ..Sample::default() }).collect::<Vec<_>>();
-        assert!(told(0, Given::default()).is_empty());
-        let held = Given { hold: true, feed_override: 0.5, ..Given::default() };
+        assert!(told(0, OperatorInputs::default()).is_empty());
+        let held = OperatorInputs { hold: true, feed_override: 0.5, ..OperatorInputs::default() };
         let expected = [Command::FeedOverride(0.5), Command::Hold].map(|command| Timed { tick: 1, command });
         assert_eq!(told(1, held), expected);
         assert!(told(2, held).is_empty());
-        assert_eq!(told(3, Given { hold: false, ..held }), [Timed { tick: 3, command: Command::Resume }]);
-        assert_eq!(told(4, Given { abort: true, ..held })[1].command, Command::Abort);
-        assert!(told(5, Given { hold: false, ..held }).is_empty(), "the abort has ended the hold");
+        assert_eq!(told(3, OperatorInputs { hold: false, ..held }), [Timed { tick: 3, command: Command::Resume }]);
+        assert_eq!(told(4, OperatorInputs { abort: true, ..held })[1].command, Command::Abort);
+        assert!(told(5, OperatorInputs { hold: false, ..held }).is_empty(), "the abort has ended the hold");
     }
 }

@@ -3,6 +3,6 @@
 pub mod command;
 pub mod command_file;
 pub mod command_log;
-pub mod pump;
+pub mod soft_loop;
 pub mod strategy;
 pub mod waits;

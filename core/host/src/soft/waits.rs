@@ -5,9 +5,9 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_machine::Machine;
 use tandem_rings::HostEnd;
 
-use crate::words::joint_words;
-use crate::words::roles;
-use crate::words::spindle;
+use crate::messages::drive_states;
+use crate::messages::roles;
+use crate::messages::spindle;
 
 /// Time for which nobody wonders why the drives do not hold yet, or a cut does not begin, s: contactors, brakes of small drives
 /// and small spindles need less.
@@ -56,7 +56,7 @@ impl Waits {
         if self.enabling_periods as f64 * self.machine.rough_period_s < UNNOTED_S {
             return None;
         }
-        let words = joint_words::enabling(&self.machine, status);
+        let words = drive_states::enabling(&self.machine, status);
         let news = words.clone().filter(|_| words != self.enabling);
         self.enabling = words;
         news.map(|words| format!("{words} …"))

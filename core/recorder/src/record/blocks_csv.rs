@@ -6,11 +6,10 @@ use std::path::Path;
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, Block, BlockKind, BlockReport, LimitedBy};
+use tandem_sdk::{Axes, Block, BlockKind, BlockReport};
 
-use super::failure::RecordError;
-use super::output::Output;
-use crate::block_times::BlockTimes;
+use super::output::{Output, RecordError};
+use crate::block_times::{BlockTimes, limited_by};
 
 /// Writes a blocks CSV.
 pub struct BlocksCsv {
@@ -143,20 +142,4 @@ fn kind(block: &Block) -> &'static str {
 fn is_helix(block: &Block) -> bool {
     let plane = block.arc.plane.map(|axis| axis as usize);
     (0..block.end.0.len()).any(|axis| !plane.contains(&axis) && block.end[axis] != block.start[axis])
-}
-
-/// What held the feed down, as it is written.
-pub(crate) fn limited_by(reason: LimitedBy) -> &'static str {
-    match reason {
-        LimitedBy::Feed => "feed",
-        LimitedBy::Acceleration => "acceleration",
-        LimitedBy::Curvature => "curvature",
-        LimitedBy::Junction => "junction",
-        LimitedBy::Velocity => "velocity",
-        LimitedBy::Buffer => "buffer",
-        LimitedBy::TimeConstant => "time-constant",
-        LimitedBy::Tolerance => "tolerance",
-        LimitedBy::Jerk => "jerk",
-        LimitedBy::Policy => "policy",
-    }
 }

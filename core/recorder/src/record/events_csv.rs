@@ -8,8 +8,7 @@ use tandem_fine::Left;
 use tandem_rings::{FLOOD, MIST, Sample, StopCause, Switched, SwitchedBy};
 use tandem_sdk::{Event, EventKind};
 
-use super::failure::RecordError;
-use super::output::Output;
+use super::output::{Output, RecordError};
 use super::trace_csv::{TraceCsv, rpm};
 
 /// Writes an events CSV: a row for each switch of spindle, coolant and outputs.

@@ -8,8 +8,7 @@ use tandem_machine::Machine;
 use tandem_rings::{Sample, Switched};
 use tandem_sdk::Axes;
 
-use super::failure::RecordError;
-use super::output::Output;
+use super::output::{Output, RecordError};
 
 /// Writes a trace CSV.
 pub struct TraceCsv {

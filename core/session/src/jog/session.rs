@@ -9,33 +9,34 @@ use tandem_rings::Rest;
 use tandem_rough::Source;
 use tandem_sdk::AxisVector;
 
-use super::{JogRest, Jogs};
+use super::controller::JogController;
+use super::message::JogRest;
 
 /// The operator's side of a session. Called on the soft side.
-pub trait JogHand: Send {
+pub trait JogInput: Send {
     /// A rough period begins: what is due is asked of `jogs`. On the virtual clock it may wait for words, and machine time
     /// stands still meanwhile.
-    fn period(&mut self, jogs: &Jogs);
+    fn period(&mut self, jogs: &JogController);
 
     /// Whether time has to pass before more is asked.
     fn is_waiting(&self) -> bool;
 
     /// A jog is over and the machine rests.
-    fn rested(&mut self, jogs: &Jogs, rest: &JogRest);
+    fn rested(&mut self, jogs: &JogController, rest: &JogRest);
 
     /// A jog that was taken could not begin, in words.
     fn refused(&mut self, why: &str);
 }
 
-type Hand = Arc<Mutex<Box<dyn JogHand>>>;
+type SharedInput = Arc<Mutex<Box<dyn JogInput>>>;
 
 /// Jogging on one machine.
 pub struct JogSession<'a> {
     machine: Machine,
     registry: &'a Registry,
     switches: Switches,
-    jogs: Arc<Jogs>,
-    hand: Hand,
+    jogs: Arc<JogController>,
+    input: SharedInput,
 }
 
 impl<'a> JogSession<'a> {
@@ -47,17 +48,17 @@ impl<'a> JogSession<'a> {
         machine: Machine,
         registry: &'a Registry,
         switches: Switches,
-        hand: Box<dyn JogHand>,
+        input: Box<dyn JogInput>,
     ) -> Result<Self, HostError> {
         let mut machine = machine;
         let judge = planner(&machine, registry)?;
         machine.limits = axis_limits(&machine, registry)?;
-        let jogs = Arc::new(Jogs::new(&machine, judge));
-        Ok(Self { machine, registry, switches, jogs, hand: Arc::new(Mutex::new(hand)) })
+        let jogs = Arc::new(JogController::new(&machine, judge));
+        Ok(Self { machine, registry, switches, jogs, input: Arc::new(Mutex::new(input)) })
     }
 
     /// Where jogs are asked for.
-    pub fn jogs(&self) -> &Arc<Jogs> {
+    pub fn jogs(&self) -> &Arc<JogController> {
         &self.jogs
     }
 
@@ -66,7 +67,7 @@ impl<'a> JogSession<'a> {
     /// # Errors
     /// The plugins refuse, or do not go together.
     pub fn enable(&self) -> Result<Run, HostError> {
-        let source = Jogging { jogs: Arc::clone(&self.jogs), hand: Arc::clone(&self.hand), standing: 0 };
+        let source = Jogging { jogs: Arc::clone(&self.jogs), input: Arc::clone(&self.input), standing: 0 };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
         let homed = if self.switches.home.is_some() {
@@ -96,26 +97,26 @@ const STANDING: u32 = 2;
 
 /// The session as the rough loop pulls it.
 struct Jogging {
-    jogs: Arc<Jogs>,
-    hand: Hand,
+    jogs: Arc<JogController>,
+    input: SharedInput,
     /// How often in a row everything was driven.
     standing: u32,
 }
 
 impl Jogging {
-    fn hand(&self) -> MutexGuard<'_, Box<dyn JogHand>> {
-        // A panic of the hand leaves the jogs as they were.
-        self.hand.lock().unwrap_or_else(PoisonError::into_inner)
+    fn input(&self) -> MutexGuard<'_, Box<dyn JogInput>> {
+        // A panic of the input leaves the jogs as they were.
+        self.input.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Source for Jogging {
     fn period(&mut self) {
-        self.hand().period(&self.jogs);
+        self.input().period(&self.jogs);
     }
 
     fn is_waiting(&self) -> bool {
-        self.hand().is_waiting()
+        self.input().is_waiting()
     }
 
     fn may_go_on(&mut self, driven: bool) -> bool {
@@ -124,7 +125,7 @@ impl Source for Jogging {
             return false;
         }
         if let Some(rest) = self.jogs.arrived() {
-            self.hand().rested(&self.jogs, &rest);
+            self.input().rested(&self.jogs, &rest);
         }
         true
     }
@@ -132,7 +133,7 @@ impl Source for Jogging {
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         let (more, refused) = self.jogs.next(items);
         for why in refused {
-            self.hand().refused(&why);
+            self.input().refused(&why);
         }
         if !items.is_empty() {
             self.standing = 0;
@@ -145,7 +146,7 @@ impl Source for Jogging {
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         self.standing = 0;
         if let Some(rest) = self.jogs.rests(rest) {
-            self.hand().rested(&self.jogs, &rest);
+            self.input().rested(&self.jogs, &rest);
         }
         true
     }

@@ -1,4 +1,4 @@
-//! What is asked of the panel, without loops.
+//! What is asked of the controller, without loops.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use tandem_machine::Machine;
 use tandem_rings::{Controls, Rest, RestCause};
 use tandem_sdk::{AxisVector, StopOn};
 
-use super::{JogEnd, JogRest, JogWords, Jogs, ReachWords};
+use super::{JogController, JogEnd, JogMessage, JogRest, ReachMessage};
 
 struct Rig {
-    jogs: Jogs,
+    jogs: JogController,
     controls: Arc<Controls>,
 }
 
@@ -23,19 +23,19 @@ impl Rig {
         let machine = Machine::read(&path, &[]).unwrap();
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
-        let jogs = Jogs::new(&machine, planner(&machine, &registry).unwrap());
+        let jogs = JogController::new(&machine, planner(&machine, &registry).unwrap());
         let controls = Arc::<Controls>::default();
         jogs.enable(Arc::clone(&controls), true, 0);
         Self { jogs, controls }
     }
 
-    fn ask(&self, axis: char, reach: ReachWords) -> Result<(), String> {
-        let words = JogWords { axis, reach, feed_per_min: 600.0, degrees: None };
+    fn ask(&self, axis: char, reach: ReachMessage) -> Result<(), String> {
+        let words = JogMessage { axis, reach, feed_per_min: 600.0, degrees: None };
         self.jogs.ask(words.on(&self.jogs.machine().axes)?)
     }
 
     fn on(&self, axis: char, positive: bool) -> Result<(), String> {
-        self.ask(axis, ReachWords::On { positive })
+        self.ask(axis, ReachMessage::On { positive })
     }
 
     /// The end of the next block, if one begins.
@@ -101,35 +101,35 @@ fn a_keep_alive_that_comes_while_the_machine_stops_starts_it_again() {
 fn steps_wait_for_each_other_and_are_forgotten_at_a_stop() {
     let rig = Rig::new();
     for _ in 0..3 {
-        rig.ask('x', ReachWords::By(100.0)).unwrap_or_else(|why| assert!(why.contains("300 mm"), "{why}"));
+        rig.ask('x', ReachMessage::By(100.0)).unwrap_or_else(|why| assert!(why.contains("300 mm"), "{why}"));
     }
     assert_eq!(rig.begins().unwrap()[0], 100.0);
     assert_eq!(rig.controls.jog.most_periods.load(Relaxed), 0, "a step needs no keep-alive");
     let rest = rig.jogs.arrived().unwrap();
     assert_eq!((rest.end, rest.position[0]), (JogEnd::Arrived, 100.0));
     assert_eq!(rig.begins().unwrap()[0], 200.0);
-    rig.ask('x', ReachWords::By(1.0)).unwrap();
+    rig.ask('x', ReachMessage::By(1.0)).unwrap();
     rig.jogs.let_go();
     assert_eq!(rig.rests_at(150.0).unwrap().end, JogEnd::LetGo);
     assert!(rig.begins().is_none() && rig.jogs.is_still());
-    let crowd = (0..20).filter_map(|_| rig.ask('x', ReachWords::By(1.0)).err()).collect::<Vec<_>>();
+    let crowd = (0..20).filter_map(|_| rig.ask('x', ReachMessage::By(1.0)).err()).collect::<Vec<_>>();
     assert_eq!((crowd.len(), crowd[0].as_str()), (4, "16 steps wait already"));
 }
 
 #[test]
 fn degrees_become_radians_and_units_must_fit() {
     let rig = Rig::new();
-    rig.ask('a', ReachWords::By(90.0)).unwrap();
+    rig.ask('a', ReachMessage::By(90.0)).unwrap();
     assert_eq!(rig.begins().unwrap()[3], 90f64.to_radians());
-    let words = JogWords { axis: 'a', reach: ReachWords::By(1.0), feed_per_min: 1.0, degrees: Some(false) };
+    let words = JogMessage { axis: 'a', reach: ReachMessage::By(1.0), feed_per_min: 1.0, degrees: Some(false) };
     assert!(words.on(&rig.jogs.machine().axes).unwrap_err().contains("a is a rotary axis"));
     for (reach, feed_per_min, why) in [
-        (ReachWords::By(0.0), 1.0, "goes nowhere"),
-        (ReachWords::By(f64::NAN), 1.0, "goes nowhere"),
-        (ReachWords::By(1.0), 0.0, "not above zero"),
-        (ReachWords::By(1.0), f64::INFINITY, "not above zero"),
+        (ReachMessage::By(0.0), 1.0, "goes nowhere"),
+        (ReachMessage::By(f64::NAN), 1.0, "goes nowhere"),
+        (ReachMessage::By(1.0), 0.0, "not above zero"),
+        (ReachMessage::By(1.0), f64::INFINITY, "not above zero"),
     ] {
-        let words = JogWords { axis: 'x', reach, feed_per_min, degrees: None };
+        let words = JogMessage { axis: 'x', reach, feed_per_min, degrees: None };
         assert!(words.on(&rig.jogs.machine().axes).unwrap_err().contains(why), "{words:?}");
     }
 }

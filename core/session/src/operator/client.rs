@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::PollFlags;
 
-use super::desk::Desk;
+use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::listen::{Comer, Stream};
 use super::outbox::Outbox;
@@ -108,11 +108,11 @@ impl Client {
 
     /// Reads, answers, sends: whatever can be done without waiting. A stranger that names the token becomes an owner
     /// where its door `has_place` for one.
-    pub fn serve(&mut self, desk: &Desk, lease: &mut Lease, has_place: bool, now: Instant) {
+    pub fn serve(&mut self, hub: &OperatorHub, lease: &mut Lease, has_place: bool, now: Instant) {
         self.session.has_place = has_place;
-        self.read(desk, lease, now);
+        self.read(hub, lease, now);
         if self.phase == Phase::Talking && self.session.is_due(now) {
-            self.outbox.telemetry(|lost| reply::telemetry(&desk.status(), lost));
+            self.outbox.telemetry(|lost| reply::telemetry(&hub.status(), lost));
         }
         self.send(now);
         let most = if self.phase == Phase::Talking { TOKEN_WITHIN } else { PATIENCE };
@@ -125,9 +125,9 @@ impl Client {
     }
 
     /// The run is over: its last line.
-    pub fn dismiss(&mut self, desk: &Desk, now: Instant) {
+    pub fn dismiss(&mut self, hub: &OperatorHub, now: Instant) {
         if self.is_talking() {
-            self.outbox.last(|lost| reply::ended(&desk.status(), lost));
+            self.outbox.last(|lost| reply::ended(&hub.status(), lost));
         }
         self.leave(now);
     }
@@ -160,14 +160,14 @@ impl Client {
         self.send(now);
     }
 
-    fn read(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+    fn read(&mut self, hub: &OperatorHub, lease: &mut Lease, now: Instant) {
         let mut chunk = [0; MAX_LINE];
         // One chunk a round: a client that never stops sending does not keep the others waiting.
         match self.stream.read(&mut chunk) {
             Ok(0) => self.hang_up(now),
             Ok(count) if self.phase == Phase::Talking => {
                 self.incoming.extend_from_slice(&chunk[..count]);
-                self.lines(desk, lease, now);
+                self.lines(hub, lease, now);
             }
             Err(error) if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 self.phase = Phase::Gone;
@@ -185,13 +185,13 @@ impl Client {
         }
     }
 
-    fn lines(&mut self, desk: &Desk, lease: &mut Lease, now: Instant) {
+    fn lines(&mut self, hub: &OperatorHub, lease: &mut Lease, now: Instant) {
         while self.phase == Phase::Talking {
             let end = self.incoming.iter().position(|byte| *byte == b'\n');
             let answer = match end {
                 Some(end) if end <= MAX_LINE => {
                     let line: Vec<u8> = self.incoming.drain(..=end).collect();
-                    self.session.line(&String::from_utf8_lossy(&line[..end]), desk, lease, now)
+                    self.session.line(&String::from_utf8_lossy(&line[..end]), hub, lease, now)
                 }
                 None if self.incoming.len() <= MAX_LINE => return,
                 _ => self.session.too_long(MAX_LINE),

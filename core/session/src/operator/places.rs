@@ -5,9 +5,8 @@ use std::time::{Duration, Instant};
 
 use super::client::{Client, Standing};
 use super::reply::Problem;
+use super::session::MAX_OWNERS;
 
-/// Most clients that are known, at one door.
-pub const MAX_OWNERS: usize = 16;
 /// Most clients of other users, at one door.
 const MAX_GUESTS: usize = 4;
 /// Most clients that have not said who they are, at one door. Each costs a socket and a few hundred bytes.

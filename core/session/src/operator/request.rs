@@ -7,7 +7,7 @@ use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use tandem_host::Command;
 
 use super::reply::Problem;
-use crate::jog::{JogWords, ReachWords};
+use crate::jog::{JogMessage, ReachMessage};
 
 /// Lowest rate of a subscription, Hz: a line in a minute and a half. What is slower asks for a status when it wants one.
 pub const MIN_RATE_HZ: f64 = 0.01;
@@ -26,7 +26,7 @@ pub enum Request {
     /// The control lease.
     Lease(LeaseWord),
     /// A jog, or its keep-alive; none lets go of what moves.
-    Jog(Option<JogWords>),
+    Jog(Option<JogMessage>),
     /// Who the client is, over TCP.
     Token(String),
 }
@@ -181,13 +181,13 @@ impl JogLine {
             return Err("feed and distance are both in mm or both in deg");
         }
         let reach = match (self.direction, distance) {
-            (Some(direction @ (1 | -1)), None) => ReachWords::On { positive: direction == 1 },
-            (None, Some(distance)) => ReachWords::By(distance),
+            (Some(direction @ (1 | -1)), None) => ReachMessage::On { positive: direction == 1 },
+            (None, Some(distance)) => ReachMessage::By(distance),
             (Some(_), None) => return Err("\"direction\" is 1 or -1"),
             _ => return Err("it needs one of direction and distance"),
         };
         let axis = self.axis.ok_or("it needs an axis")?;
-        Ok(Request::Jog(Some(JogWords { axis, reach, feed_per_min, degrees: Some(degrees) })))
+        Ok(Request::Jog(Some(JogMessage { axis, reach, feed_per_min, degrees: Some(degrees) })))
     }
 }
 
@@ -206,8 +206,8 @@ fn rate(Subscribe { rate_hz }: Subscribe) -> Result<Request, Problem> {
 mod tests {
     use super::*;
 
-    fn jog(reach: ReachWords, degrees: bool) -> Request {
-        Request::Jog(Some(JogWords { axis: 'x', reach, feed_per_min: 600.0, degrees: Some(degrees) }))
+    fn jog(reach: ReachMessage, degrees: bool) -> Request {
+        Request::Jog(Some(JogMessage { axis: 'x', reach, feed_per_min: 600.0, degrees: Some(degrees) }))
     }
 
     #[test]
@@ -227,9 +227,9 @@ mod tests {
             (r#"{"jog":{"stop":true}}"#, Request::Jog(None)),
             (
                 r#"{"jog":{"axis":"x","feed_mm_per_min":600,"direction":-1}}"#,
-                jog(ReachWords::On { positive: false }, false),
+                jog(ReachMessage::On { positive: false }, false),
             ),
-            (r#"{"jog":{"axis":"x","distance_deg":0.1,"feed_deg_per_min":600}}"#, jog(ReachWords::By(0.1), true)),
+            (r#"{"jog":{"axis":"x","distance_deg":0.1,"feed_deg_per_min":600}}"#, jog(ReachMessage::By(0.1), true)),
             (r#"{"token":"abc"}"#, Request::Token("abc".to_string())),
         ] {
             assert_eq!(parse(text), Ok(request), "{text}");

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::client::{Client, Standing};
-use super::desk::Desk;
+use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::listen::{Door, Listen};
 use super::places::{crowded, has_place, make_place_for_stranger};
@@ -42,11 +42,11 @@ impl Server {
     ///
     /// # Errors
     /// The place with the cause: it is taken, or not allowed.
-    pub fn start(desk: Arc<Desk>, listen: &Listen) -> Result<Self, String> {
+    pub fn start(hub: Arc<OperatorHub>, listen: &Listen) -> Result<Self, String> {
         let doors = Door::open(listen)?;
         let address = doors.iter().find_map(Door::address);
         let over = Arc::new(AtomicBool::new(false));
-        let mut room = Room::new(desk, doors);
+        let mut room = Room::new(hub, doors);
         let seen = Arc::clone(&over);
         let builder = thread::Builder::new().name("tandem-operator".to_string()).stack_size(STACK_BYTES);
         let handle = builder.spawn(move || room.serve(&seen));
@@ -67,7 +67,7 @@ impl Drop for Server {
 
 /// Everybody who is there.
 struct Room {
-    desk: Arc<Desk>,
+    hub: Arc<OperatorHub>,
     doors: Vec<Door>,
     /// Until when nobody is let in at each door: the system refuses to.
     shut_until: Vec<Option<Instant>>,
@@ -78,9 +78,9 @@ struct Room {
 }
 
 impl Room {
-    fn new(desk: Arc<Desk>, doors: Vec<Door>) -> Self {
+    fn new(hub: Arc<OperatorHub>, doors: Vec<Door>) -> Self {
         let shut_until = doors.iter().map(|_| None).collect();
-        Self { desk, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
+        Self { hub, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
     }
 
     fn serve(&mut self, over: &AtomicBool) {
@@ -103,8 +103,8 @@ impl Room {
     fn round(&mut self, now: Instant) {
         for at in 0..self.clients.len() {
             let has_place = has_place(&self.clients, self.clients[at].door, Standing::Owner);
-            let (desk, lease, client) = (&self.desk, &mut self.lease, &mut self.clients[at]);
-            let served = catch_unwind(AssertUnwindSafe(|| client.serve(desk, lease, has_place, now)));
+            let (hub, lease, client) = (&self.hub, &mut self.lease, &mut self.clients[at]);
+            let served = catch_unwind(AssertUnwindSafe(|| client.serve(hub, lease, has_place, now)));
             if served.is_err() {
                 let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
                 if failed.is_err() {
@@ -118,7 +118,7 @@ impl Room {
             }
         }
         self.clients.retain(|client| !client.is_gone());
-        self.desk.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
+        self.hub.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
     }
 
     /// Lets in who waits at the doors, a bounded number of them.
@@ -179,7 +179,7 @@ impl Room {
         self.doors.clear();
         let start = Instant::now();
         for client in &mut self.clients {
-            client.dismiss(&self.desk, start);
+            client.dismiss(&self.hub, start);
         }
         while !self.clients.is_empty() && start.elapsed() < FAREWELL {
             self.round(Instant::now());

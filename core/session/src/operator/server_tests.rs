@@ -42,7 +42,7 @@ impl Stream for Defective {
 fn room() -> Room {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let machine = Machine::read(&path, &[]).unwrap();
-    Room::new(Arc::new(Desk::new(&machine, Arc::default(), Arc::default())), vec![])
+    Room::new(Arc::new(OperatorHub::new(&machine, Arc::default(), Arc::default())), vec![])
 }
 
 impl Room {

@@ -5,13 +5,15 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use tandem_host::Command;
 
-use super::desk::Desk;
+use super::hub::OperatorHub;
 use super::lease::{ANSWER_WITHIN, Lease};
-use super::places::MAX_OWNERS;
 use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
 use super::token;
-use crate::jog::JogWords;
+use crate::jog::JogMessage;
+
+/// Most clients that are known, at one door.
+pub const MAX_OWNERS: usize = 16;
 
 /// What a line led to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,7 +55,7 @@ impl Session {
     }
 
     /// Answers a line.
-    pub fn line(&mut self, text: &str, desk: &Desk, lease: &mut Lease, now: Instant) -> Answer {
+    pub fn line(&mut self, text: &str, hub: &OperatorHub, lease: &mut Lease, now: Instant) -> Answer {
         self.lines += 1;
         lease.hears(self.client);
         let request = match parse(text) {
@@ -68,7 +70,7 @@ impl Session {
             self.token = answer.last.then_some(token);
             return answer;
         }
-        match self.grant(&request, desk, lease, now) {
+        match self.grant(&request, hub, lease, now) {
             Ok(line) => Answer { line, last: false },
             Err(problem) => Answer { line: reply::error(self.lines, &problem), last: false },
         }
@@ -112,11 +114,17 @@ impl Session {
         }
     }
 
-    fn grant(&mut self, request: &Request, desk: &Desk, lease: &mut Lease, now: Instant) -> Result<String, Problem> {
+    fn grant(
+        &mut self,
+        request: &Request,
+        hub: &OperatorHub,
+        lease: &mut Lease,
+        now: Instant,
+    ) -> Result<String, Problem> {
         match request {
-            Request::Command(command) => self.command(*command, desk, lease),
-            Request::Status => Ok(reply::status(&desk.status())),
-            Request::Jog(words) => self.jog(words.as_ref(), desk, lease),
+            Request::Command(command) => self.command(*command, hub, lease),
+            Request::Status => Ok(reply::status(&hub.status())),
+            Request::Jog(words) => self.jog(words.as_ref(), hub, lease),
             Request::Lease(word) => self.lease(*word, lease, now),
             Request::Token(_) => Err(Problem::refused("key \"token\"", "no token is asked for here".to_string())),
             Request::Subscribe(rate_hz) => {
@@ -127,23 +135,23 @@ impl Session {
         }
     }
 
-    fn command(&self, command: Command, desk: &Desk, lease: &Lease) -> Result<String, Problem> {
+    fn command(&self, command: Command, hub: &OperatorHub, lease: &Lease) -> Result<String, Problem> {
         // Safety needs no lease.
         let free = matches!(command, Command::Hold | Command::EmergencyStop);
         if !free && !lease.is_held_by(self.client) {
             return Err(Problem::refused("key \"command\"", without_lease(lease)));
         }
-        let tick = desk.give(command).map_err(|why| Problem::refused("key \"value\"", why))?;
+        let tick = hub.give(command).map_err(|why| Problem::refused("key \"value\"", why))?;
         Ok(reply::ok(&json!({ "command": command.name(), "tick": tick })))
     }
 
-    fn jog(&self, words: Option<&JogWords>, desk: &Desk, lease: &Lease) -> Result<String, Problem> {
+    fn jog(&self, words: Option<&JogMessage>, hub: &OperatorHub, lease: &Lease) -> Result<String, Problem> {
         let refused = |why: String| Problem::refused("key \"jog\"", why);
         // To stop is safety.
         if words.is_some() && !lease.is_held_by(self.client) {
             return Err(refused(without_lease(lease)));
         }
-        let tick = desk.jog(words).map_err(refused)?;
+        let tick = hub.jog(words).map_err(refused)?;
         let axis = words.map(|words| words.axis.to_ascii_lowercase());
         Ok(reply::ok(&json!({ "jog": axis.map_or(json!("stop"), |axis| json!({ "axis": axis })), "tick": tick })))
     }

@@ -10,7 +10,7 @@ use tandem_machine::Machine;
 use super::*;
 
 struct Room {
-    desk: Desk,
+    hub: OperatorHub,
     lease: Lease,
     now: Instant,
 }
@@ -19,13 +19,13 @@ impl Room {
     fn new() -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let machine = Machine::read(&path, &[("motion.max_feed_ratio".to_string(), "1.5".to_string())]).unwrap();
-        let desk = Desk::new(&machine, Arc::default(), Arc::default());
-        Self { desk, lease: Lease::default(), now: Instant::now() }
+        let hub = OperatorHub::new(&machine, Arc::default(), Arc::default());
+        Self { hub, lease: Lease::default(), now: Instant::now() }
     }
 
     /// The answer to a line, and whether it is the last.
     fn ask(&mut self, session: &mut Session, line: &str) -> (Value, bool) {
-        let answer = session.line(line, &self.desk, &mut self.lease, self.now);
+        let answer = session.line(line, &self.hub, &mut self.lease, self.now);
         assert_eq!(answer.line.matches('\n').count(), 1, "one line each");
         (serde_json::from_str(&answer.line).unwrap(), answer.last)
     }
@@ -56,15 +56,15 @@ fn commands_need_the_lease_and_safety_needs_none() {
     room.is_granted(&mut a, TAKE);
     room.is_refused(&mut b, TAKE, "client 1 holds the lease");
     room.is_granted(&mut b, r#"{"command":"hold"}"#);
-    assert!(room.desk.controls().hold.load(Relaxed));
+    assert!(room.hub.controls().hold.load(Relaxed));
     for command in ["resume", "abort"] {
         room.is_refused(&mut b, &format!("{{\"command\":\"{command}\"}}"), "client 1 holds it");
     }
     room.is_refused(&mut b, r#"{"command":"feed-override","value":0}"#, "client 1 holds it");
     room.is_granted(&mut a, RESUME);
-    assert!(!room.desk.controls().hold.load(Relaxed));
+    assert!(!room.hub.controls().hold.load(Relaxed));
     room.is_granted(&mut b, r#"{"command":"emergency-stop"}"#);
-    assert!(room.desk.controls().emergency_stop.load(Relaxed));
+    assert!(room.hub.controls().emergency_stop.load(Relaxed));
     room.is_refused(&mut b, RELEASE, "does not hold");
     room.is_granted(&mut a, RELEASE);
     room.is_granted(&mut b, TAKE);
@@ -79,8 +79,8 @@ fn overrides_beyond_the_machine_are_refused_not_clamped() {
     room.is_refused(&mut session, r#"{"command":"feed-override","value":1.6}"#, "motion.max_feed_ratio, which is 1.5");
     room.is_refused(&mut session, r#"{"command":"rapid-override","value":1.1}"#, "above 1");
     room.is_refused(&mut session, r#"{"command":"stall-rough","value":3}"#, "for tests");
-    assert_eq!(room.desk.controls().feed_override.load(), 1.5);
-    assert_eq!(room.desk.controls().rapid_override.load(), 1.0);
+    assert_eq!(room.hub.controls().feed_override.load(), 1.5);
+    assert_eq!(room.hub.controls().rapid_override.load(), 1.0);
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn over_tcp_the_first_line_is_the_token() {
         let (answer, last) = room.ask(&mut session, line);
         assert!(last && answer["error"]["why"].as_str().unwrap().contains(why), "{answer}");
     }
-    assert!(!room.desk.controls().hold.load(Relaxed));
+    assert!(!room.hub.controls().hold.load(Relaxed));
     let mut session = Session::new(1, token());
     assert!(!session.is_known());
     room.is_granted(&mut session, r#"{"token":"0123456789abcdef"}"#);

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use serde::{Serialize, Serializer};
-use tandem_host::joint_words::JointLine;
+use tandem_host::drive_states::JointLine;
 use tandem_recorder::PolicySummary;
 use tandem_rings::Status;
 use tandem_sdk::{Axes, AxisVector};

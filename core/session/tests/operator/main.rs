@@ -13,8 +13,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tandem_host::{Registry, Switches};
 use tandem_machine::Machine;
-use tandem_session::jog::{JogHand, JogRest, JogSession, Jogs};
-use tandem_session::operator::{Desk, Listen, Server};
+use tandem_session::jog::{JogController, JogInput, JogRest, JogSession};
+use tandem_session::operator::{Listen, OperatorHub, Server};
 
 /// An answer that does not come is a failure after this; nothing else depends on it.
 const NEVER: Duration = Duration::from_mins(1);
@@ -22,19 +22,19 @@ const NEVER: Duration = Duration::from_mins(1);
 /// Nobody at the machine.
 struct Nobody;
 
-impl JogHand for Nobody {
-    fn period(&mut self, _: &Jogs) {}
+impl JogInput for Nobody {
+    fn period(&mut self, _: &JogController) {}
 
     fn is_waiting(&self) -> bool {
         false
     }
 
-    fn rested(&mut self, _: &Jogs, _: &JogRest) {}
+    fn rested(&mut self, _: &JogController, _: &JogRest) {}
 
     fn refused(&mut self, _: &str) {}
 }
 
-/// A desk with both doors, for programs and for jogs.
+/// A hub with both doors, for programs and for jogs.
 struct Office {
     folder: tempfile::TempDir,
     server: Server,
@@ -51,14 +51,14 @@ impl Office {
         }
         let session = JogSession::new(machine.clone(), &registry, Switches::default(), Box::new(Nobody)).unwrap();
         let run = session.enable().unwrap();
-        let desk = Desk::new(&machine, run.controls(), run.status()).with_jogs(Arc::clone(session.jogs()));
+        let hub = OperatorHub::new(&machine, run.controls(), run.status()).with_jogs(Arc::clone(session.jogs()));
         let folder = tempfile::tempdir().unwrap();
         let listen = Listen {
             unix: Some(folder.path().join("s")),
             tcp: Some("127.0.0.1:0".parse().unwrap()),
             token_file: Some(folder.path().join("token")),
         };
-        let server = Server::start(Arc::new(desk), &listen).unwrap();
+        let server = Server::start(Arc::new(hub), &listen).unwrap();
         let token = std::fs::read_to_string(folder.path().join("token")).unwrap().trim().to_string();
         Self { folder, server, token }
     }

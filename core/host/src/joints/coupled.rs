@@ -11,7 +11,7 @@ use super::travel::Travel;
 
 /// Hands blocks on with the lanes of the joints filled, refuses those in which a joint leaves its travel, and fills the
 /// lanes of every segment from its axes.
-pub struct Carrier {
+pub struct CoupledJoints {
     planner: Box<dyn Planner>,
     lanes: Option<&'static JointLanes>,
     travel: Travel,
@@ -19,7 +19,7 @@ pub struct Carrier {
     points: Vec<AxisVector>,
 }
 
-impl Carrier {
+impl CoupledJoints {
     /// `planner` as it is where the joints are the axes; else one that keeps their travel too, and carries their lanes. Host;
     /// allocates.
     pub fn around(planner: Box<dyn Planner>, joints: JointSpace, machine: &Machine) -> Box<dyn Planner> {
@@ -49,7 +49,7 @@ fn filled(block: &Block, lanes: &'static JointLanes, points: &mut Vec<AxisVector
     block
 }
 
-impl Planner for Carrier {
+impl Planner for CoupledJoints {
     fn describe(&self) -> PlannerDescription {
         self.planner.describe()
     }

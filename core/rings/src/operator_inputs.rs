@@ -8,7 +8,7 @@ use crate::Controls;
 /// says what acted in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::struct_excessive_bools)] // independent keys and switches of a panel
-pub struct Given {
+pub struct OperatorInputs {
     /// Feed override, 1 for the programmed feed.
     pub feed_override: f64,
     /// Rapid override, 1 for the machine's rapid feed.
@@ -27,7 +27,7 @@ pub struct Given {
     pub abort: bool,
 }
 
-impl Given {
+impl OperatorInputs {
     /// What `controls` hold now. Any loop; does not allocate.
     pub fn of(controls: &Controls) -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Given {
     }
 }
 
-impl Default for Given {
+impl Default for OperatorInputs {
     /// Nothing is asked for.
     fn default() -> Self {
         Self::of(&Controls::default())

@@ -4,19 +4,19 @@ use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tandem_host::{Command, awaited_spindle, holding_inputs, joint_words};
+use tandem_host::{Command, awaited_spindle, drive_states, holding_inputs};
 use tandem_machine::Machine;
 use tandem_recorder::PolicySummary;
 use tandem_rings::{Controls, MachineState, Sample, Status};
 use tandem_sdk::{Axes, AxisVector};
 
-use crate::jog::{JogWords, Jogs};
+use crate::jog::{JogController, JogMessage};
 
 use super::status::{Counters, Position, StatusLine};
 
-/// The operator's desk: keys, sockets and whatever else gives commands share one. Soft side; never waits for the fine
+/// The operator's hub: keys, sockets and whatever else gives commands share one. Soft side; never waits for the fine
 /// loop.
-pub struct Desk {
+pub struct OperatorHub {
     controls: Arc<Controls>,
     status: Arc<Status>,
     machine: Machine,
@@ -29,7 +29,7 @@ pub struct Desk {
     /// What a session in fault waits for: set by a reset, taken by the session.
     reset: AtomicBool,
     /// Where jogs are asked for, in a session that jogs.
-    jogs: Option<Arc<Jogs>>,
+    jogs: Option<Arc<JogController>>,
 }
 
 /// What the recorder last saw.
@@ -48,8 +48,8 @@ struct Latest {
     policy: Option<PolicySummary>,
 }
 
-impl Desk {
-    /// The desk of a run on `machine`. Host; allocates.
+impl OperatorHub {
+    /// The hub of a run on `machine`. Host; allocates.
     pub fn new(machine: &Machine, controls: Arc<Controls>, status: Arc<Status>) -> Self {
         let latest = Latest {
             position: machine.start,
@@ -76,9 +76,9 @@ impl Desk {
         }
     }
 
-    /// The desk of a session that jogs.
+    /// The hub of a session that jogs.
     #[must_use]
-    pub fn with_jogs(self, jogs: Arc<Jogs>) -> Self {
+    pub fn with_jogs(self, jogs: Arc<JogController>) -> Self {
         Self { jogs: Some(jogs), ..self }
     }
 
@@ -102,11 +102,11 @@ impl Desk {
         Ok(self.now())
     }
 
-    /// Asks for a jog, or keeps one alive; without words, lets go of what moves. The answer is that of [`Desk::give`].
+    /// Asks for a jog, or keeps one alive; without words, lets go of what moves. The answer is that of [`OperatorHub::give`].
     ///
     /// # Errors
     /// Nothing is jogged here, or the jog is refused; nothing has changed.
-    pub fn jog(&self, words: Option<&JogWords>) -> Result<u64, String> {
+    pub fn jog(&self, words: Option<&JogMessage>) -> Result<u64, String> {
         let jogs = self.jogs.as_ref().ok_or("nothing is jogged here: tandem jog does")?;
         match words {
             Some(words) => jogs.ask(words.on(&self.axes)?)?,
@@ -245,8 +245,8 @@ impl Desk {
             progress: latest.progress,
             counters: Counters::of(status),
             policy: latest.policy.clone(),
-            joints: joint_words::lines(&self.machine, status),
-            enabling: joint_words::enabling(&self.machine, status),
+            joints: drive_states::lines(&self.machine, status),
+            enabling: drive_states::enabling(&self.machine, status),
             waits_for: awaited_spindle(status),
             held_by: holding_inputs(&self.machine, status.tripped.load(Relaxed)),
             fault: latest.fault.clone(),

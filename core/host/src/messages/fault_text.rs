@@ -6,9 +6,9 @@ use tandem_sdk::{Driver, JointState, PluginError};
 
 use crate::drives::Roster;
 use crate::joints::JointSpace;
-use crate::words::joint_words::{code_text, state_text};
-use crate::words::roles;
-use crate::words::spindle;
+use crate::messages::drive_states::{code_text, state_text};
+use crate::messages::roles;
+use crate::messages::spindle;
 
 /// Who is meant by the numbers of a fault.
 struct Names<'a> {

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use tandem_session::NextLine;
-use tandem_session::jog::{JogHand, JogRest, JogWords, Jogs, ReachWords};
+use tandem_session::jog::{JogController, JogInput, JogMessage, JogRest, ReachMessage};
 
 use super::line::{Line, parse};
 use super::shared::Shared;
@@ -64,7 +64,7 @@ impl Script {
         }
     }
 
-    fn is_due(&self, jogs: &Jogs) -> bool {
+    fn is_due(&self, jogs: &JogController) -> bool {
         match self.wait {
             Wait::Nothing => true,
             Wait::Until(tick) => self.now() >= tick,
@@ -73,10 +73,10 @@ impl Script {
     }
 
     fn now(&self) -> u64 {
-        self.shared.desk().map_or(0, |(desk, _)| desk.now())
+        self.shared.hub().map_or(0, |(hub, _)| hub.now())
     }
 
-    fn take(&mut self, text: &str, jogs: &Jogs) {
+    fn take(&mut self, text: &str, jogs: &JogController) {
         self.lines += 1;
         match parse(text) {
             Ok(line) => {
@@ -87,7 +87,7 @@ impl Script {
         }
     }
 
-    fn carry_out(&mut self, line: &Line, jogs: &Jogs) -> Result<(), String> {
+    fn carry_out(&mut self, line: &Line, jogs: &JogController) -> Result<(), String> {
         match line {
             Line::Jog(words) => {
                 jogs.ask(words.on(&jogs.machine().axes)?)?;
@@ -105,8 +105,8 @@ impl Script {
             Line::Reset => return Err("there is no fault to reset".to_string()),
             Line::Quit => self.shared.quit.store(true, Relaxed),
             Line::Command(command) => {
-                if let Some((desk, _)) = self.shared.desk() {
-                    desk.give(*command)?;
+                if let Some((hub, _)) = self.shared.hub() {
+                    hub.give(*command)?;
                 }
             }
             Line::Nothing => {}
@@ -119,19 +119,19 @@ impl Script {
     }
 }
 
-fn is_step(words: &JogWords) -> bool {
-    matches!(words.reach, ReachWords::By(_))
+fn is_step(words: &JogMessage) -> bool {
+    matches!(words.reach, ReachMessage::By(_))
 }
 
 /// What asks for jogs.
 #[derive(Clone)]
-pub struct Hand {
+pub struct Inputs {
     shared: Arc<Shared>,
     /// None where keys ask.
     script: Arc<Mutex<Option<Script>>>,
 }
 
-impl Hand {
+impl Inputs {
     /// Nothing asked yet.
     pub fn new(shared: Arc<Shared>, script: Option<Script>) -> Self {
         Self { shared, script: Arc::new(Mutex::new(script)) }
@@ -157,8 +157,8 @@ impl Hand {
     }
 }
 
-impl JogHand for Hand {
-    fn period(&mut self, jogs: &Jogs) {
+impl JogInput for Inputs {
+    fn period(&mut self, jogs: &JogController) {
         if self.shared.is_over() {
             jogs.end();
             return;
@@ -180,7 +180,7 @@ impl JogHand for Hand {
         self.script().as_ref().is_some_and(|script| matches!(script.wait, Wait::Until(_)))
     }
 
-    fn rested(&mut self, jogs: &Jogs, rest: &JogRest) {
+    fn rested(&mut self, jogs: &JogController, rest: &JogRest) {
         self.shared.rested(jogs, rest);
     }
 

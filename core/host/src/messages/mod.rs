@@ -1,6 +1,6 @@
 //! What a machine is and waits for, in words.
 
+pub mod drive_states;
 pub mod fault_text;
-pub mod joint_words;
 pub mod roles;
 pub mod spindle;

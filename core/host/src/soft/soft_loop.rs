@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use tandem_machine::RecordErrorMode;
 use tandem_recorder::{Lateness, Monitor, PolicySummary};
-use tandem_rings::{Given, HostEnd, Rest, RestCause, Sample};
+use tandem_rings::{HostEnd, OperatorInputs, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
 use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
 
@@ -71,7 +71,7 @@ pub trait RunObserver {
 impl RunObserver for () {}
 
 /// Rough loop, strategy and recorder.
-pub struct Pump<'a> {
+pub struct SoftLoop<'a> {
     rough: RoughLoop,
     pub host: HostEnd,
     feed: Option<FeedRunner>,
@@ -103,7 +103,7 @@ pub struct Pump<'a> {
 /// Rough periods between two reports of what the policy did.
 const TOLD_EVERY: u32 = 32;
 
-impl<'a> Pump<'a> {
+impl<'a> SoftLoop<'a> {
     pub fn new(
         rough: RoughLoop,
         host: HostEnd,
@@ -112,7 +112,7 @@ impl<'a> Pump<'a> {
         monitor: Monitor,
         observer: &'a mut dyn RunObserver,
     ) -> Self {
-        let commands = CommandLog::new(Given::of(&host.controls));
+        let commands = CommandLog::new(OperatorInputs::of(&host.controls));
         Self {
             rough,
             host,
@@ -144,8 +144,8 @@ impl<'a> Pump<'a> {
         self.serve_policy();
         self.tell_plugin_log();
         self.tell_waits();
-        let (rough, mut both) = self.with_both();
-        if let Err(error) = rough.step(&mut both) {
+        let (rough, mut tee) = self.with_tee();
+        if let Err(error) = rough.step(&mut tee) {
             let words = error.with_planner(&self.planner);
             self.fail(words);
         }
@@ -155,15 +155,15 @@ impl<'a> Pump<'a> {
     }
 
     /// The rough loop, and who looks at what it does.
-    fn with_both(&mut self) -> (&mut RoughLoop, Both<'_>) {
+    fn with_tee(&mut self) -> (&mut RoughLoop, Tee<'_>) {
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
-        (&mut self.rough, Both { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing })
+        (&mut self.rough, Tee { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing })
     }
 
     /// Takes the rests that have been reported, where no rough period follows to do it: the machine may be over.
     pub fn take_rests(&mut self) {
-        let (rough, mut both) = self.with_both();
-        if let Err(error) = rough.take_rests(&mut both) {
+        let (rough, mut tee) = self.with_tee();
+        if let Err(error) = rough.take_rests(&mut tee) {
             let words = error.with_planner(&self.planner);
             self.fail(words);
         }
@@ -314,14 +314,14 @@ fn signals(feed: Option<&FeedRunner>, analog: &[usize], sample: &Sample) -> ([f6
     (signals, count)
 }
 
-struct Both<'a> {
+struct Tee<'a> {
     monitor: &'a mut Monitor,
     observer: &'a mut dyn RunObserver,
     aborted: &'a mut Option<Rest>,
     skips_homing: bool,
 }
 
-impl Observer for Both<'_> {
+impl Observer for Tee<'_> {
     fn block(&mut self, block: &Block, report: &BlockReport) {
         if self.skips_homing && block.line == 0 {
             return;

@@ -10,13 +10,13 @@ use tandem_machine::Machine;
 use tandem_rings::{Controls, Rest};
 use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, Planner};
 
-use super::{Jog, JogEnd, JogRest, Reach};
+use super::message::{Jog, JogEnd, JogRest, Reach};
 
 /// Steps that may wait behind the one that moves.
 const MOST_WAITING: usize = 16;
 
 /// The jogs of a machine. Keys, sockets and scripts share it; soft side, never waits for the fine loop.
-pub struct Jogs {
+pub struct JogController {
     machine: Machine,
     /// Fine periods without a beat after which a jog is let go.
     keep_alive_periods: u64,
@@ -49,7 +49,7 @@ struct Moving {
     end: AxisVector,
 }
 
-impl Jogs {
+impl JogController {
     /// Nothing asked yet; `judge` is a planner that only judges blocks.
     pub(super) fn new(machine: &Machine, judge: Box<dyn Planner>) -> Self {
         let inner = Inner {
