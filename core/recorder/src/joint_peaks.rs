@@ -5,8 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tandem_sdk::AxisVector;
 
-use crate::monitor::raise;
-
 /// What one joint did, as finite differences of the samples: the largest magnitudes. What it is called names its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -96,5 +94,12 @@ impl JointWatch {
             (joint.name.clone(), if joint.rotary { JointPeaks::rotary(peaks) } else { JointPeaks::linear(peaks) })
         });
         each.collect()
+    }
+}
+
+/// Raises every entry of `peak` to the magnitude of the entry of `now`, where that is a larger number.
+pub(crate) fn raise(peak: &mut AxisVector, now: &AxisVector) {
+    for (peak, now) in peak.0.iter_mut().zip(now.0) {
+        *peak = if now.abs() > *peak { now.abs() } else { *peak };
     }
 }

@@ -5,7 +5,7 @@ use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport};
 
 use crate::block_times::{BlockTimes, TimeGoesTo};
-use crate::joint_peaks::JointWatch;
+use crate::joint_peaks::{JointWatch, raise};
 use crate::path_watch::PathWatch;
 use crate::stops::StopWatch;
 use crate::worst::Worst;
@@ -123,12 +123,5 @@ impl Monitor {
         }
         self.position = sample.command;
         self.watch.sample(sample.block, &sample.command)
-    }
-}
-
-/// Raises every entry of `peak` to the magnitude of the entry of `now`, where that is a larger number.
-pub(crate) fn raise(peak: &mut AxisVector, now: &AxisVector) {
-    for (peak, now) in peak.0.iter_mut().zip(now.0) {
-        *peak = if now.abs() > *peak { now.abs() } else { *peak };
     }
 }

@@ -38,9 +38,9 @@ impl Drives {
     ///
     /// # Errors
     /// One is not there, refuses its options, or names a joint that is none; two pace the loop.
-    pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
+    pub fn of(machine: &Machine, registry: &Registry, joints: &JointSpace) -> Result<Self, HostError> {
         let all: Vec<UnopenedDriver> =
-            machine.drivers.iter().map(|choice| made(machine, registry, choice)).collect::<Result<_, _>>()?;
+            machine.drivers.iter().map(|choice| made(machine, registry, joints, choice)).collect::<Result<_, _>>()?;
         let mut entries = all.iter().map(entry);
         let first = entries.next().ok_or_else(|| refusal(machine, "drivers", "a machine has at least one driver"))?;
         let roster = Roster::new(first, entries.collect());
@@ -144,17 +144,22 @@ impl Drives {
 /// # Errors
 /// What refuses a run too.
 pub fn attached_driver(machine: &Machine, registry: &Registry) -> Result<(Box<dyn Driver>, Attached), HostError> {
-    let mut drives = Drives::of(machine, registry)?;
-    let attached = drives.open(machine, &JointSpace::of(machine, registry)?, false)?;
+    let joints = JointSpace::of(machine, registry)?;
+    let mut drives = Drives::of(machine, registry, &joints)?;
+    let attached = drives.open(machine, &joints, false)?;
     Ok((drives.into_driver(), attached))
 }
 
-fn made(machine: &Machine, registry: &Registry, choice: &DriverChoice) -> Result<UnopenedDriver, HostError> {
+fn made(
+    machine: &Machine,
+    registry: &Registry,
+    joints: &JointSpace,
+    choice: &DriverChoice,
+) -> Result<UnopenedDriver, HostError> {
     let section = choice.section();
     let driver = registry.driver(&choice.choice).map_err(|e| e.at(machine, &section))?;
     let share = match &choice.owns {
         Some(owned) => {
-            let joints = JointSpace::of(machine, registry)?;
             let names: Vec<_> = (0..joints.count()).map(|joint| joints.name(joint)).collect();
             let none = |name: String| {
                 let cause = format!("no joint is called \"{name}\"; the machine has {}", names.join(", "));

@@ -1,5 +1,7 @@
 //! A planner on a machine whose joints are not its axes.
 
+use std::sync::Arc;
+
 use tandem_machine::Machine;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, JointLanes, Planner, PlannerDescription,
@@ -22,12 +24,12 @@ pub struct CoupledJoints {
 impl CoupledJoints {
     /// `planner` as it is where the joints are the axes; else one that keeps their travel too, and carries their lanes. Host;
     /// allocates.
-    pub fn around(planner: Box<dyn Planner>, joints: JointSpace, machine: &Machine) -> Box<dyn Planner> {
+    pub fn around(planner: Box<dyn Planner>, joints: &Arc<JointSpace>, machine: &Machine) -> Box<dyn Planner> {
         if joints.are_axes() {
             return planner;
         }
         let lanes = joints.lanes();
-        Box::new(Self { planner, lanes, travel: Travel::new(joints, machine.axes), points: Vec::new() })
+        Box::new(Self { planner, lanes, travel: Travel::new(Arc::clone(joints), machine.axes), points: Vec::new() })
     }
 }
 

@@ -55,7 +55,8 @@ impl JointSpace {
                 fold::narrow(machine, &mut limits, axis, joint, (1.0, 0.0))?;
             }
             let this = Self { joints, map: Map::Axes, axes, are_own, limits, lanes: vec![] };
-            return this.check_health(machine);
+            this.check_health(machine)?;
+            return Ok(this);
         };
         let positions = positions(&machine.limits);
         let sound = linear::check(kinematics.as_ref(), joints.len(), axes, &positions);
@@ -69,7 +70,8 @@ impl JointSpace {
             let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
             Self { joints, map: Map::Curved(kinematics), axes, are_own, limits, lanes }
         };
-        this.check_health(machine)
+        this.check_health(machine)?;
+        Ok(this)
     }
 
     /// How many there are.
@@ -203,13 +205,9 @@ impl JointSpace {
         Some(JointWatch::new(self.joints.iter().map(watched).collect(), to_joints, fine_period_s))
     }
 
-    /// The map for the fine loop; none where the joints are the axes.
-    pub fn into_kinematics(self) -> Option<Box<dyn Kinematics>> {
-        match self.map {
-            Map::Axes => None,
-            Map::Linear(linear, _) => Some(Box::new(linear)),
-            Map::Curved(kinematics) => Some(kinematics),
-        }
+    /// The map for the fine loop, which asks the same plugin; none where the joints are the axes.
+    pub fn kinematics(this: &Arc<Self>) -> Option<Box<dyn Kinematics>> {
+        (!this.are_axes()).then(|| Box::new(SharedMap(Arc::clone(this))) as Box<dyn Kinematics>)
     }
 
     /// The joints that are sums of axes, as planners carry them.
@@ -228,10 +226,13 @@ impl JointSpace {
         moved.fold(0, |axes, (_, joint)| axes | of(joint))
     }
 
-    fn check_health(self, machine: &Machine) -> Result<Self, HostError> {
+    /// Whether the kinematics know the joints where the machine starts.
+    ///
+    /// # Errors
+    /// Why they do not.
+    pub fn check_health(&self, machine: &Machine) -> Result<(), HostError> {
         let at = self.to_joints(&machine.start);
-        self.health(&at).map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
-        Ok(self)
+        self.health(&at).map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))
     }
 
     /// Whether the machine starts within the travel of its joints: programs do.
@@ -247,5 +248,36 @@ impl JointSpace {
             }
         }
         Ok(())
+    }
+}
+
+/// The map of joints that are not the axes, for the fine loop: it says by itself in which call of a plugin it is.
+struct SharedMap(Arc<JointSpace>);
+
+impl SharedMap {
+    fn map(&self) -> Option<&dyn Kinematics> {
+        match &self.0.map {
+            Map::Axes => None,
+            Map::Linear(linear, _) => Some(linear),
+            Map::Curved(kinematics) => Some(kinematics.as_ref()),
+        }
+    }
+}
+
+impl Kinematics for SharedMap {
+    fn joint_count(&self, _axis_count: usize) -> usize {
+        self.0.count()
+    }
+
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        self.map().map_or(*axes, |map| map.to_joints(axes))
+    }
+
+    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        self.map().map_or(*joints, |map| map.to_axes(joints))
+    }
+
+    fn health(&self) -> Result<(), PluginError> {
+        self.map().map_or(Ok(()), Kinematics::health)
     }
 }

@@ -1,6 +1,7 @@
 //! Whether the joints stay within their travel along a block.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use tandem_motion::Path;
 use tandem_motion::nurbs::Nurbs;
@@ -14,12 +15,12 @@ const TRIED: u32 = 64;
 
 /// The travel of all joints.
 pub struct Travel {
-    space: JointSpace,
+    space: Arc<JointSpace>,
     axes: Axes,
 }
 
 impl Travel {
-    pub fn new(space: JointSpace, axes: Axes) -> Self {
+    pub fn new(space: Arc<JointSpace>, axes: Axes) -> Self {
         Self { space, axes }
     }
 

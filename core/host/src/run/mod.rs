@@ -142,7 +142,7 @@ impl Run {
         rough_config.awaits_drives = true;
         let exchange = Arc::new(ExchangeTimes::default());
         let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
-        let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics.into_kinematics());
+        let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics);
         fine.reset();
         Ok(Self {
             watch,

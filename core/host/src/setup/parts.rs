@@ -1,5 +1,7 @@
 //! From a machine to the parts of a run.
 
+use std::sync::Arc;
+
 use tandem_fine::{FineConfig, MissedLimits};
 use tandem_gcode::{Config, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
@@ -58,10 +60,11 @@ pub fn source(
     stream: Stream,
     switches: Switches,
     policy: Option<&PolicyHost>,
+    joints: &Arc<JointSpace>,
 ) -> Result<Box<dyn Source + Send>, HostError> {
     let mut source = program(machine, stream, switches);
     if let Some(policy) = policy {
-        source = Box::new(Tuned::new(source, Tuner::new(policy.clone(), planner(machine, registry)?)));
+        source = Box::new(Tuned::new(source, Tuner::new(policy.clone(), planner_on(machine, registry, joints)?)));
     }
     Ok(behind_homing(machine, source, switches))
 }
@@ -92,7 +95,15 @@ fn tool(tool: &tandem_machine::Tool) -> Tool {
 /// # Errors
 /// The planner is not there or refuses its options; or what is wrong with the joints.
 pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
-    let joints = JointSpace::of(machine, registry)?;
+    planner_on(machine, registry, &Arc::new(JointSpace::of(machine, registry)?))
+}
+
+/// The same on joints that are there.
+pub fn planner_on(
+    machine: &Machine,
+    registry: &Registry,
+    joints: &Arc<JointSpace>,
+) -> Result<Box<dyn Planner>, HostError> {
     let context = PlannerContext {
         size: size_of_contract::<PlannerContext>(),
         axes: machine.axes,

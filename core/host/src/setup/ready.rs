@@ -6,7 +6,7 @@ use tandem_faults::{Faults, Joints};
 use tandem_gcode::{CheckReport, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
-use tandem_sdk::{Block, Planner};
+use tandem_sdk::{Block, Kinematics, Planner};
 
 use crate::drives::Drives;
 use crate::error::{HostError, refusal};
@@ -37,8 +37,8 @@ pub struct Ready {
     pub claim: Claim,
     pub feed: Option<FeedRunner>,
     pub joints: Arc<JointSpace>,
-    /// The same once more, for the fine loop to own.
-    pub kinematics: JointSpace,
+    /// The map of the joints for the fine loop to own, where they are not the axes.
+    pub kinematics: Option<Box<dyn Kinematics>>,
     /// What the first pass found.
     pub checked: CheckReport,
     /// Entries of the ring of segments that hold the worst stop anywhere in the program.
@@ -48,9 +48,11 @@ pub struct Ready {
     pub records_drives: bool,
 }
 
-/// Planner and driver of a machine, as they are made for a run.
+/// Joints, planner and driver of a machine, as they are made for a run.
 pub struct Plugins {
     pub watch: Option<HangWatch>,
+    /// Made once: the planner and the policy keep the travel of these.
+    pub joints: Arc<JointSpace>,
     pub planner: Box<dyn Planner>,
     pub claim: Claim,
 }
@@ -62,32 +64,33 @@ impl Plugins {
     /// One of them is not there, or refuses its options.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
         let watch = HangWatch::of(machine);
-        let planner = parts::planner(machine, registry)?;
-        Ok(Self { watch, planner, claim: Claim::new(Drives::of(machine, registry)?) })
+        let joints = Arc::new(JointSpace::of(machine, registry)?);
+        let planner = parts::planner_on(machine, registry, &joints)?;
+        let claim = Claim::new(Drives::of(machine, registry, &joints)?);
+        Ok(Self { watch, joints, planner, claim })
     }
 
     /// Whether they go with each other, and with what is asked of them.
     ///
     /// # Errors
     /// What does not go together, with its place in the machine file.
-    pub fn check(&self, machine: &Machine, registry: &Registry, switches: Switches) -> Result<(), HostError> {
-        let (joints, drivers) = (JointSpace::of(machine, registry)?, self.claim.roster());
+    pub fn check(&self, machine: &Machine, switches: Switches) -> Result<(), HostError> {
+        let (joints, drivers) = (&self.joints, self.claim.roster());
         rules::check(machine, &self.planner.describe(), &drivers)?;
-        rules::check_homing(machine, &joints, switches)?;
+        rules::check_homing(machine, joints, switches)?;
         // A driver that has panicked says so here, and of what it is nothing is known.
-        self.claim.check(machine, &joints)?;
+        self.claim.check(machine, joints)?;
         rules::check_times(machine, &drivers)?;
-        rules::check_real(machine, &joints, &drivers, switches.clock)
+        rules::check_real(machine, joints, &drivers, switches.clock)
     }
 
     /// Puts the machine's faults around the driver.
     ///
     /// # Errors
     /// What `[faults]` says wrongly.
-    pub fn add_faults(&mut self, machine: &Machine, registry: &Registry) -> Result<(), HostError> {
+    pub fn add_faults(&mut self, machine: &Machine) -> Result<(), HostError> {
         let Some(table) = &machine.faults else { return Ok(()) };
-        let joints = JointSpace::of(machine, registry)?;
-        let joints = Joints { rotary: joints.rotary(), count: joints.count() };
+        let joints = Joints { rotary: self.joints.rotary(), count: self.joints.count() };
         let faults = Faults::read(table, &joints).map_err(|wrong| refusal(machine, &wrong.key, wrong.cause))?;
         self.claim.add_faults(faults);
         Ok(())
@@ -103,15 +106,15 @@ impl Plugins {
         registry: &Registry,
         switches: Switches,
     ) -> Result<(Machine, Self), HostError> {
-        let joints = JointSpace::of(&machine, registry)?;
-        let stands = self.claim.attach(&machine, &joints, switches)?;
+        let stands = self.claim.attach(&machine, &self.joints, switches)?;
         if stands != machine.start {
             machine.start = stands;
             // Who is outside of the travel is led back by hand; before homing nobody knows who is.
             if !switches.unhomed && switches.home.is_none() {
-                joints.check_start(&machine)?;
+                self.joints.check_start(&machine)?;
             }
-            self.planner = parts::planner(&machine, registry)?;
+            self.joints.check_health(&machine)?;
+            self.planner = parts::planner_on(&machine, registry, &self.joints)?;
         }
         Ok((machine, self))
     }
@@ -131,18 +134,18 @@ impl Ready {
         claims: bool,
     ) -> Result<Self, HostError> {
         let mut plugins = Plugins::of(&machine, registry)?;
-        JointSpace::of(&machine, registry)?.check_start(&machine)?;
+        plugins.joints.check_start(&machine)?;
         // Only real drives know where a program on them begins.
         let asks_first = claims && plugins.claim.describe().simulated == 0;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let mut passed = (!asks_first).then(|| Passed::of(&machine, registry, &plugins, &mut program, switches));
+        let mut passed = (!asks_first).then(|| Passed::of(&machine, &plugins, &mut program, switches));
         if let Some(Err(refused)) = passed {
             return Err(refused);
         }
-        plugins.check(&machine, registry, switches)?;
-        plugins.add_faults(&machine, registry)?;
+        plugins.check(&machine, switches)?;
+        plugins.add_faults(&machine)?;
         let policy = PolicyHost::open(&machine)?;
-        feed(&machine, registry, policy.as_ref(), 0.0)?;
+        feed(&machine, registry, &plugins.joints, policy.as_ref(), 0.0)?;
         if claims {
             let start = machine.start;
             (machine, plugins) = plugins.attach(machine, registry, switches)?;
@@ -150,11 +153,11 @@ impl Ready {
         }
         let passed = match passed {
             Some(passed) => passed?,
-            None => Passed::of(&machine, registry, &plugins, &mut program, switches)?,
+            None => Passed::of(&machine, &plugins, &mut program, switches)?,
         };
         let name = program.name().to_string();
         let stream = Stream::new(program, &parts::interpreter_config(&machine, switches))?;
-        let source = parts::source(&machine, registry, stream, switches, policy.as_ref())?;
+        let source = parts::source(&machine, registry, stream, switches, policy.as_ref(), &plugins.joints)?;
         let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
         Ok(Self { entries: passed.entries, ..ready })
     }
@@ -173,11 +176,11 @@ impl Ready {
     ) -> Result<Self, HostError> {
         let mut plugins = Plugins::of(&machine, registry)?;
         if !switches.unhomed {
-            JointSpace::of(&machine, registry)?.check_start(&machine)?;
+            plugins.joints.check_start(&machine)?;
         }
-        plugins.check(&machine, registry, switches)?;
-        plugins.add_faults(&machine, registry)?;
-        feed(&machine, registry, None, 0.0)?;
+        plugins.check(&machine, switches)?;
+        plugins.add_faults(&machine)?;
+        feed(&machine, registry, &plugins.joints, None, 0.0)?;
         let (machine, plugins) = plugins.attach(machine, registry, switches)?;
         let source = source(&machine);
         Self::new(machine, registry, name, source, None, plugins, CheckReport::default(), switches)
@@ -195,10 +198,10 @@ impl Ready {
         checked: CheckReport,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let feed = feed(&machine, registry, policy.as_ref(), checked.length_mm)?;
+        let feed = feed(&machine, registry, &plugins.joints, policy.as_ref(), checked.length_mm)?;
         Ok(Self {
-            joints: Arc::new(JointSpace::of(&machine, registry)?),
-            kinematics: JointSpace::of(&machine, registry)?,
+            kinematics: JointSpace::kinematics(&plugins.joints),
+            joints: plugins.joints,
             records_drives: program.is_none(),
             program: program.unwrap_or_else(|| HOMING.to_string()),
             watch: plugins.watch,
@@ -224,15 +227,8 @@ struct Passed {
 
 impl Passed {
     /// The whole program through the interpreter and the planner.
-    fn of(
-        machine: &Machine,
-        registry: &Registry,
-        plugins: &Plugins,
-        program: &mut Program,
-        switches: Switches,
-    ) -> Result<Self, HostError> {
-        let joints = JointSpace::of(machine, registry)?;
-        let depth_s = parts::queue_depth_s(machine, &joints, plugins.planner.describe().order);
+    fn of(machine: &Machine, plugins: &Plugins, program: &mut Program, switches: Switches) -> Result<Self, HostError> {
+        let depth_s = parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
         let mut density = Density::new(machine, depth_s);
         let report = first_pass(machine, plugins.planner.as_ref(), program, switches, &mut density)?;
         if report.is_ok() {
@@ -247,10 +243,11 @@ impl Passed {
 fn feed(
     machine: &Machine,
     registry: &Registry,
+    joints: &JointSpace,
     policy: Option<&PolicyHost>,
     length_mm: f64,
 ) -> Result<Option<FeedRunner>, HostError> {
-    let feed = parts::feed(machine, registry, &JointSpace::of(machine, registry)?, policy, length_mm)?;
+    let feed = parts::feed(machine, registry, joints, policy, length_mm)?;
     rules::check_signals(machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
     Ok(feed)
 }
