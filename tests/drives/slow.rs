@@ -32,8 +32,8 @@ fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
     assert!(bus.exchanges > 200, "two seconds of motion: {}", bus.exchanges);
     assert!((2..=6).contains(&line.exchanges), "{} answers", line.exchanges);
     assert!(line.turned, "it was told to turn");
-    let exchange = summary.exchange_us.unwrap();
-    assert!(exchange.max < 150_000.0, "an answer takes 200 ms: {exchange:?}");
+    // Twenty fine periods lie between two of its answers, and none of them was waited through.
+    assert!(bus.exchanges >= 20 * line.exchanges, "{} exchanges beside {} answers", bus.exchanges, line.exchanges);
     let fault = summary.fault.unwrap();
     assert!(fault.contains("its device does not answer"), "it cannot be let go of: {fault}");
 }
