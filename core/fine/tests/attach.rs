@@ -8,14 +8,19 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use demanding::{Bench, FAULT_CODE, Script, config};
+use rtrb::RingBuffer;
 use tandem_fine::{FaultKind, FineConfig};
 use tandem_rig::Random;
 use tandem_rings::{MachineState, RestCause};
-use tandem_sdk::{Arm, Attached, AxisVector, Edge, EventKind, Feedback, JointState, MAX_AXES, Setpoint, StopOn};
+use tandem_sdk::{
+    Arm, Attached, AxisVector, Edge, EventKind, Feedback, JointState, Kinematics, MAX_AXES, Setpoint, StopOn,
+};
 
 /// One increment of the encoders, mm.
 const COUNT_MM: f64 = 1e-3;
 const JOINTS: usize = 3;
+/// Reports of rests that nobody has taken, at most.
+const MOST_RESTS: usize = 8;
 
 /// Three joints with so many periods to be enabled in.
 fn three(script: Script, enable_periods: u64) -> Bench {
@@ -292,4 +297,120 @@ fn drives_whose_line_is_cut_are_not_waited_for() {
         bench.ticks(2);
         assert!(bench.fine.is_over(), "{ticks}: nothing is known of brakes");
     }
+}
+
+/// The second axis has two joints.
+struct Gantry;
+
+impl Kinematics for Gantry {
+    fn joint_count(&self, axis_count: usize) -> usize {
+        axis_count + 1
+    }
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        AxisVector::from_slice(&[axes[0], axes[1], axes[1]])
+    }
+    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        AxisVector::from_slice(&[joints[0], joints[1]])
+    }
+}
+
+#[test]
+fn a_gantry_keeps_its_skew_from_one_reset_to_the_next() {
+    let mut random = Random::new(21);
+    let mut skewed = || {
+        let (y, skew) = (random.between(-900.0, 900.0), random.between(-0.9, 0.9));
+        AxisVector::from_slice(&[random.between(-900.0, 900.0), y, y + skew])
+    };
+    let mut position = skewed();
+    let script = Script { position, ..Script::new(JOINTS) };
+    let mut bench = Bench::with(&config(JOINTS - 1), script, Some(Box::new(Gantry)));
+    for round in 0..40 {
+        attach(&mut bench, 20).unwrap_or_else(|| panic!("round {round}: {:?}", bench.fault()));
+        bench.queue(1, 0.1, 0.0, StopOn::default());
+        bench.ticks(250);
+        assert_eq!(bench.fault(), None, "round {round}");
+        let gone = bench.script().position - position;
+        assert!(gone[0] == 0.0 && (gone[1] - 5.0).abs() < 1e-9 && (gone[2] - 5.0).abs() < 1e-9, "{round}: {gone:?}");
+        bench.assert_bumpless(COUNT_MM);
+        bench.script().fault = Some(2);
+        bench.ticks(20);
+        // Somebody moves the axes by hand while the drives are off.
+        position = skewed();
+        bench.script().move_to(position);
+        bench.script().told.clear();
+        while bench.rough.rests.pop().is_ok() {}
+        while bench.host.samples.pop().is_ok() {}
+        bench.fine.reset();
+    }
+}
+
+/// What stops the machine in the period of the reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cut {
+    EmergencyStop,
+    Abort,
+    Line,
+    Nonsense,
+}
+
+#[test]
+fn a_reset_is_sent_for_one_period_whatever_comes_in_it() {
+    for seed in 1..=80 {
+        let mut random = Random::new(seed);
+        let cut = random.pick(&[Cut::EmergencyStop, Cut::Abort, Cut::Line, Cut::Nonsense]);
+        let script = Script {
+            position: somewhere(&mut random),
+            reset_takes: random.below(30),
+            brake_for: [random.below(10); MAX_AXES],
+            ..Script::new(JOINTS)
+        };
+        let mut bench = three(script, 500);
+        attach(&mut bench, 10).unwrap();
+        bench.script().fault = Some(random.below(JOINTS as u64) as usize);
+        bench.ticks(20);
+        assert_eq!((bench.script().resets, bench.fine.is_over()), (0, true));
+        bench.fine.reset();
+        bench.script().told.clear();
+        let controls = Arc::clone(&bench.host.controls);
+        // In the period that tells the drives, or while they are at it.
+        bench.ticks(random.below(3));
+        match cut {
+            Cut::EmergencyStop => controls.emergency_stop.store(true, Relaxed),
+            Cut::Abort => controls.abort.store(true, Relaxed),
+            Cut::Line => bench.script().cut = true,
+            Cut::Nonsense => bench.script().position[1] = f64::NAN,
+        }
+        bench.ticks(40);
+        let resets: Vec<_> = bench.script().told.iter().map(|(told, _)| told.reset).collect();
+        assert_eq!(resets.iter().sum::<u32>(), 1, "seed {seed}, {cut:?}: {resets:?}");
+        assert_eq!(resets[0], 1, "seed {seed}, {cut:?}");
+    }
+}
+
+/// The reports of rests are all waiting to be taken when the operator aborts: the first one is taken while the joints come to hold.
+#[test]
+fn an_abort_that_finds_no_room_for_its_report_acts_when_the_joints_hold() {
+    let mut bench = three(Script { enable_after: [9; MAX_AXES], ..Script::new(JOINTS) }, 500);
+    attach(&mut bench, 20).unwrap();
+    let controls = Arc::clone(&bench.host.controls);
+    while bench.rough.rests.slots() < MOST_RESTS {
+        controls.abort.store(true, Relaxed);
+        bench.ticks(1);
+    }
+    bench.script().fault = Some(0);
+    bench.ticks(20);
+    bench.fine.reset();
+    // The period of the reset and nine more: all hold behind the next exchange.
+    bench.ticks(10);
+    assert!(bench.fine.is_attaching());
+    let (_, nobody) = RingBuffer::new(1);
+    bench.script().rests = Some(std::mem::replace(&mut bench.rough.rests, nobody));
+    controls.abort.store(true, Relaxed);
+    bench.ticks(1);
+    assert!(!bench.fine.is_attaching() && controls.abort.load(Relaxed), "it is still to act");
+    let taken = bench.script().rests.take().unwrap();
+    bench.rough.rests = taken;
+    bench.ticks(2);
+    let causes: Vec<_> = std::iter::from_fn(|| bench.rough.rests.pop().ok()).map(|rest| rest.cause).collect();
+    assert_eq!((causes, controls.abort.load(Relaxed)), (vec![RestCause::Attached, RestCause::Abort], false));
 }

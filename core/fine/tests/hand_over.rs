@@ -174,3 +174,56 @@ fn what_the_host_has_called_the_axis_before_is_forgotten() {
     assert_eq!(bench.rest(300).expect("homed").position[HOMED], homed_at_mm);
     assert_bumpless(&bench);
 }
+
+/// Where a joint was when its drive was last heard is not where it is homed, nor where it is taken back.
+#[test]
+fn a_joint_is_taken_back_by_nothing_that_is_old() {
+    for seed in 1..=60 {
+        let mut random = Random::new(seed);
+        let mut bench = unhomed(&mut random);
+        // Were it homed before, nobody could tell an old homing from a new one that was not seen to begin.
+        bench.script().was_homed = 0;
+        bench.ticks(1);
+        hand_over(&mut bench, 10.0);
+        let (aborts, late) = (random.below(2) == 1, 1 + random.below(5) as u32);
+        if aborts {
+            bench.script().never_homes = true;
+            bench.ticks(20 + random.below(50));
+            bench.host.controls.abort.store(true, Relaxed);
+        }
+        bench.script().late = late;
+        // Until the drive is through with it, and for some time more.
+        assert_eq!(bench.rest(250), None, "seed {seed}: nothing new was heard of the joint");
+        bench.script().late = 0;
+        let rest = bench.rest(20).unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
+        let at_mm = bench.script().position[HOMED];
+        let cause = if aborts { RestCause::Abort } else { RestCause::Corrected };
+        assert_eq!((rest.cause, rest.position[HOMED], bench.fault()), (cause, at_mm, None), "seed {seed}");
+    }
+}
+
+/// A frame that was under way since before an older homing says that the joint is not homed: that does not make the older
+/// homing the one that was asked for.
+#[test]
+fn an_old_frame_does_not_make_an_older_homing_a_new_one() {
+    for seed in 1..=20 {
+        let mut random = Random::new(seed);
+        let mut bench = unhomed(&mut random);
+        let mut script = bench.script();
+        (script.was_homed, script.homing_lag) = (1 << HOMED, 30);
+        drop(script);
+        bench.ticks(1);
+        hand_over(&mut bench, 10.0);
+        bench.ticks(3 + random.below(10));
+        let mut script = bench.script();
+        (script.was_homed, script.late) = (0, 3);
+        drop(script);
+        bench.ticks(1 + random.below(5));
+        let mut script = bench.script();
+        (script.was_homed, script.late) = (1 << HOMED, 0);
+        drop(script);
+        let rest = bench.rest(400).unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
+        let homed_at_mm = bench.script().homed_at_mm;
+        assert_eq!((rest.cause, rest.position[HOMED]), (RestCause::Corrected, homed_at_mm), "seed {seed}");
+    }
+}

@@ -96,6 +96,7 @@ impl Machine {
             Script { behind, homing_takes: u64::MAX, position: somewhere(&mut random, joints), ..Script::new(joints) };
         // What the drives say of their states is as late as what they say of their places.
         script.enable_after = std::array::from_fn(|_| 2 + behind as u64 + random.below(30));
+        script.reset_takes = random.below(12);
         script.brake_for = std::array::from_fn(|_| random.below(20));
         let attached = Attached { delay_periods: [behind as u32; MAX_AXES], ..Attached::default() };
         let plain = FineConfig { period_s, attached, ..config(joints) };
@@ -256,8 +257,12 @@ impl Machine {
     /// One round: what works, faults in the phase, and is reset.
     fn round(&mut self, round: u64, phase: Phase, joint: usize) {
         if phase == Phase::Enabling {
-            let first = *self.bench.script().enable_after[..self.joints].iter().min().unwrap_or(&1);
-            self.bench.ticks(1 + self.random.below(first));
+            let script = self.bench.script();
+            // Until the drives are reset their fault is what the reset is for.
+            let reset = if round > 0 { script.reset_takes + 1 } else { 0 };
+            let first = script.enable_after[..self.joints].iter().min().copied().unwrap_or(1);
+            drop(script);
+            self.bench.ticks(reset + 1 + self.random.below(first));
             assert!(self.bench.fine.is_attaching(), "{}", self.round);
         } else {
             self.attach();

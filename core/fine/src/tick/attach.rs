@@ -26,6 +26,8 @@ enum Stage {
 #[derive(Debug)]
 pub(super) struct Attach {
     stage: Stage,
+    /// The drives have been told to reset, which they are for one period, whatever comes in it.
+    told: bool,
     /// Fine periods of this stage and those before it.
     periods: u64,
     /// Bit per joint that holds: what it is told stays as it is.
@@ -38,12 +40,12 @@ impl Attach {
     /// Joints where the driver says they stand.
     pub(super) fn new(config: &FineConfig) -> Self {
         let stage = if config.reset_drives { Stage::Resetting } else { Stage::Enabling };
-        Self { stage, periods: 0, held: 0, joints: config.attached.position }
+        Self { stage, told: false, periods: 0, held: 0, joints: config.attached.position }
     }
 
     /// Once more, from where the joints stand now.
     pub(super) fn again(joints: AxisVector) -> Self {
-        Self { stage: Stage::Resetting, periods: 0, held: 0, joints }
+        Self { stage: Stage::Resetting, told: false, periods: 0, held: 0, joints }
     }
 
     /// Whether all joints hold.
@@ -58,7 +60,8 @@ impl FineLoop {
         let may_hold = self.fault.is_none() && !self.is_letting_go() && self.may_enable();
         let enables = self.attach.stage == Stage::Enabling && may_hold;
         self.setpoint.enable = u32::from(enables);
-        self.setpoint.reset = u32::from(self.attach.stage == Stage::Resetting && self.attach.periods == 0);
+        self.setpoint.reset = u32::from(self.attach.stage == Stage::Resetting && !self.attach.told);
+        self.attach.told = true;
         self.attach.joints
     }
 

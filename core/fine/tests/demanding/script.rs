@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
+use rtrb::Consumer;
+use tandem_rings::Rest;
 use tandem_sdk::{
     Attached, AxisVector, Driver, DriverContext, DriverDescription, Edge, Feedback, JointState, Latch, MAX_AXES,
     PluginError, Setpoint,
@@ -39,6 +41,8 @@ pub struct Script {
     pub age: u32,
     /// Periods by which the positions that are reported are behind.
     pub behind: usize,
+    /// Periods by which they are older still from now on, and are said to be: what else is reported is new.
+    pub late: u32,
     pub inputs: u64,
     pub input_age: [u16; 64],
     /// Exchanges that the spindle needs to turn.
@@ -70,6 +74,8 @@ pub struct Script {
     /// Every setpoint, with the feedback that was known before it.
     pub told: Vec<(Setpoint, Feedback)>,
     pub resets: u32,
+    /// The soft side takes the reports of rests while the exchanges go on.
+    pub rests: Option<Consumer<Rest>>,
 }
 
 impl Script {
@@ -88,6 +94,7 @@ impl Script {
             phase_ns: None,
             age: 0,
             behind: 0,
+            late: 0,
             inputs: 0,
             input_age: [0; 64],
             spin_up: 0,
@@ -108,6 +115,7 @@ impl Script {
             been: vec![],
             told: vec![],
             resets: 0,
+            rests: None,
         }
     }
 
@@ -213,6 +221,9 @@ impl Driver for Drives {
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         let mut script = self.0.lock().unwrap();
         script.told.push((*setpoint, *feedback));
+        if let Some(rests) = &mut script.rests {
+            while rests.pop().is_ok() {}
+        }
         if script.cut {
             return Err(PluginError::fixed("the line is cut"));
         }
@@ -229,14 +240,15 @@ impl Driver for Drives {
         feedback.homed = script.homed | script.was_homed;
         let position = script.position;
         script.been.push(position);
-        let known = script.been[script.been.len().saturating_sub(1 + script.behind)];
+        let behind = script.behind + script.late as usize;
+        let known = script.been[script.been.len().saturating_sub(1 + behind)];
         feedback.position = known - AxisVector([script.droop_mm; MAX_AXES]);
         (feedback.inputs, feedback.input_age_periods) = (script.inputs, script.input_age);
         feedback.latches[0] = script.latch(setpoint);
         let turns = setpoint.spindle_rad_per_s == 0.0 || script.spun_for > script.spin_up;
         feedback.spindle_at_speed = u32::from(turns);
         (feedback.has_phase, feedback.phase_ns) = (u32::from(script.phase_ns.is_some()), script.phase_ns.unwrap_or(5));
-        feedback.age_periods = [0; MAX_AXES];
+        feedback.age_periods = [script.late; MAX_AXES];
         Ok(())
     }
     fn quick_stop(&mut self) {}
