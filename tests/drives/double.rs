@@ -75,6 +75,21 @@ struct Plan {
     /// A fault stands when it starts, until it is reset.
     #[serde(default)]
     faulty: bool,
+    /// One exchange in mid-program takes so long, ms: the first in which the joints `rest`, or the first in which they move.
+    #[serde(default)]
+    stall_ms: u64,
+    #[serde(default)]
+    stalls_at_rest: bool,
+    /// It measures what [`measured`] says.
+    #[serde(default)]
+    measures: bool,
+}
+
+/// Inputs that a driver measures, and what it says of them in the fine period `tick`, in its own numbers: their levels, the age
+/// of each, an analog value, and the age of its first joint.
+pub const MEASURED_INPUTS: usize = 3;
+pub fn measured(tick: u64) -> (u64, [u16; MEASURED_INPUTS], f64, u32) {
+    (tick & 7, std::array::from_fn(|input| ((tick + input as u64) % 3) as u16), 0.5 * tick as f64, (tick % 4) as u32)
 }
 
 pub struct Double {
@@ -83,6 +98,7 @@ pub struct Double {
     position: AxisVector,
     faulty: bool,
     last: Option<AxisVector>,
+    has_stalled: bool,
 }
 
 /// The driver as a plugin.
@@ -94,7 +110,16 @@ impl Double {
     fn made(options: &RawOptions) -> Result<Self, PluginError> {
         let plan: Plan = parse_options(&options.0)?;
         let faulty = plan.faulty;
-        Ok(Self { plan, joints: 0, position: AxisVector::ZERO, faulty, last: None })
+        Ok(Self { plan, joints: 0, position: AxisVector::ZERO, faulty, last: None, has_stalled: false })
+    }
+
+    /// Stays away once, where it is to.
+    fn stall(&mut self, setpoint: &Setpoint) {
+        let rests = setpoint.velocity == AxisVector::ZERO;
+        if self.plan.stall_ms > 0 && !self.has_stalled && setpoint.tick > 0 && rests == self.plan.stalls_at_rest {
+            self.has_stalled = true;
+            thread::sleep(Duration::from_millis(self.plan.stall_ms));
+        }
     }
 
     fn note(&self, what: impl FnOnce(&mut Log)) {
@@ -160,6 +185,7 @@ impl Driver for Double {
         if takes_ms > 0 {
             thread::sleep(Duration::from_millis(takes_ms));
         }
+        self.stall(setpoint);
         self.faulty &= setpoint.reset == 0;
         if setpoint.enable != 0 && !self.plan.never_enables {
             self.position = setpoint.position;
@@ -181,6 +207,11 @@ impl Driver for Double {
         feedback.follow(setpoint, self.joints);
         feedback.position = self.position;
         (feedback.has_phase, feedback.phase_ns) = (u32::from(self.plan.phase), 0);
+        if self.plan.measures {
+            let (inputs, ages, analog, age) = measured(setpoint.tick);
+            (feedback.inputs, feedback.analog[0], feedback.age_periods[0]) = (inputs, analog, age);
+            feedback.input_age_periods[..MEASURED_INPUTS].copy_from_slice(&ages);
+        }
         if self.plan.never_enables {
             feedback.state[..self.joints].fill(JointState::Enabling);
         }

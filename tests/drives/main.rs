@@ -5,6 +5,8 @@
 #[path = "../counting_allocator.rs"]
 mod counting_allocator;
 mod double;
+mod keeper;
+mod measures;
 mod real;
 mod several;
 mod slow;

@@ -2,7 +2,7 @@
 
 use tandem_estimate::{Choice, estimate};
 use tandem_gcode::Program;
-use tandem_host::{Clock, Run, Switches, check_program, with_stand_ins};
+use tandem_host::{Clock, Run, Summary, Switches, check_program, with_stand_ins};
 
 use crate::double::log;
 use crate::{SQUARE, machine, program, registry, try_machine};
@@ -208,4 +208,37 @@ fn several_drivers_leave_no_joint_without_one() {
         refused.contains("axes.a: no driver has joint a: it is in no list of [drivers.*], which are bus"),
         "{refused}"
     );
+}
+
+/// A stall of two seconds, where half of one in a row is too much: no computer stalls so long by itself.
+fn stalled(name: &str, plan: &str) -> (Summary, String) {
+    let loops = "[loops]\nmax_missed_periods = 500\nmax_missed_share = 1\n";
+    let text = real(name, &format!(", stall_ms = 2000{plan}")) + loops;
+    let dwells = program("G21 G90 G94 F6000\nG1 X1\nG4 P0.2\nG1 X2\nM2\n");
+    let run = Run::prepare(machine(&text), &registry(), dwells, Switches::default()).unwrap();
+    let summary = run.drive(Clock::Wall, &[], &mut ()).unwrap().summary;
+    let told = summary.warnings().concat();
+    (summary, told)
+}
+
+/// Everything at rest was the fault "the drives saw a step", which nobody saw.
+#[test]
+fn periods_that_are_missed_while_real_drives_rest_are_counted_and_told_and_no_fault() {
+    let (summary, told) = stalled("stalls-at-rest", ", stalls_at_rest = true");
+    assert_eq!((summary.fault, log("stalls-at-rest").positions[0]), (None, 2.0));
+    assert!(summary.missed_periods >= 1999, "a period is a millisecond: {}", summary.missed_periods);
+    assert!(summary.missed_in_motion <= summary.missed_periods - 1999, "{} in motion", summary.missed_in_motion);
+    let words = format!("{} fine periods went by without a sample", summary.missed_periods);
+    assert!(told.starts_with(&words) && told.contains("the driver's exchange took longer than the period"), "{told}");
+}
+
+#[test]
+fn periods_that_are_missed_while_real_drives_move_are_a_fault_that_names_its_key_and_its_cause() {
+    let (summary, told) = stalled("stalls-in-motion", "");
+    let fault = summary.fault.unwrap();
+    assert!(fault.contains("fine periods in a row") && fault.contains("max_missed_periods"), "{fault}");
+    assert!(fault.contains("the driver's exchange took longer than the period of 1 ms"), "{fault}");
+    assert!(summary.missed_in_motion >= 1999, "{}", summary.missed_in_motion);
+    assert!(told.contains("of them in motion"), "{told}");
+    assert!(log("stalls-in-motion").positions[0] < 1.0, "it came to rest in the first move");
 }

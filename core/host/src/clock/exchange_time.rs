@@ -27,17 +27,18 @@ impl ExchangeTimes {
     }
 }
 
-/// A driver, measured.
+/// A driver with its drives claimed, measured. Where a run ends before it has begun, and nobody stops it, it is stopped.
 pub struct Timed {
     driver: Box<dyn Driver>,
     times: Arc<ExchangeTimes>,
     period_ns: u64,
+    is_stopped: bool,
 }
 
 impl Timed {
     /// `driver`, whose exchange has `fine_period_s`.
     pub fn new(driver: Box<dyn Driver>, fine_period_s: f64, times: Arc<ExchangeTimes>) -> Self {
-        Self { driver, times, period_ns: (fine_period_s * 1e9).round() as u64 }
+        Self { driver, times, period_ns: (fine_period_s * 1e9).round() as u64, is_stopped: false }
     }
 }
 
@@ -55,6 +56,7 @@ impl Driver for Timed {
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
+        self.is_stopped = false;
         self.driver.start()
     }
 
@@ -79,10 +81,20 @@ impl Driver for Timed {
     }
 
     fn stop(&mut self) -> Result<(), PluginError> {
+        self.is_stopped = true;
         self.driver.stop()
     }
 
     fn explain(&self, joint: u32, code: u32) -> Words {
         self.driver.explain(joint, code)
+    }
+}
+
+impl Drop for Timed {
+    fn drop(&mut self) {
+        if !self.is_stopped {
+            // What ended the run is told; that the drives could not be let go of either would hide it.
+            let _ = self.driver.stop();
+        }
     }
 }
