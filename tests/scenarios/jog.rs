@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::path::Path;
 use std::process::{ChildStdin, Command, Stdio};
-use std::time::Duration;
 
 use serde_json::Value;
 use tandem_oracle::{Check, Machine, Options, Trace, judge};

@@ -195,7 +195,8 @@ fn a_client_takes_back_the_fault_that_a_session_stands_in() {
     assert!(client.hear()["ended"]["fault"].is_string());
     while !client.hear().is_null() {}
     let mut client = session.connect();
-    writeln!(typed, "G1 X0 F6000").unwrap();
+    writeln!(typed, "G1 X200 F600").unwrap();
     client.wait("it moves again", is_moving);
+    client.command("abort");
     drop(typed);
 }
