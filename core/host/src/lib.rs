@@ -1,7 +1,20 @@
-//! The host: plugins by name, both loops on a clock, what they did as numbers.
+//! The host: plugins by name, joints, both loops on a clock, and what they did as numbers.
 //!
 //! [`Run::prepare`] reads nothing but the machine and the program, checks the whole program, and refuses before
-//! anything moves. [`Run::virtual_clock`] and [`Run::wall_clock`] drive the same two loops.
+//! anything moves. [`Run::drive`] hands the two loops to a clock.
+//!
+//! The modules, each of which needs only those before it:
+//!
+//! 1. `error`, `switches`: why a run does not start, and what it is asked for
+//! 2. `plugins`: the registry, libraries, the log that plugins write to, and a watch over calls that do not come back
+//! 3. `joints`: what the drives move, their limits and their travel
+//! 4. `drives`: the drivers of a machine as the one that the fine loop calls
+//! 5. `messages`: faults, drives, inputs and the spindle in words
+//! 6. `policy`: the policy script
+//! 7. `soft`: the soft loop with commands, feed strategy and observer
+//! 8. `clock`: lockstep, and real time
+//! 9. `setup`: from a machine and a program to everything that a run needs
+//! 10. `run`: one run
 
 mod clock;
 #[cfg(test)]
