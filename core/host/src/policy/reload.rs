@@ -118,6 +118,8 @@ fn look(host: &PolicyHost, asked: &Receiver<()>, found: &Sender<Candidate>) {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use tandem_machine::Machine;
 
@@ -145,7 +147,7 @@ mod tests {
         let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let set = ("policy.script".to_string(), file.display().to_string());
         let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap()).unwrap().unwrap();
-        let mut reloader = host.reloader();
+        let mut reloader = Reloader::new(host.clone());
         reloader.watch().unwrap();
         std::fs::write(&file, "no module").unwrap();
         let refused = until(&reloader, |summary| summary.refused_reloads > 0);
