@@ -2,7 +2,8 @@
 
 use tandem_estimate::{Choice, estimate};
 use tandem_gcode::Program;
-use tandem_host::{Clock, Run, Summary, Switches, check_program, with_stand_ins};
+use tandem_host::{Clock, Run, Switches, check_program, with_stand_ins};
+use tandem_recorder::Summary;
 
 use crate::double::log;
 use crate::{SQUARE, machine, program, registry, try_machine};
