@@ -5,24 +5,41 @@ use tandem_sdk::{AxisVector, Feedback, JointState, MAX_AXES};
 use crate::fault::FaultKind;
 use crate::history::History;
 
-/// The numbers of an answer that go on to strategies and trace.
+/// The numbers of an answer that go on to strategies and trace, but the positions, which the history keeps.
 pub struct Numbers {
-    joints: [AxisVector; 3],
+    joints: [AxisVector; 2],
     spindle: [f64; 2],
 }
 
 impl Numbers {
     /// Those of `feedback`. Fine loop; does not allocate.
+    #[inline]
     pub fn of(feedback: &Feedback) -> Self {
         Self {
-            joints: [feedback.position, feedback.speed, feedback.current_a],
+            joints: [feedback.speed, feedback.current_a],
             spindle: [feedback.spindle_rad_per_s, feedback.spindle_angle_rad],
         }
     }
 
-    /// Puts these in the place of what is no finite number in `feedback`, so that nothing downstream computes with it;
-    /// gives the fault that it is. Fine loop; does not allocate.
-    pub fn replace_wrong_ones(&self, feedback: &mut Feedback, joints: usize) -> Option<FaultKind> {
+    /// Puts these, and the last `position`, in the place of what is no finite number in `feedback`, so that nothing downstream
+    /// computes with it; gives the fault that it is. Fine loop; does not allocate.
+    #[inline]
+    pub fn replace_wrong_ones(
+        &self,
+        feedback: &mut Feedback,
+        position: &AxisVector,
+        joints: usize,
+    ) -> Option<FaultKind> {
+        // What is true nearly always is looked at first: a sum is finite only where all of it is.
+        let lanes = feedback.position.0.iter().zip(&feedback.speed.0).zip(&feedback.current_a.0).take(joints);
+        let sum =
+            lanes.fold(feedback.spindle_rad_per_s + feedback.spindle_angle_rad, |sum, ((p, s), c)| sum + p + s + c);
+        if sum.is_finite() { None } else { self.replace(feedback, position, joints) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn replace(&self, feedback: &mut Feedback, position: &AxisVector, joints: usize) -> Option<FaultKind> {
         let mut fault = None;
         let spindle = [&mut feedback.spindle_rad_per_s, &mut feedback.spindle_angle_rad];
         for (value, last) in spindle.into_iter().zip(&self.spindle) {
@@ -32,7 +49,7 @@ impl Numbers {
             }
         }
         let vectors = [&mut feedback.position, &mut feedback.speed, &mut feedback.current_a];
-        for (vector, last) in vectors.into_iter().zip(&self.joints) {
+        for (vector, last) in vectors.into_iter().zip([position, &self.joints[0], &self.joints[1]]) {
             // The lowest joint is named: it comes last.
             for joint in (0..joints).rev() {
                 if !vector[joint].is_finite() {
@@ -47,9 +64,8 @@ impl Numbers {
 
 /// Age of what is reported of each joint, fine periods; 0 where there is no such joint. Fine loop.
 pub fn ages(feedback: &Feedback, joints: usize) -> [u32; MAX_AXES] {
-    let mut ages = [0; MAX_AXES];
-    ages[..joints].copy_from_slice(&feedback.age_periods[..joints]);
-    ages
+    // As many steps as there are joints at most: to copy a part of an array is a call.
+    std::array::from_fn(|joint| if joint < joints { feedback.age_periods[joint] } else { 0 })
 }
 
 /// Bit per digital input that was not heard of in this exchange. Fine loop.
@@ -62,11 +78,17 @@ pub fn old_inputs(feedback: &Feedback) -> u64 {
     ages.fold(0, |old, (input, age)| old | u64::from(*age > 0) << input)
 }
 
+/// Whether all joints hold. Fine loop.
+#[inline]
+pub fn all_hold(feedback: &Feedback, joints: usize) -> bool {
+    feedback.state.iter().take(joints).fold(0, |any, state| any | (state.0 ^ JointState::Enabled.0)) == 0
+}
+
 /// The fault that the drives report; one that has let go while the machine is `moving` is one too. Joints that are their drives'
 /// `own`, a bit each, may move as those will. Fine loop.
 pub fn reported(feedback: &Feedback, joints: usize, moving: bool, own: u32) -> Option<FaultKind> {
     // What is true nearly always is looked at first.
-    if feedback.state[..joints].iter().all(|state| *state == JointState::Enabled) {
+    if all_hold(feedback, joints) {
         return None;
     }
     let first = |state: JointState| feedback.state[..joints].iter().position(|s| *s == state);
@@ -109,7 +131,7 @@ mod tests {
         let good = Feedback { position: AxisVector([7.0; 8]), spindle_angle_rad: 3.0, ..Feedback::default() };
         let mut feedback = Feedback { position: AxisVector([8.0; 8]), ..good };
         change(&mut feedback);
-        (Numbers::of(&good).replace_wrong_ones(&mut feedback, 3), feedback)
+        (Numbers::of(&good).replace_wrong_ones(&mut feedback, &good.position, 3), feedback)
     }
 
     #[test]

@@ -219,8 +219,10 @@ impl Cursor {
             return if self.resting { Reached::Rest } else { Reached::Inside };
         }
         let reached = self.go(delta_s, meet);
-        let crossed = self.crossed.take();
-        self.recent.pass(crossed.as_ref());
+        self.recent.pass(self.crossed.as_ref());
+        if self.crossed.is_some() {
+            self.crossed = None;
+        }
         self.look_at_path();
         reached
     }

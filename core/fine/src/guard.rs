@@ -20,21 +20,47 @@ const FITTED_MM: f64 = 1e-8;
 #[derive(Debug)]
 pub struct Guard {
     config: FineConfig,
+    lanes: [Lane; MAX_AXES],
     position: AxisVector,
-    velocity: AxisVector,
-    acceleration: AxisVector,
+    /// What is known behind the sample that was sent last, and behind the one judged last; which is which changes with each that
+    /// is sent, so that nothing is copied.
+    behind: [Behind; 2],
+    /// Index of what is known behind the one that was sent last.
+    sent: usize,
     /// Samples for which jerk is not judged.
     relaxed: u32,
+}
+
+/// What a limit is with its tolerance, per entry: computed once.
+#[derive(Clone, Copy, Debug)]
+struct Lane {
+    min_mm: f64,
+    max_mm: f64,
+    /// Change of velocity that the acceleration limit explains in a period, mm/s.
+    leak_mm_per_s: f64,
+    fastest_mm_per_s: f64,
+    /// Change of velocity beyond that.
+    allowed_mm_per_s: f64,
+}
+
+/// Motion behind a sample, as the differences of samples show it.
+#[derive(Clone, Copy, Debug)]
+struct Behind {
+    velocity: AxisVector,
+    /// Zero where jerk is not judged.
+    acceleration: AxisVector,
     /// Per sign and axis: by how much the velocity has changed more than the acceleration limit explains, mm/s.
     buckets: [[f64; MAX_AXES]; 2],
 }
 
-/// A sample that passed, or was let pass, as the guard will remember it.
+impl Behind {
+    const REST: Self =
+        Self { velocity: AxisVector::ZERO, acceleration: AxisVector::ZERO, buckets: [[0.0; MAX_AXES]; 2] };
+}
+
+/// What was found of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
-    velocity: AxisVector,
-    acceleration: AxisVector,
-    buckets: [[f64; MAX_AXES]; 2],
     /// Beyond the jerk limit, and not held against it.
     pub relaxed: bool,
     /// The first limit broken, if any.
@@ -44,9 +70,17 @@ pub struct Checked {
 impl Guard {
     /// At rest at the configured position.
     pub fn new(config: &FineConfig) -> Self {
-        let position = config.position;
-        let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
-        Self { config: *config, position, velocity, acceleration, relaxed: 0, buckets: [[0.0; MAX_AXES]; 2] }
+        let lanes = std::array::from_fn(|axis| {
+            let limits = &config.limits.axes[axis];
+            Lane {
+                min_mm: limits.min_mm,
+                max_mm: limits.max_mm,
+                leak_mm_per_s: limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * config.period_s,
+                fastest_mm_per_s: limits.feed_mm_per_s.max(limits.rapid_mm_per_s) * (1.0 + TOLERANCE),
+                allowed_mm_per_s: config.speed_difference_mm_per_s[axis] * (1.0 + TOLERANCE),
+            }
+        });
+        Self { config: *config, lanes, position: config.position, behind: [Behind::REST; 2], sent: 0, relaxed: 0 }
     }
 
     /// The last position sent.
@@ -56,12 +90,12 @@ impl Guard {
 
     /// The velocity of the last period, mm/s.
     pub fn velocity(&self) -> &AxisVector {
-        &self.velocity
+        &self.behind[self.sent].velocity
     }
 
     /// The acceleration of the last period, mm/s².
     pub fn acceleration(&self) -> &AxisVector {
-        &self.acceleration
+        &self.behind[self.sent].acceleration
     }
 
     /// No rate is known that keeps the jerk limit with the next sample: where it does not, that is not held against it.
@@ -80,70 +114,97 @@ impl Guard {
     }
 
     /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
-    pub fn check(&self, next: &AxisVector, unhomed: u32) -> Checked {
-        let (velocity, acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
-        let mut checked = Checked { velocity, acceleration, buckets: self.buckets, relaxed: false, breach: None };
+    pub fn check(&mut self, next: &AxisVector, unhomed: u32) -> Checked {
+        let mut checked = Checked { relaxed: false, breach: None };
         for axis in 0..self.config.lane_count() {
             let travels = unhomed >> axis & 1 == 0;
-            let breach = self.check_axis(axis, next[axis], travels, &mut checked);
-            checked.breach = checked.breach.or(breach);
+            let breach = self.check_axis(axis, next[axis], travels, &mut checked.relaxed);
+            if checked.breach.is_none() && breach.is_some() {
+                checked.breach = breach;
+            }
         }
         checked
     }
 
-    /// Remembers that `next` was sent.
-    pub fn sent(&mut self, next: &AxisVector, checked: &Checked) {
+    /// Remembers that `next` was sent, which was judged last.
+    pub fn sent(&mut self, next: &AxisVector) {
         self.position = *next;
-        (self.velocity, self.acceleration) = (checked.velocity, checked.acceleration);
+        self.sent = 1 - self.sent;
         self.relaxed = self.relaxed.saturating_sub(1);
-        self.buckets = checked.buckets;
     }
 
-    fn check_axis(&self, axis: usize, next: f64, travels: bool, checked: &mut Checked) -> Option<FaultKind> {
-        let limits = &self.config.limits.axes[axis];
-        let period_s = self.config.period_s;
+    #[inline]
+    fn check_axis(&mut self, axis: usize, next: f64, travels: bool, relaxed: &mut bool) -> Option<FaultKind> {
+        let (lane, period_s, at) = (&self.lanes[axis], self.config.period_s, self.position[axis]);
+        let [first, second] = &mut self.behind;
+        let (last, now) = if self.sent == 0 { (first, second) } else { (second, first) };
         // Each velocity is a difference of two positions that are known to half a unit in the last place.
-        let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
-        let velocity = (next - self.position[axis]) / period_s;
-        let change = velocity - self.velocity[axis];
-        checked.velocity[axis] = velocity;
-        let leak = limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * period_s + rounding;
-        let mut fullest = 0.0f64;
-        for (sign, bucket) in [change, -change].into_iter().zip(&mut checked.buckets) {
-            bucket[axis] = (bucket[axis] + sign - leak).max(0.0);
-            fullest = fullest.max(bucket[axis]);
+        let rounding = rounding(next, period_s);
+        let velocity = (next - at) / period_s;
+        let change = velocity - last.velocity[axis];
+        let leak = lane.leak_mm_per_s + rounding;
+        let up = larger(last.buckets[0][axis] + change - leak, 0.0);
+        let down = larger(last.buckets[1][axis] - change - leak, 0.0);
+        (now.velocity[axis], now.acceleration[axis]) = (velocity, 0.0);
+        (now.buckets[0][axis], now.buckets[1][axis]) = (up, down);
+        // What is true nearly always is looked at first; what is no number is within nothing.
+        let forgiven = FITTED_MM + rounding;
+        let within = next >= lane.min_mm - forgiven && next <= lane.max_mm + forgiven;
+        let slow = velocity.abs() <= lane.fastest_mm_per_s + rounding;
+        let even = larger(up, down) <= lane.allowed_mm_per_s + rounding;
+        if !(next.abs() < f64::INFINITY && within && slow && even)
+            && let Some(breach) = self.breach_of(axis, next, travels, velocity, change)
+        {
+            return Some(breach);
         }
+        if self.config.order >= 3 { self.check_jerk(axis, change / period_s, rounding, relaxed) } else { None }
+    }
+    /// The limit that `next` breaks, where it does.
+    #[cold]
+    #[inline(never)]
+    fn breach_of(&self, axis: usize, next: f64, travels: bool, velocity: f64, change: f64) -> Option<FaultKind> {
+        let (limits, lane, period_s) = (&self.config.limits.axes[axis], &self.lanes[axis], self.config.period_s);
+        let rounding = rounding(next, period_s);
         let breach = |breach, value, limit| Some(FaultKind::Guard { breach, axis, value, limit });
         if !next.is_finite() {
             return breach(Breach::NotFinite, next, 0.0);
         }
         // Who stands outside of the travel may go inward only.
-        let (lowest, highest) = (limits.min_mm.min(self.position[axis]), limits.max_mm.max(self.position[axis]));
+        let (lowest, highest) = (lane.min_mm.min(self.position[axis]), lane.max_mm.max(self.position[axis]));
         let forgiven = FITTED_MM + rounding;
         if travels && (next < lowest - forgiven || next > highest + forgiven) {
-            let nearest = if next < lowest { limits.min_mm } else { limits.max_mm };
+            let nearest = if next < lowest { lane.min_mm } else { lane.max_mm };
             return breach(Breach::Position, next, nearest);
         }
-        let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
-        if velocity.abs() > fastest * (1.0 + TOLERANCE) + rounding {
-            return breach(Breach::Velocity, velocity, fastest);
+        if velocity.abs() > lane.fastest_mm_per_s + rounding {
+            return breach(Breach::Velocity, velocity, limits.feed_mm_per_s.max(limits.rapid_mm_per_s));
         }
-        let allowed = self.config.speed_difference_mm_per_s[axis];
-        if fullest > allowed * (1.0 + TOLERANCE) + rounding {
+        let buckets = &self.behind[1 - self.sent].buckets;
+        if larger(buckets[0][axis], buckets[1][axis]) > lane.allowed_mm_per_s + rounding {
             return breach(Breach::Acceleration, change / period_s, limits.acceleration_mm_per_s2);
         }
-        if self.config.order >= 3 { self.check_jerk(axis, change / period_s, rounding, checked) } else { None }
+        None
     }
 
     /// Jerk, where the planner keeps it.
-    fn check_jerk(&self, axis: usize, acceleration: f64, rounding: f64, checked: &mut Checked) -> Option<FaultKind> {
+    fn check_jerk(&mut self, axis: usize, acceleration: f64, rounding: f64, relaxed: &mut bool) -> Option<FaultKind> {
         let (limit, period_s) = (self.config.limits.axes[axis].jerk_mm_per_s3, self.config.period_s);
-        checked.acceleration[axis] = acceleration;
-        let value = (acceleration - self.acceleration[axis]) / period_s;
+        self.behind[1 - self.sent].acceleration[axis] = acceleration;
+        let value = (acceleration - self.behind[self.sent].acceleration[axis]) / period_s;
         let beyond = value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
-        checked.relaxed |= beyond && self.relaxed > 0;
+        *relaxed |= beyond && self.relaxed > 0;
         (beyond && self.relaxed == 0).then_some(FaultKind::Guard { breach: Breach::Jerk, axis, value, limit })
     }
+}
+
+/// By how much a velocity at the position `next`, mm, may be off, mm/s.
+fn rounding(next: f64, period_s: f64) -> f64 {
+    4.0 * f64::EPSILON * larger(next.abs(), 1.0) / period_s
+}
+
+/// The larger of two numbers of which the second is one: one instruction, where `f64::max` also looks for NaN there.
+fn larger(value: f64, least: f64) -> f64 {
+    if value > least { value } else { least }
 }
 
 #[cfg(test)]
@@ -180,7 +241,7 @@ mod tests {
             if checked.breach.is_some() {
                 return checked.breach;
             }
-            guard.sent(&at, &checked);
+            guard.sent(&at);
         }
         None
     }

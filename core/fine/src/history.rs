@@ -20,12 +20,20 @@ impl History {
     }
 
     /// Another period. Fine loop.
+    #[inline]
     pub fn push(&mut self, position: &AxisVector) {
         self.kept[self.next] = *position;
         self.next = (self.next + 1) % KEPT;
     }
 
+    /// What was pushed last. Fine loop.
+    #[inline]
+    pub fn last(&self) -> &AxisVector {
+        self.at(0)
+    }
+
     /// What was pushed `periods` before the last; at most as long ago as is kept. Fine loop.
+    #[inline]
     pub fn at(&self, periods: u32) -> &AxisVector {
         let back = 1 + (periods.min(MAX_DELAY_PERIODS) as usize);
         &self.kept[(self.next + KEPT - back) % KEPT]

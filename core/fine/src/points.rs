@@ -65,9 +65,12 @@ impl Points {
         self.list[..self.count].iter()
     }
 
-    /// Adds a stretch of `segment`: its ends, and the middle where the segment is curved.
+    /// Adds a stretch of `segment`: its ends, and the middle where the segment is curved; one point where that is all it is.
     pub fn add(&mut self, segment: &Segment, from_s: f64, duration_s: f64) {
         self.point(segment, from_s);
+        if duration_s == 0.0 {
+            return;
+        }
         self.point(segment, from_s + duration_s);
         if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
             self.point(segment, from_s + duration_s / 2.0);

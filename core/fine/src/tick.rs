@@ -152,9 +152,11 @@ pub struct FineLoop {
     attach: Attach,
     setpoint: Setpoint,
     feedback: Feedback,
-    /// Where the joints were told to be in the last periods, and where they were.
+    /// Where the joints were told to be in the last periods, as far as a following error is judged, and where they were.
     sent: History,
     measured: History,
+    /// Some joint has a limit of its following error.
+    judges_following: bool,
     /// What the drives are to catch.
     arm: Arm,
     release: Release,
@@ -221,6 +223,7 @@ impl FineLoop {
             feedback: Feedback { position: config.attached.position, ..Feedback::default() },
             sent: History::new(&config.attached.position),
             measured: History::new(&config.attached.position),
+            judges_following: config.max_following_error_mm.0.iter().any(|most| *most < f64::INFINITY),
             arm: Arm::default(),
             release: Release::default(),
             left: Left::default(),
@@ -244,8 +247,8 @@ impl FineLoop {
         let waiting = matches!(self.phase, Phase::Waiting);
         let before_mm = self.cursor.path_mm();
         let (position, input) = self.next_position();
-        self.exchange(&position);
-        self.state = state::next(state::next(self.state, self.drives()), input);
+        let all_hold = self.exchange(&position);
+        self.state = state::next(state::next(self.state, self.drives(all_hold)), input);
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
         let recorded = (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
         if started && recorded && !ended && !self.outputs.ended {
@@ -379,8 +382,8 @@ impl FineLoop {
     }
 
     fn ramp_out(&mut self, position: AxisVector, over: bool) -> AxisVector {
-        let checked = self.guard.check(&position, self.outputs.unhomed);
-        self.guard.sent(&position, &checked);
+        self.guard.check(&position, self.outputs.unhomed);
+        self.guard.sent(&position);
         if over {
             if self.outputs.by != SwitchedBy::EmergencyStop {
                 self.outputs.switch_off(self.config.kept_outputs, SwitchedBy::Fault);

@@ -1,5 +1,6 @@
 //! The exchange with the drives, and what the soft side is told.
 
+use std::iter::once_with;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{Sample, Switched};
@@ -11,8 +12,9 @@ use crate::fault::FaultKind;
 use crate::state::Input;
 
 impl FineLoop {
-    pub(super) fn exchange(&mut self, axes: &AxisVector) {
-        let joints = self.next_joints(axes);
+    /// Gives whether all joints hold behind it.
+    pub(super) fn exchange(&mut self, axes: &AxisVector) -> bool {
+        self.set_joints(axes);
         self.setpoint.tick = self.tick;
         self.setpoint.arm = self.arm;
         // Where axes are homed, joints are axes.
@@ -23,27 +25,38 @@ impl FineLoop {
         let failed = self.ask_driver();
         self.hear_roles(failed);
         self.hear_spindle();
-        // From the first motion on the drives hold, at rest too: what let go has moved.
-        let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
-        let own = self.handed_over();
-        let unreadable = last.replace_wrong_ones(&mut self.feedback, self.joints);
-        let fault = failed.then_some(FaultKind::Driver).or(unreadable);
-        self.remember(&joints);
-        let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
-        let resets = self.is_resetting();
-        let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
-        let sent = (&self.sent, &self.config.attached.delay_periods);
-        let far = || answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own);
-        if let Some(kind) = fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go)) {
+        let unreadable = last.replace_wrong_ones(&mut self.feedback, self.measured.last(), self.joints);
+        self.remember();
+        // What is true nearly always is looked at first.
+        let all_hold = answer::all_hold(&self.feedback, self.joints);
+        if (failed || unreadable.is_some() || !all_hold || self.judges_following)
+            && let Some(kind) = self.fault_of_answer(failed, unreadable)
+        {
             self.fail(kind);
         }
         self.watch_attach();
         self.watch_edge();
         self.watch_release(failed);
+        all_hold
     }
 
-    /// Where the joints are told to be, with what the setpoint says of their motion.
-    fn next_joints(&mut self, axes: &AxisVector) -> AxisVector {
+    /// The fault that the drives' answer is, where it is one: of an exchange that `failed`, or with numbers that are `unreadable`.
+    #[inline(never)]
+    fn fault_of_answer(&self, failed: bool, unreadable: Option<FaultKind>) -> Option<FaultKind> {
+        // From the first motion on the drives hold, at rest too: what let go has moved.
+        let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
+        let own = self.handed_over();
+        let fault = failed.then_some(FaultKind::Driver).or(unreadable);
+        let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
+        let resets = self.is_resetting();
+        let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
+        let sent = (&self.sent, &self.config.attached.delay_periods);
+        let far = || answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own);
+        fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go))
+    }
+
+    /// Tells the setpoint where the joints are to be, and how they move.
+    fn set_joints(&mut self, axes: &AxisVector) {
         let still = if !self.attach.is_done() {
             Some(self.hold_still())
         } else if self.handed_over() != 0 {
@@ -55,7 +68,7 @@ impl FineLoop {
             // They are told to be where they stand: that is no motion, though the numbers may change.
             self.setpoint.position = joints;
             (self.setpoint.velocity, self.setpoint.acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
-            return joints;
+            return;
         }
         self.setpoint.homing = 0;
         let (joints, rate) = (self.joints_of(axes), 1.0 / self.config.period_s);
@@ -64,14 +77,15 @@ impl FineLoop {
         (self.setpoint.position, self.setpoint.velocity) = (joints, velocity);
         self.setpoint.enable = u32::from(!self.is_letting_go());
         self.setpoint.reset = 0;
-        joints
     }
 
-    /// Keeps what was sent, and what came back of it.
-    fn remember(&mut self, joints: &AxisVector) {
-        self.sent.push(joints);
+    /// Keeps what was sent, where it is asked for, and what came back of it.
+    fn remember(&mut self) {
+        if self.judges_following {
+            self.sent.push(&self.setpoint.position);
+        }
         self.measured.push(&self.feedback.position);
-        let is_old = self.feedback.age_periods[..self.joints].iter().any(|age| *age > 0);
+        let is_old = self.feedback.age_periods[..self.joints].iter().fold(0, |any, age| any | age) > 0;
         self.counters.old_feedback_periods += u64::from(is_old);
     }
 
@@ -86,7 +100,11 @@ impl FineLoop {
         }
     }
 
-    pub(super) fn drives(&self) -> Input {
+    /// What the drives do for the state of the machine, where `all_hold` or not all of them do.
+    pub(super) fn drives(&self, all_hold: bool) -> Input {
+        if all_hold {
+            return Input::DrivesOn;
+        }
         let own = self.handed_over();
         let holds = |joint: usize| own >> joint & 1 == 1 || self.feedback.state[joint] == JointState::Enabled;
         let on = (0..self.joints).all(holds);
@@ -100,7 +118,8 @@ impl FineLoop {
             let reported = self.feedback.position;
             (self.config.axes_alone(command), self.axes_of(&reported))
         };
-        let sample = Sample {
+        let (switched, phase_ns) = (self.switched(), self.phase_ns());
+        let sample = || Sample {
             tick: self.tick,
             block: self.cursor.segment().block,
             line: self.cursor.segment().line,
@@ -114,8 +133,8 @@ impl FineLoop {
             sigma: self.governor.sigma(),
             ratio: self.ratio * self.given.feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
-            switched: self.switched(),
-            phase_ns: self.phase_ns(),
+            switched,
+            phase_ns,
             analog: self.feedback.analog,
             inputs: self.feedback.inputs,
             old_inputs: answer::old_inputs(&self.feedback),
@@ -124,8 +143,10 @@ impl FineLoop {
             given: self.given,
         };
         self.counters.samples += 1;
-        if self.samples.push(sample).is_err() {
-            self.status.lost_samples.fetch_add(1, Relaxed);
+        match self.samples.write_chunk_uninit(1) {
+            // Made in its slot: to push it would copy it.
+            Ok(slot) => _ = slot.fill_from_iter(once_with(sample)),
+            Err(_) => _ = self.status.lost_samples.fetch_add(1, Relaxed),
         }
     }
 

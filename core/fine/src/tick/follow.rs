@@ -82,8 +82,8 @@ impl FineLoop {
     /// The sample of a period that leaves the axes where they are; the guard knows from it that they stand.
     pub(super) fn stand(&mut self) -> AxisVector {
         let position = *self.guard.position();
-        let checked = self.guard.check(&position, self.outputs.unhomed);
-        self.guard.sent(&position, &checked);
+        self.guard.check(&position, self.outputs.unhomed);
+        self.guard.sent(&position);
         position
     }
 
@@ -100,7 +100,7 @@ impl FineLoop {
             }
             (breach, _) => {
                 self.counters.limit_violations += u64::from(breach.is_some() || checked.relaxed);
-                self.guard.sent(&position, checked);
+                self.guard.sent(&position);
                 position
             }
         }

@@ -133,6 +133,9 @@ impl FineLoop {
 
     /// Whether a period that ends at the rate `sigma` keeps ratio × programmed feed, at its end and in its mean.
     fn is_feed_kept(&mut self, sigma: f64, ratios: &Ratios) -> bool {
+        if self.asks_for_nothing(ratios) {
+            return true;
+        }
         let mean = f64::midpoint(self.governor.sigma(), sigma);
         let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, f64::INFINITY);
         sigma <= asked.at_end * (1.0 + FEED_TOLERANCE) && mean <= asked.mean * (1.0 + FEED_TOLERANCE)
@@ -215,6 +218,9 @@ impl FineLoop {
         if self.cursor.is_resting() {
             return self.ratio_from_rest(ratios, way_speed_mm_per_s);
         }
+        if way_speed_mm_per_s == f64::INFINITY && self.asks_for_nothing(ratios) {
+            return 1.0;
+        }
         let from = self.governor.sigma();
         let speed_mm_per_s = from * self.cursor.path_speed_mm_per_s();
         let mut sigma = from;
@@ -231,6 +237,11 @@ impl FineLoop {
             sigma = next;
         }
         sigma
+    }
+
+    /// Whether neither a feed nor a rapid is to be slower than planned: then the plan itself keeps both at any rate.
+    fn asks_for_nothing(&self, ratios: &Ratios) -> bool {
+        ratios.feed >= self.config.max_feed_ratio && ratios.rapid >= 1.0
     }
 
     /// The same from rest, where any rate is as good to begin with: one that is kept over the period.
