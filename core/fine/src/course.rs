@@ -94,6 +94,17 @@ impl<'a> Place<'a> {
         motion
     }
 
+    /// How the plan moves here, and how fast on its path, as [`Place::pace`] has it; `None` where nothing moves.
+    pub fn motion_and_speed(&self) -> Option<(Motion, f64)> {
+        let segment = self.segment?;
+        let [speed, ..] = derivatives(&segment.path, self.local_s);
+        let (motion, mut squares) = (self.motion(), 0.0);
+        for axis in (0..self.course.axes).filter(|axis| self.course.linear >> axis & 1 == 1) {
+            squares += motion.velocity[axis] * motion.velocity[axis];
+        }
+        Some((motion, if squares > speed * speed { f64::sqrt(squares) } else { speed }))
+    }
+
     /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
     ///
     /// The path coordinate of a planner is a polynomial beside those of the axes, and may run behind the way that they

@@ -10,6 +10,7 @@ mod early;
 mod smooth;
 mod steady;
 
+use below::Ahead;
 use early::Early;
 pub use smooth::Aim;
 use steady::Steadying;
@@ -38,6 +39,8 @@ pub struct Governor {
     /// Where jerk is limited: the way that was begun last, and one that is being tried.
     begun: Steadying,
     tried: Steadying,
+    /// Room for the places ahead at which a feed is to be kept.
+    ahead: Box<[Ahead]>,
 }
 
 impl Governor {
@@ -52,6 +55,7 @@ impl Governor {
             early: Early::new(Points::new(limits, axes)),
             begun: Steadying::new(),
             tried: Steadying::new(),
+            ahead: Ahead::room(),
         }
     }
 

@@ -7,7 +7,7 @@
 use super::Governor;
 use super::smooth::{Aim, Interval};
 use super::steady::Way;
-use crate::course::Motion;
+use crate::course::{Motion, Place};
 use crate::outlook::Outlook;
 
 /// Share of the path jerk that bringing the rise of the speed to nothing counts on: in a period in which the plan's own jerk
@@ -38,12 +38,46 @@ const TRIES: u32 = 4;
 
 /// A place ahead.
 #[derive(Clone, Copy, Debug, Default)]
-struct Ahead {
+pub(super) struct Ahead {
     /// Program time from the place before, s.
     step_s: f64,
     /// Rate at which the path speed there is the highest that is allowed.
     most: f64,
     motion: Motion,
+}
+
+impl Ahead {
+    /// Room for the places of a period. Host; allocates.
+    pub(super) fn room() -> Box<[Self]> {
+        vec![Self::default(); PLACES].into_boxed_slice()
+    }
+}
+
+/// The places ahead of a period, nearest first. Each is looked at when it is first asked for: a rate that falls is at rest long
+/// before the last.
+#[derive(Debug)]
+struct AheadOf<'a> {
+    seen: Box<[Ahead]>,
+    count: usize,
+    place: Place<'a>,
+    /// From the last one seen to the next, s.
+    step_s: f64,
+    ratio: f64,
+}
+
+impl AheadOf<'_> {
+    /// The place of this number; `None` behind the last, and where nothing moves there.
+    fn get(&mut self, number: usize) -> Option<&Ahead> {
+        if number == self.count && number < self.seen.len() {
+            self.place.go(self.step_s);
+            let (motion, speed) = self.place.motion_and_speed()?;
+            let most = self.ratio * self.place.feed_mm_per_s() / speed;
+            self.seen[number] = Ahead { step_s: self.step_s, most, motion };
+            self.step_s *= FARTHER;
+            self.count += 1;
+        }
+        self.seen[..self.count].get(number)
+    }
 }
 
 /// How fast a speed may rise that is to end at a limit.
@@ -64,7 +98,7 @@ impl Curve {
 
 impl Governor {
     /// σ̈ that brings the rate to the one aimed at, as far as the path speed stays below the feed here and ahead.
-    pub(super) fn wanted_below(&self, aim: &Aim, outlook: &Outlook, here: &Way<'_>) -> f64 {
+    pub(super) fn wanted_below(&mut self, aim: &Aim, outlook: &Outlook, here: &Way<'_>) -> f64 {
         let h = self.period_s;
         if aim.path[0] <= 0.0 {
             // From rest the rate was chosen for what follows.
@@ -106,41 +140,36 @@ impl Governor {
     }
 
     /// The greatest σ̈ up to `most` behind which there is time to lower σ before the plan is too fast.
-    fn in_time(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
+    fn in_time(&mut self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, sigma) = (self.period_s, here.sigma);
-        let mut ahead = [Ahead::default(); PLACES];
-        let (mut place, mut step_s, mut count) = (here.place, h * sigma.max(SLOWEST), 0);
-        place.go(h * sigma);
-        for next in &mut ahead {
-            place.go(step_s);
-            let Some(pace) = place.pace() else { break };
-            *next = Ahead { step_s, most: aim.ratio * place.feed_mm_per_s() / pace.speed, motion: place.motion() };
-            step_s *= FARTHER;
-            count += 1;
-        }
+        let (seen, step_s) = (std::mem::take(&mut self.ahead), h * sigma.max(SLOWEST));
+        let mut ahead = AheadOf { seen, count: 0, place: here.place, step_s, ratio: aim.ratio };
+        ahead.place.go(h * sigma);
         let mut change = most;
         for _ in 0..TRIES {
-            let over = self.over(change, here, &ahead[..count], outlook);
+            let over = self.over(change, here, &mut ahead, outlook);
             if over <= 0.0 {
                 break;
             }
             change -= over;
         }
+        self.ahead = ahead.seen;
         change
     }
 
     /// By how much σ̈ has to be lower than `change`, so that lowering σ as far as the limits allow from the next period on
     /// keeps the speed below at the places ahead; not more than 0 where it does.
-    fn over(&self, change: f64, here: &Way<'_>, ahead: &[Ahead], outlook: &Outlook) -> f64 {
+    fn over(&self, change: f64, here: &Way<'_>, ahead: &mut AheadOf<'_>, outlook: &Outlook) -> f64 {
         let h = self.period_s;
         let mut sigma = here.sigma + h * (here.rate_per_s + h * change / 2.0);
         let mut rate = here.rate_per_s + h * change;
         let (mut time_s, mut most, mut was_below) = (0.0, f64::NEG_INFINITY, false);
         let mut before = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-        for place in ahead {
+        for number in 0.. {
             if sigma <= 0.0 {
                 break;
             }
+            let Some(place) = ahead.get(number) else { break };
             let real_s = place.step_s / sigma;
             let least = self.least(sigma, rate, &place.motion, outlook);
             // What the limits leave at either end of the way counts on all of it.
