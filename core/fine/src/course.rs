@@ -47,6 +47,16 @@ pub struct Motion {
     pub jerk: [f64; MAX_AXES],
 }
 
+impl Motion {
+    /// That of `segment` at local time `local_s`, for its first `axes` axes; others stay as they are.
+    fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
+        for axis in 0..axes {
+            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], local_s);
+            (self.velocity[axis], self.acceleration[axis], self.jerk[axis]) = (velocity, acceleration, jerk);
+        }
+    }
+}
+
 /// A place on a [`Course`].
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
@@ -86,23 +96,23 @@ impl<'a> Place<'a> {
     /// How the plan moves here.
     pub fn motion(&self) -> Motion {
         let mut motion = Motion::default();
-        let Some(segment) = self.segment else { return motion };
-        for axis in 0..self.course.axes {
-            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], self.local_s);
-            (motion.velocity[axis], motion.acceleration[axis], motion.jerk[axis]) = (velocity, acceleration, jerk);
+        if let Some(segment) = self.segment {
+            motion.look_at(segment, self.local_s, self.course.axes);
         }
         motion
     }
 
-    /// How the plan moves here, and how fast on its path, as [`Place::pace`] has it; `None` where nothing moves.
-    pub fn motion_and_speed(&self) -> Option<(Motion, f64)> {
+    /// Writes to `motion` how the plan moves here, and gives how fast on its path, as [`Place::pace`] has it; `None` where nothing
+    /// moves.
+    pub fn look_at_motion(&self, motion: &mut Motion) -> Option<f64> {
         let segment = self.segment?;
         let [speed, ..] = derivatives(&segment.path, self.local_s);
-        let (motion, mut squares) = (self.motion(), 0.0);
+        motion.look_at(segment, self.local_s, self.course.axes);
+        let mut squares = 0.0;
         for axis in (0..self.course.axes).filter(|axis| self.course.linear >> axis & 1 == 1) {
             squares += motion.velocity[axis] * motion.velocity[axis];
         }
-        Some((motion, if squares > speed * speed { f64::sqrt(squares) } else { speed }))
+        Some(if squares > speed * speed { f64::sqrt(squares) } else { speed })
     }
 
     /// Where the plan is on its path here, per s of program time; `None` where nothing moves.

@@ -58,11 +58,14 @@ impl Cursor {
         let mut at = self.taken + skip.min(wanted) as u64;
         let Ok(chunk) = self.entries.read_chunk(wanted) else { return at };
         let (first, second) = chunk.as_slices();
-        for queued in first.iter().chain(second).skip(skip) {
-            if !look(queued) {
-                return at;
+        let behind = skip.saturating_sub(first.len());
+        for part in [first.get(skip..), second.get(behind..)] {
+            for queued in part.unwrap_or_default() {
+                if !look(queued) {
+                    return at;
+                }
+                at += 1;
             }
-            at += 1;
         }
         at
     }

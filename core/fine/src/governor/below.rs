@@ -68,11 +68,12 @@ struct AheadOf<'a> {
 impl AheadOf<'_> {
     /// The place of this number; `None` behind the last, and where nothing moves there.
     fn get(&mut self, number: usize) -> Option<&Ahead> {
-        if number == self.count && number < self.seen.len() {
+        if number == self.count
+            && let Some(next) = self.seen.get_mut(number)
+        {
             self.place.go(self.step_s);
-            let (motion, speed) = self.place.motion_and_speed()?;
-            let most = self.ratio * self.place.feed_mm_per_s() / speed;
-            self.seen[number] = Ahead { step_s: self.step_s, most, motion };
+            let speed = self.place.look_at_motion(&mut next.motion)?;
+            (next.step_s, next.most) = (self.step_s, self.ratio * self.place.feed_mm_per_s() / speed);
             self.step_s *= FARTHER;
             self.count += 1;
         }
@@ -187,14 +188,23 @@ impl Governor {
 
     /// The least σ̈ and the least rate of σ that the limits leave where the plan has this motion.
     fn least(&self, sigma: f64, rate_per_s: f64, motion: &Motion, outlook: &Outlook) -> (f64, f64) {
-        let (mut changes, mut rates) = (Interval::ALL, Interval::ALL);
+        let (mut changes, mut rate) = (Interval::ALL, f64::NEG_INFINITY);
         for (axis, (acceleration_limit, jerk_limit)) in outlook.limits() {
             let velocity = motion.velocity[axis];
             let turned = sigma * motion.acceleration[axis];
             let planned = sigma * sigma * sigma * motion.jerk[axis];
             changes.keep(planned + 3.0 * turned * rate_per_s, velocity, (LEFT * jerk_limit).max(planned.abs()));
-            rates.keep(sigma * turned, velocity, (LEFT * acceleration_limit).max((sigma * turned).abs()));
+            let planned = sigma * turned;
+            rate = rate.max(lowest(planned, velocity, (LEFT * acceleration_limit).max(planned.abs())));
         }
-        (changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)), rates.low)
+        (changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)), rate)
     }
+}
+
+/// The least x that keeps `|constant + slope·x| ≤ most`, where `most` is no less than `|constant|`.
+fn lowest(constant: f64, slope: f64, most: f64) -> f64 {
+    if slope.abs() < f64::MIN_POSITIVE {
+        return f64::NEG_INFINITY;
+    }
+    (if slope > 0.0 { -most - constant } else { most - constant }) / slope
 }

@@ -58,12 +58,17 @@ impl Interval {
     /// Keeps `|constant + slope·x| ≤ most`.
     pub(super) fn keep(&mut self, constant: f64, slope: f64, most: f64) {
         // A constant beyond the limit that nothing can change leaves no interval; rounding is not such a case.
-        let (a, b) = ((-most - constant) / slope, (most - constant) / slope);
-        if a.is_nan() || b.is_nan() || slope.abs() < f64::MIN_POSITIVE {
+        if slope.abs() < f64::MIN_POSITIVE {
             return;
         }
-        self.low = self.low.max(a.min(b));
-        self.high = self.high.min(a.max(b));
+        let (a, b) = ((-most - constant) / slope, (most - constant) / slope);
+        if a.is_nan() || b.is_nan() {
+            return;
+        }
+        // Numbers all: an instruction each, where `f64::max` also looks for what is none.
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        self.low = if low > self.low { low } else { self.low };
+        self.high = if high < self.high { high } else { self.high };
     }
 
     pub(super) fn is_empty(&self) -> bool {
