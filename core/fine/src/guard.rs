@@ -279,4 +279,24 @@ mod tests {
         assert!(matches!(found, Some(FaultKind::Guard { breach: Breach::Position, axis: 2, limit: 500.0, .. })));
         assert!(guard.check(&at, 0b100).breach.is_none(), "an axis that is not homed has no travel yet");
     }
+
+    #[test]
+    fn a_sample_that_is_refused_leaves_nothing_behind() {
+        let (mut plain, mut tempted) = (guard(), guard());
+        (plain.config.order, tempted.config.order) = (3, 3);
+        let (mut at, mut refused) = (AxisVector::ZERO, 0);
+        for period in 0..40 {
+            let wild = at + AxisVector([f64::from(period - 20) * 0.01; MAX_AXES]);
+            refused += u32::from(tempted.check(&wild, 0).breach.is_some());
+            // Up to 8 mm/s and down again, the steps now and then as large as the buckets are full.
+            at[0] += 0.001 * f64::from(if period < 20 { period / 3 } else { (40 - period) / 2 });
+            let (expected, found) = (plain.check(&at, 0), tempted.check(&at, 0));
+            assert_eq!(expected.breach, found.breach, "{period}");
+            plain.sent(&at);
+            tempted.sent(&at);
+            assert_eq!((plain.velocity(), plain.acceleration()), (tempted.velocity(), tempted.acceleration()));
+            assert_eq!(plain.behind[plain.sent].buckets, tempted.behind[tempted.sent].buckets);
+        }
+        assert!(refused > 30, "{refused}");
+    }
 }
