@@ -7,9 +7,9 @@ use tandem_sdk::Block;
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::fault::{Fault, Span};
-use crate::interpreter::Interpreter;
+use crate::flow::{Execution, Step};
 use crate::item::Item;
-use crate::program::lines::{Lines, Next, Pass};
+use crate::program::lines::{Next, Pass};
 use crate::program::{Program, ProgramError};
 
 /// Most errors that are listed.
@@ -46,6 +46,9 @@ pub struct CheckReport {
     pub length_mm: f64,
     /// Lines whose numbers follow from what a probe or an input will answer: the run judges them when it comes to them.
     pub open_lines: u64,
+    /// Where the check ended because the program's way depends on what a probe or an input will answer (a branch, a loop or
+    /// a call): the line. What the program does after it is checked when it is driven.
+    pub seen_to: Option<u32>,
 }
 
 impl CheckReport {
@@ -55,7 +58,7 @@ impl CheckReport {
     }
 
     fn add(&mut self, diagnostic: Diagnostic) {
-        let once = |d: &Diagnostic| d.code == "feed-missing" && diagnostic.code == d.code;
+        let once = |d: &Diagnostic| d.code == "feed-missing" && diagnostic.code == d.code || *d == diagnostic;
         if self.diagnostics.len() >= MAX_DIAGNOSTICS || self.diagnostics.iter().any(once) {
             self.unlisted += 1;
         } else {
@@ -75,6 +78,7 @@ pub fn check(
     config: &Config,
     per_block: &mut dyn FnMut(&Block) -> Result<(), String>,
 ) -> Result<CheckReport, ProgramError> {
+    program.subroutines.clear();
     let mut pass = FirstPass::new(program, config, per_block);
     match pass.run(program) {
         Ok(()) => {}
@@ -85,47 +89,60 @@ pub fn check(
 }
 
 struct FirstPass<'a> {
-    interpreter: Interpreter,
+    execution: Execution,
     per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>,
     items: Vec<Item>,
     report: CheckReport,
 }
 
 impl<'a> FirstPass<'a> {
-    fn new(program: &Program, config: &Config, per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>) -> Self {
-        let mut interpreter = Interpreter::new(config.clone());
-        interpreter.set_file(&program.name);
-        Self { interpreter, per_block, items: Vec::new(), report: CheckReport::default() }
+    fn new(program: &mut Program, config: &Config, per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>) -> Self {
+        let execution = Execution::new(program, config, Pass::First);
+        Self { execution, per_block, items: Vec::new(), report: CheckReport::default() }
     }
 
     fn run(&mut self, program: &mut Program) -> Result<(), ProgramError> {
-        let mut lines = Lines::new(program, Pass::First)?;
-        while !self.interpreter.ended() {
-            match lines.next(program)? {
-                Next::Line(range) => self.line(program, lines.number, lines.text(&range)),
-                Next::Bad(diagnostic) => self.report.add(diagnostic),
-                Next::End => break,
+        while !self.execution.interpreter.ended() {
+            self.items.clear();
+            let step = self.execution.step(program, &mut self.items)?;
+            self.report.lines = self.report.lines.max(self.execution.lines().number);
+            match step {
+                Step::Line => self.line(program, None),
+                Step::Wrong(diagnostic) => self.line(program, Some(diagnostic)),
+                Step::Stuck(diagnostic) => {
+                    self.report.add(diagnostic);
+                    return Ok(());
+                }
+                Step::Open(warning) => {
+                    self.report.seen_to = Some(warning.line);
+                    self.report.warnings.push(warning);
+                    return Ok(());
+                }
+                Step::End => break,
             }
-            self.report.lines = lines.number;
         }
-        self.look_behind_percent(program, &mut lines)?;
+        self.look_behind_percent(program)?;
         self.items.clear();
-        self.interpreter.finish(&mut self.items)?;
-        self.take_items(program, b"");
+        self.execution.interpreter.finish(&mut self.items)?;
+        self.take_items(program);
         Ok(())
     }
 
     /// Where `%` ended the program: text behind it is not driven, which nobody may find out by what is missing. RS274/NGC
     /// lets a program that begins with `%` end at the second one, whatever follows; a `%` that closes what none opened
     /// may only be the last text of the file.
-    fn look_behind_percent(&mut self, program: &mut Program, lines: &mut Lines) -> Result<(), ProgramError> {
-        let Some((percent, opened)) = self.interpreter.ended_by_percent() else { return Ok(()) };
+    fn look_behind_percent(&mut self, program: &mut Program) -> Result<(), ProgramError> {
+        let Some((percent, opened)) = self.execution.interpreter.ended_by_percent() else { return Ok(()) };
         loop {
-            let found = match lines.next(program) {
+            let next = self.execution.lines().next(program);
+            let lines = self.execution.lines();
+            let found = match next {
                 Ok(Next::End) => return Ok(()),
                 Ok(Next::Line(range)) => {
-                    let text = lines.text(&range);
-                    let Some(at) = self.interpreter.first_text(text) else { continue };
+                    let number = lines.number;
+                    let text = lines.text(&range).to_vec();
+                    let text = &text[..];
+                    let Some(at) = self.execution.interpreter.first_text(text) else { continue };
                     let message = if opened {
                         format!(
                             "this and all that follows is not driven: the % of line {percent} has ended the program"
@@ -137,7 +154,7 @@ impl<'a> FirstPass<'a> {
                         )
                     };
                     let fault = Fault::new(Span::new(at, text.len()), "behind-percent", message);
-                    Diagnostic::new(&program.name, lines.number, text, fault)
+                    Diagnostic::new(&program.name, number, text, fault)
                 }
                 Ok(Next::Bad(diagnostic)) | Err(ProgramError::Text(diagnostic)) => diagnostic,
                 Err(other) => return Err(other),
@@ -151,32 +168,37 @@ impl<'a> FirstPass<'a> {
         }
     }
 
-    fn line(&mut self, program: &Program, number: u32, text: &[u8]) {
-        self.items.clear();
-        let done = self.interpreter.line(number, text, &mut self.items);
-        let open = self.interpreter.is_assumed();
+    /// A line has been executed, or could not be.
+    fn line(&mut self, program: &Program, wrong: Option<Diagnostic>) {
+        let interpreter = &mut self.execution.interpreter;
+        let open = interpreter.is_assumed();
         if self.items.iter().any(Item::is_probe) {
-            self.interpreter.assume_probe();
+            interpreter.assume_probe();
         }
         self.report.open_lines += u64::from(open);
-        if let Err(diagnostic) = done
+        if let Some(diagnostic) = wrong
             && !(open && OF_NUMBERS.contains(&diagnostic.code))
         {
             self.report.add(diagnostic);
         }
-        self.take_items(program, text);
+        self.take_items(program);
     }
 
-    fn take_items(&mut self, program: &Program, text: &[u8]) {
+    fn take_items(&mut self, program: &Program) {
+        let text = self.execution.text();
+        let mut waits = false;
         for item in &self.items {
             match item {
                 Item::Block(block) => judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)),
                 Item::Curve(owned) => {
                     owned.with(|block| judge_block(&mut self.report, &mut self.per_block, block, (&program.name, b"")));
                 }
-                Item::Wait(_) => self.interpreter.assume_input(),
+                Item::Wait(_) => waits = true,
                 Item::Event(_) | Item::End => {}
             }
+        }
+        if waits {
+            self.execution.interpreter.assume_input();
         }
     }
 }

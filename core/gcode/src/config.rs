@@ -1,5 +1,7 @@
 //! What the interpreter must know of the machine.
 
+use std::path::PathBuf;
+
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
 /// One row of the tool table.
@@ -72,7 +74,14 @@ pub struct Config {
     pub outputs: Lines,
     /// Inputs that M66 may read.
     pub inputs: Lines,
+    /// Folders in which the files of subroutines are looked up, the first first.
+    pub subroutine_path: Vec<PathBuf>,
+    /// How many lines a program with O-words may execute in the first pass, and in the second without an item.
+    pub max_steps: u64,
 }
+
+/// Lines that a program with O-words may execute where the machine file does not say: some ten seconds.
+pub const DEFAULT_MAX_STEPS: u64 = 50_000_000;
 
 impl Config {
     /// A machine with `axes`, without travel limits and tools, standing at zero.
@@ -89,6 +98,8 @@ impl Config {
             probe: None,
             outputs: Lines::all(),
             inputs: Lines::all(),
+            subroutine_path: Vec::new(),
+            max_steps: DEFAULT_MAX_STEPS,
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::item::{Item, ProbeResult};
 use crate::line::Line;
 use crate::state::State;
 use crate::state::letters::{AXIS_MASK, Letters};
-use crate::state::parameters::Parameters;
+use crate::state::parameters::{Parameters, Value};
 use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
 use crate::syntax::parse::{O_WORDS, parse};
@@ -60,6 +60,9 @@ pub struct Interpreter {
     begun: bool,
     /// A value of the current line follows from what the first pass has assumed.
     reads_assumed: Cell<bool>,
+    /// The line that blocks and events bear, where it is not the one that is read: lines of a subroutine's own file bear
+    /// that of the call.
+    pub(crate) reported_line: Option<u32>,
 }
 
 impl Interpreter {
@@ -76,6 +79,7 @@ impl Interpreter {
             ended_by_percent: None,
             begun: false,
             reads_assumed: Cell::new(false),
+            reported_line: None,
             config,
         }
     }
@@ -88,6 +92,46 @@ impl Interpreter {
     /// Whether the program has ended: further lines are passed over.
     pub fn ended(&self) -> bool {
         self.state.ended
+    }
+
+    /// The name of the program in diagnostics.
+    pub(crate) fn file(&self) -> &Arc<str> {
+        &self.file
+    }
+
+    pub(crate) fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// A line with an O-word is executed instead of being interpreted.
+    pub(crate) fn begin_o_word(&mut self, number: u32) {
+        self.phase = Phase::after_text(self.phase);
+        self.begun = true;
+        self.state.line = self.reported_line.unwrap_or(number);
+        self.words.clear();
+        self.orders.clear();
+        self.state.path.begin_line();
+        self.reads_assumed.set(false);
+    }
+
+    /// A subroutine begins.
+    pub(crate) fn enter_sub(&mut self, arguments: &[Value]) {
+        self.parameters.enter(arguments);
+    }
+
+    /// A subroutine ends.
+    pub(crate) fn leave_sub(&mut self, value: Option<Value>) {
+        self.parameters.leave(value);
+    }
+
+    /// What values are made of.
+    pub(crate) fn context(&self) -> Context<'_> {
+        Context {
+            parameters: &self.parameters,
+            state: &self.state,
+            letters: &self.letters,
+            reads_assumed: &self.reads_assumed,
+        }
     }
 
     /// The line of the `%` that ended the program, and whether one had opened it; `None` where something else ended it.
@@ -178,7 +222,7 @@ impl Interpreter {
         }
         let items_before = out.len();
         let (next_index, at_rest) = (self.state.path.next_index, self.state.path.at_rest);
-        self.state.line = number;
+        self.state.line = self.reported_line.unwrap_or(number);
         self.run(text, out).map_err(|fault| {
             out.truncate(items_before);
             let path = &mut self.state.path;

@@ -43,6 +43,7 @@ mod check;
 mod config;
 mod diagnostic;
 mod fault;
+mod flow;
 mod interpreter;
 mod item;
 mod line;
@@ -56,7 +57,7 @@ mod testing;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
-pub use config::{Config, Lines, ProbeInput, Tool};
+pub use config::{Config, DEFAULT_MAX_STEPS, Lines, ProbeInput, Tool};
 pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult};

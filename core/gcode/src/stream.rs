@@ -5,17 +5,16 @@ use std::sync::Arc;
 use tandem_sdk::AxisVector;
 
 use crate::config::Config;
-use crate::interpreter::Interpreter;
+use crate::flow::{Execution, Step};
 use crate::item::{Item, ProbeResult};
-use crate::program::lines::{Lines, Next, Pass};
+use crate::program::lines::Pass;
 use crate::program::{Program, ProgramError};
 
 /// A checked program, read again through the same file and handed out as far as it is asked for. Each chunk of text is
 /// compared with what the first pass read before a line of it is interpreted.
 pub struct Stream {
     program: Program,
-    lines: Lines,
-    interpreter: Interpreter,
+    execution: Execution,
     waiting: Option<Waiting>,
 }
 
@@ -32,13 +31,11 @@ impl Stream {
     /// # Errors
     /// The program has not gone through [`crate::check`], or cannot be read.
     pub fn new(mut program: Program, config: &Config) -> Result<Self, ProgramError> {
-        if program.hashes.is_none() {
+        if program.chunks.is_none() {
             return Err(ProgramError::Unchecked(Arc::clone(&program.name)));
         }
-        let lines = Lines::new(&mut program, Pass::Second)?;
-        let mut interpreter = Interpreter::new(config.clone());
-        interpreter.set_file(&program.name);
-        Ok(Self { program, lines, interpreter, waiting: None })
+        let execution = Execution::new(&mut program, config, Pass::Second);
+        Ok(Self { program, execution, waiting: None })
     }
 
     /// Appends the items of the next line that has any; false when the program is over. The last item is
@@ -57,13 +54,15 @@ impl Stream {
         }
         let before = out.len();
         while out.len() == before {
-            if self.interpreter.ended() {
+            if self.execution.interpreter.ended() {
                 return Ok(false);
             }
-            match self.lines.next(&mut self.program)? {
-                Next::Line(range) => self.interpreter.line(self.lines.number, self.lines.text(&range), out)?,
-                Next::Bad(diagnostic) => return Err(diagnostic.into()),
-                Next::End => self.interpreter.finish(out)?,
+            match self.execution.step(&mut self.program, out)? {
+                Step::Line => {}
+                Step::End => self.execution.interpreter.finish(out)?,
+                Step::Wrong(diagnostic) | Step::Stuck(diagnostic) | Step::Open(diagnostic) => {
+                    return Err(diagnostic.into());
+                }
             }
         }
         self.waiting = out[before..].iter().find_map(|item| match item {
@@ -75,18 +74,18 @@ impl Stream {
 
     /// The answer to [`Item::Wait`]: 1 or 0, or −1 after the time-out.
     pub fn provide_input(&mut self, value: f64) {
-        self.interpreter.provide_input(value);
+        self.execution.interpreter.provide_input(value);
         self.waiting = None;
     }
 
     /// What became of the probe that was handed out last.
     pub fn provide_probe(&mut self, result: &ProbeResult) {
-        self.interpreter.provide_probe(result);
+        self.execution.interpreter.provide_probe(result);
         self.waiting = None;
     }
 
     /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.
     pub fn set_position(&mut self, position: AxisVector) {
-        self.interpreter.set_position(position);
+        self.execution.interpreter.set_position(position);
     }
 }

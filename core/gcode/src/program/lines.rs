@@ -1,10 +1,9 @@
 //! A file as lines, read in chunks of whole lines.
 
 use std::hash::{DefaultHasher, Hasher};
-use std::io::Read;
 use std::sync::Arc;
 
-use super::{Program, ProgramError};
+use super::{KnownChunk, Program, ProgramError};
 use crate::diagnostic::Diagnostic;
 use crate::fault::{Fault, Span};
 use crate::interpreter::MAX_LINE_BYTES;
@@ -31,46 +30,84 @@ pub(crate) enum Next {
     End,
 }
 
-/// The lines of a program in one pass.
+/// Most chunks that are held: what a loop that crosses chunks needs at a time. A program without jumps holds one.
+const MAX_HELD: usize = 8;
+
+/// A place between two lines of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Mark {
+    chunk: usize,
+    at: usize,
+    /// Number of the line before.
+    number: u32,
+}
+
+impl Mark {
+    /// The place before the first line.
+    pub const START: Self = Self { chunk: 0, at: 0, number: 0 };
+}
+
+/// A chunk of whole lines that has been read.
+struct Chunk {
+    /// Its place in the program.
+    index: usize,
+    text: Vec<u8>,
+    /// End of its last line; what follows belongs to the next chunk.
+    end: usize,
+    last: bool,
+}
+
+/// The lines of a program in one pass: one after the other, or from a mark on.
 pub(crate) struct Lines {
     pass: Pass,
-    buffer: Vec<u8>,
-    /// Bytes of the buffer that have been read from the file.
-    filled: usize,
-    /// End of the chunk: behind its last line end.
-    end: usize,
+    /// The chunks that are held; the one that is read is the last of them.
+    held: Vec<Chunk>,
+    /// How many chunks may be held.
+    room: usize,
     at: usize,
-    /// Number of chunks read.
-    chunks: usize,
     /// Number of the last line handed out.
     pub number: u32,
     /// The chunk has begun within a line that is too long.
     skipping: bool,
-    at_end_of_file: bool,
 }
 
 impl Lines {
-    pub fn new(program: &mut Program, pass: Pass) -> Result<Self, ProgramError> {
-        program.rewind()?;
+    pub fn new(program: &mut Program, pass: Pass) -> Self {
         if pass == Pass::First {
-            program.hashes = Some(Vec::new());
+            program.chunks = Some(Vec::new());
         }
-        Ok(Self {
-            pass,
-            buffer: vec![0; CHUNK],
-            filled: 0,
-            end: 0,
-            at: 0,
-            chunks: 0,
-            number: 0,
-            skipping: false,
-            at_end_of_file: false,
-        })
+        Self { pass, held: Vec::new(), room: 1, at: 0, number: 0, skipping: false }
     }
 
     /// The text of a line.
     pub fn text(&self, line: &std::ops::Range<usize>) -> &[u8] {
-        &self.buffer[line.clone()]
+        self.held.last().map_or(&[], |chunk| &chunk.text[line.clone()])
+    }
+
+    /// Where the chunk that is read ends.
+    fn end(&self) -> usize {
+        self.held.last().map_or(0, |chunk| chunk.end)
+    }
+
+    /// The place before the next line.
+    pub fn mark(&self) -> Mark {
+        Mark { chunk: self.held.last().map_or(0, |chunk| chunk.index), at: self.at, number: self.number }
+    }
+
+    /// Goes on behind `mark`.
+    ///
+    /// # Errors
+    /// As [`Lines::next`].
+    pub fn seek(&mut self, program: &mut Program, mark: Mark) -> Result<(), ProgramError> {
+        self.room = MAX_HELD;
+        if self.held.last().is_none_or(|chunk| chunk.index != mark.chunk) {
+            self.load(program, mark.chunk)?;
+        }
+        let begins = mark == Mark::START && self.text(&(0..self.end())).starts_with(BOM);
+        self.at = if begins { BOM.len() } else { mark.at };
+        self.number = mark.number;
+        self.skipping = false;
+        Ok(())
     }
 
     /// The next line.
@@ -80,89 +117,93 @@ impl Lines {
     #[inline]
     pub fn next(&mut self, program: &mut Program) -> Result<Next, ProgramError> {
         loop {
-            if self.at == self.end && !self.read_chunk(program)? {
+            let Some(chunk) = self.held.last().filter(|chunk| self.at < chunk.end) else {
+                if self.next_chunk(program)? {
+                    continue;
+                }
                 return Ok(Next::End);
-            }
-            let (range, closed) = self.take_piece();
+            };
+            let (range, after, closed) = piece(chunk, self.at);
+            self.at = after;
             if std::mem::replace(&mut self.skipping, !closed) {
                 continue;
             }
             self.number += 1;
             if range.len() > MAX_LINE_BYTES {
-                return Ok(Next::Bad(self.too_long(program, range.start, range.end)));
+                return Ok(Next::Bad(self.too_long(program, &range)));
             }
             return Ok(Next::Line(range));
         }
     }
 
-    /// The text up to the next line end, and whether there is one (or the file ends). A chunk without any line end is a
-    /// piece of a line that is too long.
-    #[inline]
-    fn take_piece(&mut self) -> (std::ops::Range<usize>, bool) {
-        let from = self.at;
-        let newline = self.buffer[from..self.end].iter().position(|b| *b == b'\n');
-        let to = newline.map_or(self.end, |length| from + length);
-        self.at = (to + 1).min(self.end);
-        let text = &self.buffer[from..to];
-        let to = if text.ends_with(b"\r") { to - 1 } else { to };
-        (from..to, newline.is_some() || self.at_end_of_file)
-    }
-
-    fn too_long(&self, program: &Program, from: usize, to: usize) -> Diagnostic {
+    fn too_long(&self, program: &Program, range: &std::ops::Range<usize>) -> Diagnostic {
         let why = format!("the line is longer than {MAX_LINE_BYTES} bytes: this is hardly a part program");
         let fault = Fault::new(Span::new(0, 1), "line-long", why);
-        Diagnostic::new(&program.name, self.number, &self.buffer[from..to], fault)
+        Diagnostic::new(&program.name, self.number, self.text(range), fault)
     }
 
-    /// Reads the next chunk; false at the end of the file.
-    fn read_chunk(&mut self, program: &mut Program) -> Result<bool, ProgramError> {
-        self.buffer.copy_within(self.end..self.filled, 0);
-        self.filled -= self.end;
-        self.fill(program)?;
-        self.end = match self.buffer[..self.filled].iter().rposition(|b| *b == b'\n') {
-            Some(newline) => newline + 1,
-            None => self.filled,
+    /// Goes on with the next chunk; false at the end of the file.
+    fn next_chunk(&mut self, program: &mut Program) -> Result<bool, ProgramError> {
+        let index = match self.held.last() {
+            Some(chunk) if chunk.last => return Ok(false),
+            Some(chunk) => chunk.index + 1,
+            None => 0,
         };
-        if self.at_end_of_file {
-            self.end = self.filled;
-        }
-        self.compare(program)?;
-        self.at = if self.chunks == 0 && self.buffer[..self.end].starts_with(BOM) { BOM.len() } else { 0 };
-        self.chunks += 1;
-        self.refuse_binary(program)?;
-        Ok(self.end > 0)
+        self.load(program, index)?;
+        let chunk = self.held.last().map_or(&[][..], |chunk| &chunk.text[..chunk.end]);
+        self.at = if index == 0 && chunk.starts_with(BOM) { BOM.len() } else { 0 };
+        Ok(!chunk.is_empty())
     }
 
-    fn fill(&mut self, program: &mut Program) -> Result<(), ProgramError> {
-        while self.filled < CHUNK && !self.at_end_of_file {
-            match program.file.read(&mut self.buffer[self.filled..]) {
-                Ok(0) => self.at_end_of_file = true,
-                Ok(count) => self.filled += count,
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(ProgramError::Io { name: Arc::clone(&program.name), error }),
+    /// Makes the chunk `index` the one that is read: from those that are held, or from the file.
+    fn load(&mut self, program: &mut Program, index: usize) -> Result<(), ProgramError> {
+        if let Some(place) = self.held.iter().position(|chunk| chunk.index == index) {
+            let chunk = self.held.remove(place);
+            self.held.push(chunk);
+            return Ok(());
+        }
+        let text = if self.held.len() < self.room { vec![0; CHUNK] } else { self.held.remove(0).text };
+        let offset = match index.checked_sub(1) {
+            Some(before) => program.chunks.as_ref().and_then(|chunks| chunks.get(before)).map_or(0, |c| c.end),
+            None => 0,
+        };
+        let mut chunk = Chunk { index, text, end: 0, last: false };
+        let filled = program.read_at(offset, &mut chunk.text)?;
+        chunk.last = filled < CHUNK;
+        let newline = chunk.text[..filled].iter().rposition(|b| *b == b'\n');
+        chunk.end = if chunk.last { filled } else { newline.map_or(filled, |newline| newline + 1) };
+        let new = self.compare(program, &chunk, offset)?;
+        if new {
+            self.refuse_binary(program, &chunk)?;
+        }
+        self.held.push(chunk);
+        Ok(())
+    }
+
+    /// Keeps the hash of a chunk that has not been read before, or refuses one that is not what was read then. Whether it
+    /// is new.
+    fn compare(&self, program: &mut Program, chunk: &Chunk, offset: u64) -> Result<bool, ProgramError> {
+        let mut hasher = DefaultHasher::new();
+        hasher.write(&chunk.text[..chunk.end]);
+        let hash = hasher.finish();
+        let known = program.chunks.get_or_insert_default();
+        match known.get(chunk.index) {
+            Some(before) if before.hash == hash => Ok(false),
+            None if self.pass == Pass::First => {
+                known.push(KnownChunk { end: offset + chunk.end as u64, hash });
+                Ok(true)
+            }
+            _ => {
+                let lines = chunk.text[..chunk.end].split(|b| *b == b'\n').count() as u32;
+                let name = Arc::clone(&program.name);
+                let (first_line, last_line) = (self.number + 1, self.number + lines);
+                Err(ProgramError::Changed { name, first_line, last_line })
             }
         }
-        Ok(())
     }
 
-    /// Keeps the hash of the chunk, or refuses a chunk that is not what the first pass read.
-    fn compare(&self, program: &mut Program) -> Result<(), ProgramError> {
-        let mut hasher = DefaultHasher::new();
-        hasher.write(&self.buffer[..self.end]);
-        let hash = hasher.finish();
-        let hashes = program.hashes.get_or_insert_default();
-        if self.pass == Pass::First {
-            hashes.push(hash);
-        } else if hashes.get(self.chunks) != Some(&hash) {
-            let first_line = self.number + 1;
-            let last_line = self.number + self.buffer[..self.end].split(|b| *b == b'\n').count() as u32;
-            return Err(ProgramError::Changed { name: Arc::clone(&program.name), first_line, last_line });
-        }
-        Ok(())
-    }
-
-    fn refuse_binary(&self, program: &Program) -> Result<(), ProgramError> {
-        let chunk = &self.buffer[..self.end];
+    fn refuse_binary(&self, program: &Program, chunk: &Chunk) -> Result<(), ProgramError> {
+        let chunk = &chunk.text[..chunk.end];
         // Nearly always all is plain text, which is seen without a branch for each byte.
         let plain = |b: &u8| *b >= b' ' && *b != 0x7f || *b == b'\n';
         if chunk.iter().fold(true, |all, b| all & plain(b)) {
@@ -182,4 +223,15 @@ impl Lines {
         let text = &chunk[start..start + length.min(MAX_LINE_BYTES).max(at - start)];
         Err(Diagnostic::new(&program.name, line, text, fault).into())
     }
+}
+
+/// The text from `at` to the next line end, where the line after it begins, and whether there is a line end (or the file
+/// ends). A chunk without any line end is a piece of a line that is too long.
+#[inline]
+fn piece(chunk: &Chunk, at: usize) -> (std::ops::Range<usize>, usize, bool) {
+    let newline = chunk.text[at..chunk.end].iter().position(|b| *b == b'\n');
+    let to = newline.map_or(chunk.end, |length| at + length);
+    let after = (to + 1).min(chunk.end);
+    let length = if chunk.text[at..to].ends_with(b"\r") { to - 1 } else { to };
+    (at..length, after, newline.is_some() || chunk.last)
 }

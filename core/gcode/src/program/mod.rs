@@ -1,7 +1,7 @@
 //! The text of a program: one open file, read twice.
 //!
-//! Memory is bounded whatever the size of the program: one chunk of 64 KiB, and 8 bytes (a hash) for each chunk of the
-//! file. A program of a million lines of 30 bytes needs 64 KiB + 4 KiB.
+//! Memory is bounded whatever the size of the program: one chunk of 64 KiB, and 16 bytes (a hash and a place) for each
+//! chunk of the file. A program of a million lines of 30 bytes needs 64 KiB + 8 KiB. One that jumps holds eight chunks.
 
 pub(crate) mod lines;
 
@@ -51,9 +51,19 @@ pub enum ProgramError {
 #[derive(Debug)]
 pub struct Program {
     pub(crate) name: Arc<str>,
-    pub(crate) file: File,
-    /// A hash of each chunk the first pass has read; `None` before it.
-    pub(crate) hashes: Option<Vec<u64>>,
+    file: File,
+    /// Each chunk that the first pass has read; `None` before it.
+    pub(crate) chunks: Option<Vec<KnownChunk>>,
+    /// Files of subroutines that the first pass has opened, with the labels that they were looked up by.
+    pub(crate) subroutines: Vec<(String, Program)>,
+}
+
+/// What is kept of a chunk of text.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct KnownChunk {
+    /// Where it ends in the file.
+    pub end: u64,
+    pub hash: u64,
 }
 
 impl Program {
@@ -72,7 +82,7 @@ impl Program {
         if !kind.is_file() {
             return Self::spool(&name, file);
         }
-        Ok(Self { name, file, hashes: None })
+        Ok(Self { name, file, chunks: None, subroutines: Vec::new() })
     }
 
     /// Copies `reader` to an unnamed temporary file; `name` is for messages.
@@ -84,7 +94,7 @@ impl Program {
         let io = |error| ProgramError::Io { name: Arc::clone(&name), error };
         let mut file = tempfile::tempfile().map_err(io)?;
         io::copy(&mut reader, &mut file).map_err(io)?;
-        Ok(Self { name, file, hashes: None })
+        Ok(Self { name, file, chunks: None, subroutines: Vec::new() })
     }
 
     /// The name of the program, as it was opened.
@@ -92,9 +102,19 @@ impl Program {
         &self.name
     }
 
-    /// Goes back to the first byte.
-    pub(crate) fn rewind(&mut self) -> Result<(), ProgramError> {
-        let rewound = self.file.seek(SeekFrom::Start(0));
-        rewound.map(|_| ()).map_err(|error| ProgramError::Io { name: Arc::clone(&self.name), error })
+    /// Reads from byte `offset` on until `text` is full or the file ends; how many bytes that were.
+    pub(crate) fn read_at(&mut self, offset: u64, text: &mut [u8]) -> Result<usize, ProgramError> {
+        let io = |error| ProgramError::Io { name: Arc::clone(&self.name), error };
+        self.file.seek(SeekFrom::Start(offset)).map_err(io)?;
+        let mut filled = 0;
+        while filled < text.len() {
+            match self.file.read(&mut text[filled..]) {
+                Ok(0) => break,
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(ProgramError::Io { name: Arc::clone(&self.name), error }),
+            }
+        }
+        Ok(filled)
     }
 }

@@ -19,16 +19,72 @@ pub(crate) struct Value {
     pub assumed: bool,
 }
 
+/// Numbered parameters that each call of a subroutine has of its own: its arguments.
+const LOCAL: usize = 30;
+
+type Names = HashMap<Box<[u8]>, Value>;
+
 /// The values that the program has set.
 #[derive(Clone)]
 pub(crate) struct Parameters {
     numbered: Vec<Value>,
-    named: HashMap<Box<[u8]>, Value>,
+    /// Names that begin with `_`.
+    global: Names,
+    /// The other names, of the call that is executed.
+    local: Names,
+    /// What the callers have of their own.
+    callers: Vec<Caller>,
+    /// How many names there are in all.
+    names: usize,
+    /// What the last subroutine returned.
+    returned: Option<Value>,
+}
+
+/// What a caller has of its own while a subroutine is executed.
+#[derive(Clone)]
+struct Caller {
+    numbered: [Value; LOCAL],
+    local: Names,
 }
 
 impl Parameters {
     pub fn new() -> Self {
-        Self { numbered: vec![Value::default(); LAST + 1], named: HashMap::new() }
+        Self {
+            numbered: vec![Value::default(); LAST + 1],
+            global: Names::new(),
+            local: Names::new(),
+            callers: Vec::new(),
+            names: 0,
+            returned: None,
+        }
+    }
+
+    /// A subroutine begins: #1 to #30 are its arguments, zero where there are fewer, and no local name exists.
+    pub fn enter(&mut self, arguments: &[Value]) {
+        let mut numbered = [Value::default(); LOCAL];
+        numbered[..arguments.len()].copy_from_slice(arguments);
+        numbered.swap_with_slice(&mut self.numbered[1..=LOCAL]);
+        self.callers.push(Caller { numbered, local: std::mem::take(&mut self.local) });
+    }
+
+    /// A subroutine ends, and returns a value or none.
+    pub fn leave(&mut self, value: Option<Value>) {
+        self.returned = value;
+        let Some(caller) = self.callers.pop() else { return };
+        self.names -= self.local.len();
+        self.numbered[1..=LOCAL].copy_from_slice(&caller.numbered);
+        self.local = caller.local;
+    }
+
+    /// What the calls say of themselves: `#<_value>`, `#<_value_returned>`, `#<_call_level>`.
+    fn of_calls(&self, name: &[u8]) -> Option<Value> {
+        let value = |number: f64| Value { number, assumed: self.returned.is_some_and(|value| value.assumed) };
+        match name {
+            b"_value" => Some(value(self.returned.map_or(0.0, |value| value.number))),
+            b"_value_returned" => Some(value(f64::from(u8::from(self.returned.is_some())))),
+            b"_call_level" => Some(Value { number: self.callers.len() as f64, assumed: false }),
+            _ => None,
+        }
     }
 
     /// The value of parameter `number`, which lies within 1 to [`LAST`]; zero where it was never set.
@@ -44,7 +100,7 @@ impl Parameters {
             Value { number: predefined_name(name, state, letters)?, assumed: is_position_assumed(name, state, letters) }
                 .into()
         };
-        self.named.get(name).copied().or_else(own)
+        self.names_of(name).get(name).copied().or_else(|| self.of_calls(name)).or_else(own)
     }
 
     pub fn set_numbered(&mut self, number: usize, value: f64, assumed: bool) {
@@ -56,13 +112,19 @@ impl Parameters {
         self.numbered[number].assumed = true;
     }
 
+    fn names_of(&self, name: &[u8]) -> &Names {
+        if name.starts_with(b"_") { &self.global } else { &self.local }
+    }
+
     /// Sets a named parameter; false where there are too many.
     pub fn set_named(&mut self, name: &[u8], value: f64, assumed: bool) -> bool {
         let value = Value { number: value, assumed };
-        if let Some(slot) = self.named.get_mut(name) {
+        let names = if name.starts_with(b"_") { &mut self.global } else { &mut self.local };
+        if let Some(slot) = names.get_mut(name) {
             *slot = value;
-        } else if self.named.len() < MAX_NAMED {
-            self.named.insert(name.into(), value);
+        } else if self.names < MAX_NAMED {
+            names.insert(name.into(), value);
+            self.names += 1;
         } else {
             return false;
         }
@@ -148,6 +210,10 @@ fn position(state: &State, letters: &Letters, nth: usize) -> f64 {
 pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
+        // What calls say of themselves has its value elsewhere; here it only cannot be assigned.
+        b"_value" | b"_value_returned" | b"_call_level" => 0.0,
+        // 0 in previews of LinuxCNC, which this interpreter has none of.
+        b"_task" => 1.0,
         b"_line" => f64::from(state.line),
         b"_metric" => flag(state.modes.unit_mm == 1.0),
         b"_imperial" => flag(state.modes.unit_mm != 1.0),

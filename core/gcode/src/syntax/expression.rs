@@ -8,7 +8,7 @@ use super::scan::Scanner;
 use crate::fault::{Checked, Fault, Span};
 use crate::state::State;
 use crate::state::letters::Letters;
-use crate::state::parameters::{LAST, Parameters};
+use crate::state::parameters::{LAST, Parameters, Value};
 
 /// Most brackets, signs and `#` within each other.
 const MAX_DEPTH: usize = 32;
@@ -39,6 +39,30 @@ impl Context<'_> {
     #[inline]
     pub fn value(&self, scanner: &mut Scanner) -> Checked<f64> {
         if number::starts_here(scanner) { number::read(scanner) } else { self.deep_value(scanner, 0) }
+    }
+
+    /// The value at the cursor, and whether it follows from what the first pass has assumed.
+    pub fn assumed_value(&self, scanner: &mut Scanner) -> Checked<Value> {
+        self.reads_assumed.set(false);
+        let number = self.value(scanner)?;
+        Ok(Value { number, assumed: self.reads_assumed.get() })
+    }
+
+    /// The `[values]` from byte `at` of `text` to its end, at most `max` of them.
+    pub fn bracketed(&self, text: &[u8], at: usize, max: usize, values: &mut Vec<Value>) -> Checked<()> {
+        values.clear();
+        let mut scanner = Scanner::new(text, at);
+        loop {
+            scanner.skip_ignorable()?;
+            if scanner.at_end() {
+                return Ok(());
+            }
+            if scanner.peek() != b'[' || values.len() == max {
+                let more = if max == 0 { "nothing may" } else { "only values in brackets may" };
+                return Err(Fault::new(scanner.here(), "o-word", format!("{more} follow here")));
+            }
+            values.push(self.assumed_value(&mut scanner)?);
+        }
     }
 
     fn deep_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {

@@ -73,8 +73,7 @@ fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
     Ok(Code { tenths: tenths as u16, span })
 }
 
-pub(crate) const O_WORDS: &str =
-    "O-words (subprograms, IF, WHILE, REPEAT) are not supported: let the CAM system write the program out flat";
+pub(crate) const O_WORDS: &str = "an O-word stands in a line of its own of a program; manual input has none";
 
 /// `O1234` alone is the number of a program and harmless; with a word after it, it is flow control.
 fn program_number(scanner: &mut Scanner, start: usize, value: f64, words: &mut LineWords) -> Checked<()> {

@@ -1,0 +1,399 @@
+//! The order in which the lines of a program are executed: one after the other, and as its O-words say.
+
+mod o_word;
+mod outline;
+mod repeats;
+mod sources;
+
+use std::ops::Range;
+
+use crate::config::Config;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::fault::{Fault, Span};
+use crate::interpreter::Interpreter;
+use crate::item::Item;
+use crate::program::lines::{Lines, Mark, Next, Pass};
+use crate::program::{Program, ProgramError};
+use crate::state::parameters::Value;
+use crate::syntax::scan::Scanner;
+use o_word::{Keyword, Label};
+use outline::Entry;
+use repeats::Repeats;
+use sources::{Sources, file};
+
+/// Most calls within each other.
+const MAX_CALLS: usize = 100;
+/// Most callers that a message names.
+const MAX_CALLERS_SHOWN: usize = 5;
+
+/// What a step has met.
+pub(crate) enum Step {
+    /// A line has been executed.
+    Line,
+    /// A line is wrong; what follows can be executed to find more errors.
+    Wrong(Diagnostic),
+    /// Nothing more can be executed.
+    Stuck(Diagnostic),
+    /// In the first pass: where the program goes on depends on what a probe or an input will answer.
+    Open(Diagnostic),
+    /// The file is over.
+    End,
+}
+
+/// A call that has not returned.
+struct Frame {
+    file: usize,
+    /// Where the caller goes on.
+    after: Mark,
+    call_line: u32,
+    /// The subroutine, as an entry of the file that is executed.
+    sub: usize,
+    /// Loops that the caller is in.
+    repeats: usize,
+}
+
+/// A program as it is executed.
+pub(crate) struct Execution {
+    pub interpreter: Interpreter,
+    pass: Pass,
+    sources: Sources,
+    frames: Vec<Frame>,
+    repeats: Repeats,
+    /// Lines executed since the first O-word; in the second pass since the last item.
+    steps: u64,
+    /// The loop that has gone back last.
+    last_loop: Option<(usize, usize)>,
+    /// The line that was executed last, in its chunk.
+    last: Range<usize>,
+    text: Vec<u8>,
+    values: Vec<Value>,
+}
+
+impl Execution {
+    pub fn new(program: &mut Program, config: &Config, pass: Pass) -> Self {
+        let mut interpreter = Interpreter::new(config.clone());
+        interpreter.set_file(&program.name);
+        Self {
+            interpreter,
+            pass,
+            sources: Sources::new(program, pass),
+            frames: Vec::new(),
+            repeats: Repeats::default(),
+            steps: 0,
+            last_loop: None,
+            last: 0..0,
+            text: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// The lines of the program's own file.
+    pub fn lines(&mut self) -> &mut Lines {
+        self.sources.own_lines()
+    }
+
+    /// The text of the line that was executed last.
+    pub fn text(&self) -> &[u8] {
+        self.sources.current().lines.text(&self.last)
+    }
+
+    /// Executes the next line.
+    ///
+    /// # Errors
+    /// A file cannot be read, or has changed since the first pass.
+    #[inline]
+    pub fn step(&mut self, program: &mut Program, out: &mut Vec<Item>) -> Result<Step, ProgramError> {
+        match self.sources.next(program)? {
+            Next::Line(range) => self.last = range,
+            Next::Bad(diagnostic) => return Ok(Step::Wrong(self.called(diagnostic))),
+            Next::End => return Ok(Step::End),
+        }
+        if self.sources.current().outline.is_some() {
+            self.steps += 1;
+            if self.steps > self.interpreter.config().max_steps {
+                return Ok(Step::Stuck(self.endless()));
+            }
+        }
+        let source = self.sources.current();
+        let text = source.lines.text(&self.last);
+        if let Some(label_at) = o_word::find(text, self.interpreter.config().block_delete) {
+            return self.o_word_line(program, label_at, out);
+        }
+        let items = out.len();
+        let done = self.interpreter.line(source.lines.number, text, out);
+        if self.pass == Pass::Second && out.len() > items {
+            self.steps = 0;
+        }
+        Ok(done.map_or_else(|diagnostic| Step::Wrong(self.called(diagnostic)), |()| Step::Line))
+    }
+
+    #[cold]
+    fn o_word_line(&mut self, program: &mut Program, at: usize, out: &mut Vec<Item>) -> Result<Step, ProgramError> {
+        let lines = &self.sources.current().lines;
+        let number = lines.number;
+        if self.sources.current().outline.is_none() {
+            if let Ok(None) = o_word::OWord::read(lines.text(&self.last), at) {
+                // The number of a program is a word as any other.
+                let done = self.interpreter.line(number, lines.text(&self.last), out);
+                return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
+            }
+            let which = self.sources.current;
+            self.sources.index(program, which, self.interpreter.config())?;
+        }
+        if let Some(wrong) = self.sources.outline().wrong(number) {
+            return Ok(Step::Stuck(self.called(wrong.clone())));
+        }
+        let mut text = std::mem::take(&mut self.text);
+        text.clear();
+        text.extend_from_slice(self.sources.current().lines.text(&self.last));
+        let found = self.sources.outline().find(number);
+        let step = if let Some(index) = found {
+            self.obey(program, index, &text)
+        } else {
+            let done = self.interpreter.line(number, &text, out);
+            Ok(done.map_or_else(|diagnostic| Step::Wrong(self.called(diagnostic)), |()| Step::Line))
+        };
+        self.text = text;
+        step
+    }
+
+    /// Executes the O-word `index` of the current file, whose line is `text`.
+    fn obey(&mut self, program: &mut Program, index: usize, text: &[u8]) -> Result<Step, ProgramError> {
+        let entry = self.sources.outline().entry(index).clone();
+        self.interpreter.begin_o_word(entry.number);
+        let jumps = matches!(entry.word.keyword, Keyword::Sub | Keyword::Else | Keyword::ElseIf | Keyword::Do);
+        if !jumps && let Err(fault) = self.read_values(&entry, text) {
+            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+            self.leave_block(program, &entry)?;
+            return Ok(Step::Wrong(self.called(diagnostic)));
+        }
+        let decides = !matches!(entry.word.keyword, Keyword::Call | Keyword::Return | Keyword::EndSub);
+        if decides && self.assumes() {
+            return Ok(self.open(&entry, text));
+        }
+        match entry.word.keyword {
+            Keyword::Call => return self.call(program, &entry, text),
+            Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text),
+            Keyword::Sub | Keyword::Else | Keyword::ElseIf => self.jump_behind(program, entry.close)?,
+            Keyword::If => return self.choose(program, index),
+            Keyword::While if entry.open != index => self.end_do(program, &entry)?,
+            Keyword::While if !self.truth() => self.jump_behind(program, entry.close)?,
+            Keyword::Do | Keyword::EndIf | Keyword::While => {}
+            Keyword::EndWhile => self.go_back(program, entry.open, true)?,
+            Keyword::Repeat => self.begin_repeat(program, index, entry.close)?,
+            Keyword::EndRepeat => self.end_repeat(program, &entry)?,
+            Keyword::Break => {
+                self.leave_repeats(entry.open);
+                self.jump_behind(program, entry.close)?;
+            }
+            Keyword::Continue => {
+                self.leave_repeats(entry.open + 1);
+                let before = self.sources.outline().entry(entry.close).before;
+                self.jump(program, before)?;
+            }
+        }
+        Ok(Step::Line)
+    }
+
+    /// Reads the `[values]` behind the keyword.
+    fn read_values(&mut self, entry: &Entry, text: &[u8]) -> Result<(), Fault> {
+        let at = usize::from(entry.word.values_at);
+        let (min, max) = entry.word.keyword.values();
+        self.interpreter.context().bracketed(text, at, max, &mut self.values)?;
+        if self.values.len() < min {
+            let message = format!("{} needs a value in brackets", entry.word.keyword.name());
+            return Err(Fault::new(Span::new(0, at), "value-missing", message));
+        }
+        Ok(())
+    }
+
+    /// In the first pass: whether a value follows from what has been assumed.
+    fn assumes(&self) -> bool {
+        self.pass == Pass::First && self.values.iter().any(|value| value.assumed)
+    }
+
+    fn truth(&self) -> bool {
+        self.values.first().is_some_and(|value| value.number != 0.0)
+    }
+
+    fn open(&mut self, entry: &Entry, text: &[u8]) -> Step {
+        let message = "from here on the program depends on what a probe or an input will answer: \
+                       what follows is checked when it is driven";
+        let span = Span::new(0, text.len());
+        let fault = Fault::new(span, "branch-open", message);
+        let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+        Step::Open(Diagnostic { severity: Severity::Warning, ..self.called(diagnostic) })
+    }
+
+    /// `if`, and the branches after it whose turn it is.
+    fn choose(&mut self, program: &mut Program, index: usize) -> Result<Step, ProgramError> {
+        if self.truth() {
+            return Ok(Step::Line);
+        }
+        let next = self.sources.outline().entry(self.sources.outline().entry(index).next).clone();
+        if next.word.keyword != Keyword::ElseIf {
+            self.jump(program, next.after)?;
+            return Ok(Step::Line);
+        }
+        let at = self.sources.outline().find(next.number).unwrap_or(index);
+        self.jump(program, next.before)?;
+        let Next::Line(range) = self.sources.next(program)? else { return Ok(Step::Line) };
+        let line = self.sources.current().lines.text(&range).to_vec();
+        self.interpreter.begin_o_word(next.number);
+        if let Err(fault) = self.read_values(&next, &line) {
+            let diagnostic = Diagnostic::new(self.interpreter.file(), next.number, &line, fault);
+            self.leave_block(program, &next)?;
+            return Ok(Step::Wrong(self.called(diagnostic)));
+        }
+        if self.assumes() {
+            return Ok(self.open(&next, &line));
+        }
+        self.choose(program, at)
+    }
+
+    /// After an error: goes on behind the block that the O-word opens or continues.
+    fn leave_block(&mut self, program: &mut Program, entry: &Entry) -> Result<(), ProgramError> {
+        match entry.word.keyword {
+            Keyword::If | Keyword::ElseIf | Keyword::While | Keyword::Repeat if entry.close > 0 => {
+                self.jump_behind(program, entry.close)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn end_do(&mut self, program: &mut Program, entry: &Entry) -> Result<(), ProgramError> {
+        if self.truth() { self.go_back(program, entry.open, false) } else { Ok(()) }
+    }
+
+    fn begin_repeat(&mut self, program: &mut Program, index: usize, close: usize) -> Result<(), ProgramError> {
+        let count = self.values.first().map_or(0.0, |value| value.number.round());
+        if count < 1.0 {
+            return self.jump_behind(program, close);
+        }
+        self.leave_repeats(index);
+        self.repeats.begin(index, count as u64);
+        Ok(())
+    }
+
+    fn end_repeat(&mut self, program: &mut Program, entry: &Entry) -> Result<(), ProgramError> {
+        self.leave_repeats(entry.open + 1);
+        if self.repeats.turn(entry.open) { self.go_back(program, entry.open, false) } else { Ok(()) }
+    }
+
+    /// Forgets the repeats of this call that begin at the O-word `from` or behind it.
+    fn leave_repeats(&mut self, from: usize) {
+        self.repeats.leave(from, self.frames.last().map_or(0, |frame| frame.repeats));
+    }
+
+    /// A loop goes on: at its first line, or with the test before it.
+    fn go_back(&mut self, program: &mut Program, open: usize, with_test: bool) -> Result<(), ProgramError> {
+        self.last_loop = Some((self.sources.current, open));
+        let entry = self.sources.outline().entry(open);
+        let mark = if with_test { entry.before } else { entry.after };
+        self.jump(program, mark)
+    }
+
+    fn jump_behind(&mut self, program: &mut Program, index: usize) -> Result<(), ProgramError> {
+        let after = self.sources.outline().entry(index).after;
+        self.jump(program, after)
+    }
+
+    fn jump(&mut self, program: &mut Program, mark: Mark) -> Result<(), ProgramError> {
+        self.sources.seek(program, mark)
+    }
+
+    fn call(&mut self, program: &mut Program, entry: &Entry, text: &[u8]) -> Result<Step, ProgramError> {
+        let label = match &entry.word.label {
+            Label::Fixed(label) => label.clone(),
+            Label::Computed(at) => {
+                match self.interpreter.context().assumed_value(&mut Scanner::new(text, usize::from(*at))) {
+                    Ok(value) if value.assumed && self.pass == Pass::First => return Ok(self.open(entry, text)),
+                    Ok(value) => format!("{}", value.number.round()).into(),
+                    Err(fault) => {
+                        let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+                        return Ok(Step::Wrong(self.called(diagnostic)));
+                    }
+                }
+            }
+        };
+        let refuse = |this: &Self, why: String| {
+            let fault = Fault::new(Span::new(0, usize::from(entry.word.values_at)), "o-word", why);
+            this.called(Diagnostic::new(this.interpreter.file(), entry.number, text, fault))
+        };
+        if self.frames.len() == MAX_CALLS {
+            let why = format!("calls lie {MAX_CALLS} deep within each other: a subroutine calls itself without end");
+            return Ok(Step::Stuck(refuse(self, why)));
+        }
+        let (target, sub) = match self.sources.find_sub(program, &label, self.interpreter.config())? {
+            Ok(found) => found,
+            Err(why) => return Ok(Step::Wrong(refuse(self, why))),
+        };
+        let called = self.sources.get(target).outline.as_ref();
+        let wrong = called.and_then(|outline| outline.wrong(outline.entry(sub).number));
+        if let Some(wrong) = wrong {
+            return Ok(Step::Stuck(self.called(wrong.clone())));
+        }
+        let after = self.sources.current().lines.mark();
+        let (call_line, repeats) = (entry.number, self.repeats.len());
+        self.frames.push(Frame { file: self.sources.current, after, call_line, sub, repeats });
+        self.interpreter.enter_sub(&self.values);
+        self.switch_to(program, target);
+        let start = self.sources.outline().entry(sub).after;
+        self.jump(program, start)?;
+        Ok(Step::Line)
+    }
+
+    /// `return` and `endsub`.
+    fn end_call(&mut self, program: &mut Program, entry: &Entry, text: &[u8]) -> Result<Step, ProgramError> {
+        let Some(frame) = self.frames.pop() else {
+            let why = format!("{} without a call", entry.word.keyword.name());
+            let fault = Fault::new(Span::new(0, usize::from(entry.word.values_at)), "o-word", why);
+            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+            return Ok(Step::Stuck(diagnostic));
+        };
+        self.interpreter.leave_sub(self.values.first().copied());
+        self.repeats.truncate(frame.repeats);
+        self.switch_to(program, frame.file);
+        self.jump(program, frame.after)?;
+        Ok(Step::Line)
+    }
+
+    /// Makes another file the one that is executed. The blocks of a file of its own bear the line that calls it.
+    fn switch_to(&mut self, program: &mut Program, which: usize) {
+        self.sources.current = which;
+        self.interpreter.set_file(&file(program, which).name);
+        let in_program = self.frames.iter().rev().find(|frame| frame.file == 0);
+        self.interpreter.reported_line = in_program.filter(|_| which != 0).map(|frame| frame.call_line);
+    }
+
+    /// Adds to a message who called the subroutine in which it arises.
+    fn called(&self, mut diagnostic: Diagnostic) -> Diagnostic {
+        use std::fmt::Write as _;
+        for (depth, frame) in self.frames.iter().enumerate().rev().take(MAX_CALLERS_SHOWN) {
+            let which = self.frames.get(depth + 1).map_or(self.sources.current, |inner| inner.file);
+            let name = self.sources.get(which).outline.as_ref().map(|outline| outline.shown(frame.sub));
+            let name = name.unwrap_or_default().replace(" sub", "");
+            let _ = write!(diagnostic.message, "; in {name}, called from line {}", frame.call_line);
+        }
+        if self.frames.len() > MAX_CALLERS_SHOWN {
+            let _ = write!(diagnostic.message, "; and {} callers before", self.frames.len() - MAX_CALLERS_SHOWN);
+        }
+        diagnostic
+    }
+
+    /// The program has executed too many lines.
+    fn endless(&self) -> Diagnostic {
+        let steps = self.interpreter.config().max_steps;
+        let since = if self.pass == Pass::Second { " without an item" } else { "" };
+        let whose = self.last_loop.and_then(|(which, open)| {
+            let outline = self.sources.get(which).outline.as_ref()?;
+            Some(format!("{} of line {} goes on", outline.shown(open), outline.entry(open).number))
+        });
+        let whose = whose.unwrap_or_else(|| "the program goes on".into());
+        let message = format!("{whose} after {steps} lines{since} ([program] max_steps): it may never end");
+        let number = self.sources.current().lines.number;
+        let text = self.text();
+        let fault = Fault::new(Span::new(0, text.len()), "endless", message);
+        self.called(Diagnostic::new(self.interpreter.file(), number, text, fault))
+    }
+}

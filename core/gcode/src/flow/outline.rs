@@ -1,0 +1,231 @@
+//! Where the O-words of a file stand, and what belongs together: found once, when the first of them comes.
+
+use std::collections::HashMap;
+
+use super::o_word::{self, Keyword, Label, OWord};
+use crate::diagnostic::Diagnostic;
+use crate::fault::{Checked, Fault, Span};
+use crate::program::lines::{Lines, Mark, Next};
+use crate::program::{Program, ProgramError};
+
+/// Most O-words of a file, so that memory stays bounded.
+const MAX_O_WORDS: usize = 20_000;
+
+/// One O-word.
+#[derive(Clone, Debug)]
+pub(crate) struct Entry {
+    pub number: u32,
+    pub word: OWord,
+    /// The place before its line, and the one after it.
+    pub before: Mark,
+    pub after: Mark,
+    /// What opens the block that this belongs to, and what closes it.
+    pub open: usize,
+    pub close: usize,
+    /// After `if`, `elseif` and `else`: the next of them, or `endif`.
+    pub next: usize,
+}
+
+/// The O-words of a file in their order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Outline {
+    entries: Vec<Entry>,
+    /// The subroutines by their labels.
+    subs: HashMap<Box<str>, usize>,
+    /// What is wrong with the O-words of a line. It counts where the line is executed, and not where it never is.
+    wrong: HashMap<u32, Diagnostic>,
+}
+
+impl Outline {
+    /// Reads all of `lines`, which then stand at their end.
+    pub fn read(program: &mut Program, lines: &mut Lines, block_delete: bool) -> Result<Self, ProgramError> {
+        let mut outline = Self::default();
+        let mut open = Vec::new();
+        lines.seek(program, Mark::START)?;
+        loop {
+            let before = lines.mark();
+            let range = match lines.next(program)? {
+                Next::Line(range) => range,
+                Next::Bad(_) => continue,
+                Next::End => break,
+            };
+            let number = lines.number;
+            let text = lines.text(&range);
+            let Some(at) = o_word::find(text, block_delete) else { continue };
+            let added = match OWord::read(text, at) {
+                Ok(None) => continue,
+                Ok(Some(word)) => {
+                    let entry = Entry { number, word, before, after: lines.mark(), open: 0, close: 0, next: 0 };
+                    outline.add(entry, &mut open)
+                }
+                Err(fault) => Err(fault),
+            };
+            if let Err(fault) = added {
+                outline.wrong.insert(number, Diagnostic::new(&program.name, number, text, fault));
+            }
+        }
+        for opened in open {
+            let fault = outline.fault(opened, "it is opened and never closed");
+            let number = outline.entries[opened].number;
+            outline.wrong.entry(number).or_insert_with(|| Diagnostic::new(&program.name, number, b"", fault));
+        }
+        Ok(outline)
+    }
+
+    /// What is wrong with the O-word of line `number`.
+    pub fn wrong(&self, number: u32) -> Option<&Diagnostic> {
+        self.wrong.get(&number)
+    }
+
+    /// The O-word of line `number`; none where it is wrong.
+    pub fn find(&self, number: u32) -> Option<usize> {
+        self.entries.binary_search_by_key(&number, |entry| entry.number).ok()
+    }
+
+    pub fn entry(&self, index: usize) -> &Entry {
+        &self.entries[index]
+    }
+
+    pub fn sub(&self, label: &str) -> Option<usize> {
+        self.subs.get(label).copied()
+    }
+
+    /// How an entry is written: `o100 while`.
+    pub fn shown(&self, index: usize) -> String {
+        let entry = &self.entries[index];
+        match &entry.word.label {
+            Label::Fixed(label) if label.bytes().all(|b| b.is_ascii_digit()) => {
+                format!("o{label} {}", entry.word.keyword.name())
+            }
+            Label::Fixed(label) => format!("o<{label}> {}", entry.word.keyword.name()),
+            Label::Computed(_) => format!("o[…] {}", entry.word.keyword.name()),
+        }
+    }
+
+    /// Adds an entry; `open` are the blocks that are not closed yet.
+    fn add(&mut self, entry: Entry, open: &mut Vec<usize>) -> Checked<()> {
+        let index = self.entries.len();
+        if index == MAX_O_WORDS {
+            let message = format!("a file holds at most {MAX_O_WORDS} O-words");
+            return Err(Fault::new(Span::new(0, 1), "o-word", message));
+        }
+        let keyword = entry.word.keyword;
+        let label = entry.word.label.clone();
+        self.entries.push(Entry { open: index, close: index, next: index, ..entry });
+        match keyword {
+            Keyword::Sub => self.open_sub(index, &label, open),
+            Keyword::While if self.top(open, &label, &[Keyword::Do]).is_some() => {
+                self.close(index, open);
+                Ok(())
+            }
+            Keyword::If | Keyword::While | Keyword::Do | Keyword::Repeat => {
+                open.push(index);
+                Ok(())
+            }
+            Keyword::ElseIf | Keyword::Else => self.branch(index, &label, open),
+            Keyword::EndIf => self.end(index, &label, &[Keyword::If], open),
+            Keyword::EndSub => self.end(index, &label, &[Keyword::Sub], open),
+            Keyword::EndWhile => self.end(index, &label, &[Keyword::While], open),
+            Keyword::EndRepeat => self.end(index, &label, &[Keyword::Repeat], open),
+            Keyword::Break | Keyword::Continue => {
+                self.inside(index, &label, &[Keyword::While, Keyword::Do, Keyword::Repeat], open)
+            }
+            Keyword::Return => self.inside(index, &label, &[Keyword::Sub], open),
+            Keyword::Call => Ok(()),
+        }
+    }
+
+    fn open_sub(&mut self, index: usize, label: &Label, open: &mut Vec<usize>) -> Checked<()> {
+        let outer = open.iter().find(|outer| self.entries[**outer].word.keyword == Keyword::Sub).copied();
+        open.push(index);
+        if let Some(outer) = outer {
+            return Err(self.fault(index, &format!("a subroutine lies within another, {}", self.placed(outer))));
+        }
+        let Label::Fixed(label) = label else { return Ok(()) };
+        match self.subs.insert(label.clone(), index) {
+            Some(before) => {
+                Err(self.fault(index, &format!("the subroutine is there already: {}", self.placed(before))))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The block that was opened last, if it has this label and one of these keywords.
+    fn top(&self, open: &[usize], label: &Label, keywords: &[Keyword]) -> Option<usize> {
+        let entry = &self.entries[*open.last()?];
+        (keywords.contains(&entry.word.keyword) && entry.word.label == *label).then_some(*open.last()?)
+    }
+
+    fn end(&mut self, index: usize, label: &Label, keywords: &[Keyword], open: &mut Vec<usize>) -> Checked<()> {
+        if self.top(open, label, keywords).is_some() {
+            self.close(index, open);
+            return Ok(());
+        }
+        // Gives up what lies within the block that this closes, so that one mistake is one message.
+        let opener = |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
+        let fault = match open.last() {
+            Some(other) => self.fault(index, &format!("it closes nothing here: open is {}", self.placed(*other))),
+            None => self.fault(index, "it closes nothing: no block is open"),
+        };
+        if let Some(place) = open.iter().rposition(|opened| opener(&self.entries[*opened])) {
+            open.truncate(place);
+        }
+        Err(fault)
+    }
+
+    /// Entry `index` closes the block that was opened last.
+    fn close(&mut self, index: usize, open: &mut Vec<usize>) {
+        let Some(opened) = open.pop() else { return };
+        self.entries[index].open = opened;
+        for inside in opened..index {
+            if self.entries[inside].open == opened {
+                self.entries[inside].close = index;
+            }
+        }
+        // The last branch of an if goes on at its end.
+        let last = (opened..index)
+            .rev()
+            .find(|inside| self.entries[*inside].open == opened && is_branch(&self.entries[*inside]));
+        if let Some(last) = last {
+            self.entries[last].next = index;
+        }
+    }
+
+    fn branch(&mut self, index: usize, label: &Label, open: &[usize]) -> Checked<()> {
+        let Some(opened) = self.top(open, label, &[Keyword::If]) else {
+            return Err(self.fault(index, "it belongs to no if that is open here"));
+        };
+        self.entries[index].open = opened;
+        let before = (opened..index).rev().find(|inside| self.entries[*inside].open == opened).unwrap_or(opened);
+        if self.entries[before].word.keyword == Keyword::Else {
+            return Err(self.fault(index, &format!("nothing but endif may follow else, {}", self.placed(before))));
+        }
+        self.entries[before].next = index;
+        Ok(())
+    }
+
+    /// `break`, `continue` and `return` belong to a block around them.
+    fn inside(&mut self, index: usize, label: &Label, keywords: &[Keyword], open: &[usize]) -> Checked<()> {
+        let belongs = |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
+        let around = open.iter().rev().find(|opened| belongs(&self.entries[**opened])).copied();
+        let Some(around) = around else {
+            let names: Vec<_> = keywords.iter().map(|keyword| keyword.name()).collect();
+            return Err(self.fault(index, &format!("it stands in no {} with this label", names.join(" or "))));
+        };
+        self.entries[index].open = around;
+        Ok(())
+    }
+
+    fn fault(&self, index: usize, why: &str) -> Fault {
+        let end = usize::from(self.entries[index].word.values_at);
+        Fault::new(Span::new(0, end), "o-word", format!("{}: {why}", self.shown(index)))
+    }
+
+    fn placed(&self, index: usize) -> String {
+        format!("{} of line {}", self.shown(index), self.entries[index].number)
+    }
+}
+
+fn is_branch(entry: &Entry) -> bool {
+    matches!(entry.word.keyword, Keyword::If | Keyword::ElseIf | Keyword::Else)
+}

@@ -1,0 +1,134 @@
+//! The files that a program executes: its own, and those of subroutines.
+
+use std::sync::Arc;
+
+use super::outline::Outline;
+use crate::config::Config;
+use crate::program::lines::{Lines, Mark, Next, Pass};
+use crate::program::{Program, ProgramError};
+
+/// Most files of subroutines.
+const MAX_FILES: usize = 256;
+
+/// One file.
+pub(super) struct Source {
+    pub lines: Lines,
+    /// Its O-words, once one has come.
+    pub outline: Option<Outline>,
+}
+
+/// The files; the one that is executed is the current one.
+pub(super) struct Sources {
+    pass: Pass,
+    /// The program, and then the files of subroutines.
+    list: Vec<Source>,
+    pub current: usize,
+}
+
+impl Sources {
+    pub fn new(program: &mut Program, pass: Pass) -> Self {
+        let own = Source { lines: Lines::new(program, pass), outline: None };
+        Self { pass, list: vec![own], current: 0 }
+    }
+
+    #[inline]
+    pub fn current(&self) -> &Source {
+        &self.list[self.current]
+    }
+
+    pub fn get(&self, which: usize) -> &Source {
+        &self.list[which]
+    }
+
+    /// The lines of the program's own file.
+    pub fn own_lines(&mut self) -> &mut Lines {
+        &mut self.list[0].lines
+    }
+
+    /// The next line of the current file.
+    #[inline]
+    pub fn next(&mut self, program: &mut Program) -> Result<Next, ProgramError> {
+        self.list[self.current].lines.next(file(program, self.current))
+    }
+
+    /// Goes on behind `mark` of the current file.
+    pub fn seek(&mut self, program: &mut Program, mark: Mark) -> Result<(), ProgramError> {
+        self.list[self.current].lines.seek(file(program, self.current), mark)
+    }
+
+    /// The O-words of the current file; none before they have been indexed.
+    pub fn outline(&self) -> &Outline {
+        static NONE: std::sync::OnceLock<Outline> = std::sync::OnceLock::new();
+        self.current().outline.as_ref().unwrap_or_else(|| NONE.get_or_init(Outline::default))
+    }
+
+    /// Finds the O-words of a file, whose lines then stand where they stood.
+    pub fn index(&mut self, program: &mut Program, which: usize, config: &Config) -> Result<(), ProgramError> {
+        let source = &mut self.list[which];
+        let file = file(program, which);
+        let mark = source.lines.mark();
+        source.outline = Some(Outline::read(file, &mut source.lines, config.block_delete)?);
+        source.lines.seek(file, mark)
+    }
+
+    /// The file and the entry of a subroutine: in the current file, in the program, or in a file of its own. The inner error
+    /// says why there is none.
+    pub fn find_sub(
+        &mut self,
+        program: &mut Program,
+        label: &str,
+        config: &Config,
+    ) -> Result<Result<(usize, usize), String>, ProgramError> {
+        for which in [self.current, 0] {
+            if let Some(sub) = self.list[which].outline.as_ref().and_then(|outline| outline.sub(label)) {
+                return Ok(Ok((which, sub)));
+            }
+        }
+        let known = program.subroutines.iter().position(|(name, _)| name == label);
+        let place = match known.map_or_else(|| open_file(program, label, config), Ok) {
+            Ok(place) => place,
+            Err(why) => return Ok(Err(why)),
+        };
+        while self.list.len() <= place + 1 {
+            let index = self.list.len();
+            let pass = if known.is_some() { self.pass } else { Pass::First };
+            let lines = Lines::new(file(program, index), pass);
+            self.list.push(Source { lines, outline: None });
+        }
+        if self.list[place + 1].outline.is_none() {
+            self.index(program, place + 1, config)?;
+        }
+        let found = self.list[place + 1].outline.as_ref().and_then(|outline| outline.sub(label));
+        let name = Arc::clone(&program.subroutines[place].1.name);
+        Ok(found.map(|sub| (place + 1, sub)).ok_or_else(|| format!("{name} holds no subroutine o<{label}>")))
+    }
+}
+
+/// The file `which` of a program: itself, or one of its subroutines.
+pub(super) fn file(program: &mut Program, which: usize) -> &mut Program {
+    match which.checked_sub(1) {
+        None => program,
+        Some(place) => &mut program.subroutines[place].1,
+    }
+}
+
+/// Opens the file of a subroutine; its place among them.
+fn open_file(program: &mut Program, label: &str, config: &Config) -> Result<usize, String> {
+    if program.subroutines.len() == MAX_FILES {
+        return Err(format!("the program calls subroutines of more than {MAX_FILES} files"));
+    }
+    let folders = &config.subroutine_path;
+    let name = format!("{label}.ngc");
+    let Some(path) = folders.iter().map(|folder| folder.join(&name)).find(|path| path.is_file()) else {
+        let shown: Vec<_> = folders.iter().map(|folder| folder.display().to_string()).collect();
+        let elsewhere = if shown.is_empty() {
+            "the machine file has no [program] subroutine_path for files of subroutines".to_owned()
+        } else {
+            format!("no file {name} lies in {}", shown.join(" or "))
+        };
+        return Err(format!("there is no subroutine with this label in this file, and {elsewhere}"));
+    };
+    let opened = Program::open(&path).map_err(|error| error.to_string())?;
+    program.subroutines.push((label.to_owned(), opened));
+    Ok(program.subroutines.len() - 1)
+}

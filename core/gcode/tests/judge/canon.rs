@@ -1,0 +1,106 @@
+//! What the judge prints: calls of the canonical machine, with the offsets that it leaves to the machine.
+
+use std::fs::File;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::Move;
+
+/// What is said of a program that the judge does not end: some loops within repeats in subroutines keep it going for ever.
+pub const NEVER_ENDS: &str = "the judge does not end";
+const GIVE_UP_MS: u32 = 4000;
+
+/// The offsets of the canonical machine, program units.
+#[derive(Default)]
+struct Machine {
+    unit_mm: f64,
+    origin: [f64; 3],
+    g92: [f64; 3],
+    tool: [f64; 3],
+    rotation_deg: f64,
+    plane: usize,
+}
+
+impl Machine {
+    /// G92 first, then the rotation, then the coordinate system and the tool.
+    fn position(&self, program: &[f64]) -> [f64; 3] {
+        let mut at = [0, 1, 2].map(|axis| program[axis] + self.g92[axis]);
+        let (sin, cos) = self.rotation_deg.to_radians().sin_cos();
+        (at[0], at[1]) = (at[0] * cos - at[1] * sin, at[0] * sin + at[1] * cos);
+        [0, 1, 2].map(|axis| (at[axis] + self.origin[axis] + self.tool[axis]) * self.unit_mm)
+    }
+
+    fn arc(&self, numbers: &[f64]) -> Move {
+        // Ends and centres in the plane: XY, YZ or ZX.
+        let axes = [[0, 1, 2], [1, 2, 0], [2, 0, 1]][self.plane];
+        let place = |first: f64, second: f64| {
+            let mut point = [0.0; 3];
+            (point[axes[0]], point[axes[1]], point[axes[2]]) = (first, second, numbers[5]);
+            self.position(&point)
+        };
+        let end = place(numbers[0], numbers[1]);
+        let center = place(numbers[2], numbers[3]);
+        // The order of this interpreter's planes: XY, YZ, ZX.
+        Move::Arc(end, [center[axes[0]] - end[axes[0]], center[axes[1]] - end[axes[1]]])
+    }
+}
+
+/// What the judge says of a program.
+pub fn judged(judge: &Path, program: &Path, folder: &Path) -> Result<Vec<Move>, String> {
+    let tools = folder.join("tools.tbl");
+    let variables = folder.join("variables.var");
+    // Without a configuration its tool table is in inches: 20 and 25 mm.
+    std::fs::write(&tools, "T1 P1 Z0.787401574803 D0.25\nT2 P2 Z0.984251968504 D0.25\n").unwrap();
+    std::fs::write(&variables, "").unwrap();
+    let mut command = Command::new(judge);
+    command.arg("-t").arg(&tools).arg("-v").arg(&variables).arg("-g").arg(program);
+    // Its tool table is a file in the home folder, which runs side by side would share.
+    command.env("HOME", folder).current_dir(folder).stdin(Stdio::null());
+    let [calls, messages] = ["calls.txt", "messages.txt"].map(|name| folder.join(name));
+    command.stdout(File::create(&calls).unwrap()).stderr(File::create(&messages).unwrap());
+    let mut running = command.spawn().map_err(|e| e.to_string())?;
+    for waited_ms in (0..).step_by(10) {
+        if running.try_wait().map_err(|e| e.to_string())?.is_some() {
+            break;
+        }
+        if waited_ms > GIVE_UP_MS {
+            running.kill().and_then(|()| running.wait()).map_err(|e| e.to_string())?;
+            return Err(NEVER_ENDS.to_owned());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let text = |path| String::from_utf8_lossy(&std::fs::read(path).unwrap()).into_owned();
+    let calls = text(&calls);
+    if !calls.contains("PROGRAM_END") {
+        return Err(text(&messages).lines().skip(1).collect::<Vec<_>>().join(" | "));
+    }
+    Ok(read(&calls))
+}
+
+fn read(text: &str) -> Vec<Move> {
+    let mut machine = Machine { unit_mm: 1.0, ..Machine::default() };
+    let mut moves = Vec::new();
+    for line in text.lines() {
+        let Some(call) = line.split_whitespace().nth(2) else { continue };
+        let Some((name, _)) = call.split_once('(') else { continue };
+        let inside = line.split_once('(').map_or("", |(_, inside)| inside).trim_end_matches(')');
+        let numbers: Vec<f64> = inside.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+        match name {
+            "STRAIGHT_TRAVERSE" => moves.push(Move::Rapid(machine.position(&numbers))),
+            "STRAIGHT_FEED" => moves.push(Move::Line(machine.position(&numbers))),
+            "ARC_FEED" => moves.push(machine.arc(&numbers)),
+            "DWELL" => moves.push(Move::Dwell(numbers[0])),
+            "SET_G5X_OFFSET" => machine.origin = [numbers[1], numbers[2], numbers[3]],
+            "SET_G92_OFFSET" => machine.g92 = [numbers[0], numbers[1], numbers[2]],
+            "SET_XY_ROTATION" => machine.rotation_deg = numbers[0],
+            "USE_TOOL_LENGTH_OFFSET" => machine.tool = [numbers[0], numbers[1], numbers[2]],
+            "USE_LENGTH_UNITS" => machine.unit_mm = if inside.contains("INCHES") { 25.4 } else { 1.0 },
+            "SELECT_PLANE" => {
+                machine.plane = ["XY", "YZ", "XZ"].iter().position(|plane| inside.contains(plane)).unwrap_or(0);
+            }
+            _ => {}
+        }
+    }
+    moves
+}

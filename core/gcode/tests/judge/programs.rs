@@ -1,0 +1,191 @@
+//! Random programs from seeds.
+
+use std::fmt::Write as _;
+
+use tandem_rig::Random;
+
+/// A program that is being written.
+struct Writer {
+    random: Random,
+    text: String,
+    /// The next number of a loop or a branch.
+    label: u32,
+    /// Statements that may still be written, so that a program ends.
+    left: u32,
+    /// Subroutines that may be called: those before it, so that none calls itself.
+    subs: u32,
+    in_sub: bool,
+}
+
+impl Writer {
+    fn new(seed: u64, statements: u32) -> Self {
+        let text = "G21 G90 G94 G17 F600\nG64\n".to_owned();
+        Self { random: Random::new(seed), text, label: 1000, left: statements, subs: 0, in_sub: false }
+    }
+
+    fn line(&mut self, text: &str) {
+        let _ = writeln!(self.text, "{text}");
+    }
+
+    fn label(&mut self) -> u32 {
+        self.label += 1;
+        self.label
+    }
+
+    fn below(&mut self, count: u64) -> u64 {
+        self.random.below(count)
+    }
+
+    /// A value that stays small: parameters hold 0 to 12.
+    fn value(&mut self) -> String {
+        match self.below(8) {
+            0 | 1 => format!("#{}", 1 + self.below(5)),
+            2 => format!("#{}", 31 + self.below(4)),
+            3 => "#<_count>".into(),
+            4 => format!("[#{} * 3 + #31]", 1 + self.below(5)),
+            5 => format!("[#{} MOD 4 + 0.5]", 1 + self.below(5)),
+            6 => "#<_value>".into(),
+            _ => format!("{}", self.below(13)),
+        }
+    }
+
+    fn condition(&mut self) -> String {
+        let (a, b) = (self.value(), self.value());
+        let operator = self.random.pick(&["GT", "LT", "GE", "LE", "EQ", "NE"]);
+        let simple = format!("[{a} {operator} {b}]");
+        match self.below(4) {
+            0 => format!("[{simple} AND [{} LT 9]]", self.value()),
+            1 => format!("[{simple} OR [{} GT 7]]", self.value()),
+            _ => simple,
+        }
+    }
+
+    fn statements(&mut self, depth: u32) {
+        for _ in 0..=self.below(4) {
+            if self.left == 0 {
+                return;
+            }
+            self.left -= 1;
+            self.statement(depth);
+        }
+    }
+
+    fn statement(&mut self, depth: u32) {
+        match self.below(if depth < 4 { 14 } else { 6 }) {
+            0..=2 => self.motion(),
+            3 | 4 => {
+                let target = match self.below(3) {
+                    0 => format!("#{}", 1 + self.below(5)),
+                    1 => format!("#{}", 31 + self.below(4)),
+                    _ => "#<_count>".into(),
+                };
+                let value = self.value();
+                self.line(&format!("{target} = [[{value}] MOD 13]"));
+            }
+            5 => {
+                let text = self.random.pick(&["G91", "G90", "G90", "G90", "(a comment)", "", "G4 P0.25", "N77"]);
+                self.line(text);
+            }
+            6 | 7 => self.branch(depth),
+            8 => self.while_loop(depth),
+            // No `do`: once another loop has been there, the judge ends it after one turn, or never.
+            9 => self.motion(),
+            10 => self.repeat(depth),
+            11 if self.in_sub => {
+                let (label, condition, value) = (self.label(), self.condition(), self.value());
+                let sub = self.subs + 1;
+                self.line(&format!("o{label} if {condition}"));
+                let end =
+                    if self.below(2) == 0 { format!("o{sub} return") } else { format!("o{sub} return [{value}]") };
+                self.line(&end);
+                self.line(&format!("o{label} endif"));
+            }
+            _ => self.call(),
+        }
+    }
+
+    fn motion(&mut self) {
+        let (word, x, y) = (self.random.pick(&["G0", "G1", ""]), self.value(), self.value());
+        let z = if self.below(3) == 0 { format!(" Z{}", self.value()) } else { String::new() };
+        self.line(&format!("{word} X{x} Y{y}{z}"));
+    }
+
+    fn branch(&mut self, depth: u32) {
+        let (label, condition) = (self.label(), self.condition());
+        self.line(&format!("o{label} if {condition}"));
+        self.statements(depth + 1);
+        for _ in 0..self.below(3) {
+            let condition = self.condition();
+            self.line(&format!("o{label} elseif {condition}"));
+            self.statements(depth + 1);
+        }
+        if self.below(2) == 0 {
+            self.line(&format!("o{label} else"));
+            self.statements(depth + 1);
+        }
+        self.line(&format!("o{label} endif"));
+    }
+
+    /// Leaves the loop `label`, or begins its next turn.
+    fn leave(&mut self, label: u32) {
+        if self.below(3) == 0 {
+            let (inner, condition) = (self.label(), self.condition());
+            let how = self.random.pick(&["break", "continue"]);
+            self.line(&format!("o{inner} if {condition}\no{label} {how}\no{inner} endif"));
+        }
+    }
+
+    fn while_loop(&mut self, depth: u32) {
+        let label = self.label();
+        let turns = 1 + self.below(4);
+        self.line(&format!("#<turn{label}> = 0\no{label} while [#<turn{label}> LT {turns}]"));
+        self.line(&format!("#<turn{label}> = [#<turn{label}> + 1]"));
+        self.statements(depth + 1);
+        self.leave(label);
+        self.statements(depth + 1);
+        self.line(&format!("o{label} endwhile"));
+    }
+
+    fn repeat(&mut self, depth: u32) {
+        let label = self.label();
+        let turns = self.random.pick(&["0", "1", "2", "3", "2.6", "-1", "#31 MOD 4"]);
+        self.line(&format!("o{label} repeat [{turns}]"));
+        self.statements(depth + 1);
+        self.line(&format!("o{label} endrepeat"));
+    }
+
+    fn call(&mut self) {
+        if self.subs == 0 {
+            return self.motion();
+        }
+        let sub = 1 + self.below(u64::from(self.subs));
+        let arguments: Vec<_> = (0..self.below(4)).map(|_| format!("[{}]", self.value())).collect();
+        self.line(&format!("o{sub} call {}", arguments.join(" ")));
+    }
+}
+
+/// Subroutines, calls, loops and branches around straight moves.
+pub fn with_o_words(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 24);
+    writer.line("#31=1 #32=5 #33=2 #34=9 #<_count>=3");
+    for _ in 0..writer.below(4) {
+        let number = writer.subs + 1;
+        writer.line(&format!("o{number} sub"));
+        writer.in_sub = true;
+        writer.left += 8;
+        writer.statements(1);
+        writer.in_sub = false;
+        let value = writer.value();
+        let end =
+            if writer.below(2) == 0 { format!("o{number} endsub [{value}]") } else { format!("o{number} endsub") };
+        writer.line(&end);
+        writer.subs = number;
+    }
+    // The judge takes the value of an `endsub` that it passes over for one that has been returned: a call forgets it.
+    writer.line("o99 sub\no99 endsub\no99 call\n#1=4 #2=7 #3=1 #4=0 #5=11\nG0 X0 Y0");
+    while writer.left > 0 {
+        writer.statements(0);
+    }
+    writer.line("G90 G0 X1 Y#<_count>\nM2");
+    writer.text
+}
