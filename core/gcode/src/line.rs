@@ -85,12 +85,14 @@ impl Line<'_> {
     #[inline]
     fn set_motion(&mut self) {
         if let Some(word) = self.orders.get(Group::Motion) {
+            self.state.cycles.begin(word);
             match word.action {
                 Action::Move(..) => self.state.motion = MotionMode::Word(word),
                 Action::MoveOnce(..) => {}
                 Action::Act(_) | Action::Refuse(_) => self.state.motion = MotionMode::None,
             }
         } else if self.orders.has(Group::CycleCancel) {
+            self.state.cycles.end();
             self.state.motion = MotionMode::None;
         }
     }

@@ -128,7 +128,7 @@ fn what_does_not_go_with_a_probe_is_refused() {
             "G38.2 Z-101 F10",
             "1:7 [travel] Z would reach -101 mm, beyond its travel of -100 to 100 mm (machine coordinates)",
         ),
-        ("G38.2 Z-1 Q2 F10", "1:11 [unused-word] nothing in this line takes the word Q (G5, G64, M66 would)"),
+        ("G38.2 Z-1 Q2 F10", "1:11 [unused-word] nothing in this line takes the word Q (G5, G64, G73, G83, M66 would)"),
         ("#5061=3", "1:1 [read-only] parameter #5061 cannot be assigned: it holds the result of probing"),
     ];
     for (program, expected) in refused {
@@ -168,7 +168,7 @@ fn what_follows_from_a_result_is_left_to_the_run() {
 
 #[test]
 fn what_does_not_follow_from_a_result_is_judged_at_once() {
-    let program = "G38.2 Z-100 F60\nG1 X300\nG53 G1 Z-101\nG99 Z#5063\nG1 Z50\nZ120";
+    let program = "G38.2 Z-100 F60\nG1 X300\nG53 G1 Z-101\nG44 Z#5063\nG1 Z50\nZ120";
     let found = diagnostics(&mill(), program);
     let lines: Vec<_> = found.iter().map(|text| &text[..2]).collect();
     assert_eq!(lines, ["2:", "3:", "4:", "6:"], "{found:?}");

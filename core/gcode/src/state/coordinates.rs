@@ -43,6 +43,16 @@ impl Coordinates {
         &self.total
     }
 
+    /// A point of program coordinates in machine coordinates, mm or rad.
+    pub fn to_machine(&self, program: &AxisVector) -> AxisVector {
+        *program + self.total
+    }
+
+    /// A point of machine coordinates in program coordinates, mm or rad.
+    pub fn to_program(&self, machine: &AxisVector) -> AxisVector {
+        *machine - self.total
+    }
+
     /// Index of the coordinate system in force: 0 for G54.
     pub fn active(&self) -> usize {
         self.active

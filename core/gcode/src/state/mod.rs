@@ -12,6 +12,7 @@ use crate::config::Config;
 use crate::words::Word;
 use crate::words::coolant::Coolant;
 use crate::words::curve::Curves;
+use crate::words::cycles::Cycles;
 use crate::words::modes::Modes;
 use crate::words::outputs::Outputs;
 use crate::words::overrides::Permits;
@@ -47,6 +48,7 @@ pub(crate) struct State {
     pub permits: Permits,
     pub outputs: Outputs,
     pub curves: Curves,
+    pub cycles: Cycles,
     /// The program is over.
     pub ended: bool,
 }
@@ -65,6 +67,7 @@ impl State {
             permits: Permits::default(),
             outputs: Outputs::default(),
             curves: Curves::default(),
+            cycles: Cycles::default(),
             ended: false,
         }
     }

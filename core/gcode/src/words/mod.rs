@@ -11,6 +11,7 @@ pub(crate) mod circle;
 pub(crate) mod coolant;
 pub(crate) mod coordinates;
 pub(crate) mod curve;
+pub(crate) mod cycles;
 mod dwell;
 pub(crate) mod modes;
 pub(crate) mod motion;
@@ -119,6 +120,8 @@ pub(crate) enum Shape {
     Probe,
     /// Its word or axis words begin it.
     Curve,
+    /// Its word or axis words begin it: several lines around a hole.
+    Cycle,
 }
 
 /// When a word acts.
@@ -198,10 +201,11 @@ const fn tenths(code: &str) -> u16 {
 }
 
 /// The words of all subjects.
-static SUBJECTS: [&[Word]; 14] = [
+static SUBJECTS: [&[Word]; 15] = [
     motion::WORDS,
     arc::WORDS,
     curve::WORDS,
+    cycles::WORDS,
     probe::WORDS,
     modes::WORDS,
     coordinates::WORDS,

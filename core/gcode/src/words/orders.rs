@@ -172,7 +172,7 @@ fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
     let MotionMode::Word(word) = motion else { return false };
     match word.shape() {
         Some(Shape::Arc) => stands || words.present & ARC_LETTERS != 0,
-        Some(Shape::Probe | Shape::Curve) => stands,
+        Some(Shape::Probe | Shape::Curve | Shape::Cycle) => stands,
         Some(Shape::Straight) | None => false,
     }
 }

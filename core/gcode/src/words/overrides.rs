@@ -15,8 +15,8 @@ pub(super) const WORDS: &[Word] = &[
     Word::new("M53", Group::Override, "P", "feed hold permitted (P1) or not (P0)", by_p(HOLD), "M53 P0"),
 ];
 
-const FEED: usize = 0;
-const SPINDLE: usize = 1;
+pub(super) const FEED: usize = 0;
+pub(super) const SPINDLE: usize = 1;
 const ADAPTIVE: usize = 2;
 const HOLD: usize = 3;
 /// The events of the four permissions.
@@ -36,6 +36,10 @@ impl Default for Permits {
 impl Permits {
     pub fn feed_override(self) -> bool {
         self.0[FEED]
+    }
+
+    pub fn spindle_override(self) -> bool {
+        self.0[SPINDLE]
     }
 }
 
@@ -67,7 +71,7 @@ fn both_off(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-fn switch(line: &mut Line, which: usize, on: bool) {
+pub(super) fn switch(line: &mut Line, which: usize, on: bool) {
     if line.state.permits.0[which] != on {
         line.state.permits.0[which] = on;
         line.event(EVENTS[which], 0, f64::from(u8::from(on)));

@@ -1,13 +1,13 @@
 //! Words that are known and refused, with the reason.
 
 use super::Group::{
-    CutterRadius, CycleReturn, FeedMode, InputOutput, LatheDiameter, Motion, NonModal, Plane, Polar, Rotation, Scaling,
-    Spindle, SpindleMode, Stop, ToolChange, ToolLength, User,
+    CutterRadius, FeedMode, InputOutput, LatheDiameter, Motion, NonModal, Plane, Polar, Rotation, Scaling, Spindle,
+    SpindleMode, Stop, ToolChange, ToolLength, User,
 };
 use super::Word;
 
 const COMPENSATION: &str = "cutter radius compensation is not supported: let the CAM system write the tool centre path";
-const CYCLES: &str = "canned cycles are not supported: let the CAM system write them out";
+const CYCLES: &str = "this canned cycle is not supported: let the CAM system write it out";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
 const LATHE: &str = "lathe modes are not supported: X is a length as it is programmed";
 const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
@@ -39,22 +39,10 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("G66", NonModal, "modal macro call", "macros are not supported"),
     Word::refused("G68", Rotation, "rotation", FRAMES),
     Word::refused("G68.2", Rotation, "tilted plane", FRAMES),
-    Word::refused("G73", Motion, "drilling, chip breaking", CYCLES),
-    Word::refused("G74", Motion, "left-hand tapping", CYCLES),
     Word::refused("G76", Motion, "threading", CYCLES),
-    Word::refused("G81", Motion, "drilling", CYCLES),
-    Word::refused("G82", Motion, "drilling with dwell", CYCLES),
-    Word::refused("G83", Motion, "peck drilling", CYCLES),
-    Word::refused("G84", Motion, "tapping", CYCLES),
-    Word::refused("G85", Motion, "boring", CYCLES),
-    Word::refused("G86", Motion, "boring", CYCLES),
     Word::refused("G87", Motion, "back boring", CYCLES),
-    Word::refused("G88", Motion, "boring", CYCLES),
-    Word::refused("G89", Motion, "boring", CYCLES),
     Word::refused("G95", FeedMode, "feed a revolution", SYNCHRONOUS),
     Word::refused("G96", SpindleMode, "constant surface speed", "not supported: program the spindle speed"),
-    Word::refused("G98", CycleReturn, "cycle return to the old level", CYCLES),
-    Word::refused("G99", CycleReturn, "cycle return to R", CYCLES),
     Word::refused("M19", Spindle, "oriented spindle stop", "orienting the spindle is not supported"),
     Word::refused("M29", Spindle, "rigid tapping mode", "motion synchronous with the spindle is not supported"),
     Word::refused("M60", Stop, "pallet change", "pallets are not supported"),

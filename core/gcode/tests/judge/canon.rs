@@ -85,7 +85,7 @@ fn read(text: &str) -> Vec<Move> {
         let Some(call) = line.split_whitespace().nth(2) else { continue };
         let Some((name, _)) = call.split_once('(') else { continue };
         let inside = line.split_once('(').map_or("", |(_, inside)| inside).trim_end_matches(')');
-        let numbers: Vec<f64> = inside.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+        let numbers: Vec<f64> = inside.split([',', ' ']).filter_map(|n| n.parse().ok()).collect();
         match name {
             "STRAIGHT_TRAVERSE" => moves.push(Move::Rapid(machine.position(&numbers))),
             "STRAIGHT_FEED" => moves.push(Move::Line(machine.position(&numbers))),

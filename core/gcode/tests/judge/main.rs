@@ -171,3 +171,8 @@ fn judge_all(kind: &str, count: u64, program: fn(u64) -> String) {
 fn programs_with_o_words() {
     judge_all("o-words", 60, programs::with_o_words);
 }
+
+#[test]
+fn programs_with_canned_cycles() {
+    judge_all("cycles", 60, programs::with_cycles);
+}

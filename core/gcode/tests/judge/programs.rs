@@ -72,7 +72,7 @@ impl Writer {
 
     fn statement(&mut self, depth: u32) {
         match self.below(if depth < 4 { 14 } else { 6 }) {
-            0..=2 => self.motion(),
+            0..=2 | 9 => self.motion(),
             3 | 4 => {
                 let target = match self.below(3) {
                     0 => format!("#{}", 1 + self.below(5)),
@@ -89,7 +89,6 @@ impl Writer {
             6 | 7 => self.branch(depth),
             8 => self.while_loop(depth),
             // No `do`: once another loop has been there, the judge ends it after one turn, or never.
-            9 => self.motion(),
             10 => self.repeat(depth),
             11 if self.in_sub => {
                 let (label, condition, value) = (self.label(), self.condition(), self.value());
@@ -150,7 +149,10 @@ impl Writer {
         let label = self.label();
         let turns = self.random.pick(&["0", "1", "2", "3", "2.6", "-1", "#31 MOD 4"]);
         self.line(&format!("o{label} repeat [{turns}]"));
+        // No `return`: the judge keeps the count of a repeat that is left so for the next call.
+        let in_sub = std::mem::replace(&mut self.in_sub, false);
         self.statements(depth + 1);
+        self.in_sub = in_sub;
         self.line(&format!("o{label} endrepeat"));
     }
 
@@ -188,4 +190,62 @@ pub fn with_o_words(seed: u64) -> String {
     }
     writer.line("G90 G0 X1 Y#<_count>\nM2");
     writer.text
+}
+
+/// Canned cycles in three planes, absolute and incremental, in mm and inches, with offsets.
+pub fn with_cycles(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 0);
+    let start = writer.random.pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Z-2", "G43 H2", "G20"]);
+    writer.line(&format!("{start}\nF90 S500 M3"));
+    for _ in 0..2 + writer.below(4) {
+        let modes = writer.random.pick(&["G17", "G18", "G19", "G17 G98", "G17 G99"]);
+        let distance = writer.random.pick(&["G90", "G91"]);
+        let normal = match &modes[..3] {
+            "G18" => 'Y',
+            "G19" => 'X',
+            _ => 'Z',
+        };
+        let high = writer.below(12);
+        writer.line(
+            &format!("{modes} G90 G0 X1 Y2 Z3 {distance}\nG90 G0 {normal}{high} {distance}").replace("G90 G0", "G0"),
+        );
+        cycle_lines(&mut writer, normal, distance == "G91");
+    }
+    writer.line("G80 G90 G0 X0 Y0\nM2");
+    writer.text
+}
+
+/// One cycle, and lines that repeat it.
+fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool) {
+    // The judge taps along the wrong axes in G18 and G19, and takes the dwell of another cycle for a tap without P.
+    let word = match writer.random.pick(&["G73", "G81", "G82", "G83", "G84", "G85", "G86", "G89"]) {
+        "G84" if normal != 'Z' => "G81",
+        word => word,
+    };
+    let r = writer.below(6).cast_signed();
+    let depth = 1 + writer.below(5).cast_signed();
+    let bottom = if incremental { -depth } else { r - depth };
+    let more = match word {
+        "G73" | "G83" => format!(" Q{}", writer.random.pick(&["1", "0.5", "2", "9"])),
+        "G82" | "G84" | "G86" | "G89" => format!(" P{}", writer.random.pick(&["0.25", "1"])),
+        _ => String::new(),
+    };
+    let place = |writer: &mut Writer| {
+        let letters: Vec<_> = "XYZ".chars().filter(|letter| *letter != normal).collect();
+        let mut text = String::new();
+        for letter in letters {
+            if writer.below(2) == 0 {
+                let _ = write!(text, " {letter}{}", writer.below(9));
+            }
+        }
+        text
+    };
+    let at = place(writer);
+    let repeats = if writer.below(3) == 0 { " L2" } else { "" };
+    writer.line(&format!("{word}{at} {normal}{bottom} R{r}{more}{repeats}"));
+    for _ in 0..writer.below(3) {
+        let at = place(writer);
+        let deeper = writer.below(2).cast_signed();
+        writer.line(&format!("{at} {normal}{}", bottom - deeper));
+    }
 }
