@@ -85,6 +85,7 @@ pub fn check(
         Err(ProgramError::Text(diagnostic)) => pass.report.add(diagnostic),
         Err(other) => return Err(other),
     }
+    pass.report.warnings.extend(pass.execution.interpreter.note());
     Ok(pass.report)
 }
 

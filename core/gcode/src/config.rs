@@ -62,6 +62,8 @@ pub struct Config {
     pub reference: [AxisVector; 2],
     /// The tool table. Where it is empty any T number is accepted.
     pub tools: Vec<Tool>,
+    /// Where the tool table is empty: G43 H takes the length of every tool as zero, instead of being refused.
+    pub zero_length_without_table: bool,
     /// Tool in the spindle at the start, 0 for none.
     pub tool_in_spindle: u32,
     /// Least and greatest time constant that TA may ask for, s.
@@ -92,6 +94,7 @@ impl Config {
             start: AxisVector::ZERO,
             reference: [AxisVector::ZERO; 2],
             tools: Vec::new(),
+            zero_length_without_table: false,
             tool_in_spindle: 0,
             time_constant_s: (0.0, f64::INFINITY),
             block_delete: false,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tandem_sdk::AxisVector;
 
 use crate::config::Config;
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Severity};
 use crate::fault::{Checked, Fault, Span};
 use crate::item::{Item, ProbeResult};
 use crate::line::Line;
@@ -112,6 +112,14 @@ impl Interpreter {
         self.orders.clear();
         self.state.path.begin_line();
         self.reads_assumed.set(false);
+    }
+
+    /// What is worth to be known of the program as a whole: that lengths of tools were taken as zero.
+    pub(crate) fn note(&self) -> Option<Diagnostic> {
+        let line = self.state.tools.assumed_zero?;
+        let message = "the machine has no tool table: the length of every tool is taken as zero";
+        let note = Diagnostic::whole_line(&self.file, line, b"", "tool-length", message.into());
+        Some(Diagnostic { severity: Severity::Warning, ..note })
     }
 
     /// A subroutine begins.

@@ -8,7 +8,7 @@ use tandem_sdk::{AxisVector, Block, BlockKind, Event, EventKind};
 use crate::config::Config;
 use crate::fault::{Checked, Fault, Span, show};
 use crate::item::Item;
-use crate::state::letters::{AXIS_MASK, Letters};
+use crate::state::letters::{AXIS_MASK, Letters, mask};
 use crate::state::{MotionMode, State};
 use crate::syntax::line_words::LineWords;
 use crate::words::orders::Orders;
@@ -152,6 +152,9 @@ impl Line<'_> {
     pub fn advance(&mut self) {
         let machine = self.in_machine_coordinates();
         let absolute = machine || self.state.modes.absolute;
+        if self.state.coordinates.is_rotated() && !machine {
+            return self.advance_rotated(absolute);
+        }
         for axis in 0..self.letters.count() {
             let Some(value) = self.words.get(self.letters.letter(axis)) else { continue };
             let value = value * self.state.modes.scale(self.letters, axis);
@@ -165,6 +168,27 @@ impl Line<'_> {
                 self.state.path.uncertain &= !(1 << axis);
             }
             self.assume_target(axis, machine, absolute);
+        }
+        self.state.path.moved = true;
+    }
+
+    /// The same in a rotated coordinate system, where one word moves two axes.
+    #[cold]
+    fn advance_rotated(&mut self, absolute: bool) {
+        let mut program = self.state.coordinates.to_program(&self.state.path.position);
+        for (axis, value) in self.named_axes() {
+            program[axis] = if absolute { value } else { program[axis] + value };
+        }
+        self.state.path.position = self.state.coordinates.to_machine(&program);
+        let plane = mask("XY");
+        let named = self.words.present & AXIS_MASK;
+        let moved = if named & plane == 0 { named } else { named | plane };
+        if absolute && named & plane == plane {
+            self.state.path.uncertain &= !self.letters.axes_of(named);
+        }
+        let follows = self.reads_assumed.get() || self.state.coordinates.assumed != 0;
+        if follows {
+            self.state.path.assumed |= self.letters.axes_of(moved);
         }
         self.state.path.moved = true;
     }

@@ -5,10 +5,17 @@ use tandem_sdk::AxisVector;
 /// Number of work coordinate systems, G54 to G59.3.
 pub(crate) const SYSTEMS: usize = 9;
 
-/// Coordinate systems, G92 and the tool length; all vectors in mm or rad.
+/// Coordinate systems, G92 and the tool length; all vectors in mm or rad. A point goes from program to machine coordinates
+/// by the offset of G92, the rotation, the origin of the system and the tool, as in LinuxCNC.
 #[derive(Clone, Debug)]
 pub(crate) struct Coordinates {
     origins: [AxisVector; SYSTEMS],
+    /// Rotation of each system about its origin, from X to Y, rad.
+    rotations: [f64; SYSTEMS],
+    /// Cosine and sine of the rotation in force; `None` where there is none.
+    turn: Option<[f64; 2]>,
+    /// The axes X and Y, which rotate.
+    plane: Option<[usize; 2]>,
     active: usize,
     g92: AxisVector,
     /// What G92.3 restores.
@@ -23,10 +30,13 @@ pub(crate) struct Coordinates {
 }
 
 impl Coordinates {
-    pub fn new(reference: [AxisVector; 2]) -> Self {
+    pub fn new(reference: [AxisVector; 2], plane: Option<[usize; 2]>) -> Self {
         let zero = AxisVector::ZERO;
         Self {
             origins: [zero; SYSTEMS],
+            rotations: [0.0; SYSTEMS],
+            turn: None,
+            plane,
             active: 0,
             g92: zero,
             g92_stored: zero,
@@ -37,7 +47,7 @@ impl Coordinates {
         }
     }
 
-    /// The sum of all offsets in force.
+    /// The sum of all offsets in force. Where no rotation is, it is the way from program to machine coordinates.
     #[inline]
     pub fn total(&self) -> &AxisVector {
         &self.total
@@ -45,12 +55,74 @@ impl Coordinates {
 
     /// A point of program coordinates in machine coordinates, mm or rad.
     pub fn to_machine(&self, program: &AxisVector) -> AxisVector {
-        *program + self.total
+        self.turned(&(*program + self.g92), 1.0) + self.origins[self.active] + self.tool
     }
 
     /// A point of machine coordinates in program coordinates, mm or rad.
     pub fn to_program(&self, machine: &AxisVector) -> AxisVector {
-        *machine - self.total
+        self.turned(&(*machine - self.tool - self.origins[self.active]), -1.0) - self.g92
+    }
+
+    /// Whether the coordinate system in force is rotated.
+    #[inline]
+    pub fn is_rotated(&self) -> bool {
+        self.turn.is_some()
+    }
+
+    /// A direction of program coordinates in machine coordinates.
+    pub fn direction(&self, program: &AxisVector) -> AxisVector {
+        self.turned(program, 1.0)
+    }
+
+    /// A vector turned by the rotation in force, or back.
+    fn turned(&self, vector: &AxisVector, way: f64) -> AxisVector {
+        let mut turned = *vector;
+        if let (Some([cos, sin]), Some([x, y])) = (self.turn, self.plane) {
+            turned[x] = vector[x] * cos - vector[y] * sin * way;
+            turned[y] = vector[x] * sin * way + vector[y] * cos;
+        }
+        turned
+    }
+
+    /// Whether the machine has what rotates.
+    pub fn can_rotate(&self) -> bool {
+        self.plane.is_some()
+    }
+
+    /// A point of machine coordinates in program coordinates without the length of a tool: in the system in force, or in
+    /// that of G59.3, which then has no offset of G92.
+    pub fn without_tool(&self, machine: &AxisVector, fixture: bool) -> AxisVector {
+        let zero = AxisVector::ZERO;
+        let base = Self { tool: zero, ..self.clone() };
+        let base = if fixture { Self { active: SYSTEMS - 1, g92: zero, ..base } } else { base };
+        base.summed_up().to_program(machine)
+    }
+
+    /// Rotation of a coordinate system, rad.
+    pub fn rotation(&self, system: usize) -> f64 {
+        self.rotations[system]
+    }
+
+    pub fn set_rotation(&mut self, system: usize, rotation: f64) {
+        self.rotations[system] = rotation;
+        self.sum_up();
+    }
+
+    /// Moves the origin of `system` so that the point `machine`, which has certain coordinates there, gets others: those of
+    /// `wanted`, which are given for the axes where it is a number.
+    pub fn shift_origin(&mut self, system: usize, machine: &AxisVector, wanted: &[Option<f64>]) {
+        let other = Self { active: system, ..self.clone() }.summed_up();
+        let current = other.to_program(machine);
+        let mut shift = AxisVector::ZERO;
+        for (axis, value) in wanted.iter().enumerate() {
+            shift[axis] = value.map_or(0.0, |value| current[axis] - value);
+        }
+        self.set_origin(system, self.origins[system] + other.direction(&shift));
+    }
+
+    fn summed_up(mut self) -> Self {
+        self.sum_up();
+        self
     }
 
     /// Index of the coordinate system in force: 0 for G54.
@@ -115,5 +187,7 @@ impl Coordinates {
 
     fn sum_up(&mut self) {
         self.total = self.origins[self.active] + self.g92 + self.tool;
+        let rotation = self.rotations[self.active];
+        self.turn = (rotation != 0.0).then(|| [rotation.cos(), rotation.sin()]);
     }
 }

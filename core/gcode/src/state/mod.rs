@@ -55,11 +55,14 @@ pub(crate) struct State {
 
 impl State {
     pub fn new(config: &Config) -> Self {
+        let letters = letters::Letters::new(&config.axes);
+        let linear = |letter| letters.axis(letter).filter(|axis| !letters.is_rotary(*axis));
+        let plane = linear(b'X').zip(linear(b'Y')).map(|(x, y)| [x, y]);
         Self {
             line: 0,
             motion: MotionMode::None,
             modes: Modes::default(),
-            coordinates: Coordinates::new(config.reference),
+            coordinates: Coordinates::new(config.reference, plane),
             path: Path::new(config.start),
             tools: Tools::new(config),
             spindle: Spindle::default(),
@@ -74,8 +77,7 @@ impl State {
 
     /// The position in program coordinates and program units.
     pub fn program_position(&self, letters: &letters::Letters, axis: usize) -> f64 {
-        let position = self.path.position[axis] - self.coordinates.total()[axis];
-        position / self.modes.scale(letters, axis)
+        self.coordinates.to_program(&self.path.position)[axis] / self.modes.scale(letters, axis)
     }
 
     /// The block that comes next, at rest where the last one ended, with all that is in force.

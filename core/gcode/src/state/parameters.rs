@@ -161,6 +161,7 @@ fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
         5220 => Some((coordinates.active() + 1) as f64),
         5221..=5390 => match (number - 5221) % 20 {
             nth @ 0..=8 => fixed(coordinates.origin((number - 5221) / 20), nth),
+            9 => Some(coordinates.rotation((number - 5221) / 20).to_degrees()),
             _ => Some(0.0),
         },
         5399 => Some(state.outputs.answer),

@@ -13,11 +13,13 @@ pub(crate) struct Tools {
     pub in_spindle: u32,
     /// What T has selected.
     pub selected: Option<u32>,
+    /// The first line that has taken the length of a tool as zero, because there is no table.
+    pub assumed_zero: Option<u32>,
 }
 
 impl Tools {
     pub fn new(config: &Config) -> Self {
-        Self { table: config.tools.clone(), in_spindle: config.tool_in_spindle, selected: None }
+        Self { table: config.tools.clone(), in_spindle: config.tool_in_spindle, selected: None, assumed_zero: None }
     }
 
     /// The tool called `number`.

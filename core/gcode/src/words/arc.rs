@@ -3,6 +3,7 @@
 use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 
 use super::circle::{Ends, Part, Parts, extent};
+use super::modes::Plane;
 use super::{Action, Group, Shape, Word};
 use crate::fault::{Checked, Fault, Span};
 use crate::line::Line;
@@ -105,15 +106,29 @@ fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
     arc.map_err(|(code, message)| arc_fault(line, letters, code, message))
 }
 
+/// The centre in machine coordinates.
 fn center(line: &Line, ends: &Ends, plane: [usize; 2], given: [Option<f64>; 2]) -> Checked<[f64; 2]> {
     let unit = line.state.modes.unit_mm;
-    if !line.state.modes.arc_absolute {
-        return Ok(std::array::from_fn(|i| ends.start[i] + given[i].unwrap_or(0.0) * unit));
+    let coordinates = &line.state.coordinates;
+    if coordinates.is_rotated() && line.state.modes.plane != Plane::Xy {
+        let message = "in a rotated coordinate system (G10 L2 R) arcs lie in the plane XY (G17)";
+        return Err(line.motion_fault("arc-centre", message));
     }
-    let ([Some(a), Some(b)], offset) = (given, line.state.coordinates.total()) else {
+    let mut from = AxisVector::ZERO;
+    if !line.state.modes.arc_absolute {
+        for (axis, value) in plane.into_iter().zip(given) {
+            from[axis] = value.unwrap_or(0.0) * unit;
+        }
+        let from = coordinates.direction(&from);
+        return Ok(std::array::from_fn(|i| ends.start[i] + from[plane[i]]));
+    }
+    let [Some(a), Some(b)] = given else {
         return Err(line.motion_fault("arc-centre", "with G90.1 an arc needs both coordinates of its centre"));
     };
-    Ok([a * unit + offset[plane[0]], b * unit + offset[plane[1]]])
+    from[plane[0]] = a * unit;
+    from[plane[1]] = b * unit;
+    let center = coordinates.to_machine(&from);
+    Ok(plane.map(|axis| center[axis]))
 }
 
 fn no_center(line: &Line, letters: [u8; 2]) -> Fault {

@@ -3,7 +3,6 @@
 use tandem_sdk::AxisVector;
 
 use super::{Action, Group, Word, nothing, tool};
-use crate::config::Tool;
 use crate::fault::Checked;
 use crate::line::Line;
 use crate::state::coordinates::SYSTEMS;
@@ -14,9 +13,17 @@ pub(super) const WORDS: &[Word] = &[
         "G10",
         Group::NonModal,
         "LPRXYZABCUVW",
-        "L1 tool table, L2 and L20 coordinate systems",
+        "L1, L10, L11 tool table (P tool); L2 (R rotation), L20 coordinate systems (P 1 to 9, 0 the one in force)",
         Action::Act(set_data),
-        "G10 L2 P1 X10",
+        "G10 L2 P1 X10 R30",
+    ),
+    Word::new(
+        "G52",
+        Group::NonModal,
+        "XYZABCUVW",
+        "local coordinate system: the offset of G92 as it is given, in the axes that are named",
+        Action::Act(set_local_offset),
+        "G52 X5",
     ),
     Word::new("G53", Group::NonModal, "", "machine coordinates, in this line", Action::Act(nothing), "G53 G0 X1"),
     Word::new("G54", Group::CoordinateSystem, "", "coordinate system 1", Action::Act(|line| select(line, 0)), "G54"),
@@ -120,11 +127,22 @@ fn set_position_offset(line: &mut Line) -> Checked<()> {
         return Err(line.orders.fault(Group::NonModal, "axis-missing", "G92 needs at least one axis word"));
     }
     let coordinates = &line.state.coordinates;
+    let at = coordinates.to_program(&line.state.path.position);
     let mut g92 = *coordinates.g92();
     for (axis, value) in line.named_axes() {
-        g92[axis] += line.state.path.position[axis] - coordinates.total()[axis] - value;
+        g92[axis] += at[axis] - value;
     }
     assume_offsets(line, true);
+    line.state.coordinates.set_g92(g92);
+    Ok(())
+}
+
+fn set_local_offset(line: &mut Line) -> Checked<()> {
+    let mut g92 = *line.state.coordinates.g92();
+    for (axis, value) in line.named_axes() {
+        g92[axis] = value;
+    }
+    assume_offsets(line, false);
     line.state.coordinates.set_g92(g92);
     Ok(())
 }
@@ -140,54 +158,99 @@ fn assume_offsets(line: &mut Line, from_position: bool) {
 /// G10.
 fn set_data(line: &mut Line) -> Checked<()> {
     match line.words.integer(b'L', 0..=999)? {
-        Some(1) => set_tool(line),
-        Some(2) => set_system(line, false),
-        Some(20) => set_system(line, true),
+        Some(1) => set_tool(line, ToolOrigin::Value),
+        Some(10) => set_tool(line, ToolOrigin::Position),
+        Some(11) => set_tool(line, ToolOrigin::Fixture),
+        Some(2) => set_system(line),
+        Some(20) => set_system_here(line),
         Some(other) => {
-            let message = format!("G10 L{other} is not supported; L1 (tools), L2 and L20 (coordinate systems) are");
+            let message = format!("G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are");
             Err(line.words.fault(b'L', "refused", message))
         }
-        None => Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs L1, L2 or L20")),
+        None => Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs L: 1, 2, 10, 11 or 20")),
     }
 }
 
-/// G10 L2 sets the origin of a system; L20 sets it so that the current position gets the named coordinates.
-fn set_system(line: &mut Line, from_position: bool) -> Checked<()> {
-    if line.words.get(b'R').is_some_and(|angle| angle != 0.0) {
-        return Err(line.words.fault(b'R', "refused", "rotated coordinate systems (G10 R) are not supported"));
+/// The index of the coordinate system that P names.
+fn system(line: &Line) -> Checked<usize> {
+    match line.words.integer(b'P', 0..=SYSTEMS as u32)? {
+        Some(0) => Ok(line.state.coordinates.active()),
+        Some(number) => Ok(number as usize - 1),
+        None => {
+            let message = "G10 needs P, the coordinate system (0 to 9)";
+            Err(line.orders.fault(Group::NonModal, "word-missing", message))
+        }
     }
-    let Some(number) = line.words.integer(b'P', 0..=SYSTEMS as u32)? else {
-        let message = "G10 needs P, the coordinate system (0 to 9)";
-        return Err(line.orders.fault(Group::NonModal, "word-missing", message));
-    };
-    let coordinates = &line.state.coordinates;
-    let system = if number == 0 { coordinates.active() } else { number as usize - 1 };
-    let mut origin = *coordinates.origin(system);
+}
+
+/// G10 L2: the origin of a system, and its rotation R in degrees.
+fn set_system(line: &mut Line) -> Checked<()> {
+    let system = system(line)?;
+    let mut origin = *line.state.coordinates.origin(system);
     for (axis, value) in line.named_axes() {
-        origin[axis] = if from_position {
-            line.state.path.position[axis] - coordinates.g92()[axis] - coordinates.tool()[axis] - value
-        } else if line.state.modes.absolute {
-            value
-        } else {
-            origin[axis] + value
-        };
+        origin[axis] = if line.state.modes.absolute { value } else { origin[axis] + value };
     }
-    assume_offsets(line, from_position);
+    if let Some(degrees) = line.words.get(b'R') {
+        if degrees != 0.0 && !line.state.coordinates.can_rotate() {
+            return Err(line.words.fault(b'R', "axis", "a rotation needs the linear axes X and Y"));
+        }
+        line.state.coordinates.set_rotation(system, degrees.to_radians());
+    }
+    assume_offsets(line, false);
     line.state.coordinates.set_origin(system, origin);
     Ok(())
 }
 
-/// G10 L1: a row of the tool table, for this run only.
-fn set_tool(line: &mut Line) -> Checked<()> {
-    let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
-        return Err(line.orders.fault(Group::NonModal, "word-missing", "G10 L1 needs P, the number of the tool"));
-    };
-    let blank = Tool { number, pocket: None, offset: AxisVector::ZERO, diameter_mm: 0.0 };
-    let mut tool = line.state.tools.find(number).copied().unwrap_or(blank);
-    for (axis, value) in line.named_axes() {
-        tool.offset[axis] = value;
+/// G10 L20: the origin at which the current position gets the named coordinates.
+fn set_system_here(line: &mut Line) -> Checked<()> {
+    let system = system(line)?;
+    if line.words.has(b'R') {
+        return Err(line.words.fault(b'R', "unused-word", "G10 L20 takes no R: L2 sets the rotation"));
     }
-    assume_offsets(line, false);
+    let wanted = wanted(line);
+    assume_offsets(line, true);
+    let position = line.state.path.position;
+    line.state.coordinates.shift_origin(system, &position, &wanted);
+    Ok(())
+}
+
+/// The values of the named axes, by axis.
+fn wanted(line: &Line) -> Vec<Option<f64>> {
+    let mut wanted = vec![None; line.letters.count()];
+    for (axis, value) in line.named_axes() {
+        wanted[axis] = Some(value);
+    }
+    wanted
+}
+
+/// What the axis words of a tool mean.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ToolOrigin {
+    /// L1: the offset itself.
+    Value,
+    /// L10: the coordinates that the current position gets in the system in force.
+    Position,
+    /// L11: the same in the system of G59.3, without G92.
+    Fixture,
+}
+
+/// G10 L1, L10, L11: a row of the tool table, for this run only. It acts with the next G43.
+fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
+    let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
+        return Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs P, the number of the tool"));
+    };
+    let Some(mut tool) = line.state.tools.find(number).copied() else {
+        return Err(line.words.fault(b'P', "tool", format!("the tool table has no tool {number}")));
+    };
+    let at = match from {
+        ToolOrigin::Value => AxisVector::ZERO,
+        ToolOrigin::Position => line.state.coordinates.without_tool(&line.state.path.position, false),
+        ToolOrigin::Fixture => line.state.coordinates.without_tool(&line.state.path.position, true),
+    };
+    for (axis, value) in line.named_axes() {
+        tool.offset[axis] = if from == ToolOrigin::Value { value } else { at[axis] - value };
+    }
+    assume_offsets(line, from != ToolOrigin::Value);
     if let Some(radius) = line.words.not_negative(b'R')? {
         tool.diameter_mm = 2.0 * radius * line.state.modes.unit_mm;
     }
@@ -229,10 +292,11 @@ mod tests {
             [["11", "1", "0"], ["1", "1", "0"], ["11", "1", "0"], ["2", "1", "0"]]
         );
         assert_eq!(ends("G10 L2 P1 X10\nG92 X5\nG53 G0 X7\nX0"), [["7", "0", "0"], ["-5", "0", "0"]]);
+        assert_eq!(ends("G52 X5\nG0 X1\nG52 X0 Y2\nG0 X1 Y0"), [["6", "0", "0"], ["1", "2", "0"]]);
         // L20 leaves G92 and the tool out of the origin: the current position is what it says.
         assert_eq!(ends("G43 H1 G0 Z5\nG92 X3\nG10 L20 P1 X1 Z2\nG0 X2 Z4")[1..], [["1", "0", "27"]]);
         assert_eq!(short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]), "25");
-        assert_eq!(ends("G10 L1 P7 Z3 R4\nG43 H7 G0 Z#5410"), [["0", "0", "3"]]);
+        assert_eq!(ends("G10 L1 P2 Z3 R4\nG43 H2 G0 Z#5410"), [["0", "0", "3"]]);
     }
 
     #[test]
@@ -242,5 +306,23 @@ mod tests {
         assert_eq!(ends("G0 X5 Z5\nG91 G28 Z0")[1..], [["5", "0", "0"]]);
         // A motion word beside G28 only sets the mode.
         assert_eq!(ends("F60 G0 X5 Z5\nG1 G91 G28 Z0\nX1")[1..], [["5", "0", "0"], ["6", "0", "0"]]);
+    }
+
+    #[test]
+    fn a_rotated_system_turns_moves_arcs_and_offsets() {
+        assert_eq!(ends("G10 L2 P1 X10 R90\nG0 X5\nY2")[..], [["0", "5", "0"], ["8", "5", "0"]]);
+        assert_eq!(ends("G10 L2 P1 R90\nG91 G0 X5\nX1")[1], ["0", "6", "0"]);
+        // The offset of G92 lies before the rotation, machine coordinates after it.
+        assert_eq!(ends("G10 L2 P1 R90\nG92 X-3\nG0 X2\nG53 X1"), [["0", "5", "0"], ["1", "5", "0"]]);
+        assert_eq!(ends("G10 L2 P1 R90\nG0 X5\nG10 L20 P1 X1 Y1\nG0 X0 Y0")[1], ["1", "4", "0"]);
+        let arc = last("F60 G10 L2 P1 R90\nG2 X2 I1");
+        assert_eq!(arc.arc.center_mm.map(short), ["0".to_owned(), "1".to_owned()]);
+        assert_eq!(short(last("G10 L2 P1 R30\nG0 X#5230").end[0]), "25.981");
+    }
+
+    #[test]
+    fn a_tool_is_measured_where_it_stands() {
+        assert_eq!(ends("G53 G0 Z30\nG10 L10 P1 Z3\nG43 H1\nG0 Z4")[1], ["0", "0", "31"]);
+        assert_eq!(ends("G10 L2 P9 Z5\nG53 G0 Z30\nG10 L11 P1 Z3\nG43 H1\nG0 Z1")[1], ["0", "0", "23"]);
     }
 }

@@ -235,9 +235,8 @@ fn axes(letters: &Letters, plane: [u8; 2]) -> Option<(usize, [usize; 2])> {
 /// What the line says of its holes; `at` is where it begins.
 fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let plane = line.state.modes.plane.letters();
-    let Some((normal, plane)) = axes(line.letters, plane) else {
-        return Err(line.motion_fault("axis", "a canned cycle needs the linear axes X Y Z"));
-    };
+    let missing = || line.motion_fault("axis", "a canned cycle needs the linear axes X Y Z");
+    let (normal, plane) = axes(line.letters, plane).ok_or_else(missing)?;
     let sticky = sticky(line, kind, line.letters.letter(normal), at[normal])?;
     let unit_mm = line.state.modes.unit_mm;
     let r_mm = sticky.r_mm.unwrap_or_default();

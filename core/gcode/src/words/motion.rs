@@ -26,14 +26,29 @@ pub(super) const WORDS: &[Word] = &[
     ),
 ];
 
+/// G53 asks for a place of the machine, which a distance is none.
+#[inline]
+fn refuse_distance(line: &Line) -> Checked<()> {
+    if line.in_machine_coordinates() && !line.state.modes.absolute {
+        return Err(line.orders.fault(
+            Group::NonModal,
+            "conflict",
+            "G53 does not go with G91: machine coordinates are absolute",
+        ));
+    }
+    Ok(())
+}
+
 #[inline]
 fn rapid(line: &mut Line) -> Checked<()> {
+    refuse_distance(line)?;
     line.advance();
     straight(line, BlockKind::Rapid)
 }
 
 #[inline]
 fn feed(line: &mut Line) -> Checked<()> {
+    refuse_distance(line)?;
     line.advance();
     straight(line, BlockKind::Line)
 }

@@ -118,15 +118,17 @@ impl Orders {
     /// Decides who takes the axis words: a non-modal word, else the motion word, else the motion mode.
     #[inline]
     fn choose_motion(&mut self, words: &LineWords, modal: MotionMode, claims: &mut Claims) -> Checked<()> {
-        let non_modal = self.get(Group::NonModal);
-        self.axes_taken |= non_modal.is_some_and(|word| word.mask & AXIS_MASK != 0);
+        let takes_axes = |word: &&'static Word| word.mask & AXIS_MASK != 0;
+        let taker = self.get(Group::NonModal).filter(takes_axes).or(self.get(Group::ToolLength).filter(takes_axes));
+        let has_axes = words.present & AXIS_MASK != 0;
+        self.axes_taken |= taker.is_some_and(|word| word.group == Group::NonModal || has_axes);
         let refused = self.motion.filter(|motion| matches!(motion, MotionMode::Refused));
         let word = self.get(Group::Motion);
         if word.is_some_and(|word| word.shape().is_none()) {
             return Err(self.fault(Group::Motion, "nurbs", super::curve::NONE_OPEN));
         }
         if self.axes_taken {
-            return self.check_taken(word, non_modal, words);
+            return self.check_taken(word, taker, words);
         }
         let motion = word.map(MotionMode::Word).or(refused).unwrap_or(modal);
         if !begins(motion, words, word.is_some()) {
@@ -148,10 +150,10 @@ impl Orders {
     fn check_taken(
         &self,
         motion: Option<&'static Word>,
-        non_modal: Option<&'static Word>,
+        taker: Option<&'static Word>,
         words: &LineWords,
     ) -> Checked<()> {
-        let Some((motion, taker)) = motion.zip(non_modal) else { return Ok(()) };
+        let Some((motion, taker)) = motion.zip(taker) else { return Ok(()) };
         let probes = motion.shape() == Some(Shape::Probe);
         let has_axes = words.present & AXIS_MASK != 0;
         let only_sets_mode = matches!(taker.tenths, 280 | 300);

@@ -125,10 +125,9 @@ fn refuse_company(line: &Line, word: &str) -> Checked<()> {
 /// where nothing touched; #5070 says which. The program goes on from where the machine rests.
 pub(crate) fn provide(state: &mut State, parameters: &mut Parameters, letters: &Letters, result: &ProbeResult) {
     let touched: AxisVector = result.touched.unwrap_or(state.path.position);
+    let touched = state.coordinates.to_program(&touched);
     for (nth, letter) in AXIS_LETTERS.bytes().enumerate() {
-        let value = letters
-            .axis(letter)
-            .map_or(0.0, |axis| (touched[axis] - state.coordinates.total()[axis]) / state.modes.scale(letters, axis));
+        let value = letters.axis(letter).map_or(0.0, |axis| touched[axis] / state.modes.scale(letters, axis));
         parameters.set_numbered(TOUCHED + nth, value, false);
     }
     parameters.set_numbered(SUCCESS, f64::from(u8::from(result.touched.is_some())), false);

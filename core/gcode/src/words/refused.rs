@@ -2,7 +2,7 @@
 
 use super::Group::{
     CutterRadius, FeedMode, InputOutput, LatheDiameter, Motion, NonModal, Plane, Polar, Rotation, Scaling, Spindle,
-    SpindleMode, Stop, ToolChange, ToolLength, User,
+    SpindleMode, Stop, ToolLength, User,
 };
 use super::Word;
 
@@ -30,11 +30,8 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("G41.1", CutterRadius, "cutter radius compensation, left", COMPENSATION),
     Word::refused("G42", CutterRadius, "cutter radius compensation, right", COMPENSATION),
     Word::refused("G42.1", CutterRadius, "cutter radius compensation, right", COMPENSATION),
-    Word::refused("G43.1", ToolLength, "dynamic tool length offset", "not supported: use G43 with the tool table"),
-    Word::refused("G43.2", ToolLength, "additional tool length offset", "not supported: use G43 with the tool table"),
     Word::refused("G44", ToolLength, "negative tool length offset", "not supported: use G43 with the tool table"),
     Word::refused("G51", Scaling, "scaling", FRAMES),
-    Word::refused("G52", NonModal, "local coordinate system", "not supported: use G92 or G10 L2"),
     Word::refused("G65", NonModal, "macro call", "macros are not supported"),
     Word::refused("G66", NonModal, "modal macro call", "macros are not supported"),
     Word::refused("G68", Rotation, "rotation", FRAMES),
@@ -46,12 +43,6 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("M19", Spindle, "oriented spindle stop", "orienting the spindle is not supported"),
     Word::refused("M29", Spindle, "rigid tapping mode", "motion synchronous with the spindle is not supported"),
     Word::refused("M60", Stop, "pallet change", "pallets are not supported"),
-    Word::refused(
-        "M61",
-        ToolChange,
-        "set the number of the tool",
-        "not supported: the configuration says which tool is in",
-    ),
     Word::refused("M67", InputOutput, "analogue output with the motion", ANALOG),
     Word::refused("M68", InputOutput, "analogue output", ANALOG),
     Word::refused("M70", User, "save the modal state", MODAL),

@@ -5,10 +5,35 @@ use tandem_sdk::{AxisVector, EventKind};
 use super::{Action, Group, Word, spindle};
 use crate::fault::Checked;
 use crate::line::Line;
+use crate::state::letters::AXIS_MASK;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new("M6", Group::ToolChange, "", "change to the tool selected by T", Action::Act(change), "T1 M6"),
     Word::new("G43", Group::ToolLength, "H", "tool length offset of tool H", Action::Act(length), "G43 H1"),
+    Word::new(
+        "G43.1",
+        Group::ToolLength,
+        "XYZABCUVW",
+        "tool length offset as the axis words say, in the axes that are named",
+        Action::Act(length_from_words),
+        "G43.1 Z20",
+    ),
+    Word::new(
+        "G43.2",
+        Group::ToolLength,
+        "HXYZABCUVW",
+        "adds the offset of tool H, or that of the axis words, to the one in force",
+        Action::Act(more_length),
+        "G43 H1\nG43.2 H2",
+    ),
+    Word::new(
+        "M61",
+        Group::ToolChange,
+        "Q",
+        "the tool in the spindle is number Q; nothing is changed",
+        Action::Act(set_number),
+        "M61 Q2",
+    ),
     Word::new("G49", Group::ToolLength, "", "tool length offset off", Action::Act(no_length), "G49"),
 ];
 
@@ -28,11 +53,10 @@ pub(crate) fn select(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-/// The spindle stops, as in LinuxCNC: nobody changes the tool of a spindle that turns.
+/// The spindle stops, as in LinuxCNC: nobody changes the tool of a spindle that turns. Without any T the spindle becomes
+/// empty, as there.
 fn change(line: &mut Line) -> Checked<()> {
-    let Some(number) = line.state.tools.selected else {
-        return Err(line.orders.fault(Group::ToolChange, "tool", "M6 has no tool to change to: T is missing"));
-    };
+    let number = line.state.tools.selected.unwrap_or(0);
     if number != line.state.tools.in_spindle {
         line.rest();
         spindle::stop(line);
@@ -45,12 +69,76 @@ fn change(line: &mut Line) -> Checked<()> {
 /// A later change of the tool or of its row acts with the next G43.
 fn length(line: &mut Line) -> Checked<()> {
     let number = line.words.integer(b'H', 0..=MAX_TOOL)?.unwrap_or(line.state.tools.in_spindle);
-    let no_tool = || line.orders.fault(Group::ToolLength, "tool", format!("the tool table has no tool {number}"));
-    let offset = match number {
-        0 => AxisVector::ZERO,
-        _ => line.state.tools.find(number).map(|tool| tool.offset).ok_or_else(no_tool)?,
+    let offset = offset_of(line, number)?;
+    line.state.coordinates.set_tool(offset);
+    Ok(())
+}
+
+/// The offset of a tool.
+fn offset_of(line: &mut Line, number: u32) -> Checked<AxisVector> {
+    if let Some(tool) = line.state.tools.find(number) {
+        return Ok(tool.offset);
+    }
+    let without_table = line.config.tools.is_empty() && line.config.zero_length_without_table;
+    if number != 0 && !without_table {
+        return Err(line.orders.fault(Group::ToolLength, "tool", no_tool(line, number)));
+    }
+    if number != 0 {
+        line.state.tools.assumed_zero.get_or_insert(line.state.line);
+    }
+    Ok(AxisVector::ZERO)
+}
+
+#[cold]
+fn no_tool(line: &Line, number: u32) -> String {
+    if line.config.tools.is_empty() {
+        return format!(
+            "the length of tool {number} is not known: the machine file names no tool table \
+             ([tools] table, or without_table = \"zero\" where every length is zero)"
+        );
+    }
+    format!("the tool table has no tool {number}")
+}
+
+/// The offset in force with the axis words of the line: in their place, or added to them.
+fn with_words(line: &Line, add: bool) -> AxisVector {
+    let mut offset = *line.state.coordinates.tool();
+    for (axis, value) in line.named_axes() {
+        offset[axis] = if add { offset[axis] + value } else { value };
+    }
+    offset
+}
+
+fn length_from_words(line: &mut Line) -> Checked<()> {
+    if line.words.present & AXIS_MASK == 0 {
+        return Err(line.orders.fault(Group::ToolLength, "axis-missing", "G43.1 needs at least one axis word"));
+    }
+    let offset = with_words(line, false);
+    line.state.coordinates.set_tool(offset);
+    Ok(())
+}
+
+fn more_length(line: &mut Line) -> Checked<()> {
+    let offset = match (line.words.integer(b'H', 0..=MAX_TOOL)?, line.words.present & AXIS_MASK != 0) {
+        (Some(number), false) => *line.state.coordinates.tool() + offset_of(line, number)?,
+        (None, true) => with_words(line, true),
+        _ => {
+            let message = "G43.2 needs either H, a tool, or axis words";
+            return Err(line.orders.fault(Group::ToolLength, "word-missing", message));
+        }
     };
     line.state.coordinates.set_tool(offset);
+    Ok(())
+}
+
+/// M61.
+fn set_number(line: &mut Line) -> Checked<()> {
+    let missing = || line.orders.fault(Group::ToolChange, "word-missing", "M61 needs Q, the number of the tool");
+    let number = line.words.integer(b'Q', 0..=MAX_TOOL)?.ok_or_else(missing)?;
+    if number != 0 && !line.config.tools.is_empty() && line.state.tools.find(number).is_none() {
+        return Err(line.words.fault(b'Q', "tool", format!("the tool table has no tool {number}")));
+    }
+    line.state.tools.in_spindle = number;
     Ok(())
 }
 
@@ -61,7 +149,7 @@ fn no_length(line: &mut Line) -> Checked<()> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{assert_items, ends, run, shown};
+    use crate::testing::{assert_items, ends, mill, run, run_on, shown};
 
     #[test]
     fn a_change_rests_and_stops_the_spindle() {
@@ -78,6 +166,7 @@ mod tests {
                 "End",
             ],
         );
+        assert_items("M6", &["End"]);
         // T with a function is a tool all the same.
         assert!(shown(&run("TABS[-2]"))[0].starts_with("1: ToolSelect 2"));
     }
@@ -88,5 +177,27 @@ mod tests {
             ends("G43 H1 G0 Z0\nG49 Z1\nT2 M6\nG43 Z0"),
             [["0", "0", "20"], ["0", "0", "1"], ["0", "0", "1"], ["0", "0", "25"]]
         );
+        assert_eq!(
+            ends("G43 H1\nG43.2 H2\nG0 Z1\nG43.2 X3\nG0 X0\nG43.1 Z5\nG0 Z0")[..],
+            [["0", "0", "46"], ["3", "0", "46"], ["3", "0", "5"]]
+        );
+        assert_eq!(ends("M61 Q2\nG43\nG0 Z0"), [["0", "0", "25"]]);
+    }
+
+    #[test]
+    fn without_a_table_a_length_is_zero_only_where_the_machine_says_so() {
+        let mut config = mill();
+        config.tools.clear();
+        let (_, errors) = run_on(config.clone(), "T5 M6\nG43 H5 G0 Z1");
+        assert_eq!((errors.len(), errors[0].line, errors[0].code), (1, 2, "tool"));
+        assert!(errors[0].message.contains("without_table = \"zero\""), "{}", errors[0].message);
+        config.zero_length_without_table = true;
+        let (items, errors) = run_on(config.clone(), "T5 M6\nG43 H5 G0 Z1\nG43 H6\nZ2");
+        assert!(errors.is_empty());
+        assert!(shown(&items).iter().any(|item| item == "2: Rapid 0 to 0 0 1 0"));
+        let mut program = crate::Program::spool("t.ngc", &b"T5 M6\nG43 H5 G0 Z1\nG43 H6"[..]).unwrap();
+        let report = crate::check(&mut program, &config, &mut |_| Ok(())).unwrap();
+        let notes: Vec<_> = report.warnings.iter().map(|w| (w.line, w.code)).collect();
+        assert_eq!(notes, [(2, "tool-length")], "one note a run");
     }
 }

@@ -176,3 +176,8 @@ fn programs_with_o_words() {
 fn programs_with_canned_cycles() {
     judge_all("cycles", 60, programs::with_cycles);
 }
+
+#[test]
+fn programs_with_offsets_and_rotation() {
+    judge_all("offsets", 60, programs::with_offsets);
+}

@@ -249,3 +249,39 @@ fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool) {
         writer.line(&format!("{at} {normal}{}", bottom - deeper));
     }
 }
+
+/// Coordinate systems, rotations, G92 and tools between lines and arcs.
+pub fn with_offsets(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 0);
+    for _ in 0..14 {
+        let [x, y, z] = [0; 3].map(|_| writer.below(20).cast_signed() - 9);
+        let (system, tool) = (writer.below(10), 1 + writer.below(2));
+        let degrees = writer.random.pick(&["0", "30", "90", "-12.5"]);
+        let line = match writer.below(19) {
+            0 => format!("G10 L2 P{system} X{x} Y{y} R{degrees}"),
+            1 => format!("G10 L2 P{system} Z{z} R{degrees}"),
+            2 => format!("G10 L20 P{system} X{x} Y{y}"),
+            3 => format!("G10 L20 P{system} Y{y} Z{z}"),
+            // After a rotation the judge forgets the offset of G92 in where it stands, which distances then begin from.
+            4 if seed.is_multiple_of(2) => format!("G92 X{x} Z{z}"),
+            5 => writer.random.pick(&["G92.1", "G92.2", "G92.3"]).to_owned(),
+            6 => writer.random.pick(&["G54", "G55", "G56", "G59", "G59.1", "G59.3"]).to_owned(),
+            7 => format!("G10 L1 P{tool} Z{z}"),
+            8 => format!("G10 L10 P{tool} Z{z}"),
+            9 => format!("G10 L11 P{tool} Z{z}"),
+            10 => writer.random.pick(&["G43 H1", "G43 H2", "G49"]).to_owned(),
+            11 => format!("G90 G53 G0 X{x} Y{y}"),
+            12 => format!("G90 G17 G3 X{x} Y{y} I[{x} - #5420] J[{y} - #5421 + 0]").replace(&format!("X{x} Y{y} "), ""),
+            13 if seed % 2 == 1 => writer.random.pick(&["G90", "G91"]).to_owned(),
+            14 if seed.is_multiple_of(2) => format!("G52 X{x} Y{y}"),
+            15 => format!("G43.1 Z{z}"),
+            16 => format!("G43.2 H{tool}"),
+            _ => format!("G1 X{x} Y{y}"),
+        };
+        writer.line(&line);
+        let (x, y) = (writer.below(9), writer.below(9));
+        writer.line(&format!("G0 X{x} Y{y}"));
+    }
+    writer.line("M2");
+    writer.text
+}
