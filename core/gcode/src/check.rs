@@ -58,7 +58,11 @@ impl CheckReport {
     }
 
     fn add(&mut self, diagnostic: Diagnostic) {
-        let once = |d: &Diagnostic| d.code == "feed-missing" && diagnostic.code == d.code || *d == diagnostic;
+        // A line that is executed again says nothing new.
+        if self.diagnostics.contains(&diagnostic) {
+            return;
+        }
+        let once = |d: &Diagnostic| d.code == "feed-missing" && diagnostic.code == d.code;
         if self.diagnostics.len() >= MAX_DIAGNOSTICS || self.diagnostics.iter().any(once) {
             self.unlisted += 1;
         } else {

@@ -139,6 +139,19 @@ fn line() -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(piece, 0..6).prop_map(|pieces| pieces.join(&b' '))
 }
 
+/// O-words with few labels, so that they often belong together.
+fn o_line() -> impl Strategy<Value = Vec<u8>> {
+    let keywords = "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue";
+    let keyword = prop::sample::select(keywords.split(' ').collect::<Vec<_>>());
+    let value = prop::sample::select(vec!["", " [#1 LT 3]", " [1]", " [0]", " [#31]", " [2] [3]", " [1/0]", " x"]);
+    (1..4, keyword, value).prop_map(|(label, keyword, value)| format!("o{label} {keyword}{value}").into_bytes())
+}
+
+/// Counts, and moves a little.
+fn step() -> impl Strategy<Value = Vec<u8>> {
+    Just(b"#1=[#1+1] #31=1 G91 G0 X0.1".to_vec())
+}
+
 fn point(block: &Block, share: f64) -> [f64; 2] {
     let angle = block.arc.start_angle_rad + share * block.arc.sweep_rad;
     let [a, b] = block.arc.center_mm;
@@ -215,6 +228,28 @@ proptest! {
                 stream.provide_input(1.0);
             }
             assert_sound(&only_blocks(&items), true);
+        }
+    }
+
+    #[test]
+    fn o_words_in_any_order_end_and_run_as_they_were_checked(
+        lines in prop::collection::vec(prop_oneof![1 => line(), 1 => step(), 4 => o_line()], 0..40),
+    ) {
+        let mut config = mill();
+        config.max_steps = 2000;
+        let mut program = Program::spool("o-words", &lines.join(&b'\n')[..]).unwrap();
+        let report = check(&mut program, &config, &mut |_| Ok(())).unwrap();
+        if report.is_ok() && report.seen_to.is_none() && report.open_lines == 0 {
+            let mut stream = Stream::new(program, &config).unwrap();
+            let mut items = Vec::new();
+            while let Ok(true) = stream.next_items(&mut items) {
+                if items.last().is_some_and(Item::is_probe) {
+                    return Ok(());
+                }
+                stream.provide_input(1.0);
+            }
+            let curves = items.iter().filter(|item| matches!(item, Item::Curve(_))).count();
+            prop_assert_eq!((only_blocks(&items).len() + curves) as u64, report.blocks);
         }
     }
 
