@@ -137,6 +137,9 @@ static MACHINE: &[Key] = &[
     key("homing.<axis>.drive_within_s", "s", "one minute", "Time that the drive has for its homing"),
     key("operator.jog_keep_alive_ms", "ms", "200", "Time without a keep-alive, as key repeats are, after which a jog stops"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
+    key("tools.without_table", "text", "none", "zero: instead of `table`, every tool has length zero; simulated drives do so without it"),
+    key("program.subroutine_path", "file", "none", "Folder of files that O-word calls look up: `o<name> call` runs `name.ngc`"),
+    key("program.max_steps", "number", "50000000", "Lines that a program with O-words may execute in the check"),
 ];
 
 #[rustfmt::skip]

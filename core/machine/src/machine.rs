@@ -20,6 +20,7 @@ use crate::parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, S
 use crate::places::Places;
 use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
+use crate::program::ProgramRules;
 use crate::schema::check;
 use crate::section::Section;
 use crate::signals::{self, Analog};
@@ -98,6 +99,8 @@ pub struct Machine {
     pub require_homing: bool,
     /// The probe, if there is one.
     pub probe: Option<Probe>,
+    /// What part programs may use.
+    pub program: ProgramRules,
     /// What the operator's switches mean.
     pub operator: Operator,
     /// Tools; empty without a tool table.
@@ -216,6 +219,7 @@ struct Tables {
     policy: Option<Policy>,
     spindle: Spindle,
     probe: Option<Probe>,
+    program: ProgramRules,
     operator: Operator,
 }
 
@@ -242,6 +246,7 @@ impl Tables {
             policy: optional("policy").and_then(|s| Policy::read(&s)),
             spindle: Spindle::read(&root.section("spindle")),
             probe: optional("probe").and_then(|s| Probe::read(&s)),
+            program: ProgramRules::read(&root.section("program")),
             operator: Operator::read(&root.section("operator")),
         }
     }
@@ -306,6 +311,7 @@ impl Tables {
             policy: self.policy,
             spindle: self.spindle,
             probe: self.probe,
+            program: self.program,
             operator: self.operator,
             tools: moving.tools,
             effective,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::node::{Table, Value};
 
 /// Keys whose value names a file, wherever it is stated from.
-const FILES: [(&str, &str); 2] = [("policy", "script"), ("tools", "table")];
+const FILES: [(&str, &str); 3] = [("policy", "script"), ("tools", "table"), ("program", "subroutine_path")];
 
 /// Tables that choose a plugin; `*` stands for any name.
 const PLUGINS: [&[&str]; 7] = [

@@ -36,6 +36,8 @@ pub struct ToolTable {
     pub path: Option<PathBuf>,
     /// The tools, in the order of the file.
     pub tools: Vec<Tool>,
+    /// There is no file, and the machine says that every tool has length zero then.
+    pub zero_without_table: bool,
 }
 
 impl ToolTable {
@@ -46,10 +48,14 @@ impl ToolTable {
 
     /// Reads `[tools]` and the file that it names; what is wrong is reported and left out.
     pub(crate) fn read(tools: &Section<'_>, axes: &Axes, problems: &Problems) -> Option<Self> {
+        let zero = tools.choice("without_table", &[("zero", true)]);
+        if zero.is_some() && !tools.has("table") {
+            return Some(Self { zero_without_table: true, ..Self::default() });
+        }
         let path = tools.required("table", Section::text).map(PathBuf::from)?;
         let from = Named { origin: tools.node("table")?.origin, key: "tools.table" };
         let tools = read_file(&path, from, axes, problems)?;
-        Some(Self { path: Some(path), tools })
+        Some(Self { path: Some(path), tools, zero_without_table: false })
     }
 }
 

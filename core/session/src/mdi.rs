@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::{Interpreter, Item, ProbeResult};
-use tandem_host::{HostError, Left, Registry, Run, Switches, check_block, interpreter_config, planner};
+use tandem_host::{HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal, planner};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
@@ -57,7 +57,8 @@ impl<'a> MdiSession<'a> {
         switches: Switches,
         input: Box<dyn MdiInput>,
     ) -> Result<Self, HostError> {
-        let mut interpreter = Interpreter::new(interpreter_config(&machine, switches));
+        let simulated = !moves_metal(&machine, registry);
+        let mut interpreter = Interpreter::new(interpreter_config(&machine, simulated, switches));
         interpreter.set_file("input");
         let judge = planner(&machine, registry)?;
         let manual = Manual { machine: machine.clone(), judge, interpreter, input, lines: 0, standing: 0, busy: false };

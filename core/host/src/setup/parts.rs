@@ -26,8 +26,9 @@ use crate::switches::Switches;
 /// Greatest time constant that a program may ask for where the machine states no range, s.
 const MOST_TIME_CONSTANT_S: f64 = 1.0;
 
-/// The interpreter's view of the machine.
-pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
+/// The interpreter's view of the machine. A length of zero would drive a tool into the table: where there is no tool table, only
+/// `simulated` drives take it without being told.
+pub fn interpreter_config(machine: &Machine, simulated: bool, switches: Switches) -> Config {
     let mut config = Config::new(machine.axes);
     config.start = start(machine, switches);
     config.block_delete = switches.block_delete;
@@ -41,6 +42,9 @@ pub fn interpreter_config(machine: &Machine, switches: Switches) -> Config {
     let (outputs, inputs) = lines::of(machine);
     (config.outputs, config.inputs) = (outputs, inputs);
     config.tools = machine.tools.tools.iter().map(tool).collect();
+    config.zero_length_without_table = machine.tools.path.is_none() && (machine.tools.zero_without_table || simulated);
+    config.subroutine_path = machine.program.subroutine_path.iter().cloned().collect();
+    config.max_steps = u64::from(machine.program.max_steps);
     config
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tandem_faults::{Faults, Joints};
-use tandem_gcode::{CheckReport, Program, Stream, check};
+use tandem_gcode::{CheckReport, Config, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Kinematics, Planner};
@@ -12,7 +12,7 @@ use crate::drives::Drives;
 use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
 use crate::plugins::hang::HangWatch;
-use crate::plugins::registry::Registry;
+use crate::plugins::registry::{Registry, moves_metal};
 use crate::policy::PolicyHost;
 use crate::setup::claim::Claim;
 use crate::setup::density::Density;
@@ -133,12 +133,13 @@ impl Ready {
         switches: Switches,
         claims: bool,
     ) -> Result<Self, HostError> {
+        let simulated = !moves_metal(&machine, registry);
         let mut plugins = Plugins::of(&machine, registry)?;
         plugins.joints.check_start(&machine)?;
         // Only real drives know where a program on them begins.
         let asks_first = claims && plugins.claim.describe().simulated == 0;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let mut passed = (!asks_first).then(|| Passed::of(&machine, &plugins, &mut program, switches));
+        let mut passed = (!asks_first).then(|| Passed::of(&machine, &plugins, &mut program, simulated, switches));
         if let Some(Err(refused)) = passed {
             return Err(refused);
         }
@@ -153,10 +154,10 @@ impl Ready {
         }
         let passed = match passed {
             Some(passed) => passed?,
-            None => Passed::of(&machine, &plugins, &mut program, switches)?,
+            None => Passed::of(&machine, &plugins, &mut program, simulated, switches)?,
         };
         let name = program.name().to_string();
-        let stream = Stream::new(program, &parts::interpreter_config(&machine, switches))?;
+        let stream = Stream::new(program, &parts::interpreter_config(&machine, simulated, switches))?;
         let source = parts::source(&machine, registry, stream, switches, policy.as_ref(), &plugins.joints)?;
         let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
         Ok(Self { entries: passed.entries, ..ready })
@@ -227,10 +228,17 @@ struct Passed {
 
 impl Passed {
     /// The whole program through the interpreter and the planner.
-    fn of(machine: &Machine, plugins: &Plugins, program: &mut Program, switches: Switches) -> Result<Self, HostError> {
+    fn of(
+        machine: &Machine,
+        plugins: &Plugins,
+        program: &mut Program,
+        simulated: bool,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
         let depth_s = parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
         let mut density = Density::new(machine, depth_s);
-        let report = first_pass(machine, plugins.planner.as_ref(), program, switches, &mut density)?;
+        let config = parts::interpreter_config(machine, simulated, switches);
+        let report = first_pass(machine, plugins.planner.as_ref(), program, &config, &mut density)?;
         if report.is_ok() {
             Ok(Self { report, entries: density.entries() })
         } else {
@@ -281,7 +289,7 @@ pub fn each_block(
     switches: Switches,
     per_block: &mut dyn FnMut(&Block),
 ) -> Result<CheckReport, HostError> {
-    let config = parts::interpreter_config(machine, switches);
+    let config = parts::interpreter_config(machine, true, switches);
     Ok(check(program, &config, &mut |block| {
         per_block(block);
         Ok(())
@@ -293,11 +301,10 @@ fn first_pass(
     machine: &Machine,
     planner: &dyn Planner,
     program: &mut Program,
-    switches: Switches,
+    config: &Config,
     density: &mut Density,
 ) -> Result<CheckReport, HostError> {
-    let config = parts::interpreter_config(machine, switches);
-    Ok(check(program, &config, &mut |block| {
+    Ok(check(program, config, &mut |block| {
         density.block(block);
         check_block(machine, planner, block)
     })?)
