@@ -54,6 +54,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     // It reads a table of the machine file, and no hardware.
     ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),
+    ("hal-drivers/ethercat-emulator", &[]),
     ("hal-drivers", &["tandem-sdk"]),
     ("scripts", &[]),
     (
