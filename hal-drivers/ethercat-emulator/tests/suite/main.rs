@@ -1,4 +1,4 @@
-//! The emulator, judged by masters that know nothing of it.
+//! The emulator, judged by masters that know nothing of it, and by what real terminals once answered.
 
 #![allow(clippy::large_futures, reason = "the futures of ethercrab hold its group of devices")]
 
@@ -7,8 +7,10 @@ mod counting_allocator;
 mod cyclic;
 mod rig;
 
+mod captures;
 mod clocks;
 mod drives;
 mod faults;
 mod frames;
+mod masters;
 mod states;
