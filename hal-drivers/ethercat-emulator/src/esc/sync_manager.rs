@@ -116,3 +116,25 @@ impl SyncManager {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mailbox_is_read_once_when_it_is_full_and_from_its_start() {
+        let mut mailbox = SyncManager::default();
+        // 16 bytes from 0x1000, a mailbox that the master reads, switched on.
+        mailbox.configure(&[0x00, 0x10, 16, 0, 0x22, 0, 1, 0]);
+        assert_eq!(mailbox.judge(0x1000, 0x1010, false), Access::Refused);
+        mailbox.full = true;
+        assert_eq!(mailbox.judge(0x1000, 0x1010, true), Access::Refused);
+        assert_eq!(mailbox.judge(0x1004, 0x1010, false), Access::Refused);
+        assert_eq!(mailbox.judge(0x1010, 0x1020, false), Access::Beside);
+        for (start, end, verdict) in [(0x1000, 0x1008, Access::Granted), (0x1008, 0x1010, Access::Completed)] {
+            assert_eq!(mailbox.judge(start, end, false), verdict);
+            mailbox.follow(verdict, false);
+        }
+        assert_eq!(mailbox.judge(0x1000, 0x1010, false), Access::Refused);
+    }
+}
