@@ -6,6 +6,7 @@
 mod counting_allocator;
 mod double;
 mod keeper;
+mod mapping;
 mod measures;
 mod real;
 mod several;

@@ -1,0 +1,385 @@
+//! Machines whose joints, lines and spindle are dealt out to drivers at random: each driver is told of its own, in its
+//! own numbers, and what it answers comes back in those of the machine.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tandem_host::attached_driver;
+use tandem_rig::Random;
+use tandem_sdk::{
+    Arm, Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, Plugin,
+    PluginError, RawOptions, Setpoint, Words, local_plugin,
+};
+
+use crate::machine;
+
+const AXES: [&str; 4] = ["x", "y", "z", "a"];
+
+/// A driver that keeps what it is told, and answers what it is to.
+#[derive(Clone, Debug, Default)]
+struct Mirror {
+    context: Option<DriverContext>,
+    sent: Option<Setpoint>,
+    told: Option<Setpoint>,
+    attached: Attached,
+    answer: Feedback,
+    fails: bool,
+    quick_stops: u32,
+    stops: u32,
+    explained: Option<u32>,
+}
+
+static MIRRORS: Mutex<BTreeMap<String, Mirror>> = Mutex::new(BTreeMap::new());
+
+fn mirrors() -> MutexGuard<'static, BTreeMap<String, Mirror>> {
+    MIRRORS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Reflecting(String);
+
+impl Reflecting {
+    fn with<T>(&self, what: impl FnOnce(&mut Mirror) -> T) -> T {
+        what(mirrors().entry(self.0.clone()).or_default())
+    }
+}
+
+#[allow(clippy::unnecessary_wraps)] // the form of a constructor
+fn made(options: &RawOptions) -> Result<Reflecting, PluginError> {
+    Ok(Reflecting(options.0.split('"').nth(1).unwrap_or_default().to_string()))
+}
+
+fn plugin() -> Plugin {
+    local_plugin!(driver "mirror" = made)
+}
+
+impl Driver for Reflecting {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::real()
+    }
+    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        self.with(|mirror| mirror.context = Some(*context));
+        Ok(())
+    }
+    fn start(&mut self) -> Result<Attached, PluginError> {
+        Ok(self.with(|mirror| mirror.attached))
+    }
+    fn send(&mut self, setpoint: &Setpoint) {
+        self.with(|mirror| mirror.sent = Some(*setpoint));
+    }
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        self.with(|mirror| {
+            mirror.told = Some(*setpoint);
+            if mirror.fails {
+                return Err(PluginError::fixed("the line is cut"));
+            }
+            *feedback = mirror.answer;
+            Ok(())
+        })
+    }
+    fn quick_stop(&mut self) {
+        self.with(|mirror| mirror.quick_stops += 1);
+    }
+    fn stop(&mut self) -> Result<(), PluginError> {
+        self.with(|mirror| mirror.stops += 1);
+        Err(PluginError::fixed("the brake is not on"))
+    }
+    fn explain(&self, joint: u32, _code: u32) -> Words {
+        self.with(|mirror| mirror.explained = Some(joint));
+        Words::new(format!("{} of {}", joint, self.0))
+    }
+}
+
+/// What a driver has of the machine, by the machine's numbers.
+#[derive(Clone, Debug, Default)]
+struct Own {
+    name: String,
+    joints: Vec<usize>,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+    analog: Vec<usize>,
+    spindle: bool,
+}
+
+/// What is told and answered in one numbering, as sets and lists that know nothing of runs and masks.
+impl Own {
+    fn bits(&self, of: impl Fn(usize) -> bool) -> u32 {
+        self.joints.iter().enumerate().fold(0, |bits, (own, joint)| bits | u32::from(of(*joint)) << own)
+    }
+    fn vector(&self, of: &AxisVector) -> AxisVector {
+        let own: Vec<f64> = self.joints.iter().map(|joint| of[*joint]).collect();
+        AxisVector::from_slice(&own)
+    }
+    fn lines(numbers: &[u32], of: u64) -> u64 {
+        numbers.iter().enumerate().fold(0, |own, (i, number)| own | (of >> number & 1) << i)
+    }
+}
+
+/// Deals everything out to two or three drivers, in any order.
+fn dealt(random: &mut Random, seed: u64) -> Vec<Own> {
+    let count = 2 + random.below(2) as usize;
+    let mut all: Vec<Own> = (0..count).map(|i| Own { name: format!("m{seed}-{i}"), ..Own::default() }).collect();
+    let mut shuffled = |count: u64| {
+        let mut left: Vec<u64> = (0..count).collect();
+        let mut order = vec![];
+        while !left.is_empty() {
+            order.push((left.remove(random.below(left.len() as u64) as usize), random.below(1 << 32) as usize % 97));
+        }
+        order
+    };
+    for (joint, to) in shuffled(4) {
+        all[to % count].joints.push(joint as usize);
+    }
+    for (line, to) in shuffled(64) {
+        all[to % count].inputs.push(line as u32);
+    }
+    for (line, to) in shuffled(64) {
+        all[to % count].outputs.push(line as u32);
+    }
+    for (analog, to) in shuffled(4) {
+        all[to % count].analog.push(analog as usize);
+    }
+    let turns = seed as usize % count;
+    all[turns].spindle = true;
+    // Some have their lines in one run, as most have.
+    if seed % 3 == 0 {
+        all.iter_mut().for_each(|own| own.inputs.sort_unstable());
+    }
+    all
+}
+
+fn text(all: &[Own]) -> String {
+    let mut text = String::new();
+    for own in all {
+        let joints: Vec<_> = own.joints.iter().map(|joint| AXES[*joint]).collect();
+        let _ = writeln!(
+            text,
+            "[drivers.{}]\nplugin = \"mirror\"\noptions = {{ name = \"{}\" }}\njoints = {joints:?}\ninputs = {:?}\n\
+             outputs = {:?}\nanalog = {:?}\nspindle = {}",
+            own.name, own.name, own.inputs, own.outputs, own.analog, own.spindle
+        );
+    }
+    text
+}
+
+fn drawn_answer(random: &mut Random) -> Feedback {
+    let mut answer =
+        Feedback { homed: random.below(256) as u32, inputs: random.below(u64::MAX), ..Feedback::default() };
+    for joint in 0..8 {
+        answer.state[joint] = random.pick(&[JointState::Enabled, JointState::Homing, JointState::QuickStop]);
+        (answer.fault_code[joint], answer.age_periods[joint]) = (random.below(99) as u32, random.below(9) as u32);
+        answer.position[joint] = random.unit();
+        (answer.speed[joint], answer.current_a[joint]) = (random.unit(), random.unit());
+    }
+    answer.input_age_periods = std::array::from_fn(|_| random.below(9) as u16);
+    answer.analog = std::array::from_fn(|_| random.unit());
+    answer.latches[0] = Latch {
+        input: random.below(20) as u32,
+        edge: random.below(3) as u32,
+        joints: random.below(16) as u32,
+        position: AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]),
+        ..Latch::default()
+    };
+    (answer.spindle_rad_per_s, answer.spindle_angle_rad, answer.spindle_at_speed) = (random.unit(), random.unit(), 1);
+    answer
+}
+
+fn drawn_setpoint(random: &mut Random) -> Setpoint {
+    let mut setpoint = Setpoint {
+        enable: 1,
+        homing: random.below(16) as u32,
+        limited: random.below(16) as u32,
+        outputs: random.below(u64::MAX),
+        arm: Arm { input: random.below(64) as u32, edge: random.below(3) as u32 },
+        spindle_rad_per_s: random.unit(),
+        tick: random.below(1000),
+        ..Setpoint::default()
+    };
+    for joint in 0..4 {
+        setpoint.position[joint] = random.unit();
+        (setpoint.velocity[joint], setpoint.acceleration[joint]) = (random.unit(), random.unit());
+    }
+    setpoint
+}
+
+fn assert_told(own: &Own, whole: &Setpoint, case: &str) {
+    let mirror = mirrors()[&own.name].clone();
+    let told = mirror.told.unwrap();
+    assert_eq!(mirror.sent, Some(told), "{case}: sent to all before anybody is received from");
+    assert_eq!((told.enable, told.reset, told.tick), (whole.enable, whole.reset, whole.tick), "{case}");
+    assert_eq!(told.homing, own.bits(|joint| whole.homing >> joint & 1 == 1), "{case}");
+    assert_eq!(told.limited, own.bits(|joint| whole.limited >> joint & 1 == 1), "{case}");
+    assert_eq!(told.outputs, Own::lines(&own.outputs, whole.outputs), "{case}");
+    let armed = own.inputs.iter().position(|input| *input == whole.arm.input).filter(|_| whole.arm.edge != 0);
+    let arm = armed.map_or(Arm::default(), |input| Arm { input: input as u32, edge: whole.arm.edge });
+    assert_eq!(told.arm, arm, "{case}");
+    assert_eq!(told.spindle_rad_per_s, if own.spindle { whole.spindle_rad_per_s } else { 0.0 }, "{case}");
+    assert_eq!(
+        [told.position, told.velocity, told.acceleration],
+        [&whole.position, &whole.velocity, &whole.acceleration].map(|vector| own.vector(vector)),
+        "{case}"
+    );
+}
+
+/// What came of the answer of one driver; the latches of all are looked at together.
+fn assert_answered(own: &Own, whole: &Feedback, latches: &mut Vec<Latch>, case: &str) {
+    let answer = mirrors()[&own.name].answer;
+    for (i, joint) in own.joints.iter().enumerate() {
+        assert_eq!(whole.homed >> joint & 1, answer.homed >> i & 1, "{case}");
+        assert_eq!((whole.state[*joint], whole.fault_code[*joint]), (answer.state[i], answer.fault_code[i]), "{case}");
+        assert_eq!(whole.age_periods[*joint], answer.age_periods[i], "{case}");
+        assert_eq!(
+            [whole.position[*joint], whole.speed[*joint], whole.current_a[*joint]],
+            [answer.position[i], answer.speed[i], answer.current_a[i]],
+            "{case}"
+        );
+    }
+    for (i, input) in own.inputs.iter().enumerate() {
+        assert_eq!(whole.inputs >> input & 1, answer.inputs >> i & 1, "{case}: input {input}");
+        assert_eq!(whole.input_age_periods[*input as usize], answer.input_age_periods[i], "{case}: input {input}");
+    }
+    for (i, analog) in own.analog.iter().enumerate() {
+        assert_eq!(whole.analog[*analog], answer.analog[i], "{case}");
+    }
+    if own.spindle {
+        let (is, of) = (whole, answer);
+        assert_eq!(
+            (is.spindle_rad_per_s, is.spindle_angle_rad),
+            (of.spindle_rad_per_s, of.spindle_angle_rad),
+            "{case}"
+        );
+        assert_eq!(is.spindle_at_speed, of.spindle_at_speed, "{case}");
+    }
+    let caught = answer.latches[0];
+    let Some(input) = own.inputs.get(caught.input as usize).filter(|_| caught.edge != 0) else { return };
+    let mut latch = Latch { input: *input, joints: 0, ..caught };
+    for (i, joint) in own.joints.iter().enumerate() {
+        latch.joints |= (caught.joints >> i & 1) << joint;
+        latch.position[*joint] = caught.position[i];
+    }
+    latches.push(latch);
+}
+
+fn registry() -> tandem_host::Registry {
+    let mut registry = crate::registry();
+    registry.register(plugin()).unwrap();
+    registry
+}
+
+#[test]
+fn each_driver_is_told_and_answers_in_its_own_numbers() {
+    for seed in 0..60 {
+        let mut random = Random::new(300 + seed);
+        let all = dealt(&mut random, seed);
+        let claimed: Vec<u32> = (0..64).filter(|_| random.below(4) == 0).collect();
+        let mut tables = text(&all);
+        claimed.iter().for_each(|input| _ = writeln!(tables, "[inputs.i{input}]\ninput = {input}"));
+        let mut stands = Attached::default();
+        for own in &all {
+            let mut attached = Attached { known: random.below(16) as u32, homed: random.below(16) as u32, ..stands };
+            for joint in 0..4 {
+                attached.position[joint] = random.unit();
+                attached.state[joint] = random.pick(&[JointState::Disabled, JointState::Fault]);
+                (attached.fault_code[joint], attached.delay_periods[joint]) =
+                    (random.below(99) as u32, random.below(9) as u32);
+            }
+            mirrors().insert(own.name.clone(), Mirror { attached, ..Mirror::default() });
+        }
+        let (mut driver, attached) = attached_driver(&machine(&tables), &registry()).unwrap();
+        for own in &all {
+            let (context, stood) = mirrors().get(&own.name).map(|own| (own.context.unwrap(), own.attached)).unwrap();
+            let names: Vec<_> =
+                context.joints[..context.joint_count as usize].iter().map(|of| of.name.as_str().to_string()).collect();
+            assert_eq!(names, own.joints.iter().map(|joint| AXES[*joint]).collect::<Vec<_>>(), "seed {seed}");
+            let mask = claimed.iter().fold(0_u64, |mask, input| mask | 1 << input);
+            assert_eq!(context.inputs, Own::lines(&own.inputs, mask), "seed {seed}");
+            assert_eq!(context.outputs, Own::lines(&own.outputs, u64::MAX), "seed {seed}");
+            assert_eq!(context.spindle, u32::from(own.spindle), "seed {seed}");
+            for (i, joint) in own.joints.iter().enumerate() {
+                assert_eq!(
+                    (attached.known >> joint & 1, attached.homed >> joint & 1),
+                    (stood.known >> i & 1, stood.homed >> i & 1)
+                );
+                assert_eq!((attached.position[*joint], attached.state[*joint]), (stood.position[i], stood.state[i]));
+                assert_eq!(
+                    (attached.fault_code[*joint], attached.delay_periods[*joint]),
+                    (stood.fault_code[i], stood.delay_periods[i])
+                );
+                let words = driver.explain(*joint as u32, 7);
+                assert_eq!(words.as_str(), format!("{i} of {}", own.name), "seed {seed}");
+            }
+        }
+        stands = attached;
+        let mut feedback = Feedback { position: stands.position, ..Feedback::default() };
+        for period in 0..20 {
+            let (whole, case) = (drawn_setpoint(&mut random), format!("seed {seed}, period {period}"));
+            all.iter().for_each(|own| mirrors().get_mut(&own.name).unwrap().answer = drawn_answer(&mut random));
+            driver.exchange(&whole, &mut feedback).unwrap();
+            let mut latches = vec![];
+            for own in &all {
+                assert_told(own, &whole, &case);
+                assert_answered(own, &feedback, &mut latches, &case);
+            }
+            let given: Vec<_> = feedback.latches.iter().filter(|latch| latch.edge != 0).copied().collect();
+            assert_eq!(given.len(), latches.len(), "{case}");
+            for (given, latch) in given.iter().zip(&latches) {
+                assert_eq!((given.input, given.edge, given.joints), (latch.input, latch.edge, latch.joints), "{case}");
+                let caught = (0..4).filter(|joint| latch.joints >> joint & 1 == 1);
+                caught.for_each(|joint| assert_eq!(given.position[joint], latch.position[joint], "{case}"));
+            }
+        }
+    }
+}
+
+/// A driver whose line is cut says nothing new, and that is told once; a reset that finds it again begins anew. At the
+/// end all are stopped, whoever could not be.
+#[test]
+fn one_whose_line_is_cut_is_old_and_lost_until_a_reset_finds_it_again() {
+    let mut random = Random::new(77);
+    let deal = |name: &str, joints: &[usize], inputs: &[u32], spindle| Own {
+        name: name.to_string(),
+        joints: joints.to_vec(),
+        inputs: inputs.to_vec(),
+        spindle,
+        ..Own::default()
+    };
+    let all = [deal("cut-none", &[2, 0], &[7], false), deal("cut", &[3, 1], &[40, 3], true)];
+    for own in &all {
+        let mut answer = Feedback { homed: 3, ..drawn_answer(&mut random) };
+        (answer.age_periods, answer.input_age_periods) = ([0; 8], [0; 64]);
+        answer.latches[0] = Latch { input: 0, edge: 1, joints: 1, ..Latch::default() };
+        (answer.has_phase, answer.phase_ns) = (u32::from(own.spindle), 9);
+        mirrors().insert(own.name.clone(), Mirror { answer, ..Mirror::default() });
+    }
+    let (mut driver, _) = attached_driver(&machine(&text(&all)), &registry()).unwrap();
+    let (mut setpoint, mut feedback) = (Setpoint { enable: 1, ..Setpoint::default() }, Feedback::default());
+    driver.exchange(&setpoint, &mut feedback).unwrap();
+    assert_eq!((feedback.homed, feedback.has_phase, feedback.phase_ns), (0b1111, 1, 9));
+    assert_eq!(feedback.latches.iter().filter(|latch| latch.edge != 0).count(), 2);
+    mirrors().get_mut("cut").unwrap().fails = true;
+    let failed = (1..=30_u32).filter(|_| driver.exchange(&setpoint, &mut feedback).is_err()).count();
+    assert_eq!((failed, feedback.spindle_at_speed), (1, 0));
+    let (states, ages) = (feedback.state, feedback.age_periods);
+    assert_eq!((states[3], states[1], ages), (JointState::Lost, JointState::Lost, [0, 30, 0, 30, 0, 0, 0, 0]));
+    let inputs = feedback.input_age_periods;
+    assert_eq!((inputs[40], inputs[3], inputs[7]), (30, 30, 0));
+    let given: Vec<_> = feedback.latches.iter().filter(|latch| latch.edge != 0).map(|latch| latch.input).collect();
+    assert_eq!(given, [7], "an edge of before is not caught again");
+    let mut mirror = mirrors();
+    let cut = mirror.get_mut("cut").unwrap();
+    (cut.fails, cut.answer.homed, cut.answer.has_phase) = (false, 0, 0);
+    cut.answer.latches = Feedback::default().latches;
+    drop(mirror);
+    driver.exchange(&setpoint, &mut feedback).unwrap();
+    assert_eq!(feedback.state[3], JointState::Lost, "nobody has reset it");
+    setpoint.reset = 1;
+    driver.exchange(&setpoint, &mut feedback).unwrap();
+    assert_eq!((feedback.state[3], feedback.age_periods[3]), (mirrors()["cut"].answer.state[0], 0));
+    assert_eq!((feedback.homed, feedback.has_phase), (0b101, 0), "what it says no more");
+    driver.quick_stop();
+    assert!(driver.stop().is_err());
+    for own in &all {
+        let mirror = mirrors()[&own.name].clone();
+        assert_eq!((mirror.quick_stops, mirror.stops), (1, 1), "{}", own.name);
+    }
+}
