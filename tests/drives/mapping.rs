@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tandem_host::attached_driver;
+use tandem_host::{Run, Switches, attached_driver};
 use tandem_rig::Random;
 use tandem_sdk::{
     Arm, Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, Plugin,
     PluginError, RawOptions, Setpoint, Words, local_plugin,
 };
 
-use crate::machine;
+use crate::{machine, program};
 
 const AXES: [&str; 4] = ["x", "y", "z", "a"];
 
@@ -55,7 +55,7 @@ fn plugin() -> Plugin {
 
 impl Driver for Reflecting {
     fn describe(&self) -> DriverDescription {
-        DriverDescription::real()
+        DriverDescription { watches_following: 1, ..DriverDescription::real() }
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         self.with(|mirror| mirror.context = Some(*context));
@@ -274,6 +274,8 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
         let claimed: Vec<u32> = (0..64).filter(|_| random.below(4) == 0).collect();
         let mut tables = text(&all);
         claimed.iter().for_each(|input| _ = writeln!(tables, "[inputs.i{input}]\ninput = {input}"));
+        let measured: Vec<usize> = (0..4).filter(|_| random.below(2) == 0).collect();
+        measured.iter().for_each(|analog| _ = writeln!(tables, "[analog.s{analog}]\ninput = {analog}"));
         let mut stands = Attached::default();
         for own in &all {
             let mut attached = Attached { known: random.below(16) as u32, homed: random.below(16) as u32, ..stands };
@@ -295,6 +297,8 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
             assert_eq!(context.inputs, Own::lines(&own.inputs, mask), "seed {seed}");
             assert_eq!(context.outputs, Own::lines(&own.outputs, u64::MAX), "seed {seed}");
             assert_eq!(context.spindle, u32::from(own.spindle), "seed {seed}");
+            let wanted = own.analog.iter().enumerate().filter(|(_, analog)| measured.contains(analog));
+            assert_eq!(u64::from(context.analog), wanted.fold(0, |mask, (i, _)| mask | 1 << i), "seed {seed}");
             for (i, joint) in own.joints.iter().enumerate() {
                 assert_eq!(
                     (attached.known >> joint & 1, attached.homed >> joint & 1),
@@ -381,5 +385,21 @@ fn one_whose_line_is_cut_is_old_and_lost_until_a_reset_finds_it_again() {
     for own in &all {
         let mirror = mirrors()[&own.name].clone();
         assert_eq!((mirror.quick_stops, mirror.stops), (1, 1), "{}", own.name);
+    }
+}
+
+/// Where it is not known where a joint stands, nobody knows how skew its gantry is: homing and jogging may go on.
+#[test]
+fn the_skew_of_a_gantry_is_judged_by_joints_that_know_where_they_stand() {
+    for (known, skew) in [(u32::MAX, true), (0b11101, false), (0b11110, false)] {
+        let mut attached = Attached { known, ..Attached::at(AxisVector::ZERO) };
+        attached.position[1] = 50.0;
+        mirrors().insert("skew".to_string(), Mirror { attached, ..Mirror::default() });
+        let gantry = "[driver]\nplugin = \"mirror\"\noptions = { name = \"skew\" }\n\
+                      [joints.x1]\naxis = \"x\"\n[joints.x2]\naxis = \"x\"\n";
+        let switches = Switches { unhomed: true, ..Switches::default() };
+        let run = Run::prepare(machine(gantry), &registry(), program("G21\nM2\n"), switches);
+        let refused = run.err().map(|error| error.to_string()).unwrap_or_default();
+        assert_eq!(refused.contains("the gantry is skew"), skew, "{known:b}: {refused}");
     }
 }
