@@ -152,11 +152,10 @@ pub struct FineLoop {
     attach: Attach,
     setpoint: Setpoint,
     feedback: Feedback,
-    /// Where the joints were told to be in the last periods, as far as a following error is judged, and where they were.
-    sent: History,
+    /// Where the joints were told to be in the last periods, where some joint has a limit of its following error.
+    sent: Option<History>,
+    /// Where they were.
     measured: History,
-    /// Some joint has a limit of its following error.
-    judges_following: bool,
     /// What the drives are to catch.
     arm: Arm,
     release: Release,
@@ -178,6 +177,7 @@ impl FineLoop {
         kinematics: Option<Box<dyn Kinematics>>,
     ) -> Self {
         let (limits, lanes) = (&config.limits.axes, config.lane_count());
+        let judges_following = config.max_following_error_mm.0.iter().any(|most| *most < f64::INFINITY);
         Self {
             config: *config,
             driver,
@@ -221,9 +221,8 @@ impl FineLoop {
             attach: Attach::new(config),
             setpoint: Setpoint::default(),
             feedback: Feedback { position: config.attached.position, ..Feedback::default() },
-            sent: History::new(&config.attached.position),
+            sent: judges_following.then(|| History::new(&config.attached.position)),
             measured: History::new(&config.attached.position),
-            judges_following: config.max_following_error_mm.0.iter().any(|most| *most < f64::INFINITY),
             arm: Arm::default(),
             release: Release::default(),
             left: Left::default(),

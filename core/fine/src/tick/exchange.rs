@@ -29,7 +29,7 @@ impl FineLoop {
         self.remember();
         // What is true nearly always is looked at first.
         let all_hold = answer::all_hold(&self.feedback, self.joints);
-        if (failed || unreadable.is_some() || !all_hold || self.judges_following)
+        if (failed || unreadable.is_some() || !all_hold || self.sent.is_some())
             && let Some(kind) = self.fault_of_answer(failed, unreadable)
         {
             self.fail(kind);
@@ -50,8 +50,10 @@ impl FineLoop {
         let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
         let resets = self.is_resetting();
         let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
-        let sent = (&self.sent, &self.config.attached.delay_periods);
-        let far = || answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own);
+        let far = || {
+            let sent = (self.sent.as_ref()?, &self.config.attached.delay_periods);
+            answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own)
+        };
         fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go))
     }
 
@@ -81,8 +83,8 @@ impl FineLoop {
 
     /// Keeps what was sent, where it is asked for, and what came back of it.
     fn remember(&mut self) {
-        if self.judges_following {
-            self.sent.push(&self.setpoint.position);
+        if let Some(sent) = &mut self.sent {
+            sent.push(&self.setpoint.position);
         }
         self.measured.push(&self.feedback.position);
         let is_old = self.feedback.age_periods[..self.joints].iter().fold(0, |any, age| any | age) > 0;

@@ -113,6 +113,8 @@ impl FineLoop {
         self.offset[joint] = 0.0;
         self.stand_at(&joints);
         (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
-        self.sent = History::new(&joints);
+        if let Some(sent) = &mut self.sent {
+            *sent = History::new(&joints);
+        }
     }
 }
