@@ -37,6 +37,11 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
     let walker = Walker::new(&path.elements, options);
     let Some(last) = followed.chain.last().copied() else { return followed };
     let Some((cap_mm, first)) = smallest_tolerance(&walker, &followed.chain) else {
+        if let Some(places) = walker.any(&followed.chain) {
+            followed.end = walker.end(places.last().copied().unwrap_or_default(), &last);
+            followed.settle(&path.elements, &places, &places);
+            return followed;
+        }
         let walk = walker.recovering(&followed.chain);
         followed.end = walker.end(walk.places.last().copied().unwrap_or_default(), &last);
         followed.deviation_mm = walk.misses.iter().map(|&(_, off_mm)| off_mm).fold(0.0, f64::max);
@@ -54,7 +59,9 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
 /// features smaller than the tolerance.
 pub fn ranges(elements: &[Element], followed: &Followed, options: &Options) -> Option<Vec<(Place, Place)>> {
     let walker = Walker::new(elements, options);
-    let (cap_mm, first) = widest_tolerance(&walker, &followed.chain)?;
+    let Some((cap_mm, first)) = widest_tolerance(&walker, &followed.chain) else {
+        return walker.any_ranges(&followed.chain);
+    };
     let last = latest(elements, followed.end, &followed.chain, cap_mm, options)?;
     Some(first.into_iter().zip(last).collect())
 }

@@ -41,6 +41,7 @@ mod limits;
 mod machine;
 mod options;
 mod path;
+mod places;
 mod program;
 mod trace;
 mod verdict;

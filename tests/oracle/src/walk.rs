@@ -9,6 +9,7 @@ use crate::{
     Options, Position,
     geometry::{distance, distance_to_chord},
     path::{Element, Place},
+    places,
 };
 
 /// After a sample off the path, the path is searched this many times as far as the samples have moved since.
@@ -66,6 +67,20 @@ impl<'a> Walker<'a> {
             places.push(place);
         }
         Some(places)
+    }
+
+    /// A place of every sample, if there are any at all: not always the first ones, which may lead nowhere.
+    pub fn any(&self, samples: &[Position]) -> Option<Vec<Place>> {
+        Some(self.known(samples)?.nearest(self.elements, samples, self.reach_mm))
+    }
+
+    /// Between which places each sample may be then.
+    pub fn any_ranges(&self, samples: &[Position]) -> Option<Vec<(Place, Place)>> {
+        Some(self.known(samples)?.ranges(self.elements, samples, self.reach_mm))
+    }
+
+    fn known(&self, samples: &[Position]) -> Option<places::Known> {
+        places::find(self.elements, samples, |element| self.tolerance_mm(element), self.reach_mm)
     }
 
     /// The first places of all samples; where a sample has none, the walk waits until the samples come back.

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use common::{
     Profile, assert_finds, assert_passes, at, machine, polyline, smooth_machine, stop_at_all, trace, verdict,
 };
-use tandem_oracle::{Kind, Options, Position, judge};
+use tandem_oracle::{Check, Kind, Options, Position, judge};
 
 const CORNER: &str = "G64 P0.002\nG1 X20 F3000\nY15\nM2\n";
 
@@ -106,6 +106,47 @@ fn a_reversal_and_a_crossing_fool_nobody() {
         [points[0], points[1], at(10.0, 0.0, 0.0), points[4], points[3], points[2], at(10.0, 0.0, 0.0), points[5]];
     let other_way = [&other_way[..], &points[6..]].concat();
     assert!(judge(&other_way).kinds().contains(&Kind::PathDeviation));
+}
+
+/// Samples along a polyline, each the mean of those around it: a motion that rounds what is small.
+fn rounded(points: &[(f64, f64)]) -> Vec<Position> {
+    const STEP_MM: f64 = 8e-4;
+    const AROUND: usize = 25;
+    let mut along = vec![points[0]; AROUND];
+    for pair in points.windows(2) {
+        let (x, y) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let count = (x.hypot(y) / STEP_MM).round();
+        along.extend((0..count as usize).map(|n| (n as f64 / count)).map(|t| (pair[0].0 + t * x, pair[0].1 + t * y)));
+    }
+    along.extend(vec![points[points.len() - 1]; AROUND + 1]);
+    let mean = |of: &[(f64, f64)]| {
+        let [x, y] = [|p: &(f64, f64)| p.0, |p: &(f64, f64)| p.1].map(|part| of.iter().map(part).sum::<f64>());
+        at(x / of.len() as f64, y / of.len() as f64, 0.0)
+    };
+    along.windows(2 * AROUND + 1).map(mean).collect()
+}
+
+/// The first place of each sample would lag behind until what it leaves behind is beside no chord.
+#[test]
+fn loops_as_small_as_the_tolerance_are_followed() {
+    let marks = [
+        (0.24, 0.0),
+        (0.24, 0.02),
+        (0.22, 0.0),
+        (0.25, 0.02),
+        (0.2304, 0.02),
+        (0.25, 0.0),
+        (0.25, 0.02),
+        (0.2304, 0.0),
+    ];
+    let path = [&[(0.0, 0.0), (0.0, 0.02), (0.2, 0.02)][..], &marks, &[(0.2, 0.0), (0.2, 0.0528)]].concat();
+    let blocks: String = path[1..].iter().map(|(x, y)| format!("X{x} Y{y}\n")).collect();
+    let program = format!("F600\nG1\n{blocks}");
+    let options = Options { checks: vec![Check::Path, Check::Vertices], ..Options::default() };
+    let judged = |points: &[(f64, f64)]| judge(&trace(&rounded(points)), &program, &smooth_machine(), &options);
+    assert_passes(&judged(&path));
+    let without = [&path[..3], &path[11..]].concat();
+    assert!(!judged(&without).kinds().is_empty());
 }
 
 /// A walk that takes the first place of each sample would still be on the first piece where the samples are on the third.
