@@ -147,8 +147,8 @@ impl<'a> Route<'a> {
         }
     }
 
-    /// Highest speed at `s_mm` for a jump of the derivatives there, infinite where there is none, and how far the next place
-    /// is where there may be one, mm.
+    /// Highest speed at `s_mm` for a jump of the derivatives or of the speed there, infinite where there is none, and how far
+    /// the next place is where there may be one, mm.
     pub fn step_cap_mm_per_s(&self, s_mm: f64, bounds: &Bounds, cursor: &mut Cursor) -> (f64, f64) {
         let leg = self.find(s_mm, cursor);
         let past_mm = 2.0 * leg.beside_mm();
@@ -160,6 +160,10 @@ impl<'a> Route<'a> {
         let ends = break_mm >= leg.end_mm;
         let next = if ends { self.leg(cursor.leg + 1).filter(|_| leg.joined) } else { Some(leg) };
         let next_mm = next.map_or(f64::INFINITY, |leg| leg.next_break_mm(s_mm.max(break_mm) + leg.beside_mm()));
-        (Leg::step_cap_mm_per_s(&self.sides(break_mm, cursor), bounds), next_mm - s_mm)
+        // Where legs join, the place has the lower of their speeds, whichever of them it is counted to.
+        let beside = if starts { self.leg(cursor.leg - 1) } else { next.filter(|_| ends) };
+        let cap = |leg: &Leg| leg.cap_mm_per_s(&leg.at(break_mm, &mut Place::default()), bounds);
+        let cap = beside.map_or(f64::INFINITY, cap);
+        (cap.min(Leg::step_cap_mm_per_s(&self.sides(break_mm, cursor), bounds)), next_mm - s_mm)
     }
 }
