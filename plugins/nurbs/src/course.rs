@@ -1,11 +1,15 @@
 //! The path of a block by arc length, in smooth stretches.
 
 use tandem_motion::Path;
-use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Place};
+use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Piece, Place};
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
 /// A stretch no longer than this is rounding, mm.
 const LEAST_MM: f64 = 1e-9;
+
+/// Where a curve turns on less than this it is driven from rest to rest, mm: even with 100 m/s² it would be passed at 0.01 mm/s,
+/// which gains nothing, and no grid of places is as fine as the path beside it.
+const HAIRPIN_MM: f64 = 1e-9;
 
 /// What a block moves along: a curve, or a line or arc.
 #[derive(Clone, Debug)]
@@ -29,6 +33,8 @@ pub struct Course {
 pub struct Stretch {
     /// Length, mm.
     pub length_mm: f64,
+    /// It ends where the curve turns back: at rest.
+    pub turns: bool,
     table: Option<ArcLength>,
     /// Where its knots lie inside: there the third derivative may jump, mm from its start.
     knots_mm: Vec<f64>,
@@ -51,19 +57,21 @@ impl Course {
         let (end, count) = (block.end, axes.count());
         if block.kind != BlockKind::Nurbs {
             return Ok(Path::new(block).map(|path| {
-                let stretches = vec![Stretch { length_mm: path.length_mm(), table: None, knots_mm: Vec::new() }];
+                let stretches =
+                    vec![Stretch { length_mm: path.length_mm(), turns: false, table: None, knots_mm: Vec::new() }];
                 Self { shape: Shape::Path(Box::new(path)), stretches, end, axes: count }
             }));
         }
         let curve = curve_of(axes, block)?;
-        let stretch = |piece: &tandem_motion::nurbs::Piece| {
+        let stretch = |(piece, turns): &(Piece, bool)| {
             let table = ArcLength::of_piece(&curve, piece);
             let inside = curve.inner_knots().filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
             let knots_mm = inside.map(|knot| table.length_at(&curve, knot)).collect();
-            Stretch { length_mm: table.length().mm, table: Some(table), knots_mm }
+            Stretch { length_mm: table.length().mm, turns: *turns, table: Some(table), knots_mm }
         };
         // Between points of a polygon that coincide there is nothing to drive.
-        let stretches = curve.pieces().iter().map(stretch).filter(|stretch| stretch.length_mm > LEAST_MM).collect();
+        let pieces = curve.pieces().into_iter().flat_map(|piece| between_hairpins(&curve, piece)).collect::<Vec<_>>();
+        let stretches = pieces.iter().map(stretch).filter(|stretch| stretch.length_mm > LEAST_MM).collect();
         Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end, axes: count }))
     }
 
@@ -118,6 +126,15 @@ impl Course {
             Shape::Path(_) => vector.0[..self.axes].iter().map(|v| v * v).sum::<f64>().sqrt(),
         }
     }
+}
+
+/// The parts of a piece from hairpin to hairpin, and whether they end in one.
+fn between_hairpins(curve: &Nurbs, piece: Piece) -> Vec<(Piece, bool)> {
+    let mut ends = curve.hairpins(piece.range, HAIRPIN_MM);
+    ends.push(piece.range.1);
+    let starts = std::iter::once(piece.range.0).chain(ends.iter().copied());
+    let part = |range: (f64, f64)| (Piece { range, ..piece }, range.1 < piece.range.1);
+    starts.zip(ends.iter().copied()).map(part).collect()
 }
 
 /// The curve of `block`, checked.

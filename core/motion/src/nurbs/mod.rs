@@ -9,6 +9,7 @@ mod derivatives;
 mod error;
 mod evaluate;
 mod fit;
+mod hairpins;
 mod hull;
 mod insert;
 mod length;

@@ -16,6 +16,8 @@ const TURN_RAD: f64 = 1e-5;
 const HALVINGS: u32 = 60;
 /// Share of the coordinates of a span that is rounding.
 const ROUNDING: f64 = 1e-13;
+/// Share of its coordinates below which the length of a span is too short to tell a turn from rounding.
+const SHORT: f64 = ROUNDING / TURN_RAD;
 /// Parts of a span that are looked at: more are needed only where rounding, of coordinates and of weights far apart, looks
 /// like turns.
 const MOST_PARTS: u32 = 2000;
@@ -125,7 +127,8 @@ impl Hull {
         let ways = || (1..=self.degree()).map(|index| self.position(index) - start);
         let longest = ways().max_by(|a, b| far(a).total_cmp(&far(b)))?;
         let length = far(&longest).sqrt();
-        if length <= ON_LINE {
+        let far_mm = far(&start).sqrt().max(length);
+        if length <= ON_LINE.min(SHORT * far_mm) {
             return None;
         }
         let line = longest * (1.0 / length);

@@ -167,6 +167,24 @@ fn a_straight_span_without_a_turn_is_not_cut() {
 }
 
 #[test]
+fn hairpins_are_found_by_their_radius() {
+    // x turns where 105 u² − 120 u + 30 = 0; the radii there are 1.5e-12 mm and 6e-12 mm.
+    let points = [[0.0, 0.0, 0.0], [10.0, 1e-5, 0.0], [0.0, 1e-5, 0.0], [5.0, 0.0, 0.0]];
+    let hairpin = curve(&clamped(3, &points, &[1.0; 4]));
+    let found = hairpin.hairpins((0.0, 1.0), 1e-9);
+    assert_eq!(found.len(), 2);
+    for (u, turn) in found.iter().zip([0.369_398_1, 0.773_459_1]) {
+        assert!((u - turn).abs() < 1e-6, "{u} {turn}");
+    }
+    assert!(hairpin.hairpins((0.0, 1.0), 1e-13).is_empty());
+    assert_eq!(hairpin.hairpins((0.5, 1.0), 1e-9), found[1..]);
+    // Standing still in the parameter and going on the same way is none, nor is a smooth turn.
+    let still = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [6.0, 0.0, 0.0]];
+    assert!(curve(&clamped(3, &still, &[1.0; 4])).hairpins((0.0, 1.0), 1e-9).is_empty());
+    assert!(curve(&clamped(3, &ZIGZAG, &[1.0; 6])).hairpins((0.0, 1.0), 1e-9).is_empty());
+}
+
+#[test]
 fn control_points_on_a_corner_cut_the_curve() {
     let points = [
         [0.0, 0.0, 0.0],

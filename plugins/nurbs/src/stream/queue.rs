@@ -49,11 +49,27 @@ impl Queue {
             };
             self.end_mm = leg.end_mm;
             if let Some(Item::Leg(before)) = self.items.back_mut() {
-                let rests = leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
+                let turns = before.course.stretches()[before.stretch].turns;
+                let rests = turns || leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
                 before.joined = !rests && before.runs_into(&leg, bounds);
             }
             self.items.push_back(Item::Leg(leg));
         }
+    }
+
+    /// Moves the path coordinates so that the leg at the front begins at zero, and sums them up anew; gives by how much. Does
+    /// not allocate.
+    pub fn begin_at_zero(&mut self) -> f64 {
+        let Some(behind_mm) = self.front().map(|leg| leg.start_mm) else { return 0.0 };
+        self.end_mm = 0.0;
+        for item in &mut self.items {
+            if let Item::Leg(leg) = item {
+                leg.start_mm = self.end_mm;
+                leg.end_mm = self.end_mm + leg.course.stretches()[leg.stretch].length_mm;
+                self.end_mm = leg.end_mm;
+            }
+        }
+        behind_mm
     }
 
     /// The leg at the front.

@@ -1,0 +1,60 @@
+//! Where a curve turns back on next to no radius.
+//!
+//! There it nearly stands still in its parameter. By arc length that is a feature of its own size, however small: between it
+//! and the rest of the curve lie all derivatives up to those of a cusp.
+
+use super::Nurbs;
+
+/// Places of a span at which its speed in the parameter is compared; polynomials have no more minima than their degree.
+const LOOKS: u32 = 32;
+/// Share of the highest of these below which there may be a hairpin: on the way to a cusp the speed falls evenly.
+const SLOW: f64 = 0.3;
+/// Halvings until the slowest place is known to rounding.
+const HALVINGS: u32 = 60;
+
+impl Nurbs {
+    /// Parameters between the two of `range` at which the curve is slowest in its parameter and its radius is less than
+    /// `radius_mm`, in order. Rough loop. Allocates.
+    pub fn hairpins(&self, range: (f64, f64), radius_mm: f64) -> Vec<f64> {
+        let mut found = Vec::new();
+        for span in self.span(range.0)..self.points() {
+            let part = (self.knots[span].max(range.0), self.knots[span + 1].min(range.1));
+            if part.1 > part.0 {
+                self.hairpins_in(span, part, radius_mm, &mut found);
+            }
+        }
+        found
+    }
+
+    fn hairpins_in(&self, span: usize, (from, to): (f64, f64), radius_mm: f64, found: &mut Vec<f64>) {
+        // Speed in the parameter, and half of how its square changes.
+        let look = |u: f64| {
+            let at = self.derivatives_in(span, u);
+            (self.counted_length(&at.first), self.counted_product(&at.first, &at.second))
+        };
+        let at = |n: u32| from + (to - from) * (f64::from(n) / f64::from(LOOKS));
+        let fastest = (0..=LOOKS).map(|n| look(at(n)).0).fold(0.0, f64::max);
+        for n in 0..LOOKS {
+            let (mut low, mut high) = (at(n), at(n + 1));
+            let ends = [low, high].map(look);
+            let falls_and_rises = ends[0].1 < 0.0 && ends[1].1 > 0.0;
+            if !falls_and_rises || ends[0].0.min(ends[1].0) > SLOW * fastest {
+                continue;
+            }
+            let ways = [low, high].map(|u| self.derivatives_in(span, u).first);
+            if self.counted_product(&ways[0], &ways[1]) >= 0.0 {
+                // It slows down and goes on the same way.
+                continue;
+            }
+            for _ in 0..HALVINGS {
+                let middle = f64::midpoint(low, high);
+                if look(middle).1 < 0.0 { low = middle } else { high = middle }
+            }
+            // Where it stands still it has no curvature: that is a cusp.
+            let per_mm = self.curvature(&self.derivatives_in(span, high)).unwrap_or(f64::INFINITY);
+            if per_mm * radius_mm > 1.0 && high > from && high < to {
+                found.push(high);
+            }
+        }
+    }
+}
