@@ -33,8 +33,10 @@ pub struct Streamer<P: Planning> {
     dwell: Option<Segment>,
     /// What segments of the present block say.
     blank: Segment,
-    /// Path coordinate and position at rest.
+    /// Path coordinate and position at rest. Path coordinates of the queue and of windows begin where the last motion from rest
+    /// does, `from_mm` behind the start of the program: so long a path rounds none of them.
     at_mm: f64,
+    from_mm: f64,
     position: AxisVector,
     /// The last segments, of three fine periods; and where the last one ends.
     recent: VecDeque<Segment>,
@@ -55,6 +57,7 @@ impl<P: Planning> Streamer<P> {
             dwell: None,
             blank: Segment::rest(&context.position, 0.0),
             at_mm: 0.0,
+            from_mm: 0.0,
             position: context.position,
             recent: VecDeque::new(),
             at: context.position,
@@ -88,7 +91,8 @@ impl<P: Planning> Streamer<P> {
     pub fn reset(&mut self, position: &AxisVector) {
         let Bounds { context, chord_error_mm } = self.bounds;
         self.queue = Queue::default();
-        (self.driving, self.dwell, self.finished, self.at_mm) = (None, None, false, 0.0);
+        (self.driving, self.dwell, self.finished) = (None, None, false);
+        (self.at_mm, self.from_mm) = (0.0, 0.0);
         self.position = *position;
         self.bounds = Bounds { context: PlannerContext { position: *position, ..context }, chord_error_mm };
         self.blank = Segment::rest(position, 0.0);
@@ -112,6 +116,8 @@ impl<P: Planning> Streamer<P> {
     }
 
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+        let behind_mm = self.queue.begin_at_zero();
+        (self.at_mm, self.from_mm) = (self.at_mm - behind_mm, self.from_mm + behind_mm);
         match self.queue.items.front() {
             None => return Ok(None),
             Some(Item::Dwell(block)) => {
@@ -151,7 +157,7 @@ impl<P: Planning> Streamer<P> {
         PluginError::new(format!(
             "line {line}: no motion from rest at path coordinate {:.6} mm keeps velocity, acceleration, jerk and chord \
              error; the path turns too sharply there",
-            self.at_mm
+            self.from_mm + self.at_mm
         ))
     }
 
@@ -217,11 +223,18 @@ impl<P: Planning> Streamer<P> {
         }
         self.driving = Some((until_s, to_s));
         if segment.duration_s > 0.0 {
-            sink.segment(&segment);
+            self.send(&segment, sink);
             let flags = self.blank.flags.0 & !SegmentFlags::BLOCK_BEGINS.0;
             self.blank.flags = SegmentFlags(flags);
         }
         segment.duration_s
+    }
+
+    /// Hands a segment over, by the path coordinate of the program.
+    fn send(&self, segment: &Segment, sink: &mut dyn SegmentSink) {
+        let mut sent = *segment;
+        sent.path[0] += self.from_mm;
+        sink.segment(&sent);
     }
 
     /// Keeps the last three fine periods.
@@ -281,7 +294,7 @@ impl<P: Planning> Streamer<P> {
         (rest.block, rest.line, rest.order) = (self.blank.block, self.blank.line, 3);
         rest.path[0] = self.at_mm;
         self.driving = None;
-        sink.segment(&rest);
+        self.send(&rest, sink);
     }
 
     fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
@@ -295,7 +308,7 @@ impl<P: Planning> Streamer<P> {
         } else {
             rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
         }
-        sink.segment(&rest);
+        self.send(&rest, sink);
         rest.duration_s
     }
 
