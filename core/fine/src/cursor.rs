@@ -175,6 +175,8 @@ impl Cursor {
             points.add(segment, 0.0, segment.duration_s.min(left_s));
             left_s -= segment.duration_s;
             if ends(segment) {
+                // At a wall behind which only a rest without duration has come, no time leads there: but it is to be reached.
+                points.covered_s = points.covered_s.max(f64::MIN_POSITIVE);
                 return;
             }
         }
@@ -381,6 +383,19 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The queue ran empty where the plan comes to rest, and what follows only says so.
+    #[test]
+    fn a_rest_without_duration_behind_a_wall_is_reached() {
+        let (mut input, output) = RingBuffer::new(8);
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.01);
+        segment.flags = SegmentFlags::DWELL;
+        input.push(Queued::Segment { start_s: 0.0, segment }).unwrap();
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        assert_eq!(cursor.advance(0.02, |_| false), Reached::Wall);
+        input.push(Queued::Segment { start_s: 0.01, segment: Segment::rest(&AxisVector::ZERO, 0.0) }).unwrap();
+        assert_eq!(periods(&mut cursor, 0.001, 1.0, 3), Some(1));
     }
 
     #[test]
