@@ -102,6 +102,13 @@ impl Governor {
     pub(super) fn wanted_below(&mut self, aim: &Aim, outlook: &Outlook, here: &Way<'_>) -> f64 {
         let h = self.period_s;
         if aim.path[0] <= 0.0 {
+            let mut soon = here.place;
+            soon.go(h);
+            let goal = aim.sigma.min(aim.ratio);
+            if self.sigma < goal && soon.pace().is_some_and(|pace| pace.speed <= 0.0) {
+                // A hold in a dwell has taken the rate to nothing, and a dwell has no speed that says how fast it is to pass.
+                return self.small(self.freely(goal, outlook), outlook);
+            }
             // From rest the rate was chosen for what follows.
             return -self.rate_per_s / h;
         }
