@@ -41,7 +41,7 @@ pub struct Queue {
 
 impl Queue {
     /// An empty queue.
-    pub fn new(end: RoughEnd, depth: QueueDepth) -> Self {
+    pub fn new(end: RoughEnd, depth: QueueDepth, seams: Seams) -> Self {
         Self {
             end,
             depth,
@@ -57,7 +57,7 @@ impl Queue {
             queued_s: 0.0,
             ends_at_rest: true,
             plan_rests: true,
-            seams: Seams::default(),
+            seams,
             defect: None,
         }
     }
@@ -79,7 +79,7 @@ impl Queue {
     /// Forgets all that was queued behind `rest`, and begins the next epoch there.
     pub fn restart(&mut self, rest: &Rest) {
         self.epoch = rest.epoch + 1;
-        self.seams = Seams::default();
+        self.seams.restart();
         self.path_start_mm = rest.path_mm;
         (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
         self.plan_rests = true;

@@ -7,7 +7,12 @@ use tandem_sdk::{Accepted, Edge, Event, EventKind, OwnedBlock, Planner};
 use crate::Observer;
 use crate::depth::QueueDepth;
 use crate::queue::Queue;
+use crate::seams::{ROUNDING, Seams};
 use crate::source::Source;
+
+/// Shares of the limits of acceleration and of jerk from which on what samples show of a step counts: half of what the fine loop
+/// leaves beside a governed rate, and of jerk half of what its guard forgives.
+const COUNTS: [f64; 2] = [1e-3, 5e-3];
 
 /// What the rough loop is told before it runs.
 #[derive(Clone, Copy, Debug)]
@@ -24,12 +29,31 @@ pub struct RoughConfig {
     /// Share of the worst stop that the queue holds: 1, or the machine cannot use the speed that is planned. Tests show
     /// with less what the depth is for.
     pub depth_factor: f64,
+    /// Steps between segments up to these count as none: of velocity, mm/s, and of acceleration, mm/s².
+    pub seam_rounding: [f64; 2],
 }
 
 impl RoughConfig {
     /// The configuration of a machine with these periods, s.
     pub fn new(rough_period_s: f64, fine_period_s: f64) -> Self {
-        Self { rough_period_s, fine_period_s, advance_s: rough_period_s, awaits_drives: false, depth_factor: 1.0 }
+        Self {
+            rough_period_s,
+            fine_period_s,
+            advance_s: rough_period_s,
+            awaits_drives: false,
+            depth_factor: 1.0,
+            seam_rounding: ROUNDING,
+        }
+    }
+
+    /// Makes steps count of which samples of the fine period show a part of what an axis of these limits may: acceleration,
+    /// mm/s², and jerk, mm/s³. Called for each axis. Host.
+    pub fn count_steps_of(&mut self, acceleration_mm_per_s2: f64, jerk_mm_per_s3: f64) {
+        let period_s = self.fine_period_s;
+        let [acceleration, jerk] = [COUNTS[0] * acceleration_mm_per_s2, COUNTS[1] * jerk_mm_per_s3];
+        let [of_velocity, of_acceleration] = &mut self.seam_rounding;
+        *of_velocity = of_velocity.min(acceleration * period_s).min(jerk * period_s * period_s);
+        *of_acceleration = of_acceleration.min(jerk * period_s);
     }
 }
 
@@ -115,7 +139,11 @@ impl RoughLoop {
             config,
             source,
             planner,
-            queue: Queue::new(end, QueueDepth::new(config.rough_period_s, config.fine_period_s, config.depth_factor)),
+            queue: Queue::new(
+                end,
+                QueueDepth::new(config.rough_period_s, config.fine_period_s, config.depth_factor),
+                Seams::new(config.seam_rounding),
+            ),
             items: Vec::new(),
             next: 0,
             dry: false,

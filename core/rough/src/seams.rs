@@ -2,17 +2,29 @@
 
 use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags};
 
-/// Steps below these are rounding: of velocity, mm/s, and of acceleration, mm/s².
-const ROUNDING: [f64; 2] = [1e-4, 0.1];
+/// Steps below these are rounding on any machine: of velocity, mm/s, and of acceleration, mm/s².
+pub const ROUNDING: [f64; 2] = [1e-4, 0.1];
 
 /// How the last segment ended.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Seams {
     /// Velocity and acceleration; none at a rest, and of plans that keep no jerk.
     end: Option<[AxisVector; 2]>,
+    /// Steps up to these do not count: of velocity, mm/s, and of acceleration, mm/s².
+    rounding: [f64; 2],
 }
 
 impl Seams {
+    /// Behind a rest.
+    pub fn new(rounding: [f64; 2]) -> Self {
+        Self { end: None, rounding }
+    }
+
+    /// Behind a rest again.
+    pub fn restart(&mut self) {
+        self.end = None;
+    }
+
     /// Whether velocity or acceleration step where `segment` begins, which follows the last one.
     pub fn steps_at(&mut self, segment: &Segment) -> bool {
         let before = self.end.take();
@@ -24,7 +36,7 @@ impl Seams {
         }
         let start = derivatives(segment, 0.0);
         before.is_some_and(|end| {
-            let off = |n: usize| (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > ROUNDING[n]);
+            let off = |n: usize| (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > self.rounding[n]);
             off(0) || off(1)
         })
     }
@@ -47,7 +59,7 @@ mod tests {
 
     #[test]
     fn steps_are_found_where_segments_meet() {
-        let mut seams = Seams::default();
+        let mut seams = Seams::new(ROUNDING);
         // At its end the velocity is 4, the acceleration 8.
         assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "after a rest nothing steps");
         assert!(!seams.steps_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])), "it goes on");
@@ -57,5 +69,11 @@ mod tests {
         assert!(seams.steps_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])), "velocity steps");
         assert!(!seams.steps_at(&Segment::rest(&AxisVector::ZERO, 0.0)));
         assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "nor behind a rest");
+        // What is rounding on fast machines is a part of what a slow one may.
+        for (rounding, counts) in [(ROUNDING, false), ([1e-6, 3e-4], true)] {
+            let mut seams = Seams::new(rounding);
+            assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])));
+            assert_eq!(seams.steps_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])), counts);
+        }
     }
 }

@@ -140,6 +140,9 @@ impl Run {
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
+        for limits in fine_config.limits.axes() {
+            rough_config.count_steps_of(limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3);
+        }
         let exchange = Arc::new(ExchangeTimes::default());
         let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
         let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics);
