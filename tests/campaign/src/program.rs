@@ -171,7 +171,8 @@ impl Program<'_> {
                 let x = self.axis('X').unwrap_or_default();
                 let to = self.place(x, self.scale_mm);
                 let by = (to - self.at[x]).abs();
-                let per_minute = self.feed / by.max(1e-9);
+                // A line of less than 60 ns has no F that G-code can say.
+                let per_minute = (self.feed / by).min(1e9);
                 if by > 0.0 && self.spend(&[(x, by)], false) {
                     self.line(&format!("G93 G1 X{to:.*} F{per_minute:.5}", self.digits));
                     self.line(&format!("G94 F{}", self.feed));
