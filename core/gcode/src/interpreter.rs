@@ -214,6 +214,7 @@ impl Interpreter {
     }
 
     /// Whether what the last line does follows from an assumed answer, so that only the run can judge its numbers.
+    #[inline]
     pub(crate) fn is_assumed(&mut self) -> bool {
         self.execution(&mut Vec::new()).is_assumed()
     }
@@ -312,6 +313,7 @@ impl Interpreter {
     }
 
     /// Executes any other line, if it could be read; otherwise takes over what can be.
+    #[inline]
     fn obey(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
         let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
         let complete = parsed.is_ok();
@@ -328,6 +330,7 @@ impl Interpreter {
     }
 
     /// A program number stands before all words.
+    #[inline]
     fn refuse_late_number(&mut self) -> Checked<()> {
         if self.words.has(b'O') && self.begun {
             return Err(self.words.fault(b'O', "o-word", O_WORDS));
@@ -373,6 +376,7 @@ impl Interpreter {
         Ok(None)
     }
 
+    #[inline]
     fn assign(&mut self) -> Checked<()> {
         let assumed = self.reads_assumed.get();
         for assignment in &self.words.assignments {

@@ -118,8 +118,12 @@ impl Line<'_> {
     }
 
     /// Whether what the line does follows from an assumed answer, so that only the run can judge its numbers.
+    #[inline]
     pub fn is_assumed(&self) -> bool {
         let path = &self.state.path;
+        if !self.reads_assumed.get() && (path.assumed | path.assumed_start) == 0 {
+            return false;
+        }
         let named = self.letters.axes_of(self.words.present & AXIS_MASK) & path.assumed;
         let shape = match self.orders.motion {
             Some(MotionMode::Word(word)) => word.shape(),

@@ -64,6 +64,11 @@ fn loops_repeat_break_and_continue() {
     assert_eq!(path("o1 while [#1 LT 3]\n#1=[#1+1]\nG0 X#1\no1 endwhile"), "3:1 3:2 3:3");
     assert_eq!(path("o1 do\n#1=[#1+1]\nG0 X#1\no1 while [#1 LT 3]\nG0 X9"), "3:1 3:2 3:3 5:9");
     assert_eq!(path("o1 repeat [2.6]\nG91 G0 X1\no1 endrepeat"), "2:1 2:2 2:3");
+    assert_eq!(
+        path("o1 repeat [2.5]\nG91 G0 X1\no1 endrepeat"),
+        "2:1 2:2",
+        "halves are rounded to even numbers, as in LinuxCNC"
+    );
     assert_eq!(path("o1 repeat [0]\nG0 X1\no1 endrepeat\nG0 X2"), "4:2");
     let left = |how: &str| {
         path(&format!("o1 repeat [4]\n#1=[#1+1]\no2 if [#1 EQ 2]\no1 {how}\no2 endif\nG0 X#1\no1 endrepeat\nG0 X9"))

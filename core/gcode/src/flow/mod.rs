@@ -266,7 +266,7 @@ impl Execution {
     }
 
     fn begin_repeat(&mut self, program: &mut Program, index: usize, close: usize) -> Result<(), ProgramError> {
-        let count = self.values.first().map_or(0.0, |value| value.number.round());
+        let count = self.values.first().map_or(0.0, |value| value.number.round_ties_even());
         if count < 1.0 {
             return self.jump_behind(program, close);
         }

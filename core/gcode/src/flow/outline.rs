@@ -32,6 +32,8 @@ pub(crate) struct Outline {
     entries: Vec<Entry>,
     /// The subroutines by their labels.
     subs: HashMap<Box<str>, usize>,
+    /// Blocks that another's end has left unclosed.
+    given_up: Vec<usize>,
     /// What is wrong with the O-words of a line. It counts where the line is executed, and not where it never is.
     wrong: HashMap<u32, Diagnostic>,
 }
@@ -64,6 +66,7 @@ impl Outline {
                 outline.wrong.insert(number, Diagnostic::new(&program.name, number, text, fault));
             }
         }
+        open.append(&mut outline.given_up);
         for opened in open {
             let fault = outline.fault(opened, "it is opened and never closed");
             let number = outline.entries[opened].number;
@@ -168,7 +171,7 @@ impl Outline {
             None => self.fault(index, "it closes nothing: no block is open"),
         };
         if let Some(place) = open.iter().rposition(|opened| opener(&self.entries[*opened])) {
-            open.truncate(place);
+            self.given_up.extend(open.drain(place..));
         }
         Err(fault)
     }

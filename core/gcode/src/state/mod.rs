@@ -81,6 +81,7 @@ impl State {
     }
 
     /// The block that comes next, at rest where the last one ended, with all that is in force.
+    #[inline]
     pub fn blank_block(&self) -> Block {
         Block {
             path_mode: if self.modes.exact_stop { PathMode::ExactStop } else { PathMode::Continuous },

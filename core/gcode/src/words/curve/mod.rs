@@ -136,7 +136,13 @@ impl Curves {
     ///
     /// # Errors
     /// It does not, though the curve is not complete: the curve is given up.
+    #[inline]
     pub fn goes_on(&mut self, words: &LineWords) -> Checked<bool> {
+        if self.open.is_none() { Ok(false) } else { self.is_of_curve(words) }
+    }
+
+    #[cold]
+    fn is_of_curve(&mut self, words: &LineWords) -> Checked<bool> {
         let Some(curve) = &self.open else { return Ok(false) };
         let own = |tenths: u16| match curve.dialect {
             Dialect::LinuxCnc => matches!(tenths, 52 | 53),
