@@ -205,9 +205,13 @@ impl JointSpace {
         Some(JointWatch::new(self.joints.iter().map(watched).collect(), to_joints, fine_period_s))
     }
 
-    /// The map for the fine loop, which asks the same plugin; none where the joints are the axes.
-    pub fn kinematics(this: &Arc<Self>) -> Option<Box<dyn Kinematics>> {
-        (!this.are_axes()).then(|| Box::new(SharedMap(Arc::clone(this))) as Box<dyn Kinematics>)
+    /// The map for the fine loop; none where the joints are the axes.
+    pub fn into_kinematics(self) -> Option<Box<dyn Kinematics>> {
+        match self.map {
+            Map::Axes => None,
+            Map::Linear(linear, _) => Some(Box::new(linear)),
+            Map::Curved(kinematics) => Some(kinematics),
+        }
     }
 
     /// The joints that are sums of axes, as planners carry them.
@@ -248,36 +252,5 @@ impl JointSpace {
             }
         }
         Ok(())
-    }
-}
-
-/// The map of joints that are not the axes, for the fine loop: it says by itself in which call of a plugin it is.
-struct SharedMap(Arc<JointSpace>);
-
-impl SharedMap {
-    fn map(&self) -> Option<&dyn Kinematics> {
-        match &self.0.map {
-            Map::Axes => None,
-            Map::Linear(linear, _) => Some(linear),
-            Map::Curved(kinematics) => Some(kinematics.as_ref()),
-        }
-    }
-}
-
-impl Kinematics for SharedMap {
-    fn joint_count(&self, _axis_count: usize) -> usize {
-        self.0.count()
-    }
-
-    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
-        self.map().map_or(*axes, |map| map.to_joints(axes))
-    }
-
-    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        self.map().map_or(*joints, |map| map.to_axes(joints))
-    }
-
-    fn health(&self) -> Result<(), PluginError> {
-        self.map().map_or(Ok(()), Kinematics::health)
     }
 }

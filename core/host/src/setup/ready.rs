@@ -201,7 +201,8 @@ impl Ready {
     ) -> Result<Self, HostError> {
         let feed = feed(&machine, registry, &plugins.joints, policy.as_ref(), checked.length_mm)?;
         Ok(Self {
-            kinematics: JointSpace::kinematics(&plugins.joints),
+            // Its own: a plugin that panics on the soft side does not take the fine loop's with it.
+            kinematics: JointSpace::of(&machine, registry)?.into_kinematics(),
             joints: plugins.joints,
             records_drives: program.is_none(),
             program: program.unwrap_or_else(|| HOMING.to_string()),
