@@ -50,6 +50,11 @@ impl Nurbs {
                 let middle = f64::midpoint(low, high);
                 if look(middle).1 < 0.0 { low = middle } else { high = middle }
             }
+            // An axis that does not count and moves there would have to do so on no way at all, from rest as well.
+            let first = self.derivatives_in(span, high).first;
+            if (0..first.0.len()).any(|axis| self.counted[axis] == 0.0 && first[axis] != 0.0) {
+                continue;
+            }
             // Where it stands still it has no curvature: that is a cusp.
             let per_mm = self.curvature(&self.derivatives_in(span, high)).unwrap_or(f64::INFINITY);
             if per_mm * radius_mm > 1.0 && high > from && high < to {
