@@ -116,7 +116,7 @@ fn rounded(points: &[(f64, f64)]) -> Vec<Position> {
     for pair in points.windows(2) {
         let (x, y) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
         let count = (x.hypot(y) / STEP_MM).round();
-        along.extend((0..count as usize).map(|n| (n as f64 / count)).map(|t| (pair[0].0 + t * x, pair[0].1 + t * y)));
+        along.extend((0..count as usize).map(|n| n as f64 / count).map(|t| (pair[0].0 + t * x, pair[0].1 + t * y)));
     }
     along.extend(vec![points[points.len() - 1]; AROUND + 1]);
     let mean = |of: &[(f64, f64)]| {
@@ -287,7 +287,7 @@ fn a_helix_passes_and_a_wrong_pitch_does_not() {
     let mut bent = samples.clone();
     let middle = bent.len() / 2;
     bent[middle][2] += 1e-5;
-    let options = Options { checks: vec![tandem_oracle::Check::Path], ..exact() };
+    let options = Options { checks: vec![Check::Path], ..exact() };
     let verdict = judge(&trace(&bent), &program, &smooth_machine(), &options);
     assert_finds(&verdict, &[Kind::PathDeviation]);
     assert_eq!((verdict.findings.len(), verdict.findings[0].sample), (1, middle));
