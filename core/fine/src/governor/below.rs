@@ -79,11 +79,6 @@ impl AheadOf<'_> {
         }
         self.seen[..self.count].get(number)
     }
-
-    /// Whether no place ahead is too fast at this rate.
-    fn allow(&mut self, rate: f64) -> bool {
-        (0..).map_while(|number| self.get(number).map(|place| place.most)).all(|most| rate <= most)
-    }
 }
 
 /// How fast a speed may rise that is to end at a limit.
@@ -152,9 +147,7 @@ impl Governor {
         change
     }
 
-    /// The greatest σ̈ up to `most` behind which there is time to lower σ before the plan is too fast. A constant σ is
-    /// admissible wherever the plan is: one that no place ahead forbids is never lowered, whatever the way that is tried out
-    /// finds between places that lie far apart. Otherwise the machine could come to a stand before a corner it can pass.
+    /// The greatest σ̈ up to `most` behind which there is time to lower σ before the plan is too fast.
     fn in_time(&mut self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, sigma) = (self.period_s, here.sigma);
         let (seen, step_s) = (std::mem::take(&mut self.ahead), h * sigma.max(SLOWEST));
@@ -167,11 +160,6 @@ impl Governor {
                 break;
             }
             change -= over;
-        }
-        // A constant rate is only asked about where the trial would lower it: all places ahead have to be looked at for that.
-        let constant = most.min(-here.rate_per_s / h);
-        if change < constant && sigma <= 1.0 && ahead.allow(sigma) {
-            change = constant;
         }
         self.ahead = ahead.seen;
         change
@@ -226,61 +214,4 @@ fn lowest(constant: f64, slope: f64, most: f64) -> f64 {
         return f64::NEG_INFINITY;
     }
     (if slope > 0.0 { -most - constant } else { most - constant }) / slope
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::course::Course;
-    use crate::steps::Recent;
-    use proptest::prelude::*;
-    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment};
-
-    /// X is slower than Y.
-    fn limits(acceleration_mm_per_s2: f64, slower: f64, jerk_mm_per_s3: f64) -> [AxisLimits; MAX_AXES] {
-        let axis = AxisLimits {
-            min_mm: -1000.0,
-            max_mm: 1000.0,
-            feed_mm_per_s: 1000.0,
-            rapid_mm_per_s: 1000.0,
-            acceleration_mm_per_s2,
-            jerk_mm_per_s3,
-            speed_difference_mm_per_s: 0.0,
-        };
-        let mut limits = [axis; MAX_AXES];
-        limits[0].acceleration_mm_per_s2 *= slower;
-        limits[0].jerk_mm_per_s3 *= slower;
-        limits
-    }
-
-    proptest! {
-        /// X turns with all that it has while Y gets fast: a constant rate at which no place ahead is too fast is not lowered.
-        #[test]
-        fn a_rate_that_no_place_ahead_forbids_is_not_lowered(
-            acceleration in 10.0..1000.0f64, building_s in 0.002..0.1f64, slower in 0.05..1.0f64, period_s in 1e-4..2e-3f64,
-            used in 0.3..1.0f64, gain in 0.5..4.0f64, long in 0.3..3.0f64, ratio in 0.1..1.0f64,
-            part in 0.05..1.0f64, falling in 0.0..0.02f64,
-        ) {
-            let jerk = acceleration / building_s;
-            let (turning, time_s) = (used * slower * jerk, long * building_s);
-            let from = turning * time_s * time_s / 4.0;
-            let mut segment = Segment::rest(&AxisVector::ZERO, time_s);
-            segment.coefficients[0] = [0.0, from, 0.0, -turning / 6.0, 0.0, 0.0];
-            segment.coefficients[1] = [0.0, 0.0, gain * from / time_s / 2.0, 0.0, 0.0, 0.0];
-            segment.feed_mm_per_s = from;
-            let course = Course::new(&segment, [&[], &[]], (2, 0b11));
-            let fastest = (0..=1000)
-                .filter_map(|step| course.begin(time_s * f64::from(step) / 1000.0).pace())
-                .fold(0.0, |most: f64, pace| most.max(pace.speed));
-            let (sigma, rate_per_s) = (part * (ratio * from / fastest).min(1.0) * 0.999, -falling / period_s);
-            let here = Way { sigma, rate_per_s, place: course.begin(0.0), recent: Recent::default() };
-            let aim = Aim { sigma: 1.0, speed_mm_per_s: ratio * from, ratio, path: [from, 0.0, 0.0] };
-            let limits = limits(acceleration, slower, jerk);
-            let mut governor = Governor::new(&limits, 2, period_s);
-            let most = 0.01 / (period_s * period_s);
-            let change = governor.in_time(&aim, most, &here, &Outlook::new(&limits, 2, period_s));
-            let constant = most.min(falling / (period_s * period_s));
-            prop_assert!(change >= constant * (1.0 - 1e-9), "{change} where {constant} keeps the rate");
-        }
-    }
 }
