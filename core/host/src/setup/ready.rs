@@ -12,7 +12,7 @@ use crate::drives::Drives;
 use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
 use crate::plugins::hang::HangWatch;
-use crate::plugins::registry::{Registry, moves_metal};
+use crate::plugins::registry::Registry;
 use crate::policy::PolicyHost;
 use crate::setup::claim::Claim;
 use crate::setup::density::Density;
@@ -133,11 +133,11 @@ impl Ready {
         switches: Switches,
         claims: bool,
     ) -> Result<Self, HostError> {
-        let simulated = !moves_metal(&machine, registry);
         let mut plugins = Plugins::of(&machine, registry)?;
         plugins.joints.check_start(&machine)?;
+        let simulated = plugins.claim.describe().simulated != 0;
         // Only real drives know where a program on them begins.
-        let asks_first = claims && plugins.claim.describe().simulated == 0;
+        let asks_first = claims && !simulated;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
         let mut passed = (!asks_first).then(|| Passed::of(&machine, &plugins, &mut program, simulated, switches));
         if let Some(Err(refused)) = passed {
