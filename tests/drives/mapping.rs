@@ -142,8 +142,10 @@ fn dealt(random: &mut Random, seed: u64) -> Vec<Own> {
     let turns = seed as usize % count;
     all[turns].spindle = true;
     // Some have their lines in one run, as most have.
-    if seed % 3 == 0 {
-        all.iter_mut().for_each(|own| own.inputs.sort_unstable());
+    if seed.is_multiple_of(3) {
+        for own in &mut all {
+            own.inputs.sort_unstable();
+        }
     }
     all
 }
@@ -273,9 +275,13 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
         let all = dealt(&mut random, seed);
         let claimed: Vec<u32> = (0..64).filter(|_| random.below(4) == 0).collect();
         let mut tables = text(&all);
-        claimed.iter().for_each(|input| _ = writeln!(tables, "[inputs.i{input}]\ninput = {input}"));
+        for input in &claimed {
+            _ = writeln!(tables, "[inputs.i{input}]\ninput = {input}");
+        }
         let measured: Vec<usize> = (0..4).filter(|_| random.below(2) == 0).collect();
-        measured.iter().for_each(|analog| _ = writeln!(tables, "[analog.s{analog}]\ninput = {analog}"));
+        for analog in &measured {
+            _ = writeln!(tables, "[analog.s{analog}]\ninput = {analog}");
+        }
         let mut stands = Attached::default();
         for own in &all {
             let mut attached = Attached { known: random.below(16) as u32, homed: random.below(16) as u32, ..stands };
@@ -317,7 +323,9 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
         let mut feedback = Feedback { position: stands.position, ..Feedback::default() };
         for period in 0..20 {
             let (whole, case) = (drawn_setpoint(&mut random), format!("seed {seed}, period {period}"));
-            all.iter().for_each(|own| mirrors().get_mut(&own.name).unwrap().answer = drawn_answer(&mut random));
+            for own in &all {
+                mirrors().get_mut(&own.name).unwrap().answer = drawn_answer(&mut random);
+            }
             driver.exchange(&whole, &mut feedback).unwrap();
             let mut latches = vec![];
             for own in &all {

@@ -269,7 +269,7 @@ fn an_edge_is_armed_before_the_motion_and_a_joint_that_did_not_catch_it_is_found
         let rest = bench.rest(200).expect("it comes to rest");
         let latch = rest.latch.expect("a place of the edge");
         assert_eq!((rest.cause, latch[0]), (RestCause::Edge, at_edge[0]), "seed {seed}: its drive has caught it");
-        let between = (before[1] + at_edge[1]) / 2.0;
+        let between = f64::midpoint(before[1], at_edge[1]);
         assert!((latch[1] - between).abs() < 1e-9 && latch[2] == at_edge[2], "seed {seed}: {latch:?} {at_edge:?}");
         bench.ticks(3);
         let script = bench.script();

@@ -61,7 +61,7 @@ fn run(group: &str, program: &Path, machine: &Path, settings: &[&str]) -> Case {
     let [program_text, machine_text] = [program, machine].map(|path| path.to_string_lossy().into_owned());
     let mut arguments = vec!["run".to_string(), program_text, "--machine".to_string(), machine_text];
     arguments.extend(settings.iter().flat_map(|setting| ["--set".to_string(), (*setting).to_string()]));
-    let settings: String = settings.iter().map(|setting| format!(" {setting}")).collect();
+    let settings = settings.iter().flat_map(|setting| [" ", setting]).collect::<String>();
     Case {
         name: format!("{group}/{} on {}{settings}", stem(program), stem(machine)),
         arguments,

@@ -117,7 +117,7 @@ impl Comparison<'_> {
         let old: Vec<_> = leaves(&self.old.summary).into_iter().map(expected).collect();
         let new = leaves(&self.new.summary);
         let shown = |leaves: &[(String, String)]| {
-            leaves.iter().map(|(path, value)| format!("{path} = {value}\n")).collect::<String>()
+            leaves.iter().flat_map(|(path, value)| [path, " = ", value, "\n"]).collect::<String>()
         };
         differences.extend(first_difference("summary", &shown(&old), &shown(&new)));
         differences.extend(first_difference("blocks", &self.with_declared_head(&self.old.blocks), &self.new.blocks));

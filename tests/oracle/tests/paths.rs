@@ -140,8 +140,8 @@ fn loops_as_small_as_the_tolerance_are_followed() {
         (0.2304, 0.0),
     ];
     let path = [&[(0.0, 0.0), (0.0, 0.02), (0.2, 0.02)][..], &marks, &[(0.2, 0.0), (0.2, 0.0528)]].concat();
-    let blocks: String = path[1..].iter().map(|(x, y)| format!("X{x} Y{y}\n")).collect();
-    let program = format!("F600\nG1\n{blocks}");
+    let blocks: Vec<_> = path[1..].iter().map(|(x, y)| format!("X{x} Y{y}")).collect();
+    let program = format!("F600\nG1\n{}\n", blocks.join("\n"));
     let options = Options { checks: vec![Check::Path, Check::Vertices], ..Options::default() };
     let judged = |points: &[(f64, f64)]| judge(&trace(&rounded(points)), &program, &smooth_machine(), &options);
     assert_passes(&judged(&path));

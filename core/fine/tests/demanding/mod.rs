@@ -112,8 +112,8 @@ impl Bench {
     /// Queues a piece: where it begins, with which speed, and half of its acceleration along each axis.
     pub fn piece(&mut self, motion: [AxisVector; 2], duration_s: f64, last: bool, stop_on: StopOn) {
         let mut segment = Segment::rest(&self.position, duration_s);
-        for axis in 0..MAX_AXES {
-            segment.coefficients[axis] = [self.position[axis], motion[0][axis], motion[1][axis], 0.0, 0.0, 0.0];
+        for (axis, coefficients) in segment.coefficients.iter_mut().enumerate() {
+            *coefficients = [self.position[axis], motion[0][axis], motion[1][axis], 0.0, 0.0, 0.0];
         }
         segment.path = segment.coefficients[0];
         segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };

@@ -16,7 +16,7 @@ impl CommandLog {
         Self { last: given }
     }
 
-    /// The commands that acted in the period of `sample`. OperatorInputs again as a command file they have the same effect.
+    /// The commands that acted in the period of `sample`. Given again as a command file they have the same effect.
     pub fn sample(&mut self, sample: &Sample) -> impl Iterator<Item = Timed> + use<> {
         let (tick, last, now) = (sample.tick, self.last, sample.given);
         self.last = now;
