@@ -5,11 +5,29 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::Move;
+use super::compare::Move;
 
 /// What is said of a program that the judge does not end: some loops within repeats in subroutines keep it going for ever.
 pub const NEVER_ENDS: &str = "the judge does not end";
+const NO_END: &str = "File ended with no percent sign";
 const GIVE_UP_MS: u32 = 4000;
+/// Without a configuration its tool table is in inches.
+const INCH_MM: f64 = 25.4;
+
+/// What the judge is given besides the program.
+pub struct Tables {
+    tools: String,
+}
+
+impl Tables {
+    /// Tools by number, length and diameter, mm.
+    pub fn of_tools(tools: &[(u32, f64, f64)]) -> Self {
+        let row = |(number, length, diameter): &(u32, f64, f64)| {
+            format!("T{number} P{number} Z{:.12} D{:.12}\n", length / INCH_MM, diameter / INCH_MM)
+        };
+        Self { tools: tools.iter().map(row).collect() }
+    }
+}
 
 /// The offsets of the canonical machine, program units.
 #[derive(Default)]
@@ -47,16 +65,18 @@ impl Machine {
 }
 
 /// What the judge says of a program.
-pub fn judged(judge: &Path, program: &Path, folder: &Path) -> Result<Vec<Move>, String> {
+/// What it writes, it writes in `folder`.
+pub fn judged(judge: &Path, program: &Path, folder: &Path, tables: &Tables) -> Result<Vec<Move>, String> {
     let tools = folder.join("tools.tbl");
     let variables = folder.join("variables.var");
-    // Without a configuration its tool table is in inches: 20 and 25 mm.
-    std::fs::write(&tools, "T1 P1 Z0.787401574803 D0.25\nT2 P2 Z0.984251968504 D0.25\n").unwrap();
+    std::fs::write(&tools, &tables.tools).unwrap();
     std::fs::write(&variables, "").unwrap();
     let mut command = Command::new(judge);
     command.arg("-t").arg(&tools).arg("-v").arg(&variables).arg("-g").arg(program);
     // Its tool table is a file in the home folder, which runs side by side would share.
-    command.env("HOME", folder).current_dir(folder).stdin(Stdio::null());
+    // Files of subroutines are looked up where it stands.
+    let stands = program.parent().unwrap_or(folder);
+    command.env("HOME", folder).current_dir(stands).stdin(Stdio::null());
     let [calls, messages] = ["calls.txt", "messages.txt"].map(|name| folder.join(name));
     command.stdout(File::create(&calls).unwrap()).stderr(File::create(&messages).unwrap());
     let mut running = command.spawn().map_err(|e| e.to_string())?;
@@ -72,8 +92,10 @@ pub fn judged(judge: &Path, program: &Path, folder: &Path) -> Result<Vec<Move>, 
     }
     let text = |path| String::from_utf8_lossy(&std::fs::read(path).unwrap()).into_owned();
     let calls = text(&calls);
-    if !calls.contains("PROGRAM_END") {
-        return Err(text(&messages).lines().skip(1).collect::<Vec<_>>().join(" | "));
+    let messages = text(&messages);
+    // Here the end of the text ends a program too, which the judge has driven by then.
+    if !calls.contains("PROGRAM_END") && !messages.contains(NO_END) {
+        return Err(messages.lines().skip(1).collect::<Vec<_>>().join(" | "));
     }
     Ok(read(&calls))
 }
