@@ -26,4 +26,4 @@ mod tick;
 pub use config::{FineConfig, GuardMode, Joints, MissedLimits};
 pub use fault::{Breach, Fault, FaultKind, InputFault};
 pub use roles::Roles;
-pub use tick::{Counters, FineLoop, Left};
+pub use tick::{Counters, FineLoop, JobEnd, Left};

@@ -16,6 +16,7 @@ mod rest;
 mod roles;
 mod single_block;
 mod spindle;
+mod succeed;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -50,6 +51,7 @@ use release::Release;
 use rest::Stop;
 use roles::RoleWatch;
 use spindle::SpinUp;
+pub use succeed::JobEnd;
 
 /// What the fine loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -141,6 +143,8 @@ pub struct FineLoop {
     roles: RoleWatch,
     spin_up: SpinUp,
     outputs: Outputs,
+    /// The drives stay enabled when the program has ended: another job may follow.
+    stays: bool,
     phase: Phase,
     state: MachineState,
     starved: bool,
@@ -211,6 +215,7 @@ impl FineLoop {
             roles: RoleWatch::default(),
             spin_up: SpinUp::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
+            stays: false,
             phase: Phase::Waiting,
             state: MachineState::Fault,
             starved: false,

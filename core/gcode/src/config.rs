@@ -1,8 +1,11 @@
 //! What the interpreter must know of the machine.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
+
+use crate::lasting::Lasting;
 
 /// One row of the tool table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +83,9 @@ pub struct Config {
     pub subroutine_path: Vec<PathBuf>,
     /// How many lines a program with O-words may execute in the first pass, and in the second without an item.
     pub max_steps: u64,
+    /// What has lasted from the programs before; its tool table is to be that of `tools`. None where a program begins with
+    /// nothing but this machine.
+    pub lasting: Option<Arc<Lasting>>,
 }
 
 /// Lines that a program with O-words may execute where the machine file does not say: some ten seconds.
@@ -103,6 +109,7 @@ impl Config {
             inputs: Lines::all(),
             subroutine_path: Vec::new(),
             max_steps: DEFAULT_MAX_STEPS,
+            lasting: None,
         }
     }
 }

@@ -47,8 +47,8 @@ impl Phase {
 pub struct Interpreter {
     config: Config,
     letters: Letters,
-    state: State,
-    parameters: Parameters,
+    pub(crate) state: State,
+    pub(crate) parameters: Parameters,
     /// The words of the current line, and what they order.
     words: LineWords,
     orders: Orders,
@@ -68,6 +68,15 @@ pub struct Interpreter {
 impl Interpreter {
     /// An interpreter at the start of a program on the machine `config`.
     pub fn new(config: Config) -> Self {
+        let lasting = config.lasting.clone();
+        let mut new = Self::without_lasting(config);
+        if let Some(lasting) = lasting {
+            new.set_lasting(&lasting);
+        }
+        new
+    }
+
+    fn without_lasting(config: Config) -> Self {
         Self {
             letters: Letters::new(&config.axes),
             state: State::new(&config),

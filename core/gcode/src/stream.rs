@@ -7,6 +7,7 @@ use tandem_sdk::AxisVector;
 use crate::config::Config;
 use crate::flow::{Execution, Step};
 use crate::item::{Item, ProbeResult};
+use crate::lasting::{Ledger, Moment};
 use crate::program::lines::Pass;
 use crate::program::{Program, ProgramError};
 
@@ -16,6 +17,9 @@ pub struct Stream {
     program: Program,
     execution: Execution,
     waiting: Option<Waiting>,
+    /// Who is told what lines change, and how things were behind the last line that was told.
+    ledger: Option<Ledger>,
+    told: Option<Moment>,
 }
 
 /// What must be provided before the next item.
@@ -35,7 +39,20 @@ impl Stream {
             return Err(ProgramError::Unchecked(Arc::clone(&program.name)));
         }
         let execution = Execution::new(&mut program, config, Pass::Second);
-        Ok(Self { program, execution, waiting: None })
+        Ok(Self { program, execution, waiting: None, ledger: None, told: None })
+    }
+
+    /// Tells `ledger` what every line changes, with the block at which the path reaches it. Before the first item.
+    pub fn tell(&mut self, ledger: Ledger) {
+        self.execution.interpreter.keep_moments();
+        self.ledger = Some(ledger);
+    }
+
+    fn tell_of_line(&mut self, first_block: u64) {
+        let Some(ledger) = &self.ledger else { return };
+        if let Some(moment) = self.execution.interpreter.moment_since(&mut self.told) {
+            ledger.push(first_block, moment);
+        }
     }
 
     /// Appends the items of the next line that has any; false when the program is over. The last item is
@@ -57,7 +74,10 @@ impl Stream {
             if self.execution.interpreter.ended() {
                 return Ok(false);
             }
-            match self.execution.step(&mut self.program, out)? {
+            let first_block = self.execution.interpreter.next_block();
+            let step = self.execution.step(&mut self.program, out)?;
+            self.tell_of_line(first_block);
+            match step {
                 Step::Line => {}
                 Step::End => self.execution.interpreter.finish(out)?,
                 Step::Wrong(diagnostic) | Step::Stuck(diagnostic) | Step::Open(diagnostic) => {

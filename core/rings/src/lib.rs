@@ -147,12 +147,17 @@ pub fn sample_ring(size: usize) -> (Producer<Sample>, Consumer<Sample>) {
 
 /// Makes the bridge between the loops. Allocates for good.
 pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
+    bridge_with(sizes, Arc::default(), Arc::default())
+}
+
+/// Makes the bridge between the loops of one job among several, which share `controls` and `status`. Allocates for good.
+pub fn bridge_with(sizes: Sizes, controls: Arc<Controls>, status: Arc<Status>) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
     let (samples_in, samples_out) = sample_ring(sizes.samples);
     let (requests_in, requests_out) = RingBuffer::new(8);
     let (rests_in, rests_out) = RingBuffer::new(8);
-    let (depth, controls, status) = (Arc::default(), Arc::<Controls>::default(), Arc::<Status>::default());
+    let depth = Arc::<Depth>::default();
     let rough =
         RoughEnd { segments: segments_in, rests: rests_out, depth: Arc::clone(&depth), status: Arc::clone(&status) };
     let fine = FineEnd {

@@ -48,6 +48,17 @@ impl Attach {
         Self { stage: Stage::Resetting, told: false, periods: 0, held: 0, joints }
     }
 
+    /// Once more, from where the joints stand now; their faults are reset first where that `resets`.
+    pub(super) fn anew(joints: AxisVector, resets: bool) -> Self {
+        let stage = if resets { Stage::Resetting } else { Stage::Enabling };
+        Self { stage, ..Self::again(joints) }
+    }
+
+    /// All joints hold at `joints` already.
+    pub(super) fn held(joints: AxisVector) -> Self {
+        Self { stage: Stage::Done, told: true, periods: 0, held: u32::MAX, joints }
+    }
+
     /// Whether all joints hold.
     pub(super) fn is_done(&self) -> bool {
         self.stage == Stage::Done
@@ -105,6 +116,9 @@ impl FineLoop {
         let input = self.part(Stop::abort());
         let reported = matches!(self.phase, Phase::Parted);
         (self.outputs.ended, self.release.had_ended) = (reported, reported);
+        if reported {
+            self.release.begin();
+        }
         input
     }
 

@@ -15,10 +15,23 @@ pub(super) struct Release {
     pub(super) is_over: bool,
 }
 
+impl Release {
+    /// The drives are told to let go from the next exchange on, or have been.
+    pub(super) fn begin(&mut self) {
+        self.periods = self.periods.max(1);
+    }
+
+    /// Whether the drives have been told to let go.
+    pub(super) fn has_begun(&self) -> bool {
+        self.periods > 0
+    }
+}
+
 impl FineLoop {
-    /// Whether the drives are to let go: the program had ended before this period, or a fault has brought the machine to rest.
+    /// Whether the drives are to let go: the program had ended before this period and no other job may follow, or a fault has
+    /// brought the machine to rest.
     pub(super) fn is_letting_go(&self) -> bool {
-        self.release.had_ended || matches!(self.phase, Phase::Faulted)
+        (self.release.had_ended && !self.stays_enabled()) || matches!(self.phase, Phase::Faulted)
     }
 
     /// Behind an exchange: whether it was the last. A driver that `failed` knows of no brakes.

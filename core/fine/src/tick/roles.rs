@@ -62,7 +62,7 @@ impl FineLoop {
             self.roles.stood_on = if may_leave { tripped.all & !tripped.old } else { 0 };
         }
         self.roles.stood_on &= tripped.all & !tripped.old;
-        let holds = self.attach.is_done() && !self.outputs.ended;
+        let holds = self.attach.is_done() && (!self.outputs.ended || self.stays_enabled());
         let sought = if homes { roles.home_switches } else { 0 };
         let limits = if moves { roles.limit & !self.roles.stood_on & !sought } else { 0 };
         let awaited = if moves { roles.awaited & self.awaited() & tripped.old } else { 0 };

@@ -2,12 +2,14 @@
 
 use tandem_sdk::AxisVector;
 
+use crate::lasting::Lasting;
+
 /// Number of work coordinate systems, G54 to G59.3.
 pub(crate) const SYSTEMS: usize = 9;
 
 /// Coordinate systems, G92 and the tool length; all vectors in mm or rad. A point goes from program to machine coordinates
 /// by the offset of G92, the rotation, the origin of the system and the tool, as in LinuxCNC.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coordinates {
     origins: [AxisVector; SYSTEMS],
     /// Rotation of each system about its origin, from X to Y, rad.
@@ -182,6 +184,23 @@ impl Coordinates {
 
     pub fn set_tool(&mut self, offset: AxisVector) {
         self.tool = offset;
+        self.sum_up();
+    }
+
+    /// Says what lasts of them.
+    pub fn tell(&self, lasting: &mut Lasting) {
+        (lasting.origins, lasting.rotations_rad, lasting.active_system) = (self.origins, self.rotations, self.active);
+        (lasting.g92, lasting.g92_stored) = (self.g92, self.g92_stored);
+        (lasting.reference, lasting.tool_offset) = (self.reference, self.tool);
+    }
+
+    /// Takes what has lasted.
+    pub fn hear(&mut self, lasting: &Lasting) {
+        self.origins = lasting.origins;
+        self.rotations = lasting.rotations_rad;
+        self.active = lasting.active_system.min(SYSTEMS - 1);
+        (self.g92, self.g92_stored) = (lasting.g92, lasting.g92_stored);
+        (self.reference, self.tool) = (lasting.reference, lasting.tool_offset);
         self.sum_up();
     }
 

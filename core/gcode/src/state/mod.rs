@@ -53,7 +53,30 @@ pub(crate) struct State {
     pub ended: bool,
 }
 
+impl MotionMode {
+    /// The word, where one is in force.
+    pub fn code(self) -> Option<&'static str> {
+        match self {
+            Self::Word(word) => Some(word.code),
+            Self::None | Self::Refused => None,
+        }
+    }
+}
+
 impl State {
+    /// Whether modes, offsets and tools are those of `other`, wherever the path has come to.
+    pub fn is_as(&self, other: &Self) -> bool {
+        self.motion.code() == other.motion.code()
+            && self.modes.is_as(&other.modes)
+            && self.coordinates == other.coordinates
+            && self.tools.is_as(&other.tools)
+            && self.spindle == other.spindle
+            && self.coolant == other.coolant
+            && self.permits == other.permits
+            && self.outputs == other.outputs
+            && self.cycles == other.cycles
+    }
+
     pub fn new(config: &Config) -> Self {
         let letters = letters::Letters::new(&config.axes);
         let linear = |letter| letters.axis(letter).filter(|axis| !letters.is_rotary(*axis));

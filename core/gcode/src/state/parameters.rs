@@ -1,6 +1,6 @@
 //! Numbered (`#1` to `#5602`) and named (`#<name>`) parameters.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use tandem_sdk::AxisVector;
 
@@ -24,6 +24,16 @@ const LOCAL: usize = 30;
 
 type Names = HashMap<Box<[u8]>, Value>;
 
+/// Parameters that outlive the program that sets them: those of the user, and what probes have found.
+const LASTING: [std::ops::RangeInclusive<usize>; 2] = [LOCAL + 1..=5000, 5061..=5070];
+
+/// A parameter that was set, and outlives its program.
+#[derive(Clone, Debug)]
+pub(crate) enum Written {
+    Numbered(usize, f64),
+    Named(Box<[u8]>, f64),
+}
+
 /// The values that the program has set.
 #[derive(Clone)]
 pub(crate) struct Parameters {
@@ -38,6 +48,8 @@ pub(crate) struct Parameters {
     names: usize,
     /// What the last subroutine returned.
     returned: Option<Value>,
+    /// What was set since somebody asked, where anybody does.
+    log: Option<Vec<Written>>,
 }
 
 /// What a caller has of its own while a subroutine is executed.
@@ -56,6 +68,42 @@ impl Parameters {
             callers: Vec::new(),
             names: 0,
             returned: None,
+            log: None,
+        }
+    }
+
+    /// From here on what is set is kept for [`Parameters::take_log`].
+    pub fn keep_log(&mut self) {
+        self.log = Some(vec![]);
+    }
+
+    /// What was set since this was asked last.
+    pub fn take_log(&mut self) -> Vec<Written> {
+        self.log.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Sets what another has set.
+    pub fn write(&mut self, written: Vec<Written>) {
+        for one in written {
+            match one {
+                Written::Numbered(number, value) => self.set_numbered(number, value, false),
+                Written::Named(name, value) => _ = self.set_named(&name, value, false),
+            }
+        }
+    }
+
+    /// Numbered parameters that last and are not zero.
+    pub fn lasting(&self) -> BTreeMap<u32, f64> {
+        let numbers = LASTING.into_iter().flatten();
+        let set = numbers.map(|number| (number as u32, self.numbered[number].number));
+        set.filter(|(_, value)| *value != 0.0).collect()
+    }
+
+    /// Sets numbered parameters that last; those that are not named are zero. A number that is none of them is passed over.
+    pub fn set_lasting(&mut self, values: &BTreeMap<u32, f64>) {
+        for number in LASTING.into_iter().flatten() {
+            let number_value = values.get(&(number as u32)).copied().unwrap_or(0.0);
+            self.set_numbered(number, number_value, false);
         }
     }
 
@@ -105,6 +153,11 @@ impl Parameters {
 
     pub fn set_numbered(&mut self, number: usize, value: f64, assumed: bool) {
         self.numbered[number] = Value { number: value, assumed };
+        if let Some(log) = &mut self.log
+            && LASTING.iter().any(|range| range.contains(&number))
+        {
+            log.push(Written::Numbered(number, value));
+        }
     }
 
     /// The value of parameter `number` is only assumed.
@@ -118,6 +171,9 @@ impl Parameters {
 
     /// Sets a named parameter; false where there are too many.
     pub fn set_named(&mut self, name: &[u8], value: f64, assumed: bool) -> bool {
+        if let Some(log) = self.log.as_mut().filter(|_| name.starts_with(b"_")) {
+            log.push(Written::Named(name.into(), value));
+        }
         let value = Value { number: value, assumed };
         let names = if name.starts_with(b"_") { &mut self.global } else { &mut self.local };
         if let Some(slot) = names.get_mut(name) {

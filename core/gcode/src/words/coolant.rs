@@ -13,7 +13,7 @@ pub(super) const WORDS: &[Word] = &[
 ];
 
 /// What flows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Coolant {
     mist: bool,
     flood: bool,

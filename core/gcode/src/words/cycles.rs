@@ -142,7 +142,7 @@ impl Kind {
 }
 
 /// What the lines of a cycle leave to the next ones.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Cycles {
     /// G99.
     to_initial: bool,
@@ -154,7 +154,7 @@ pub(crate) struct Cycles {
 }
 
 /// Words that stay in force from line to line of one cycle: levels in program coordinates, mm and s.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sticky {
     r_mm: Option<f64>,
     bottom_mm: Option<f64>,

@@ -69,10 +69,19 @@ impl Plane {
             Self::Yz => *b"YZ",
         }
     }
+
+    /// The word that selects it.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::Xy => "G17",
+            Self::Zx => "G18",
+            Self::Yz => "G19",
+        }
+    }
 }
 
 /// The feed: F is kept in both units, because an axis that turns reads it in degrees.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Feed {
     /// G93: F is the inverse of the line's duration.
     pub inverse_time: bool,
@@ -81,7 +90,7 @@ pub(crate) struct Feed {
 }
 
 /// The modes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Modes {
     pub plane: Plane,
     /// Millimetres a program unit of length.
@@ -112,6 +121,13 @@ impl Default for Modes {
 }
 
 impl Modes {
+    /// Whether these are the same; what the machine decides is a number that is none, and the same as itself.
+    pub fn is_as(&self, other: &Self) -> bool {
+        let bits = |modes: &Self| [modes.tolerance_mm.to_bits(), modes.time_constant_s.to_bits()];
+        let rest = Self { tolerance_mm: 0.0, time_constant_s: 0.0, ..self.clone() };
+        bits(self) == bits(other) && rest == Self { tolerance_mm: 0.0, time_constant_s: 0.0, ..other.clone() }
+    }
+
     /// Inner units (mm, rad) a program unit (mm or inch, degree) of `axis`.
     #[inline]
     pub fn scale(&self, letters: &Letters, axis: usize) -> f64 {

@@ -24,7 +24,7 @@ const AT_REST_OFF: Action = Action::Act(|line| switch(line, false, true));
 const MAX_OUTPUT: u32 = 61;
 
 /// What the program has set, and the answer of M66.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Outputs {
     /// Bit per output that the program has set.
     set: u64,

@@ -24,7 +24,7 @@ const EVENTS: [EventKind; 4] =
     [EventKind::FeedOverride, EventKind::SpindleOverride, EventKind::AdaptiveFeed, EventKind::FeedHold];
 
 /// What is permitted: feed override, spindle override, adaptive feed, feed hold.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Permits([bool; 4]);
 
 impl Default for Permits {

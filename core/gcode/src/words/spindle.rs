@@ -23,7 +23,7 @@ pub(super) const WORDS: &[Word] = &[
 ];
 
 /// Speed and direction of the spindle.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Spindle {
     /// 1 clockwise, −1 counter-clockwise, 0 stopped.
     pub direction: i8,

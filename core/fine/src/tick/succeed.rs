@@ -1,0 +1,88 @@
+//! One fine loop behind another: the next job of a process takes over the drives of the last one while they hold, or lets
+//! them be enabled once more.
+
+use std::sync::atomic::Ordering::Relaxed;
+
+use tandem_rings::MachineState;
+use tandem_sdk::AxisVector;
+
+use super::attach::Attach;
+use super::rest::Stop;
+use super::{Counters, FineLoop, Left, Phase};
+
+/// How a job of a resident machine has ended; its loop stays at the drives until the next one takes over.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JobEnd {
+    /// What the job counted.
+    pub counters: Counters,
+    /// What was switched last.
+    pub left: Left,
+    /// Where the machine rests, axis space, mm or rad.
+    pub position: AxisVector,
+}
+
+impl FineLoop {
+    /// The drives stay enabled when the program has ended, and are told to stay where they are, until somebody says that
+    /// they are to let go ([`tandem_rings::Controls::let_go`]). Host, before the first tick.
+    pub fn stay(&mut self) {
+        self.stays = true;
+    }
+
+    /// There is nothing to do: the drives are not enabled, and the exchange with them goes on. Host, before the first tick.
+    pub fn begin_ended(&mut self) {
+        (self.outputs.ended, self.release.had_ended) = (true, true);
+        self.release.begin();
+    }
+
+    /// Takes the place of `last`, which rests and has ended or is in fault: from here on this loop has the drives, and knows
+    /// what they were told and have answered. What this job counts begins anew; what was on stays on. Where the drives of
+    /// `last` hold, they go on holding, and the job begins at the next fine period; else they are enabled first, where they
+    /// stand, and their faults reset with `resets`.
+    ///
+    /// Fine thread, between ticks; does not allocate. `last` keeps what it counted, and is dropped by the host.
+    pub fn succeed(&mut self, last: &mut Self, resets: bool) {
+        std::mem::swap(&mut self.driver, &mut last.driver);
+        (self.setpoint, self.feedback) = (last.setpoint, last.feedback);
+        std::mem::swap(&mut self.sent, &mut last.sent);
+        std::mem::swap(&mut self.measured, &mut last.measured);
+        (self.offset, self.axes) = (last.offset, last.axes);
+        (self.outputs.bits, self.outputs.spindle_rad_per_s) = (last.outputs.bits, last.outputs.spindle_rad_per_s);
+        self.outputs.by = last.outputs.by;
+        self.spin_up = last.spin_up;
+        if self.outputs.ended {
+            return;
+        }
+        if last.has_ended() && last.attach.is_done() && last.setpoint.enable != 0 {
+            (self.state, self.roles) = (last.state, std::mem::take(&mut last.roles));
+            self.guard.place(last.guard.position());
+            self.attach = Attach::held(last.setpoint.position);
+            self.part(Stop::attached());
+            self.phase = Phase::Waiting;
+        } else {
+            // Where the joints stand is asked of the drives once more.
+            self.guard.place(last.guard.position());
+            self.attach = Attach::anew(last.feedback.position, resets);
+            self.state = MachineState::Disabled;
+        }
+    }
+
+    /// Whether the program has ended: nothing of this job moves any more. Any side.
+    pub fn has_ended(&self) -> bool {
+        self.outputs.ended && !matches!(self.phase, Phase::Ramping(_) | Phase::Faulted)
+    }
+
+    /// What the job did, once it has ended. Fine thread or host; does not allocate.
+    pub fn job_end(&self) -> JobEnd {
+        JobEnd {
+            counters: self.counters,
+            left: Left { switched: self.switched(), ..self.left },
+            position: self.config.axes_alone(self.guard.position()),
+        }
+    }
+
+    /// Whether the drives are to stay enabled though the program has ended.
+    pub(super) fn stays_enabled(&self) -> bool {
+        // What has begun to let go is enabled by the next job alone, from where the joints are then.
+        self.stays && !self.release.has_begun() && !self.controls.let_go.load(Relaxed)
+    }
+}
