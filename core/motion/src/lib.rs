@@ -3,6 +3,7 @@
 //! Units: mm, s, rad. Nothing here allocates unless it says so; everything is called on the rough loop.
 
 mod arc;
+pub mod blocks;
 mod geometry;
 pub mod nurbs;
 mod path;

@@ -39,10 +39,10 @@ impl AxisVector {
         Self(self.0.map(f))
     }
 
-    /// Whether every entry is finite.
+    /// Whether every entry is finite, without a branch for each.
     #[inline]
     pub fn is_finite(&self) -> bool {
-        self.0.iter().all(|v| v.is_finite())
+        self.0.iter().fold(true, |all, v| all & v.is_finite())
     }
 }
 

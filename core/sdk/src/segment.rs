@@ -32,6 +32,13 @@ impl SegmentFlags {
         self.0 & other.0 == other.0
     }
 
+    /// These bits but for those of `other`.
+    #[inline]
+    #[must_use]
+    pub fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// Both sets of bits.
     #[inline]
     #[must_use]

@@ -169,7 +169,7 @@ impl Motion {
         } else {
             self.signal.drop_before(self.now_s - self.filter.memory_s());
         }
-        driving.blank.flags = without_begin(driving.blank.flags);
+        driving.blank.flags = driving.blank.flags.without(SegmentFlags::BLOCK_BEGINS);
         self.driving = (!over).then_some(driving);
     }
 
@@ -180,9 +180,4 @@ impl Motion {
         self.now_s = 0.0;
         self.knot = Knot::rest(position);
     }
-}
-
-/// The flags of a block's later segments.
-pub(crate) fn without_begin(flags: SegmentFlags) -> SegmentFlags {
-    SegmentFlags(flags.0 & !SegmentFlags::BLOCK_BEGINS.0)
 }

@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 
 use tandem_motion::Path;
+use tandem_motion::blocks::{self, BlockId, BlockWriter, limited_by_feed};
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink, size_of_contract,
+    PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
-use crate::motion::{Motion, without_begin};
+use crate::motion::Motion;
 use crate::options::Options;
 
 /// Most blocks that wait to be driven. The filter does not look ahead, so there is no use in more.
@@ -32,8 +33,7 @@ pub struct AfterInterpolation {
     context: PlannerContext,
     waiting: VecDeque<Waiting>,
     motion: Motion,
-    /// What is left of a dwell.
-    dwell: Option<Segment>,
+    writer: BlockWriter,
     finished: bool,
 }
 
@@ -54,7 +54,7 @@ impl AfterInterpolation {
             context: *context,
             waiting: VecDeque::with_capacity(BUFFER_BLOCKS),
             motion: Motion::new(options, context),
-            dwell: None,
+            writer: BlockWriter::new(2),
             finished: false,
         })
     }
@@ -70,7 +70,10 @@ impl AfterInterpolation {
         self.waiting.pop_front();
         match Path::new(&block) {
             Some(path) => self.begin_motion(&block, &path, stops, sink),
-            None => self.begin_dwell(&block, sink),
+            None => {
+                let path_mm = self.motion.path_mm();
+                self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, path_mm, sink);
+            }
         }
         true
     }
@@ -78,29 +81,8 @@ impl AfterInterpolation {
     fn begin_motion(&mut self, block: &Block, path: &Path, stops: bool, sink: &mut dyn SegmentSink) {
         let (feed, limited_by) = self.feed_mm_per_s(block, path);
         let time_s = self.motion.begin(&self.blank(block), path, feed, stops);
-        sink.block(&BlockReport { limited_by, ..self.report(block, feed, time_s) });
-    }
-
-    fn begin_dwell(&mut self, block: &Block, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&block.end, block.dwell_s);
-        (rest.block, rest.line) = (block.index, block.line);
-        rest.path[0] = self.motion.path_mm();
-        rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
-        self.dwell = Some(rest);
-        sink.block(&BlockReport { time_constant_s: f64::NAN, ..self.report(block, 0.0, block.dwell_s) });
-    }
-
-    fn report(&self, block: &Block, feed_mm_per_s: f64, time_s: f64) -> BlockReport {
-        BlockReport {
-            size: size_of_contract::<BlockReport>(),
-            limited_by: LimitedBy::Feed,
-            block: block.index,
-            start_feed_mm_per_s: feed_mm_per_s,
-            peak_feed_mm_per_s: feed_mm_per_s,
-            end_feed_mm_per_s: feed_mm_per_s,
-            time_s,
-            time_constant_s: self.motion.time_constant_s(),
-        }
+        let report = blocks::report(block.index, limited_by, [feed; 3], time_s);
+        sink.block(&BlockReport { time_constant_s: self.motion.time_constant_s(), ..report });
     }
 
     /// The feed of a block's step, mm/s: the command at the highest ratio that may be asked, within the axis speeds.
@@ -114,19 +96,11 @@ impl AfterInterpolation {
         if asked > most {
             return (most, LimitedBy::Velocity);
         }
-        let capped = block.feed_cap_mm_per_s < block.feed_mm_per_s;
-        (asked, if capped { LimitedBy::Policy } else { LimitedBy::Feed })
+        (asked, limited_by_feed(block))
     }
 
     fn blank(&self, block: &Block) -> Segment {
-        let mut blank = Segment::rest(&block.start, 0.0);
-        (blank.block, blank.line) = (block.index, block.line);
-        blank.flags = SegmentFlags::BLOCK_BEGINS;
-        if block.kind == BlockKind::Rapid {
-            blank.flags = blank.flags.with(SegmentFlags::RAPID);
-        } else {
-            blank.feed_mm_per_s = block.command_feed_mm_per_s();
-        }
+        let mut blank = self.writer.blank(block);
         let axes = self.context.limits.axes();
         let weakest = axes.iter().map(|axis| axis.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
         // A path deceleration that no axis exceeds, whatever the direction. The plan's own accelerations follow from feed
@@ -137,28 +111,14 @@ impl AfterInterpolation {
 
     /// Emits the next piece, at most `left_s` long; `None` where nothing can be emitted for now.
     fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
-        if let Some(rest) = self.dwell.take() {
-            return Some(self.emit_dwell(rest, left_s, sink));
+        if let Some(emitted_s) = self.writer.emit_dwell(left_s, sink) {
+            return Some(emitted_s);
         }
         if let Some(segment) = self.motion.emit(left_s) {
             sink.segment(&segment);
             return Some(segment.duration_s);
         }
         self.begin(sink).then_some(0.0)
-    }
-
-    fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        // What is left may be lost in rounding beside the dwell: the part comes from it, not from a difference.
-        let part_s = rest.duration_s.min(left_s);
-        let later_s = rest.duration_s - part_s;
-        rest.duration_s = part_s;
-        if later_s > 0.0 {
-            self.dwell = Some(Segment { duration_s: later_s, flags: without_begin(rest.flags), ..rest });
-        } else {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        sink.segment(&rest);
-        rest.duration_s
     }
 }
 
@@ -168,25 +128,10 @@ impl Planner for AfterInterpolation {
     }
 
     fn check(&self, block: &Block) -> Result<(), PluginError> {
-        let refuse = |why| Err(PluginError::fixed(why));
-        let axes = self.context.axes.count() as u32;
-        let sound = block.start.is_finite() && block.end.is_finite();
-        match block.kind {
-            BlockKind::Nurbs => refuse("after-interpolation drives lines and arcs; for NURBS use planner nurbs"),
-            BlockKind::Dwell if !(sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite()) => {
-                refuse("a dwell needs a place and a duration of zero or more")
-            }
-            BlockKind::Dwell => Ok(()),
-            BlockKind::Arc if !block.arc.plane.iter().all(|axis| *axis < axes) => {
-                refuse("an arc lies in a plane of axes that the machine lacks")
-            }
-            _ if !(sound && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
-                refuse("a block needs two ends and a length above zero")
-            }
-            // Both asked, because the smaller of a number and NaN is the number.
-            _ if block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0 => Ok(()),
-            _ => refuse("a block needs a feed above zero"),
+        if block.kind == BlockKind::Nurbs {
+            return Err(PluginError::fixed("after-interpolation drives lines and arcs; for NURBS use planner nurbs"));
         }
+        blocks::check(block, &self.context.axes)
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
@@ -218,13 +163,14 @@ impl Planner for AfterInterpolation {
                 None => break,
             }
         }
-        let empty = self.waiting.is_empty() && !self.motion.is_driving() && self.dwell.is_none();
+        let empty = self.waiting.is_empty() && !self.motion.is_driving() && !self.writer.is_dwelling();
         Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
     }
 
     fn reset(&mut self, position: &AxisVector) {
         self.waiting.clear();
         self.motion.reset(position);
-        (self.dwell, self.finished) = (None, false);
+        self.writer.reset();
+        self.finished = false;
     }
 }

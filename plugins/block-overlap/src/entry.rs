@@ -1,5 +1,6 @@
 //! What the planner knows of one block by itself.
 
+use tandem_motion::blocks::BlockId;
 use tandem_motion::{Builder, Path};
 use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy};
 
@@ -60,6 +61,11 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// What names it in segments.
+    pub fn id(&self) -> BlockId {
+        BlockId { index: self.index, line: self.line }
+    }
+
     /// A dwell of no duration.
     pub fn blank() -> Self {
         Self {

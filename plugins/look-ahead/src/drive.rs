@@ -111,14 +111,14 @@ impl Drive {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
         }
         sink.segment(segment);
-        segment.flags = without(segment.flags, SegmentFlags::BLOCK_BEGINS);
+        segment.flags = segment.flags.without(SegmentFlags::BLOCK_BEGINS);
     }
 
     /// The programmed position itself, for the sample at rest.
     fn rest(&self, path: &Path, segment: &mut Segment, sink: &mut dyn SegmentSink) {
         let mut rest = Segment::rest(path.end(), 0.0);
         (rest.block, rest.line, rest.feed_mm_per_s) = (segment.block, segment.line, segment.feed_mm_per_s);
-        rest.flags = without(segment.flags, SegmentFlags::BLOCK_ENDS).with(SegmentFlags::ENDS_AT_REST);
+        rest.flags = segment.flags.without(SegmentFlags::BLOCK_ENDS).with(SegmentFlags::ENDS_AT_REST);
         rest.path[0] = self.builder.path_start_mm() + path.length_mm();
         sink.segment(&rest);
     }
@@ -133,9 +133,4 @@ pub fn begin(segment: &mut Segment, entry: &Entry, plan: &Plan) {
     if entry.kind == BlockKind::Rapid {
         segment.flags = segment.flags.with(SegmentFlags::RAPID);
     }
-}
-
-/// The bits of `flags` that are not in `other`.
-pub fn without(flags: SegmentFlags, other: SegmentFlags) -> SegmentFlags {
-    SegmentFlags(flags.0 & !other.0)
 }

@@ -1,7 +1,8 @@
 //! What is decided for one block when it is taken out of the buffer: its profile and the steps at its ends.
 
 use tandem_motion::Profile;
-use tandem_sdk::{AxisVector, BlockReport, LimitedBy, size_of_contract};
+use tandem_motion::blocks::report;
+use tandem_sdk::{AxisVector, BlockReport, LimitedBy};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
@@ -58,16 +59,9 @@ impl Plan {
 
     /// The block's row of the report.
     pub fn report(&self, entry: &Entry) -> BlockReport {
-        BlockReport {
-            size: size_of_contract::<BlockReport>(),
-            limited_by: self.limited_by(entry),
-            block: entry.index,
-            start_feed_mm_per_s: self.profile.start_mm_per_s,
-            peak_feed_mm_per_s: self.profile.peak_mm_per_s,
-            end_feed_mm_per_s: self.profile.end_mm_per_s,
-            time_s: self.duration_s(),
-            time_constant_s: f64::NAN,
-        }
+        let Profile { start_mm_per_s, peak_mm_per_s, end_mm_per_s, .. } = self.profile;
+        let feeds_mm_per_s = [start_mm_per_s, peak_mm_per_s, end_mm_per_s];
+        report(entry.index, self.limited_by(entry), feeds_mm_per_s, self.duration_s())
     }
 
     fn limited_by(&self, entry: &Entry) -> LimitedBy {
@@ -82,19 +76,5 @@ impl Plan {
         } else {
             LimitedBy::Acceleration
         }
-    }
-}
-
-/// The report of a dwell.
-pub fn dwell_report(entry: &Entry) -> BlockReport {
-    BlockReport {
-        size: size_of_contract::<BlockReport>(),
-        limited_by: LimitedBy::Feed,
-        block: entry.index,
-        start_feed_mm_per_s: 0.0,
-        peak_feed_mm_per_s: 0.0,
-        end_feed_mm_per_s: 0.0,
-        time_s: entry.dwell.1,
-        time_constant_s: f64::NAN,
     }
 }

@@ -1,28 +1,20 @@
 //! The planner itself: blocks in, segments out.
 
+use tandem_motion::blocks::{self, BlockId, BlockWriter};
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, MAX_AXES, Planner, PlannerContext, PlannerDescription,
-    PluginError, Segment, SegmentFlags, SegmentSink,
+    PluginError, Segment, SegmentSink,
 };
 
 use crate::buffer::Buffer;
-use crate::drive::{Drive, begin, without};
-use crate::geometry::{Entry, FeedCaps};
+use crate::drive::{Drive, begin};
+use crate::geometry::FeedCaps;
 use crate::junction::Rule;
 use crate::options::{Junction, Options};
-use crate::plan::{Plan, dwell_report};
-
-/// What is being emitted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Emitting {
-    Nothing,
-    Block,
-    /// A dwell, of which so much is left, s.
-    Dwell(f64),
-}
+use crate::plan::Plan;
 
 /// Largest buffer, blocks: about a gigabyte.
-const MOST_BUFFER_BLOCKS: usize = 1_000_000;
+const MAX_BUFFER_BLOCKS: usize = 1_000_000;
 
 /// Most blocks that are driven in one fine period; each has up to three segments and the fine loop looks at 64.
 const BLOCKS_PER_FINE_PERIOD: f64 = 16.0;
@@ -37,7 +29,9 @@ pub struct LookAhead {
     feed_axis_mm_per_s: Vec<f64>,
     rapid_axis_mm_per_s: Vec<f64>,
     buffer: Buffer,
-    emitting: Emitting,
+    writer: BlockWriter,
+    /// Whether `drive` drives a block.
+    driving: bool,
     drive: Drive,
     /// The segment that goes out: written over and over, because it is large.
     segment: Segment,
@@ -53,9 +47,9 @@ impl LookAhead {
     /// # Errors
     /// A buffer of fewer than two blocks, or beyond reason.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
-        if !(2..=MOST_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
+        if !(2..=MAX_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
             let asked = options.buffer_blocks;
-            let range = format!("{asked}: must be from 2 to {MOST_BUFFER_BLOCKS}");
+            let range = format!("{asked}: must be from 2 to {MAX_BUFFER_BLOCKS}");
             return Err(PluginError::of_option("buffer_blocks", range));
         }
         let axes = context.limits.axes();
@@ -66,7 +60,8 @@ impl LookAhead {
             feed_axis_mm_per_s: axes.iter().map(|a| a.feed_mm_per_s).collect(),
             rapid_axis_mm_per_s: axes.iter().map(|a| a.rapid_mm_per_s).collect(),
             buffer: Buffer::new(options.buffer_blocks),
-            emitting: Emitting::Nothing,
+            writer: BlockWriter::new(2),
+            driving: false,
             drive: Drive::default(),
             segment: Segment::rest(&AxisVector::ZERO, 0.0),
             path_mm: 0.0,
@@ -81,9 +76,9 @@ impl LookAhead {
         let Some(taken) = self.buffer.pop() else { return false };
         let entry = self.buffer.entry(&taken);
         let Some(path) = &entry.path else {
-            sink.block(&dwell_report(entry));
-            self.segment = dwell(entry, self.path_mm);
-            self.emitting = Emitting::Dwell(entry.dwell.1);
+            let id = BlockId { index: entry.index, line: entry.line };
+            let (position, duration_s) = entry.dwell;
+            self.writer.begin_dwell(id, &position, duration_s, self.path_mm, sink);
             return true;
         };
         let half_step = self.buffer.end_half_step(&taken);
@@ -92,39 +87,25 @@ impl LookAhead {
         sink.block(&plan.report(entry));
         begin(&mut self.segment, entry, &plan);
         self.drive.start(taken, path, &plan, self.path_mm);
-        self.emitting = Emitting::Block;
+        self.driving = true;
         true
     }
 
-    /// Emits at most `duration_s` of a dwell of which `left_s` is left.
-    fn emit_dwell(&mut self, left_s: f64, duration_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let rest = &mut self.segment;
-        rest.duration_s = left_s.min(duration_s);
-        let after_s = left_s - rest.duration_s;
-        self.emitting = if after_s > 0.0 { Emitting::Dwell(after_s) } else { Emitting::Nothing };
-        if after_s <= 0.0 {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        sink.segment(rest);
-        rest.flags = without(rest.flags, SegmentFlags::BLOCK_BEGINS);
-        rest.duration_s
-    }
-
     fn emit(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
-        match self.emitting {
-            Emitting::Dwell(left_s) => Some(self.emit_dwell(left_s, duration_s, sink)),
-            Emitting::Block => {
-                let entry = self.buffer.entry(self.drive.taken());
-                let Some(path) = &entry.path else { unreachable!("dwells are emitted above") };
-                let (emitted_s, over) = self.drive.advance(path, duration_s, &mut self.segment, sink);
-                if over {
-                    self.path_mm += path.length_mm();
-                    self.emitting = Emitting::Nothing;
-                }
-                Some(emitted_s)
+        if self.driving {
+            let entry = self.buffer.entry(self.drive.taken());
+            let Some(path) = &entry.path else { unreachable!("a dwell is not driven") };
+            let (emitted_s, over) = self.drive.advance(path, duration_s, &mut self.segment, sink);
+            if over {
+                self.path_mm += path.length_mm();
+                self.driving = false;
             }
-            Emitting::Nothing => self.start_block(sink).then_some(0.0),
+            return Some(emitted_s);
         }
+        if let Some(emitted_s) = self.writer.emit_dwell(duration_s, sink) {
+            return Some(emitted_s);
+        }
+        self.start_block(sink).then_some(0.0)
     }
 }
 
@@ -145,17 +126,7 @@ impl Planner for LookAhead {
                 "the look-ahead planner drives lines and arcs; for NURBS use planner nurbs",
             ));
         }
-        if block.kind == BlockKind::Dwell {
-            let possible = block.dwell_s >= 0.0 && block.dwell_s.is_finite();
-            return if possible { Ok(()) } else { Err(PluginError::fixed("a dwell needs a duration of zero or more")) };
-        }
-        let sound = is_finite(&block.start) && is_finite(&block.end) && block.length_mm > 0.0;
-        let feed = block.command_feed_mm_per_s();
-        if sound && feed > 0.0 {
-            Ok(())
-        } else {
-            Err(PluginError::fixed("a block needs a length and a feed above zero"))
-        }
+        blocks::check(block, &self.context.axes)
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
@@ -188,27 +159,17 @@ impl Planner for LookAhead {
                 None => break,
             }
         }
-        let empty = self.buffer.len() == 0 && self.emitting == Emitting::Nothing;
+        let empty = self.buffer.len() == 0 && !self.driving && !self.writer.is_dwelling();
         Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
     }
 
     fn reset(&mut self, position: &AxisVector) {
         self.context.position = *position;
         self.buffer.clear();
-        self.emitting = Emitting::Nothing;
-        (self.path_mm, self.speed_mm_per_s, self.finished) = (0.0, 0.0, false);
+        self.writer.reset();
+        self.driving = false;
+        self.path_mm = 0.0;
+        self.speed_mm_per_s = 0.0;
+        self.finished = false;
     }
-}
-
-/// Whether all entries are finite, without a branch for each.
-fn is_finite(vector: &AxisVector) -> bool {
-    vector.0.iter().fold(true, |all, v| all & v.is_finite())
-}
-
-fn dwell(entry: &Entry, path_mm: f64) -> Segment {
-    let mut rest = Segment::rest(&entry.dwell.0, 0.0);
-    (rest.block, rest.line) = (entry.index, entry.line);
-    rest.path[0] = path_mm;
-    rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
-    rest
 }

@@ -2,13 +2,14 @@
 
 use std::collections::VecDeque;
 
+use tandem_motion::blocks::{BlockId, BlockWriter, limited_by_feed, report};
 use tandem_motion::nurbs::Place;
 use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy, PlannerContext, Segment, SegmentFlags, SegmentSink};
 
 use crate::adaptive::{Adaptive, next_mm};
 use crate::course::Course;
 use crate::piece::Piece;
-use crate::planner::{BUFFER_BLOCKS, dwell_report, report};
+use crate::planner::BUFFER_BLOCKS;
 
 /// Share of an axis limit that a feed may reach.
 const AIM: f64 = 0.999;
@@ -39,8 +40,7 @@ pub struct Baseline {
     chord_error_mm: f64,
     waiting: VecDeque<Waiting>,
     driving: Option<Driving>,
-    /// What is left of a dwell.
-    dwell: Option<Segment>,
+    writer: BlockWriter,
     /// The blank of the block being driven, and its next segment.
     segment: Segment,
     path_mm: f64,
@@ -60,7 +60,7 @@ impl Baseline {
             chord_error_mm,
             waiting: VecDeque::with_capacity(BUFFER_BLOCKS),
             driving: None,
-            dwell: None,
+            writer: BlockWriter::new(2),
             segment: Segment::rest(&context.position, 0.0),
             path_mm: 0.0,
             end: context.position,
@@ -88,16 +88,19 @@ impl Baseline {
 
     /// Whether all is emitted.
     pub fn is_done(&self) -> bool {
-        let empty = self.waiting.is_empty() && self.driving.is_none() && self.dwell.is_none() && !self.moving;
+        let empty = self.waiting.is_empty() && self.driving.is_none() && !self.writer.is_dwelling() && !self.moving;
         empty && self.finished
     }
 
     /// Forgets everything.
     pub fn reset(&mut self, position: &AxisVector) {
         self.waiting.clear();
-        (self.driving, self.dwell) = (None, None);
+        self.driving = None;
+        self.writer.reset();
         self.segment = Segment::rest(position, 0.0);
-        (self.path_mm, self.moving, self.finished) = (0.0, false, false);
+        self.path_mm = 0.0;
+        self.moving = false;
+        self.finished = false;
     }
 
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
@@ -109,7 +112,7 @@ impl Baseline {
         let Some(Waiting { block, course }) = self.waiting.pop_front() else { return false };
         match course {
             Some(course) => self.begin_motion(&block, course, sink),
-            None => self.begin_dwell(&block, sink),
+            None => self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, self.path_mm, sink),
         }
         true
     }
@@ -121,20 +124,11 @@ impl Baseline {
         let (time_s, feeds) = profile.summary(&course);
         let slowed = feeds[1] < feed_mm_per_s;
         let limited_by = if slowed { LimitedBy::Tolerance } else { limited_by };
-        sink.block(&report(block, limited_by, feeds, time_s));
+        sink.block(&report(block.index, limited_by, feeds, time_s));
         self.segment = self.blank(block);
         (self.end, self.ends_at_rest) = (*course.end(), block.ends_at_rest());
         self.driving = Some(Driving { course, profile, stretch: 0, s_mm: 0.0, place: Place::default(), piece: None });
         self.moving = true;
-    }
-
-    fn begin_dwell(&mut self, block: &Block, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&block.end, block.dwell_s);
-        (rest.block, rest.line) = (block.index, block.line);
-        rest.path[0] = self.path_mm;
-        rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
-        self.dwell = Some(rest);
-        sink.block(&dwell_report(block));
     }
 
     /// The feed to be driven where no chord limits it, mm/s.
@@ -144,20 +138,11 @@ impl Baseline {
             let limits = self.context.limits.along(&block.start, &direction);
             return (AIM * limits.rapid_mm_per_s, LimitedBy::Feed);
         }
-        let capped = block.feed_cap_mm_per_s < block.feed_mm_per_s;
-        let limited_by = if capped { LimitedBy::Policy } else { LimitedBy::Feed };
-        (block.command_feed_mm_per_s() * self.context.max_feed_ratio, limited_by)
+        (block.command_feed_mm_per_s() * self.context.max_feed_ratio, limited_by_feed(block))
     }
 
     fn blank(&self, block: &Block) -> Segment {
-        let mut blank = Segment::rest(&block.start, 0.0);
-        (blank.block, blank.line) = (block.index, block.line);
-        blank.flags = SegmentFlags::BLOCK_BEGINS;
-        if block.kind == BlockKind::Rapid {
-            blank.flags = blank.flags.with(SegmentFlags::RAPID);
-        } else {
-            blank.feed_mm_per_s = block.command_feed_mm_per_s();
-        }
+        let mut blank = self.writer.blank(block);
         // A path deceleration that no axis exceeds, whatever the direction; this form serves simulated drives only.
         let axes = self.context.limits.axes();
         blank.stop_deceleration_mm_per_s2 =
@@ -167,17 +152,15 @@ impl Baseline {
 
     /// Rest where the last block ended, exactly.
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&self.end, 0.0);
-        (rest.block, rest.line) = (self.segment.block, self.segment.line);
-        rest.path[0] = self.path_mm;
+        let id = BlockId { index: self.segment.block, line: self.segment.line };
         self.moving = false;
-        sink.segment(&rest);
+        sink.segment(&self.writer.rest(id, &self.end, self.path_mm));
     }
 
     /// Emits the next piece, at most `left_s` long; none where there is nothing.
     pub fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
-        if let Some(rest) = self.dwell.take() {
-            return Some(self.emit_dwell(rest, left_s, sink));
+        if let Some(emitted_s) = self.writer.emit_dwell(left_s, sink) {
+            return Some(emitted_s);
         }
         let Some(mut driving) = self.driving.take() else { return self.begin(sink).then_some(0.0) };
         let over = driving.draw(left_s, &mut self.segment);
@@ -189,24 +172,8 @@ impl Baseline {
             self.driving = Some(driving);
         }
         sink.segment(&self.segment);
-        let flags = self.segment.flags.0 & !(SegmentFlags::BLOCK_BEGINS.0 | SegmentFlags::BLOCK_ENDS.0);
-        self.segment.flags = SegmentFlags(flags);
+        self.segment.flags = self.segment.flags.without(SegmentFlags::BLOCK_BEGINS).without(SegmentFlags::BLOCK_ENDS);
         Some(self.segment.duration_s)
-    }
-
-    fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        // What is left may be lost in rounding beside the dwell: the part comes from it, not from a difference.
-        let part_s = rest.duration_s.min(left_s);
-        let later_s = rest.duration_s - part_s;
-        rest.duration_s = part_s;
-        if later_s > 0.0 {
-            let flags = SegmentFlags(rest.flags.0 & !SegmentFlags::BLOCK_BEGINS.0);
-            self.dwell = Some(Segment { duration_s: later_s, flags, ..rest });
-        } else {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        sink.segment(&rest);
-        rest.duration_s
     }
 }
 

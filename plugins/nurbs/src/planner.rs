@@ -1,8 +1,9 @@
 //! The planner: its form, and what all forms have in common.
 
+use tandem_motion::blocks;
 use tandem_sdk::{
-    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, NurbsGeometry, Planner,
-    PlannerContext, PlannerDescription, PluginError, SegmentSink, size_of_contract,
+    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, NurbsGeometry, Planner, PlannerContext, PlannerDescription,
+    PluginError, SegmentSink,
 };
 
 use crate::baseline::Baseline;
@@ -65,25 +66,6 @@ impl NurbsPlanner {
     }
 }
 
-/// The report of a dwell.
-pub(crate) fn dwell_report(block: &Block) -> BlockReport {
-    report(block, LimitedBy::Feed, [0.0; 3], block.dwell_s)
-}
-
-/// The report of `block`: feeds at the start, highest and at the end.
-pub(crate) fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) -> BlockReport {
-    BlockReport {
-        size: size_of_contract::<BlockReport>(),
-        limited_by,
-        block: block.index,
-        start_feed_mm_per_s: feeds[0],
-        peak_feed_mm_per_s: feeds[1],
-        end_feed_mm_per_s: feeds[2],
-        time_s,
-        time_constant_s: f64::NAN,
-    }
-}
-
 /// Whether the curve of `block` can be driven by its length.
 fn check_curve(axes: &Axes, block: &Block) -> Result<(), PluginError> {
     let curve = curve_of(axes, block).map_err(|error| PluginError::new(error.to_string()))?;
@@ -105,20 +87,8 @@ impl Planner for NurbsPlanner {
     }
 
     fn check(&self, block: &Block) -> Result<(), PluginError> {
-        let refuse = |why| Err(PluginError::fixed(why));
-        let sound = block.start.is_finite() && block.end.is_finite();
-        match block.kind {
-            BlockKind::Dwell if sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite() => Ok(()),
-            BlockKind::Dwell => refuse("a dwell needs a place and a duration of zero or more"),
-            _ if !(sound && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
-                refuse("a block needs two ends and a length above zero")
-            }
-            _ if !(block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0) => {
-                refuse("a block needs a feed above zero")
-            }
-            BlockKind::Nurbs => check_curve(&self.context.axes, block),
-            _ => Ok(()),
-        }
+        blocks::check(block, &self.context.axes)?;
+        if block.kind == BlockKind::Nurbs { check_curve(&self.context.axes, block) } else { Ok(()) }
     }
 
     fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {

@@ -1,5 +1,6 @@
 //! Windows one after the other: what is driven, what is planned next, and what is done where a plan is refused.
 
+use tandem_motion::blocks::{BlockId, report};
 use tandem_motion::tube::Lanes;
 use tandem_sdk::{AxisVector, Block, PlannerContext, PluginError, SegmentSink};
 
@@ -8,7 +9,6 @@ use crate::flatten::{self, Flat};
 use crate::frame::Frame;
 use crate::plan::{Effort, Planning, Start, Tuning};
 use crate::profile;
-use crate::report::report;
 use crate::route::{Item, Route};
 use crate::window::{Piece, State, Window};
 
@@ -115,10 +115,10 @@ impl<const L: usize> Core<L> {
         if let Some(Item::Leg(leg)) = self.route.pop() {
             self.held_s -= leg.least_s;
             if !self.emitter.knows(&leg.block) {
-                sink.block(&report(&leg.block, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0));
+                sink.block(&report(leg.block.index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0));
             }
             self.position = self.frame.lanes(&leg.block.end);
-            self.emitter.rest(&leg.block, &leg.block.end, sink);
+            self.emitter.rest(BlockId::from(&leg.block), &leg.block.end, sink);
         }
     }
 
@@ -265,8 +265,7 @@ impl<const L: usize> AnyCore for Core<L> {
     }
 
     fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
-        if self.emitter.is_dwelling() {
-            let time_s = self.emitter.dwell(left_s, sink);
+        if let Some(time_s) = self.emitter.writer.emit_dwell(left_s, sink) {
             self.position = self.frame.lanes(&self.emitter.position);
             return Ok(Some(time_s));
         }
@@ -285,12 +284,15 @@ impl<const L: usize> AnyCore for Core<L> {
     }
 
     fn is_done(&self) -> bool {
-        self.finished && self.route.items.is_empty() && self.driven_s.is_none() && !self.emitter.is_dwelling()
+        self.finished && self.route.items.is_empty() && self.driven_s.is_none() && !self.emitter.writer.is_dwelling()
     }
 
     fn reset(&mut self, position: &AxisVector) {
         self.route.clear();
-        (self.driven_s, self.finished, self.at, self.held_s) = (None, false, 0.0, 0.0);
+        self.driven_s = None;
+        self.finished = false;
+        self.at = 0.0;
+        self.held_s = 0.0;
         self.position = self.frame.lanes(position);
         self.emitter = Emitter::new(position);
     }

@@ -1,9 +1,10 @@
 //! Windows as segments.
 
-use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy, MAX_AXES, Segment, SegmentFlags, SegmentSink};
+use tandem_motion::blocks::{BlockId, BlockWriter};
+use tandem_sdk::{AxisVector, Block, MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
 use crate::core::Core;
-use crate::report::{of_leg, path, report};
+use crate::report::{of_leg, path};
 use crate::route::{Item, Leg};
 
 /// Share of the jerk limits on which a stop counts: the plan takes the rest.
@@ -18,7 +19,7 @@ pub struct Emitter {
     blank: Segment,
     /// The block whose report was given last.
     reported: Option<u64>,
-    dwell: Option<Segment>,
+    pub(crate) writer: BlockWriter,
     /// Length driven, mm.
     path_mm: f64,
     /// Path coordinate polynomial of the piece at `piece`, mm.
@@ -34,7 +35,7 @@ impl Emitter {
         Self {
             blank: Segment::rest(position, 0.0),
             reported: None,
-            dwell: None,
+            writer: BlockWriter::new(3),
             path_mm: 0.0,
             path: [0.0; 6],
             piece: None,
@@ -54,56 +55,16 @@ impl Emitter {
 
     /// Begins a rest of the program.
     pub fn begin_dwell(&mut self, block: &Block, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(&block.end, block.dwell_s);
-        (rest.block, rest.line) = (block.index, block.line);
-        rest.path[0] = self.path_mm;
-        rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
         self.position = block.end;
         self.reported = Some(block.index);
-        sink.block(&report(block, LimitedBy::Feed, [0.0; 3], block.dwell_s));
-        self.dwell = Some(rest);
-    }
-
-    /// Whether a rest of the program is under way.
-    pub fn is_dwelling(&self) -> bool {
-        self.dwell.is_some()
-    }
-
-    /// Emits at most `left_s` of the rest.
-    pub fn dwell(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        let Some(mut rest) = self.dwell.take() else { return 0.0 };
-        let later_s = (rest.duration_s - left_s).max(0.0);
-        rest.duration_s -= later_s;
-        if later_s > 0.0 {
-            let flags = SegmentFlags(rest.flags.0 & !SegmentFlags::BLOCK_BEGINS.0);
-            self.dwell = Some(Segment { duration_s: later_s, flags, ..rest });
-        } else {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        sink.segment(&rest);
-        rest.duration_s
+        self.writer.begin_dwell(BlockId::from(block), &block.end, block.dwell_s, self.path_mm, sink);
     }
 
     /// Rest at `position`, in or at the end of `block`.
-    pub fn rest(&mut self, block: &Block, position: &AxisVector, sink: &mut dyn SegmentSink) {
-        let mut rest = Segment::rest(position, 0.0);
-        (rest.block, rest.line, rest.order) = (block.index, block.line, 3);
-        rest.path[0] = self.path_mm;
+    pub fn rest(&mut self, block: BlockId, position: &AxisVector, sink: &mut dyn SegmentSink) {
         self.position = *position;
         self.reported = Some(block.index);
-        sink.segment(&rest);
-    }
-
-    /// Segments of `block` from here on.
-    fn begin_block(&mut self, block: &Block) {
-        self.blank = Segment::rest(&block.start, 0.0);
-        (self.blank.block, self.blank.line, self.blank.order) = (block.index, block.line, 3);
-        self.blank.flags = SegmentFlags::BLOCK_BEGINS;
-        if block.kind == BlockKind::Rapid {
-            self.blank.flags = self.blank.flags.with(SegmentFlags::RAPID);
-        } else {
-            self.blank.feed_mm_per_s = block.command_feed_mm_per_s();
-        }
+        sink.segment(&self.writer.rest(block, position, self.path_mm));
     }
 }
 
@@ -148,8 +109,7 @@ impl<const L: usize> Core<L> {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
             self.pop_leg();
         }
-        let flags = self.emitter.blank.flags.0 & !SegmentFlags::BLOCK_BEGINS.0;
-        self.emitter.blank.flags = SegmentFlags(flags);
+        self.emitter.blank.flags = self.emitter.blank.flags.without(SegmentFlags::BLOCK_BEGINS);
         self.driven_s = Some(until_s);
         segment.duration_s = until_s - from_s;
         sink.segment(&segment);
@@ -167,7 +127,7 @@ impl<const L: usize> Core<L> {
         sink.block(&of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (start_s, to_s)));
         let block = leg.block;
         self.emitter.reported = Some(block.index);
-        self.emitter.begin_block(&block);
+        self.emitter.blank = self.emitter.writer.blank(&block);
     }
 
     fn pop_leg(&mut self) {
@@ -212,23 +172,21 @@ impl<const L: usize> Core<L> {
         self.at = end;
         self.position = end_state[0];
         let mut exact = self.frame.axes(&self.position);
-        let mut named = (self.emitter.blank.block, self.emitter.blank.line);
+        let mut named = BlockId { index: self.emitter.blank.block, line: self.emitter.blank.line };
         let mut ended = false;
         while let Some(leg) = self.route.front().filter(|leg| leg.end <= end + 1e-9) {
             (exact, ended) = (leg.block.end, true);
-            named = (leg.block.index, leg.block.line);
+            named = BlockId::from(&leg.block);
             self.report_last(&leg.clone(), sink);
             self.pop_leg();
         }
         if ended {
             self.position = self.frame.lanes(&exact);
         }
-        let mut block = Block::at(exact);
-        (block.index, block.line) = named;
-        self.emitter.rest(&block, &exact, sink);
+        self.emitter.rest(named, &exact, sink);
         if !ended {
             // The block in front goes on behind the rest, and its report is given.
-            self.emitter.reported = Some(named.0);
+            self.emitter.reported = Some(named.index);
         }
     }
 

@@ -1,5 +1,6 @@
 //! The planner for any number of axes.
 
+use tandem_motion::blocks;
 use tandem_sdk::{
     Accepted, Advanced, AxisVector, Block, BlockKind, Planner, PlannerContext, PlannerDescription, PluginError,
     SegmentSink,
@@ -12,9 +13,9 @@ use crate::plan::Effort;
 /// Most straight pieces that are held.
 pub const BUFFER_CHORDS: usize = 65_536;
 /// Time that is told from none, s.
-const LEAST_S: f64 = 1e-9;
+const MIN_S: f64 = 1e-9;
 /// Least path tolerance of a block that does not end at rest, mm.
-const LEAST_TOLERANCE_MM: f64 = 1e-4;
+const MIN_TOLERANCE_MM: f64 = 1e-4;
 
 /// Rough loop. A block allocates when it is accepted, a window where one is longer than any before.
 #[derive(Debug)]
@@ -81,7 +82,7 @@ impl Planner for SmoothPlanner {
     fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         // What rounding leaves of the duration is no time to rest or move.
-        while duration_s - emitted_s > LEAST_S {
+        while duration_s - emitted_s > MIN_S {
             match self.core.emit(duration_s - emitted_s, sink)? {
                 Some(part_s) => emitted_s += part_s,
                 None => break,
@@ -99,23 +100,15 @@ impl Planner for SmoothPlanner {
 impl SmoothPlanner {
     /// Checks what a block says of itself, without a look at its path.
     fn check_facts(&self, block: &Block) -> Result<(), PluginError> {
-        let refuse = |why| Err(PluginError::fixed(why));
-        let sound = block.start.is_finite() && block.end.is_finite();
+        blocks::check(block, &self.context.axes)?;
         let stated = block.path_tolerance_mm;
         let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
         match block.kind {
-            BlockKind::Dwell if sound && block.dwell_s >= 0.0 && block.dwell_s.is_finite() => Ok(()),
-            BlockKind::Dwell => refuse("a dwell needs a place and a duration of zero or more"),
-            _ if !(sound && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
-                refuse("a block needs two ends and a length above zero")
-            }
-            _ if !(block.feed_mm_per_s > 0.0 && block.feed_cap_mm_per_s > 0.0) => {
-                refuse("a block needs a feed above zero")
-            }
+            BlockKind::Dwell => Ok(()),
             BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
-            _ if tolerance_mm.is_nan() || tolerance_mm < LEAST_TOLERANCE_MM => {
-                refuse("smooth needs a path tolerance of 0.0001 mm or more (G64 P); G61 drives lines exactly")
-            }
+            _ if tolerance_mm.is_nan() || tolerance_mm < MIN_TOLERANCE_MM => Err(PluginError::fixed(
+                "smooth needs a path tolerance of 0.0001 mm or more (G64 P); G61 drives lines exactly",
+            )),
             _ => Ok(()),
         }
     }

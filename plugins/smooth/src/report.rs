@@ -1,24 +1,11 @@
 //! How blocks are driven.
 
+use tandem_motion::blocks::{limited_by_feed, report};
 use tandem_motion::tube::Lanes;
-use tandem_sdk::{Block, BlockReport, LimitedBy, size_of_contract};
+use tandem_sdk::{BlockReport, LimitedBy};
 
 use crate::route::Leg;
 use crate::window::{Bound, Window};
-
-/// A report of `block`: feeds at the start, highest and at the end.
-pub fn report(block: &Block, limited_by: LimitedBy, feeds: [f64; 3], time_s: f64) -> BlockReport {
-    BlockReport {
-        size: size_of_contract::<BlockReport>(),
-        limited_by,
-        block: block.index,
-        start_feed_mm_per_s: feeds[0],
-        peak_feed_mm_per_s: feeds[1],
-        end_feed_mm_per_s: feeds[2],
-        time_s,
-        time_constant_s: f64::NAN,
-    }
-}
 
 /// Path speed of a velocity.
 pub fn path_speed<const L: usize>(counted: &Lanes<L>, velocity: &Lanes<L>) -> f64 {
@@ -58,18 +45,16 @@ pub fn of_leg<const L: usize>(
     } else {
         to_s - from_s
     };
-    report(&leg.block, limited_by(&bound_s, leg), [start, peak, end], time_s)
+    report(leg.block.index, limited_by(&bound_s, leg), [start, peak, end], time_s)
 }
 
 fn limited_by(bound_s: &[f64; 5], leg: &Leg) -> LimitedBy {
     let most = (0..5).fold(0, |best, n| if bound_s[n] > bound_s[best] { n } else { best });
-    let capped = leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s;
     match most {
         n if n == Bound::Jerk as usize => LimitedBy::Jerk,
         n if n == Bound::Acceleration as usize => LimitedBy::Acceleration,
         n if n == Bound::Velocity as usize => LimitedBy::Velocity,
-        n if n == Bound::Feed as usize && capped => LimitedBy::Policy,
-        n if n == Bound::Feed as usize => LimitedBy::Feed,
+        n if n == Bound::Feed as usize => limited_by_feed(&leg.block),
         _ => LimitedBy::Tolerance,
     }
 }

@@ -2,16 +2,15 @@
 
 use std::collections::VecDeque;
 
+use tandem_motion::blocks::{BlockId, BlockWriter, limited_by_feed, report};
 use tandem_sdk::{
-    AxisVector, Block, BlockKind, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags,
-    SegmentSink,
+    AxisVector, Block, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags, SegmentSink,
 };
 
 use super::draw::{Drawn, Pen, draw};
 use super::queue::{Item, Queue};
 use super::{Bounds, Cursor, Driven, Job, Leg, Motion, Planning, Route, Start, State, Window, stop_s};
 use crate::course::Course;
-use crate::planner::{dwell_report, report};
 
 /// Share of the jerk limits on which a stop counts: the plan takes the rest.
 const STOP_JERK: f64 = 0.5;
@@ -30,7 +29,7 @@ pub struct Streamer<P: Planning> {
     next: Window<P::Motion>,
     /// Driven and committed time of the window; none at rest.
     driving: Option<(f64, f64)>,
-    dwell: Option<Segment>,
+    writer: BlockWriter,
     /// What segments of the present block say.
     blank: Segment,
     /// Path coordinate and position at rest. Path coordinates of the queue and of windows begin where the last motion from rest
@@ -54,7 +53,7 @@ impl<P: Planning> Streamer<P> {
             window: Window::default(),
             next: Window::default(),
             driving: None,
-            dwell: None,
+            writer: BlockWriter::new(3),
             blank: Segment::rest(&context.position, 0.0),
             at_mm: 0.0,
             from_mm: 0.0,
@@ -84,15 +83,18 @@ impl<P: Planning> Streamer<P> {
 
     /// Whether all is emitted.
     pub fn is_done(&self) -> bool {
-        self.finished && self.queue.items.is_empty() && self.driving.is_none() && self.dwell.is_none()
+        self.finished && self.queue.items.is_empty() && self.driving.is_none() && !self.writer.is_dwelling()
     }
 
     /// Forgets everything.
     pub fn reset(&mut self, position: &AxisVector) {
         let Bounds { context, chord_error_mm } = self.bounds;
         self.queue = Queue::default();
-        (self.driving, self.dwell, self.finished) = (None, None, false);
-        (self.at_mm, self.from_mm) = (0.0, 0.0);
+        self.driving = None;
+        self.writer.reset();
+        self.finished = false;
+        self.at_mm = 0.0;
+        self.from_mm = 0.0;
         self.position = *position;
         self.bounds = Bounds { context: PlannerContext { position: *position, ..context }, chord_error_mm };
         self.blank = Segment::rest(position, 0.0);
@@ -100,8 +102,8 @@ impl<P: Planning> Streamer<P> {
 
     /// Emits the next piece, at most `left_s` long; none where there is nothing.
     pub fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
-        if let Some(rest) = self.dwell.take() {
-            return Ok(Some(self.emit_dwell(rest, left_s, sink)));
+        if let Some(emitted_s) = self.writer.emit_dwell(left_s, sink) {
+            return Ok(Some(emitted_s));
         }
         let Some((driven_s, committed_s)) = self.driving else { return self.begin(sink) };
         if driven_s < committed_s {
@@ -121,13 +123,9 @@ impl<P: Planning> Streamer<P> {
         match self.queue.items.front() {
             None => return Ok(None),
             Some(Item::Dwell(block)) => {
-                let mut rest = Segment::rest(&block.end, block.dwell_s);
-                (rest.block, rest.line) = (block.index, block.line);
-                rest.path[0] = self.at_mm;
-                rest.flags = rest.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
                 self.position = block.end;
-                sink.block(&dwell_report(block));
-                self.dwell = Some(rest);
+                let path_mm = self.at_mm + self.from_mm;
+                self.writer.begin_dwell(BlockId::from(block), &block.end, block.dwell_s, path_mm, sink);
                 self.queue.items.pop_front();
             }
             Some(Item::Leg(leg)) => {
@@ -209,7 +207,8 @@ impl<P: Planning> Streamer<P> {
         let begins = leg.begins && self.blank.flags.contains(SegmentFlags::BLOCK_ENDS);
         if begins || from_s == 0.0 && self.is_new(leg) {
             sink.block(&self.block_report(leg, from_s));
-            self.blank = blank(leg);
+            // A blank that was made of a leg has a duration; the one at the beginning has none.
+            self.blank = Segment { duration_s: 1.0, ..self.writer.blank(&leg.block) };
         }
         let mut segment = self.blank;
         let pen = Pen { from_s, at: &self.at };
@@ -224,8 +223,7 @@ impl<P: Planning> Streamer<P> {
         self.driving = Some((until_s, to_s));
         if segment.duration_s > 0.0 {
             self.send(&segment, sink);
-            let flags = self.blank.flags.0 & !SegmentFlags::BLOCK_BEGINS.0;
-            self.blank.flags = SegmentFlags(flags);
+            self.blank.flags = self.blank.flags.without(SegmentFlags::BLOCK_BEGINS);
         }
         segment.duration_s
     }
@@ -290,26 +288,9 @@ impl<P: Planning> Streamer<P> {
             self.position = route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
         }
-        let mut rest = Segment::rest(&self.position, 0.0);
-        (rest.block, rest.line, rest.order) = (self.blank.block, self.blank.line, 3);
-        rest.path[0] = self.at_mm;
+        let id = BlockId { index: self.blank.block, line: self.blank.line };
         self.driving = None;
-        self.send(&rest, sink);
-    }
-
-    fn emit_dwell(&mut self, mut rest: Segment, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
-        // What is left may be lost in rounding beside the dwell: the part comes from it, not from a difference.
-        let part_s = rest.duration_s.min(left_s);
-        let later_s = rest.duration_s - part_s;
-        rest.duration_s = part_s;
-        if later_s > 0.0 {
-            let flags = SegmentFlags(rest.flags.0 & !SegmentFlags::BLOCK_BEGINS.0);
-            self.dwell = Some(Segment { duration_s: later_s, flags, ..rest });
-        } else {
-            rest.flags = rest.flags.with(SegmentFlags::BLOCK_ENDS);
-        }
-        self.send(&rest, sink);
-        rest.duration_s
+        self.send(&self.writer.rest(id, &self.position, self.at_mm), sink);
     }
 
     /// How the block is driven that begins at `from_s`. Where it ends beyond the window, the rest of its time is estimated
@@ -327,12 +308,11 @@ impl<P: Planning> Streamer<P> {
         let beyond_mm = (end_mm - end.s_mm).max(0.0);
         // The way to the rest at the end of the window is not how it will be driven.
         let time_s = until_s - from_s + beyond_mm / window.most_mm_per_s.max(peak);
-        let capped = leg.block.feed_cap_mm_per_s < leg.block.feed_mm_per_s;
         let limited_by = match window.bound((from_s, until_s), self.bounds.context.fine_period_s) {
-            Some(LimitedBy::Feed) if capped => LimitedBy::Policy,
+            Some(LimitedBy::Feed) => limited_by_feed(&leg.block),
             bound => bound.unwrap_or(LimitedBy::Jerk),
         };
-        report(&leg.block, limited_by, [state.speed_mm_per_s, peak, end.speed_mm_per_s], time_s)
+        report(leg.block.index, limited_by, [state.speed_mm_per_s, peak, end.speed_mm_per_s], time_s)
     }
 }
 
@@ -340,16 +320,4 @@ impl Leg {
     fn block_length_mm(&self) -> f64 {
         self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
     }
-}
-
-fn blank(leg: &Leg) -> Segment {
-    let mut blank = Segment::rest(&leg.block.start, 1.0);
-    (blank.block, blank.line, blank.order) = (leg.block.index, leg.block.line, 3);
-    blank.flags = SegmentFlags::BLOCK_BEGINS;
-    if leg.block.kind == BlockKind::Rapid {
-        blank.flags = blank.flags.with(SegmentFlags::RAPID);
-    } else {
-        blank.feed_mm_per_s = leg.block.command_feed_mm_per_s();
-    }
-    blank
 }
