@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use tandem_sdk::{
@@ -30,7 +30,12 @@ pub struct Log {
     pub joints: u32,
     pub names: Vec<String>,
     pub positions: Vec<f64>,
+    /// When each of the first exchanges began and ended.
+    pub calls: Vec<(Instant, Instant)>,
 }
+
+/// Calls of a driver that are written down.
+const MAX_CALLS: usize = 1000;
 
 static LOGS: Mutex<BTreeMap<String, Log>> = Mutex::new(BTreeMap::new());
 
@@ -180,6 +185,7 @@ impl Driver for Double {
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+        let began = Instant::now();
         let silent = self.plan.silent_after.is_some_and(|count| log(&self.plan.name).exchanges >= count);
         let takes_ms = if silent { 10_000 } else { self.plan.slow_ms };
         if takes_ms > 0 {
@@ -197,6 +203,9 @@ impl Driver for Double {
         let joints = self.joints;
         self.note(|log| {
             log.exchanges += 1;
+            if log.calls.len() < MAX_CALLS {
+                log.calls.push((began, Instant::now()));
+            }
             log.enabled += u64::from(setpoint.enable);
             log.outputs |= setpoint.outputs;
             log.turned |= setpoint.spindle_rad_per_s != 0.0;
