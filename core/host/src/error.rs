@@ -31,7 +31,7 @@ pub enum HostError {
 /// A refusal with the place in the machine file.
 pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
     let place = match machine.place(key) {
-        place @ Place::Override(_) => place.to_string(),
+        Place::Override(path) if path == key => Place::Override(path).to_string(),
         place => format!("{place}: {key}"),
     };
     HostError::Setup { place, cause: cause.into() }
