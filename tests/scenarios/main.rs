@@ -30,6 +30,7 @@ mod optimal_jerk_stop;
 mod optimal_stop;
 mod overlap;
 mod overrides;
+mod pages;
 mod plan;
 mod plugins;
 mod policy;
