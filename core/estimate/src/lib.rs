@@ -2,6 +2,12 @@
 //!
 //! Four models behind one trait: the machine's own planner on the virtual clock ([`Choice::Simulate`]), the closed forms
 //! of a look-ahead and of an overlap control, and the published regression. [`estimate`] streams a program through one.
+//!
+//! `core/estimate` sees blocks, not planners. `tandem_estimate::estimate` either hands every block of the first pass to
+//! a model (`Model::block`, a bounded number of blocks kept) or runs the machine on the virtual clock with an observer
+//! that looks at reports of blocks only. The closed forms repeat published rules, not the plugins' code, so that the
+//! tests of either find the other's mistakes. A calibration measures samples of the driver, never what a planner says
+//! of itself, because that is all that another control gives. docs/machining-time.md has the models and their accuracy.
 
 mod choice;
 pub mod diagnose;

@@ -4,6 +4,93 @@
 //! time the axes move at σ·q′ and accelerate by σ²·q″ + σ̇·q′. Where the plan's velocity steps at junctions, q′ stands
 //! for the continuous velocity that the segment declares; the steps themselves shrink with σ. A constant σ is always
 //! admissible where the plan is, so the interval for σ̇ is never empty.
+//!
+//! # Velocity steps
+//!
+//! The look-ahead planner drives blocks one after the other, so at a corner the velocity of an axis steps. The machine
+//! allows a step of V (`motion.allowable_speed_difference_mm_per_min`). A rule for single junctions is not enough: a
+//! circle of 2 mm radius in chords of 0.02 mm would keep V at each junction and exceed the acceleration limit A several
+//! times. What is asked instead holds over every window: **the velocity of an axis changes by at most A·Δt + V in any
+//! time Δt, however many junctions lie in it.**
+//!
+//! The rule. At a junction the direction of an axis steps by Δu; at the feed v its velocity steps by v·Δu. Take the
+//! velocity g that at every junction runs through the mean of the velocities before and after, and that in between
+//! takes the step back at a constant rate. Just after a junction the axis is ahead of g by half the step there; just
+//! before the next it is behind by half the step there. So inside a block of duration t
+//!
+//! ```text
+//! dg/dt = acceleration of the axis + (v_s·Δu_s + v_e·Δu_e) / (2·t)
+//! ```
+//!
+//! with `s` and `e` for the start and the end of the block. The planner asks for two things: |v·Δu| ≤ V at every
+//! junction, and |dg/dt| ≤ A everywhere. Both are local. The sum in the second is signed: a zigzag pays for each of its
+//! steps but not for their sum, a chain of chords pays exactly the centripetal acceleration of the curve it stands for.
+//!
+//! Why the window follows. The lead of the velocity over g is never more than half a step, so between any two instants
+//! it changes by at most V. g changes by at most A·Δt. Together: A·Δt + V.
+//!
+//! Why it is a leaky bucket. Judge, guard and report keep, per axis and sign, `u ← max(0, u + Δv − A·T)` over the
+//! sampled velocity and ask u ≤ V. By unrolling, u is the greatest value of (sum of Δv) − A·Δt over all windows that
+//! end now. One number for each axis and sign therefore asks the question over all windows.
+//!
+//! Why sampled differences inherit the bound. The sampled velocity of a period is the mean of the true velocity over
+//! the period. The difference of two of them, n periods apart, is the mean over 0 ≤ s ≤ T of the true velocity change
+//! from t + s to t + s + n·T. Each of these changes is taken over a window of exactly n·T and is at most A·n·T + V; so
+//! is their mean. In other words: a sampled velocity change is the acceleration (with impulses at the junctions)
+//! weighted by a trapezoid, a triangle for n = 1, and that weight is a mixture of indicators of intervals of equal
+//! length. No correction for the sampling is needed.
+//!
+//! What the segment carries. `Segment::step_velocity` is the lead at the start of the segment,
+//! `Segment::step_acceleration` the rate at which it is taken back; at local time t the continuous velocity is
+//! `velocity(t) − step_velocity + step_acceleration·t`. The governor limits σ²·(q″ + step_acceleration) + σ̇·(q′ −
+//! lead), with q the plan: the rate of σ·g. The steps themselves shrink with σ. So the same argument holds while the
+//! machine is held, slowed or starved. Planners of continuous velocity leave both fields zero.
+//!
+//! Under `junction = "tangent"` nothing of this holds: that form bounds the velocity along the block before, as
+//! published. It runs with `guard.mode = "count"` on simulated drives only.
+//!
+//! # Order 2 and order 3
+//!
+//! **Order 2.** σ changes linearly within a period, so that the velocity of the axes is continuous under hold and
+//! override. With σ₀ at the start and σ₀ + d·t at the end of a period T, an axis accelerates by σ₀²·q″ + (d·t/T)·q′ at
+//! the start, which is linear in t, and by (σ₀ + d·t)²·q″ + (d·t/T)·q′ at its end, which is quadratic. Both crossings
+//! of ±A have a closed form, and the smallest of them over all axes and over the ends (and, on curved segments, the
+//! middles) of the segments in the period is how far σ may go. t = 0 is always admissible where the plan is. Where that
+//! does not reach what is asked for, because the plan turns from getting faster to braking within the period, the
+//! period is laid out segment by segment: σ is linear in each.
+//!
+//! **Order 3.** An axis jerks by q‴σ³ + 3q″σσ̇ + q′σ̈. σ̈ is constant within a period. The points of the period give an
+//! interval for it, linear in σ̈. What is wanted of it comes from two time-optimal laws, one in σ (back to 1) and one
+//! in the path speed (down to a cap, or to rest). Taken of it is as much as leaves a way back: from the end of the
+//! period on σ̇ must come to zero, within the limits at the ends and in the middle of every stretch of a segment that a
+//! period drives, within 0 ≤ σ ≤ 1, and within what is queued, tried out on the queued plan period by period. So σ
+//! comes to 0 and to 1 with σ̇ = 0. A constant σ is always admissible, and the way that was found is kept: where the
+//! next period finds no better one, it goes on that way to its end. At most five ways are tried in a period, each over
+//! 3.2 times the longest a/J of an axis or 640 periods at most, and none while σ stands still. Where the plan uses all
+//! of the jerk and eases off, a hold therefore begins by fractions of a percent and grows with the room that its own
+//! slowness leaves. Where no way is known (a plan that is itself beyond its limits), velocity and acceleration are
+//! kept, and samples beyond the jerk limit are counted in `jerk_relaxed_samples`; the guard does not hold them against
+//! the planner.
+//!
+//! A plan of order 3 may let velocity or acceleration step where segments meet: a line that runs into an arc, with a
+//! little turn, passed at a speed at which samples keep the jerk limit. The rough loop flags segments that begin so
+//! (`SegmentFlags::STEPS`). With Δv and Δa those steps, samples show up to σ·Δv/T as acceleration and σ·Δv/T² +
+//! 0.75·σ²·Δa/T as jerk, which no single point has, in the differences of three samples. In the periods around such a
+//! place, two before it and two behind, the governor leaves that out of what it uses.
+//!
+//! Asked for is a path speed, ratio × programmed feed, not a scale: a corner that is slower than that anyway runs as
+//! planned.
+//!
+//! # Places ahead
+//!
+//! Speed is linear within periods, so braking for a place is laid out in whole ones: the end speed is met and not gone
+//! below, rest is met at the place. From rest the rate of the first period is one that is kept over it. At a ratio
+//! below 1 the plan does not slow down for a lower feed by itself: it reaches that feed at its own deceleration, but
+//! not ratio × feed. The fine loop looks at each queued segment once, at most 64 in a period, and remembers where the
+//! feed falls; the speed from which every such place can be met with the declared deceleration is a cap. The end of a
+//! line in single-block operation is such a place with speed zero. A line whose end can no longer be met is passed.
+//! With a jerk limit the machine may pass an end that it brakes for by a few hundredths of a mm, where a turn behind it
+//! takes of the jerk: it is held there.
 
 mod below;
 mod early;

@@ -116,8 +116,8 @@ pub struct Segment {
     /// continuous over the junctions, mm/s. Zero for planners with continuous velocity.
     pub step_velocity: AxisVector,
     /// How fast that lead is taken back, mm/s²: at local time t the continuous velocity is
-    /// `velocity(t) − step_velocity + step_acceleration · t`, and it is what the governor limits. See `ARCHITECTURE.md`,
-    /// "Velocity steps and the governor".
+    /// `velocity(t) − step_velocity + step_acceleration · t`, and it is what the governor limits. `core/fine/src/governor.rs`
+    /// says why.
     pub step_acceleration: AxisVector,
     /// Order 3: the plan leaves room for |dσ/dt| up to this, together with the next, at every σ from 0 to 1, 1/s; infinite
     /// for order 2. On a straight path it is `a_s/v`, with `a_s` the deceleration declared above.

@@ -1,4 +1,10 @@
 //! Manual input: lines of G-code from an operator, one after the other, each from where the machine stands.
+//!
+//! `tandem mdi` is a run whose source is a `tandem_session::MdiSession`. The rough loop asks a source whether it may go
+//! on (`tandem_rough::Source::may_go_on`) and says whether everything before is driven; the session answers yes only at
+//! rest, so each line is interpreted from where the machine stands. A line goes through a copy of the interpreter,
+//! which takes the place of the original once every block is judged. A fault ends the run, and the session enables a
+//! new one from there.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

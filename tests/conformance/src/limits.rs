@@ -2,7 +2,7 @@
 //!
 //! The samples are taken as the fine loop takes them: one a fine period, one exactly at each rest. Velocity and
 //! acceleration are their differences; the allowable speed difference V is judged by a leaky bucket per axis and sign,
-//! `u ← max(0, u + Δv − A·T)`, `u ≤ V` (ARCHITECTURE.md, "Velocity steps and the governor").
+//! `u ← max(0, u + Δv − A·T)`, `u ≤ V` (`core/fine/src/governor.rs`, "Velocity steps").
 
 use tandem_sdk::{AxisVector, Limits, PlannerDescription, Segment, SegmentFlags};
 

@@ -3,6 +3,15 @@
 //! What the plan does is looked at where the period ends, and not where it begins: its own jerk may turn round within. There
 //! the speed may rise by no more than leaves time to bring that to nothing. And where the plan turns it may use all the jerk
 //! or acceleration of an axis, so that σ cannot be lowered while it gets faster: that is tried out on the way ahead.
+//!
+//! A plan is made at `max_feed_ratio`, so at a lower ratio it runs through what is asked for with all its acceleration
+//! and jerk. With a jerk limit three things keep the samples below (`governor/below.rs`). σ̈ is sought with which speed
+//! and its rise *at the end* of the period lie on a curve that comes to the feed with no rise, and the mean of the
+//! period below it. On 40 places ahead, the first 1/48 of the longest build-up of an acceleration away (or a period)
+//! and each 7 % farther than the one before, it is tried out whether lowering σ from the next period on with what the
+//! limits leave there keeps the feed: a plan that leaves a corner may use all of an axis for so long that σ has to be
+//! low before. And from rest σ begins with a rate that lasts for six periods. Speed is that of the linear axes where
+//! they move more than the path coordinate, which is a polynomial of its own and may run behind.
 
 use super::Governor;
 use super::smooth::{Aim, Interval};

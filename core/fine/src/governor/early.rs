@@ -5,6 +5,8 @@
 //! Then the rate has to be low before. With w = σ²/2 the rate of change σ̇ is dw/dτ, τ being program time, and an axis
 //! accelerates by `2w·q″ + q′·dw/dτ`: what the limits leave for dw/dτ is linear in w. Laid out backward from the feeds ahead
 //! with the least dw/dτ this gives the highest w from which each of them can be met.
+//!
+//! It looks back over up to 96 pieces of the queued plan.
 
 use tandem_sdk::Segment;
 

@@ -1,5 +1,12 @@
 //! Rests that end an epoch: an input edge or an abort stops the machine on the path, and what was queued behind counts no
 //! more.
+//!
+//! # Exact rest
+//!
+//! A plan that comes to rest ends with a segment of zero duration that holds the programmed position bit for bit. When
+//! the fine loop reaches a segment flagged `ENDS_AT_REST`, its period ends there: what is left of the period is not
+//! used. So one sample stands exactly on the programmed position, increments do not add up rounding over a program, and
+//! motion after a rest starts on a tick.
 
 use std::sync::atomic::Ordering::Relaxed;
 

@@ -22,7 +22,12 @@ pub(crate) struct Tools {
 
 impl Tools {
     pub fn new(config: &Config) -> Self {
-        Self { table: Arc::new(config.tools.clone()), in_spindle: config.tool_in_spindle, selected: None, assumed_zero: None }
+        Self {
+            table: Arc::new(config.tools.clone()),
+            in_spindle: config.tool_in_spindle,
+            selected: None,
+            assumed_zero: None,
+        }
     }
 
     /// The tool called `number`.

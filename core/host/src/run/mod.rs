@@ -1,4 +1,11 @@
 //! One run of one program on one machine.
+//!
+//! # The first and the last sample
+//!
+//! Tick 0 is the rest before motion. Motion starts when the drives hold and enough is queued; fine periods before that
+//! are neither counted nor recorded, so that a trace does not depend on how long drives and ring took. The end of the
+//! program is an event in the ring; the period that reaches it ends the record. A trace therefore has the same rows on
+//! both clocks.
 
 mod summarise;
 

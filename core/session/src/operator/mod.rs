@@ -2,6 +2,12 @@
 //!
 //! Everything here is on the soft side. A command reaches the fine loop as an atomic, through [`OperatorHub::give`] whoever
 //! gives it; a client that reads slowly loses telemetry and never costs the machine time.
+//!
+//! Keys, signals and clients at sockets share one `tandem_session::operator::OperatorHub`; what it gives ends in the
+//! same atomics as a command file. One thread of ordinary priority serves all clients with non-blocking sockets and a
+//! bounded outbox for each: no client can hold up another, or a loop. A panic in the handling of a client is caught
+//! there and costs that client. Places are counted by door and by who somebody is, so that strangers cannot keep the
+//! owner out. The protocol is docs/operator.md.
 
 mod client;
 mod hub;
