@@ -11,15 +11,15 @@ use crate::fault::{Checked, Fault, Span};
 use crate::item::{Item, ProbeResult};
 use crate::line::Line;
 use crate::state::State;
-use crate::state::letters::{AXIS_MASK, Letters};
+use crate::state::letters::Letters;
 use crate::state::parameters::{Parameters, Value};
 use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
 use crate::syntax::parse::{O_WORDS, parse};
 use crate::syntax::scan::Scanner;
 use crate::words::coolant::Coolant;
-use crate::words::orders::Orders;
-use crate::words::{curve, probe, stop};
+use crate::words::orders::{Orders, polar_misplaced};
+use crate::words::{curve, modal, probe, stop};
 
 /// Longest line, bytes.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -134,11 +134,13 @@ impl Interpreter {
     /// A subroutine begins.
     pub(crate) fn enter_sub(&mut self, arguments: &[Value]) {
         self.parameters.enter(arguments);
+        self.state.saved.enter();
     }
 
-    /// A subroutine ends.
-    pub(crate) fn leave_sub(&mut self, value: Option<Value>) {
+    /// A subroutine ends; what is restored then goes to `out`.
+    pub(crate) fn leave_sub(&mut self, value: Option<Value>, out: &mut Vec<Item>) {
         self.parameters.leave(value);
+        modal::leave(&mut self.execution(out));
     }
 
     /// What values are made of.
@@ -218,7 +220,7 @@ impl Interpreter {
 
     /// The first pass: the probe is taken to touch at its end, and what follows from that to be unknown.
     pub(crate) fn assume_probe(&mut self) {
-        let named = self.letters.axes_of(self.words.present & AXIS_MASK);
+        let named = self.letters.axes_of(self.words.named());
         probe::assume(&mut self.state, &mut self.parameters, &self.letters, named);
     }
 
@@ -313,6 +315,7 @@ impl Interpreter {
     fn curve_line(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
         let done = parsed.and_then(|()| self.assign()).and_then(|()| {
             self.orders.clear();
+            self.words.polar.map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
             curve::curve_line(&mut self.execution(out))
         });
         if done.is_err() {

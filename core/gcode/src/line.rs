@@ -19,7 +19,7 @@ const TRAVEL_ROUNDING: f64 = 1e-9;
 /// Groups that take effect before F, and those between T and S. The units and the feed mode of a line hold for all its
 /// words, unlike in LinuxCNC: `G20 F10` is 10 inches a minute.
 const BEFORE_FEED: u32 = Group::Units.bit() | Group::FeedMode.bit();
-const BEFORE_SPEED: u32 = Group::InputOutput.bit() | Group::ToolChange.bit();
+const BEFORE_SPEED: u32 = Group::ModalState.bit() | Group::InputOutput.bit() | Group::ToolChange.bit();
 const BEFORE_MOTION: u32 = (Group::Motion.bit() - 1) & !(BEFORE_FEED | BEFORE_SPEED);
 /// Modes that later lines are read with.
 const MODES: u32 = Group::Plane.bit()
@@ -111,7 +111,7 @@ impl Line<'_> {
             self.state.path.uncertain |= (1 << self.letters.count()) - 1;
         }
         if self.orders.axes_taken {
-            self.state.path.uncertain |= self.letters.axes_of(self.words.present & AXIS_MASK);
+            self.state.path.uncertain |= self.letters.axes_of(self.words.named());
         } else if !self.state.path.moved {
             self.advance();
         }
@@ -124,7 +124,7 @@ impl Line<'_> {
         if !self.reads_assumed.get() && (path.assumed | path.assumed_start) == 0 {
             return false;
         }
-        let named = self.letters.axes_of(self.words.present & AXIS_MASK) & path.assumed;
+        let named = self.letters.axes_of(self.words.named()) & path.assumed;
         let shape = match self.orders.motion {
             Some(MotionMode::Word(word)) => word.shape(),
             _ => None,
@@ -156,8 +156,8 @@ impl Line<'_> {
     pub fn advance(&mut self) {
         let machine = self.in_machine_coordinates();
         let absolute = machine || self.state.modes.absolute;
-        if self.state.coordinates.is_rotated() && !machine {
-            return self.advance_rotated(absolute);
+        if !machine && (self.state.coordinates.is_rotated() || self.words.polar.is_some()) {
+            return self.advance_in_plane(absolute);
         }
         for axis in 0..self.letters.count() {
             let Some(value) = self.words.get(self.letters.letter(axis)) else { continue };
@@ -176,16 +176,21 @@ impl Line<'_> {
         self.state.path.moved = true;
     }
 
-    /// The same in a rotated coordinate system, where one word moves two axes.
+    /// The same in a rotated coordinate system or in polar coordinates, where one word moves two axes.
     #[cold]
-    fn advance_rotated(&mut self, absolute: bool) {
+    fn advance_in_plane(&mut self, absolute: bool) {
         let mut program = self.state.coordinates.to_program(&self.state.path.position);
         for (axis, value) in self.named_axes() {
             program[axis] = if absolute { value } else { program[axis] + value };
         }
+        if let (Some(polar), Some([x, y])) = (self.words.polar, self.state.coordinates.plane()) {
+            let unit_mm = self.state.modes.unit_mm;
+            let place = polar.place([program[x] / unit_mm, program[y] / unit_mm], absolute);
+            [program[x], program[y]] = place.map(|value| value * unit_mm);
+        }
         self.state.path.position = self.state.coordinates.to_machine(&program);
         let plane = mask("XY");
-        let named = self.words.present & AXIS_MASK;
+        let named = self.words.named();
         let moved = if named & plane == 0 { named } else { named | plane };
         if absolute && named & plane == plane {
             self.state.path.uncertain &= !self.letters.axes_of(named);

@@ -212,3 +212,18 @@ fn a_loop_across_chunks_reads_the_same_text() {
     let long = format!("o1 call\nM2\n{filler}{filler}{filler}{filler}o1 sub\nG0 X7\no1 endsub\n");
     assert_eq!(path(&long), "16004:7 2:7");
 }
+
+#[test]
+fn a_subroutine_leaves_the_modes_as_m73_found_them() {
+    let program =
+        "o1 sub\nM73\nG91 G20\nG0 X1\no1 endsub\no2 sub\nM70\nG91\no2 endsub\nG0 X5\no1 call\nX1\no2 call\nX1";
+    assert_eq!(path(program), "10:5 4:30.4 12:1 14:2");
+    let inner = "o1 sub\nM72\no1 endsub\nM70\no1 call";
+    assert!(errors_on(&mill(), inner)[0].starts_with("2:1 [modal-state]"), "each call has its own");
+}
+
+#[test]
+fn a_return_needs_no_label_of_its_own() {
+    let program = "o1 sub\no2 if [#1]\no2 return [7]\no2 endif\nG0 X1\no1 endsub\no1 call [1]\nG0 X#<_value>";
+    assert_eq!(path(program), "8:7");
+}

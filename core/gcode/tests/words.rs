@@ -93,6 +93,10 @@ fn parameters_take_effect_after_their_line() {
     assert_eq!(ends("#2=3 #3=2\nG0 X##3 Y#[1+1] Z-#2"), [["3", "3", "-3"]]);
     assert_eq!(ends("G10 L2 P2 X5\nG55 G0 X1\nG0 Y#5420 Z#5241\nX#5220")[1..], [["6", "1", "5"], ["7", "1", "5"]]);
     assert_eq!(ends("G0 X3\n#1=#<_x>\nG0 Y[#1 + #<_line>]")[1], ["3", "6", "0"]);
+    // Where the touched position and more were kept can be assigned before it is.
+    assert_eq!(ends("#5061=4 #5070=2\nG0 X#5061 Y#5070 Z[EXISTS[#99999]]"), [["4", "2", "0"]]);
+    let named = "G0 X#<_abs_x> Y[#<_plane> - #<_motion_mode> / 10] Z[#<_absolute> + #<_spindle_on>]";
+    assert_eq!(ends(&format!("G54 G92 X-7\nS1 M3 G18\n{named}"))[0], ["7", "100", "2"]);
     assert_eq!(ends("G0 X[EXISTS[#<no>] + 1]\n#<no>=1\nY[EXISTS[#<no>]]"), [["1", "0", "0"], ["1", "1", "0"]]);
 }
 

@@ -148,7 +148,7 @@ impl Execution {
         text.extend_from_slice(self.sources.current().lines.text(&self.last));
         let found = self.sources.outline().find(number);
         let step = if let Some(index) = found {
-            self.obey(program, index, &text)
+            self.obey(program, index, &text, out)
         } else {
             let done = self.interpreter.line(number, &text, out);
             Ok(done.map_or_else(|diagnostic| Step::Wrong(self.called(diagnostic)), |()| Step::Line))
@@ -158,7 +158,13 @@ impl Execution {
     }
 
     /// Executes the O-word `index` of the current file, whose line is `text`.
-    fn obey(&mut self, program: &mut Program, index: usize, text: &[u8]) -> Result<Step, ProgramError> {
+    fn obey(
+        &mut self,
+        program: &mut Program,
+        index: usize,
+        text: &[u8],
+        out: &mut Vec<Item>,
+    ) -> Result<Step, ProgramError> {
         let entry = self.sources.outline().entry(index).clone();
         self.interpreter.begin_o_word(entry.number);
         let jumps = matches!(entry.word.keyword, Keyword::Sub | Keyword::Else | Keyword::ElseIf | Keyword::Do);
@@ -173,7 +179,7 @@ impl Execution {
         }
         match entry.word.keyword {
             Keyword::Call => return self.call(program, &entry, text),
-            Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text),
+            Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text, out),
             Keyword::Sub | Keyword::Else | Keyword::ElseIf => self.jump_behind(program, entry.close)?,
             Keyword::If => return self.choose(program, index),
             Keyword::While if entry.open != index => self.end_do(program, &entry)?,
@@ -344,14 +350,20 @@ impl Execution {
     }
 
     /// `return` and `endsub`.
-    fn end_call(&mut self, program: &mut Program, entry: &Entry, text: &[u8]) -> Result<Step, ProgramError> {
+    fn end_call(
+        &mut self,
+        program: &mut Program,
+        entry: &Entry,
+        text: &[u8],
+        out: &mut Vec<Item>,
+    ) -> Result<Step, ProgramError> {
         let Some(frame) = self.frames.pop() else {
             let why = format!("{} without a call", entry.word.keyword.name());
             let fault = Fault::new(Span::new(0, usize::from(entry.word.values_at)), "o-word", why);
             let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
             return Ok(Step::Stuck(diagnostic));
         };
-        self.interpreter.leave_sub(self.values.first().copied());
+        self.interpreter.leave_sub(self.values.first().copied(), out);
         self.repeats.truncate(frame.repeats);
         self.switch_to(program, frame.file);
         self.jump(program, frame.after)?;

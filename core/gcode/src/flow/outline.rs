@@ -133,7 +133,7 @@ impl Outline {
             Keyword::Break | Keyword::Continue => {
                 self.inside(index, &label, &[Keyword::While, Keyword::Do, Keyword::Repeat], open)
             }
-            Keyword::Return => self.inside(index, &label, &[Keyword::Sub], open),
+            Keyword::Return => self.return_from(index, open),
             Keyword::Call => Ok(()),
         }
     }
@@ -207,7 +207,7 @@ impl Outline {
         Ok(())
     }
 
-    /// `break`, `continue` and `return` belong to a block around them.
+    /// `break` and `continue` belong to a block around them.
     fn inside(&mut self, index: usize, label: &Label, keywords: &[Keyword], open: &[usize]) -> Checked<()> {
         let belongs = |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
         let around = open.iter().rev().find(|opened| belongs(&self.entries[**opened])).copied();
@@ -215,6 +215,14 @@ impl Outline {
             let names: Vec<_> = keywords.iter().map(|keyword| keyword.name()).collect();
             return Err(self.fault(index, &format!("it stands in no {} with this label", names.join(" or "))));
         };
+        self.entries[index].open = around;
+        Ok(())
+    }
+
+    /// `return` leaves the subroutine around it, whatever its label.
+    fn return_from(&mut self, index: usize, open: &[usize]) -> Checked<()> {
+        let around = open.iter().rev().find(|opened| self.entries[**opened].word.keyword == Keyword::Sub).copied();
+        let Some(around) = around else { return Err(self.fault(index, "it stands in no sub")) };
         self.entries[index].open = around;
         Ok(())
     }

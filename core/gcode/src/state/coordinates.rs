@@ -86,6 +86,11 @@ impl Coordinates {
         turned
     }
 
+    /// The axes X and Y, where both are there and linear.
+    pub fn plane(&self) -> Option<[usize; 2]> {
+        self.plane
+    }
+
     /// Whether the machine has what rotates.
     pub fn can_rotate(&self) -> bool {
         self.plane.is_some()

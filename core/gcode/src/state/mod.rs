@@ -13,6 +13,7 @@ use crate::words::Word;
 use crate::words::coolant::Coolant;
 use crate::words::curve::Curves;
 use crate::words::cycles::Cycles;
+use crate::words::modal::SavedStates;
 use crate::words::modes::Modes;
 use crate::words::outputs::Outputs;
 use crate::words::overrides::Permits;
@@ -48,6 +49,8 @@ pub(crate) struct State {
     pub permits: Permits,
     pub outputs: Outputs,
     pub curves: Curves,
+    /// What M70 and M73 have saved.
+    pub saved: SavedStates,
     pub cycles: Cycles,
     /// The program is over.
     pub ended: bool,
@@ -93,8 +96,17 @@ impl State {
             permits: Permits::default(),
             outputs: Outputs::default(),
             curves: Curves::default(),
+            saved: SavedStates::default(),
             cycles: Cycles::default(),
             ended: false,
+        }
+    }
+
+    /// The motion mode as `#<_motion_mode>` has it: the number of its word in tenths, 800 for none.
+    pub fn motion_code(&self) -> f64 {
+        match self.motion {
+            MotionMode::Word(word) => f64::from(word.tenths),
+            MotionMode::None | MotionMode::Refused => 800.0,
         }
     }
 

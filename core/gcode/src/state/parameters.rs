@@ -6,6 +6,7 @@ use tandem_sdk::AxisVector;
 
 use super::State;
 use super::letters::{AXIS_LETTERS, Letters};
+use crate::words::modes::Plane;
 
 /// Highest number of a parameter.
 pub(crate) const LAST: usize = 5602;
@@ -191,7 +192,6 @@ impl Parameters {
 /// Why parameter `number` cannot be assigned.
 pub(crate) fn read_only(number: usize) -> Option<&'static str> {
     match number {
-        5061..=5070 => Some("it holds the result of probing"),
         5161..=5169 => Some("it holds the position of G28: use G28.1"),
         5181..=5189 => Some("it holds the position of G30: use G30.1"),
         5210..=5219 => Some("it holds the offset of G92: use G92"),
@@ -245,7 +245,7 @@ fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
 }
 
 fn is_position_assumed(name: &[u8], state: &State, letters: &Letters) -> bool {
-    let [b'_', letter] = name else { return false };
+    let ([b'_', letter] | [b'_', b'a', b'b', b's', b'_', letter]) = name else { return false };
     let axis = letters.axis(letter.to_ascii_uppercase());
     axis.is_some_and(|axis| (state.coordinates.assumed | state.path.assumed) >> axis & 1 != 0)
 }
@@ -263,22 +263,58 @@ fn position(state: &State, letters: &Letters, nth: usize) -> f64 {
     letters.axis(AXIS_LETTERS.as_bytes()[nth]).map_or(0.0, |axis| state.program_position(letters, axis))
 }
 
+/// The pocket of a tool; −1 for no tool.
+fn pocket(state: &State, tool: Option<u32>) -> f64 {
+    let Some(number) = tool else { return -1.0 };
+    f64::from(state.tools.find(number).and_then(|tool| tool.pocket).unwrap_or(0))
+}
+
 /// Named values that the interpreter keeps itself.
 pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
-        // What calls say of themselves has its value elsewhere; here it only cannot be assigned.
-        b"_value" | b"_value_returned" | b"_call_level" => 0.0,
+        // What calls say of themselves has its value elsewhere; here it only cannot be assigned. There are no remaps.
+        b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" | b"_units_per_rev" => 0.0,
         // 0 in previews of LinuxCNC, which this interpreter has none of.
         b"_task" => 1.0,
         b"_line" => f64::from(state.line),
+        b"_motion_mode" => state.motion_code(),
+        b"_plane" => match state.modes.plane {
+            Plane::Xy => 170.0,
+            Plane::Zx => 180.0,
+            Plane::Yz => 190.0,
+        },
+        b"_inverse_time" => flag(state.modes.feed.inverse_time),
+        b"_units_per_minute" => flag(!state.modes.feed.inverse_time),
+        b"_tool_offset" => flag(*state.coordinates.tool() != AxisVector::ZERO),
+        b"_retract_r_plane" => flag(!state.cycles.return_to_initial()),
+        b"_retract_old_z" => flag(state.cycles.return_to_initial()),
+        b"_ijk_absolute_mode" => flag(state.modes.arc_absolute),
+        b"_spindle_on" => flag(state.spindle.direction != 0),
+        b"_spindle_cw" => flag(state.spindle.direction > 0),
+        b"_mist" => flag(state.coolant.mist),
+        b"_flood" => flag(state.coolant.flood),
+        b"_feed_override" => flag(state.permits.feed_override()),
+        b"_speed_override" => flag(state.permits.spindle_override()),
+        b"_adaptive_feed" => flag(state.permits.adaptive_feed()),
+        b"_feed_hold" => flag(state.permits.feed_hold()),
+        b"_current_pocket" => pocket(state, Some(state.tools.in_spindle)),
+        b"_selected_pocket" => pocket(state, state.tools.selected),
+        [b'_', b'a', b'b', b's', b'_', letter] => {
+            let letter = AXIS_LETTERS.bytes().find(|l| *l == letter.to_ascii_uppercase())?;
+            let axis = letters.axis(letter);
+            axis.map_or(0.0, |axis| state.path.position[axis] / state.modes.scale(letters, axis))
+        }
         b"_metric" => flag(state.modes.unit_mm == 1.0),
         b"_imperial" => flag(state.modes.unit_mm != 1.0),
         b"_absolute" => flag(state.modes.absolute),
         b"_incremental" => flag(!state.modes.absolute),
         b"_feed" => state.modes.feed.linear_mm_per_s * 60.0 / state.modes.unit_mm,
         b"_rpm" => state.spindle.speed_rad_per_s * 30.0 / std::f64::consts::PI,
-        b"_coord_system" => 540.0 + 10.0 * state.coordinates.active() as f64,
+        b"_coord_system" => match state.coordinates.active() {
+            tenth @ 6.. => 590.0 + (tenth - 5) as f64,
+            whole => 540.0 + 10.0 * whole as f64,
+        },
         b"_current_tool" => f64::from(state.tools.in_spindle),
         b"_selected_tool" => state.tools.selected.map_or(-1.0, f64::from),
         [b'_', letter] => {

@@ -149,11 +149,13 @@ impl Context<'_> {
         if !opened || scanner.peek() != b'#' {
             return Err(Fault::new(scanner.here(), "bracket", "EXISTS takes a parameter: EXISTS[#<name>]"));
         }
-        let known = match self.parameter(scanner, depth)? {
-            Parameter::Numbered(_) => true,
-            Parameter::Named(name, length) => {
+        let known = match self.parameter(scanner, depth) {
+            Ok(Parameter::Numbered(_)) => true,
+            Ok(Parameter::Named(name, length)) => {
                 self.parameters.named(&name[..length], self.state, self.letters).is_some()
             }
+            Err(fault) if fault.code == "parameter-number" => false,
+            Err(fault) => return Err(fault),
         };
         if !scanner.take(b']') {
             return Err(Fault::new(scanner.here(), "bracket", "] is missing"));
@@ -168,7 +170,7 @@ impl Context<'_> {
             Parameter::Named(name, length) => {
                 let name = &name[..length];
                 self.parameters.named(name, self.state, self.letters).ok_or_else(|| {
-                    let message = format!("parameter #<{}> has never been set", String::from_utf8_lossy(name));
+                    let message = unset(name);
                     Fault::new(scanner.since(start), "parameter-unset", message)
                 })
             }
@@ -195,6 +197,21 @@ impl Context<'_> {
             return Err(Fault::new(scanner.since(start), "parameter-number", message));
         }
         Ok(Parameter::Numbered(rounded as usize))
+    }
+}
+
+/// Why a name has no value.
+#[cold]
+fn unset(name: &[u8]) -> String {
+    let shown = String::from_utf8_lossy(name);
+    match name {
+        [b'_', b'i', b'n', b'i', b'[', ..] => {
+            format!("parameter #<{shown}> would read LinuxCNC's INI file, and there is none: assign the value itself")
+        }
+        [b'_', b'h', b'a', b'l', b'[', ..] => {
+            format!("parameter #<{shown}> would read a HAL pin, and there is no HAL: M66 reads inputs")
+        }
+        _ => format!("parameter #<{shown}> has never been set"),
     }
 }
 

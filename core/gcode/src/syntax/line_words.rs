@@ -1,7 +1,7 @@
 //! The words of one line.
 
 use crate::fault::{Checked, Fault, Span};
-use crate::state::letters::index;
+use crate::state::letters::{AXIS_MASK, index, mask};
 
 /// Most G words, and most M words, of a line.
 const MAX_CODES: usize = 16;
@@ -54,6 +54,29 @@ pub(crate) struct Assignment {
     pub span: Span,
 }
 
+/// `@` and `^`: a place of the plane XY by its distance from the origin and its direction from X to Y, in program units and
+/// degrees.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Polar {
+    pub radius: Option<f64>,
+    pub angle_deg: Option<f64>,
+    pub span: Span,
+}
+
+impl Polar {
+    /// X and Y of the place, where the line begins at `at`.
+    pub fn place(&self, at: [f64; 2], absolute: bool) -> [f64; 2] {
+        let (radius, angle) = (at[0].hypot(at[1]), at[1].atan2(at[0]));
+        let given = self.angle_deg.map(f64::to_radians);
+        let (radius, angle) = if absolute {
+            (self.radius.unwrap_or(radius), given.unwrap_or(angle))
+        } else {
+            (radius + self.radius.unwrap_or(0.0), angle + given.unwrap_or(0.0))
+        };
+        [radius * angle.cos(), radius * angle.sin()]
+    }
+}
+
 /// The words of one line. Kept from line to line so that nothing is allocated.
 #[derive(Clone, Default)]
 pub(crate) struct LineWords {
@@ -63,6 +86,8 @@ pub(crate) struct LineWords {
     spans: [Span; 26],
     pub g: Codes,
     pub m: Codes,
+    /// `@` and `^`.
+    pub polar: Option<Polar>,
     /// TA in ms.
     pub time_constant: Option<(f64, Span)>,
     pub assignments: Vec<Assignment>,
@@ -74,15 +99,34 @@ impl LineWords {
         self.present = 0;
         self.g.count = 0;
         self.m.count = 0;
+        self.polar = None;
         self.time_constant = None;
         self.assignments.clear();
         self.names.clear();
     }
 
+    /// The letters of the axes that the line names; `@` and `^` name X and Y.
+    #[inline]
+    pub fn named(&self) -> u32 {
+        let polar = if self.polar.is_some() { mask("XY") } else { 0 };
+        self.present & AXIS_MASK | polar
+    }
+
+    /// Adds `@` or `^`.
+    #[cold]
+    pub fn add_polar(&mut self, byte: u8, value: f64, span: Span) -> Checked<()> {
+        let polar = self.polar.get_or_insert(Polar { span, ..Polar::default() });
+        let place = if byte == b'@' { &mut polar.radius } else { &mut polar.angle_deg };
+        match place.replace(value) {
+            None => Ok(()),
+            Some(_) => Err(Fault::new(span, "word-twice", format!("{} stands in this line twice", byte as char))),
+        }
+    }
+
     /// Whether the line holds no word.
     #[inline]
     pub fn is_empty(&self) -> bool {
-        self.present == 0 && self.g.count == 0 && self.m.count == 0
+        self.present == 0 && self.polar.is_none() && self.g.count == 0 && self.m.count == 0
     }
 
     /// Adds a word other than G and M.

@@ -19,6 +19,7 @@ pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut Lin
         scanner.skip_ignorable()?;
         match scanner.peek() {
             _ if scanner.at_end() => return Ok(()),
+            byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
             b'#' => assignment(&mut scanner, context, words)?,
             letter @ (b'a'..=b'z' | b'A'..=b'Z') => word(letter.to_ascii_uppercase(), &mut scanner, context, words)?,
             other => return Err(unexpected(other, scanner.here())),
@@ -48,6 +49,20 @@ fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWo
         b'O' => program_number(scanner, start, value, words),
         _ => words.add(letter, value, span),
     }
+}
+
+/// `@` and `^`.
+#[cold]
+fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
+    let start = scanner.at();
+    scanner.advance(1);
+    scanner.skip_blanks();
+    let value = context.value(scanner).map_err(|fault| in_word(byte, start, fault))?;
+    let span = scanner.since(start);
+    if value.abs() > MAX_VALUE || value.is_nan() {
+        return Err(Fault::new(span, "word-range", format!("{} is too large a number", byte as char)));
+    }
+    words.add_polar(byte, value, span)
 }
 
 /// Adds which word lacks its value.

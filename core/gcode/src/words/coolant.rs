@@ -15,8 +15,8 @@ pub(super) const WORDS: &[Word] = &[
 /// What flows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Coolant {
-    mist: bool,
-    flood: bool,
+    pub mist: bool,
+    pub flood: bool,
 }
 
 fn mist_on(line: &mut Line) -> Checked<()> {
@@ -45,7 +45,7 @@ pub(crate) fn stop(line: &mut Line) {
     switch(line, Coolant::default());
 }
 
-fn switch(line: &mut Line, wanted: Coolant) {
+pub(super) fn switch(line: &mut Line, wanted: Coolant) {
     let before = std::mem::replace(&mut line.state.coolant, wanted);
     let value = |on: bool| f64::from(u8::from(on));
     if wanted.mist != before.mist {

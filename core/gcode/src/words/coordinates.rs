@@ -3,6 +3,7 @@
 use tandem_sdk::AxisVector;
 
 use super::{Action, Group, Word, nothing, tool};
+use crate::config::Tool;
 use crate::fault::Checked;
 use crate::line::Line;
 use crate::state::coordinates::SYSTEMS;
@@ -239,7 +240,10 @@ fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
     let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
         return Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs P, the number of the tool"));
     };
-    let Some(mut tool) = line.state.tools.find(number).copied() else {
+    let zero = Tool { number, pocket: None, offset: AxisVector::ZERO, diameter_mm: 0.0 };
+    // Without a table every tool has a row of zeros, where lengths of zero are safe at all.
+    let without_table = || (line.config.tools.is_empty() && line.config.zero_length_without_table).then_some(zero);
+    let Some(mut tool) = line.state.tools.find(number).copied().or_else(without_table) else {
         return Err(line.words.fault(b'P', "tool", format!("the tool table has no tool {number}")));
     };
     let at = match from {

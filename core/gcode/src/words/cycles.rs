@@ -6,7 +6,7 @@ use super::overrides::{self, FEED, SPINDLE};
 use super::{Action, Group, Shape, Word, motion, spindle};
 use crate::fault::{Checked, Fault};
 use crate::line::Line;
-use crate::state::letters::{AXIS_MASK, Letters, mask};
+use crate::state::letters::{Letters, mask};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -153,11 +153,11 @@ pub(crate) struct Cycles {
     initial_mm: Option<f64>,
 }
 
-/// Words that stay in force from line to line of one cycle: levels in program coordinates, mm and s.
+/// Words that stay in force from line to line of one cycle, as they were given: mm and s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sticky {
     r_mm: Option<f64>,
-    bottom_mm: Option<f64>,
+    depth_mm: Option<f64>,
     peck_mm: Option<f64>,
     dwell_s: Option<f64>,
 }
@@ -172,6 +172,15 @@ impl Cycles {
         if word.shape() != Some(Shape::Cycle) {
             self.initial_mm = None;
         }
+    }
+
+    /// Whether G98 is in force.
+    pub fn return_to_initial(self) -> bool {
+        self.to_initial
+    }
+
+    pub fn set_to_initial(&mut self, to_initial: bool) {
+        self.to_initial = to_initial;
     }
 
     /// G80.
@@ -207,7 +216,7 @@ struct Holes {
 fn cycle(line: &mut Line, kind: Kind) -> Checked<()> {
     line.state.path.moved = true;
     line.refuse_machine_coordinates()?;
-    if line.words.present & AXIS_MASK == 0 {
+    if line.words.named() == 0 {
         let message = format!("{} needs at least one of X Y Z", line.orders.motion_code());
         return Err(line.motion_fault("axis-missing", message));
     }
@@ -237,18 +246,21 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let plane = line.state.modes.plane.letters();
     let missing = || line.motion_fault("axis", "a canned cycle needs the linear axes X Y Z");
     let (normal, plane) = axes(line.letters, plane).ok_or_else(missing)?;
-    let sticky = sticky(line, kind, line.letters.letter(normal), at[normal])?;
+    let sticky = sticky(line, kind, line.letters.letter(normal))?;
     let unit_mm = line.state.modes.unit_mm;
-    let r_mm = sticky.r_mm.unwrap_or_default();
-    let bottom_mm = sticky.bottom_mm.unwrap_or_default();
+    let initial_mm = *line.state.cycles.initial_mm.get_or_insert(at[normal]);
+    let (r_mm, depth_mm) = (sticky.r_mm.unwrap_or_default(), sticky.depth_mm.unwrap_or_default());
+    // With G91 R is measured from where the first of the cycles began, and the bottom from R.
+    let absolute = line.state.modes.absolute;
+    let r_mm = if absolute { r_mm } else { initial_mm + r_mm };
+    let bottom_mm = if absolute { depth_mm } else { r_mm + depth_mm };
     if r_mm < bottom_mm {
         return Err(line.motion_fault("cycle", "R lies below the bottom of the hole"));
     }
     let named = plane.map(|axis| line.words.get(line.letters.letter(axis)).unwrap_or_default() * unit_mm);
     let step = if line.state.modes.absolute { [0.0; 2] } else { named };
     let count = line.words.integer(b'L', 1..=10_000)?.unwrap_or(1);
-    let initial = *line.state.cycles.initial_mm.get_or_insert(at[normal].max(r_mm));
-    let clear_mm = if line.state.cycles.to_initial { initial.max(r_mm) } else { r_mm };
+    let clear_mm = if line.state.cycles.to_initial { initial_mm.max(r_mm) } else { r_mm };
     let peck_mm = sticky.peck_mm.unwrap_or_default();
     let dwell_s = sticky.dwell_s.unwrap_or_default();
     let moves = f64::from(count) * if kind.pecks() { (r_mm - bottom_mm) / peck_mm * 3.0 } else { 8.0 };
@@ -260,17 +272,13 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
 }
 
 /// The words of the line, and those that earlier lines of the same cycle have left.
-fn sticky(line: &mut Line, kind: Kind, normal: u8, level_mm: f64) -> Checked<Sticky> {
+fn sticky(line: &mut Line, kind: Kind, normal: u8) -> Checked<Sticky> {
     let unit_mm = line.state.modes.unit_mm;
-    let absolute = line.state.modes.absolute;
     let left = line.state.cycles.sticky;
     let given = |letter| line.words.get(letter).map(|value| value * unit_mm);
-    // With G91 R is measured from where the line begins, and the bottom from R.
-    let r_mm = given(b'R').map(|r| if absolute { r } else { level_mm + r }).or(left.r_mm);
-    let depth = given(normal).map(|depth| depth + if absolute { 0.0 } else { r_mm.unwrap_or_default() });
     let sticky = Sticky {
-        r_mm,
-        bottom_mm: depth.or(left.bottom_mm),
+        r_mm: given(b'R').or(left.r_mm),
+        depth_mm: given(normal).or(left.depth_mm),
         peck_mm: given(b'Q').or(left.peck_mm),
         dwell_s: line.words.not_negative(b'P')?.or(left.dwell_s),
     };
@@ -280,7 +288,7 @@ fn sticky(line: &mut Line, kind: Kind, normal: u8, level_mm: f64) -> Checked<Sti
     let bottom = format!("{}, the bottom of the hole", normal as char);
     for (lacks, what) in [
         (sticky.r_mm.is_none(), "R, the level from which the feed begins"),
-        (sticky.bottom_mm.is_none(), &bottom),
+        (sticky.depth_mm.is_none(), &bottom),
         (kind.needs_dwell() && sticky.dwell_s.is_none(), "P, the dwell in seconds"),
         (kind.pecks() && sticky.peck_mm.is_none(), "Q, the depth of a peck"),
     ] {
@@ -316,6 +324,11 @@ fn drill(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
         for (axis, step) in holes.plane.into_iter().zip(holes.step) {
             let named = line.words.get(line.letters.letter(axis)).filter(|_| line.state.modes.absolute);
             at[axis] = named.map_or(at[axis] + step, |value| value * line.state.modes.unit_mm);
+        }
+        if let (Some(polar), Some([x, y])) = (line.words.polar, line.state.coordinates.plane()) {
+            let (unit_mm, absolute) = (line.state.modes.unit_mm, line.state.modes.absolute);
+            let place = polar.place([at[x] / unit_mm, at[y] / unit_mm], absolute);
+            [at[x], at[y]] = place.map(|value| value * unit_mm);
         }
         go(line, BlockKind::Rapid, at)?;
         plunge(line, BlockKind::Rapid, at, holes.normal, holes.r_mm)?;

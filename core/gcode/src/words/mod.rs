@@ -13,6 +13,7 @@ pub(crate) mod coordinates;
 pub(crate) mod curve;
 pub(crate) mod cycles;
 mod dwell;
+pub(crate) mod modal;
 pub(crate) mod modes;
 pub(crate) mod motion;
 pub(crate) mod orders;
@@ -36,6 +37,7 @@ use crate::state::letters::mask;
 pub(crate) enum Group {
     Units,
     FeedMode,
+    ModalState,
     InputOutput,
     ToolChange,
     Spindle,
@@ -94,6 +96,7 @@ impl Group {
             Self::Rotation => "rotation",
             Self::LatheDiameter => "lathe diameter mode",
             Self::Stop => "stopping",
+            Self::ModalState => "modal state",
             Self::InputOutput => "input and output",
             Self::ToolChange => "tool change",
             Self::Spindle => "spindle",
@@ -201,13 +204,14 @@ const fn tenths(code: &str) -> u16 {
 }
 
 /// The words of all subjects.
-static SUBJECTS: [&[Word]; 15] = [
+static SUBJECTS: [&[Word]; 16] = [
     motion::WORDS,
     arc::WORDS,
     curve::WORDS,
     cycles::WORDS,
     probe::WORDS,
     modes::WORDS,
+    modal::WORDS,
     coordinates::WORDS,
     dwell::WORDS,
     tool::WORDS,

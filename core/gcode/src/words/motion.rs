@@ -78,7 +78,7 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{assert_items, blocks};
+    use crate::testing::{assert_items, blocks, ends, mill, run_on};
 
     #[test]
     fn no_motion_no_block() {
@@ -99,5 +99,22 @@ mod tests {
                 "End",
             ],
         );
+    }
+
+    #[test]
+    fn polar_coordinates_stand_for_x_and_y() {
+        assert_eq!(ends("G0 @10 ^30")[0], ["8.66", "5", "0"]);
+        // The direction, or the distance, stays where only the other is given; with G91 both add up.
+        assert_eq!(
+            ends("G0 @10 ^0\nG91 ^90\n@5 Z1\nG90 ^180")[1..],
+            [["0", "10", "0"], ["0", "15", "1"], ["-15", "0", "1"]]
+        );
+        assert_eq!(ends("G20 G0 @1 ^90")[0], ["0", "25.4", "0"]);
+        assert_eq!(ends("G10 L2 P1 X5 R90\nG0 @10 ^90")[0], ["-5", "0", "0"]);
+        assert_eq!(ends("G0 X10\nG91 G81 Z-1 R1 ^90 L2 F60\nG80")[6], ["-10", "0", "0"]);
+        for wrong in ["G0 @1 X2", "G53 G0 @1", "G92 @1", "G1 F60 @1 @2", "@1", "F60 G5 @1 I1 J1 P1 Q1"] {
+            let (_, errors) = run_on(mill(), wrong);
+            assert!(!errors.is_empty(), "{wrong}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::{Action, GROUPS, Group, Shape, Word, written};
 use crate::fault::{Checked, Fault, Span};
 use crate::state::MotionMode;
 use crate::state::letters::{AXIS_MASK, Letters, index, mask};
-use crate::syntax::line_words::{Code, LineWords};
+use crate::syntax::line_words::{Code, LineWords, Polar};
 
 /// Letters that any line may have.
 const ALWAYS: u32 = mask("NOFST");
@@ -78,7 +78,7 @@ impl Orders {
         let mut claims = Claims::default();
         let g = self.sort_kind(b'G', words.g.as_slice(), words, &mut claims);
         let m = self.sort_kind(b'M', words.m.as_slice(), words, &mut claims);
-        let motion = self.choose_motion(words, modal, &mut claims);
+        let motion = self.choose_motion(words, modal, &mut claims, letters);
         g.and(m).and(motion)?;
         let foreign = words.present & AXIS_MASK & !letters.mask;
         if words.present & (ALWAYS | claims.letters) != words.present || foreign != 0 {
@@ -117,10 +117,16 @@ impl Orders {
 
     /// Decides who takes the axis words: a non-modal word, else the motion word, else the motion mode.
     #[inline]
-    fn choose_motion(&mut self, words: &LineWords, modal: MotionMode, claims: &mut Claims) -> Checked<()> {
+    fn choose_motion(
+        &mut self,
+        words: &LineWords,
+        modal: MotionMode,
+        claims: &mut Claims,
+        letters: &Letters,
+    ) -> Checked<()> {
         let takes_axes = |word: &&'static Word| word.mask & AXIS_MASK != 0;
         let taker = self.get(Group::NonModal).filter(takes_axes).or(self.get(Group::ToolLength).filter(takes_axes));
-        let has_axes = words.present & AXIS_MASK != 0;
+        let has_axes = words.named() != 0;
         self.axes_taken |= taker.is_some_and(|word| word.group == Group::NonModal || has_axes);
         let refused = self.motion.filter(|motion| matches!(motion, MotionMode::Refused));
         let word = self.get(Group::Motion);
@@ -128,6 +134,7 @@ impl Orders {
             return Err(self.fault(Group::Motion, "nurbs", super::curve::NONE_OPEN));
         }
         if self.axes_taken {
+            words.polar.map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
             return self.check_taken(word, taker, words);
         }
         let motion = word.map(MotionMode::Word).or(refused).unwrap_or(modal);
@@ -135,6 +142,12 @@ impl Orders {
             return Ok(());
         }
         self.motion = Some(motion);
+        if let Some(polar) = &words.polar {
+            if self.has(Group::NonModal) {
+                return Err(polar_misplaced(polar));
+            }
+            check_polar(polar, motion, words, letters)?;
+        }
         match motion {
             MotionMode::None => Err(no_motion(words)),
             MotionMode::Refused => {
@@ -168,7 +181,7 @@ impl Orders {
 /// Whether the words of a line begin a motion; `stands` says whether its word is in the line.
 #[inline]
 fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
-    if words.present & AXIS_MASK != 0 {
+    if words.named() != 0 {
         return true;
     }
     let MotionMode::Word(word) = motion else { return false };
@@ -177,6 +190,27 @@ fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
         Some(Shape::Probe | Shape::Curve | Shape::Cycle) => stands,
         Some(Shape::Straight) | None => false,
     }
+}
+
+/// `@` and `^` stand for X and Y of a motion.
+#[cold]
+fn check_polar(polar: &Polar, motion: MotionMode, words: &LineWords, letters: &Letters) -> Checked<()> {
+    let bends = matches!(motion, MotionMode::Word(word) if word.shape() == Some(Shape::Curve));
+    if bends || words.present & mask("XY") != 0 {
+        return Err(polar_misplaced(polar));
+    }
+    let linear = |letter: u8| letters.axis(letter).is_some_and(|axis| !letters.is_rotary(axis));
+    if linear(b'X') && linear(b'Y') {
+        return Ok(());
+    }
+    Err(Fault::new(polar.span, "axis", "polar coordinates (@ and ^) need the linear axes X and Y"))
+}
+
+#[cold]
+pub(crate) fn polar_misplaced(polar: &Polar) -> Fault {
+    let message = "polar coordinates (@ and ^) stand for X and Y of a line, an arc, a probe or a cycle: neither go they \
+                   with X and Y, nor with G53 and words that take axis words for something else";
+    Fault::new(polar.span, "conflict", message)
 }
 
 #[cold]

@@ -38,6 +38,14 @@ impl Permits {
         self.0[FEED]
     }
 
+    pub fn adaptive_feed(self) -> bool {
+        self.0[ADAPTIVE]
+    }
+
+    pub fn feed_hold(self) -> bool {
+        self.0[HOLD]
+    }
+
     pub fn spindle_override(self) -> bool {
         self.0[SPINDLE]
     }
@@ -69,6 +77,13 @@ fn both_off(line: &mut Line) -> Checked<()> {
     switch(line, FEED, false);
     switch(line, SPINDLE, false);
     Ok(())
+}
+
+/// What is permitted is what was so before.
+pub(super) fn put_back(line: &mut Line, permits: Permits) {
+    for (which, permitted) in permits.0.into_iter().enumerate() {
+        switch(line, which, permitted);
+    }
 }
 
 pub(super) fn switch(line: &mut Line, which: usize, on: bool) {

@@ -7,7 +7,7 @@ use crate::fault::Checked;
 use crate::item::ProbeResult;
 use crate::line::Line;
 use crate::state::State;
-use crate::state::letters::{AXIS_LETTERS, AXIS_MASK, Letters};
+use crate::state::letters::{AXIS_LETTERS, Letters};
 use crate::state::parameters::Parameters;
 use crate::state::path::NO_MOVE;
 
@@ -111,7 +111,7 @@ fn refuse_company(line: &Line, word: &str) -> Checked<()> {
         let message = format!("{word} and M66 each wait for an input: split the line");
         return Err(line.motion_fault("conflict", message));
     }
-    if line.words.present & AXIS_MASK == 0 {
+    if line.words.named() == 0 {
         return Err(line.motion_fault("axis-missing", format!("{word} needs at least one axis word")));
     }
     if line.state.modes.feed.inverse_time {

@@ -8,12 +8,12 @@ use super::Word;
 
 const COMPENSATION: &str = "cutter radius compensation is not supported: let the CAM system write the tool centre path";
 const CYCLES: &str = "this canned cycle is not supported: let the CAM system write it out";
+const TURNING: &str = "turning cycles are not supported: let the CAM system write the passes out";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
 const LATHE: &str = "lathe modes are not supported: X is a length as it is programmed";
 const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
 const SUBPROGRAMS: &str = "subprograms are not supported: let the CAM system write the program out flat";
 const ANALOG: &str = "analogue outputs are not supported";
-const MODAL: &str = "saving and restoring the modal state is not supported";
 
 pub(super) const WORDS: &[Word] = &[
     Word::refused("G6.1", Motion, "NURBS", "write G6.2 (a control point and a knot a line) or G5.2"),
@@ -36,6 +36,13 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("G66", NonModal, "modal macro call", "macros are not supported"),
     Word::refused("G68", Rotation, "rotation", FRAMES),
     Word::refused("G68.2", Rotation, "tilted plane", FRAMES),
+    Word::refused("G70", Motion, "finishing of a turned profile", TURNING),
+    Word::refused("G71", Motion, "roughing of a turned profile", TURNING),
+    Word::refused("G71.1", Motion, "roughing of a turned profile", TURNING),
+    Word::refused("G71.2", Motion, "roughing of a turned profile", TURNING),
+    Word::refused("G72", Motion, "facing of a turned profile", TURNING),
+    Word::refused("G72.1", Motion, "facing of a turned profile", TURNING),
+    Word::refused("G72.2", Motion, "facing of a turned profile", TURNING),
     Word::refused("G76", Motion, "threading", CYCLES),
     Word::refused("G87", Motion, "back boring", CYCLES),
     Word::refused("G95", FeedMode, "feed a revolution", SYNCHRONOUS),
@@ -45,10 +52,6 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("M60", Stop, "pallet change", "pallets are not supported"),
     Word::refused("M67", InputOutput, "analogue output with the motion", ANALOG),
     Word::refused("M68", InputOutput, "analogue output", ANALOG),
-    Word::refused("M70", User, "save the modal state", MODAL),
-    Word::refused("M71", User, "drop the saved modal state", MODAL),
-    Word::refused("M72", User, "restore the modal state", MODAL),
-    Word::refused("M73", User, "save and restore the modal state", MODAL),
     Word::refused("M98", User, "subprogram call", SUBPROGRAMS),
     Word::refused("M99", User, "subprogram return", SUBPROGRAMS),
 ];

@@ -47,11 +47,17 @@ pub(crate) fn speed(line: &mut Line) -> Checked<()> {
 
 /// A change of direction needs rest, a change of speed does not.
 pub(super) fn turn(line: &mut Line, direction: i8) -> Checked<()> {
-    let before = line.state.spindle;
-    let mut spindle = Spindle { direction, ..before };
+    let mut spindle = Spindle { direction, ..line.state.spindle };
     if let Some(speed) = line.words.not_negative(b'S')? {
         spindle.speed_rad_per_s = speed * PI / 30.0;
     }
+    set(line, spindle);
+    Ok(())
+}
+
+/// The spindle is to turn so.
+pub(super) fn set(line: &mut Line, spindle: Spindle) {
+    let before = line.state.spindle;
     let turns = spindle.direction != before.direction;
     if turns {
         line.rest();
@@ -60,7 +66,6 @@ pub(super) fn turn(line: &mut Line, direction: i8) -> Checked<()> {
     if turns || spindle.command_rad_per_s() != before.command_rad_per_s() {
         line.event(EventKind::Spindle, 0, spindle.command_rad_per_s());
     }
-    Ok(())
 }
 
 /// Stops the spindle where it turns.

@@ -209,14 +209,14 @@ pub fn with_cycles(seed: u64) -> String {
         writer.line(
             &format!("{modes} G90 G0 X1 Y2 Z3 {distance}\nG90 G0 {normal}{high} {distance}").replace("G90 G0", "G0"),
         );
-        cycle_lines(&mut writer, normal, distance == "G91");
+        cycle_lines(&mut writer, normal, distance == "G91", high);
     }
     writer.line("G80 G90 G0 X0 Y0\nM2");
     writer.text
 }
 
 /// One cycle, and lines that repeat it.
-fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool) {
+fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool, high: u64) {
     // The judge taps along the wrong axes in G18 and G19, and takes the dwell of another cycle for a tap without P.
     let word = match writer.random.pick(&["G73", "G81", "G82", "G83", "G84", "G85", "G86", "G89"]) {
         "G84" if normal != 'Z' => "G81",
@@ -247,6 +247,16 @@ fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool) {
         let at = place(writer);
         let deeper = writer.below(2).cast_signed();
         writer.line(&format!("{at} {normal}{}", bottom - deeper));
+    }
+    // The same cycle goes on in the other distance mode, from the same level: where that is another, the judge goes to it and
+    // to the next hole at once.
+    if writer.below(3) == 0 && !incremental {
+        let (at, bottom, r) = (place(writer), -1 - writer.below(3).cast_signed(), r - high.cast_signed());
+        writer.line(&format!("G91 {word}{at} {normal}{bottom} R{r}{more}"));
+        let polar = writer.random.pick(&["@3 ^30", "^45", "@2"]);
+        if normal == 'Z' {
+            writer.line(&format!("X1 Y2 {normal}{bottom}\n{polar} {normal}{bottom}"));
+        }
     }
 }
 
