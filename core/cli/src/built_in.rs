@@ -17,5 +17,7 @@ pub fn registry() -> Result<Registry, String> {
     registry.register(tandem_corexy::PLUGIN)?;
     registry.register(tandem_wrapped_rotary::PLUGIN)?;
     registry.register(tandem_sim::PLUGIN)?;
+    #[cfg(feature = "ethercat")]
+    registry.register(tandem_ethercat::PLUGIN)?;
     Ok(registry)
 }

@@ -1,14 +1,13 @@
 //! The command: a bus of emulated devices on a network interface, in real time.
 
-mod raw;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use raw::RawSocket;
-use tandem_ethercat_emulator::{AlCode, AlState, BusDescription, Device, DriveState, MAX_FRAME, Wire};
+use tandem_ethercat_emulator::{
+    AlCode, AlState, BusDescription, Device, DriveState, MAX_FRAME, RawError, RawSocket, Wire,
+};
 
 /// Longest wait for a frame, in ns: at least so often the devices' own time goes on.
 const MAX_WAIT_NS: u64 = 500_000;
@@ -62,7 +61,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Takes what came in and sends what is back.
-fn exchange(socket: &RawSocket, wire: &mut Wire, now_ns: impl Fn() -> u64) -> Result<(), raw::RawError> {
+fn exchange(socket: &RawSocket, wire: &mut Wire, now_ns: impl Fn() -> u64) -> Result<(), RawError> {
     let mut buffer = [0; MAX_FRAME];
     while let Some(frame) = socket.receive(&mut buffer)? {
         wire.send(now_ns(), frame);
@@ -71,7 +70,7 @@ fn exchange(socket: &RawSocket, wire: &mut Wire, now_ns: impl Fn() -> u64) -> Re
     send_replies(socket, wire, now_ns())
 }
 
-fn send_replies(socket: &RawSocket, wire: &mut Wire, now_ns: u64) -> Result<(), raw::RawError> {
+fn send_replies(socket: &RawSocket, wire: &mut Wire, now_ns: u64) -> Result<(), RawError> {
     let mut buffer = [0; MAX_FRAME];
     while let Some(length) = wire.receive(now_ns, &mut buffer) {
         socket.send(&buffer[..length])?;

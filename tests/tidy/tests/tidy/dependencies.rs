@@ -55,6 +55,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // It reads a table of the machine file, and no hardware.
     ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),
     ("hal-drivers/ethercat-emulator", &[]),
+    ("hal-drivers/ethercat", &["tandem-ethercat-emulator", "tandem-sdk"]),
     ("hal-drivers", &["tandem-sdk"]),
     ("scripts", &[]),
     (

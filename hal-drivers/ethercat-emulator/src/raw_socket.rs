@@ -7,8 +7,10 @@ use std::os::fd::AsFd;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::netdevice::name_to_index;
 use socket2::{Domain, Protocol, SockAddr, Socket, Type};
-use tandem_ethercat_emulator::{ETHERTYPE, MAX_FRAME};
 use thiserror::Error;
+
+use crate::bus::MAX_FRAME;
+use crate::frame::ETHERTYPE;
 
 /// Why an interface cannot be used.
 #[derive(Debug, Error)]
@@ -36,6 +38,9 @@ pub struct RawSocket {
 
 impl RawSocket {
     /// Opens an interface by its name.
+    ///
+    /// # Errors
+    /// It is not there, or not allowed.
     pub fn open(name: &str) -> Result<Self, RawError> {
         let system = |error: io::Error| match error.kind() {
             io::ErrorKind::PermissionDenied => RawError::NoPermission,
@@ -61,7 +66,10 @@ impl RawSocket {
         let _ = poll(&mut [PollFd::new(&socket, PollFlags::IN)], Some(&timeout));
     }
 
-    /// The next frame that came in, if any.
+    /// The next frame that came in, if any. Neither waits nor allocates.
+    ///
+    /// # Errors
+    /// The interface went away or down.
     pub fn receive<'a>(&self, into: &'a mut [u8; MAX_FRAME]) -> Result<Option<&'a [u8]>, RawError> {
         let mut buffer = [MaybeUninit::uninit(); MAX_FRAME];
         match self.socket.recv(&mut buffer) {
@@ -77,7 +85,10 @@ impl RawSocket {
         }
     }
 
-    /// Sends a frame.
+    /// Sends a frame. Does not allocate.
+    ///
+    /// # Errors
+    /// The interface went away or down.
     pub fn send(&self, frame: &[u8]) -> Result<(), RawError> {
         self.socket.send(frame).map(|_| ()).map_err(|error| self.failed(error))
     }

@@ -1,0 +1,506 @@
+//! A bus that is up: one exchange in a period, and what is known of every device.
+
+use tandem_ethercat_emulator::BusDescription;
+use tandem_sdk::{Attached, AxisVector, DriverContext, Feedback, JointState, MAX_AXES, MAX_DIGITAL, Setpoint};
+
+use crate::bring_up::{self, Ready, refuses};
+use crate::check::emulated;
+use crate::cyclic::Cyclic;
+use crate::drive::Moves;
+use crate::link::Link;
+use crate::map::u16_at;
+use crate::master::Master;
+use crate::options::{EMULATED, Encoder, Options, Sync};
+use crate::words::{al_code, al_state, own};
+
+/// Share of a period that a reply is waited for: what is left is the host's.
+const REPLY_SHARE: f64 = 0.6;
+
+/// How long all devices together may take for OP, s: drives first find SYNC0 and build up their loops.
+const OP_S: f64 = 10.0;
+
+/// Share of the phase error by which a bus that is brought up, or runs on virtual time, is steered in a period, and the most that
+/// it is steered at once, share of a period. On the wall clock the host steers.
+const STEER_SHARE: f64 = 0.1;
+const MAX_STEER_SHARE: f64 = 0.05;
+
+/// Exchanges before OP is asked for: clocks and drives settle.
+const SETTLE_EXCHANGES: u64 = 60;
+
+/// States of the bus.
+const OP: u16 = 8;
+const ERROR: u16 = 0x10;
+
+/// A device that takes part in the exchange.
+#[derive(Debug)]
+struct Member {
+    ready: Ready,
+    /// Exchanges in a row without its answer.
+    silent: u32,
+    /// Why it counts as lost, from then on.
+    lost: Option<u32>,
+    /// Its state, as it was asked for last.
+    al: u16,
+    al_code: u16,
+    /// Its inputs, as they came last.
+    inputs: Vec<u8>,
+}
+
+/// Exchanges and what became of them, since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Exchanges.
+    pub exchanges: u64,
+    /// Exchanges whose reply did not come in time.
+    pub lost: u64,
+    /// Frames that came and were none that was awaited: late, twice, another master's.
+    pub strays: u64,
+    /// Answers of devices that took no part in a frame that came back.
+    pub short: u64,
+}
+
+/// A bus, powered and maybe up.
+pub(crate) struct Bus {
+    options: Options,
+    context: DriverContext,
+    link: Link,
+    master: Option<Master>,
+    cyclic: Option<Cyclic>,
+    members: Vec<Member>,
+    period_ns: u64,
+    /// When the next exchange is due, where the driver itself keeps time.
+    next_ns: u64,
+    asks: usize,
+    last: Setpoint,
+    phase_ns: Option<i64>,
+    pub(crate) counters: Counters,
+    sent: bool,
+}
+
+impl Bus {
+    /// Takes the interface, or gives an emulated bus its power.
+    pub(crate) fn open(options: &Options, context: &DriverContext) -> Result<Self, String> {
+        let link = if options.interface == EMULATED {
+            let description: BusDescription = emulated(options, context).map_err(|error| error.to_string())?;
+            Link::emulated(&description, context.real_time != 0)?
+        } else {
+            Link::interface(&options.interface)?
+        };
+        let master = Master::take(options.sync == Sync::Dc);
+        let master = master.ok_or_else(|| "there is no memory for another bus".to_string())?;
+        Ok(Self {
+            options: options.clone(),
+            context: *context,
+            link,
+            master: Some(master),
+            cyclic: None,
+            members: vec![],
+            period_ns: (context.fine_period_s * 1e9).round() as u64,
+            next_ns: 0,
+            asks: 0,
+            last: Setpoint::default(),
+            phase_ns: None,
+            counters: Counters::default(),
+            sent: false,
+        })
+    }
+
+    /// The emulator, where it is one.
+    pub(crate) fn link_mut(&mut self) -> &mut Link {
+        &mut self.link
+    }
+
+    /// Brings the bus into OP, and tells where the joints stand.
+    pub(crate) fn start(&mut self) -> Result<Attached, String> {
+        let Self { options, context, link, master, .. } = self;
+        let master = master.as_mut().ok_or_else(|| "the bus is closed".to_string())?;
+        let up = master.run(link, |main| bring_up::bring_up(main, options, context))?;
+        let stations: Vec<_> = up.devices.iter().map(|device| device.station).collect();
+        let mut cyclic = Cyclic::new(&stations, up.reference)?;
+        cyclic.ask(0);
+        self.cyclic = Some(cyclic);
+        let member = |ready: Ready| Member {
+            inputs: vec![0; ready.station.inputs.bytes],
+            ready,
+            silent: 0,
+            lost: None,
+            al: 4,
+            al_code: 0,
+        };
+        self.members = up.devices.into_iter().map(member).collect();
+        (self.last, self.counters, self.phase_ns) = (Setpoint::default(), Counters::default(), None);
+        (self.asks, self.sent) = (0, false);
+        self.next_ns = self.link.now_ns();
+        self.come_into_op()?;
+        Ok(self.attached())
+    }
+
+    /// Exchanges until every device is in OP.
+    fn come_into_op(&mut self) -> Result<(), String> {
+        let most = (OP_S / self.context.fine_period_s) as u64;
+        for exchange in 0..most {
+            let asked = exchange.checked_sub(SETTLE_EXCHANGES).map(|n| n as usize).filter(|n| *n < self.members.len());
+            if let Some(cyclic) = &mut self.cyclic {
+                cyclic.request(asked.map(|device| (device, OP)));
+            }
+            self.turn();
+            if exchange == 0 || exchange == SETTLE_EXCHANGES {
+                self.begin_drives();
+            }
+            for member in &self.members {
+                if member.al & ERROR != 0 {
+                    return Err(refuses(&member.ready.called, OP, member.al, member.al_code));
+                }
+            }
+            let all = self.members.iter().all(|member| member.al & 0x0f == OP && member.silent == 0);
+            if all {
+                self.begin_drives();
+                return Ok(());
+            }
+        }
+        Err(self.why_not_op())
+    }
+
+    fn begin_drives(&mut self) {
+        for member in &mut self.members {
+            if let Some(drive) = &mut member.ready.drive {
+                drive.begin(&member.inputs);
+            }
+        }
+    }
+
+    fn why_not_op(&self) -> String {
+        let late = self.members.iter().find(|member| member.al & 0x0f != OP || member.silent > 0);
+        late.map_or_else(String::new, |member| {
+            let (called, al) = (&member.ready.called, al_state(member.al));
+            if self.counters.lost > self.counters.exchanges / 2 {
+                return format!(
+                    "{} of {} frames did not come back on the way to OP",
+                    self.counters.lost, self.counters.exchanges
+                );
+            }
+            if member.al & 0x0f == OP {
+                return format!("{called}: it is in OP, and does not take part in the exchange of process data");
+            }
+            format!(
+                "{called}: it stays in {al} and does not come to OP within {OP_S} s: {:04X}, {}",
+                member.al_code,
+                al_code(member.al_code)
+            )
+        })
+    }
+
+    /// One exchange at the time when it is due, with what was sent last.
+    fn turn(&mut self) {
+        let setpoint = self.last;
+        self.link.wait_until(self.next_ns);
+        self.exchange_at_once(&setpoint);
+        self.steer();
+    }
+
+    /// When the next exchange is due: a period later, and towards the phase where clocks lead.
+    fn steer(&mut self) {
+        let most = self.period_ns as f64 * MAX_STEER_SHARE;
+        let by = self.phase_ns.map_or(0.0, |phase| (phase as f64 * STEER_SHARE).clamp(-most, most));
+        self.next_ns = (self.next_ns + self.period_ns).saturating_add_signed(-(by as i64));
+        if !self.link.is_virtual() {
+            // A wait that was too long is not made up for by exchanges in a row.
+            self.next_ns = self.next_ns.max(self.link.now_ns());
+        }
+    }
+
+    /// Begins the exchange of a period: on virtual time, the period goes by first.
+    pub(crate) fn send(&mut self, setpoint: &Setpoint) {
+        if self.link.is_virtual() {
+            self.link.wait_until(self.next_ns);
+            self.steer();
+        }
+        self.lay_out(setpoint);
+        if let Some(cyclic) = &mut self.cyclic {
+            cyclic.send(&mut self.link);
+        }
+        self.sent = true;
+    }
+
+    /// The exchange of a period, for the host.
+    pub(crate) fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) {
+        if !self.sent {
+            self.send(setpoint);
+        }
+        self.take_in();
+        self.report(setpoint, feedback);
+    }
+
+    /// An exchange while the host does not ask for one: enabled joints hold where they were told to be last.
+    pub(crate) fn keep_alive(&mut self) {
+        let mut setpoint = self.last;
+        let moving = setpoint.velocity.0[..MAX_AXES].iter().any(|velocity| *velocity != 0.0);
+        if moving {
+            for member in &mut self.members {
+                if let Some(drive) = &mut member.ready.drive {
+                    drive.fall_silent(true);
+                }
+            }
+        }
+        (setpoint.velocity, setpoint.acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
+        (setpoint.reset, setpoint.arm) = (0, tandem_sdk::Arm::default());
+        self.exchange_at_once(&setpoint);
+    }
+
+    fn exchange_at_once(&mut self, setpoint: &Setpoint) {
+        self.lay_out(setpoint);
+        if let Some(cyclic) = &mut self.cyclic {
+            cyclic.send(&mut self.link);
+        }
+        self.take_in();
+    }
+
+    fn lay_out(&mut self, setpoint: &Setpoint) {
+        self.last = *setpoint;
+        let Some(cyclic) = &mut self.cyclic else { return };
+        for (number, member) in self.members.iter_mut().enumerate() {
+            let out = cyclic.outputs(number);
+            if let Some(drive) = &mut member.ready.drive {
+                drive.command(setpoint, out);
+                continue;
+            }
+            let lines = &self.options.devices[member.ready.options].outputs;
+            for (bit, line) in lines.iter().enumerate().filter(|(_, line)| **line >= 0) {
+                let Some(byte) = out.get_mut(bit / 8) else { break };
+                let mask = 1 << (bit % 8);
+                let on = setpoint.outputs >> line & 1 == 1;
+                *byte = if on { *byte | mask } else { *byte & !mask };
+            }
+        }
+        cyclic.ask(self.asks);
+    }
+
+    /// Waits for the reply and takes in what it says.
+    fn take_in(&mut self) {
+        let Some(cyclic) = &mut self.cyclic else { return };
+        self.sent = false;
+        let wait_ns = (self.period_ns as f64 * REPLY_SHARE) as u64;
+        let until_ns = self.link.now_ns() + wait_ns;
+        let came = cyclic.receive(&mut self.link, until_ns);
+        self.counters.exchanges += 1;
+        self.counters.lost += u64::from(!came);
+        self.counters.strays = cyclic.strays;
+        let status = if came { cyclic.al_status() } else { None };
+        if let Some(status) = status {
+            let member = &mut self.members[status.device];
+            (member.al, member.al_code) = (status.status, status.code);
+        }
+        for (number, member) in self.members.iter_mut().enumerate() {
+            let inputs = if came { cyclic.inputs(number) } else { None };
+            match inputs.filter(|_| cyclic.took(number)) {
+                Some(inputs) => {
+                    member.silent = 0;
+                    member.inputs.copy_from_slice(inputs);
+                    if let Some(drive) = &mut member.ready.drive {
+                        drive.answer(&member.inputs);
+                    }
+                }
+                None => {
+                    self.counters.short += u64::from(came);
+                    member.miss(came, self.options.max_lost_frames);
+                }
+            }
+        }
+        if came {
+            self.phase_ns = cyclic.clock_ns().map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
+        }
+        self.ask_on(came);
+    }
+
+    /// Whose state is asked for next: of a device that takes no part, else of one after the other.
+    fn ask_on(&mut self, came: bool) {
+        let count = self.members.len().max(1);
+        let from = self.asks + 1;
+        let silent = (from..from + count)
+            .map(|n| n % count)
+            .find(|n| came && self.members.get(*n).is_some_and(|m| m.silent > 0));
+        self.asks = silent.unwrap_or(from % count);
+    }
+
+    /// Writes everything that is known.
+    fn report(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) {
+        feedback.latches = [tandem_sdk::Latch::default(); tandem_sdk::MAX_LATCHES];
+        let mut latches = 0;
+        let mut spindle_trouble = false;
+        for member in &mut self.members {
+            let options = &self.options.devices[member.ready.options];
+            if member.lost.is_none() {
+                read_lines(options, member, feedback);
+            }
+            let age = u16::try_from(member.silent).unwrap_or(u16::MAX);
+            for line in options.inputs.iter().filter(|line| **line >= 0) {
+                feedback.input_age_periods[*line as usize % MAX_DIGITAL] = age;
+            }
+            let (lost, silent) = (member.lost, member.silent);
+            let Some(drive) = &mut member.ready.drive else { continue };
+            drive.report(lost, feedback);
+            match drive.moves() {
+                Moves::Joint(joint) => {
+                    feedback.age_periods[joint] = silent;
+                    if let Some(latch) = drive.take_latch() {
+                        latches = merge(&mut feedback.latches, latches, latch);
+                    }
+                }
+                Moves::Spindle { at_speed_share, .. } => {
+                    let state = if lost.is_some() { JointState::Lost } else { drive.state().0 };
+                    spindle_trouble = matches!(state, JointState::Fault | JointState::Lost);
+                    let at_speed = drive.is_at_speed(setpoint.spindle_rad_per_s, at_speed_share);
+                    feedback.spindle_at_speed = u32::from(at_speed && !spindle_trouble);
+                }
+            }
+        }
+        if spindle_trouble && feedback.state[0] == JointState::Enabled {
+            // The contract has no state for a spindle: what stops the axes on their ramps is a joint's.
+            (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE);
+        }
+        if let Some(phase_ns) = self.phase_ns {
+            (feedback.has_phase, feedback.phase_ns) = (1, phase_ns);
+        }
+    }
+
+    /// Where the joints stand.
+    fn attached(&mut self) -> Attached {
+        let mut feedback = Feedback::default();
+        let setpoint = self.last;
+        self.report(&setpoint, &mut feedback);
+        let delay = self.options.delay_periods.unwrap_or(if self.options.sync == Sync::Dc { 2 } else { 1 });
+        let mut attached = Attached::at(feedback.position);
+        (attached.state, attached.fault_code) = (feedback.state, feedback.fault_code);
+        attached.delay_periods = [delay; MAX_AXES];
+        for member in &self.members {
+            let options = &self.options.devices[member.ready.options];
+            if let (Some(Moves::Joint(joint)), Encoder::Incremental) =
+                (member.ready.drive.as_ref().map(crate::drive::Drive::moves), options.encoder)
+            {
+                attached.known &= !(1 << joint);
+                attached.homed &= !(1 << joint);
+            }
+        }
+        attached
+    }
+
+    /// The drives come to rest by their own means.
+    pub(crate) fn quick_stop(&mut self) {
+        for member in &mut self.members {
+            if let Some(drive) = &mut member.ready.drive {
+                drive.quick_stop();
+            }
+        }
+    }
+
+    /// Takes the torque from the drives and the bus to INIT.
+    pub(crate) fn stop(&mut self) {
+        if self.cyclic.take().is_some()
+            && let Some(master) = &mut self.master
+        {
+            master.run(&mut self.link, bring_up::leave);
+        }
+        self.members.clear();
+    }
+
+    /// Device, state of the bus, status word of its drive, whether it is lost: for people who watch.
+    pub(crate) fn watch(&self) -> Vec<(String, u16, u16, Option<u16>, Option<u32>)> {
+        let line = |member: &Member| {
+            let status = member.ready.drive.as_ref().map(crate::drive::Drive::status);
+            (member.ready.called.clone(), member.al, member.al_code, status, member.lost)
+        };
+        self.members.iter().map(line).collect()
+    }
+
+    /// How far the last exchange was from its phase, ns.
+    pub(crate) fn phase_ns(&self) -> Option<i64> {
+        self.phase_ns
+    }
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        self.stop();
+        if let Some(master) = self.master.take() {
+            master.give_back();
+        }
+    }
+}
+
+impl Member {
+    /// Its answer is missing once more.
+    fn miss(&mut self, came: bool, patience: u32) {
+        self.silent = self.silent.saturating_add(1);
+        if let Some(drive) = &mut self.ready.drive {
+            drive.miss();
+        }
+        if self.silent <= patience {
+            return;
+        }
+        // Its state is asked for while it is missing; what it said then is the better reason.
+        let left = came && self.al & 0x0f != OP;
+        let why = match (left, came) {
+            (true, _) => own::LEFT_STATE | u32::from(self.al_code),
+            (false, true) => own::WORKING_COUNTER,
+            (false, false) => own::NO_ANSWER,
+        };
+        let better = left && self.lost.is_some_and(|lost| lost & 0xffff_0000 != own::LEFT_STATE);
+        if self.lost.is_none() || better {
+            self.lost = Some(why);
+        }
+    }
+}
+
+/// Inputs and analog values of a device.
+fn read_lines(options: &crate::options::DeviceOptions, member: &Member, feedback: &mut Feedback) {
+    let bits = |bit: usize| match &member.ready.drive {
+        Some(drive) => bit < 32 && drive.digital >> bit & 1 == 1,
+        None => member.inputs.get(bit / 8).is_some_and(|byte| byte >> (bit % 8) & 1 == 1),
+    };
+    for (bit, line) in options.inputs.iter().enumerate().filter(|(_, line)| **line >= 0) {
+        let mask = 1_u64 << line;
+        feedback.inputs = if bits(bit) { feedback.inputs | mask } else { feedback.inputs & !mask };
+    }
+    for analog in &options.analog {
+        let value = f64::from(u16_at(&member.inputs, analog.byte).cast_signed());
+        feedback.analog[analog.input] = value * analog.scale + analog.offset;
+    }
+}
+
+/// Puts a latch to one of the same edge, or behind those that are there.
+fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Latch) -> usize {
+    let same = latches[..count].iter_mut().find(|other| other.input == latch.input && other.edge == latch.edge);
+    if let Some(other) = same {
+        other.joints |= latch.joints;
+        other.position = other.position + latch.position;
+        return count;
+    }
+    match latches.get_mut(count) {
+        Some(slot) => {
+            *slot = latch;
+            count + 1
+        }
+        None => count,
+    }
+}
+
+/// How much later than its phase an exchange passed the clock that leads, ns; within half a period either way.
+fn phase(clock_ns: u64, period_ns: u64, phase_us: Option<f64>) -> i64 {
+    let wanted_ns = phase_us.map_or(period_ns / 2, |phase| (phase * 1000.0) as u64);
+    let late_ns = ((clock_ns % period_ns + period_ns - wanted_ns % period_ns) % period_ns).cast_signed();
+    if late_ns > (period_ns / 2).cast_signed() { late_ns - period_ns.cast_signed() } else { late_ns }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_is_within_half_a_period() {
+        assert_eq!(phase(7_000_300_000, 1_000_000, Some(300.0)), 0);
+        assert_eq!(phase(7_000_310_000, 1_000_000, Some(300.0)), 10_000);
+        assert_eq!(phase(7_000_290_000, 1_000_000, Some(300.0)), -10_000);
+        assert_eq!(phase(7_000_900_000, 1_000_000, Some(300.0)), -400_000);
+        assert_eq!(phase(7_000_500_000, 1_000_000, None), 0);
+    }
+}
