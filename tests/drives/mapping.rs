@@ -204,10 +204,11 @@ fn drawn_setpoint(random: &mut Random) -> Setpoint {
     setpoint
 }
 
-fn assert_told(own: &Own, whole: &Setpoint, case: &str) {
+/// The exchange of the `first` comes next and sends by itself.
+fn assert_told(own: &Own, whole: &Setpoint, first: bool, case: &str) {
     let mirror = mirrors()[&own.name].clone();
     let told = mirror.told.unwrap();
-    assert_eq!(mirror.sent, Some(told), "{case}: sent to all before anybody is received from");
+    assert_eq!(mirror.sent, Some(told).filter(|_| !first), "{case}: sent to all before anybody is received from");
     assert_eq!((told.enable, told.reset, told.tick), (whole.enable, whole.reset, whole.tick), "{case}");
     assert_eq!(told.homing, own.bits(|joint| whole.homing >> joint & 1 == 1), "{case}");
     assert_eq!(told.limited, own.bits(|joint| whole.limited >> joint & 1 == 1), "{case}");
@@ -328,8 +329,8 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
             }
             driver.exchange(&whole, &mut feedback).unwrap();
             let mut latches = vec![];
-            for own in &all {
-                assert_told(own, &whole, &case);
+            for (i, own) in all.iter().enumerate() {
+                assert_told(own, &whole, i == 0, &case);
                 assert_answered(own, &feedback, &mut latches, &case);
             }
             let given: Vec<_> = feedback.latches.iter().filter(|latch| latch.edge != 0).copied().collect();

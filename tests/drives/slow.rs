@@ -9,7 +9,7 @@ use crate::{Samples, machine, program, registry};
 /// Four joints on a bus, and a spindle whose driver takes `slow_ms` an answer; fine periods of 10 ms.
 fn with_spindle(name: &str, spindle: &str) -> String {
     format!(
-        "[loops]\nfine_period_ms = 10\nrough_period_ms = 80\nmax_missed_periods = 100000\n\
+        "[loops]\nfine_period_ms = 10\nrough_period_ms = 80\nmax_missed_periods = 100000\nmax_missed_share = 1\n\
          [drivers.bus]\nplugin = \"double\"\noptions = {{ name = \"{name}-bus\" }}\njoints = [\"x\", \"y\", \"z\", \"a\"]\n\
          [drivers.line]\nplugin = \"double\"\noptions = {{ name = \"{name}-line\"{spindle} }}\nspindle = true\n"
     )

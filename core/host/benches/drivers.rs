@@ -6,33 +6,39 @@ use divan::{Bencher, black_box};
 use tandem_host::{Registry, attached_driver};
 use tandem_machine::Machine;
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint,
-    local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, NoOptions,
+    PluginError, Setpoint, local_plugin,
 };
 
 const CALLS: u32 = 1000;
+const COUNTS_PER_MM: f64 = 4096.0;
 
 fn main() {
     divan::main();
 }
 
-/// Drives that are where they are told to be.
+/// Drives that are where they are told to be, to a count: each joint is told and answers by itself, as on a bus.
 #[derive(Default)]
-struct Echo(usize);
+struct Counts([i32; MAX_AXES], usize);
 
-impl Driver for Echo {
+impl Driver for Counts {
     fn describe(&self) -> DriverDescription {
         DriverDescription::simulated()
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.0 = context.joint_count as usize;
+        self.1 = context.joint_count as usize;
         Ok(())
     }
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(AxisVector::ZERO))
     }
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        feedback.follow(setpoint, self.0);
+        for joint in 0..self.1.min(MAX_AXES) {
+            self.0[joint] = (setpoint.position[joint] * COUNTS_PER_MM) as i32;
+            feedback.position[joint] = f64::from(self.0[joint]) / COUNTS_PER_MM;
+            feedback.speed[joint] = setpoint.velocity[joint];
+            feedback.state[joint] = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+        }
         Ok(())
     }
     fn quick_stop(&mut self) {}
@@ -52,12 +58,12 @@ fn exchanges(bencher: Bencher, drivers: &str) {
     std::fs::write(&path, text + drivers).unwrap();
     let machine = Machine::read(&path, &[]).unwrap();
     let mut registry = Registry::default();
-    registry.register(local_plugin!(driver "echo" = |_: &NoOptions| Ok(Echo::default()))).unwrap();
+    registry.register(local_plugin!(driver "counts" = |_: &NoOptions| Ok(Counts::default()))).unwrap();
     let (mut driver, _) = attached_driver(&machine, &registry).unwrap();
     let (mut setpoint, mut feedback) = (Setpoint { enable: 1, ..Setpoint::default() }, Feedback::default());
     bencher.counter(ItemsCount::new(CALLS)).bench_local(|| {
         for tick in 0..CALLS {
-            setpoint.position[0] = f64::from(tick);
+            setpoint.tick = u64::from(tick);
             let _ = black_box(driver.exchange(black_box(&setpoint), black_box(&mut feedback)));
         }
     });
@@ -66,7 +72,7 @@ fn exchanges(bencher: Bencher, drivers: &str) {
 /// One driver that has everything: the fine loop calls it itself.
 #[divan::bench]
 fn one(bencher: Bencher) {
-    exchanges(bencher, "[driver]\nplugin = \"echo\"\n");
+    exchanges(bencher, "[driver]\nplugin = \"counts\"\n");
 }
 
 /// Three joints and one, each with its own driver.
@@ -74,7 +80,7 @@ fn one(bencher: Bencher) {
 fn two(bencher: Bencher) {
     exchanges(
         bencher,
-        "[drivers.bus]\nplugin = \"echo\"\njoints = [\"x\", \"y\", \"z\"]\nspindle = true\n\
-         [drivers.arm]\nplugin = \"echo\"\njoints = [\"u\"]\n",
+        "[drivers.bus]\nplugin = \"counts\"\njoints = [\"x\", \"y\", \"z\"]\nspindle = true\n\
+         [drivers.arm]\nplugin = \"counts\"\njoints = [\"u\"]\n",
     );
 }

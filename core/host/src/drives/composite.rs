@@ -5,19 +5,45 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_LATCHES, PluginError,
-    Setpoint, Words,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES, MAX_LATCHES,
+    PluginError, Setpoint, Words,
 };
 
 use super::share::Share;
+
+/// The machine's number of each of a driver's joints.
+struct Joints {
+    machine: [u8; MAX_AXES],
+    count: usize,
+}
+
+impl Joints {
+    fn of(share: &Share) -> Self {
+        let mut this = Self { machine: [0; MAX_AXES], count: 0 };
+        for (machine, (_, joint)) in this.machine.iter_mut().zip(share.joints.pairs()) {
+            *machine = joint as u8;
+            this.count += 1;
+        }
+        this
+    }
+
+    /// The driver's and the machine's number of each, both below [`MAX_AXES`].
+    #[inline]
+    fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.machine.iter().take(self.count).enumerate().map(|(own, machine)| (own, usize::from(*machine) % MAX_AXES))
+    }
+}
 
 /// One of the drivers, with what it is told and what it answers, in its own numbers.
 pub struct Part {
     driver: Box<dyn Driver>,
     share: Share,
+    joints: Joints,
     title: String,
     setpoint: Setpoint,
     feedback: Feedback,
+    /// What it was told last had orders ([`has_orders`]).
+    has_orders: bool,
     /// Its exchange has failed since the drives were last reset: nothing is known of its joints.
     has_failed: bool,
 }
@@ -26,78 +52,117 @@ impl Part {
     /// `driver` for its `share` of the machine.
     pub fn new(driver: Box<dyn Driver>, share: Share, title: String) -> Self {
         let (setpoint, feedback) = (Setpoint::default(), Feedback::default());
-        Self { driver, share, title, setpoint, feedback, has_failed: false }
+        Self {
+            joints: Joints::of(&share),
+            driver,
+            share,
+            title,
+            setpoint,
+            feedback,
+            has_orders: false,
+            has_failed: false,
+        }
     }
 
-    /// Takes its part of what the machine is told.
-    #[inline]
-    fn take(&mut self, whole: &Setpoint) {
-        let own = &mut self.setpoint;
-        (own.enable, own.reset, own.tick) = (whole.enable, whole.reset, whole.tick);
-        own.homing = if whole.homing == 0 { 0 } else { self.share.own_bits(whole.homing) };
-        own.limited = if whole.limited == 0 { 0 } else { self.share.own_bits(whole.limited) };
-        own.outputs = self.share.outputs.to_own(whole.outputs);
-        own.arm = self.share.own_arm(whole.arm);
-        for (i, joint) in self.share.joints().iter().enumerate() {
-            own.position[i] = whole.position[*joint];
-            own.velocity[i] = whole.velocity[*joint];
-            own.acceleration[i] = whole.acceleration[*joint];
+    /// Takes its part of what the machine is told; `orders` says whether some of what is zero in most periods is not.
+    #[allow(clippy::inline_always)] // two calls of it in every period
+    #[inline(always)]
+    fn take(&mut self, whole: &Setpoint, orders: bool) {
+        let (share, own) = (&self.share, &mut self.setpoint);
+        own.enable = whole.enable;
+        own.tick = whole.tick;
+        own.outputs = share.outputs.to_own(whole.outputs);
+        for (i, joint) in self.joints.iter() {
+            own.position[i] = whole.position[joint];
+            own.velocity[i] = whole.velocity[joint];
+            own.acceleration[i] = whole.acceleration[joint];
         }
-        own.spindle_rad_per_s = if self.share.spindle { whole.spindle_rad_per_s } else { 0.0 };
+        if share.spindle {
+            own.spindle_rad_per_s = whole.spindle_rad_per_s;
+        }
+        if orders | self.has_orders {
+            self.take_orders(whole);
+        }
+    }
+
+    /// Takes what is zero in most periods.
+    #[cold]
+    fn take_orders(&mut self, whole: &Setpoint) {
+        let (share, own) = (&self.share, &mut self.setpoint);
+        own.reset = whole.reset;
+        own.homing = share.joints.to_own(u64::from(whole.homing)) as u32;
+        own.limited = share.joints.to_own(u64::from(whole.limited)) as u32;
+        own.arm = share.own_arm(whole.arm);
         self.has_failed &= whole.reset == 0;
+        self.has_orders = has_orders(whole);
     }
 
     /// Adds its answer to that of the machine; `latches` have been filled before it.
     #[inline]
     fn give(&self, whole: &mut Feedback, latches: &mut usize) {
-        let own = &self.feedback;
-        for (i, joint) in self.share.joints().iter().enumerate() {
-            whole.state[*joint] = if self.has_failed { JointState::Lost } else { own.state[i] };
-            whole.fault_code[*joint] = own.fault_code[i];
-            whole.age_periods[*joint] = own.age_periods[i];
-            whole.position[*joint] = own.position[i];
-            whole.speed[*joint] = own.speed[i];
-            whole.current_a[*joint] = own.current_a[i];
+        let (share, own) = (&self.share, &self.feedback);
+        for (i, joint) in self.joints.iter() {
+            whole.state[joint] = own.state[i];
+            whole.fault_code[joint] = own.fault_code[i];
+            whole.age_periods[joint] = own.age_periods[i];
+            whole.position[joint] = own.position[i];
+            whole.speed[joint] = own.speed[i];
+            whole.current_a[joint] = own.current_a[i];
         }
-        if own.homed != 0 {
-            whole.homed |= self.share.machine_bits(own.homed);
-        }
-        whole.inputs |= self.share.inputs.to_machine(own.inputs);
-        for run in self.share.inputs.runs() {
+        whole.inputs |= share.inputs.to_machine(own.inputs);
+        for run in share.inputs.runs() {
             let (to, from, count) = (run.machine as usize, run.own as usize, run.count as usize);
             whole.input_age_periods[to..to + count].copy_from_slice(&own.input_age_periods[from..from + count]);
         }
-        for (own, number) in own.analog.iter().zip(&self.share.analog) {
+        for (own, number) in own.analog.iter().zip(&share.analog) {
             whole.analog[*number] = *own;
         }
-        for latch in own.latches.iter().filter(|latch| latch.edge != 0) {
-            self.give_latch(latch, whole, latches);
-        }
-        if self.share.spindle {
+        if share.spindle {
             whole.spindle_rad_per_s = own.spindle_rad_per_s;
             whole.spindle_angle_rad = own.spindle_angle_rad;
-            whole.spindle_at_speed = if self.has_failed { 0 } else { own.spindle_at_speed };
+            whole.spindle_at_speed = own.spindle_at_speed;
         }
         if own.has_phase != 0 {
             (whole.has_phase, whole.phase_ns) = (1, own.phase_ns);
+        }
+        let caught = own.latches.iter().fold(0, |edges, latch| edges | latch.edge);
+        if caught | own.homed | u32::from(self.has_failed) != 0 {
+            self.give_news(whole, latches);
+        }
+    }
+
+    /// Gives what is there in few periods.
+    #[cold]
+    fn give_news(&self, whole: &mut Feedback, latches: &mut usize) {
+        whole.homed |= self.share.joints.to_machine(u64::from(self.feedback.homed)) as u32;
+        for own in self.feedback.latches.iter().filter(|latch| latch.edge != 0) {
+            self.give_latch(own, whole, latches);
+        }
+        if self.has_failed {
+            self.share.joints.pairs().for_each(|(_, joint)| whole.state[joint] = JointState::Lost);
+            whole.spindle_at_speed &= u32::from(!self.share.spindle);
         }
     }
 
     fn give_latch(&self, own: &Latch, whole: &mut Feedback, latches: &mut usize) {
         let Some(input) = self.share.inputs.machine(own.input) else { return };
         let Some(latch) = whole.latches.get_mut(*latches) else { return };
-        *latch = Latch { input, joints: self.share.machine_bits(own.joints), ..*own };
-        for (i, joint) in self.share.joints().iter().enumerate() {
-            latch.position[*joint] = own.position[i];
+        let joints = self.share.joints.to_machine(u64::from(own.joints)) as u32;
+        *latch = Latch { input, joints, ..*own };
+        for (i, joint) in self.share.joints.pairs() {
+            latch.position[joint] = own.position[i];
         }
         *latches += 1;
     }
 
-    /// What it knows gets older by a period: its exchange has failed.
-    fn grow_old(&mut self) {
+    /// Its exchange has failed: what it knows gets older by a period. Whether it had not failed before: that is told once, and
+    /// from then on its joints are lost, and those of the others are waited for.
+    #[cold]
+    fn is_first_failure(&mut self) -> bool {
         self.feedback.age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
         self.feedback.input_age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
         self.feedback.latches = [Latch::default(); MAX_LATCHES];
+        !std::mem::replace(&mut self.has_failed, true)
     }
 }
 
@@ -111,19 +176,27 @@ pub struct Composite {
     failed: Arc<AtomicUsize>,
     /// How many latches were handed out last.
     latches: usize,
+    /// Why an exchange of this period failed; not told yet.
+    failure: Option<PluginError>,
 }
 
 impl Composite {
     /// `parts`, which describe themselves together as `description`; the number of the first that fails goes to `failed`.
     pub fn new(parts: Vec<Part>, description: DriverDescription, failed: Arc<AtomicUsize>) -> Self {
-        Self { parts, description, failed, latches: 0 }
+        Self { parts, description, failed, latches: 0, failure: None }
     }
 
+    /// Begins the exchanges of all, so that they wait for their answers together. That of the first comes next, and sends by
+    /// itself.
+    #[inline]
     fn send_all(&mut self, setpoint: &Setpoint) {
-        for part in &mut self.parts {
-            part.take(setpoint);
+        let Some((first, others)) = self.parts.split_first_mut() else { return };
+        let orders = has_orders(setpoint);
+        for part in others {
+            part.take(setpoint, orders);
             part.driver.send(&part.setpoint);
         }
+        first.take(setpoint, orders);
     }
 
     fn forget(&mut self, feedback: &mut Feedback) {
@@ -169,20 +242,18 @@ impl Driver for Composite {
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
         self.send_all(setpoint);
         self.forget(feedback);
-        let mut answer = Ok(());
         for (index, part) in self.parts.iter_mut().enumerate() {
-            if let Err(error) = part.driver.exchange(&part.setpoint, &mut part.feedback) {
-                part.grow_old();
-                // Told once: from then on its joints are lost, and those of the others are waited for.
-                if !part.has_failed && answer.is_ok() {
-                    self.failed.store(index, Relaxed);
-                    answer = Err(error);
-                }
-                part.has_failed = true;
+            if let Err(error) = part.driver.exchange(&part.setpoint, &mut part.feedback)
+                && part.is_first_failure()
+                && self.failure.is_none()
+            {
+                self.failed.store(index, Relaxed);
+                self.failure = Some(error);
             }
             part.give(feedback, &mut self.latches);
         }
-        answer
+        // An answer that was a place of its own all along would be copied to where it goes in every period.
+        if self.failure.is_some() { self.failure.take().map_or(Ok(()), Err) } else { Ok(()) }
     }
 
     fn quick_stop(&mut self) {
@@ -198,9 +269,15 @@ impl Driver for Composite {
     }
 
     fn explain(&self, joint: u32, code: u32) -> Words {
-        let of = |part: &Part| Some(part.driver.explain(part.share.own_joint(joint as usize)? as u32, code));
+        let of = |part: &Part| Some(part.driver.explain(part.share.joints.own(joint)?, code));
         self.parts.iter().find_map(of).unwrap_or_default()
     }
+}
+
+/// Whether some of what is zero in most periods is not.
+#[inline]
+fn has_orders(setpoint: &Setpoint) -> bool {
+    setpoint.reset | setpoint.homing | setpoint.limited | setpoint.arm.edge != 0
 }
 
 /// An answer whose refusal names the driver.

@@ -117,7 +117,7 @@ impl Drives {
     /// What a code of the drive of `joint` means. Host; may allocate.
     pub fn explain(&self, joint: usize, code: u32) -> Words {
         let of = |made: &UnopenedDriver| match &made.share {
-            Some(share) => share.own_joint(joint).map(|own| made.driver.explain(own as u32, code)),
+            Some(share) => share.joints.own(joint as u32).map(|own| made.driver.explain(own, code)),
             None => Some(made.driver.explain(joint as u32, code)),
         };
         self.all.iter().find_map(of).unwrap_or_default()
@@ -179,7 +179,7 @@ fn entry(made: &UnopenedDriver) -> Entry {
         title: made.title.clone(),
         section: made.section.clone(),
         description: made.driver.describe(),
-        joints: made.share.as_ref().map(|share| share.joints().to_vec()),
+        joints: made.share.as_ref().map(|share| share.joints.pairs().map(|(_, joint)| joint).collect()),
         spindle: made.share.as_ref().is_none_or(|share| share.spindle),
     }
 }
@@ -203,7 +203,7 @@ impl UnopenedDriver {
         if self.driver.describe().slow == 0 {
             return Ok(self);
         }
-        if self.share.as_ref().is_none_or(|share| !share.joints().is_empty()) {
+        if self.share.as_ref().is_none_or(|share| !share.joints.runs().is_empty()) {
             let cause =
                 format!("driver {} takes longer than a fine period to answer: it can move no joint", self.title);
             return Err(refusal(machine, &self.section, cause));

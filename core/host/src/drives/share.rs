@@ -6,11 +6,10 @@ use tandem_sdk::{Arm, Attached, AxisVector, DriverContext, MAX_AXES};
 /// The part of the machine that one of several drivers has; its own numbers count from 0 in the order of the machine file.
 #[derive(Clone, Debug, Default)]
 pub struct Share {
-    /// The machine's number of each of the driver's joints, and how many there are.
-    joints: [usize; MAX_AXES],
-    count: usize,
-    pub inputs: Lines,
-    pub outputs: Lines,
+    /// At most [`MAX_AXES`].
+    pub joints: Numbers,
+    pub inputs: Numbers,
+    pub outputs: Numbers,
     /// The machine's number of each of the driver's analog inputs.
     pub analog: Vec<usize>,
     pub spindle: bool,
@@ -19,41 +18,29 @@ pub struct Share {
 impl Share {
     /// What `owned` says, on a machine whose joints are called `names`. Where it names a joint that is none: that name.
     pub fn of(owned: &Owned, names: &[&str]) -> Result<Self, String> {
-        let mut this = Self {
-            inputs: Lines::of(&owned.inputs),
-            outputs: Lines::of(&owned.outputs),
+        let number = |name: &String| names.iter().position(|other| other == name).map(|joint| joint as u32);
+        let joints: Result<Vec<u32>, String> =
+            owned.joints.iter().map(|name| number(name).ok_or_else(|| name.clone())).collect();
+        if let Some(beyond) = owned.joints.get(MAX_AXES) {
+            return Err(beyond.clone());
+        }
+        Ok(Self {
+            joints: Numbers::of(&joints?),
+            inputs: Numbers::of(&owned.inputs),
+            outputs: Numbers::of(&owned.outputs),
             analog: owned.analog.iter().map(|number| *number as usize).collect(),
             spindle: owned.spindle,
-            ..Self::default()
-        };
-        for name in &owned.joints {
-            let joint = names.iter().position(|other| other == name).ok_or_else(|| name.clone())?;
-            let Some(entry) = this.joints.get_mut(this.count) else { return Err(name.clone()) };
-            *entry = joint;
-            this.count += 1;
-        }
-        Ok(this)
-    }
-
-    /// The machine's numbers of the driver's joints. Any loop; does not allocate.
-    #[inline]
-    pub fn joints(&self) -> &[usize] {
-        &self.joints[..self.count]
-    }
-
-    /// The driver's number of a joint of the machine.
-    pub fn own_joint(&self, joint: usize) -> Option<usize> {
-        self.joints().iter().position(|own| *own == joint)
+        })
     }
 
     /// The driver's part of what the driver of the whole machine is told.
     pub fn context(&self, whole: &DriverContext) -> DriverContext {
         let mut context = *whole;
-        context.joint_count = self.count as u32;
+        context.joint_count = self.joints.pairs().count() as u32;
         context.start_position = AxisVector::ZERO;
-        for (own, joint) in self.joints().iter().enumerate() {
-            context.joints[own] = whole.joints[*joint];
-            context.start_position[own] = whole.start_position[*joint];
+        for (own, joint) in self.joints.pairs() {
+            context.joints[own] = whole.joints[joint];
+            context.start_position[own] = whole.start_position[joint];
         }
         context.inputs = self.inputs.to_own(whole.inputs);
         context.outputs = self.outputs.to_own(whole.outputs);
@@ -65,26 +52,14 @@ impl Share {
 
     /// Adds what the driver said of its joints to what all have said.
     pub fn add_to(&self, all: &mut Attached, own: &Attached) {
-        all.known |= self.machine_bits(own.known);
-        all.homed |= self.machine_bits(own.homed);
-        for (i, joint) in self.joints().iter().enumerate() {
-            all.position[*joint] = own.position[i];
-            all.state[*joint] = own.state[i];
-            all.fault_code[*joint] = own.fault_code[i];
-            all.delay_periods[*joint] = own.delay_periods[i];
+        all.known |= self.joints.to_machine(u64::from(own.known)) as u32;
+        all.homed |= self.joints.to_machine(u64::from(own.homed)) as u32;
+        for (i, joint) in self.joints.pairs() {
+            all.position[joint] = own.position[i];
+            all.state[joint] = own.state[i];
+            all.fault_code[joint] = own.fault_code[i];
+            all.delay_periods[joint] = own.delay_periods[i];
         }
-    }
-
-    /// Bits of the machine's joints as the driver numbers them. Any loop; does not allocate.
-    #[inline]
-    pub fn own_bits(&self, bits: u32) -> u32 {
-        self.joints().iter().enumerate().fold(0, |own, (i, joint)| own | (bits >> joint & 1) << i)
-    }
-
-    /// Bits of the driver's joints as the machine numbers them. Any loop; does not allocate.
-    #[inline]
-    pub fn machine_bits(&self, own: u32) -> u32 {
-        self.joints().iter().enumerate().fold(0, |bits, (i, joint)| bits | (own >> i & 1) << joint)
     }
 
     /// What the driver is to catch: nothing where the input is not its. Any loop; does not allocate.
@@ -95,13 +70,14 @@ impl Share {
     }
 }
 
-/// Digital lines of the machine that a driver has, as runs of consecutive numbers on both sides: most have one.
+/// The machine's numbers of the joints or digital lines that a driver has, in its order, as runs of consecutive numbers on both
+/// sides: most have one.
 #[derive(Clone, Debug, Default)]
-pub struct Lines(Vec<Run>);
+pub struct Numbers(Vec<Run>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run {
-    /// The machine's number of the first line.
+    /// The machine's number of the first of them.
     pub machine: u32,
     /// The driver's number of it.
     pub own: u32,
@@ -114,8 +90,8 @@ impl Run {
     }
 }
 
-impl Lines {
-    /// The lines with these numbers of the machine, in the driver's order.
+impl Numbers {
+    /// These numbers of the machine, in the driver's order; all are below 64.
     pub fn of(numbers: &[u32]) -> Self {
         let mut runs: Vec<Run> = vec![];
         for (own, machine) in (0..).zip(numbers.iter().copied()) {
@@ -133,6 +109,11 @@ impl Lines {
         &self.0
     }
 
+    /// Each of them as the driver and as the machine numbers it, in the driver's order. Does not allocate.
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.0.iter().flat_map(|run| (0..run.count).map(|i| ((run.own + i) as usize, (run.machine + i) as usize)))
+    }
+
     /// Bits of the machine as the driver numbers them. Any loop; does not allocate.
     #[inline]
     pub fn to_own(&self, bits: u64) -> u64 {
@@ -145,13 +126,13 @@ impl Lines {
         self.0.iter().fold(0, |bits, run| bits | (own >> run.own & run.mask()) << run.machine)
     }
 
-    /// The driver's number of a line of the machine. Any loop; does not allocate.
+    /// The driver's number of one of the machine's. Any loop; does not allocate.
     pub fn own(&self, machine: u32) -> Option<u32> {
         let run = self.0.iter().find(|run| (run.machine..run.machine + run.count).contains(&machine))?;
         Some(run.own + (machine - run.machine))
     }
 
-    /// The machine's number of a line of the driver. Any loop; does not allocate.
+    /// The machine's number of one of the driver's. Any loop; does not allocate.
     pub fn machine(&self, own: u32) -> Option<u32> {
         let run = self.0.iter().find(|run| (run.own..run.own + run.count).contains(&own))?;
         Some(run.machine + (own - run.own))
@@ -163,15 +144,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_keep_the_order_of_the_driver() {
-        let lines = Lines::of(&[8, 9, 10, 3, 63]);
-        assert_eq!(lines.runs().len(), 3);
-        assert_eq!(lines.to_own(1 << 9 | 1 << 3 | 1 << 63 | 1 << 4), 0b11010);
-        assert_eq!(lines.to_machine(0b11010 | 1 << 7), 1 << 9 | 1 << 3 | 1 << 63);
-        assert_eq!((lines.own(3), lines.own(4), lines.machine(4), lines.machine(5)), (Some(3), None, Some(63), None));
+    fn numbers_keep_the_order_of_the_driver() {
+        let numbers = Numbers::of(&[8, 9, 10, 3, 63]);
+        assert_eq!(numbers.runs().len(), 3);
+        assert_eq!(numbers.to_own(1 << 9 | 1 << 3 | 1 << 63 | 1 << 4), 0b11010);
+        assert_eq!(numbers.to_machine(0b11010 | 1 << 7), 1 << 9 | 1 << 3 | 1 << 63);
+        assert_eq!(
+            (numbers.own(3), numbers.own(4), numbers.machine(4), numbers.machine(5)),
+            (Some(3), None, Some(63), None)
+        );
         let all: Vec<u32> = (0..64).collect();
-        let all = Lines::of(&all);
+        let all = Numbers::of(&all);
         assert_eq!((all.runs().len(), all.to_own(u64::MAX), all.to_machine(u64::MAX)), (1, u64::MAX, u64::MAX));
-        assert_eq!(Lines::default().to_machine(u64::MAX), 0);
+        assert_eq!(Numbers::default().to_machine(u64::MAX), 0);
     }
 }

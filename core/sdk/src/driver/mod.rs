@@ -91,8 +91,8 @@ pub trait Driver: Send {
 
     /// On a machine with several drivers, before the exchanges of a period: what takes its time on a wire may begin here with
     /// `setpoint`, which the exchange of the same period is given again, so that the drivers wait for their answers together. An
-    /// exchange without it sends by itself. Fine loop: no allocation, no lock, bounded time. A driver that sends and receives in
-    /// one go leaves it out.
+    /// exchange without it sends by itself, as that of the driver does whose exchange comes first. Fine loop: no allocation, no
+    /// lock, bounded time. A driver that sends and receives in one go leaves it out.
     fn send(&mut self, _setpoint: &Setpoint) {}
 
     /// One fine period: sends `setpoint`, fills `feedback`, which it is given as it left it. Fine loop: no allocation, no lock,
