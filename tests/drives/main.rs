@@ -5,6 +5,7 @@
 #[path = "../counting_allocator.rs"]
 mod counting_allocator;
 mod double;
+mod ethercat;
 mod keeper;
 mod mapping;
 mod measures;
@@ -20,7 +21,7 @@ use tandem_rings::Sample;
 /// A registry with the driver for tests beside those that are needed.
 fn registry() -> Registry {
     let mut registry = Registry::default();
-    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, double::plugin()] {
+    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, tandem_ethercat::PLUGIN, double::plugin()] {
         registry.register(plugin).unwrap();
     }
     registry

@@ -36,6 +36,9 @@ const STATE_NS: u64 = 10_000_000_000;
 /// Pause between two looks at a state, ns.
 const LOOK_NS: u64 = 1_000_000;
 
+/// Share of the time for enabling after which a drive that is not enabled says why.
+const ENABLE_SHARE: f64 = 0.98;
+
 /// Units of an EtherCAT slave controller that map logical addresses.
 const FMMUS: u16 = 8;
 
@@ -256,6 +259,8 @@ async fn set_up(
             let counts = device.counts_per_unit(description.is_none_or(|joint| joint.rotary != 0)).unwrap_or(1.0);
             let homing_percent = description.map_or(f64::INFINITY, |joint| joint.homing_torque_percent);
             let constants = judge_drive(&objects, device, moves, counts, homing_percent, context.fine_period_s).await?;
+            // It says in which state it stays before the host gives up.
+            let constants = Constants { enable_s: options.enable_s * ENABLE_SHARE, ..constants };
             if options.drives_watch_following && joint.is_some() {
                 judge_window(&objects).await?;
             }
@@ -337,6 +342,7 @@ async fn judge_drive(
         max_torque,
         homing_torque: homing_torque.min(max_torque),
         period_s,
+        enable_s: f64::INFINITY,
     })
 }
 

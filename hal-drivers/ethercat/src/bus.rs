@@ -326,7 +326,7 @@ impl Bus {
     fn report(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) {
         feedback.latches = [tandem_sdk::Latch::default(); tandem_sdk::MAX_LATCHES];
         let mut latches = 0;
-        let mut spindle_trouble = false;
+        let mut spindle_trouble = None;
         for member in &mut self.members {
             let options = &self.options.devices[member.ready.options];
             if member.lost.is_none() {
@@ -347,16 +347,20 @@ impl Bus {
                     }
                 }
                 Moves::Spindle { at_speed_share, .. } => {
-                    let state = if lost.is_some() { JointState::Lost } else { drive.state().0 };
-                    spindle_trouble = matches!(state, JointState::Fault | JointState::Lost);
+                    let (state, code) = lost.map_or_else(|| drive.state(), |code| (JointState::Lost, code));
+                    spindle_trouble = matches!(state, JointState::Fault | JointState::Lost).then_some(code);
                     let at_speed = drive.is_at_speed(setpoint.spindle_rad_per_s, at_speed_share);
-                    feedback.spindle_at_speed = u32::from(at_speed && !spindle_trouble);
+                    feedback.spindle_at_speed = u32::from(at_speed && spindle_trouble.is_none());
                 }
             }
         }
-        if spindle_trouble && feedback.state[0] == JointState::Enabled {
+        let joints = self.context.joint_count as usize;
+        if let Some(code) = spindle_trouble
+            && joints > 0
+            && feedback.state[..joints].iter().all(|state| *state == JointState::Enabled)
+        {
             // The contract has no state for a spindle: what stops the axes on their ramps is a joint's.
-            (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE);
+            (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE + code);
         }
         if let Some(phase_ns) = self.phase_ns {
             (feedback.has_phase, feedback.phase_ns) = (1, phase_ns);

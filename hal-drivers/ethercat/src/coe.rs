@@ -1,6 +1,6 @@
 //! Objects of a device, read and written by SDO.
 
-use ethercrab::error::{Error, MailboxError};
+use ethercrab::error::{CoeAbortCode, Error, MailboxError};
 use ethercrab::{SubDevice, SubDeviceRef};
 
 use crate::map::{Entry, Map};
@@ -62,7 +62,10 @@ impl Objects<'_, '_> {
         };
         match value {
             Ok(value) => Ok(Some(value)),
-            Err(Error::Mailbox(MailboxError::Aborted { .. })) => Ok(None),
+            Err(Error::Mailbox(MailboxError::Aborted {
+                code: CoeAbortCode::NotFound | CoeAbortCode::SubIndexNotFound,
+                ..
+            })) => Ok(None),
             Err(error) => Err(self.failed("reading", index, sub, &error)),
         }
     }

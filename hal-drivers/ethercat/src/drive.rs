@@ -95,6 +95,8 @@ pub(crate) struct Constants {
     pub(crate) max_torque: u16,
     pub(crate) homing_torque: u16,
     pub(crate) period_s: f64,
+    /// How long it may take to be enabled, s, before that is a fault of its own.
+    pub(crate) enable_s: f64,
 }
 
 /// One drive.
@@ -123,6 +125,7 @@ pub(crate) struct Drive {
     quick: bool,
     reset_left: u32,
     mode_waits: u32,
+    enable_waits: u32,
     code: u32,
     homing: HomingPhase,
     probe: Option<Probe>,
@@ -221,6 +224,7 @@ impl Drive {
             quick: false,
             reset_left: 0,
             mode_waits: 0,
+            enable_waits: 0,
             code: 0,
             homing: HomingPhase::Idle,
             probe: device.probe.map(Probe::new),
@@ -339,12 +343,14 @@ impl Drive {
         if !wanted {
             self.was_enabled = false;
             self.mode_waits = 0;
+            self.enable_waits = 0;
         }
         self.wanted = wanted;
         if setpoint.reset != 0 {
             self.code = 0;
             self.was_enabled = false;
             self.mode_waits = 0;
+            self.enable_waits = 0;
             self.reset_left = (RESET_S / self.constants.period_s).ceil() as u32;
         }
         if let Moves::Joint(joint) = self.constants.moves {
@@ -460,6 +466,11 @@ impl Drive {
             }
         } else if self.was_enabled {
             self.code = own::LET_GO;
+        } else {
+            self.enable_waits += 1;
+            if f64::from(self.enable_waits) * self.constants.period_s > self.constants.enable_s {
+                self.code = own::NEVER_ENABLED | u32::from(self.status & 0xff);
+            }
         }
     }
 

@@ -40,11 +40,6 @@ impl Map {
         }
         None
     }
-
-    /// Length in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        self.0.iter().map(|entry| usize::from(entry.bits)).sum::<usize>().div_ceil(8)
-    }
 }
 
 pub(crate) fn u16_at(bytes: &[u8], at: usize) -> u16 {
@@ -69,7 +64,7 @@ mod tests {
     #[test]
     fn objects_lie_behind_each_other() {
         let map = Map(vec![Entry::new(0x6041, 16), Entry::new(0x6061, 8), Entry::new(0, 8), Entry::new(0x6064, 32)]);
-        assert_eq!((map.place(0x6041, 16), map.place(0x6064, 32), map.bytes()), (Some(0), Some(4), 8));
+        assert_eq!((map.place(0x6041, 16), map.place(0x6064, 32)), (Some(0), Some(4)));
         assert_eq!((map.place(0x6064, 16), map.place(0x606C, 32)), (None, None));
         assert_eq!(
             Entry::of(Entry { index: 0x6099, sub: 1, bits: 32 }.word()),

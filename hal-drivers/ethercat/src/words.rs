@@ -16,8 +16,10 @@ pub(crate) mod own {
     pub(crate) const HOMING: u32 = 0x2_0005;
     /// The host fell silent while the joint moved.
     pub(crate) const SILENT_HOST: u32 = 0x2_0006;
-    /// The drive of the spindle is in trouble.
-    pub(crate) const SPINDLE: u32 = 0x2_0007;
+    /// The drive was told to enable and does not; the low 8 bits are of its status word.
+    pub(crate) const NEVER_ENABLED: u32 = 0x3_0000;
+    /// Added to a code of the spindle's drive, which no joint has.
+    pub(crate) const SPINDLE: u32 = 0x10_0000;
 }
 
 /// What a state of the bus is called.
@@ -153,7 +155,13 @@ pub(crate) fn joint_code(code: u32) -> String {
         own::MODE => "it shows another mode of operation (6061) than it was asked for (6060)".to_string(),
         own::HOMING => "it says that its homing failed (6041 bit 13)".to_string(),
         own::SILENT_HOST => "it was stopped, because the computer told it nothing while it moved".to_string(),
-        own::SPINDLE => "the drive of the spindle is in a fault, or not reached".to_string(),
+        0x3_0000..=0x3_ffff => {
+            format!("it was told to enable, and its status (6041) stays at \"{}\"", status((code & 0xffff) as u16))
+        }
+        own::SPINDLE.. => match joint_code(code - own::SPINDLE) {
+            words if words.is_empty() => format!("the spindle's drive has the fault {:#06x}", code - own::SPINDLE),
+            words => format!("the spindle's drive: {words}"),
+        },
         0x1_0000..=0x1_ffff => {
             let code = (code & 0xffff) as u16;
             format!("it left OP: {code:04X}, {}", al_code(code))

@@ -1,0 +1,298 @@
+//! EtherCAT drives behind the host, on the emulator and on virtual time: what goes wrong in any frame of a program.
+
+use tandem_host::{Clock, Run, Switches};
+use tandem_machine::Machine;
+use tandem_rig::Random;
+
+use crate::{Samples, program, registry};
+
+/// All joints move, one past the end of the 32 bits that its drive counts in.
+const SHORT: &str = "G21 G90 G94 F4000\nG1 X0.25 Y-0.3 Z0.2\nG1 X0 Y0 Z-0.1\nM2\n";
+
+/// Three drives and a terminal, with a machine of its own for every seed: limits, counts, directions, patience, period.
+fn table(seed: u64, faults: &str, options: &str) -> String {
+    let mut random = Random::new(seed);
+    let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
+    let period_ms = random.pick(&[1, 2]);
+    text += &format!("[loops]\nfine_period_ms = {period_ms}\nrough_period_ms = {}\n", 8 * period_ms);
+    for axis in ["x", "y", "z"] {
+        text += &format!(
+            "[axes.{axis}]\ntravel_mm = [-250, 250]\nmax_feed_mm_per_min = {}\nmax_acceleration_mm_per_s2 = {}\n\
+             max_following_error_mm = 2\n",
+            3000 + random.below(6000),
+            500 + random.below(1500)
+        );
+    }
+    text += "[drivers.bus]\nplugin = \"ethercat\"\njoints = [\"x\", \"y\", \"z\"]\ninputs = [0, 1, 2, 3]\n\
+             [drivers.bus.options]\ninterface = \"emulated\"\n";
+    text += &format!("max_lost_frames = 2\nwatchdog_ms = {}\n{options}\n", 20 * period_ms);
+    for (position, axis) in ["x", "y", "z"].iter().enumerate() {
+        let counts = 1000 + random.below(9000);
+        let zero = if *axis == "y" { i64::from(i32::MAX) - 500 } else { 0 };
+        text += &format!(
+            "[[drivers.bus.options.devices]]\nposition = {position}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{axis}\"\n\
+             counts_per_mm = {counts}\ninvert = {}\nzero_counts = {zero}\n",
+            random.below(2) == 1
+        );
+    }
+    text += "[[drivers.bus.options.devices]]\nposition = 3\nproduct = \"2:0x03f03052\"\ninputs = [0, 1, 2, 3]\n";
+    text += "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\n";
+    text += &format!(
+        "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\ndrive = {{ position_counts = {}.0 }}\n",
+        i64::from(i32::MAX) - 500
+    );
+    text += "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\ndrive = { brake_open_ms = 40.0, brake_close_ms = 30.0 }\n";
+    text += "[[drivers.bus.options.emulated.devices]]\nkind = \"digital-inputs\"\n";
+    text + faults
+}
+
+fn fault(at: &str, lasts: &str, what: &str) -> String {
+    let lasts = if lasts.is_empty() { String::new() } else { format!("lasts = {{ {lasts} }}\n") };
+    format!("[[drivers.bus.options.emulated.faults]]\nat = {{ {at} }}\n{lasts}what = {{ {what} }}\n")
+}
+
+fn machine(text: &str) -> Machine {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("machine.toml");
+    std::fs::write(&path, text).unwrap();
+    Machine::read(&path, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// How many machines are tried.
+fn seeds() -> u64 {
+    std::env::var("TANDEM_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(1)
+}
+
+/// What a run came to: its samples, and the words of its fault or of its refusal.
+struct Ran {
+    samples: Samples,
+    fault: Option<String>,
+    refused: bool,
+}
+
+fn ran(text: &str) -> Ran {
+    let machine = machine(text);
+    let run = match Run::prepare(machine, &registry(), program(SHORT), Switches::default()) {
+        Ok(run) => run,
+        Err(error) => return Ran { samples: Samples::default(), fault: Some(error.to_string()), refused: true },
+    };
+    let mut samples = Samples::default();
+    match run.drive(Clock::Virtual, &[], &mut samples) {
+        Ok(outcome) => Ran { samples, fault: outcome.summary.fault, refused: false },
+        Err(error) => Ran { samples, fault: Some(error.to_string()), refused: true },
+    }
+}
+
+/// Every setpoint within the limits of its axis, and the last one at rest.
+fn judge(case: &str, text: &str, samples: &Samples) {
+    let machine = machine(text);
+    for window in samples.0.windows(3) {
+        for axis in 0..3 {
+            let at = |i: usize| window[i].command[axis];
+            let before = (at(1) - at(0)) / machine.fine_period_s;
+            let after = (at(2) - at(1)) / machine.fine_period_s;
+            let limit = machine.limits.axes()[axis];
+            assert!(after.abs() <= limit.feed_mm_per_s * (1.0 + 1e-9), "{case}: axis {axis}: {after} mm/s");
+            let change = (after - before).abs() / machine.fine_period_s;
+            assert!(change <= limit.acceleration_mm_per_s2 * (1.0 + 1e-6), "{case}: axis {axis}: {change} mm/s²");
+        }
+    }
+    if let [.., before, last] = &samples.0[..] {
+        assert_eq!(last.command, before.command, "{case}: it is at rest");
+    }
+}
+
+/// The frame of process data, from 1, in which the program's first sample was sent, and the number of its samples.
+fn frames(seed: u64) -> (u64, u64) {
+    let whole = ran(&table(seed, "", ""));
+    assert_eq!(whole.fault, None);
+    // A reply that is lost in frame n is missing in sample n − first.
+    for n in (1..4000).step_by(20) {
+        let lost = fault(&format!("cycle = {n}"), "cycles = 1", "kind = \"lost-reply\"");
+        let ran = ran(&table(seed, &lost, ""));
+        if let Some(seen) = ran.samples.0.iter().position(|sample| sample.age_periods[0] > 0) {
+            return (n - seen as u64, whole.samples.0.len() as u64);
+        }
+    }
+    panic!("no frame of the program was found");
+}
+
+/// What goes wrong for good at any frame is a fault that names the device and says why; the joints come to rest within their limits.
+#[test]
+fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
+    for seed in 0..seeds() {
+        let (first, count) = frames(seed);
+        for (lasts, what, words) in [
+            ("ms = 1e6", "kind = \"lost-reply\"", "no frame comes back"),
+            ("ms = 1e6", "kind = \"lost-request\"", "no frame comes back"),
+            ("", "kind = \"cut\", behind = 1", "device 2: the working counter says"),
+            ("", "kind = \"deaf\", device = 1", "device 1: the working counter says"),
+            (
+                "",
+                "kind = \"drive-fault\", device = 2, code = 0x7305",
+                "axis Z reports fault 0x7305 (device 2: encoder 1)",
+            ),
+            (
+                "",
+                "kind = \"al-error\", device = 1, state = \"safe-op\", code = 0x1a",
+                "device 1: it left OP: 001A, synchron",
+            ),
+            (
+                "",
+                "kind = \"al-error\", device = 0, state = \"safe-op\", code = 0x2c",
+                "device 0: it left OP: 002C, fatal",
+            ),
+            ("", "kind = \"disables-itself\", device = 0", "device 0: it let go by itself"),
+            ("", "kind = \"torque-off\", device = 1", "device 1: it let go by itself"),
+            ("", "kind = \"power-cycle\", device = 1", "device 1: "),
+        ] {
+            for n in first..first + count - 4 {
+                let case = format!("seed {seed}: {what} in frame {n}, {} of the program", n - first);
+                let text = table(seed, &fault(&format!("cycle = {n}"), lasts, what), "");
+                let ran = ran(&text);
+                judge(&case, &text, &ran.samples);
+                let told = ran.fault.unwrap_or_else(|| panic!("{case}: nobody noticed"));
+                assert!(!ran.refused && told.contains(words), "{case}: {told}");
+            }
+        }
+    }
+}
+
+/// What is over within the driver's patience, and what no device was meant by, changes not one command.
+#[test]
+fn what_passes_within_patience_changes_no_command() {
+    for seed in 0..seeds() {
+        let (first, count) = frames(seed);
+        let whole = ran(&table(seed, "", ""));
+        let commands = |ran: &Ran| ran.samples.0.iter().map(|sample| sample.command).collect::<Vec<_>>();
+        let undisturbed = commands(&whole);
+        for (lasts, what, old) in [
+            ("cycles = 1", "kind = \"lost-reply\"", 1),
+            ("cycles = 2", "kind = \"lost-request\"", 2),
+            ("cycles = 1", "kind = \"late\", by_us = 3500.0", 1),
+            ("cycles = 1", "kind = \"late\", by_us = 100.0", 0),
+            ("cycles = 1", "kind = \"duplicate\", after_us = 50.0", 0),
+            ("cycles = 1", "kind = \"duplicate\", after_us = 4200.0", 0),
+            ("cycles = 1", "kind = \"swapped\"", 1),
+            ("cycles = 1", "kind = \"corrupt\", byte = 20, mask = 255", 1),
+            ("cycles = 1", "kind = \"corrupt\", byte = 26, mask = 1", 1),
+            ("cycles = 1", "kind = \"truncated\", bytes = 40", 1),
+            ("cycles = 1", "kind = \"foreign\"", 0),
+            ("cycles = 1", "kind = \"stray\"", 0),
+            ("cycles = 2", "kind = \"deaf\", device = 1", 2),
+        ] {
+            for n in first..first + count - 6 {
+                let case = format!("seed {seed}: {what} in frame {n}, {} of the program", n - first);
+                let ran = ran(&table(seed, &fault(&format!("cycle = {n}"), lasts, what), ""));
+                assert_eq!(ran.fault, None, "{case}");
+                assert!(commands(&ran) == undisturbed, "{case}: another command was sent");
+                let oldest = ran.samples.0.iter().map(|sample| sample.age_periods[1]).max().unwrap();
+                assert_eq!(oldest, old, "{case}: age of the feedback");
+                let back = ran.samples.0.last().unwrap().age_periods[1];
+                assert_eq!(back, 0, "{case}: it is new again");
+            }
+        }
+    }
+}
+
+/// What is wrong from the start on is refused, or given up, in words that name the device.
+#[test]
+fn what_is_wrong_from_the_start_is_refused_in_words() {
+    let always = |what: &str| fault("ms = 0.0", "", what);
+    for (what, words) in [
+        (
+            "kind = \"refuse-state\", device = 2, state = \"safe-op\", code = 0x1d",
+            "device 2 (z): it refuses SAFE-OP and is in PRE-OP: 001D",
+        ),
+        ("kind = \"refuse-state\", device = 2, state = \"safe-op\", code = 0x1e", "001E, invalid input configuration"),
+        ("kind = \"refuse-state\", device = 0, state = \"safe-op\", code = 0x35", "0035, the cycle time of SYNC0"),
+        (
+            "kind = \"refuse-state\", device = 1, state = \"op\", code = 0x32",
+            "device 1 (y): it refuses OP and is in SAFE-OP: 0032",
+        ),
+        (
+            "kind = \"hang-state\", device = 1, state = \"op\"",
+            "device 1 (y): it stays in SAFE-OP and does not come to OP",
+        ),
+        (
+            "kind = \"hang-state\", device = 1, state = \"safe-op\"",
+            "device 1 (y): it stays in PRE-OP and does not come to SAFE-OP",
+        ),
+        (
+            "kind = \"sdo-abort\", device = 2, index = 0x60c2, sub = 1, abort = 0x06090030",
+            "device 2 (z): reading 60C2:01: it refuses",
+        ),
+        (
+            "kind = \"sdo-abort\", device = 1, index = 0x1600, sub = 1, abort = 0x06040041",
+            "device 1 (y): writing 1600:01: it refuses",
+        ),
+        ("kind = \"silent-mailbox\", device = 2", "device 2 (z): reading 6502:00: its mailbox does not answer"),
+        ("kind = \"mode-shown\", device = 0, mode = 3", "another mode of operation (6061)"),
+        ("kind = \"never-enables\", device = 1", "device 1: it was told to enable, and its status (6041) stays at"),
+        ("kind = \"brake\", device = 1, open_ms = 6000.0", "axis Y"),
+    ] {
+        let text = table(3, &always(what), "");
+        let ran = ran(&text);
+        let told = ran.fault.unwrap_or_else(|| panic!("{what}: nobody noticed"));
+        assert!(told.contains(words), "{what}: {told}");
+        assert!(ran.samples.0.windows(2).all(|pair| pair[0].command == pair[1].command), "{what}: it moved");
+    }
+    let slow = ran(&table(3, &always("kind = \"brake\", device = 1, open_ms = 3000.0"), ""));
+    assert_eq!(slow.fault, None, "a brake of 3 s is waited for");
+}
+
+/// Another bus than the machine file's is refused, with what is there.
+#[test]
+fn another_bus_is_refused_with_what_is_there() {
+    let text = table(4, "", "");
+    let emulated = "[[drivers.bus.options.emulated.devices]]\n";
+    let of_file = "[[drivers.bus.options.devices]]\nposition = 1\n";
+    for (case, changed, words) in [
+        (
+            "one device less",
+            text.replacen(&format!("{emulated}kind = \"digital-inputs\"\n"), "", 1),
+            "3 devices are on the bus, and the machine file has 4",
+        ),
+        (
+            "one more",
+            format!("{text}{emulated}kind = \"coupler\"\n"),
+            "5 devices are on the bus, and the machine file has 4",
+        ),
+        (
+            "swapped",
+            {
+                let terminal = format!("{emulated}kind = \"digital-inputs\"\n");
+                let without = text.replacen(&terminal, "", 1);
+                without.replacen(emulated, &format!("{terminal}{emulated}"), 1)
+            },
+            "device 0 (x): its vendor is 0x0002, and the machine file wants 0x0e1a",
+        ),
+        ("vendor", text.replacen("0x0e1a:0x0402", "0x0e1b:0x0402", 1), "device 0 (x): its vendor is 0x0e1a"),
+        ("product", text.replacen("0x0e1a:0x0402", "0x0e1a:0x0403", 1), "device 0 (x): its product is 0x0402"),
+        (
+            "revision",
+            text.replacen(of_file, &format!("{of_file}revision = 7\n"), 1),
+            "device 1 (y): its revision is 0x1, and the machine file wants 0x7",
+        ),
+        (
+            "alias",
+            text.replacen(of_file, "[[drivers.bus.options.devices]]\nalias = 1001\n", 1),
+            "devices[1]: no device on the bus has the alias 1001",
+        ),
+    ] {
+        let told = ran(&changed).fault.unwrap_or_else(|| panic!("{case}: nobody noticed"));
+        assert!(told.contains(words), "{case}: {told}");
+    }
+}
+
+/// The same run again is the same run: every sample to the bit, with clocks that drift too.
+#[test]
+fn runs_repeat_to_the_bit() {
+    for options in ["", "sync = \"dc\"\nphase_us = 250.0"] {
+        let text = table(5, "", options).replacen("kind = \"drive\"\n", "kind = \"drive\"\ndrift_ppm = 80.0\n", 1);
+        let (one, two) = (ran(&text), ran(&text));
+        assert_eq!(one.fault, None, "{options}");
+        assert!(one.samples.0.len() > 20);
+        assert!(format!("{:?}", one.samples.0) == format!("{:?}", two.samples.0), "{options}");
+    }
+}
