@@ -16,6 +16,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/policy", &["tandem-motion", "tandem-sdk"]),
     ("core/machine", &["tandem-sdk"]),
     ("core/rings", &["tandem-sdk"]),
+    ("core/state", &["tandem-gcode", "tandem-machine", "tandem-sdk"]),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),
     ("core/trace", &["tandem-rings", "tandem-sdk"]),
     ("core/recorder", &["tandem-fine", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"]),
@@ -45,6 +46,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-rings",
             "tandem-rough",
             "tandem-sdk",
+            "tandem-state",
         ],
     ),
     (
