@@ -145,6 +145,8 @@ pub struct FineLoop {
     outputs: Outputs,
     /// The drives stay enabled when the program has ended: another job may follow.
     stays: bool,
+    /// Drives hear their heartbeat from the job before: the setpoint's tick goes on from there, in every exchange.
+    beats_on: bool,
     phase: Phase,
     state: MachineState,
     starved: bool,
@@ -216,6 +218,7 @@ impl FineLoop {
             spin_up: SpinUp::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             stays: false,
+            beats_on: false,
             phase: Phase::Waiting,
             state: MachineState::Fault,
             starved: false,

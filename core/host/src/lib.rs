@@ -15,6 +15,7 @@
 //! 8. `clock`: lockstep, and real time
 //! 9. `setup`: from a machine and a program to everything that a run needs
 //! 10. `run`: one run
+//! 11. `resident`: a machine that stays, and drives job after job
 
 mod clock;
 #[cfg(test)]
@@ -26,6 +27,7 @@ mod joints;
 mod messages;
 mod plugins;
 mod policy;
+mod resident;
 mod run;
 mod setup;
 mod soft;
@@ -43,9 +45,10 @@ pub use plugins::loading::load as load_plugins;
 pub use plugins::plugin_log::drain_plugin_log;
 pub use plugins::registry::{PluginRefusal, Registry, moves_metal};
 pub use policy::PolicySetup;
+pub use resident::{JobOutcome, PreparedJob, Resident};
 pub use run::{Outcome, Run};
 pub use setup::parts::{axis_limits, interpreter_config, planner};
-pub use setup::ready::{check_block, check_program, each_block};
+pub use setup::ready::{Memory, check_block, check_program, each_block};
 pub use setup::stand_in::with_stand_ins;
 pub use soft::command::{Command, Timed};
 pub use soft::command_file::parse_commands;

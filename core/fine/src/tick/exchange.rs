@@ -15,7 +15,7 @@ impl FineLoop {
     /// Gives whether all joints hold behind it.
     pub(super) fn exchange(&mut self, axes: &AxisVector) -> bool {
         self.set_joints(axes);
-        self.setpoint.tick = self.tick;
+        self.setpoint.tick = if self.beats_on { self.setpoint.tick + 1 } else { self.tick };
         self.setpoint.arm = self.arm;
         // Where axes are homed, joints are axes.
         self.setpoint.limited = self.outputs.unhomed & self.config.homing_limits;

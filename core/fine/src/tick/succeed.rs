@@ -45,6 +45,7 @@ impl FineLoop {
         (self.setpoint, self.feedback) = (last.setpoint, last.feedback);
         std::mem::swap(&mut self.sent, &mut last.sent);
         std::mem::swap(&mut self.measured, &mut last.measured);
+        self.beats_on = last.setpoint.tick > 0;
         (self.offset, self.axes) = (last.offset, last.axes);
         (self.outputs.bits, self.outputs.spindle_rad_per_s) = (last.outputs.bits, last.outputs.spindle_rad_per_s);
         self.outputs.by = last.outputs.by;

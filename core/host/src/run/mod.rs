@@ -7,6 +7,7 @@
 //! program is an event in the ring; the period that reaches it ends the record. A trace therefore has the same rows on
 //! both clocks.
 
+pub mod job;
 mod summarise;
 
 use std::sync::Arc;
@@ -15,11 +16,11 @@ use std::time::Instant;
 
 use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
-use tandem_machine::{Analog, Machine};
-use tandem_recorder::{LatenessUs, Monitor, PageFaults, Summary};
-use tandem_rings::{HostEnd, Sizes, Switched, bridge};
-use tandem_rough::{RoughConfig, RoughLoop, Source};
-use tandem_sdk::{AxisVector, MAX_AXES, PluginError};
+use tandem_machine::Machine;
+use tandem_recorder::{LatenessUs, PageFaults, Summary};
+use tandem_rings::Switched;
+use tandem_rough::Source;
+use tandem_sdk::{AxisVector, PluginError};
 
 use crate::clock::exchange_time::{self, ExchangeTimes};
 use crate::clock::periods::Timing;
@@ -28,42 +29,25 @@ use crate::clock::wall_clock;
 use crate::clock::wall_clock::Periods;
 use crate::drives::Roster;
 use crate::error::HostError;
-use crate::joints::JointSpace;
-use crate::messages::fault_text::{Known, describe};
 use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
-use crate::policy::{PolicyHost, Reloader};
+use crate::setup::claim::Claim;
 use crate::setup::parts;
 use crate::setup::ready::Ready;
 use crate::setup::rules;
 use crate::soft::command::Timed;
-use crate::soft::soft_loop::{RunObserver, SoftLoop};
-use crate::soft::strategy::FeedRunner;
-use crate::soft::waits::Waits;
+use crate::soft::soft_loop::RunObserver;
 use crate::switches::{Clock, Lead, Switches};
-use summarise::summarise;
+use job::{Job, Made};
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
 pub struct Run {
-    machine: Machine,
-    program: String,
-    rough: RoughLoop,
+    job: Job,
     fine: FineLoop,
-    host: HostEnd,
-    feed: Option<FeedRunner>,
-    policy: Option<PolicyHost>,
-    /// Steps of the velocity that the planner makes use of where blocks meet, per axis, mm/s.
-    speed_difference_mm_per_s: [f64; MAX_AXES],
-    leaves_path: bool,
-    uses_time_constants: bool,
-    joints: Arc<JointSpace>,
     exchange: Arc<ExchangeTimes>,
-    switches: Switches,
     watch: Option<HangWatch>,
     clock: Clock,
-    /// Who is who among the drivers.
-    roster: Roster,
     /// Bit per axis of which the drives did not know where it is when they were attached.
     unknown_axes: u32,
     /// What the first pass found: totals.
@@ -124,55 +108,28 @@ impl Run {
     }
 
     /// Makes the loops around drives that are claimed.
-    fn open(ready: Ready) -> Result<Self, HostError> {
-        let Ready { watch, machine, program, source, policy, planner, claim, feed, joints, checked, switches, .. } =
-            ready;
-        let roster = claim.roster();
-        let drives = roster.describe();
+    fn open(mut ready: Ready) -> Result<Self, HostError> {
+        let elsewhere = Claim::elsewhere(ready.claim.roster());
+        let claim = std::mem::replace(&mut ready.claim, elsewhere);
+        let watch = ready.watch.take();
         let Some((driver, attached)) = claim.into_parts() else {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
-        let description = planner.describe();
-        let depth_s = parts::queue_depth_s(&machine, &joints, description.order);
-        let cuts = 2.0 * depth_s / machine.rough_period_s;
-        let segments = Sizes::segments_for(ready.entries as f64 + cuts);
-        // As lockstep needs it: the samples of each rough period are taken behind it.
-        let sizes = Sizes { samples: machine.fine_periods_per_rough as usize, segments };
-        let (rough_end, fine_end, host) = bridge(sizes);
-        let mut fine_config = parts::fine_config(&machine, &joints, &description, (&drives, &attached), switches);
-        fine_config.record_drives = ready.records_drives;
-        let unknown_axes = joints.axes_moved_by(!(attached.known | attached.homed));
-        host.status.hexadecimal_codes.store(drives.hexadecimal_codes != 0, Relaxed);
-        host.controls.optional_stop.store(switches.optional_stop, Relaxed);
-        let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
-        rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
-        rough_config.awaits_drives = true;
-        for limits in fine_config.limits.axes() {
-            rough_config.count_steps_of(limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3);
-        }
         let exchange = Arc::new(ExchangeTimes::default());
-        let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, Arc::clone(&exchange)));
-        let mut fine = FineLoop::new(&fine_config, fine_end, driver, ready.kinematics);
+        let driver = Box::new(exchange_time::Timed::new(driver, ready.machine.fine_period_s, Arc::clone(&exchange)));
+        let made = Made::of(ready, &attached, false, (Arc::default(), Arc::default()));
+        let mut fine = FineLoop::new(&made.config, made.end, driver, made.kinematics);
         fine.reset();
+        let job = made.job;
+        let simulated = job.roster.describe().simulated != 0;
         Ok(Self {
             watch,
-            rough: RoughLoop::new(rough_config, source, planner, rough_end),
             fine,
-            machine,
-            program,
-            host,
-            feed,
-            policy,
-            switches,
-            speed_difference_mm_per_s: description.speed_difference_mm_per_s,
-            leaves_path: description.leaves_path != 0,
-            uses_time_constants: description.uses_time_constants != 0,
-            joints,
+            clock: job.switches.clock.unwrap_or(if simulated { Clock::Virtual } else { Clock::Wall }),
+            unknown_axes: job.joints.axes_moved_by(!(attached.known | attached.homed)),
             exchange,
-            checked,
-            clock: switches.clock.unwrap_or(if drives.simulated == 0 { Clock::Wall } else { Clock::Virtual }),
-            roster,
-            unknown_axes,
+            checked: job.checked.clone(),
+            job,
         })
     }
 
@@ -183,12 +140,12 @@ impl Run {
 
     /// The operator's end of the run, to give commands from other threads.
     pub fn controls(&self) -> Arc<tandem_rings::Controls> {
-        Arc::clone(&self.host.controls)
+        Arc::clone(&self.job.host.controls)
     }
 
     /// The fine loop's status, to look at from other threads.
     pub fn status(&self) -> Arc<tandem_rings::Status> {
-        Arc::clone(&self.host.status)
+        Arc::clone(&self.job.host.status)
     }
 
     /// The clock that was asked for, or else the one that the driver goes with: real drives live in real time.
@@ -203,30 +160,17 @@ impl Run {
 
     /// Whether the planner makes use of velocity steps where blocks meet.
     pub fn allows_steps(&self) -> bool {
-        self.speed_difference_mm_per_s.iter().any(|step| *step > 0.0)
+        self.job.allows_steps()
     }
 
     /// Whether the planner drives each block with the time constant that it states.
     pub fn uses_time_constants(&self) -> bool {
-        self.uses_time_constants
+        self.job.uses_time_constants
     }
 
     /// Names of the feed strategy's signals, and after them those of the analog inputs.
     pub fn signals(&self) -> Vec<String> {
-        let own = self.feed.as_ref().map_or(&[][..], FeedRunner::signals);
-        own.iter().map(|name| (*name).to_string()).chain(self.machine.analog.iter().map(Analog::signal)).collect()
-    }
-
-    /// Whether the drivers go with this clock; slow ones get their threads.
-    fn begin(&self, clock: Clock) -> Result<(), HostError> {
-        match (clock, self.roster.real()) {
-            (Clock::Virtual, Some(real)) => Err(rules::refuse_virtual(&self.machine, real)),
-            (Clock::Virtual, None) => Ok(()),
-            (Clock::Wall, _) => {
-                let begun = self.roster.begin_threads();
-                begun.map_err(|error| HostError::System(format!("a slow driver has no thread: {error}")))
-            }
-        }
+        self.job.signals()
     }
 
     /// Drives the run to its end. `commands` are given on the virtual clock at their ticks.
@@ -235,65 +179,40 @@ impl Run {
     /// The computer refuses: a thread cannot be started. Real drives are refused on the virtual clock.
     pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
         let started = Instant::now();
-        if let Err(refused) = self.begin(clock) {
+        if let Err(refused) = begin(&self.job.machine, &self.job.roster, clock) {
             let _ = self.fine.into_driver().stop();
             return Err(refused);
         }
-        let machine = self.machine;
         if let Some(watch) = &self.watch {
-            watch.begin(Arc::clone(&self.host.controls), Arc::clone(&self.host.status));
+            watch.begin(self.controls(), self.status());
         }
         let mut fine = self.fine;
-        let mut monitor = Monitor::new(&machine, self.leaves_path);
-        monitor.worst.allow_steps(&self.speed_difference_mm_per_s);
-        monitor.joints = self.joints.watch(machine.fine_period_s);
-        let mut reloader = self.policy.clone().map(Reloader::new);
-        if let (Clock::Wall, Some(reloader)) = (clock, &mut reloader)
-            && let Err(note) = reloader.watch()
-        {
-            observer.note(&note);
-        }
-        let mut soft_loop = SoftLoop::new(self.rough, self.host, self.feed, reloader, monitor, observer);
-        soft_loop.waits = Some(Waits::new(&machine));
-        soft_loop.skips_homing = self.switches.home.is_some();
-        soft_loop.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
-        soft_loop.on_record_error = machine.on_record_error;
-        soft_loop.planner.clone_from(&machine.planner.plugin);
+        let (mut soft_loop, conclusion) = self.job.begin(clock, observer);
+        let machine = &conclusion.machine;
         let mut measured = None;
         self.exchange.measures.store(clock == Clock::Wall, Relaxed);
         match clock {
             Clock::Virtual => virtual_clock::drive(&mut soft_loop, &mut fine, machine.fine_periods_per_rough, commands),
             Clock::Wall => {
                 let watch = self.watch.as_ref().map(HangWatch::for_fine);
-                let timed = wall_clock::drive(&mut soft_loop, fine, periods(&machine), watch)?;
+                let timed = wall_clock::drive(&mut soft_loop, fine, periods(machine), watch)?;
                 (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
             }
         }
-        soft_loop.tell_policy_notes();
-        soft_loop.tell_plugin_log();
         let fault = fine.fault();
-        let mut summary = summarise(&machine, &self.program, clock, &soft_loop, &fine);
-        summary.dry_run = self.switches.dry_run;
-        summary.policy = self.policy.as_ref().map(PolicyHost::summary);
-        summary.stopped = soft_loop.aborted.map(|rest| stopped(rest.line));
+        let mut summary = conclusion.summary(&mut soft_loop, &fine.counters());
         tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
-        let known = Known {
-            soft: soft_loop.soft_cause(),
-            driver: fine.plugin_error(),
-            drives: fine.driver(),
-            roster: &self.roster,
-            late: late.as_deref(),
-        };
-        summary.fault = fault.map(|fault| describe(&machine, &self.joints, &fault, known));
+        let words = |fault: Fault| conclusion.words(&fault, &fine, soft_loop.soft_cause(), late.as_deref());
+        summary.fault = fault.map(words);
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
-        let sent = self.switches.home.is_some() || fine.joints_went_alone();
+        let sent = conclusion.switches.home.is_some() || fine.joints_went_alone();
         let position = if sent { fine.sent() } else { soft_loop.monitor.position };
         let left = fine.left();
         let stopped = fine.into_driver().stop();
         drop(soft_loop);
         if let Err(error) = stopped {
-            not_let_go(&self.roster, &error, &mut summary, observer);
+            not_let_go(&conclusion.roster, &error, &mut summary, observer);
         }
         // What plugins say when they are stopped and dropped.
         drain_plugin_log(&mut |line| observer.note(line));
@@ -302,11 +221,15 @@ impl Run {
     }
 }
 
-/// Where the operator's abort has stopped the program.
-fn stopped(line: u32) -> String {
-    match line {
-        0 => "stopped by the operator before the first line".to_string(),
-        line => format!("stopped by the operator at line {line}"),
+/// Whether the drivers go with this clock; slow ones get their threads.
+pub fn begin(machine: &Machine, roster: &Roster, clock: Clock) -> Result<(), HostError> {
+    match (clock, roster.real()) {
+        (Clock::Virtual, Some(real)) => Err(rules::refuse_virtual(machine, real)),
+        (Clock::Virtual, None) => Ok(()),
+        (Clock::Wall, _) => {
+            let begun = roster.begin_threads();
+            begun.map_err(|error| HostError::System(format!("a slow driver has no thread: {error}")))
+        }
     }
 }
 
@@ -328,7 +251,8 @@ fn not_let_go(roster: &Roster, error: &PluginError, summary: &mut Summary, obser
     }
 }
 
-fn periods(machine: &Machine) -> Periods {
+/// The periods of both loops.
+pub fn periods(machine: &Machine) -> Periods {
     let ns = |seconds: f64| (seconds * 1e9).round() as i64;
     Periods {
         rough_ns: ns(machine.rough_period_s),

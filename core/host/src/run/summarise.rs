@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::FineLoop;
+use tandem_fine::Counters;
 use tandem_machine::{JerkMode, Machine};
 use tandem_recorder::{JointWatch, PlanningUs, SUMMARY_FORMAT, Summary};
 use tandem_sdk::AxisVector;
@@ -10,9 +10,15 @@ use tandem_sdk::AxisVector;
 use crate::soft::soft_loop::SoftLoop;
 use crate::switches::Clock;
 
-/// The summary of what `soft_loop` and `fine` saw; what only the clock or the host knows is added to it.
-pub fn summarise(machine: &Machine, program: &str, clock: Clock, soft_loop: &SoftLoop<'_>, fine: &FineLoop) -> Summary {
-    let (monitor, counters) = (&soft_loop.monitor, fine.counters());
+/// The summary of what `soft_loop` saw and the fine loop counted; what only the clock or the host knows is added to it.
+pub fn summarise(
+    machine: &Machine,
+    program: &str,
+    clock: Clock,
+    soft_loop: &SoftLoop<'_>,
+    counters: &Counters,
+) -> Summary {
+    let monitor = &soft_loop.monitor;
     let axes = &machine.axes;
     let of = |rotary: bool, values: &AxisVector| {
         let shown = |i: usize| if rotary { values[i].to_degrees() } else { values[i] };

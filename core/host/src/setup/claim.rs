@@ -13,6 +13,8 @@ use crate::switches::{Clock, Switches};
 /// The drivers of a machine, and what they said when their drives were claimed. A claim that is dropped stops them.
 pub struct Claim {
     drives: Option<Drives>,
+    /// Who is who, where another has the drives: nothing is claimed here.
+    elsewhere: Option<Roster>,
     faults: Option<Faults>,
     attached: Option<Attached>,
 }
@@ -20,12 +22,23 @@ pub struct Claim {
 impl Claim {
     /// Drivers whose drives are not claimed.
     pub fn new(drives: Drives) -> Self {
-        Self { drives: Some(drives), faults: None, attached: None }
+        Self { drives: Some(drives), elsewhere: None, faults: None, attached: None }
+    }
+
+    /// Drives that another has claimed, which this job is driven on.
+    pub fn elsewhere(roster: Roster) -> Self {
+        Self { drives: None, elsewhere: Some(roster), faults: None, attached: None }
+    }
+
+    /// Whether another has the drives: whoever claimed them has seen to it that they may move.
+    pub fn is_elsewhere(&self) -> bool {
+        self.elsewhere.is_some()
     }
 
     /// Who is who among the drivers.
     pub fn roster(&self) -> Roster {
-        self.drives.as_ref().map_or_else(|| Roster::of_one(DriverDescription::real()), Drives::roster)
+        let elsewhere = || self.elsewhere.clone().unwrap_or_else(|| Roster::of_one(DriverDescription::real()));
+        self.drives.as_ref().map_or_else(elsewhere, Drives::roster)
     }
 
     /// What the drivers together say of themselves.

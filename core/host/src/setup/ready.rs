@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use tandem_faults::{Faults, Joints};
-use tandem_gcode::{CheckReport, Config, Program, Stream, check};
+use tandem_gcode::{CheckReport, Config, Lasting, Ledger, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Kinematics, Planner};
 
-use crate::drives::Drives;
+use crate::drives::{Drives, Roster};
 use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
 use crate::plugins::hang::HangWatch;
@@ -48,6 +48,25 @@ pub struct Ready {
     pub records_drives: bool,
 }
 
+/// What a program on a machine that stays finds from the jobs before, and to whom it tells what it changes.
+#[derive(Clone, Default)]
+pub struct Memory {
+    /// Offsets, parameters and tools as they are when the program begins.
+    pub lasting: Arc<Lasting>,
+    /// What its lines change, until the path reaches them.
+    pub ledger: Ledger,
+}
+
+impl Memory {
+    /// The interpreter's view of the machine with it.
+    pub fn config(&self, machine: &Machine, simulated: bool, switches: Switches) -> Config {
+        let mut config = parts::interpreter_config(machine, simulated, switches);
+        config.tools.clone_from(&self.lasting.tools);
+        config.lasting = Some(Arc::clone(&self.lasting));
+        config
+    }
+}
+
 /// Joints, planner and driver of a machine, as they are made for a run.
 pub struct Plugins {
     pub watch: Option<HangWatch>,
@@ -70,6 +89,16 @@ impl Plugins {
         Ok(Self { watch, joints, planner, claim })
     }
 
+    /// Makes those of a job on drives that are claimed, on a machine that stays. Host; allocates.
+    ///
+    /// # Errors
+    /// One of them is not there, or refuses its options.
+    fn on_drives(machine: &Machine, registry: &Registry, roster: &Roster) -> Result<Self, HostError> {
+        let joints = Arc::new(JointSpace::of(machine, registry)?);
+        let planner = parts::planner_on(machine, registry, &joints)?;
+        Ok(Self { watch: None, joints, planner, claim: Claim::elsewhere(roster.clone()) })
+    }
+
     /// Whether they go with each other, and with what is asked of them.
     ///
     /// # Errors
@@ -77,11 +106,21 @@ impl Plugins {
     pub fn check(&self, machine: &Machine, switches: Switches) -> Result<(), HostError> {
         let (joints, drivers) = (&self.joints, self.claim.roster());
         rules::check(machine, &self.planner.describe(), &drivers)?;
-        rules::check_homing(machine, joints, switches)?;
+        rules::check_homing(machine, joints, switches, self.claim.is_elsewhere())?;
         // A driver that has panicked says so here, and of what it is nothing is known.
         self.claim.check(machine, joints)?;
         rules::check_times(machine, &drivers)?;
         rules::check_real(machine, joints, &drivers, switches.clock)
+    }
+
+    /// The same for a machine that stays: whether its axes are homed is asked before each job.
+    ///
+    /// # Errors
+    /// What does not go together, with its place in the machine file.
+    pub fn check_staying(&self, machine: &Machine, switches: Switches) -> Result<(), HostError> {
+        let mut machine = machine.clone();
+        machine.require_homing = false;
+        self.check(&machine, switches)
     }
 
     /// Puts the machine's faults around the driver.
@@ -163,6 +202,35 @@ impl Ready {
         Ok(Self { entries: passed.entries, ..ready })
     }
 
+    /// Checks the whole program and makes everything for it, on drives that another has claimed, from where the machine stands
+    /// and with what has lasted from the jobs before. Host; allocates.
+    ///
+    /// # Errors
+    /// Everything that refuses: the program's errors, plugins, policy, what does not go together.
+    pub fn of_program_on(
+        roster: &Roster,
+        machine: Machine,
+        registry: &Registry,
+        mut program: Program,
+        switches: Switches,
+        memory: &Memory,
+    ) -> Result<Self, HostError> {
+        let plugins = Plugins::on_drives(&machine, registry, roster)?;
+        plugins.joints.check_start(&machine)?;
+        let simulated = roster.describe().simulated != 0;
+        let config = memory.config(&machine, simulated, switches);
+        let passed = Passed::with(&machine, &plugins, &mut program, &config)?;
+        plugins.check(&machine, switches)?;
+        let policy = PolicyHost::open(&machine)?;
+        feed(&machine, registry, &plugins.joints, policy.as_ref(), 0.0)?;
+        let name = program.name().to_string();
+        let mut stream = Stream::new(program, &config)?;
+        stream.tell(memory.ledger.clone());
+        let source = parts::source(&machine, registry, stream, switches, policy.as_ref(), &plugins.joints)?;
+        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
+        Ok(Self { entries: passed.entries, ..ready })
+    }
+
     /// Makes everything for a run of what `source` gives, which begins where the machine that it is given stands; the drives are
     /// claimed. Host; allocates.
     ///
@@ -175,7 +243,34 @@ impl Ready {
         source: impl FnOnce(&Machine) -> Box<dyn Source + Send>,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let mut plugins = Plugins::of(&machine, registry)?;
+        let plugins = Plugins::of(&machine, registry)?;
+        Self::of_source_with(plugins, machine, registry, name, source, switches)
+    }
+
+    /// The same on drives that another has claimed.
+    ///
+    /// # Errors
+    /// Plugins refuse, or do not go together.
+    pub fn of_source_on(
+        roster: &Roster,
+        machine: Machine,
+        registry: &Registry,
+        name: Option<String>,
+        source: impl FnOnce(&Machine) -> Box<dyn Source + Send>,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let plugins = Plugins::on_drives(&machine, registry, roster)?;
+        Self::of_source_with(plugins, machine, registry, name, source, switches)
+    }
+
+    fn of_source_with(
+        mut plugins: Plugins,
+        machine: Machine,
+        registry: &Registry,
+        name: Option<String>,
+        source: impl FnOnce(&Machine) -> Box<dyn Source + Send>,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
         if !switches.unhomed {
             plugins.joints.check_start(&machine)?;
         }
@@ -236,10 +331,14 @@ impl Passed {
         simulated: bool,
         switches: Switches,
     ) -> Result<Self, HostError> {
+        Self::with(machine, plugins, program, &parts::interpreter_config(machine, simulated, switches))
+    }
+
+    /// The same for a program that begins as `config` says.
+    fn with(machine: &Machine, plugins: &Plugins, program: &mut Program, config: &Config) -> Result<Self, HostError> {
         let depth_s = parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
         let mut density = Density::new(machine, depth_s);
-        let config = parts::interpreter_config(machine, simulated, switches);
-        let report = first_pass(machine, plugins.planner.as_ref(), program, &config, &mut density)?;
+        let report = first_pass(machine, plugins.planner.as_ref(), program, config, &mut density)?;
         if report.is_ok() {
             Ok(Self { report, entries: density.entries() })
         } else {

@@ -87,8 +87,9 @@ pub fn check_real(
     }
 }
 
-/// Checks what homing asks of the machine, and what the machine asks of homing.
-pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) -> Result<(), HostError> {
+/// Checks what homing asks of the machine, and what the machine asks of homing: a controller that `stays` asks that of its
+/// operator before it begins a job.
+pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches, stays: bool) -> Result<(), HostError> {
     let refuse = |key: &str, cause: &str| Err(refusal(machine, key, cause));
     if switches.home.is_some() && machine.homing.is_empty() {
         return refuse("homing", "no axis has a [homing.<axis>] table: there is nothing to home");
@@ -98,7 +99,7 @@ pub fn check_homing(machine: &Machine, joints: &JointSpace, switches: Switches) 
         let cause = "--home is refused: each axis is homed by a drive of its own, so not with kinematics or gantries";
         return refuse(key, cause);
     }
-    if machine.require_homing && switches.home.is_none() && !machine.homing.is_empty() {
+    if machine.require_homing && switches.home.is_none() && !machine.homing.is_empty() && !stays {
         return refuse("machine.require_homing", "the axes of this machine are to be homed first: run with --home");
     }
     Ok(())

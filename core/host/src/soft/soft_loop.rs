@@ -49,6 +49,12 @@ pub trait RunObserver {
         false
     }
 
+    /// A rough period is over, on a machine that stays.
+    fn period(&mut self) {}
+
+    /// In lockstep on a machine that stays: the fine period of this number, counted from its attachment, follows.
+    fn before_tick(&mut self, _uptime_periods: u64) {}
+
     /// The machine came to a rest that ends an epoch: a probe touched, or the operator aborted.
     fn rest(&mut self, _rest: &Rest) {}
 
@@ -201,6 +207,16 @@ impl<'a> SoftLoop<'a> {
         if let Some(note) = self.waits.as_mut().and_then(|waits| waits.look(&self.host)) {
             self.observer.note(&note);
         }
+    }
+
+    /// Tells the observer that a rough period is over.
+    pub fn period(&mut self) {
+        self.observer.period();
+    }
+
+    /// Tells the observer which fine period follows.
+    pub fn before_tick(&mut self, uptime_periods: u64) {
+        self.observer.before_tick(uptime_periods);
     }
 
     /// Passes a note on to the observer.

@@ -1,0 +1,502 @@
+//! A machine that stays: its drives are attached once, and driven by one job after the other.
+
+mod engine;
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tandem_fine::{Fault, FineLoop, Left};
+use tandem_gcode::{CheckReport, Program};
+use tandem_machine::Machine;
+use tandem_recorder::Summary;
+use tandem_rings::{Controls, Rest, Status};
+use tandem_rough::Source;
+use tandem_sdk::{Attached, AxisVector};
+
+use crate::clock::exchange_time::{self, ExchangeTimes};
+use crate::drives::Roster;
+use crate::error::HostError;
+use crate::plugins::hang::HangWatch;
+use crate::plugins::plugin_log::drain_plugin_log;
+use crate::plugins::registry::Registry;
+use crate::run::job::{Conclusion, Job, Made};
+use crate::run::{begin, periods};
+use crate::setup::ready::{Memory, Plugins, Ready};
+use crate::soft::soft_loop::{RunObserver, SoftLoop};
+use crate::switches::{Clock, Lead, Switches};
+use engine::Engine;
+
+/// Machine time, s, without any passing of program time after which a job to which nobody can say anything any more is given
+/// up in lockstep.
+const PATIENCE_S: f64 = 60.0;
+
+/// A machine whose drives stay attached from job to job. Host.
+pub struct Resident<'r> {
+    /// The machine; it stands at its `start`.
+    machine: Machine,
+    registry: &'r Registry,
+    clock: Clock,
+    roster: Roster,
+    attached: Attached,
+    controls: Arc<Controls>,
+    status: Arc<Status>,
+    engine: Engine,
+    watch: Option<HangWatch>,
+    /// Bit per axis of which it is not known where it is.
+    unknown_axes: u32,
+    /// Fine periods of the process, and of what was before it, as far as somebody says so.
+    uptime_periods: u64,
+    /// The drives hold between jobs.
+    enabled: bool,
+}
+
+/// A job that is ready to be driven; nothing has moved.
+pub struct PreparedJob {
+    made: Box<Made>,
+    homes: u32,
+}
+
+/// What a job did.
+#[derive(Clone, Debug)]
+pub struct JobOutcome {
+    /// Everything as numbers; the fault in words.
+    pub summary: Summary,
+    /// The fault that ended it; the drives have let go.
+    pub fault: Option<Fault>,
+    /// Where the machine came to rest, machine coordinates, mm or rad.
+    pub position: AxisVector,
+    /// What is on.
+    pub left: Left,
+    /// Whether the operator has stopped it.
+    pub aborted: bool,
+}
+
+impl PreparedJob {
+    /// What the first pass found: totals, and warnings.
+    pub fn checked(&self) -> &CheckReport {
+        &self.made.job.checked
+    }
+
+    /// The job, for whoever records it.
+    pub(crate) fn job(&self) -> &Job {
+        &self.made.job
+    }
+
+    /// Names of the feed strategy's signals, and after them those of the analog inputs.
+    pub fn signals(&self) -> Vec<String> {
+        self.job().signals()
+    }
+}
+
+/// The source of the job that enables: nothing but the rest at which all joints hold.
+struct Nothing;
+
+impl Source for Nothing {
+    fn next_items(&mut self, _items: &mut Vec<tandem_gcode::Item>) -> Result<bool, String> {
+        Ok(false)
+    }
+
+    fn provide_input(&mut self, _value: f64) {}
+
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        true
+    }
+}
+
+impl<'r> Resident<'r> {
+    /// Claims the drives of `machine`; none is enabled. Host; allocates.
+    ///
+    /// # Errors
+    /// Plugins refuse, the drives cannot be reached, or what is asked does not go together.
+    pub fn attach(machine: Machine, registry: &'r Registry, clock: Clock) -> Result<Self, HostError> {
+        let switches = Switches { clock: Some(clock), unhomed: true, reset: true, ..Switches::default() };
+        let mut plugins = Plugins::of(&machine, registry)?;
+        plugins.check_staying(&machine, switches)?;
+        plugins.add_faults(&machine)?;
+        let (machine, plugins) = plugins.attach(machine, registry, switches)?;
+        let roster = plugins.claim.roster();
+        begin(&machine, &roster, clock)?;
+        let watch = plugins.watch;
+        let Some((driver, attached)) = plugins.claim.into_parts() else {
+            return Err(HostError::System("the drives are not claimed".to_string()));
+        };
+        let unknown_axes = plugins.joints.axes_moved_by(!(attached.known | attached.homed));
+        let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
+        if let Some(watch) = &watch {
+            watch.begin(Arc::clone(&controls), Arc::clone(&status));
+        }
+        let ready = Ready::of_source_on(&roster, machine.clone(), registry, None, |_| Box::new(Nothing), switches)?;
+        let shared = (Arc::clone(&controls), Arc::clone(&status));
+        let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
+        // How long exchanges take is measured of runs alone.
+        let exchange = Arc::<ExchangeTimes>::default();
+        let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, exchange));
+        let mut fine = Box::new(FineLoop::new(&made.config, made.end, driver, made.kinematics));
+        fine.stay();
+        fine.begin_ended();
+        let mut this = Self {
+            engine: Engine::Down(None),
+            machine,
+            registry,
+            clock,
+            roster,
+            attached,
+            controls,
+            status,
+            watch,
+            unknown_axes,
+            uptime_periods: 0,
+            enabled: false,
+        };
+        this.engine = match clock {
+            Clock::Virtual => Engine::Here(fine),
+            Clock::Wall => this.thread(fine, true)?,
+        };
+        Ok(this)
+    }
+
+    fn thread(&self, fine: Box<FineLoop>, told: bool) -> Result<Engine, HostError> {
+        let watch = self.watch.as_ref().map(HangWatch::for_fine);
+        Ok(Engine::start(fine, told, periods(&self.machine), watch)?.0)
+    }
+
+    /// The machine; it stands at its `start`.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Whether all drives are simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.roster.describe().simulated != 0
+    }
+
+    /// The operator's atomics, the same for all jobs.
+    pub fn controls(&self) -> &Arc<Controls> {
+        &self.controls
+    }
+
+    /// The fine loop's status, the same for all jobs.
+    pub fn status(&self) -> &Arc<Status> {
+        &self.status
+    }
+
+    /// Bit per axis of which it is not known where it is.
+    pub fn unknown_axes(&self) -> u32 {
+        self.unknown_axes
+    }
+
+    /// Whether the drives hold between jobs.
+    pub fn is_enabled(&self) -> bool {
+        self.enabled
+    }
+
+    /// Fine periods since the machine was attached, beside those of [`Resident::begin_at`].
+    pub fn uptime_periods(&self) -> u64 {
+        self.uptime_periods + self.engine.periods()
+    }
+
+    /// The process is so many fine periods old already, as tests say that ask whether that changes a job.
+    pub fn begin_at(&mut self, uptime_periods: u64) {
+        self.uptime_periods = uptime_periods;
+    }
+
+    /// Checks a program from where the machine stands, with what has lasted, and makes the job that drives it. Allocates.
+    ///
+    /// # Errors
+    /// Everything that refuses: the program's errors, plugins, what does not go together.
+    pub fn program(&self, program: Program, switches: Switches, memory: &Memory) -> Result<PreparedJob, HostError> {
+        let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
+        let ready = Ready::of_program_on(&self.roster, machine, self.registry, program, switches, memory)?;
+        Ok(self.prepared(ready, 0))
+    }
+
+    /// The job of what `source` gives, which sees to it that every block is one that the planner takes. Allocates.
+    ///
+    /// # Errors
+    /// Plugins refuse, or do not go together.
+    pub fn source(
+        &self,
+        name: &str,
+        source: Box<dyn Source + Send>,
+        switches: Switches,
+    ) -> Result<PreparedJob, HostError> {
+        let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
+        let make = |_: &Machine| source;
+        let ready = Ready::of_source_on(&self.roster, machine, self.registry, Some(name.to_string()), make, switches)?;
+        Ok(self.prepared(ready, 0))
+    }
+
+    /// The job that homes the axes of the machine file, or the one `axis` alone, as `homing` does. Allocates.
+    ///
+    /// # Errors
+    /// Plugins refuse, or the machine cannot be homed so.
+    pub fn homing(&self, homing: Lead, axis: Option<usize>) -> Result<PreparedJob, HostError> {
+        let mut machine = self.machine.clone();
+        machine.homing.retain(|of| axis.is_none_or(|axis| of.axis == axis));
+        let switches = Switches { home: Some(homing), unhomed: true, ..self.on_clock(Switches::default()) };
+        let homes = machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis);
+        let (name, make) = (Some("homing".to_string()), |machine: &Machine| homing(machine, None));
+        let ready = Ready::of_source_on(&self.roster, machine, self.registry, name, make, switches)?;
+        Ok(self.prepared(ready, homes))
+    }
+
+    fn on_clock(&self, switches: Switches) -> Switches {
+        Switches { clock: Some(self.clock), ..switches }
+    }
+
+    fn prepared(&self, ready: Ready, homes: u32) -> PreparedJob {
+        let shared = (Arc::clone(&self.controls), Arc::clone(&self.status));
+        let made = Made::of(ready, &self.attached, self.clock == Clock::Wall, shared);
+        PreparedJob { made: Box::new(made), homes }
+    }
+
+    /// Enables the drives where they stand; with `resets` their faults are reset first. The outcome's fault is that of a drive
+    /// that does not hold. Host.
+    ///
+    /// # Errors
+    /// The computer refuses, or plugins do.
+    pub fn enable(&mut self, resets: bool, observer: &mut dyn RunObserver) -> Result<JobOutcome, HostError> {
+        let switches = Switches { unhomed: true, ..Switches::default() };
+        let job = self.source("enabling", Box::new(Nothing), switches)?;
+        self.controls.let_go.store(false, Relaxed);
+        self.controls.emergency_stop.store(false, Relaxed);
+        let outcome = self.drive_with(job, resets, observer)?;
+        self.enabled = outcome.fault.is_none() && !outcome.aborted;
+        Ok(outcome)
+    }
+
+    /// Drives a job to its end; the drives are enabled. The machine stands where the outcome says. Host.
+    ///
+    /// # Errors
+    /// The computer refuses: the machine is as it was.
+    pub fn drive(&mut self, job: PreparedJob, observer: &mut dyn RunObserver) -> Result<JobOutcome, HostError> {
+        self.drive_with(job, false, observer)
+    }
+
+    fn drive_with(
+        &mut self,
+        job: PreparedJob,
+        resets: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<JobOutcome, HostError> {
+        let started = Instant::now();
+        let PreparedJob { made, homes } = job;
+        let Made { job, config, end, kinematics } = *made;
+        let driver = Box::new(NoDriver);
+        let mut fine = Box::new(FineLoop::new(&config, end, driver, kinematics));
+        fine.stay();
+        fine.reset();
+        self.engine.hand_over(fine, resets)?;
+        if let Engine::Down(fine) = &mut self.engine {
+            // A fault has ended the thread: it begins anew.
+            let Some(fine) = fine.take() else { return Err(HostError::System("the fine loop is gone".to_string())) };
+            self.engine = match self.clock {
+                Clock::Virtual => Engine::Here(fine),
+                Clock::Wall => self.thread(fine, false)?,
+            };
+        }
+        let (mut soft_loop, conclusion) = job.begin(self.clock, observer);
+        let end = match self.clock {
+            Clock::Virtual => self.in_lockstep(&mut soft_loop)?,
+            Clock::Wall => self.in_real_time(&mut soft_loop)?,
+        };
+        soft_loop.drain();
+        soft_loop.take_rests();
+        let outcome = self.conclude(end, &mut soft_loop, &conclusion, started);
+        drop(soft_loop);
+        drain_plugin_log(&mut |line| observer.note(line));
+        self.clear_controls();
+        self.machine.start = outcome.position;
+        if outcome.fault.is_none() && !outcome.aborted {
+            self.unknown_axes &= !homes;
+        }
+        self.enabled &= outcome.fault.is_none();
+        Ok(outcome)
+    }
+
+    /// What was asked of the job that is over is not asked of the next one.
+    fn clear_controls(&self) {
+        let controls = &self.controls;
+        for flag in [&controls.hold, &controls.program_hold, &controls.abort, &controls.soft_fault] {
+            flag.store(false, Relaxed);
+        }
+        controls.jog.most_periods.store(0, Relaxed);
+        controls.jog.let_go.store(false, Relaxed);
+    }
+
+    fn conclude(
+        &self,
+        end: Option<tandem_fine::JobEnd>,
+        soft_loop: &mut SoftLoop<'_>,
+        conclusion: &Conclusion,
+        started: Instant,
+    ) -> JobOutcome {
+        let faulted = match &self.engine {
+            Engine::Down(Some(fine)) if end.is_none() => Some(fine),
+            _ => None,
+        };
+        let end = end.or_else(|| faulted.map(|fine| fine.job_end())).unwrap_or_default();
+        let mut summary = conclusion.summary(soft_loop, &end.counters);
+        let fault = faulted.and_then(|fine| fine.fault());
+        if let (Some(fine), Some(fault)) = (faulted, &fault) {
+            let late = summary.late_cause();
+            summary.fault = Some(conclusion.words(fault, fine, soft_loop.soft_cause(), late.as_deref()));
+        }
+        summary.wall_time_s = started.elapsed().as_secs_f64();
+        let aborted = soft_loop.aborted.is_some();
+        JobOutcome { summary, fault, position: end.position, left: end.left, aborted }
+    }
+
+    /// Both loops in lockstep, to the end of the job; none where a fault ends it.
+    fn in_lockstep(&mut self, soft_loop: &mut SoftLoop<'_>) -> Result<Option<tandem_fine::JobEnd>, HostError> {
+        let patience = (PATIENCE_S / self.machine.fine_period_s) as u64;
+        let (mut passed_s, mut stuck) = (f64::NAN, 0);
+        while self.engine.is_attaching() {
+            self.tick(soft_loop);
+        }
+        soft_loop.drain();
+        loop {
+            soft_loop.step();
+            for _ in 0..self.machine.fine_periods_per_rough {
+                if let Some(end) = self.engine.take_end() {
+                    return Ok(Some(end));
+                }
+                self.tick(soft_loop);
+                stuck += 1;
+            }
+            soft_loop.drain();
+            soft_loop.serve_stop();
+            if self.engine.fetch_faulted()?.is_some() {
+                return Ok(None);
+            }
+            soft_loop.period();
+            let now_s = self.status.program_time_s.load();
+            let waits = soft_loop.is_waiting() || self.status.spindle.waits.load(Relaxed);
+            if now_s != passed_s || waits || soft_loop.is_attended() {
+                (passed_s, stuck) = (now_s, 0);
+            } else if stuck > patience {
+                soft_loop.give_up();
+            }
+        }
+    }
+
+    fn tick(&mut self, soft_loop: &mut SoftLoop<'_>) {
+        soft_loop.before_tick(self.uptime_periods);
+        self.engine.tick();
+        self.uptime_periods += 1;
+    }
+
+    /// The soft side in real time, to the end of the job; none where a fault ends it.
+    fn in_real_time(&mut self, soft_loop: &mut SoftLoop<'_>) -> Result<Option<tandem_fine::JobEnd>, HostError> {
+        loop {
+            soft_loop.step();
+            soft_loop.drain();
+            soft_loop.serve_stop();
+            soft_loop.period();
+            if let Some(end) = self.engine.take_end() {
+                return Ok(Some(end));
+            }
+            let before = self.engine.periods();
+            if self.engine.fetch_faulted()?.is_some() {
+                self.uptime_periods += before;
+                return Ok(None);
+            }
+            thread::sleep(Duration::from_secs_f64(self.machine.rough_period_s));
+        }
+    }
+
+    /// A rough period in which no job is driven: the drives hold, or are let go. The answer is a fault that has come meanwhile, in
+    /// words. Host.
+    ///
+    /// # Errors
+    /// The fine loop is gone: it panicked.
+    pub fn idle(&mut self, observer: &mut dyn RunObserver) -> Result<Option<String>, HostError> {
+        match self.clock {
+            Clock::Virtual => {
+                for _ in 0..self.machine.fine_periods_per_rough {
+                    observer.before_tick(self.uptime_periods);
+                    self.engine.tick();
+                    self.uptime_periods += 1;
+                }
+            }
+            Clock::Wall => thread::sleep(Duration::from_secs_f64(self.machine.rough_period_s)),
+        }
+        drain_plugin_log(&mut |line| observer.note(line));
+        let before = self.engine.periods();
+        let machine = &self.machine;
+        let Some(fine) = self.engine.fetch_faulted()? else { return Ok(None) };
+        let Some(fault) = fine.fault() else { return Ok(None) };
+        let joints = crate::joints::JointSpace::of(machine, self.registry)?;
+        let known = crate::messages::fault_text::Known {
+            soft: None,
+            driver: fine.plugin_error(),
+            drives: fine.driver(),
+            roster: &self.roster,
+            late: None,
+        };
+        let words = crate::messages::fault_text::describe(machine, &joints, &fault, known);
+        self.uptime_periods += before;
+        self.enabled = false;
+        self.clear_controls();
+        Ok(Some(words))
+    }
+
+    /// Tells the drives to let go at the rest where the machine stands; whether they have. To be called until it says so, with
+    /// [`Resident::idle`] in between. Host.
+    pub fn disable(&mut self) -> bool {
+        self.enabled = false;
+        self.controls.let_go.store(true, Relaxed);
+        self.engine.is_released()
+    }
+
+    /// Lets go of the drives for good. Host.
+    ///
+    /// # Errors
+    /// A driver could not release them, in words.
+    pub fn stop(mut self, observer: &mut dyn RunObserver) -> Result<(), HostError> {
+        let most = ((self.roster.describe().disable_s + 1.0) / self.machine.rough_period_s).ceil() as u64;
+        for _ in 0..most {
+            if self.disable() || self.idle(observer)?.is_some() {
+                break;
+            }
+        }
+        let Some(fine) = self.engine.end()? else { return Ok(()) };
+        let titles = self.roster.titles();
+        let stopped = fine.into_driver().stop();
+        drain_plugin_log(&mut |line| observer.note(line));
+        stopped.map_err(|e| HostError::System(format!("driver {titles}: the drives were not let go of: {e}")))
+    }
+}
+
+/// Stands in a loop until it takes over the drives.
+struct NoDriver;
+
+impl tandem_sdk::Driver for NoDriver {
+    fn describe(&self) -> tandem_sdk::DriverDescription {
+        tandem_sdk::DriverDescription::simulated()
+    }
+
+    fn open(&mut self, _context: &tandem_sdk::DriverContext) -> Result<(), tandem_sdk::PluginError> {
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<Attached, tandem_sdk::PluginError> {
+        Ok(Attached::default())
+    }
+
+    fn exchange(
+        &mut self,
+        _setpoint: &tandem_sdk::Setpoint,
+        _feedback: &mut tandem_sdk::Feedback,
+    ) -> Result<(), tandem_sdk::PluginError> {
+        Ok(())
+    }
+
+    fn quick_stop(&mut self) {}
+
+    fn stop(&mut self) -> Result<(), tandem_sdk::PluginError> {
+        Ok(())
+    }
+}
