@@ -11,8 +11,8 @@ use tandem_recorder::TraceCsv;
 use tandem_rig::{CASES_VARIABLE, record_case};
 use tandem_rings::{MachineState, Sample};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, PluginError,
-    RawOptions, Segment, SegmentSink, local_plugin,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext, PlannerDescription,
+    PluginError, RawOptions, Segment, SegmentSink, local_plugin,
 };
 
 use crate::harness::mill;
@@ -283,11 +283,11 @@ impl Planner for Watched {
     fn describe(&self) -> PlannerDescription {
         self.inner.describe()
     }
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        self.inner.check(block)
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.inner.check(block, curve)
     }
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        self.inner.accept(block)
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        self.inner.accept(block, curve)
     }
     fn finish(&mut self) {
         self.inner.finish();

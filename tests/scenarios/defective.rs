@@ -9,7 +9,7 @@ use tandem_oracle::Kind;
 use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, Plugin,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext, PlannerDescription, Plugin,
     PluginError, Segment, SegmentSink,
 };
 
@@ -90,11 +90,11 @@ impl Planner for Bent {
     fn describe(&self) -> PlannerDescription {
         PlannerDescription { speed_difference_mm_per_s: self.allowed, ..self.inner.describe() }
     }
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        self.inner.check(block)
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.inner.check(block, curve)
     }
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        self.inner.accept(block)
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        self.inner.accept(block, curve)
     }
     fn finish(&mut self) {
         self.inner.finish();

@@ -40,7 +40,8 @@ fn behaviour(module: &Path) -> (Vec<Tuning>, Vec<Option<f64>>, Counters) {
         let kind = if index % 20 == 0 { BlockKind::Rapid } else { BlockKind::Line };
         let feed_mm_per_s = if index % 20 == 0 { f64::INFINITY } else { 60.0 };
         let (end, length_mm) = (at(index + 1), 2.0);
-        policy.offer(&Block { kind, end, length_mm, feed_mm_per_s, tool: 1 + index / 50, ..Block::at(at(index)) });
+        policy
+            .offer(&Block { kind, end, length_mm, feed_mm_per_s, tool: 1 + index / 50, ..Block::at(at(index)) }, None);
     }
     policy.decide(None);
     let tunings = (0..64).map(|index| policy.tuning(index)).collect();

@@ -4,7 +4,7 @@ use tandem_machine::Machine;
 use tandem_recorder::CurveWatch;
 use tandem_report::Signal;
 use tandem_rings::Sample;
-use tandem_sdk::Block;
+use tandem_sdk::{Block, Curve};
 
 /// Collects it: 24 bytes a sample, beside the curves. Empty for programs without curves.
 pub struct Curves {
@@ -35,8 +35,8 @@ impl Curves {
     }
 
     /// A block is planned for good.
-    pub fn block(&mut self, block: &Block) {
-        self.watch.block(block);
+    pub fn block(&mut self, block: &Block, curve: Option<Curve<'_>>) {
+        self.watch.block(block, curve);
     }
 
     /// A sample was sent.

@@ -6,7 +6,7 @@ use tandem_machine::{JerkMode, Machine};
 use tandem_recorder::{Output, PlanningRow, RecordError, Summary};
 use tandem_report::{Axis, Ended, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockReport};
+use tandem_sdk::{Axes, AxisVector, Block, BlockReport, Curve};
 
 use crate::corners::Corners;
 use crate::curves::Curves;
@@ -52,9 +52,9 @@ impl Collector {
     }
 
     /// A block is planned for good.
-    pub fn block(&mut self, block: &Block, report: &BlockReport) {
+    pub fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
         self.corners.block(block, report);
-        self.curves.block(block);
+        self.curves.block(block, curve);
         self.tolerances.block(block);
     }
 

@@ -8,7 +8,7 @@ use tandem_host::{Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer,
 use tandem_machine::Machine;
 use tandem_recorder::{BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, Stop, Summary};
 use tandem_rings::{Rest, Sample};
-use tandem_sdk::{Block, BlockReport, Event, EventKind};
+use tandem_sdk::{Block, BlockReport, Curve, Event, EventKind};
 use tandem_session::HOMING;
 
 use crate::broken::Broken;
@@ -186,13 +186,13 @@ impl RunObserver for Sinks {
         say!("{note}");
     }
 
-    fn block(&mut self, block: &Block, report: &BlockReport) {
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
         self.tell_of_time_constant(block);
         if let Some(blocks) = &mut self.blocks {
             blocks.block(block, report);
         }
         if let Some(collector) = &mut self.report {
-            collector.block(block, report);
+            collector.block(block, curve, report);
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a model needs to know of one block.
 
 use tandem_motion::Path;
-use tandem_sdk::{AxisVector, Block, BlockKind, Limits};
+use tandem_sdk::{AxisVector, Block, BlockKind, Curve, Limits};
 
 /// How a block spends its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Element {
 
 impl Element {
     /// What `block` says on a machine with `limits`. Does not allocate.
-    pub fn new(block: &Block, limits: &Limits) -> Self {
+    pub fn new(block: &Block, curve: Option<Curve<'_>>, limits: &Limits) -> Self {
         let mut element = Self {
             kind: Kind::Dwell,
             line: block.line,
@@ -66,7 +66,7 @@ impl Element {
         };
         if block.kind != BlockKind::Dwell {
             element.length_mm = block.length_mm;
-            element.geometry(block);
+            element.geometry(block, curve);
             element.feeds(block, limits);
         }
         element
@@ -77,18 +77,17 @@ impl Element {
         let direction = AxisVector::from_slice(&[angle_rad.cos(), angle_rad.sin()]);
         let mut block = Block { kind: BlockKind::Line, length_mm, feed_mm_per_s, ..Block::at(AxisVector::ZERO) };
         block.end = direction * length_mm;
-        let mut element = Self::new(&block, &unlimited());
+        let mut element = Self::new(&block, None, &unlimited());
         (element.directions, element.most) = ([direction; 2], direction.map(f64::abs));
         element
     }
 
-    fn geometry(&mut self, block: &Block) {
+    fn geometry(&mut self, block: &Block, curve: Option<Curve<'_>>) {
         if let Some(path) = Path::new(block) {
             self.directions = [path.direction(0.0), path.direction(path.length_mm())];
             (self.most, self.bend) = (path.max_direction(), path.max_curvature());
-        } else if block.kind == BlockKind::Nurbs {
-            // SAFETY: within the call that handed the block over its curve is alive.
-            let points = unsafe { block.nurbs.control_points.as_slice() };
+        } else if let Some(curve) = curve {
+            let points = curve.control_points.get();
             if let [first, second, ..] = points {
                 let [before, last] = points.last_chunk().copied().unwrap_or([*first, *second]);
                 self.directions = [unit(*second - *first), unit(last - before)];
@@ -99,7 +98,7 @@ impl Element {
     }
 
     fn feeds(&mut self, block: &Block, limits: &Limits) {
-        let along = limits.along(&block.start, &self.most);
+        let along = limits.along(&self.most);
         let moving = limits.axes().iter().enumerate().filter(|(axis, _)| self.most[*axis] > 0.0);
         self.acceleration_mm_per_s2 = moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
         let rapid = block.kind == BlockKind::Rapid;
@@ -161,7 +160,7 @@ mod tests {
     #[test]
     fn a_dwell_is_its_duration() {
         let block = Block { dwell_s: 1.5, ..Block::at(AxisVector::ZERO) };
-        let element = Element::new(&block, &unlimited());
+        let element = Element::new(&block, None, &unlimited());
         assert_eq!((element.kind, element.nominal_s, element.length_mm), (Kind::Dwell, 1.5, 0.0));
     }
 }

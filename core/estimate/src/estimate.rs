@@ -4,7 +4,7 @@ use tandem_gcode::{CheckReport, Program};
 use tandem_host::{Clock, HostError, Registry, Run, RunObserver, Switches, each_block};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause};
-use tandem_sdk::{Block, BlockKind, BlockReport, Limits};
+use tandem_sdk::{Block, BlockKind, BlockReport, Curve, Limits};
 
 use crate::choice::Choice;
 use crate::element::Element;
@@ -70,8 +70,8 @@ fn closed(
 ) -> Result<Estimate, EstimateError> {
     let mut tally = Tally::default();
     let mut add = |element: &Element, spent: &Spent| tally.add(element, spent);
-    let report = each_block(machine, &mut program, switches, &mut |block| {
-        model.block(&Element::new(block, &machine.limits), &mut add);
+    let report = each_block(machine, &mut program, switches, &mut |block, curve| {
+        model.block(&Element::new(block, curve, &machine.limits), &mut add);
     })?;
     if !report.is_ok() {
         return Err(HostError::Check(Box::new(report)).into());
@@ -121,8 +121,8 @@ impl RunObserver for Watch {
         self.missed += u64::from(rest.cause == RestCause::Missed);
     }
 
-    fn block(&mut self, block: &Block, report: &BlockReport) {
-        let element = Element::new(block, &self.limits);
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
+        let element = Element::new(block, curve, &self.limits);
         let cut = !matches!(block.kind, BlockKind::Dwell | BlockKind::Rapid);
         let case = cut.then(|| case_of(&element, report));
         let spent = Spent { time_s: report.time_s, reached_mm_per_s: report.peak_feed_mm_per_s, case };

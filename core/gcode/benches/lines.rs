@@ -63,7 +63,7 @@ fn both_passes(bencher: divan::Bencher) {
     let text = raster();
     bencher.counter(ItemsCount::new(LINES)).bench_local(|| {
         let mut program = Program::spool("raster.ngc", text.as_bytes()).expect("a temporary file");
-        assert!(check(&mut program, &config(), &mut |_| Ok(())).expect("readable").is_ok());
+        assert!(check(&mut program, &config(), &mut |_, _| Ok(())).expect("readable").is_ok());
         let mut stream = Stream::new(program, &config()).expect("checked");
         let mut items = Vec::with_capacity(16);
         while stream.next_items(&mut items).expect("unchanged") {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tandem_sdk::Block;
+use tandem_sdk::{Block, Curve, NurbsData};
 
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
@@ -80,7 +80,7 @@ impl CheckReport {
 pub fn check(
     program: &mut Program,
     config: &Config,
-    per_block: &mut dyn FnMut(&Block) -> Result<(), String>,
+    per_block: &mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
 ) -> Result<CheckReport, ProgramError> {
     program.subroutines.clear();
     let mut pass = FirstPass::new(program, config, per_block);
@@ -95,13 +95,17 @@ pub fn check(
 
 struct FirstPass<'a> {
     execution: Execution,
-    per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>,
+    per_block: &'a mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
     items: Vec<Item>,
     report: CheckReport,
 }
 
 impl<'a> FirstPass<'a> {
-    fn new(program: &mut Program, config: &Config, per_block: &'a mut dyn FnMut(&Block) -> Result<(), String>) -> Self {
+    fn new(
+        program: &mut Program,
+        config: &Config,
+        per_block: &'a mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
+    ) -> Self {
         let execution = Execution::new(program, config, Pass::First);
         Self { execution, per_block, items: Vec::new(), report: CheckReport::default() }
     }
@@ -194,9 +198,11 @@ impl<'a> FirstPass<'a> {
         let mut waits = false;
         for item in &self.items {
             match item {
-                Item::Block(block) => judge_block(&mut self.report, &mut self.per_block, block, (&program.name, text)),
-                Item::Curve(owned) => {
-                    owned.with(|block| judge_block(&mut self.report, &mut self.per_block, block, (&program.name, b"")));
+                Item::Block(block, curve) => {
+                    // A curve takes more lines than the one that is read.
+                    let text = if curve.is_some() { b"" } else { text };
+                    let curve = curve.as_deref().map(NurbsData::curve);
+                    judge_block(&mut self.report, &mut self.per_block, (block, curve), (&program.name, text));
                 }
                 Item::Wait(_) => waits = true,
                 Item::Event(_) | Item::End => {}
@@ -211,13 +217,13 @@ impl<'a> FirstPass<'a> {
 /// Counts a block and asks whether the planner can drive it. `place` is the program and the text of the block's line.
 fn judge_block(
     report: &mut CheckReport,
-    per_block: &mut dyn FnMut(&Block) -> Result<(), String>,
-    block: &Block,
+    per_block: &mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
+    (block, curve): (&Block, Option<Curve<'_>>),
     place: (&Arc<str>, &[u8]),
 ) {
     report.blocks += 1;
     report.length_mm += block.length_mm;
-    if let Err(why) = per_block(block) {
+    if let Err(why) = per_block(block, curve) {
         report.add(Diagnostic::whole_line(place.0, block.line, place.1, "block-refused", why));
     }
 }

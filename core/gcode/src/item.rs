@@ -1,16 +1,16 @@
 //! What comes out of the interpreter.
 
-use tandem_sdk::{AxisVector, Block, Edge, Event, OwnedBlock};
+use std::sync::Arc;
+
+use tandem_sdk::{AxisVector, Block, Edge, Event, NurbsData};
 
 /// One element of the stream, in program order.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "blocks are by far the most frequent item; boxing them would allocate")]
 pub enum Item {
     /// A path element, or rest. Behind a probe, whose [`Block::stop_on`] names an edge, nothing is read before
-    /// [`crate::Stream::provide_probe`]; what else stands in its line may follow it.
-    Block(Block),
-    /// A path element that is a NURBS curve, with the data of the curve.
-    Curve(OwnedBlock),
+    /// [`crate::Stream::provide_probe`]; what else stands in its line may follow it. A NURBS has the data of its curve beside it.
+    Block(Block, Option<Arc<NurbsData>>),
     /// A non-motion word, tied to the block before which it acts.
     Event(Event),
     /// M66: the program goes on when the input has answered.
@@ -22,7 +22,7 @@ pub enum Item {
 impl Item {
     /// Whether this is a block that an input ends.
     pub fn is_probe(&self) -> bool {
-        matches!(self, Self::Block(block) if block.stop_on.edge != Edge::None)
+        matches!(self, Self::Block(block, _) if block.stop_on.edge != Edge::None)
     }
 }
 

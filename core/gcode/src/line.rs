@@ -269,7 +269,7 @@ impl Line<'_> {
     #[allow(clippy::large_types_passed_by_value, reason = "built in place: a reference would copy once more")]
     pub fn push(&mut self, block: Block) {
         self.state.path.advance_to(block.end);
-        self.out.push(Item::Block(block));
+        self.out.push(Item::Block(block, None));
     }
 
     /// Appends an event before the next block.

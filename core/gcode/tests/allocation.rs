@@ -14,7 +14,7 @@ fn a_steady_state_allocates_nothing() {
     let text = "M3 S500 TA 20\n".to_owned() + &line.repeat(10_000);
     let config = Config::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
     let mut program = Program::spool("steady.ngc", text.as_bytes()).unwrap();
-    assert!(check(&mut program, &config, &mut |_| Ok(())).unwrap().is_ok());
+    assert!(check(&mut program, &config, &mut |_, _| Ok(())).unwrap().is_ok());
     let mut stream = Stream::new(program, &config).unwrap();
     let mut items = Vec::with_capacity(100);
     for _ in 0..100 {

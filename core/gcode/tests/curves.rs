@@ -3,12 +3,15 @@
 mod common;
 
 use common::{messages, mill, only_blocks, run, run_on, shown};
+use std::sync::Arc;
 use tandem_gcode::Item;
-use tandem_sdk::OwnedBlock;
 
-fn curves(program: &str) -> Vec<OwnedBlock> {
+use tandem_sdk::{Block, NurbsData};
+
+fn curves(program: &str) -> Vec<(Block, Arc<NurbsData>)> {
     let all = run(program).into_iter();
-    all.filter_map(|item| if let Item::Curve(curve) = item { Some(curve) } else { None }).collect()
+    all.filter_map(|item| if let Item::Block(block, curve) = item { curve.map(|curve| (block, curve)) } else { None })
+        .collect()
 }
 
 fn assert_messages(program: &str, expected: &[&str]) {
@@ -29,7 +32,7 @@ fn linuxcnc_curve() {
 #[test]
 fn linuxcnc_curve_with_a_point_in_its_first_line() {
     let made = curves("F60\nG91 G5.2 X1 Y1 P3 L4\nX1\nX1 Y-1\nG5.3");
-    let data = made[0].curve().unwrap();
+    let data = &made[0].1;
     assert_eq!((data.degree, data.weights.as_slice()), (3, &[1.0, 3.0, 1.0, 1.0][..]));
     assert_eq!(data.control_points[3].0[..2], [3.0, 0.0]);
     // Nothing is left of the curve's mode.
@@ -46,25 +49,25 @@ fn fanuc_curve() {
     );
     assert!(items[1].starts_with("9: Line 1 to 10 5"), "{}", items[1]);
     // Without a point in its first line the curve begins where the machine stands; without P it is cubic.
-    assert_eq!(curves("F60\nG1 X1\nG6.2 K0\nK0 X2\nK0 X2 Y1\nK0 Y2\nK1\nK1\nK1\nK1")[0].curve().unwrap().degree, 3);
+    assert_eq!(curves("F60\nG1 X1\nG6.2 K0\nK0 X2\nK0 X2 Y1\nK0 Y2\nK1\nK1\nK1\nK1")[0].1.degree, 3);
 }
 
 #[test]
 fn bezier_curves() {
     let made = curves("F60\nG5 X3 Y0 I1 J1 P-1 Q1\nX6 P-1 Q-1\nG5.1 X8 I1");
-    let points = |n: usize| made[n].curve().unwrap().control_points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>();
+    let points = |n: usize| made[n].1.control_points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>();
     assert_eq!(points(0), [[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 0.0]]);
     assert_eq!(points(1), [[3.0, 0.0], [4.0, -1.0], [5.0, -1.0], [6.0, 0.0]]);
     assert_eq!(points(2), [[6.0, 0.0], [7.0, 0.0], [8.0, 0.0]]);
     let inches = curves("G20 F60\nG5.1 X2 I1");
-    assert!((inches[0].facts().length_mm - 50.8).abs() < 1e-9 && inches[0].facts().feed_mm_per_s == 25.4);
+    assert!((inches[0].0.length_mm - 50.8).abs() < 1e-9 && inches[0].0.feed_mm_per_s == 25.4);
 }
 
 #[test]
 fn inverse_time() {
     let made = curves("G93\nG5.2 F30 L2\nX3\nG5.3\nG5.1 X3 Y8 J4 F60");
-    assert!((made[0].facts().feed_mm_per_s - 1.5).abs() < 1e-9);
-    assert!((made[1].facts().feed_mm_per_s - 8.0).abs() < 1e-9);
+    assert!((made[0].0.feed_mm_per_s - 1.5).abs() < 1e-9);
+    assert!((made[1].0.feed_mm_per_s - 8.0).abs() < 1e-9);
 }
 
 #[test]

@@ -12,7 +12,7 @@ fn assert_messages(program: &str, expected: &[&str]) {
 /// What `check` says of a fixture.
 fn checked(name: &str) -> String {
     let mut program = Program::open(&programs().join("bad").join(name)).unwrap();
-    let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
     let all: Vec<_> = report.diagnostics.iter().map(ToString::to_string).collect();
     let folder = format!("{}/", programs().join("bad").display());
     all.join("\n").replace(&folder, "")

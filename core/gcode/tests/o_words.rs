@@ -9,7 +9,7 @@ use tandem_gcode::{CheckReport, Config, Item, ProbeResult, Program, ProgramError
 
 fn checked(text: &str, config: &Config) -> (Program, CheckReport) {
     let mut program = Program::spool("t.ngc", text.as_bytes()).unwrap();
-    let report = check(&mut program, config, &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, config, &mut |_, _| Ok(())).unwrap();
     (program, report)
 }
 
@@ -20,7 +20,7 @@ fn items_on(config: &Config, text: &str) -> Vec<Item> {
     let mut stream = Stream::new(program, config).unwrap();
     let mut items = Vec::new();
     while stream.next_items(&mut items).unwrap() {
-        if let Some(Item::Block(block)) = items.last().filter(|item| item.is_probe()) {
+        if let Some(Item::Block(block, _)) = items.last().filter(|item| item.is_probe()) {
             let touched = (block.start + block.end) * 0.5;
             stream.provide_probe(&ProbeResult { touched: Some(touched), rest: touched });
         }

@@ -9,12 +9,12 @@ use tandem_sdk::{AxisVector, Block, Edge};
 /// Both passes; each probe touches at `share` of its way and comes to rest 0.25 mm further along Z.
 fn drive(config: &Config, text: &str, share: Option<f64>) -> Result<Vec<Item>, ProgramError> {
     let mut program = Program::spool("t.ngc", text.as_bytes()).unwrap();
-    let report = check(&mut program, config, &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, config, &mut |_, _| Ok(())).unwrap();
     assert!(report.is_ok(), "{}", report.diagnostics[0]);
     let mut stream = Stream::new(program, config)?;
     let mut items = Vec::new();
     while stream.next_items(&mut items)? {
-        if let Some(Item::Block(block)) = items.last().filter(|item| item.is_probe()) {
+        if let Some(Item::Block(block, _)) = items.last().filter(|item| item.is_probe()) {
             stream.provide_probe(&result(block, share));
         }
     }
@@ -36,7 +36,7 @@ fn ends(items: &[Item]) -> Vec<[f64; 3]> {
 
 fn diagnostics(config: &Config, text: &str) -> Vec<String> {
     let mut program = Program::spool("t.ngc", text.as_bytes()).unwrap();
-    let report = check(&mut program, config, &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, config, &mut |_, _| Ok(())).unwrap();
     report.diagnostics.iter().map(|d| format!("{}:{} {}", d.line, d.column, d.message)).collect()
 }
 
@@ -144,7 +144,7 @@ fn what_does_not_go_with_a_probe_is_refused() {
 #[test]
 fn nothing_is_read_ahead_of_a_probe() {
     let mut program = Program::spool("t.ngc", &b"G38.2 Z-8 F60\nG0 X1\n"[..]).unwrap();
-    check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+    check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
     let mut stream = Stream::new(program, &mill()).unwrap();
     let mut items = Vec::new();
     assert!(stream.next_items(&mut items).unwrap());
@@ -176,6 +176,6 @@ fn what_does_not_follow_from_a_result_is_judged_at_once() {
     assert_eq!(lines, ["2:", "3:", "4:", "6:"], "{found:?}");
     let mut program =
         Program::spool("t.ngc", &b"G38.2 Z-9 F60\nG0 X#5063\nX1\nM66 P1 L0\nX#5399\nG38.3 Z-1"[..]).unwrap();
-    let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
     assert_eq!((report.is_ok(), report.open_lines), (true, 3));
 }

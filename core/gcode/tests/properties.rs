@@ -200,7 +200,7 @@ proptest! {
     #[test]
     fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
         let mut program = Program::spool("bytes", &bytes[..]).unwrap();
-        let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+        let report = check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
         if report.is_ok() {
             let mut stream = Stream::new(program, &mill()).unwrap();
             let mut items = Vec::new();
@@ -215,13 +215,13 @@ proptest! {
     ) {
         let text = [&b"F100\nG38.3 X9 Y-7\n#7=#5061\n"[..], &lines.join(&b'\n')].concat();
         let mut program = Program::spool("lines", &text[..]).unwrap();
-        let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+        let report = check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
         if report.is_ok() {
             let mut stream = Stream::new(program, &mill()).unwrap();
             let mut items = Vec::new();
             while let Ok(true) = stream.next_items(&mut items) {
                 let probe = items.iter().rfind(|item| item.is_probe());
-                if let Some(Item::Block(block)) = probe {
+                if let Some(Item::Block(block, _)) = probe {
                     let at = block.start + (block.end - block.start) * share.unwrap_or(1.0);
                     stream.provide_probe(&ProbeResult { touched: share.map(|_| at), rest: at });
                 }
@@ -238,7 +238,7 @@ proptest! {
         let mut config = mill();
         config.max_steps = 2000;
         let mut program = Program::spool("o-words", &lines.join(&b'\n')[..]).unwrap();
-        let report = check(&mut program, &config, &mut |_| Ok(())).unwrap();
+        let report = check(&mut program, &config, &mut |_, _| Ok(())).unwrap();
         if report.is_ok() && report.seen_to.is_none() && report.open_lines == 0 {
             let mut stream = Stream::new(program, &config).unwrap();
             let mut items = Vec::new();
@@ -248,7 +248,7 @@ proptest! {
                 }
                 stream.provide_input(1.0);
             }
-            let curves = items.iter().filter(|item| matches!(item, Item::Curve(_))).count();
+            let curves = items.iter().filter(|item| matches!(item, Item::Block(_, Some(_)))).count();
             prop_assert_eq!((only_blocks(&items).len() + curves) as u64, report.blocks);
         }
     }

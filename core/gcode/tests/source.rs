@@ -12,12 +12,12 @@ fn spool(bytes: &[u8]) -> Program {
 }
 
 fn report_of(bytes: &[u8]) -> CheckReport {
-    check(&mut spool(bytes), &mill(), &mut |_| Ok(())).unwrap()
+    check(&mut spool(bytes), &mill(), &mut |_, _| Ok(())).unwrap()
 }
 
 fn items_of(bytes: &[u8]) -> Vec<Item> {
     let mut program = spool(bytes);
-    let report = check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+    let report = check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
     assert!(report.is_ok(), "{}", report.diagnostics[0]);
     let mut stream = Stream::new(program, &mill()).unwrap();
     let mut items = Vec::new();
@@ -121,7 +121,9 @@ fn errors_are_listed_up_to_a_thousand_and_then_counted() {
 
 #[test]
 fn a_refused_block_is_an_error_of_its_line() {
-    let mut refuse = |block: &tandem_sdk::Block| if block.index == 1 { Err("too short".to_owned()) } else { Ok(()) };
+    let mut refuse = |block: &tandem_sdk::Block, _: Option<tandem_sdk::Curve<'_>>| {
+        if block.index == 1 { Err("too short".to_owned()) } else { Ok(()) }
+    };
     let report = check(&mut spool(b"G0 X1\n\n  G0 X2\n"), &mill(), &mut refuse).unwrap();
     assert_eq!(report.diagnostics[0].to_string(), "t.ngc:3:1: error: too short\n    G0 X2\n  ^^^^^^^");
 }
@@ -133,7 +135,7 @@ fn a_file_that_changes_between_the_passes_stops_before_the_change() {
     file.write_all(text.as_bytes()).unwrap();
     let path = file.path.clone();
     let mut program = Program::open(&path).unwrap();
-    check(&mut program, &mill(), &mut |_| Ok(())).unwrap();
+    check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
     let at = text.len() - 2;
     std::fs::write(&path, [&text.as_bytes()[..at], b"(", &text.as_bytes()[at + 1..]].concat()).unwrap();
     let mut stream = Stream::new(program, &mill()).unwrap();
@@ -158,7 +160,7 @@ fn an_unchecked_program_does_not_stream() {
 #[test]
 fn a_waiting_stream_needs_its_input() {
     let mut program = spool(b"G0 X1\nM66 P1 L0\nG0 X[#5399 + 5]");
-    assert!(check(&mut program, &mill(), &mut |_| Ok(())).unwrap().is_ok());
+    assert!(check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap().is_ok());
     let mut stream = Stream::new(program, &mill()).unwrap();
     let mut items = Vec::new();
     stream.next_items(&mut items).unwrap();

@@ -18,7 +18,7 @@ pub(crate) struct Arc {
 }
 
 impl Arc {
-    pub(crate) fn new(block: &Block) -> Self {
+    pub(crate) fn new(block: &Block, lanes: Option<&'static JointLanes>) -> Self {
         let plane = block.arc.plane.map(|axis| axis as usize);
         let mut rise = (block.end - block.start) * (1.0 / block.length_mm);
         rise[plane[0]] = 0.0;
@@ -31,7 +31,7 @@ impl Arc {
             sweep_rad: block.arc.sweep_rad,
             rad_per_mm: block.arc.sweep_rad / block.length_mm,
             rise,
-            lanes: block.joint_lanes,
+            lanes,
         }
     }
 
@@ -303,10 +303,9 @@ mod tests {
             radius in 0.1..50.0f64, start in -3.0..3.0f64, sweep in -12.0..12.0f64, rise in -5.0..5.0f64,
             weights in proptest::array::uniform3(-2.0..2.0f64), at in 0.0..1.0f64,
         ) {
-            let mut block = helix_block(radius, start, sweep, rise);
+            let block = helix_block(radius, start, sweep, rise);
             let lanes = JointLanes::new(3, &[AxisVector::from_slice(&weights)]).unwrap();
-            block.joint_lanes = Some(Box::leak(Box::new(lanes)));
-            let path = Path::new(&block).unwrap();
+            let path = Path::with_lanes(&block, Some(Box::leak(Box::new(lanes)))).unwrap();
             let s_mm = at * path.length_mm();
             for (vector, most) in [(path.direction(s_mm), path.max_direction()), (path.curvature(s_mm), path.max_curvature())] {
                 let mut filled = vector;

@@ -2,7 +2,6 @@
 
 use tandem_sdk::{
     Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, PluginError, Segment, SegmentFlags, SegmentSink,
-    size_of_contract,
 };
 
 /// The block that a segment belongs to.
@@ -56,7 +55,6 @@ pub fn limited_by_feed(block: &Block) -> LimitedBy {
 pub fn report(block: u64, limited_by: LimitedBy, feeds_mm_per_s: [f64; 3], time_s: f64) -> BlockReport {
     let [start_feed_mm_per_s, peak_feed_mm_per_s, end_feed_mm_per_s] = feeds_mm_per_s;
     BlockReport {
-        size: size_of_contract::<BlockReport>(),
         limited_by,
         block,
         start_feed_mm_per_s,

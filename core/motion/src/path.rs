@@ -1,6 +1,6 @@
 //! The path of one block by its path coordinate.
 
-use tandem_sdk::{AxisVector, Block, BlockKind};
+use tandem_sdk::{AxisVector, Block, BlockKind, JointLanes};
 
 use crate::arc::Arc;
 
@@ -23,11 +23,17 @@ enum Shape {
 impl Path {
     /// The path of `block`, or `None` for kinds without one of their own (dwells) and NURBS.
     pub fn new(block: &Block) -> Option<Self> {
+        Self::with_lanes(block, None)
+    }
+
+    /// The same with the joints that are sums of axes behind the axes, as [`tandem_sdk::PlannerContext::joint_lanes`] has them. A
+    /// line carries them by being linear.
+    pub fn with_lanes(block: &Block, lanes: Option<&'static JointLanes>) -> Option<Self> {
         let shape = match block.kind {
             BlockKind::Line | BlockKind::Rapid if block.length_mm > 0.0 => {
                 return Some(Self::line(&block.start, &block.end, block.length_mm));
             }
-            BlockKind::Arc if block.length_mm > 0.0 => Shape::Arc(Arc::new(block)),
+            BlockKind::Arc if block.length_mm > 0.0 => Shape::Arc(Arc::new(block, lanes)),
             _ => return None,
         };
         Some(Self { start: block.start, end: block.end, length_mm: block.length_mm, shape })

@@ -62,7 +62,7 @@ fn record(index: usize) -> Record {
 
 fn decide_all(policy: &mut Policy, blocks: &[Block]) {
     for block in blocks {
-        policy.offer(block);
+        policy.offer(block, None);
     }
     policy.decide(None);
 }

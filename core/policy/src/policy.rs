@@ -1,6 +1,6 @@
 //! A script at work: windows, periods, strikes, quarantine, reload.
 
-use tandem_sdk::Block;
+use tandem_sdk::{Block, Curve};
 
 use crate::bounds::{Bounds, InForce, Tuning};
 use crate::budget::Budget;
@@ -61,16 +61,16 @@ impl Policy {
     }
 
     /// Takes the next block of the window, at most 64 of them. The first one after [`Self::decide`] begins a new window.
-    pub fn offer(&mut self, block: &Block) {
+    pub fn offer(&mut self, block: &Block, curve: Option<Curve<'_>>) {
         if !self.tunings.is_empty() {
             self.tunings.clear();
             self.window.clear();
         }
-        self.window.push(block);
+        self.window.push(block, curve);
     }
 
     /// Asks the script about the blocks offered; `next` follows them in the same stretch.
-    pub fn decide(&mut self, next: Option<&Block>) {
+    pub fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
         self.window.close(next);
         self.asks.clear();
         if self.script.tunes_blocks && self.ask_window().is_none() {

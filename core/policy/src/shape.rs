@@ -2,7 +2,7 @@
 
 use tandem_motion::Path;
 use tandem_motion::nurbs::Nurbs;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, MAX_AXES};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, MAX_AXES};
 
 /// Places on a curve at which its curvature is looked at.
 const CURVATURE_PLACES: usize = 16;
@@ -40,13 +40,13 @@ pub struct Shape {
 impl Shape {
     /// That of `block` on a machine with `axes`, of which `linear` are linear.
     #[inline]
-    pub fn of(block: &Block, axes: &Axes, linear: &LinearAxes) -> Self {
+    pub fn of(block: &Block, curve: Option<Curve<'_>>, axes: &Axes, linear: &LinearAxes) -> Self {
         match block.kind {
             BlockKind::Rapid | BlockKind::Line => {
                 let direction = linear.unit(&block.start, &block.end);
                 Self { start: direction, end: direction, curvature_per_mm: 0.0 }
             }
-            BlockKind::Nurbs => Self::of_curve(block, axes, linear),
+            BlockKind::Nurbs => curve.map_or_else(Self::none, |curve| Self::of_curve(curve, axes, linear)),
             BlockKind::Arc => Self::of_arc(block, linear),
             BlockKind::Dwell => Self::none(),
         }
@@ -67,10 +67,8 @@ impl Shape {
     }
 
     /// A curve: its curvature is looked at in places of equal distance in its parameter.
-    fn of_curve(block: &Block, axes: &Axes, linear: &LinearAxes) -> Self {
-        // SAFETY: the block is handed over for this call, and its curve with it.
-        let data = unsafe { block.nurbs.to_data() };
-        let Ok(curve) = Nurbs::new(&data, axes) else { return Self::none() };
+    fn of_curve(curve: Curve<'_>, axes: &Axes, linear: &LinearAxes) -> Self {
+        let Ok(curve) = Nurbs::new(&curve.to_data(), axes) else { return Self::none() };
         let (from, to) = curve.range();
         let direction = |u: f64| {
             let at = curve.along_path(u)?;

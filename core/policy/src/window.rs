@@ -1,6 +1,6 @@
 //! Windows of blocks: what the script sees of each.
 
-use tandem_sdk::{Block, BlockKind, Edge};
+use tandem_sdk::{Block, BlockKind, Curve, Edge};
 
 use crate::abi::{self, block as at, put_f64, put_u32};
 use crate::bounds::InForce;
@@ -54,8 +54,8 @@ impl Window {
     }
 
     /// Appends a block. Its turns are known when the window is closed.
-    pub fn push(&mut self, block: &Block) {
-        let shape = Shape::of(block, &self.facts.axes, &self.axes);
+    pub fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) {
+        let shape = Shape::of(block, curve, &self.facts.axes, &self.axes);
         self.half_turns.push(half_turn(self.last.as_ref(), shape.start.as_ref()));
         self.last = shape.end;
         let in_force = in_force(block, &self.facts);
@@ -64,8 +64,8 @@ impl Window {
     }
 
     /// The block behind the window, in the same stretch; without one the machine rests there. Sets the turns.
-    pub fn close(&mut self, next: Option<&Block>) {
-        let next = next.map(|next| Shape::of(next, &self.facts.axes, &self.axes));
+    pub fn close(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
+        let next = next.map(|(next, curve)| Shape::of(next, curve, &self.facts.axes, &self.axes));
         let start = next.as_ref().and_then(|next| next.start.as_ref());
         self.half_turns.push(half_turn(self.last.as_ref(), start));
         if next.is_none() {
@@ -146,21 +146,21 @@ mod tests {
     #[test]
     fn turns_are_known_at_both_ends_and_across_windows() {
         let mut window = Window::new(&facts());
-        window.push(&line([0.0, 0.0], [1.0, 0.0]));
-        window.push(&line([1.0, 0.0], [1.0, 1.0]));
-        window.close(Some(&line([1.0, 1.0], [1.0, 0.0])));
+        window.push(&line([0.0, 0.0], [1.0, 0.0]), None);
+        window.push(&line([1.0, 0.0], [1.0, 1.0]), None);
+        window.close(Some((&line([1.0, 1.0], [1.0, 0.0]), None)));
         let turns = [(0, at::TURN_IN), (0, at::TURN_OUT), (1, at::TURN_IN), (1, at::TURN_OUT)];
         let turns = turns.map(|(index, place)| field(&window, index, place));
         for (turn, expected) in turns.into_iter().zip([0.0, FRAC_PI_2, FRAC_PI_2, PI]) {
             assert!((turn - expected).abs() < 1e-12, "{turns:?}");
         }
         window.clear();
-        window.push(&line([1.0, 1.0], [1.0, 0.0]));
+        window.push(&line([1.0, 1.0], [1.0, 0.0]), None);
         window.close(None);
         assert!((field(&window, 0, at::TURN_IN) - PI).abs() < 1e-12);
         assert_eq!(field(&window, 0, at::TURN_OUT), 0.0, "a stretch ends at rest");
         window.clear();
-        window.push(&line([1.0, 0.0], [0.0, 0.0]));
+        window.push(&line([1.0, 0.0], [0.0, 0.0]), None);
         window.close(None);
         assert_eq!(field(&window, 0, at::TURN_IN), 0.0, "a stretch begins at rest");
     }
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn an_arc_has_the_curvature_of_its_circle_and_turns_by_its_tangents() {
         let mut window = Window::new(&facts());
-        window.push(&line([0.0, -2.0], [2.0, -2.0]));
+        window.push(&line([0.0, -2.0], [2.0, -2.0]), None);
         let arc = ArcGeometry {
             plane: [0, 1],
             center_mm: [2.0, 0.0],
@@ -177,7 +177,7 @@ mod tests {
             sweep_rad: PI,
         };
         let ends = line([2.0, -2.0], [2.0, 2.0]);
-        window.push(&Block { kind: BlockKind::Arc, arc, length_mm: 2.0 * PI, ..ends });
+        window.push(&Block { kind: BlockKind::Arc, arc, length_mm: 2.0 * PI, ..ends }, None);
         window.close(None);
         assert!(field(&window, 1, at::TURN_IN) < 1e-9);
         assert!((field(&window, 1, at::CURVATURE) - 0.5).abs() < 1e-9);

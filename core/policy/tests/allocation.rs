@@ -26,7 +26,7 @@ fn windows_and_periods_allocate_nothing_once_the_notes_are_spent() {
     let (mut corners, mut load) = (policy("corner-time-constant"), policy("load-feed"));
     let mut round = |period: u64| {
         for index in 0..64 {
-            corners.offer(&line(index));
+            corners.offer(&line(index), None);
         }
         corners.decide(None);
         assert!(corners.tuning(1).time_constant_s.is_some());

@@ -169,11 +169,10 @@ pub(crate) fn limited_by(reason: LimitedBy) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tandem_sdk::{AxisVector, size_of_contract};
+    use tandem_sdk::AxisVector;
 
     fn report(block: u64, limited_by: LimitedBy) -> BlockReport {
         BlockReport {
-            size: size_of_contract::<BlockReport>(),
             limited_by,
             block,
             start_feed_mm_per_s: 0.0,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use tandem_motion::nurbs::Nurbs;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{Axes, AxisVector, Block, Curve};
 
 /// Spans searched around the last foot.
 const SPANS_AROUND: usize = 4;
@@ -43,13 +43,9 @@ impl CurveWatch {
     }
 
     /// A block that will be driven: a curve is copied. Rough loop; allocates.
-    pub fn block(&mut self, block: &Block) {
-        if block.kind != BlockKind::Nurbs {
-            return;
-        }
-        // SAFETY: the block is handed over in this call, and its slices with it.
-        let data = unsafe { block.nurbs.to_data() };
-        if let Ok(curve) = Nurbs::new(&data, &self.axes) {
+    pub fn block(&mut self, block: &Block, curve: Option<Curve<'_>>) {
+        let Some(curve) = curve else { return };
+        if let Ok(curve) = Nurbs::new(&curve.to_data(), &self.axes) {
             self.curves.push_back(Watched { block: block.index, u: curve.range().0, curve });
         }
     }
@@ -95,7 +91,7 @@ fn off_chord_mm(point: &AxisVector, from: &AxisVector, to: &AxisVector) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tandem_sdk::{NurbsData, OwnedBlock};
+    use tandem_sdk::{BlockKind, NurbsData};
 
     /// A quarter of a circle of 10 mm in steps of a tenth of a radian.
     #[test]
@@ -112,7 +108,7 @@ mod tests {
         let mut block = Block::at(data.control_points[0]);
         (block.kind, block.index, block.end) = (BlockKind::Nurbs, 3, data.control_points[2]);
         let mut watch = CurveWatch::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
-        OwnedBlock::new(block, Some(data.into())).with(|block| watch.block(block));
+        watch.block(&block, Some(data.curve()));
         let sagitta_mm = 10.0 * (1.0 - 0.05f64.cos());
         for n in 0..=15 {
             let angle = 0.1 * f64::from(n);

@@ -2,7 +2,7 @@
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, Curve};
 
 use crate::block_times::{BlockTimes, TimeGoesTo};
 use crate::joint_peaks::{JointWatch, raise};
@@ -76,8 +76,8 @@ impl Monitor {
     }
 
     /// A block is planned for good.
-    pub fn block(&mut self, block: &Block, report: &BlockReport) {
-        self.watch.block(&self.axes, block);
+    pub fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
+        self.watch.block(&self.axes, block, curve);
         self.blocks += 1;
         self.times.block(block, report);
         self.length_mm += block.length_mm;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use tandem_motion::Path;
 use tandem_motion::nurbs::Nurbs;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{Axes, AxisVector, Block, Curve};
 
 /// Blocks looked back over where a planner leaves the path: what its filters can still hold.
 const LOOK_BACK: usize = 256;
@@ -28,10 +28,8 @@ enum Watched {
 }
 
 impl Watched {
-    fn curve(axes: &Axes, block: &Block) -> Option<Self> {
-        // SAFETY: the block is handed over in this call, and its slices with it.
-        let data = unsafe { block.nurbs.to_data() };
-        let curve = Nurbs::new(&data, axes).ok()?;
+    fn curve(axes: &Axes, curve: Curve<'_>) -> Option<Self> {
+        let curve = Nurbs::new(&curve.to_data(), axes).ok()?;
         let span = curve.degree();
         Some(Self::Curve(Box::new(curve), span))
     }
@@ -84,10 +82,10 @@ impl PathWatch {
     }
 
     /// A block that will be driven.
-    pub fn block(&mut self, axes: &Axes, block: &Block) {
-        let path = match block.kind {
-            BlockKind::Nurbs => Watched::curve(axes, block),
-            _ => Path::new(block).map(Watched::Path),
+    pub fn block(&mut self, axes: &Axes, block: &Block, curve: Option<Curve<'_>>) {
+        let path = match curve {
+            Some(curve) => Watched::curve(axes, curve),
+            None => Path::new(block).map(Watched::Path),
         };
         // A block that states none says NaN.
         let tolerance_mm = self.tolerance_mm.max(block.path_tolerance_mm);

@@ -16,12 +16,12 @@ pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
 pub use source::Source;
 
 use tandem_rings::Rest;
-use tandem_sdk::{Block, BlockReport, Event};
+use tandem_sdk::{Block, BlockReport, Curve, Event};
 
 /// Is told of blocks as they are planned for good; in order, each once.
 pub trait Observer {
-    /// `block` is driven as `report` says.
-    fn block(&mut self, block: &Block, report: &BlockReport);
+    /// `block` is driven as `report` says, along `curve` where it is a NURBS.
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport);
 
     /// A non-motion word is planned.
     fn event(&mut self, _event: &Event) {}
@@ -31,5 +31,5 @@ pub trait Observer {
 }
 
 impl Observer for () {
-    fn block(&mut self, _block: &Block, _report: &BlockReport) {}
+    fn block(&mut self, _block: &Block, _curve: Option<Curve<'_>>, _report: &BlockReport) {}
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use tandem_gcode::Item;
 use tandem_rings::{Rest, RestCause};
-use tandem_sdk::Block;
+use tandem_sdk::{Block, Curve, NurbsData};
 
 use crate::source::Source;
 
@@ -13,15 +13,15 @@ pub const WINDOW_BLOCKS: usize = 64;
 
 /// What decides on blocks, a window at a time. Called on the rough loop; may allocate.
 pub trait BlockPolicy: Send {
-    /// The next block of a window; its curve is valid for the call.
-    fn offer(&mut self, block: &Block);
+    /// The next block of a window, and its curve.
+    fn offer(&mut self, block: &Block, curve: Option<Curve<'_>>);
 
     /// The window is complete: it is full, or the stretch ends with it. `next` follows it in the same stretch.
-    fn decide(&mut self, next: Option<&Block>);
+    fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>);
 
     /// Block `index` of the window as it is to be driven, where it is not to be driven as it is: only time constant, path
     /// tolerance and feed cap may differ.
-    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block>;
+    fn tuned(&mut self, index: usize, block: &Block, curve: Option<Curve<'_>>) -> Option<Block>;
 }
 
 /// A source whose blocks a policy has tuned.
@@ -91,20 +91,15 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
         let Self { policy, items, .. } = self;
         let mut blocks = items.iter().filter(|item| is_block(item));
         for item in blocks.by_ref().take(count) {
-            with_block(item, |block| policy.offer(block));
+            let (block, curve) = block_of(item);
+            policy.offer(block, curve);
         }
-        match blocks.next() {
-            Some(next) => with_block(next, |block| policy.decide(Some(block))),
-            None => policy.decide(None),
-        }
+        policy.decide(blocks.next().map(block_of));
         let blocks = items.iter_mut().filter(|item| is_block(item)).take(count);
         for (index, item) in blocks.enumerate() {
-            let Some(tuned) = with_block(item, |block| policy.tuned(index, block)) else { continue };
-            let facts = match item {
-                Item::Block(block) => block,
-                Item::Curve(curve) => curve.facts_mut(),
-                _ => continue,
-            };
+            let (block, curve) = block_of(item);
+            let Some(tuned) = policy.tuned(index, block, curve) else { continue };
+            let Item::Block(facts, _) = item else { continue };
             facts.time_constant_s = tuned.time_constant_s;
             facts.path_tolerance_mm = tuned.path_tolerance_mm;
             facts.feed_cap_mm_per_s = tuned.feed_cap_mm_per_s;
@@ -173,7 +168,7 @@ impl<S: Source, P: BlockPolicy> Source for Tuned<S, P> {
 }
 
 fn is_block(item: &Item) -> bool {
-    matches!(item, Item::Block(_) | Item::Curve(_))
+    matches!(item, Item::Block(..))
 }
 
 /// Whether nothing is known of what follows until the machine has answered.
@@ -181,10 +176,9 @@ fn ends_stretch(item: &Item) -> bool {
     matches!(item, Item::Wait(_) | Item::End) || item.is_probe()
 }
 
-fn with_block<T>(item: &Item, call: impl FnOnce(&Block) -> T) -> T {
+fn block_of(item: &Item) -> (&Block, Option<Curve<'_>>) {
     match item {
-        Item::Block(block) => call(block),
-        Item::Curve(curve) => curve.with(call),
+        Item::Block(block, curve) => (block, curve.as_deref().map(NurbsData::curve)),
         _ => unreachable!("only blocks are asked about"),
     }
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::*;
 use tandem_gcode::{Input, InputMode, InputWait};
-use tandem_sdk::{AxisVector, BlockKind, Edge, Event, EventKind, StopOn};
+use tandem_sdk::{AxisVector, BlockKind, Curve, Edge, Event, EventKind, StopOn};
 
 /// What a policy was shown: blocks of each window by their index, and the block behind it.
 type Seen = Arc<Mutex<Vec<(Vec<u64>, Option<u64>)>>>;
@@ -17,16 +17,16 @@ struct Recorder {
 }
 
 impl BlockPolicy for Recorder {
-    fn offer(&mut self, block: &Block) {
+    fn offer(&mut self, block: &Block, _curve: Option<Curve<'_>>) {
         self.window.push(block.index);
     }
 
-    fn decide(&mut self, next: Option<&Block>) {
+    fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
         let window = std::mem::take(&mut self.window);
-        self.seen.lock().unwrap().push((window, next.map(|block| block.index)));
+        self.seen.lock().unwrap().push((window, next.map(|(block, _)| block.index)));
     }
 
-    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block> {
+    fn tuned(&mut self, index: usize, block: &Block, _curve: Option<Curve<'_>>) -> Option<Block> {
         Some(Block { feed_cap_mm_per_s: index as f64, line: 999, ..*block })
     }
 }
@@ -52,12 +52,12 @@ impl Source for Script {
 }
 
 fn block(index: u64) -> Item {
-    Item::Block(Block { kind: BlockKind::Line, index, line: 1, ..Block::at(AxisVector::ZERO) })
+    Item::Block(Block { kind: BlockKind::Line, index, line: 1, ..Block::at(AxisVector::ZERO) }, None)
 }
 
 fn probe(index: u64) -> Item {
     let stop_on = StopOn { edge: Edge::Rising, ..StopOn::default() };
-    Item::Block(Block { kind: BlockKind::Line, index, stop_on, ..Block::at(AxisVector::ZERO) })
+    Item::Block(Block { kind: BlockKind::Line, index, stop_on, ..Block::at(AxisVector::ZERO) }, None)
 }
 
 fn wait() -> Item {
@@ -96,7 +96,7 @@ fn windows_are_full_whatever_comes_at_once() {
         let (mut source, seen) = tuned(script);
         let (items, error) = drain(&mut source);
         assert_eq!(windows(&seen), [(64, Some(64)), (64, Some(128)), (22, None)], "{at_once} at once");
-        let caps = items.iter().map(|item| with_block(item, |b| (b.index, b.feed_cap_mm_per_s, b.line)));
+        let caps = items.iter().map(|item| block_of(item).0).map(|b| (b.index, b.feed_cap_mm_per_s, b.line));
         let expected = all.iter().map(|i| (*i, (*i % 64) as f64, 1));
         assert!(caps.eq(expected) && error.is_none(), "only what a policy may change has changed");
     }

@@ -1,10 +1,11 @@
 //! The rough loop's side of the segment ring.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, Release};
 
 use tandem_rings::{Queued, Rest, RoughEnd};
-use tandem_sdk::{BlockReport, Edge, Event, OwnedBlock, Segment, SegmentFlags, SegmentSink, StopOn};
+use tandem_sdk::{Block, BlockReport, Edge, Event, NurbsData, Segment, SegmentFlags, SegmentSink, StopOn};
 
 use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
@@ -22,8 +23,8 @@ pub struct Queue {
     sent: usize,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
-    /// Blocks accepted by the planner, not yet reported.
-    blocks: VecDeque<OwnedBlock>,
+    /// Blocks accepted by the planner, not yet reported, with their curves.
+    blocks: VecDeque<(Block, Option<Arc<NurbsData>>)>,
     /// Blocks that wait for an edge, until they are emitted.
     stops: VecDeque<(u64, StopOn)>,
     /// Reports of blocks planned for good since the last look; their blocks are still in `blocks`.
@@ -63,12 +64,11 @@ impl Queue {
     }
 
     /// The planner has accepted `block`.
-    pub fn accepted(&mut self, block: OwnedBlock) {
-        let facts = block.facts();
-        if facts.stop_on.edge != Edge::None {
-            self.stops.push_back((facts.index, facts.stop_on));
+    pub fn accepted(&mut self, block: &Block, curve: Option<&Arc<NurbsData>>) {
+        if block.stop_on.edge != Edge::None {
+            self.stops.push_back((block.index, block.stop_on));
         }
-        self.blocks.push_back(block);
+        self.blocks.push_back((*block, curve.cloned()));
     }
 
     /// The next rest that the fine loop has reported.
@@ -116,9 +116,9 @@ impl Queue {
     /// Tells `observer` of the blocks planned for good since the last look, and forgets them.
     pub fn tell_of_blocks(&mut self, observer: &mut dyn Observer) {
         for report in self.reported.drain(..) {
-            while let Some(block) = self.blocks.front().filter(|block| block.facts().index <= report.block) {
-                if block.facts().index == report.block {
-                    block.with(|block| observer.block(block, &report));
+            while let Some((block, curve)) = self.blocks.front().filter(|(block, _)| block.index <= report.block) {
+                if block.index == report.block {
+                    observer.block(block, curve.as_deref().map(NurbsData::curve), &report);
                 }
                 self.blocks.pop_front();
             }
@@ -241,9 +241,8 @@ impl SegmentSink for Queue {
 
     fn block(&mut self, report: &BlockReport) {
         let first = self.reported.last().map_or(0, |last| last.block + 1);
-        let given = |block: &OwnedBlock| block.facts().index == report.block;
-        let place = self.blocks.front().map_or(0, |front| report.block.wrapping_sub(front.facts().index) as usize);
-        if report.block >= first && self.blocks.get(place).is_some_and(given) {
+        let place = self.blocks.front().map_or(0, |(front, _)| report.block.wrapping_sub(front.index) as usize);
+        if report.block >= first && self.blocks.get(place).is_some_and(|(block, _)| block.index == report.block) {
             self.reported.push(*report);
         } else {
             self.defect = Some("advance emits a report of a block that it was not given");

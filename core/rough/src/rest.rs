@@ -38,7 +38,7 @@ impl RoughLoop {
             self.next = self.items.len();
         }
         for item in &mut self.items[self.next..] {
-            if let Item::Block(block) = item
+            if let Item::Block(block, _) = item
                 && block.kind == BlockKind::Dwell
             {
                 (block.start, block.end) = (rest.position, rest.position);

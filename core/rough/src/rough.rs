@@ -2,7 +2,7 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, Edge, Event, EventKind, OwnedBlock, Planner};
+use tandem_sdk::{Accepted, Edge, Event, EventKind, NurbsData, Planner};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
@@ -234,24 +234,15 @@ impl RoughLoop {
     fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         while !self.awaits_answer() && self.load()? {
             match &self.items[self.next] {
-                Item::Block(block) => {
-                    (self.line, self.last_block) = (block.line, block.index);
-                    let accepted =
-                        self.planner.accept(block).map_err(|e| planner_error(Some(block.line), &e.to_string()))?;
-                    if accepted == Accepted::Full {
+                Item::Block(block, curve) => {
+                    self.line = block.line;
+                    self.last_block = block.index;
+                    let accepted = self.planner.accept(block, curve.as_deref().map(NurbsData::curve));
+                    if accepted.map_err(|e| planner_error(Some(block.line), &e.to_string()))? == Accepted::Full {
                         return Ok(());
                     }
                     self.edge_awaited = block.stop_on.edge != Edge::None;
-                    self.queue.accepted(OwnedBlock::new(*block, None));
-                }
-                Item::Curve(curve) => {
-                    let line = curve.facts().line;
-                    (self.line, self.last_block) = (line, curve.facts().index);
-                    let accepted = curve.with(|block| self.planner.accept(block));
-                    if accepted.map_err(|e| planner_error(Some(line), &e.to_string()))? == Accepted::Full {
-                        return Ok(());
-                    }
-                    self.queue.accepted(curve.clone());
+                    self.queue.accepted(block, curve.as_ref());
                 }
                 Item::Event(event) if event.kind == EventKind::ProgramEnd => {}
                 Item::Event(event) => {

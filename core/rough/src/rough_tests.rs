@@ -7,7 +7,8 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_gcode::Item;
 use tandem_rings::{FineEnd, HostEnd, Rest, Sizes, bridge};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, Planner, PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, Curve, Planner, PlannerDescription, PluginError, Segment, SegmentFlags,
+    SegmentSink,
 };
 
 use super::*;
@@ -26,10 +27,10 @@ impl Planner for Fake {
     fn describe(&self) -> PlannerDescription {
         PlannerDescription::order_2()
     }
-    fn check(&self, _block: &Block) -> Result<(), PluginError> {
+    fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         Ok(())
     }
-    fn accept(&mut self, _block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         Ok(Accepted::Accepted)
     }
     fn finish(&mut self) {}

@@ -108,13 +108,12 @@ impl Mul<f64> for AxisVector {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Axes {
-    size: u32,
     count: u32,
     letters: [u8; MAX_AXES],
     rotary: [bool; MAX_AXES],
 }
 
-layout!(Axes { size, count, letters, rotary });
+layout!(Axes { count, letters, rotary });
 
 impl Axes {
     /// Axes from `(letter, rotary)` pairs; letters are upper case, one of `XYZABCUVW`.
@@ -125,12 +124,7 @@ impl Axes {
         if axes.is_empty() || axes.len() > MAX_AXES {
             return Err(format!("a machine has 1 to {MAX_AXES} axes, not {}", axes.len()));
         }
-        let mut this = Self {
-            size: crate::size_of_contract::<Self>(),
-            count: axes.len() as u32,
-            letters: [0; MAX_AXES],
-            rotary: [false; MAX_AXES],
-        };
+        let mut this = Self { count: axes.len() as u32, letters: [0; MAX_AXES], rotary: [false; MAX_AXES] };
         for (index, (letter, rotary)) in axes.iter().enumerate() {
             if !"XYZABCUVW".contains(*letter) {
                 return Err(format!("no axis is called {letter}: the letters are X Y Z A B C U V W"));

@@ -1,9 +1,8 @@
 //! A block: one path element of a part program, in machine coordinates, with what the program says about it.
 
 use crate::abi::layout::{layout, layout_of_enum};
-use std::sync::Arc;
 
-use crate::{AxisVector, Edge, JointLanes, RawSlice, StopOn, size_of_contract};
+use crate::{AxisVector, Edge, Slice, StopOn};
 
 /// What kind of path a block follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,23 +52,35 @@ pub struct ArcGeometry {
 
 layout!(ArcGeometry { plane, center_mm, radius_mm, start_angle_rad, sweep_rad });
 
-/// A NURBS curve of degree `degree` over the machine's axes. Valid for the call only.
-#[derive(Clone, Copy, Debug, Default)]
+/// The curve of a [`BlockKind::Nurbs`], of degree `degree` over the machine's axes, borrowed from who hands the block over.
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct NurbsGeometry {
+pub struct Curve<'a> {
     /// Degree, 1 to 5.
     pub degree: u32,
-    /// Control points.
-    pub control_points: RawSlice<AxisVector>,
+    /// Control points, mm or rad.
+    pub control_points: Slice<'a, AxisVector>,
     /// Weights, one a control point, positive.
-    pub weights: RawSlice<f64>,
+    pub weights: Slice<'a, f64>,
     /// Knots, non-decreasing, `control points + degree + 1` of them.
-    pub knots: RawSlice<f64>,
+    pub knots: Slice<'a, f64>,
 }
 
-layout!(NurbsGeometry { degree, control_points, weights, knots });
+layout!(Curve<'a> { degree, control_points, weights, knots });
 
-/// The data of a NURBS curve, owned: what outlives the call that hands over a [`NurbsGeometry`].
+impl Curve<'_> {
+    /// A copy that owns its data. Allocates.
+    pub fn to_data(&self) -> NurbsData {
+        NurbsData {
+            degree: self.degree as usize,
+            control_points: self.control_points.to_vec(),
+            weights: self.weights.to_vec(),
+            knots: self.knots.to_vec(),
+        }
+    }
+}
+
+/// The data of a NURBS curve, owned: what a queue of blocks keeps beside a block.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NurbsData {
     /// Degree, 1 to 5.
@@ -83,79 +94,22 @@ pub struct NurbsData {
 }
 
 impl NurbsData {
-    /// A description of this data, for a call during which it lives. Does not allocate.
-    pub fn geometry(&self) -> NurbsGeometry {
-        NurbsGeometry {
+    /// The curve as it is handed over with its block. Does not allocate.
+    pub fn curve(&self) -> Curve<'_> {
+        Curve {
             degree: self.degree as u32,
-            control_points: RawSlice::new(&self.control_points),
-            weights: RawSlice::new(&self.weights),
-            knots: RawSlice::new(&self.knots),
+            control_points: Slice::new(&self.control_points),
+            weights: Slice::new(&self.weights),
+            knots: Slice::new(&self.knots),
         }
     }
 }
 
-impl NurbsGeometry {
-    /// A copy of the data. Allocates.
-    ///
-    /// # Safety
-    /// Only during the call in which the geometry was handed over: its owner may free the data afterwards.
-    pub unsafe fn to_data(&self) -> NurbsData {
-        // SAFETY: passed on to the caller.
-        unsafe {
-            NurbsData {
-                degree: self.degree as usize,
-                control_points: self.control_points.as_slice().to_vec(),
-                weights: self.weights.as_slice().to_vec(),
-                knots: self.knots.as_slice().to_vec(),
-            }
-        }
-    }
-}
-
-/// A block that owns its curve: what a queue of blocks holds.
-#[derive(Clone, Debug)]
-pub struct OwnedBlock {
-    block: Block,
-    curve: Option<Arc<NurbsData>>,
-}
-
-impl OwnedBlock {
-    /// `block` with the data of its curve, where it has one.
-    pub fn new(mut block: Block, curve: Option<Arc<NurbsData>>) -> Self {
-        block.nurbs = NurbsGeometry::default();
-        Self { block, curve }
-    }
-
-    /// Hands the block to `call`; the slices of its curve are valid there and no longer.
-    pub fn with<T>(&self, call: impl FnOnce(&Block) -> T) -> T {
-        match &self.curve {
-            None => call(&self.block),
-            Some(curve) => call(&Block { nurbs: curve.geometry(), ..self.block }),
-        }
-    }
-
-    /// The block's plain facts, without its curve.
-    pub fn facts(&self) -> &Block {
-        &self.block
-    }
-
-    /// The same, to be changed.
-    pub fn facts_mut(&mut self) -> &mut Block {
-        &mut self.block
-    }
-
-    /// The data of its curve.
-    pub fn curve(&self) -> Option<&Arc<NurbsData>> {
-        self.curve.as_ref()
-    }
-}
-
-/// One path element. Coordinates are machine coordinates in axis space with all offsets applied.
+/// One path element: plain data. Coordinates are machine coordinates in axis space with all offsets applied. The curve of a
+/// [`BlockKind::Nurbs`] goes beside it, as a [`Curve`].
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Block {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// The kind of path.
     pub kind: BlockKind,
     /// How the end of the block is passed.
@@ -170,8 +124,6 @@ pub struct Block {
     pub end: AxisVector,
     /// The circle of an [`BlockKind::Arc`].
     pub arc: ArcGeometry,
-    /// The curve of a [`BlockKind::Nurbs`].
-    pub nurbs: NurbsGeometry,
     /// Length of the path as path speed counts it, mm (rad where only rotary axes move).
     pub length_mm: f64,
     /// Programmed feed along the path, mm/s (rad/s where only rotary axes move); for a rapid the machine's limits alone
@@ -196,12 +148,9 @@ pub struct Block {
     pub override_enabled: u32,
     /// Spindle speed commanded, rad/s; positive clockwise (M3), zero when stopped.
     pub spindle_rad_per_s: f64,
-    /// What the lanes behind the axes are; none where every joint is an axis of its own. It lives as long as the process.
-    pub joint_lanes: Option<&'static JointLanes>,
 }
 
 layout!(Block {
-    size,
     kind,
     path_mode,
     line,
@@ -209,7 +158,6 @@ layout!(Block {
     start,
     end,
     arc,
-    nurbs,
     length_mm,
     feed_mm_per_s,
     feed_cap_mm_per_s,
@@ -220,15 +168,13 @@ layout!(Block {
     offset,
     tool,
     override_enabled,
-    spindle_rad_per_s,
-    joint_lanes
+    spindle_rad_per_s
 });
 
 impl Block {
     /// A dwell of zero duration at `position`: the blank from which readers and tests build blocks.
     pub fn at(position: AxisVector) -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             kind: BlockKind::Dwell,
             path_mode: PathMode::Continuous,
             line: 0,
@@ -236,7 +182,6 @@ impl Block {
             start: position,
             end: position,
             arc: ArcGeometry::default(),
-            nurbs: NurbsGeometry::default(),
             length_mm: 0.0,
             feed_mm_per_s: f64::INFINITY,
             feed_cap_mm_per_s: f64::INFINITY,
@@ -248,7 +193,6 @@ impl Block {
             tool: 0,
             override_enabled: 1,
             spindle_rad_per_s: 0.0,
-            joint_lanes: None,
         }
     }
 

@@ -1,7 +1,5 @@
 //! Events: non-motion words, tied to a place on the path.
 
-use crate::size_of_contract;
-
 /// What an event does. The meaning of [`Event::index`] and [`Event::value`] is given with each kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -45,8 +43,6 @@ pub enum EventKind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Event {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// What it does.
     pub kind: EventKind,
     /// Line of the part program, from 1.
@@ -66,15 +62,6 @@ pub struct Event {
 impl Event {
     /// An event of `kind` on `line` that takes effect before block `before_block`.
     pub fn new(kind: EventKind, line: u32, before_block: u64, index: i32, value: f64) -> Self {
-        Self {
-            size: size_of_contract::<Self>(),
-            kind,
-            line,
-            index,
-            value,
-            epoch: 0,
-            before_block,
-            program_time_s: f64::NAN,
-        }
+        Self { kind, line, index, value, epoch: 0, before_block, program_time_s: f64::NAN }
     }
 }

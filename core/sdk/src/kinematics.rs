@@ -1,24 +1,22 @@
 //! Axis space to joint space and back.
 
 use crate::abi::layout::layout;
-use crate::{Axes, AxisVector, PluginError, size_of_contract};
+use crate::{Axes, AxisVector, PluginError};
 
 /// What a kinematics is told when it is made.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct KinematicsContext {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// The machine's axes.
     pub axes: Axes,
 }
 
-layout!(KinematicsContext { size, axes });
+layout!(KinematicsContext { axes });
 
 impl KinematicsContext {
     /// The context of a machine with these axes.
     pub fn new(axes: Axes) -> Self {
-        Self { size: size_of_contract::<Self>(), axes }
+        Self { axes }
     }
 }
 
@@ -38,12 +36,6 @@ pub trait Kinematics: Send + Sync {
 
     /// Axis positions for joint positions, mm or rad.
     fn to_axes(&self, joints: &AxisVector) -> AxisVector;
-
-    /// Change of the joints for a small change `direction` of the axes at `position`. The default takes a difference
-    /// of [`Kinematics::to_joints`], exact for linear maps. No loop asks for it; the conformance kit does.
-    fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        self.to_joints(&(*position + *direction)) - self.to_joints(position)
-    }
 
     /// Why there is no joint position for a place that was asked for: asked before a run, and where an answer is not
     /// finite, on the fine loop too. A plugin that has panicked says so here.
@@ -66,9 +58,5 @@ impl Kinematics for Identity {
 
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
         *joints
-    }
-
-    fn joint_direction(&self, _position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        *direction
     }
 }

@@ -1,7 +1,7 @@
 //! Joints that are sums of axes, as planners carry them along.
 
 use crate::abi::layout::layout;
-use crate::{AxisLimits, AxisVector, Limits, MAX_AXES, size_of_contract};
+use crate::{AxisLimits, AxisVector, Limits, MAX_AXES};
 
 /// Joints that several axes move together (the belts of a `CoreXY`), each a *lane* behind the machine's axes: entry
 /// `first() + n` of every vector holds what lane n is of the axes, `Σ weight · axis`.
@@ -13,13 +13,12 @@ use crate::{AxisLimits, AxisVector, Limits, MAX_AXES, size_of_contract};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct JointLanes {
-    size: u32,
     first: u32,
     count: u32,
     weights: [AxisVector; MAX_AXES],
 }
 
-layout!(JointLanes { size, first, count, weights });
+layout!(JointLanes { first, count, weights });
 
 impl JointLanes {
     /// Lanes behind `axes` axes, one for each of `weights`.
@@ -34,7 +33,7 @@ impl JointLanes {
             ));
         }
         let all = std::array::from_fn(|i| weights.get(i).copied().unwrap_or(AxisVector::ZERO));
-        Ok(Self { size: size_of_contract::<Self>(), first: axes as u32, count: count as u32, weights: all })
+        Ok(Self { first: axes as u32, count: count as u32, weights: all })
     }
 
     /// The entry of the first lane: the number of axes.

@@ -1,7 +1,8 @@
 //! The contracts of Tandem: what a planner, a feed strategy, a driver or a kinematics sees, and nothing else.
 //!
 //! Units inside are mm, s, rad and mm/s. A rotary axis is in rad wherever a linear one is in mm. Every type that
-//! crosses a contract is `repr(C)` and begins with its size, so that the same structures serve shared libraries.
+//! crosses a contract is `repr(C)`, so that the same structures serve shared libraries; whether both sides mean the same is
+//! judged by the names, places and types of the fields ([`abi`]).
 //!
 //! Which loop calls what:
 //!
@@ -33,7 +34,7 @@ mod strategy;
 mod text;
 
 pub use axis::{Axes, AxisVector, MAX_AXES};
-pub use block::{ArcGeometry, Block, BlockKind, NurbsData, NurbsGeometry, OwnedBlock, PathMode};
+pub use block::{ArcGeometry, Block, BlockKind, Curve, NurbsData, PathMode};
 pub use driver::{
     Arm, Attached, Driver, DriverContext, DriverDescription, Feedback, JointDescription, JointState, Latch, MAX_ANALOG,
     MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_ENABLE_S, MAX_LATCHES, Name, Setpoint,
@@ -49,7 +50,7 @@ pub use planner::{
 };
 pub use plugin::{Made, Plugin, PluginKind};
 pub use segment::{Edge, Segment, SegmentFlags, StopOn};
-pub use slice::RawSlice;
+pub use slice::Slice;
 pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
 pub use text::Words;
 
@@ -61,12 +62,4 @@ pub use serde;
 extern crate self as tandem_sdk;
 
 /// Number of the plugin contract. A plugin built against another number is refused.
-pub const ABI_VERSION: u32 = 3;
-
-/// The size field of a `repr(C)` structure, as every contract structure begins with it.
-///
-/// # Panics
-/// Never: the contract structures are far below 4 GiB.
-pub const fn size_of_contract<T>() -> u32 {
-    size_of::<T>() as u32
-}
+pub const ABI_VERSION: u32 = 4;

@@ -70,15 +70,13 @@ pub struct PathLimits {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Limits {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Number of axes, and of joint lanes behind them.
     pub count: u32,
     /// Limits per axis, in the order of the machine, then per joint lane.
     pub axes: [AxisLimits; MAX_AXES],
 }
 
-layout!(Limits { size, count, axes });
+layout!(Limits { count, axes });
 
 impl Limits {
     /// Limits of the given axes; the rest of the array repeats the last one and is never asked.
@@ -91,7 +89,7 @@ impl Limits {
             .filter(|_| axes.len() <= MAX_AXES)
             .ok_or_else(|| format!("limits are given for 1 to {MAX_AXES} axes, not {}", axes.len()))?;
         let all = std::array::from_fn(|i| *axes.get(i).unwrap_or(last));
-        Ok(Self { size: crate::size_of_contract::<Self>(), count: axes.len() as u32, axes: all })
+        Ok(Self { count: axes.len() as u32, axes: all })
     }
 
     /// The limits of the axes that exist, and behind them those of the joint lanes.
@@ -99,10 +97,10 @@ impl Limits {
         &self.axes[..self.count as usize]
     }
 
-    /// The limits along `direction` (change of the axes per mm of path) at `position`. Rough loop; does not allocate.
+    /// The limits along `direction` (change of the axes per mm of path). Rough loop; does not allocate.
     ///
     /// Axes that do not move do not limit; a direction of zero gives infinite limits. Joint lanes count like axes.
-    pub fn along(&self, _position: &AxisVector, direction: &AxisVector) -> PathLimits {
+    pub fn along(&self, direction: &AxisVector) -> PathLimits {
         let smallest = |of: fn(&AxisLimits) -> f64| -> f64 {
             let each = self.axes().iter().enumerate().filter(|(i, _)| direction[*i] != 0.0);
             each.map(|(i, axis)| of(axis) / direction[i].abs()).fold(f64::INFINITY, f64::min)

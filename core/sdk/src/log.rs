@@ -8,8 +8,6 @@ use crate::abi::layout::{Layout, START, fold, fold_text, layout, layout_of_enum,
 use std::fmt::{self, Write};
 use std::sync::atomic::{AtomicPtr, Ordering};
 
-use crate::size_of_contract;
-
 /// Longest text of a record, bytes; what is longer ends in `…`.
 pub const LOG_TEXT: usize = 200;
 /// Longest name of a source, bytes.
@@ -34,21 +32,18 @@ layout_of_enum!(LogLevel { Info, Warning, Error });
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LogRecord {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// How much it matters, as a number until it has been looked at.
     level: u32,
     source: Short<LOG_SOURCE>,
     text: Short<LOG_TEXT>,
 }
 
-layout!(LogRecord { size, level, source, text });
+layout!(LogRecord { level, source, text });
 
 impl LogRecord {
     /// A record; a text that is too long is cut. Any loop; does not allocate.
     pub fn new(level: LogLevel, source: &str, text: fmt::Arguments<'_>) -> Self {
-        let mut this =
-            Self { size: size_of_contract::<Self>(), level: level as u32, source: Short::EMPTY, text: Short::EMPTY };
+        let mut this = Self { level: level as u32, source: Short::EMPTY, text: Short::EMPTY };
         // A text that does not fit is an error of the formatter, and marked by it.
         let _ = this.source.write_str(source);
         let _ = this.text.write_fmt(text);
@@ -57,11 +52,7 @@ impl LogRecord {
 
     /// How much it matters. A number that stands for no level matters most.
     pub fn level(&self) -> LogLevel {
-        match self.level {
-            0 => LogLevel::Info,
-            1 => LogLevel::Warning,
-            _ => LogLevel::Error,
-        }
+        LogLevel::try_from(self.level).unwrap_or(LogLevel::Error)
     }
 
     /// The crate that wrote it.
@@ -121,7 +112,6 @@ impl<const N: usize> Write for Short<N> {
 table! {
     /// What a host offers its plugins.
     pub struct HostTable {
-        size: u32,
         abi_version: u32,
         log: unsafe extern "C" fn(*const LogRecord),
     }
@@ -130,7 +120,7 @@ table! {
 impl HostTable {
     /// A table whose `log` takes a record from any thread, the fine loop's included.
     pub const fn new(log: unsafe extern "C" fn(*const LogRecord)) -> Self {
-        Self { size: size_of_contract::<Self>(), abi_version: crate::ABI_VERSION, log }
+        Self { abi_version: crate::ABI_VERSION, log }
     }
 }
 

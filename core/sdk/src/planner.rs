@@ -1,14 +1,12 @@
 //! The planner contract: blocks in, segments out.
 
 use crate::abi::layout::{layout, layout_of_enum};
-use crate::{Axes, AxisVector, Block, JointLanes, Limits, MAX_AXES, PluginError, Segment, size_of_contract};
+use crate::{Axes, AxisVector, Block, Curve, JointLanes, Limits, MAX_AXES, PluginError, Segment};
 
 /// What a planner is told when it is opened.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct PlannerContext {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// The machine's axes.
     pub axes: Axes,
     /// The machine's limits. They are the limits themselves: planners aim at 0.999 of them.
@@ -30,7 +28,6 @@ pub struct PlannerContext {
 }
 
 layout!(PlannerContext {
-    size,
     axes,
     limits,
     fine_period_s,
@@ -57,8 +54,6 @@ impl PlannerContext {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct PlannerDescription {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Order of the limits that it keeps: 2 velocity and acceleration, 3 also jerk.
     pub order: u32,
     /// Allowable speed difference that it makes use of, per axis, mm/s: zero for continuous velocity. Judge and guard
@@ -73,13 +68,12 @@ pub struct PlannerDescription {
     pub uses_time_constants: u32,
 }
 
-layout!(PlannerDescription { size, order, speed_difference_mm_per_s, breaks_limits, leaves_path, uses_time_constants });
+layout!(PlannerDescription { order, speed_difference_mm_per_s, breaks_limits, leaves_path, uses_time_constants });
 
 impl PlannerDescription {
     /// A planner that keeps velocity and acceleration limits, continuous in velocity, on the path.
     pub fn order_2() -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             order: 2,
             speed_difference_mm_per_s: [0.0; MAX_AXES],
             breaks_limits: 0,
@@ -100,17 +94,6 @@ pub enum Accepted {
 }
 
 layout_of_enum!(Accepted { Accepted, Full });
-
-impl Accepted {
-    /// The answer that crosses the border as this number.
-    pub(crate) fn of_number(number: u32) -> Option<Self> {
-        match number {
-            0 => Some(Self::Accepted),
-            1 => Some(Self::Full),
-            _ => None,
-        }
-    }
-}
 
 /// How far `advance` came.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,17 +147,10 @@ layout_of_enum!(LimitedBy {
     Policy,
 });
 
-impl LimitedBy {
-    /// How many there are: their numbers are those below.
-    pub(crate) const COUNT: u32 = Self::Policy as u32 + 1;
-}
-
 /// How a block is driven; becomes a row of the blocks CSV.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct BlockReport {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// What held the feed down.
     pub limited_by: LimitedBy,
     /// Index of the block.
@@ -192,7 +168,6 @@ pub struct BlockReport {
 }
 
 layout!(BlockReport {
-    size,
     limited_by,
     block,
     start_feed_mm_per_s,
@@ -222,17 +197,17 @@ pub trait Planner: Send {
     /// What it keeps and what it does not.
     fn describe(&self) -> PlannerDescription;
 
-    /// Whether this planner can drive `block`. Pure: the first pass asks for every block before anything moves.
+    /// Whether this planner can drive `block`, along `curve` where that is a NURBS. Pure: the first pass asks for every block before anything moves.
     ///
     /// # Errors
     /// Why not.
-    fn check(&self, block: &Block) -> Result<(), PluginError>;
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError>;
 
-    /// Takes the next block. Blocks follow each other: `start` is the `end` of the one before.
+    /// Takes the next block, with its curve where it is a NURBS. Blocks follow each other: `start` is the `end` of the one before.
     ///
     /// # Errors
     /// A block that `check` refuses.
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError>;
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError>;
 
     /// No block follows for now: what is buffered ends at rest.
     fn finish(&mut self);

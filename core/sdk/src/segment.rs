@@ -1,7 +1,7 @@
 //! What the rough loop hands to the fine loop.
 
 use crate::abi::layout::{Layout, START, fold, fold_text, layout, layout_of_enum};
-use crate::{AxisVector, MAX_AXES, size_of_contract};
+use crate::{AxisVector, MAX_AXES};
 
 /// Facts about a [`Segment`], as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,11 +62,6 @@ pub enum Edge {
 
 layout_of_enum!(Edge { None, Rising, Falling });
 
-impl Edge {
-    /// How many there are: their numbers are those below.
-    pub(crate) const COUNT: u32 = Self::Falling as u32 + 1;
-}
-
 /// What ends a motion early, and whether it is an error when nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
@@ -88,8 +83,6 @@ layout!(StopOn { input, edge, miss_is_fault });
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Segment {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Entries of an older epoch are dropped by the fine loop: abort, probe and jog raise it.
     pub epoch: u32,
     /// Index of the block that moves (the later one where two overlap).
@@ -129,7 +122,6 @@ pub struct Segment {
 }
 
 layout!(Segment {
-    size,
     epoch,
     block,
     line,
@@ -156,7 +148,6 @@ impl Segment {
             coefficients[axis][0] = *value;
         }
         Self {
-            size: size_of_contract::<Self>(),
             epoch: 0,
             block: 0,
             line: 0,

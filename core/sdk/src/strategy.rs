@@ -1,9 +1,8 @@
 //! The feed-strategy contract: the samples of one rough period in, a feed ratio out.
 
 use crate::abi::layout::layout;
-use std::marker::PhantomData;
 
-use crate::{Axes, AxisVector, MAX_ANALOG, MAX_AXES, PluginError, RawSlice};
+use crate::{Axes, AxisVector, MAX_ANALOG, MAX_AXES, PluginError, Slice};
 
 /// Most named signals a strategy publishes.
 pub const MAX_SIGNALS: usize = 8;
@@ -16,8 +15,6 @@ pub struct FineSample {
     pub tick: u64,
     /// Program line that moved.
     pub line: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
     /// Position commanded, mm or rad.
     pub command: AxisVector,
     /// Position measured, as the exchange of the period answered it, mm or rad.
@@ -55,7 +52,6 @@ impl FineSample {
 layout!(FineSample {
     tick,
     line,
-    reserved,
     command,
     position,
     speed,
@@ -74,8 +70,6 @@ layout!(FineSample {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct StrategyContext {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Number of axes.
     pub axis_count: u32,
     /// The axes, in the order of all vectors.
@@ -90,33 +84,28 @@ pub struct StrategyContext {
     pub joints_are_axes: u32,
 }
 
-layout!(StrategyContext { size, axis_count, axes, fine_period_s, rough_period_s, max_feed_ratio, joints_are_axes });
+layout!(StrategyContext { axis_count, axes, fine_period_s, rough_period_s, max_feed_ratio, joints_are_axes });
 
 /// One rough period.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Window<'a> {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Number of the rough period since the start of the run.
     pub period: u64,
-    samples: RawSlice<FineSample>,
-    borrowed: PhantomData<&'a [FineSample]>,
+    samples: Slice<'a, FineSample>,
 }
 
-layout!(Window<'a> { size, period, samples, borrowed });
+layout!(Window<'a> { period, samples });
 
 impl<'a> Window<'a> {
     /// The window of rough period `period` with all its fine samples.
     pub fn new(period: u64, samples: &'a [FineSample]) -> Self {
-        let size = crate::size_of_contract::<Self>();
-        Self { size, period, samples: RawSlice::new(samples), borrowed: PhantomData }
+        Self { period, samples: Slice::new(samples) }
     }
 
     /// Every fine sample of the period, in order.
     pub fn samples(&self) -> &'a [FineSample] {
-        // SAFETY: made by `new` from a slice that lives as long as this, and nobody else can make one.
-        unsafe { self.samples.as_slice() }
+        self.samples.get()
     }
 }
 

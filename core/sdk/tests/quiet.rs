@@ -5,9 +5,8 @@ use std::panic::catch_unwind;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tandem_sdk::{
-    Accepted, Advanced, Axes, AxisLimits, AxisVector, Block, BlockReport, Kinematics, KinematicsContext, Limits,
+    Accepted, Advanced, Axes, AxisLimits, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext, Limits,
     NoOptions, Planner, PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink, local_plugin,
-    size_of_contract,
 };
 
 static TOLD: AtomicU32 = AtomicU32::new(0);
@@ -30,10 +29,10 @@ impl Planner for Emits {
     fn describe(&self) -> PlannerDescription {
         PlannerDescription::order_2()
     }
-    fn check(&self, _block: &Block) -> Result<(), PluginError> {
+    fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         Ok(())
     }
-    fn accept(&mut self, _block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         Ok(Accepted::Full)
     }
     fn finish(&mut self) {}
@@ -65,7 +64,6 @@ fn context(axes: Axes) -> PlannerContext {
         speed_difference_mm_per_s: 0.0,
     };
     PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
         axes,
         limits: Limits::new(&[ends]).unwrap(),
         fine_period_s: 0.001,

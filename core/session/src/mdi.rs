@@ -13,7 +13,7 @@ use tandem_host::{HostError, Left, Registry, Run, Switches, check_block, interpr
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, Block, Planner};
+use tandem_sdk::{AxisVector, NurbsData, Planner};
 
 /// What the operator says next.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -137,12 +137,8 @@ impl Manual {
     }
 
     fn judge(&self, item: &Item) -> Result<(), String> {
-        let judge = |block: &Block| check_block(&self.machine, self.judge.as_ref(), block);
-        match item {
-            Item::Block(block) => judge(block),
-            Item::Curve(curve) => curve.with(judge),
-            _ => Ok(()),
-        }
+        let Item::Block(block, curve) = item else { return Ok(()) };
+        check_block(&self.machine, self.judge.as_ref(), block, curve.as_deref().map(NurbsData::curve))
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use tandem_motion::Path;
 use tandem_motion::blocks::{self, BlockId, BlockWriter, limited_by_feed};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, Planner, PlannerContext,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, LimitedBy, Planner, PlannerContext,
     PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
@@ -68,7 +68,7 @@ impl AfterInterpolation {
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
         let Some(Waiting { block, stops: Some(stops) }) = self.waiting.front().copied() else { return false };
         self.waiting.pop_front();
-        match Path::new(&block) {
+        match Path::with_lanes(&block, self.context.joint_lanes) {
             Some(path) => self.begin_motion(&block, &path, stops, sink),
             None => {
                 let path_mm = self.motion.path_mm();
@@ -87,7 +87,7 @@ impl AfterInterpolation {
 
     /// The feed of a block's step, mm/s: the command at the highest ratio that may be asked, within the axis speeds.
     fn feed_mm_per_s(&self, block: &Block, path: &Path) -> (f64, LimitedBy) {
-        let limits = self.context.limits.along(&block.start, &path.max_direction());
+        let limits = self.context.limits.along(&path.max_direction());
         if block.kind == BlockKind::Rapid {
             return (AIM * limits.rapid_mm_per_s, LimitedBy::Feed);
         }
@@ -127,15 +127,15 @@ impl Planner for AfterInterpolation {
         PlannerDescription { breaks_limits: 1, leaves_path: 1, ..PlannerDescription::order_2() }
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
             return Err(PluginError::fixed("after-interpolation drives lines and arcs; for NURBS use planner nurbs"));
         }
         blocks::check(block, &self.context.axes)
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        self.check(block)?;
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        self.check(block, curve)?;
         if self.waiting.len() >= BUFFER_BLOCKS {
             return Ok(Accepted::Full);
         }

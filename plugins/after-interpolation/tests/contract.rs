@@ -119,11 +119,11 @@ fn blocks_are_planned_at_the_highest_ratio_and_within_axis_speeds() {
 fn what_cannot_be_driven_is_refused() {
     let planner = open("linear", 50.0, &context(0.001));
     let good = line(&AxisVector::ZERO, &[1.0], 5.0);
-    assert!(planner.check(&good).is_ok());
+    assert!(planner.check(&good, None).is_ok());
     let refusal = |change: fn(&mut Block)| {
         let mut block = good;
         change(&mut block);
-        planner.check(&block).unwrap_err().to_string()
+        planner.check(&block, None).unwrap_err().to_string()
     };
     assert!(refusal(|b| b.kind = BlockKind::Nurbs).contains("NURBS"));
     assert!(refusal(|b| b.feed_mm_per_s = 0.0).contains("feed"));
@@ -132,11 +132,11 @@ fn what_cannot_be_driven_is_refused() {
     assert!(refusal(|b| b.end[0] = f64::INFINITY).contains("ends"));
     let mut dwell = Block::at(AxisVector::ZERO);
     dwell.dwell_s = -1.0;
-    assert!(planner.check(&dwell).unwrap_err().to_string().contains("dwell"));
+    assert!(planner.check(&dwell, None).unwrap_err().to_string().contains("dwell"));
     let mut round = arc(&AxisVector::ZERO, [1.0, 0.0], 1.0, 5.0);
-    assert!(planner.check(&round).is_ok());
+    assert!(planner.check(&round, None).is_ok());
     round.arc.plane = [0, 4];
-    assert!(planner.check(&round).unwrap_err().to_string().contains("plane"));
+    assert!(planner.check(&round, None).unwrap_err().to_string().contains("plane"));
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn a_part_below_the_rounding_of_a_dwell_is_emitted_once() {
     let mut planner = open("linear", 20.0, &context(0.001));
     let mut dwell = Block::at(AxisVector::ZERO);
     dwell.dwell_s = 1.0;
-    planner.accept(&dwell).unwrap();
+    planner.accept(&dwell, None).unwrap();
     planner.finish();
     let mut recorder = Collected::default();
     assert_eq!(planner.advance(1e-18, &mut recorder).unwrap().duration_s, 1e-18);
@@ -174,12 +174,12 @@ fn a_full_buffer_is_said_and_memory_is_bounded_by_the_filter() {
     let points: Vec<_> = (1..3000).map(|k| [f64::from(k) * 0.01, 0.0, 0.0]).collect();
     let blocks = polyline(&points, 20.0);
     let mut planner = AfterInterpolation::new(&Options::default(), &context(0.001)).unwrap();
-    let full = blocks.iter().position(|b| planner.accept(b).unwrap() == Accepted::Full);
+    let full = blocks.iter().position(|b| planner.accept(b, None).unwrap() == Accepted::Full);
     assert_eq!(full, Some(BUFFER_BLOCKS));
     let (mut next, mut most, mut recorder) = (BUFFER_BLOCKS, 0, Collected::default());
     while next < blocks.len() {
         planner.advance(0.008, &mut recorder).unwrap();
-        while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
+        while next < blocks.len() && planner.accept(&blocks[next], None).unwrap() == Accepted::Accepted {
             next += 1;
         }
         most = most.max(planner.held());
@@ -192,9 +192,9 @@ fn without_finish_it_waits_before_the_block_whose_end_is_open() {
     let mut planner = open("linear", 20.0, &context(0.001));
     let blocks = polyline(&[[10.0, 0.0, 0.0], [20.0, 0.0, 0.0]], 50.0);
     let mut recorder = Collected::default();
-    planner.accept(&blocks[0]).unwrap();
+    planner.accept(&blocks[0], None).unwrap();
     assert_eq!(planner.advance(1.0, &mut recorder).unwrap().duration_s, 0.0);
-    planner.accept(&blocks[1]).unwrap();
+    planner.accept(&blocks[1], None).unwrap();
     let advanced = planner.advance(1.0, &mut recorder).unwrap();
     assert!((advanced.duration_s - 0.2).abs() < 1e-12 && advanced.done == 0);
     planner.finish();
@@ -207,7 +207,7 @@ fn without_finish_it_waits_before_the_block_whose_end_is_open() {
 fn advance_is_cut_at_the_time_asked_for() {
     let mut planner = open("bell", 20.0, &context(0.001));
     for block in &program() {
-        assert_eq!(planner.accept(block).unwrap(), Accepted::Accepted);
+        assert_eq!(planner.accept(block, None).unwrap(), Accepted::Accepted);
     }
     planner.finish();
     let mut recorder = Collected::default();
@@ -222,7 +222,7 @@ fn reset_forgets_and_begins_elsewhere() {
     let mut planner = open("exponential", 20.0, &context(0.001));
     let mut recorder = Collected::default();
     for block in &program() {
-        assert_eq!(planner.accept(block).unwrap(), Accepted::Accepted);
+        assert_eq!(planner.accept(block, None).unwrap(), Accepted::Accepted);
     }
     planner.advance(0.1, &mut recorder).unwrap();
     let here = AxisVector::from_slice(&[4.0, -3.0, 2.0]);

@@ -126,7 +126,7 @@ impl Entry {
     /// Slope and bend of an arc: over its whole circle, whatever part of it is driven. A joint that is a sum of axes sways
     /// with the circle and rises with the helix at once: for the rise it has what turning leaves, `√(0.6² + 0.8²)` being all.
     fn set_arc(&mut self, block: &Block, rules: &Rules) {
-        let Some(path) = Path::new(block) else { return };
+        let Some(path) = Path::with_lanes(block, rules.joint_lanes) else { return };
         self.length_mm = path.length_mm();
         self.directions = [path.direction(0.0), path.direction(self.length_mm)];
         let (turn, radius_mm) = (path.rad_per_mm(), path.radius_mm());
@@ -135,7 +135,7 @@ impl Entry {
         let mut rise = self.directions[0];
         (rise[plane[0]], rise[plane[1]]) = (0.0, 0.0);
         let mut rising = 0.0;
-        if let Some(lanes) = block.joint_lanes {
+        if let Some(lanes) = rules.joint_lanes {
             lanes.fill(&mut rise);
             for (weights, lane) in lanes.weights().iter().zip(lanes.first()..) {
                 let per_acceleration = rules.per_acceleration[lane];

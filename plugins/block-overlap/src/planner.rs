@@ -2,7 +2,7 @@
 
 use tandem_motion::blocks::{self, BlockWriter};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Planner, PlannerContext, PlannerDescription,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, Planner, PlannerContext, PlannerDescription,
     PluginError, SegmentSink,
 };
 
@@ -119,7 +119,7 @@ impl Planner for BlockOverlap {
         }
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
             return Err(PluginError::fixed("block-overlap drives lines and arcs; for NURBS use planner nurbs"));
         }
@@ -131,11 +131,11 @@ impl Planner for BlockOverlap {
         Ok(())
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         if self.buffer.is_full() {
             return Ok(Accepted::Full);
         }
-        self.check(block)?;
+        self.check(block, curve)?;
         self.finished = false;
         let taus_s = [self.last_tau_s, self.tau_s(block)];
         let rules = &self.rules;

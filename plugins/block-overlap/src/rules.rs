@@ -1,6 +1,6 @@
 //! What options and machine make of the rules, once for a run.
 
-use tandem_sdk::{AxisVector, MAX_AXES, PlannerContext};
+use tandem_sdk::{AxisVector, JointLanes, MAX_AXES, PlannerContext};
 
 use crate::options::{CornerControl, LimitMode, Options};
 
@@ -46,6 +46,8 @@ pub struct Rules {
     pub tolerance_mm: f64,
     /// The programmed feed is planned at this multiple.
     pub feed_ratio: f64,
+    /// The joints that are sums of axes, where there are any.
+    pub joint_lanes: Option<&'static JointLanes>,
 }
 
 impl Rules {
@@ -82,6 +84,7 @@ impl Rules {
             weakest_mm_per_s2: (0..axes.len()).map(acceleration).fold(f64::INFINITY, f64::min),
             tolerance_mm: context.path_tolerance_mm,
             feed_ratio: context.max_feed_ratio,
+            joint_lanes: context.joint_lanes,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use tandem_sdk::{Axes, AxisVector, FineSample, StrategyContext, Window, size_of_contract};
+use tandem_sdk::{Axes, AxisVector, FineSample, StrategyContext, Window};
 
 const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_feed_mm_per_min = 300\nteeth = 2\n\
                        stability = { torque_per_feed_nm_min_per_mm = 0.001 }\n";
@@ -18,7 +18,6 @@ fn main() {
 fn fine_period_of_three_axes(bencher: Bencher<'_, '_>) {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
     let context = StrategyContext {
-        size: size_of_contract::<StrategyContext>(),
         axis_count: 3,
         axes,
         fine_period_s: 1e-3,

@@ -4,7 +4,7 @@
 mod counting_allocator;
 
 use counting_allocator::{HeapUse, heap_use_of};
-use tandem_sdk::{Axes, AxisVector, FineSample, Request, StrategyContext, Window, size_of_contract};
+use tandem_sdk::{Axes, AxisVector, FineSample, Request, StrategyContext, Window};
 
 const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_feed_mm_per_min = 300\nteeth = 2\n\
                        stability = { torque_per_feed_nm_min_per_mm = 0.001 }\n\
@@ -13,7 +13,6 @@ const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_
 #[test]
 fn updates_do_not_allocate() {
     let context = StrategyContext {
-        size: size_of_contract::<StrategyContext>(),
         axis_count: 1,
         axes: Axes::new(&[('X', false)]).unwrap(),
         fine_period_s: 1e-3,

@@ -1,6 +1,6 @@
 //! What is old is never taken for new: the answers do not depend on it, and a gap is no jump.
 
-use tandem_sdk::{Axes, AxisVector, FineSample, MAX_AXES, StrategyContext, Window, size_of_contract};
+use tandem_sdk::{Axes, AxisVector, FineSample, MAX_AXES, StrategyContext, Window};
 
 const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_feed_mm_per_min = 300\n\
                        stability = { torque_per_feed_nm_min_per_mm = 0.001 }\n\
@@ -9,7 +9,6 @@ const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_
 /// Every answer where each seventh to ninth sample is old and says `spoilt` times as much.
 fn answers(spoilt: f64) -> Vec<f64> {
     let context = StrategyContext {
-        size: size_of_contract::<StrategyContext>(),
         axis_count: 1,
         axes: Axes::new(&[('X', false)]).unwrap(),
         fine_period_s: 1e-3,

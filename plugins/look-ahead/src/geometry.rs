@@ -1,7 +1,7 @@
 //! What the planner knows of one block.
 
 use tandem_motion::Path;
-use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy};
+use tandem_sdk::{AxisVector, Block, BlockKind, JointLanes, LimitedBy};
 
 use crate::rows::{Rows, least_ratio, lesser};
 
@@ -45,6 +45,8 @@ pub struct FeedCaps<'a> {
     pub feed_ratio: f64,
     /// Axis speeds, mm/s.
     pub axis_mm_per_s: &'a [f64],
+    /// The joints that are sums of axes, where there are any.
+    pub joint_lanes: Option<&'static JointLanes>,
     /// Most blocks a second: the fine loop looks at a bounded number of segments a period.
     pub most_blocks_per_s: f64,
 }
@@ -80,7 +82,7 @@ impl Entry {
         self.junction_mm_per_s = 0.0;
         self.half_step = AxisVector::ZERO;
         self.rows.clear();
-        self.path = Path::new(block);
+        self.path = Path::with_lanes(block, caps.joint_lanes);
         if self.path.is_none() {
             self.dwell = (block.end, block.dwell_s);
         }

@@ -2,7 +2,7 @@
 
 use tandem_motion::blocks::{self, BlockId, BlockWriter};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, MAX_AXES, Planner, PlannerContext, PlannerDescription,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, MAX_AXES, Planner, PlannerContext, PlannerDescription,
     PluginError, Segment, SegmentSink,
 };
 
@@ -120,7 +120,7 @@ impl Planner for LookAhead {
         description
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
             return Err(PluginError::fixed(
                 "the look-ahead planner drives lines and arcs; for NURBS use planner nurbs",
@@ -129,17 +129,18 @@ impl Planner for LookAhead {
         blocks::check(block, &self.context.axes)
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         if self.buffer.is_full() {
             return Ok(Accepted::Full);
         }
-        self.check(block)?;
+        self.check(block, curve)?;
         self.finished = false;
         let rapid = block.kind == BlockKind::Rapid;
         let axes = if rapid { &self.rapid_axis_mm_per_s } else { &self.feed_axis_mm_per_s };
         let caps = FeedCaps {
             feed_ratio: self.context.max_feed_ratio,
             axis_mm_per_s: axes,
+            joint_lanes: self.context.joint_lanes,
             most_blocks_per_s: self.most_blocks_per_s,
         };
         self.buffer.push(&self.rule, |entry| entry.set(block, &caps));

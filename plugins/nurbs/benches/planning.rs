@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use common::measure::BEST_S;
 use common::{canonical, context, curve_block};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_sdk::{AxisVector, BlockReport, OwnedBlock, Planner, Segment, SegmentSink};
+use tandem_rig::{Given, Offer};
+use tandem_sdk::{AxisVector, BlockReport, Planner, Segment, SegmentSink};
 
 /// Batches of which the fastest counts, and runs in one.
 const BATCHES: u32 = 8;
@@ -72,7 +73,7 @@ struct Batch {
 }
 
 impl Batch {
-    fn drive(planner: &mut NurbsPlanner, block: &OwnedBlock) -> Self {
+    fn drive(planner: &mut NurbsPlanner, block: &Given) -> Self {
         let started = processor_time();
         let runs: Vec<Run> = (0..RUNS).map(|_| drive(planner, block)).collect();
         let longest = runs.iter().map(|run| run.longest).min().unwrap_or_default();
@@ -80,19 +81,19 @@ impl Batch {
     }
 }
 
-fn planner(form: &str, name: &str) -> (NurbsPlanner, OwnedBlock) {
+fn planner(form: &str, name: &str) -> (NurbsPlanner, Given) {
     let (data, length_mm) = canonical(name);
     let block = curve_block(data, length_mm, 250.0);
     let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
-    (NurbsPlanner::new(&options, &context(block.facts().start)).unwrap(), block)
+    (NurbsPlanner::new(&options, &context(block.0.start)).unwrap(), block)
 }
 
 /// From the curve to the last segment.
-fn drive(planner: &mut NurbsPlanner, block: &OwnedBlock) -> Run {
+fn drive(planner: &mut NurbsPlanner, block: &Given) -> Run {
     let (mut counter, mut longest) = (Counter::default(), Duration::ZERO);
-    let start: AxisVector = block.facts().start;
+    let start: AxisVector = block.0.start;
     planner.reset(&start);
-    block.with(|b| planner.accept(b)).unwrap();
+    block.offer(planner).unwrap();
     planner.finish();
     loop {
         let called = Instant::now();

@@ -106,7 +106,7 @@ fn main() {
     for (name, along_s, axes_s) in BEST_S {
         let (data, length_mm) = canonical(name);
         let block = curve_block(data.clone(), length_mm, 250.0);
-        let context = context(block.facts().start);
+        let context = context(block.0.start);
         let blocks = [block];
         let driven = FORMS.map(|(form, _)| run(&format!("form = \"{form}\""), &context, &blocks));
         for (collected, (form, _)) in driven.iter().zip(FORMS) {

@@ -135,7 +135,7 @@ impl Baseline {
     fn feed_mm_per_s(&self, block: &Block, course: &Course) -> (f64, LimitedBy) {
         if block.kind == BlockKind::Rapid {
             let direction = course.at(0, 0.0, &mut Place::default()).direction;
-            let limits = self.context.limits.along(&block.start, &direction);
+            let limits = self.context.limits.along(&direction);
             return (AIM * limits.rapid_mm_per_s, LimitedBy::Feed);
         }
         (block.command_feed_mm_per_s() * self.context.max_feed_ratio, limited_by_feed(block))

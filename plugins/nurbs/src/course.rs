@@ -2,7 +2,7 @@
 
 use tandem_motion::Path;
 use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Piece, Place};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, NurbsData, PlannerContext};
 
 /// A stretch no longer than this is rounding, mm.
 const LEAST_MM: f64 = 1e-9;
@@ -49,20 +49,21 @@ impl Stretch {
 }
 
 impl Course {
-    /// The course of `block`; `None` for rest. Called while the block is handed over: it copies the curve. Allocates.
+    /// The course of `block`, which has a copy of its `curve`; `None` for rest. Allocates.
     ///
     /// # Errors
     /// A curve that is none.
-    pub fn new(axes: &Axes, block: &Block) -> Result<Option<Self>, NurbsError> {
-        let (end, count) = (block.end, axes.count());
+    pub fn new(context: &PlannerContext, block: &Block, curve: Option<Curve<'_>>) -> Result<Option<Self>, NurbsError> {
+        let end = block.end;
+        let count = context.axes.count();
         if block.kind != BlockKind::Nurbs {
-            return Ok(Path::new(block).map(|path| {
+            return Ok(Path::with_lanes(block, context.joint_lanes).map(|path| {
                 let stretches =
                     vec![Stretch { length_mm: path.length_mm(), turns: false, table: None, knots_mm: Vec::new() }];
                 Self { shape: Shape::Path(Box::new(path)), stretches, end, axes: count }
             }));
         }
-        let curve = curve_of(axes, block)?;
+        let curve = curve_of(&context.axes, curve)?;
         let stretch = |(piece, turns): &(Piece, bool)| {
             let table = ArcLength::of_piece(&curve, piece);
             let inside = curve.inner_knots().filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
@@ -137,9 +138,7 @@ fn between_hairpins(curve: &Nurbs, piece: Piece) -> Vec<(Piece, bool)> {
     starts.zip(ends.iter().copied()).map(part).collect()
 }
 
-/// The curve of `block`, checked.
-pub(crate) fn curve_of(axes: &Axes, block: &Block) -> Result<Nurbs, NurbsError> {
-    // SAFETY: the block is handed over in the call that asks, and its slices with it.
-    let data = unsafe { block.nurbs.to_data() };
-    Nurbs::new(&data, axes)
+/// The curve that was handed over with a block, checked. Without one it is a curve of no points.
+pub(crate) fn curve_of(axes: &Axes, curve: Option<Curve<'_>>) -> Result<Nurbs, NurbsError> {
+    Nurbs::new(&curve.map_or_else(NurbsData::default, |curve| curve.to_data()), axes)
 }

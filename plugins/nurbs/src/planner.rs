@@ -2,7 +2,7 @@
 
 use tandem_motion::blocks;
 use tandem_sdk::{
-    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, NurbsGeometry, Planner, PlannerContext, PlannerDescription,
+    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext, PlannerDescription,
     PluginError, SegmentSink,
 };
 
@@ -66,9 +66,9 @@ impl NurbsPlanner {
     }
 }
 
-/// Whether the curve of `block` can be driven by its length.
-fn check_curve(axes: &Axes, block: &Block) -> Result<(), PluginError> {
-    let curve = curve_of(axes, block).map_err(|error| PluginError::new(error.to_string()))?;
+/// Whether the curve of a block can be driven by its length.
+fn check_curve(axes: &Axes, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+    let curve = curve_of(axes, curve).map_err(|error| PluginError::new(error.to_string()))?;
     match curve.turns_alone() {
         None => Ok(()),
         Some(knot) => Err(PluginError::new(format!(
@@ -86,12 +86,12 @@ impl Planner for NurbsPlanner {
         }
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         blocks::check(block, &self.context.axes)?;
-        if block.kind == BlockKind::Nurbs { check_curve(&self.context.axes, block) } else { Ok(()) }
+        if block.kind == BlockKind::Nurbs { check_curve(&self.context.axes, curve) } else { Ok(()) }
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let waiting = match &self.form {
             Driver::Adaptive(form) => form.blocks(),
             Driver::Windowed(form) => form.blocks(),
@@ -100,14 +100,12 @@ impl Planner for NurbsPlanner {
         if waiting >= BUFFER_BLOCKS {
             return Ok(Accepted::Full);
         }
-        self.check(block)?;
-        let course = Course::new(&self.context.axes, block).map_err(|error| PluginError::new(error.to_string()))?;
-        // The slices of the curve are not valid any longer than this call: the course has its own copy.
-        let block = Block { nurbs: NurbsGeometry::default(), ..*block };
+        self.check(block, curve)?;
+        let course = Course::new(&self.context, block, curve).map_err(|error| PluginError::new(error.to_string()))?;
         match &mut self.form {
-            Driver::Adaptive(form) => form.accept(&block, course),
-            Driver::Windowed(form) => form.accept(&block, course),
-            Driver::Scan(form) => form.accept(&block, course),
+            Driver::Adaptive(form) => form.accept(block, course),
+            Driver::Windowed(form) => form.accept(block, course),
+            Driver::Scan(form) => form.accept(block, course),
         }
         Ok(Accepted::Accepted)
     }

@@ -20,7 +20,7 @@ fn reference_figures() {
         let curve = Nurbs::new(&data, &Axes::new(&[('X', false), ('Y', false)]).unwrap()).unwrap();
         let table = ArcLength::new(&curve);
         let block = curve_block(data, length_mm, 250.0);
-        let collected = run("form = \"adaptive\"", &context(block.facts().start), &[block]);
+        let collected = run("form = \"adaptive\"", &context(block.0.start), &[block]);
         let number = |key: &str| row[key].as_f64().unwrap();
         let close = |got: f64, key: &str, relative: f64| {
             assert!((got - number(key)).abs() <= relative * number(key), "{name} {key}: {got} not {}", number(key));
@@ -52,8 +52,8 @@ fn segments_follow_the_curve_and_each_other() {
         let curve = Nurbs::new(&data, &Axes::new(&[('X', false), ('Y', false)]).unwrap()).unwrap();
         let table = ArcLength::new(&curve);
         let block = curve_block(data, length_mm, 250.0);
-        let end = block.facts().end;
-        let collected = run("form = \"adaptive\"", &context(block.facts().start), &[block]);
+        let end = block.0.end;
+        let collected = run("form = \"adaptive\"", &context(block.0.start), &[block]);
         let (mut place, mut before) = (Place::default(), None);
         for segment in &collected.segments {
             for share in [0.0, 0.13, 0.37, 0.62, 0.9, 1.0] {
@@ -77,7 +77,7 @@ fn the_feed_does_not_fluctuate() {
         let (data, length_mm) = canonical(name);
         let curve = Nurbs::new(&data, &Axes::new(&[('X', false), ('Y', false)]).unwrap()).unwrap();
         let block = curve_block(data, length_mm, 250.0);
-        let collected = run("form = \"adaptive\"", &context(block.facts().start), &[block]);
+        let collected = run("form = \"adaptive\"", &context(block.0.start), &[block]);
         let samples = collected.path_samples(PERIOD_S);
         let samples = &samples[..samples.len() - 1];
         let realised = realised_mm(&curve, samples.iter().map(|(position, _)| *position));

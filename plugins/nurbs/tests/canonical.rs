@@ -4,12 +4,12 @@ mod common;
 
 use common::measure::{BEST_S, Figures, figures};
 use common::{canonical, case, context, curve_block, run};
-use tandem_sdk::{AxisVector, Block, BlockKind, OwnedBlock, SegmentFlags};
+use tandem_sdk::{AxisVector, Block, BlockKind, SegmentFlags};
 
 fn drive(form: &str, name: &str) -> Figures {
     let (data, length_mm) = canonical(name);
     let block = curve_block(data.clone(), length_mm, 250.0);
-    let (context, end) = (context(block.facts().start), block.facts().end);
+    let (context, end) = (context(block.0.start), block.0.end);
     let collected = run(&format!("form = \"{form}\""), &context, &[block]);
     let last = collected.segments.last().unwrap();
     assert!(last.flags.contains(SegmentFlags::ENDS_AT_REST) && last.position(0.0) == end);
@@ -33,7 +33,7 @@ fn drive(form: &str, name: &str) -> Figures {
 fn drive_baseline(name: &str) -> Figures {
     let (data, length_mm) = canonical(name);
     let block = curve_block(data.clone(), length_mm, 250.0);
-    let context = context(block.facts().start);
+    let context = context(block.0.start);
     figures(&run("form = \"adaptive\"", &context, &[block]), &data, &context)
 }
 
@@ -78,7 +78,7 @@ fn lines_take_the_shortest_time() {
         block.end = AxisVector::from_slice(&[length_mm * angle.cos(), length_mm * angle.sin()]);
         (block.kind, block.length_mm, block.feed_mm_per_s) = (BlockKind::Line, length_mm, 250.0);
         for (form, most) in [("scan", 1.03), ("windowed", 1.15)] {
-            let block = OwnedBlock::new(block, None);
+            let block = (block, None);
             let collected = run(&format!("form = \"{form}\""), &context(AxisVector::ZERO), &[block]);
             let ratio = collected.duration_s() / number("T_closed_form_s");
             assert!(ratio > 0.999 && ratio < most, "{form} {row}: {ratio}");

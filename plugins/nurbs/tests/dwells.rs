@@ -26,7 +26,7 @@ fn a_part_below_the_rounding_of_a_dwell_is_emitted_once() {
         let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
         let mut planner = NurbsPlanner::new(&options, &context(AxisVector::ZERO)).unwrap();
         let dwell = Block { dwell_s: 1.0, ..Block::at(AxisVector::ZERO) };
-        planner.accept(&dwell).unwrap();
+        planner.accept(&dwell, None).unwrap();
         planner.finish();
         let mut sink = Few { left: 200, driven_s: 0.0 };
         planner.advance(1e-18, &mut sink).unwrap();

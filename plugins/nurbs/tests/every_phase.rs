@@ -9,8 +9,8 @@ use std::fmt::Write;
 
 use common::Collected;
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_rig::{Random, arc, line, numbered};
-use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, OwnedBlock, Planner, PlannerContext, Segment};
+use tandem_rig::{Given, Offer, Random, arc, line, numbered};
+use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, Planner, PlannerContext, Segment};
 
 const AXES: usize = 4;
 const PERIODS_MS: [f64; 7] = [0.125, 0.25, 0.37, 0.5, 1.0, 1.3, 2.0];
@@ -24,7 +24,7 @@ const JERK: f64 = 1e-2;
 /// A machine and a program.
 struct Case {
     context: PlannerContext,
-    blocks: Vec<OwnedBlock>,
+    blocks: Vec<Given>,
     form: &'static str,
 }
 
@@ -57,7 +57,7 @@ fn case(seed: u64) -> Case {
 }
 
 /// Lines that turn a little or much, arcs, curves, with and without the rotary axis.
-fn program(random: &mut Random) -> Vec<OwnedBlock> {
+fn program(random: &mut Random) -> Vec<Given> {
     let size = random.length(1e-4, 20.0);
     let feed = random.length(0.02, 300.0);
     let turns = random.below(4) == 0;
@@ -120,7 +120,7 @@ fn program(random: &mut Random) -> Vec<OwnedBlock> {
         at = blocks[blocks.len() - 1].0.end;
     }
     let facts = numbered(blocks.iter().map(|(block, _)| *block).collect());
-    facts.into_iter().zip(blocks).map(|(block, (_, data))| OwnedBlock::new(block, data.map(Into::into))).collect()
+    facts.into_iter().zip(blocks).map(|(block, (_, data))| (block, data.map(Into::into))).collect()
 }
 
 /// All that the planner makes of it, or why not.
@@ -131,7 +131,7 @@ fn drive(case: &Case) -> Result<Collected, String> {
     let mut collected = Collected::default();
     for _ in 0..3_000_000 {
         while let Some(block) = waiting.peek() {
-            match block.with(|b| planner.accept(b)).map_err(|error| error.to_string())? {
+            match block.offer(&mut planner).map_err(|error| error.to_string())? {
                 tandem_sdk::Accepted::Accepted => waiting.next(),
                 tandem_sdk::Accepted::Full => break,
             };
@@ -241,7 +241,7 @@ fn judge(case: &Case, collected: &Collected) -> String {
     for phase in 0..PHASES {
         judge.samples(&samples(&collected.segments, case.context.fine_period_s, f64::from(phase) / f64::from(PHASES)));
     }
-    let (end, programmed) = (collected.end(), case.blocks[case.blocks.len() - 1].facts().end);
+    let (end, programmed) = (collected.end(), case.blocks[case.blocks.len() - 1].0.end);
     if end != programmed {
         writeln!(judge.found, "it ends at {end:?}, not at {programmed:?}").unwrap();
     }

@@ -6,8 +6,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use common::{Collected, context, curve_block, run};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_rig::{Random, arc, line, numbered};
-use tandem_sdk::{AxisVector, NurbsData, OwnedBlock, Planner, PlannerContext, Segment};
+use tandem_rig::{Given, Offer, Random, arc, line, numbered};
+use tandem_sdk::{AxisVector, NurbsData, Planner, PlannerContext, Segment};
 
 fn clamped(points: &[[f64; 2]], weights: Vec<f64>, degree: usize) -> NurbsData {
     let spans = points.len() - degree;
@@ -70,10 +70,10 @@ fn drive(name: &str, data: &NurbsData) {
 fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
     let name = format!("{form} {name}");
     let block = curve_block(data, 1.0, 100.0);
-    let context = context(block.facts().start);
-    let end = block.facts().end;
+    let context = context(block.0.start);
+    let end = block.0.end;
     let mut planner = NurbsPlanner::new(&Options::parse(&format!("form = \"{form}\"")).unwrap(), &context).unwrap();
-    if let Err(error) = block.with(|b| planner.accept(b)) {
+    if let Err(error) = block.offer(&mut planner) {
         println!("{name}: refused: {error}");
         return None;
     }
@@ -105,7 +105,7 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
 fn corners_of_coinciding_points_are_rests() {
     let rests = |form: &str, data: &NurbsData| {
         let block = curve_block(data.clone(), 1.0, 100.0);
-        let collected = run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
+        let collected = run(&format!("form = \"{form}\""), &context(block.0.start), &[block]);
         let rests: Vec<AxisVector> =
             collected.segments.iter().filter(|s| s.duration_s == 0.0).map(|s| s.position(0.0)).collect();
         (rests, collected.duration_s())
@@ -134,7 +134,7 @@ fn a_start_that_bends_without_bound_costs_no_time() {
     let data = even(&[[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-0.0448, 0.0588], [26.22, 0.06]], 4);
     for form in ["scan", "windowed"] {
         let block = curve_block(data.clone(), 1.0, 1.0);
-        let collected = run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
+        let collected = run(&format!("form = \"{form}\""), &context(block.0.start), &[block]);
         let length_mm: f64 = collected.segments.iter().map(|s| s.path_mm(s.duration_s)).fold(0.0, f64::max);
         let time_s = collected.duration_s();
         assert!(length_mm > 26.0 && time_s < 1.005 * length_mm + 0.1, "{form}: {length_mm} mm in {time_s} s");
@@ -201,7 +201,7 @@ fn lines_run_into_arcs_without_rest() {
 }
 
 /// Four lines and arcs anticlockwise.
-fn rounded(side_mm: f64, radius_mm: f64, short_rad: f64) -> Vec<OwnedBlock> {
+fn rounded(side_mm: f64, radius_mm: f64, short_rad: f64) -> Vec<Given> {
     let (mut at, mut along, mut blocks) = (AxisVector::ZERO, [1.0, 0.0], Vec::new());
     for _ in 0..4 {
         let side = [-along[1], along[0]];
@@ -212,7 +212,7 @@ fn rounded(side_mm: f64, radius_mm: f64, short_rad: f64) -> Vec<OwnedBlock> {
         (at, along) = (corner.end, side);
         blocks.push(corner);
     }
-    numbered(blocks).into_iter().map(|block| OwnedBlock::new(block, None)).collect()
+    numbered(blocks).into_iter().map(|block| (block, None)).collect()
 }
 
 /// Random curves, among them on lines and near to lines as programs with six decimals write them, with weights up to 1e3 apart

@@ -8,7 +8,7 @@ use common::{context, curve_block};
 use counting_allocator::heap_use_of;
 use tandem_motion::nurbs::{ArcLength, Nurbs};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_rig::Away;
+use tandem_rig::{Away, Offer};
 use tandem_sdk::{AxisVector, NurbsData, Planner};
 
 /// A wave of so many spans.
@@ -34,19 +34,19 @@ fn a_long_curve_is_driven_in_memory_that_is_there() {
     for form in ["adaptive", "windowed", "scan"] {
         let block = curve_block(wave(10_000), 1.0, 100.0);
         let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
-        let start = block.facts().start;
+        let start = block.0.start;
         let mut planner = NurbsPlanner::new(&options, &context(start)).unwrap();
-        let accepting = heap_use_of(|| assert!(block.with(|b| planner.accept(b)).is_ok()));
+        let accepting = heap_use_of(|| assert!(block.offer(&mut planner).is_ok()));
         assert!(accepting.allocations > 0, "the counter counts");
         let first_s = drive(&mut planner);
         // Windows change places with each other: each of them has to have held the largest.
         for _ in 0..4 {
             planner.reset(&start);
-            block.with(|b| planner.accept(b)).unwrap();
+            block.offer(&mut planner).unwrap();
             drive(&mut planner);
         }
         planner.reset(&start);
-        block.with(|b| planner.accept(b)).unwrap();
+        block.offer(&mut planner).unwrap();
         let mut again_s = 0.0;
         let steady = heap_use_of(|| again_s = drive(&mut planner));
         assert_eq!(steady.allocations, 0, "{form}");

@@ -9,7 +9,7 @@ use serde_json::Value;
 fn drive(form: &str, name: &str) -> Figures {
     let (data, length_mm) = canonical(name);
     let block = curve_block(data.clone(), length_mm, 250.0);
-    let context = context(block.facts().start);
+    let context = context(block.0.start);
     figures(&run(&format!("form = \"{form}\""), &context, &[block]), &data, &context)
 }
 

@@ -79,7 +79,7 @@ impl Motion {
     fn ours(form: &str, name: &str) -> Self {
         let (data, length_mm) = canonical(name);
         let block = curve_block(data, length_mm, 250.0);
-        let collected = run(&format!("form = \"{form}\""), &context(block.facts().start), &[block]);
+        let collected = run(&format!("form = \"{form}\""), &context(block.0.start), &[block]);
         let period_s = 1e-4;
         let mut along_mm: Vec<f64> = collected.path_samples(period_s).iter().map(|sample| sample.1).collect();
         along_mm.pop();

@@ -4,7 +4,7 @@ mod common;
 
 use common::run;
 use tandem_rig::line;
-use tandem_sdk::{AxisLimits, AxisVector, OwnedBlock, PlannerContext, SegmentFlags};
+use tandem_sdk::{AxisLimits, AxisVector, PlannerContext, SegmentFlags};
 
 /// A machine that drives a tenth of a micrometre in a fraction of a microsecond.
 fn fast() -> PlannerContext {
@@ -22,7 +22,7 @@ fn blocks_that_take_less_time_than_a_segment_are_driven_and_reported() {
                     .map(|n| {
                         let mut block = line(&at(n), &at(n + 1), 500.0);
                         (block.index, block.line) = (n as u64, n as u32 + 1);
-                        OwnedBlock::new(block, None)
+                        (block, None)
                     })
                     .collect();
                 let driven = run(&format!("form = \"{form}\""), &fast(), &blocks);
@@ -52,7 +52,7 @@ fn a_rotary_axis_that_turns_on_blocks_of_a_ten_millionth_of_a_millimetre_is_driv
             .map(|n| {
                 let mut block = line(&at(n), &at(n + 1), 5.0);
                 (block.index, block.line) = (n as u64, n as u32 + 1);
-                OwnedBlock::new(block, None)
+                (block, None)
             })
             .collect();
         let driven = run(&format!("form = \"{form}\""), &context, &blocks);
@@ -71,7 +71,7 @@ fn the_last_nanometre_before_a_rest_is_driven_where_jerk_is_low() {
     let context = PlannerContext { rough_period_s: 0.125e-3, ..tandem_rig::context(&[slow; 2], 0.125e-3) };
     for form in ["scan", "windowed"] {
         let end = AxisVector::from_slice(&[-15.0]);
-        let block = OwnedBlock::new(line(&AxisVector::ZERO, &end, 500.0), None);
+        let block = (line(&AxisVector::ZERO, &end, 500.0), None);
         let driven = run(&format!("form = \"{form}\""), &context, &[block]);
         assert_eq!(driven.end(), end, "{form}");
         let last = driven.segments.iter().rfind(|segment| segment.duration_s > 0.0).unwrap();

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{context, run};
-use tandem_sdk::{AxisVector, Block, BlockKind, OwnedBlock, SegmentFlags};
+use tandem_sdk::{AxisVector, Block, BlockKind, SegmentFlags};
 
 #[test]
 fn the_feed_is_reached_and_never_exceeded() {
@@ -12,7 +12,7 @@ fn the_feed_is_reached_and_never_exceeded() {
             let mut block = Block::at(AxisVector::ZERO);
             block.end = AxisVector::from_slice(&[4.0 * feed, 3.0 * feed]);
             (block.kind, block.length_mm, block.feed_mm_per_s) = (BlockKind::Line, 5.0 * feed, feed);
-            let blocks = [OwnedBlock::new(block, None)];
+            let blocks = [(block, None)];
             let driven = run(&format!("form = \"{form}\""), &context(AxisVector::ZERO), &blocks);
             // Looked at much closer than the fine period.
             let path: Vec<f64> = driven.path_samples(1e-4).into_iter().map(|sample| sample.1).collect();

@@ -39,7 +39,7 @@ fn stream(planner: &mut SmoothPlanner, blocks: &[Block], mut advanced: impl FnMu
     let mut next = 0;
     planner.reset(&AxisVector::ZERO);
     loop {
-        while next < blocks.len() && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
+        while next < blocks.len() && planner.accept(&blocks[next], None).unwrap() == Accepted::Accepted {
             next += 1;
         }
         if next == blocks.len() {

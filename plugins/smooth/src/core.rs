@@ -2,7 +2,7 @@
 
 use tandem_motion::blocks::{BlockId, report};
 use tandem_motion::tube::Lanes;
-use tandem_sdk::{AxisVector, Block, PlannerContext, PluginError, SegmentSink};
+use tandem_sdk::{AxisVector, Block, Curve, PlannerContext, PluginError, SegmentSink};
 
 use crate::emit::Emitter;
 use crate::flatten::{self, Flat};
@@ -52,9 +52,9 @@ pub trait AnyCore: Send + std::fmt::Debug {
     /// Whether there is room for another block: fewer chords than that are held, and fewer blocks.
     fn has_room(&self, most_chords: usize) -> bool;
     /// Whether the path of a block can be laid.
-    fn check_path(&self, block: &Block) -> Result<(), PluginError>;
+    fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError>;
     /// Takes a block that was checked.
-    fn push(&mut self, block: &Block) -> Result<(), PluginError>;
+    fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError>;
     fn finish(&mut self);
     fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError>;
     fn is_done(&self) -> bool;
@@ -242,19 +242,19 @@ impl<const L: usize> AnyCore for Core<L> {
         self.route.items.is_empty() || held < most_chords && held_s < enough_s
     }
 
-    fn check_path(&self, block: &Block) -> Result<(), PluginError> {
+    fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         let tolerance_mm = self.tolerance_mm(block);
-        flatten::check(&self.context.axes, &self.frame, block, tolerance_mm)
+        flatten::check(&self.context.axes, &self.frame, (block, curve), tolerance_mm)
     }
 
-    fn push(&mut self, block: &Block) -> Result<(), PluginError> {
+    fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         self.finished = false;
         if block.kind == tandem_sdk::BlockKind::Dwell {
             self.route.push_dwell(block);
             return Ok(());
         }
         let tolerance_mm = self.tolerance_mm(block);
-        self.flat.lay(&self.context.axes, &self.frame, block, tolerance_mm)?;
+        self.flat.lay(&self.context.axes, &self.frame, (block, curve), tolerance_mm)?;
         self.held_s += self.route.push(block, &self.flat, &self.frame, self.context.max_feed_ratio, tolerance_mm);
         self.flat.forget();
         Ok(())

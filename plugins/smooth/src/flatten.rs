@@ -3,7 +3,7 @@
 use tandem_motion::Path;
 use tandem_motion::nurbs::{ArcLength, Nurbs, NurbsError, Place};
 use tandem_motion::tube::Lanes;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PluginError};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, NurbsData, PluginError};
 
 use crate::beside::to_chord;
 use crate::frame::{Frame, minus};
@@ -34,18 +34,24 @@ pub struct Flat<const L: usize> {
 }
 
 impl<const L: usize> Flat<L> {
-    /// Lays the chords of `block`, which stand off it by at most [`SAGITTA_SHARE`] of the tolerance. Allocates.
+    /// Lays the chords of a block and its curve, which stand off it by at most [`SAGITTA_SHARE`] of the tolerance. Allocates.
     ///
     /// # Errors
     /// A curve that is none, and an arc or a curve that takes more than [`MAX_CHORDS`].
-    pub fn lay(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, tolerance_mm: f64) -> Result<(), PluginError> {
+    pub fn lay(
+        &mut self,
+        axes: &Axes,
+        frame: &Frame<L>,
+        (block, curve): (&Block, Option<Curve<'_>>),
+        tolerance_mm: f64,
+    ) -> Result<(), PluginError> {
         self.points.clear();
         self.curved = matches!(block.kind, BlockKind::Arc | BlockKind::Nurbs);
         let sagitta_mm = SAGITTA_SHARE * tolerance_mm;
         match block.kind {
             BlockKind::Arc => self.lay_arc(frame, block, sagitta_mm),
             BlockKind::Nurbs => {
-                let laid = self.lay_curve(axes, frame, block, sagitta_mm);
+                let laid = self.lay_curve(axes, frame, (block, curve), sagitta_mm);
                 laid.map_err(|error| PluginError::new(error.to_string()))?;
             }
             _ => self.points.push(frame.lanes(&block.end)),
@@ -70,9 +76,14 @@ impl<const L: usize> Flat<L> {
         }
     }
 
-    fn lay_curve(&mut self, axes: &Axes, frame: &Frame<L>, block: &Block, sagitta: f64) -> Result<(), NurbsError> {
-        // SAFETY: the block is handed over in the call that asks, and its slices with it.
-        let data = unsafe { block.nurbs.to_data() };
+    fn lay_curve(
+        &mut self,
+        axes: &Axes,
+        frame: &Frame<L>,
+        (block, curve): (&Block, Option<Curve<'_>>),
+        sagitta: f64,
+    ) -> Result<(), NurbsError> {
+        let data = curve.map_or_else(NurbsData::default, |curve| curve.to_data());
         let curve = Nurbs::new(&data, axes)?;
         for piece in &curve.pieces() {
             let table = ArcLength::of_piece(&curve, piece);
@@ -162,12 +173,12 @@ fn too_many() -> PluginError {
 pub fn check<const L: usize>(
     axes: &Axes,
     frame: &Frame<L>,
-    block: &Block,
+    (block, curve): (&Block, Option<Curve<'_>>),
     tolerance_mm: f64,
 ) -> Result<(), PluginError> {
     let arc = || count(block.arc.radius_mm, block.arc.sweep_rad, SAGITTA_SHARE * tolerance_mm);
     match block.kind {
-        BlockKind::Nurbs => Flat::default().lay(axes, frame, block, tolerance_mm),
+        BlockKind::Nurbs => Flat::default().lay(axes, frame, (block, curve), tolerance_mm),
         BlockKind::Arc if arc() > MAX_CHORDS => Err(too_many()),
         _ => Ok(()),
     }
@@ -219,9 +230,8 @@ mod tests {
         let (axes, frame) = machine();
         let mut block = Block::at(data.control_points[0]);
         (block.kind, block.end) = (BlockKind::Nurbs, data.control_points[data.degree]);
-        block.nurbs = data.geometry();
         let mut flat = Flat::default();
-        flat.lay(&axes, &frame, &block, SAGITTA / SAGITTA_SHARE).unwrap();
+        flat.lay(&axes, &frame, (&block, Some(data.curve())), SAGITTA / SAGITTA_SHARE).unwrap();
         let mut chain = vec![frame.lanes(&block.start)];
         chain.append(&mut flat.points);
         (chain, Nurbs::new(data, &axes).unwrap())

@@ -2,7 +2,7 @@
 
 use tandem_motion::blocks;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Planner, PlannerContext, PlannerDescription, PluginError,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext, PlannerDescription, PluginError,
     SegmentSink,
 };
 
@@ -61,17 +61,17 @@ impl Planner for SmoothPlanner {
         PlannerDescription { order: 3, ..PlannerDescription::order_2() }
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         self.check_facts(block)?;
-        self.core.check_path(block)
+        self.core.check_path(block, curve)
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         if !self.core.has_room(BUFFER_CHORDS) {
             return Ok(Accepted::Full);
         }
         self.check_facts(block)?;
-        self.core.push(block)?;
+        self.core.push(block, curve)?;
         Ok(Accepted::Accepted)
     }
 

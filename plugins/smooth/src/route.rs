@@ -220,10 +220,8 @@ impl<const L: usize> Route<L> {
         let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
         let least_s =
             (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);
-        // The slices of a curve are not valid any longer than the call.
-        let block = Block { nurbs: tandem_sdk::NurbsGeometry::default(), ..*block };
         self.items.push_back(Item::Leg(Leg {
-            block,
+            block: *block,
             start,
             end: self.end,
             rotary,

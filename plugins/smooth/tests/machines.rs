@@ -219,7 +219,7 @@ fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
         ..Options::default()
     };
     let mut planner = SmoothPlanner::new(&options, &context).map_err(|e| e.to_string())?;
-    if let Some(refused) = blocks.iter().find_map(|block| planner.check(block).err()) {
+    if let Some(refused) = blocks.iter().find_map(|block| planner.check(block, None).err()) {
         return Err(format!("refused: {refused}"));
     }
     let mut collected = Collected::default();

@@ -65,7 +65,7 @@ fn run_late(blocks: &[Block], cut: usize, periods: usize, context: &PlannerConte
     let (mut collected, mut next, mut left, mut emitted) = (Collected::default(), 0, periods, 0);
     loop {
         let end = if left > 0 { cut } else { blocks.len() };
-        while next < end && planner.accept(&blocks[next]).unwrap() == Accepted::Accepted {
+        while next < end && planner.accept(&blocks[next], None).unwrap() == Accepted::Accepted {
             next += 1;
         }
         if next == blocks.len() {
@@ -120,7 +120,7 @@ fn an_arc_of_too_many_chords_is_refused() {
         let context = context(&[0.0; 3], 0.01);
         let planner = SmoothPlanner::new(&Options::default(), &context).unwrap();
         let arc = tandem_rig::arc(&context.position, [0.0, 500.0], turns * std::f64::consts::TAU, 100.0);
-        planner.check(&tandem_rig::numbered(vec![arc])[0])
+        planner.check(&tandem_rig::numbered(vec![arc])[0], None)
     };
     assert!(check(100.0).is_ok(), "four hundred thousand chords of a millimetre");
     let refused = check(1000.0).unwrap_err().to_string();

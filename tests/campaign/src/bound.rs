@@ -3,7 +3,7 @@
 use tandem_host::{Switches, each_block};
 use tandem_machine::Machine;
 use tandem_oracle::{Axis, Joints, axis_index};
-use tandem_sdk::{Block, BlockKind};
+use tandem_sdk::{Block, BlockKind, Curve};
 
 /// A program may take this many times as long as it would with a rest at the end of each block.
 ///
@@ -67,8 +67,10 @@ impl<'a> Bound<'a> {
             dwell_s: 0.0,
         };
         let mut program = tandem_gcode::Program::open(program).map_err(|e| e.to_string())?;
-        each_block(machine, &mut program, Switches::default(), &mut |block| bound.add(block))
-            .map_err(|e| e.to_string())?;
+        each_block(machine, &mut program, Switches::default(), &mut |block, curve| {
+            bound.add(block, curve);
+        })
+        .map_err(|e| e.to_string())?;
         Ok(SLACK * bound.total_s + bound.dwell_s + bound.settling_s() + MORE_S + 20.0 * machine.rough_period_s)
     }
 
@@ -81,7 +83,7 @@ impl<'a> Bound<'a> {
         4.0 * self.machine.axes.iter().map(one).fold(0.0, f64::max)
     }
 
-    fn add(&mut self, block: &Block) {
+    fn add(&mut self, block: &Block, curve: Option<Curve<'_>>) {
         if !block.time_constant_s.is_nan() {
             self.time_constant_s = block.time_constant_s;
         }
@@ -101,7 +103,7 @@ impl<'a> Bound<'a> {
         let overhead_s = self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
         let moving_s = match block.kind {
             BlockKind::Arc => self.arc_s(block, &moved),
-            BlockKind::Nurbs => self.curve_s(block),
+            BlockKind::Nurbs => self.curve_s(block, curve.map_or(0, |curve| curve.control_points.len())),
             _ => self.straight_s(block, &moved),
         };
         self.total_s += moving_s + overhead_s;
@@ -152,14 +154,14 @@ impl<'a> Bound<'a> {
         limits.rest_to_rest_s(length)
     }
 
-    fn curve_s(&self, block: &Block) -> f64 {
+    fn curve_s(&self, block: &Block, points: usize) -> f64 {
         let length = block.length_mm;
         let mut limits = Along::of(feed(block));
         let every: Vec<(usize, f64)> = self.axes.iter().map(|(index, _)| (*index, length)).collect();
         for (rates, by) in self.lanes(&every) {
             limits.lane(&rates, false, by / length);
         }
-        let rests = RESTS_PER_POINT * block.nurbs.control_points.len() as f64;
+        let rests = RESTS_PER_POINT * points as f64;
         rests * limits.rest_to_rest_s(length / rests)
     }
 }

@@ -11,7 +11,7 @@ use tandem_campaign::worker::Worker;
 use tandem_host::Registry;
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Planner, PlannerContext, PlannerDescription, Plugin,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext, PlannerDescription, Plugin,
     PluginError, Segment, SegmentSink,
 };
 
@@ -40,11 +40,11 @@ impl Planner for Bent {
     fn describe(&self) -> PlannerDescription {
         self.inner.describe()
     }
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        self.inner.check(block)
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.inner.check(block, curve)
     }
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        self.inner.accept(block)
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        self.inner.accept(block, curve)
     }
     fn finish(&mut self) {
         self.inner.finish();

@@ -40,7 +40,7 @@ fn program(plugin: Plugin, setup: &Setup, seed: u64, timings: &mut Timings) -> R
     if description.breaks_limits != 0 {
         return Err(Refused("it declares that it breaks limits".to_string()));
     }
-    let takes = |block: &Block| planner.check(&filled(block, lanes)).is_ok();
+    let takes = |block: &Block| planner.check(&filled(block, lanes), None).is_ok();
     let blocks = program::random(&mut Random::new(seed), AxisVector::ZERO, BLOCKS, takes);
     if blocks.is_empty() {
         return Err(Refused("it takes no block of a whole program there".to_string()));
@@ -60,7 +60,7 @@ fn program(plugin: Plugin, setup: &Setup, seed: u64, timings: &mut Timings) -> R
 }
 
 fn filled(block: &Block, lanes: &'static JointLanes) -> Block {
-    let mut block = Block { joint_lanes: Some(lanes), ..*block };
+    let mut block = *block;
     lanes.fill(&mut block.start);
     lanes.fill(&mut block.end);
     block

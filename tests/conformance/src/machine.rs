@@ -1,6 +1,6 @@
 //! The machine that planners are judged on: three axes, and not two of them alike.
 
-use tandem_sdk::{Axes, AxisLimits, AxisVector, Limits, PlannerContext, size_of_contract};
+use tandem_sdk::{Axes, AxisLimits, AxisVector, Limits, PlannerContext};
 
 /// Fine period, s.
 pub const FINE_PERIOD_S: f64 = 0.001;
@@ -23,7 +23,6 @@ pub fn context(position: AxisVector) -> PlannerContext {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]);
     let limits = Limits::new(&[axis(1000.0), axis(1500.0), axis(600.0)]);
     PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
         axes: axes.unwrap_or_else(|_| unreachable!("three letters of axes")),
         limits: limits.unwrap_or_else(|_| unreachable!("three axes")),
         fine_period_s: FINE_PERIOD_S,

@@ -74,7 +74,7 @@ pub fn drive(
     for _ in 0..stop_after {
         let uses = heap::uses();
         while next < blocks.len() {
-            let accepted = timings.accept.of(|| planner.accept(&blocks[next]));
+            let accepted = timings.accept.of(|| planner.accept(&blocks[next], None));
             match accepted.map_err(|error| failed("accept", &blocks[next], &error))? {
                 Accepted::Full => break,
                 Accepted::Accepted => next += 1,

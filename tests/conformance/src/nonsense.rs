@@ -30,7 +30,7 @@ pub fn judge(planner: &dyn Planner, report: &mut Report) {
     const CHECK: &str = "nonsense is refused";
     report.judged(CHECK);
     for (what, block) in blocks() {
-        match planner.check(&block) {
+        match planner.check(&block, None) {
             Ok(()) => report.find(CHECK, format!("check takes {what}")),
             Err(error) if error.is_panic() => report.find(CHECK, format!("{what}: {error}")),
             Err(_) => {}

@@ -63,7 +63,7 @@ impl Judge<'_> {
         let mut random = Random::new(self.seed);
         let mut planner = self.open(AxisVector::ZERO)?;
         let timings = &mut *self.timings;
-        let takes = |block: &Block| timings.check.of(|| planner.check(block)).is_ok();
+        let takes = |block: &Block| timings.check.of(|| planner.check(block, None)).is_ok();
         let blocks = program::random(&mut random, AxisVector::ZERO, BLOCKS, takes);
         if blocks.is_empty() {
             return Err(Stuck { check: "programs", words: "it takes no block of a whole program".to_string() });

@@ -1,9 +1,6 @@
 //! Feed strategies: windows of a machine that cuts, rests and is hit.
 
-use tandem_sdk::{
-    Answer, AxisVector, FeedStrategy, FineSample, MAX_SIGNALS, Plugin, Request, StrategyContext, Window,
-    size_of_contract,
-};
+use tandem_sdk::{Answer, AxisVector, FeedStrategy, FineSample, MAX_SIGNALS, Plugin, Request, StrategyContext, Window};
 
 use crate::machine::{FINE_PERIOD_S, ROUGH_PERIOD_S};
 use crate::random::Random;
@@ -37,7 +34,6 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
 
 fn context(max_feed_ratio: f64) -> StrategyContext {
     StrategyContext {
-        size: size_of_contract::<StrategyContext>(),
         axis_count: 3,
         axes: crate::machine::context(AxisVector::ZERO).axes,
         fine_period_s: FINE_PERIOD_S,
@@ -158,7 +154,6 @@ impl Machine {
         FineSample {
             tick: self.tick,
             line: 1 + (self.tick / 1000) as u32,
-            reserved: 0,
             command,
             position: command + AxisVector::from_slice(&[noise, noise]),
             speed: AxisVector::from_slice(&[-feed_mm_per_s * sin, feed_mm_per_s * cos]),

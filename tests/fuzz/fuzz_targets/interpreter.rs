@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use tandem_gcode::{Config, Item, ProbeInput, ProbeResult, Program, ProgramError, Stream, check};
-use tandem_sdk::{Axes, Block, BlockKind};
+use tandem_sdk::{Axes, Block, BlockKind, Curve};
 
 fn config() -> Config {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).expect("four axes");
@@ -15,7 +15,7 @@ fn config() -> Config {
 }
 
 /// What a planner relies on.
-fn assert_sound(block: &Block) -> Result<(), String> {
+fn assert_sound(block: &Block, _curve: Option<Curve<'_'>>) -> Result<(), String> {
     assert!(block.start.is_finite() && block.end.is_finite() && block.length_mm.is_finite(), "{block:?}");
     assert_eq!(block.length_mm > 0.0, block.kind != BlockKind::Dwell, "{block:?}");
     assert!(block.feed_mm_per_s > 0.0 && block.dwell_s >= 0.0, "{block:?}");
@@ -45,11 +45,11 @@ fuzz_target!(|bytes: &[u8]| {
             Err(ProgramError::Text(_)) if probed || report.seen_to.is_some() => return,
             Err(error) => panic!("{error}"),
         }
-        blocks += items.iter().filter(|item| matches!(item, Item::Block(_))).count() as u64;
+        blocks += items.iter().filter(|item| matches!(item, Item::Block(..))).count() as u64;
         if items.iter().any(|item| matches!(item, Item::Wait(_))) {
             stream.provide_input(-1.0);
         }
-        if let Some(Item::Block(block)) = items.iter().find(|item| item.is_probe()) {
+        if let Some(Item::Block(block, _)) = items.iter().find(|item| item.is_probe()) {
             probed = true;
             let at = (block.start + block.end) * 0.5;
             stream.provide_probe(&ProbeResult { touched: Some(at), rest: at });

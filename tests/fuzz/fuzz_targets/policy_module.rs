@@ -145,7 +145,7 @@ fn live(policy: &mut Policy) -> Vec<u64> {
     let mut seen = vec![];
     for period in 0..3 {
         for _ in 0..4 {
-            policy.offer(&block);
+            policy.offer(&block, None);
         }
         policy.decide(None);
         for index in 0..4 {

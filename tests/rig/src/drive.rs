@@ -1,8 +1,12 @@
 //! A planner driven as the rough loop drives it.
 
 use std::hint::black_box;
+use std::sync::Arc;
 
-use tandem_sdk::{Accepted, Block, BlockReport, OwnedBlock, Planner, PluginError, Segment, SegmentSink};
+use tandem_sdk::{Accepted, Block, BlockReport, NurbsData, Planner, PluginError, Segment, SegmentSink};
+
+/// A block and its curve, where it is a NURBS.
+pub type Given = (Block, Option<Arc<NurbsData>>);
 
 /// What is given to a planner.
 pub trait Offer {
@@ -15,13 +19,13 @@ pub trait Offer {
 
 impl Offer for Block {
     fn offer(&self, planner: &mut dyn Planner) -> Result<Accepted, PluginError> {
-        planner.accept(self)
+        planner.accept(self, None)
     }
 }
 
-impl Offer for OwnedBlock {
+impl Offer for Given {
     fn offer(&self, planner: &mut dyn Planner) -> Result<Accepted, PluginError> {
-        self.with(|block| planner.accept(block))
+        planner.accept(&self.0, self.1.as_deref().map(NurbsData::curve))
     }
 }
 

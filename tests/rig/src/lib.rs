@@ -12,7 +12,7 @@ mod record;
 pub use blocks::{arc, line, lines, numbered, program};
 pub use cases::{assert_close, case, numbers, points};
 pub use collected::Collected;
-pub use drive::{Away, Offer, drive, feed, stream};
+pub use drive::{Away, Given, Offer, drive, feed, stream};
 pub use machine::{axis, context};
 pub use random::Random;
 pub use record::{CASES_VARIABLE, record_case};

@@ -1,6 +1,6 @@
 //! Machines.
 
-use tandem_sdk::{Axes, AxisLimits, AxisVector, Limits, PlannerContext, size_of_contract};
+use tandem_sdk::{Axes, AxisLimits, AxisVector, Limits, PlannerContext};
 
 /// An axis with 250 mm/s and travel beyond every program, without limits of jerk and of the speed difference.
 pub fn axis(acceleration_mm_per_s2: f64) -> AxisLimits {
@@ -23,7 +23,6 @@ pub fn axis(acceleration_mm_per_s2: f64) -> AxisLimits {
 pub fn context(axes: &[AxisLimits], fine_period_s: f64) -> PlannerContext {
     let names = [('X', false), ('Y', false), ('Z', false), ('A', true)];
     PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
         axes: Axes::new(&names[..axes.len()]).unwrap(),
         limits: Limits::new(axes).unwrap(),
         fine_period_s,

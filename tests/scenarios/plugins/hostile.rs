@@ -308,7 +308,7 @@ fn the_conformance_kit_finds_it_out() {
         ("planner", &["describe", "check", "accept", "finish", "advance", "reset"][..]),
         ("feed strategy", &["signals", "max_ratio_change_per_s", "update"]),
         ("driver", &["describe", "open", "start", "exchange", "quick_stop", "stop"]),
-        ("kinematics", &["joint_count", "to_joints", "to_axes", "joint_direction", "health"]),
+        ("kinematics", &["joint_count", "to_joints", "to_axes", "health"]),
     ];
     for (kind, method) in by_kind.iter().flat_map(|(kind, methods)| methods.iter().map(move |method| (kind, method))) {
         let mischief = Mischief::of("any", "panic", method, 1);

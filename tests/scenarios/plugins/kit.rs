@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use tandem_conformance::{Setup, judge};
 use tandem_sdk::{
-    Accepted, Advanced, Answer, Attached, AxisVector, Block, BlockReport, Driver, DriverContext, DriverDescription,
-    FeedStrategy, Feedback, JointState, Kinematics, KinematicsContext, Planner, PlannerContext, PlannerDescription,
-    Plugin, PluginError, Segment, SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window, local_plugin,
+    Accepted, Advanced, Answer, Attached, AxisVector, Block, BlockReport, Curve, Driver, DriverContext,
+    DriverDescription, FeedStrategy, Feedback, JointState, Kinematics, KinematicsContext, Planner, PlannerContext,
+    PlannerDescription, Plugin, PluginError, Segment, SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window,
+    local_plugin,
 };
 
 tandem_sdk::options! {
@@ -87,12 +88,12 @@ impl Planner for Plans {
     fn describe(&self) -> PlannerDescription {
         self.inner.describe()
     }
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        self.inner.check(block)
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.inner.check(block, curve)
     }
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let faster = if self.defect.is("feed") { 1.01 } else { 1.0 };
-        self.inner.accept(&Block { feed_mm_per_s: faster * block.feed_mm_per_s, ..*block })
+        self.inner.accept(&Block { feed_mm_per_s: faster * block.feed_mm_per_s, ..*block }, curve)
     }
     fn finish(&mut self) {
         self.inner.finish();
@@ -194,11 +195,6 @@ impl Kinematics for Bends {
         axes[0] -= joints[1] * joints[1] / 1000.0 * if self.0.is("back") { 1.000_001 } else { 1.0 };
         axes
     }
-    fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        let mut joints = *direction;
-        joints[0] += 2.0 * position[1] * direction[1] / 1000.0 * if self.0.is("derivative") { 1.01 } else { 1.0 };
-        joints
-    }
 }
 
 fn assert_found(plugin: Plugin, defects: &[(&str, &str)]) {
@@ -240,6 +236,6 @@ fn defects_of_strategies_drivers_and_kinematics_are_found() {
     assert_found(local_plugin!(feed_strategy "feeds" = Feeds::open), &found);
     let found = [("off", "enabling"), ("speed", "feedback"), ("moody", "determinism")];
     assert_found(local_plugin!(driver "drives" = Drives::open), &found);
-    let found = [("few", "joints"), ("back", "there and back"), ("derivative", "derivative"), ("moody", "determinism")];
+    let found = [("few", "joints"), ("back", "there and back"), ("moody", "determinism")];
     assert_found(local_plugin!(kinematics "bends" = Bends::open), &found);
 }

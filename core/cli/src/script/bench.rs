@@ -45,7 +45,7 @@ pub fn bench(path: &Path, calls: usize) -> Result<u8, Box<dyn Error>> {
 
 fn decide(policy: &mut Policy, blocks: &[Block]) {
     for block in blocks {
-        policy.offer(block);
+        policy.offer(block, None);
     }
     policy.decide(None);
 }

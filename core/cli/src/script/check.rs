@@ -26,7 +26,7 @@ pub fn check(path: &Path, machine: Option<&Path>, overrides: &[(String, String)]
     let instance = Instance::new(&script, &setup.budget, &setup.values).map_err(|e| named(&e))?;
     let mut policy = Policy::new(script.clone(), setup.values, setup.budget, setup.bounds, &setup.facts)?;
     for block in &sample::window() {
-        policy.offer(block);
+        policy.offer(block, None);
     }
     policy.decide(None);
     let ratios: Vec<f64> = (0..125).filter_map(|index| policy.period(&sample::period(index))).collect();

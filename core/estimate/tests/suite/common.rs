@@ -34,7 +34,7 @@ pub fn elements(points: &[AxisVector], feed_mm_per_min: f64, limits: &Limits) ->
         (block.kind, block.line, block.end) = (BlockKind::Line, index as u32 + 1, pair[1]);
         block.length_mm = (pair[1] - pair[0]).0.iter().map(|d| d * d).sum::<f64>().sqrt();
         block.feed_mm_per_s = feed_mm_per_min / MM_PER_MIN;
-        Element::new(&block, limits)
+        Element::new(&block, None, limits)
     };
     points.windows(2).enumerate().map(line).collect()
 }

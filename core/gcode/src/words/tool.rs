@@ -196,7 +196,7 @@ mod tests {
         assert!(errors.is_empty());
         assert!(shown(&items).iter().any(|item| item == "2: Rapid 0 to 0 0 1 0"));
         let mut program = crate::Program::spool("t.ngc", &b"T5 M6\nG43 H5 G0 Z1\nG43 H6"[..]).unwrap();
-        let report = crate::check(&mut program, &config, &mut |_| Ok(())).unwrap();
+        let report = crate::check(&mut program, &config, &mut |_, _| Ok(())).unwrap();
         let notes: Vec<_> = report.warnings.iter().map(|w| (w.line, w.code)).collect();
         assert_eq!(notes, [(2, "tool-length")], "one note a run");
     }

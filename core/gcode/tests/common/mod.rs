@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use tandem_gcode::{Config, Diagnostic, Interpreter, Item, ProbeInput, ProbeResult, Tool};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, OwnedBlock, PathMode};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, NurbsData, PathMode};
 
 /// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools, a probe on
 /// input 7.
@@ -36,7 +36,7 @@ pub fn run_on(config: Config, text: &str) -> (Vec<Item>, Vec<Diagnostic>) {
     let (mut items, mut errors) = (Vec::new(), Vec::new());
     for (number, line) in (1..).zip(text.lines()) {
         errors.extend(interpreter.line(number, line.as_bytes(), &mut items).err());
-        if let Some(Item::Block(block)) = items.last().filter(|item| item.is_probe()) {
+        if let Some(Item::Block(block, _)) = items.last().filter(|item| item.is_probe()) {
             let touched = (block.start + block.end) * 0.5;
             interpreter.provide_probe(&ProbeResult { touched: Some(touched), rest: touched });
         }
@@ -51,7 +51,7 @@ pub fn blocks(text: &str) -> Vec<Block> {
 }
 
 pub fn only_blocks(items: &[Item]) -> Vec<Block> {
-    let block = |item: &Item| if let Item::Block(block) = item { Some(*block) } else { None };
+    let block = |item: &Item| if let Item::Block(block, _) = item { Some(*block) } else { None };
     items.iter().filter_map(block).collect()
 }
 
@@ -83,8 +83,8 @@ pub fn shown(items: &[Item]) -> Vec<String> {
 
 fn show(item: &Item) -> String {
     match item {
-        Item::Block(block) => show_block(block),
-        Item::Curve(curve) => show_curve(curve),
+        Item::Block(block, None) => show_block(block),
+        Item::Block(block, Some(curve)) => show_curve(block, curve),
         Item::Event(e) => format!("{}: {:?} {} {} before {}", e.line, e.kind, e.index, short(e.value), e.before_block),
         Item::Wait(w) => {
             let (input, mode) = (w.input, w.mode);
@@ -94,11 +94,10 @@ fn show(item: &Item) -> String {
     }
 }
 
-fn show_curve(curve: &OwnedBlock) -> String {
-    let data = curve.curve().expect("a curve has its data");
+fn show_curve(block: &Block, data: &NurbsData) -> String {
     let numbers = |values: &[f64]| values.iter().map(|v| short(*v)).collect::<Vec<_>>().join(" ");
     let points: Vec<_> = data.control_points.iter().map(|p| numbers(&p.0[..3])).collect();
-    let block = show_block(curve.facts());
+    let block = show_block(block);
     let (degree, weights, knots) = (data.degree, numbers(&data.weights), numbers(&data.knots));
     format!("{block} degree {degree} points {} weights {weights} knots {knots}", points.join(", "))
 }

@@ -69,7 +69,7 @@ pub struct Driven {
 /// What this interpreter says; the first message where it refuses.
 pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
     let mut program = Program::open(path).map_err(|e| e.to_string())?;
-    let report = check(&mut program, config, &mut |_| Ok(())).map_err(|e| e.to_string())?;
+    let report = check(&mut program, config, &mut |_, _| Ok(())).map_err(|e| e.to_string())?;
     if let Some(first) = report.diagnostics.first() {
         return Err(first.to_string());
     }
@@ -78,12 +78,12 @@ pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
     while stream.next_items(&mut items).map_err(|e| e.to_string())? {
         for item in items.drain(..) {
             match item {
-                Item::Block(block) if item_is_probe(&block) => {
+                Item::Block(block, _) if item_is_probe(&block) => {
                     stream.provide_probe(&ProbeResult { touched: Some(block.end), rest: block.end });
                     return Ok(Driven { moves: moving(moves), whole: false });
                 }
-                Item::Wait(_) | Item::Curve(_) => return Ok(Driven { moves: moving(moves), whole: false }),
-                Item::Block(block) => moves.push(step(&block)),
+                Item::Wait(_) | Item::Block(_, Some(_)) => return Ok(Driven { moves: moving(moves), whole: false }),
+                Item::Block(block, None) => moves.push(step(&block)),
                 Item::Event(_) | Item::End => {}
             }
         }
@@ -93,7 +93,7 @@ pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
 }
 
 fn item_is_probe(block: &tandem_sdk::Block) -> bool {
-    Item::Block(*block).is_probe()
+    Item::Block(*block, None).is_probe()
 }
 
 fn step(block: &tandem_sdk::Block) -> Move {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use tandem_machine::Machine;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, JointLanes, Planner, PlannerDescription,
-    PluginError, RawSlice, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, JointLanes, Planner, PlannerDescription, PluginError,
+    Segment, SegmentSink, Slice,
 };
 
 use super::space::JointSpace;
@@ -33,22 +33,22 @@ impl CoupledJoints {
     }
 }
 
-/// `block` with its lanes filled; `points` holds the control points of a curve meanwhile.
-fn filled(block: &Block, lanes: &'static JointLanes, points: &mut Vec<AxisVector>) -> Block {
-    let mut block = Block { joint_lanes: Some(lanes), ..*block };
+/// `block` with its lanes filled.
+fn filled(block: &Block, lanes: &JointLanes) -> Block {
+    let mut block = *block;
     lanes.fill(&mut block.start);
     lanes.fill(&mut block.end);
-    if block.kind == BlockKind::Nurbs {
-        // SAFETY: the block is handed over in this call, and its slices with it.
-        let given = unsafe { block.nurbs.control_points.as_slice() };
-        points.clear();
-        points.extend_from_slice(given);
-        for point in points.iter_mut() {
-            lanes.fill(point);
-        }
-        block.nurbs.control_points = RawSlice::new(points);
-    }
     block
+}
+
+/// `curve` with the lanes of its control points filled; `points` holds them meanwhile.
+fn filled_curve<'a>(curve: Curve<'a>, lanes: &JointLanes, points: &'a mut Vec<AxisVector>) -> Curve<'a> {
+    points.clear();
+    points.extend_from_slice(&curve.control_points);
+    for point in points.iter_mut() {
+        lanes.fill(point);
+    }
+    Curve { control_points: Slice::new(points), ..curve }
 }
 
 impl Planner for CoupledJoints {
@@ -56,20 +56,21 @@ impl Planner for CoupledJoints {
         self.planner.describe()
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         let Some(lanes) = self.lanes else {
-            self.planner.check(block)?;
-            return self.travel.check(block);
+            self.planner.check(block, curve)?;
+            return self.travel.check(block, curve);
         };
         let mut points = Vec::new();
-        self.planner.check(&filled(block, lanes, &mut points))?;
-        self.travel.check(block)
+        let with_lanes = curve.map(|curve| filled_curve(curve, lanes, &mut points));
+        self.planner.check(&filled(block, lanes), with_lanes)?;
+        self.travel.check(block, curve)
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        let Some(lanes) = self.lanes else { return self.planner.accept(block) };
-        let block = filled(block, lanes, &mut self.points);
-        self.planner.accept(&block)
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        let Some(lanes) = self.lanes else { return self.planner.accept(block, curve) };
+        let curve = curve.map(|curve| filled_curve(curve, lanes, &mut self.points));
+        self.planner.accept(&filled(block, lanes), curve)
     }
 
     fn finish(&mut self) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tandem_motion::Path;
 use tandem_motion::nurbs::Nurbs;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, PluginError};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, PluginError};
 
 use super::joint::beyond;
 use super::space::{JointSpace, Map};
@@ -28,10 +28,10 @@ impl Travel {
     ///
     /// # Errors
     /// Which does not, in words.
-    pub fn check(&self, block: &Block) -> Result<(), PluginError> {
+    pub fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         match block.kind {
             BlockKind::Dwell => Ok(()),
-            BlockKind::Nurbs => self.curve(block),
+            BlockKind::Nurbs => curve.map_or(Ok(()), |curve| self.curve(curve)),
             _ if matches!(self.space.map, Map::Curved(_)) => self.tried(block),
             BlockKind::Arc => self.arc(block),
             BlockKind::Rapid | BlockKind::Line => self.at(&block.end),
@@ -59,10 +59,8 @@ impl Travel {
         turns.into_iter().try_for_each(|angle| self.at(&path.position(angle * mm_per_rad)))
     }
 
-    fn curve(&self, block: &Block) -> Result<(), PluginError> {
-        // SAFETY: the block is handed over in this call, and its slices with it.
-        let data = unsafe { block.nurbs.to_data() };
-        let curve = Nurbs::new(&data, &self.axes).map_err(|e| PluginError::new(e.to_string()))?;
+    fn curve(&self, curve: Curve<'_>) -> Result<(), PluginError> {
+        let curve = Nurbs::new(&curve.to_data(), &self.axes).map_err(|e| PluginError::new(e.to_string()))?;
         for span in curve.knots()[curve.degree()..=curve.points()].windows(2).filter(|span| span[1] > span[0]) {
             let place = |i: u32| span[0] + (span[1] - span[0]) * f64::from(i) / f64::from(TRIED);
             (0..=TRIED).try_for_each(|i| self.at(&curve.position(place(i))))?;

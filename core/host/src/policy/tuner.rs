@@ -1,7 +1,7 @@
 //! The script between interpreter and planner.
 
 use tandem_rough::BlockPolicy;
-use tandem_sdk::{Block, Planner};
+use tandem_sdk::{Block, Curve, Planner};
 
 use super::host::PolicyHost;
 
@@ -19,15 +19,15 @@ impl Tuner {
 }
 
 impl BlockPolicy for Tuner {
-    fn offer(&mut self, block: &Block) {
-        self.host.lock().offer(block);
+    fn offer(&mut self, block: &Block, curve: Option<Curve<'_>>) {
+        self.host.lock().offer(block, curve);
     }
 
-    fn decide(&mut self, next: Option<&Block>) {
+    fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
         self.host.lock().decide(next);
     }
 
-    fn tuned(&mut self, index: usize, block: &Block) -> Option<Block> {
+    fn tuned(&mut self, index: usize, block: &Block, curve: Option<Curve<'_>>) -> Option<Block> {
         let mut policy = self.host.lock();
         let tuning = policy.tuning(index);
         if tuning.is_empty() {
@@ -39,7 +39,7 @@ impl BlockPolicy for Tuner {
             feed_cap_mm_per_s: tuning.feed_cap_mm_per_s.unwrap_or(block.feed_cap_mm_per_s),
             ..*block
         };
-        match self.checker.check(&tuned) {
+        match self.checker.check(&tuned, curve) {
             Ok(()) => Some(tuned),
             Err(refusal) => {
                 policy.refused_by_planner(block.line, &refusal.to_string());

@@ -40,8 +40,7 @@ impl<S: Source> Source for DryRun<S> {
         let more = self.source.next_items(items)?;
         for item in &mut items[before..] {
             match item {
-                Item::Block(block) => self.set_feed(block),
-                Item::Curve(curve) => self.set_feed(curve.facts_mut()),
+                Item::Block(block, _) => self.set_feed(block),
                 _ => {}
             }
         }

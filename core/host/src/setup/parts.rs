@@ -9,7 +9,7 @@ use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, Planner, PlannerContext,
-    PlannerDescription, StrategyContext, size_of_contract,
+    PlannerDescription, StrategyContext,
 };
 
 use crate::error::HostError;
@@ -109,7 +109,6 @@ pub fn planner_on(
     joints: &Arc<JointSpace>,
 ) -> Result<Box<dyn Planner>, HostError> {
     let context = PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
         axes: machine.axes,
         limits: joints.planned(),
         fine_period_s: machine.fine_period_s,
@@ -161,7 +160,6 @@ fn strategy(
 ) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
     let Some(choice) = &machine.feed_strategy else { return Ok(None) };
     let context = StrategyContext {
-        size: size_of_contract::<StrategyContext>(),
         axis_count: machine.axes.count() as u32,
         axes: machine.axes,
         fine_period_s: machine.fine_period_s,

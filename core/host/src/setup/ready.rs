@@ -6,7 +6,7 @@ use tandem_faults::{Faults, Joints};
 use tandem_gcode::{CheckReport, Config, Lasting, Ledger, Program, Stream, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
-use tandem_sdk::{Block, Kinematics, Planner};
+use tandem_sdk::{Block, Curve, Kinematics, Planner};
 
 use crate::drives::{Drives, Roster};
 use crate::error::{HostError, refusal};
@@ -387,11 +387,11 @@ pub fn each_block(
     machine: &Machine,
     program: &mut Program,
     switches: Switches,
-    per_block: &mut dyn FnMut(&Block),
+    per_block: &mut dyn FnMut(&Block, Option<Curve<'_>>),
 ) -> Result<CheckReport, HostError> {
     let config = parts::interpreter_config(machine, true, switches);
-    Ok(check(program, &config, &mut |block| {
-        per_block(block);
+    Ok(check(program, &config, &mut |block, curve| {
+        per_block(block, curve);
         Ok(())
     })?)
 }
@@ -404,9 +404,9 @@ fn first_pass(
     config: &Config,
     density: &mut Density,
 ) -> Result<CheckReport, HostError> {
-    Ok(check(program, config, &mut |block| {
+    Ok(check(program, config, &mut |block, curve| {
         density.block(block);
-        check_block(machine, planner, block)
+        check_block(machine, planner, block, curve)
     })?)
 }
 
@@ -414,13 +414,18 @@ fn first_pass(
 ///
 /// # Errors
 /// Why not.
-pub fn check_block(machine: &Machine, planner: &dyn Planner, block: &Block) -> Result<(), String> {
+pub fn check_block(
+    machine: &Machine,
+    planner: &dyn Planner,
+    block: &Block,
+    curve: Option<Curve<'_>>,
+) -> Result<(), String> {
     let spindle_rad_per_s = machine.spindle.max_rad_per_s;
     if block.spindle_rad_per_s.abs() > spindle_rad_per_s {
         return Err(spindle_too_fast(block.spindle_rad_per_s, spindle_rad_per_s));
     }
     tandem_sdk::abi::beat();
-    planner.check(block).map_err(|e| e.to_string())
+    planner.check(block, curve).map_err(|e| e.to_string())
 }
 
 /// What stands for the name of a program in a run that only homes.

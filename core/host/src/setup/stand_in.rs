@@ -61,7 +61,7 @@ impl<S: Source> Source for AssumedEdges<S> {
         let before = items.len();
         let more = self.0.next_items(items)?;
         for item in &mut items[before..] {
-            if let Item::Block(block) = item
+            if let Item::Block(block, _) = item
                 && block.stop_on.edge != Edge::None
             {
                 block.stop_on.miss_is_fault = 0;

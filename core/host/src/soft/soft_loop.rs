@@ -7,7 +7,7 @@ use tandem_machine::RecordErrorMode;
 use tandem_recorder::{Lateness, Monitor, PolicySummary};
 use tandem_rings::{HostEnd, OperatorInputs, Rest, RestCause, Sample};
 use tandem_rough::{Observer, RoughLoop};
-use tandem_sdk::{Block, BlockReport, Event, MAX_SIGNALS};
+use tandem_sdk::{Block, BlockReport, Curve, Event, MAX_SIGNALS};
 
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::policy::Reloader;
@@ -32,8 +32,8 @@ pub trait RunObserver {
     /// The computer did not grant something that the wall clock asks for.
     fn note(&mut self, _note: &str) {}
 
-    /// A block is planned for good.
-    fn block(&mut self, _block: &Block, _report: &BlockReport) {}
+    /// A block is planned for good, along `curve` where it is a NURBS.
+    fn block(&mut self, _block: &Block, _curve: Option<Curve<'_>>, _report: &BlockReport) {}
 
     /// A non-motion word is planned.
     fn event(&mut self, _event: &Event) {}
@@ -338,12 +338,12 @@ struct Tee<'a> {
 }
 
 impl Observer for Tee<'_> {
-    fn block(&mut self, block: &Block, report: &BlockReport) {
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
         if self.skips_homing && block.line == 0 {
             return;
         }
-        self.monitor.block(block, report);
-        self.observer.block(block, report);
+        self.monitor.block(block, curve, report);
+        self.observer.block(block, curve, report);
     }
 
     fn event(&mut self, event: &Event) {

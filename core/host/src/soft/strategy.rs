@@ -134,7 +134,6 @@ fn fine_sample(sample: &Sample) -> FineSample {
     FineSample {
         tick: sample.tick,
         line: sample.line,
-        reserved: 0,
         command: sample.command,
         position: sample.feedback,
         speed: sample.speed,

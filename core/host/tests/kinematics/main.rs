@@ -10,7 +10,7 @@ use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_recorder::JointPeaks;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Kinematics, KinematicsContext, NoOptions, Planner,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext, NoOptions, Planner,
     PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
@@ -95,11 +95,11 @@ impl Planner for Bent {
     fn describe(&self) -> PlannerDescription {
         self.0.describe()
     }
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        self.0.check(block)
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.0.check(block, curve)
     }
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        self.0.accept(block)
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        self.0.accept(block, curve)
     }
     fn finish(&mut self) {
         self.0.finish();

@@ -11,7 +11,6 @@ use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughError, RoughLoop, Source};
 use tandem_sdk::{
     Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, PlannerContext, StopOn,
-    size_of_contract,
 };
 
 /// Fine period, s.
@@ -106,7 +105,7 @@ impl Rig {
             stop_on,
             ..Block::at(self.position)
         };
-        self.give(Item::Block(block));
+        self.give(Item::Block(block, None));
         (self.position, self.blocks) = (end, self.blocks + 1);
     }
 
@@ -199,7 +198,6 @@ impl Rig {
 
 fn planner(limits: &Limits) -> Box<LookAhead> {
     let context = PlannerContext {
-        size: size_of_contract::<PlannerContext>(),
         axes: Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap(),
         limits: *limits,
         fine_period_s: PERIOD_S,

@@ -72,7 +72,7 @@ fn chain(degrees: &[f64]) -> Vec<Block> {
 /// Hands a window over.
 fn decide(policy: &mut Policy, blocks: &[Block]) {
     for block in blocks {
-        policy.offer(block);
+        policy.offer(block, None);
     }
     policy.decide(None);
 }

@@ -7,10 +7,11 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::ptr::NonNull;
 use std::sync::{Once, OnceLock};
 
+use super::layout::Choice;
 use super::watch::{Method, calling, is_within};
 use crate::options::OptionDocs;
 use crate::text::Text;
-use crate::{PluginError, PluginOptions, RawSlice};
+use crate::{PluginError, PluginOptions, Slice};
 
 /// A call that did what it was asked for; what it answers is written.
 pub const DONE: u32 = 0;
@@ -149,20 +150,17 @@ pub fn function<F: Copy + 'static>() -> F {
 /// Opens a plugin from its options.
 ///
 /// # Safety
-/// `options` is a text that lives for the call, the name one that lives as long as the program; the other two can be
-/// written to.
+/// `handle` and `error` can be written to.
 pub unsafe fn open<T, O: PluginOptions>(
-    [name, options]: [RawSlice<u8>; 2],
+    name: Slice<'static, u8>,
+    options: Slice<'_, u8>,
     handle: *mut *mut c_void,
     error: *mut PluginError,
     make: impl FnOnce(&O) -> Result<T, PluginError>,
 ) -> u32 {
-    // SAFETY: the caller's promise.
-    let name = unsafe { text(name) };
+    let name = text(name);
     let work = || {
-        // SAFETY: the caller's promise.
-        let text = unsafe { text(options) };
-        let plugin = make(&O::read(text)?)?;
+        let plugin = make(&O::read(text(options))?)?;
         Ok(Box::into_raw(Box::new(Instance { plugin, fault: Fault::new(name) })).cast::<c_void>())
     };
     // SAFETY: the caller's promise.
@@ -199,12 +197,8 @@ pub unsafe extern "C" fn close<T>(handle: *mut c_void) {
 }
 
 /// A text of the other side.
-///
-/// # Safety
-/// It lives for the call.
-pub unsafe fn text<'a>(raw: RawSlice<u8>) -> &'a str {
-    // SAFETY: the caller's promise.
-    std::str::from_utf8(unsafe { raw.as_slice() }).unwrap_or("")
+pub fn text(raw: Slice<'_, u8>) -> &str {
+    std::str::from_utf8(raw.get()).unwrap_or("")
 }
 
 /// The host's side of an opened plugin.
@@ -238,7 +232,18 @@ impl Drop for Handle {
     }
 }
 
-/// What a plugin answered where only `known` numbers mean something. The answer was written to a place of plain numbers:
+/// The choice that `number`, which a plugin has put into `field`, stands for.
+///
+/// # Errors
+/// It stands for none.
+pub fn choice<C: Choice>(method: Method, field: &str, number: u32) -> Result<C, PluginError> {
+    C::try_from(number).map_err(|number| match C::COUNT {
+        2 => foreign(method, field, number, "0 and 1"),
+        count => foreign(method, field, number, &format!("0 to {}", count - 1)),
+    })
+}
+
+/// A plugin has put `value` into `field`, where only `known` numbers mean something. It was written to a place of plain numbers:
 /// one that stands for no choice is never taken for a choice.
 pub fn foreign(method: Method, field: &str, value: u32, known: &str) -> PluginError {
     let name = method.words().map_or("a call", |(_, name)| name);

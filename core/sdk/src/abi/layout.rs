@@ -5,7 +5,7 @@
 //! into a number: its name and size, and the name, place and type of every field. A field is never left out, because the
 //! list is taken apart as a pattern without a rest. The numbers are made when the program is compiled.
 
-use crate::RawSlice;
+use crate::Slice;
 
 /// What has a layout that two builds must agree on.
 pub trait Layout {
@@ -13,17 +13,24 @@ pub trait Layout {
     const HASH: u64;
 }
 
+/// An enumeration that a plugin hands over: as a number, until [`TryFrom`] has looked at it. A Rust `enum` with a foreign number is
+/// undefined behaviour.
+pub trait Choice: TryFrom<u32, Error = u32> {
+    /// How many choices there are.
+    const COUNT: u32;
+}
+
 /// One structure by its name and its number, as a library hands them to its host.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Structure {
-    pub name: RawSlice<u8>,
+    pub name: Slice<'static, u8>,
     pub hash: u64,
 }
 
 impl Structure {
     pub const fn of<T: Layout>(name: &'static str) -> Self {
-        Self { name: RawSlice::new(name.as_bytes()), hash: T::HASH }
+        Self { name: Slice::new(name.as_bytes()), hash: T::HASH }
     }
 }
 
@@ -77,7 +84,7 @@ macro_rules! layout {
     };
 }
 
-/// Gives an enumeration its number. A variant that is not listed does not compile.
+/// Gives an enumeration its number, and makes it of the numbers that cross the border. A variant that is not listed does not compile.
 macro_rules! layout_of_enum {
     ($name:ident { $($variant:ident),+ $(,)? }) => {
         impl $crate::abi::layout::Layout for $name {
@@ -93,6 +100,23 @@ macro_rules! layout_of_enum {
                 $(hash = fold(fold_text(hash, stringify!($variant)), $name::$variant as u64);)+
                 hash
             };
+        }
+
+        impl TryFrom<u32> for $name {
+            /// The number itself: it stands for nothing.
+            type Error = u32;
+
+            /// What crosses the border as `number`.
+            fn try_from(number: u32) -> Result<Self, u32> {
+                $(if number == $name::$variant as u32 {
+                    return Ok($name::$variant);
+                })+
+                Err(number)
+            }
+        }
+
+        impl $crate::abi::layout::Choice for $name {
+            const COUNT: u32 = [$($name::$variant as u32),+].len() as u32;
         }
     };
 }
@@ -144,10 +168,6 @@ impl<T: Layout> Layout for *const T {
 
 impl<T: Layout> Layout for Option<&T> {
     const HASH: u64 = fold(fold_text(START, "reference"), T::HASH);
-}
-
-impl<T> Layout for std::marker::PhantomData<T> {
-    const HASH: u64 = START;
 }
 
 /// How a text is freed.

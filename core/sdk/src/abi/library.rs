@@ -9,10 +9,9 @@ use crate::log::{HostTable, LogLevel, LogRecord};
 use crate::text::Text;
 use crate::{
     ABI_VERSION, Accepted, Advanced, ArcGeometry, Arm, Attached, Axes, AxisLimits, AxisVector, Block, BlockKind,
-    BlockReport, DriverContext, DriverDescription, Edge, Feedback, FineSample, JointDescription, JointLanes,
-    JointState, KinematicsContext, Latch, LimitedBy, Limits, Name, NurbsGeometry, PathMode, PlannerContext,
-    PlannerDescription, Plugin, PluginError, PluginKind, RawSlice, Segment, SegmentFlags, Setpoint, StopOn,
-    StrategyContext, Window, Words, size_of_contract,
+    BlockReport, Curve, DriverContext, DriverDescription, Edge, Feedback, FineSample, JointDescription, JointLanes,
+    JointState, KinematicsContext, Latch, LimitedBy, Limits, Name, PathMode, PlannerContext, PlannerDescription,
+    Plugin, PluginError, PluginKind, Segment, SegmentFlags, Setpoint, Slice, StopOn, StrategyContext, Window, Words,
 };
 
 /// What the exported symbol is called before the name of the crate. The number is that of [`Library`] itself.
@@ -22,11 +21,10 @@ table! {
     /// One plugin of a library.
     #[derive(Debug)]
     pub struct Descriptor {
-        size: u32,
         // Number of the kind.
         kind: u32,
-        name: RawSlice<u8>,
-        version: RawSlice<u8>,
+        name: Slice<'static, u8>,
+        version: Slice<'static, u8>,
         // Describes the options, as TOML.
         options: unsafe extern "C" fn(*mut Text, *mut PluginError) -> u32,
         // The table of the kind.
@@ -48,27 +46,24 @@ impl Descriptor {
         table: &'static T,
     ) -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             kind: kind as u32,
-            name: RawSlice::new(name.as_bytes()),
-            version: RawSlice::new(version.as_bytes()),
+            name: Slice::new(name.as_bytes()),
+            version: Slice::new(version.as_bytes()),
             options,
             table: std::ptr::from_ref(table).cast(),
         }
     }
 
     pub(crate) fn name(&self) -> &'static str {
-        // SAFETY: descriptors are made of fixed texts, and a library is never unloaded.
-        unsafe { text(self.name) }
+        text(self.name)
     }
 
     pub(crate) fn version(&self) -> &'static str {
-        // SAFETY: as above.
-        unsafe { text(self.version) }
+        text(self.version)
     }
 
     pub(crate) fn kind(&self) -> Option<PluginKind> {
-        PluginKind::ALL.into_iter().find(|kind| *kind as u32 == self.kind)
+        PluginKind::try_from(self.kind).ok()
     }
 
     /// The table, where the plugin is of `kind`.
@@ -94,25 +89,25 @@ pub struct Library {
     /// All structures of the contract in one number.
     layout: u64,
     /// Version of the SDK that it was built with.
-    sdk_version: RawSlice<u8>,
-    plugins: RawSlice<Descriptor>,
+    sdk_version: Slice<'static, u8>,
+    plugins: Slice<'static, Descriptor>,
     /// Told once after loading: the host's table.
     prepare: unsafe extern "C" fn(*const HostTable),
     /// The structures of the contract one by one.
-    structures: RawSlice<Structure>,
+    structures: Slice<'static, Structure>,
 }
 
 impl Library {
     /// A library with these plugins.
     pub const fn new(plugins: &'static [Descriptor]) -> Self {
         Self {
-            size: size_of_contract::<Self>(),
+            size: size_of::<Self>() as u32,
             abi_version: ABI_VERSION,
             layout: LAYOUT,
-            sdk_version: RawSlice::new(env!("CARGO_PKG_VERSION").as_bytes()),
-            plugins: RawSlice::new(plugins),
+            sdk_version: Slice::new(env!("CARGO_PKG_VERSION").as_bytes()),
+            plugins: Slice::new(plugins),
             prepare,
-            structures: RawSlice::new(STRUCTURES),
+            structures: Slice::new(STRUCTURES),
         }
     }
 
@@ -131,24 +126,21 @@ impl Library {
                 "it is built for version {version} of the plugin contract; this host has {ABI_VERSION}"
             ));
         }
-        if size != size_of_contract::<Self>() {
+        if size != size_of::<Self>() as u32 {
             return Err(format!("it is not a Tandem plugin: its descriptor has {size} bytes"));
         }
-        // SAFETY: the version says that the rest is there.
+        // SAFETY: the version says that the rest is there, and a library is never unloaded: its texts and lists live as long.
         let this: &'static Self = unsafe { &*library };
         if this.layout != LAYOUT {
-            // SAFETY: a fixed text.
-            let other = unsafe { text(this.sdk_version) };
-            // SAFETY: a fixed list, in a library that stays.
-            let differs = first_difference(unsafe { this.structures.as_slice() });
+            let other = text(this.sdk_version);
+            let differs = first_difference(&this.structures);
             let differs = differs.map_or_else(String::new, |name| format!(": its {name} is another one"));
             return Err(format!(
                 "it is built with another revision of tandem-sdk ({other}; this host has {}){differs}: build it again",
                 env!("CARGO_PKG_VERSION")
             ));
         }
-        // SAFETY: a fixed list, in a library that stays.
-        let descriptors: &'static [Descriptor] = unsafe { this.plugins.as_slice() };
+        let descriptors: &'static [Descriptor] = this.plugins.get();
         if let Some(unknown) = descriptors.iter().find(|d| d.kind().is_none()) {
             return Err(format!("{} is of kind {}, which this host does not know", unknown.name(), unknown.kind));
         }
@@ -196,8 +188,8 @@ const fn structures() -> [Structure; 49] {
         PluginError,
         StopOn,
         ArcGeometry,
-        NurbsGeometry,
         Block,
+        Curve<'_>,
         Segment,
         BlockReport,
         Advanced,
@@ -206,7 +198,7 @@ const fn structures() -> [Structure; 49] {
         FineSample,
         Window<'_>,
         StrategyContext,
-        super::strategy::Description,
+        super::strategy::Signals,
         super::strategy::Reply,
         Name,
         JointDescription,
@@ -243,10 +235,9 @@ pub const LAYOUT: u64 = {
 
 /// The first structure of ours that is another one in `theirs`, or is not there.
 fn first_difference(theirs: &[Structure]) -> Option<&'static str> {
-    // SAFETY: names are fixed texts, and a library is never unloaded.
-    let name = |structure: &Structure| unsafe { text(structure.name) };
+    let name = |structure: &Structure| text(structure.name);
     let is_same = |ours: &&Structure| theirs.iter().any(|other| other.hash == ours.hash && name(other) == name(ours));
-    STRUCTURES.iter().find(|ours| !is_same(ours)).map(|ours| unsafe { text(ours.name) })
+    STRUCTURES.iter().find(|ours| !is_same(ours)).map(|ours| text(ours.name))
 }
 
 #[cfg(test)]
@@ -258,8 +249,7 @@ mod tests {
         assert_eq!(first_difference(STRUCTURES), None);
         let mut other = STRUCTURES.to_vec();
         let changed = |name: &str| ["AxisLimits", "Limits", "PlannerContext"].contains(&name);
-        // SAFETY: fixed texts.
-        for structure in other.iter_mut().filter(|structure| changed(unsafe { text(structure.name) })) {
+        for structure in other.iter_mut().filter(|structure| changed(text(structure.name))) {
             structure.hash ^= 1;
         }
         assert_eq!(first_difference(&other), Some("AxisLimits"));

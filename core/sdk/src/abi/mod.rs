@@ -18,6 +18,10 @@
 //! its options and of its constructor are found by inference, so an author writes no type twice. The constructor is a
 //! function item or a closure without captures: a type without data, so that the table can call it by its type alone.
 //!
+//! A contract is a list of methods (`contract.rs`), of which one macro makes the table, the plugin's side and the host's
+//! calls. A block is plain data. The curve of a NURBS is borrowed beside it ([`crate::Curve`], made of
+//! [`crate::Slice`]s), and who queues blocks keeps an `Arc` of [`crate::NurbsData`].
+//!
 //! What crosses with an owner (errors, descriptions) carries the function that frees it, because each library has an
 //! allocator of its own. A panic is caught where the call enters the plugin; its words are kept there for good, every
 //! later call answers them, and the plugin is not dropped. It prints nothing: a library has a panic hook of its own,
@@ -34,7 +38,7 @@
 //! structure differs. The symbol carries the number of the descriptor's own form.
 //!
 //! A Rust `enum` with a foreign number is undefined behaviour, so none comes back from a plugin: what stands for a
-//! choice crosses as a number, and becomes one of ours only when it has been looked at. Where that would cost time in
+//! choice crosses as a number, and becomes one of ours by `TryFrom` only. Where that would cost time in
 //! every fine period, the type is a number with names (`JointState`), and the fine loop treats an unknown one as a
 //! fault.
 //!
@@ -50,6 +54,7 @@
 //! and are called on the fine loop; and a constructor's `KinematicsContext`, because a kinematics needs to know which
 //! axis is X. `Window` has its samples behind a method that borrows, so that a strategy needs no `unsafe`.
 
+mod contract;
 mod entry;
 pub(crate) mod layout;
 mod library;

@@ -2,32 +2,38 @@
 
 use std::any::Any;
 use std::ffi::c_void;
-use std::marker::PhantomData;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::ptr;
 
-use super::Descriptor;
-use super::entry::{self, DONE, FAILED, Handle, Instance, ask, foreign, function};
-use super::layout::table;
+use super::contract::contract;
+use super::entry::{DONE, FAILED, choice};
+use super::layout::{Choice, table};
 use super::watch::{Method, beat, calling};
 use crate::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Edge, LimitedBy, Made, Planner, PlannerContext,
-    PlannerDescription, PluginError, PluginKind, PluginOptions, RawSlice, Segment, SegmentSink, size_of_contract,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Edge, LimitedBy, Made, Planner, PlannerContext,
+    PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
-type Errors = *mut PluginError;
-
-table! {
-    /// The functions of a planner. Each that answers writes its answer, or an error.
-    pub struct Table {
-        size: u32,
-        open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const PlannerContext, *mut *mut c_void, Errors) -> u32,
-        close: unsafe extern "C" fn(*mut c_void),
-        describe: unsafe extern "C" fn(*const c_void, *mut PlannerDescription, Errors) -> u32,
-        check: unsafe extern "C" fn(*const c_void, *const Block, *mut (), Errors) -> u32,
-        accept: unsafe extern "C" fn(*mut c_void, *const Block, *mut u32, Errors) -> u32,
-        finish: unsafe extern "C" fn(*mut c_void, *mut (), Errors) -> u32,
-        advance: unsafe extern "C" fn(*mut c_void, f64, *const Sink, *mut Advanced, Errors) -> u32,
-        reset: unsafe extern "C" fn(*mut c_void, *const AxisVector, *mut (), Errors) -> u32,
+contract! {
+    /// The functions of a planner. Each writes its answer, or an error. A curve is a null pointer where there is none.
+    planner: Planner, Planner(PlannerContext), PlannerNew, PlannerDrop;
+    ref describe(plugin) -> PlannerDescription = PlannerDescribe { Ok(plugin.describe()) }
+    ref check(plugin, block: *const Block, curve: *const Curve<'_>) -> () = PlannerCheck {
+        plugin.check(&*block, curve.as_ref().copied())
+    }
+    mut accept(plugin, block: *const Block, curve: *const Curve<'_>) -> u32 = PlannerAccept {
+        plugin.accept(&*block, curve.as_ref().copied()).map(|accepted| accepted as u32)
+    }
+    mut finish(plugin) -> () = PlannerFinish {
+        plugin.finish();
+        Ok(())
+    }
+    mut advance(plugin, duration_s: f64, sink: *const Sink) -> Advanced = PlannerAdvance {
+        plugin.advance(duration_s, &mut PluginSink(&*sink))
+    }
+    mut reset(plugin, position: *const AxisVector) -> () = PlannerReset {
+        plugin.reset(&*position);
+        Ok(())
     }
 }
 
@@ -40,115 +46,10 @@ table! {
     }
 }
 
-/// The plugin `name` of the planner that `open` makes from its options.
-pub const fn planner<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
-where
-    T: Planner + 'static,
-    O: PluginOptions + 'static,
-    F: Fn(&O, &PlannerContext) -> Result<T, PluginError> + Copy + 'static,
-{
-    Descriptor::new(PluginKind::Planner, (name, version), entry::describe::<O>, &Side::<T, O, F>::TABLE)
-}
-
-/// The plugin's side.
-struct Side<T, O, F>(PhantomData<(T, O, F)>);
-
-impl<T, O, F> Side<T, O, F>
-where
-    T: Planner + 'static,
-    O: PluginOptions + 'static,
-    F: Fn(&O, &PlannerContext) -> Result<T, PluginError> + Copy + 'static,
-{
-    const TABLE: Table = Table {
-        size: size_of_contract::<Table>(),
-        open: Self::open,
-        close: entry::close::<T>,
-        describe: describe::<T>,
-        check: check::<T>,
-        accept: accept::<T>,
-        finish: finish::<T>,
-        advance: advance::<T>,
-        reset: reset::<T>,
-    };
-
-    unsafe extern "C" fn open(
-        name: RawSlice<u8>,
-        options: RawSlice<u8>,
-        context: *const PlannerContext,
-        handle: *mut *mut c_void,
-        error: Errors,
-    ) -> u32 {
-        // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options, &*context)) }
-    }
-}
-
-// SAFETY of all of these: the host passes the handle that `open` gave, places that can be written to, and references that
-// live for the call; it calls a planner from one thread at a time.
-
-unsafe extern "C" fn describe<T: Planner>(this: *const c_void, answer: *mut PlannerDescription, error: Errors) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("describe", answer, error, || Ok(this.plugin.describe())) }
-}
-
-unsafe extern "C" fn check<T: Planner>(
-    this: *const c_void,
-    block: *const Block,
-    answer: *mut (),
-    error: Errors,
-) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("check", answer, error, || this.plugin.check(&*block)) }
-}
-
-unsafe extern "C" fn accept<T: Planner>(
-    this: *mut c_void,
-    block: *const Block,
-    answer: *mut u32,
-    error: Errors,
-) -> u32 {
-    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    unsafe { fault.guard("accept", answer, error, || plugin.accept(&*block).map(|accepted| accepted as u32)) }
-}
-
-unsafe extern "C" fn finish<T: Planner>(this: *mut c_void, answer: *mut (), error: Errors) -> u32 {
-    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    let work = || {
-        plugin.finish();
-        Ok(())
-    };
-    unsafe { fault.guard("finish", answer, error, work) }
-}
-
-unsafe extern "C" fn advance<T: Planner>(
-    this: *mut c_void,
-    duration_s: f64,
-    sink: *const Sink,
-    answer: *mut Advanced,
-    error: Errors,
-) -> u32 {
-    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    unsafe { fault.guard("advance", answer, error, || plugin.advance(duration_s, &mut Outlet(&*sink))) }
-}
-
-unsafe extern "C" fn reset<T: Planner>(
-    this: *mut c_void,
-    position: *const AxisVector,
-    answer: *mut (),
-    error: Errors,
-) -> u32 {
-    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    let work = || {
-        plugin.reset(unsafe { &*position });
-        Ok(())
-    };
-    unsafe { fault.guard("reset", answer, error, work) }
-}
-
 /// The sink as the planner sees it.
-struct Outlet<'a>(&'a Sink);
+struct PluginSink<'a>(&'a Sink);
 
-impl SegmentSink for Outlet<'_> {
+impl SegmentSink for PluginSink<'_> {
     fn segment(&mut self, segment: &Segment) {
         // SAFETY: the host's function with the host's context, during the call of `advance`.
         until_refused(unsafe { (self.0.segment)(self.0.context, segment) });
@@ -166,10 +67,10 @@ fn until_refused(status: u32) {
 }
 
 /// Most calls of the sink in one `advance`: hundreds of times what the densest program needs.
-const MOST_EMITTED: u32 = 100_000;
+const MAX_EMITTED: u32 = 100_000;
 
 /// The host's sink behind a [`Sink`]. Its panics must not cross the plugin.
-struct Inlet<'a> {
+struct HostSink<'a> {
     sink: &'a mut dyn SegmentSink,
     emitted: u32,
     panic: Option<Box<dyn Any + Send>>,
@@ -177,11 +78,11 @@ struct Inlet<'a> {
     foreign: Option<PluginError>,
 }
 
-impl Inlet<'_> {
+impl HostSink<'_> {
     fn take(&mut self, put: impl FnOnce(&mut dyn SegmentSink)) -> u32 {
         self.emitted += 1;
         beat();
-        if self.emitted > MOST_EMITTED || self.panic.is_some() || self.foreign.is_some() {
+        if self.emitted > MAX_EMITTED || self.panic.is_some() || self.foreign.is_some() {
             return FAILED;
         }
         let taken = calling(Method::None, || catch_unwind(AssertUnwindSafe(|| put(self.sink))));
@@ -189,96 +90,83 @@ impl Inlet<'_> {
         if self.panic.is_none() { DONE } else { FAILED }
     }
 
-    /// Whether `number`, which the planner has put into `field`, is one of `known` choices from 0 on.
-    fn knows(&mut self, number: u32, known: u32, field: &str) -> bool {
-        if number >= known {
-            let words = format!("0 to {}", known - 1);
-            self.foreign.get_or_insert_with(|| foreign(Method::PlannerAdvance, field, number, &words));
+    /// Whether `number`, which the planner has put into `field`, is a choice.
+    fn knows<C: Choice>(&mut self, number: u32, field: &str) -> bool {
+        match choice::<C>(Method::PlannerAdvance, field, number) {
+            Ok(_) => true,
+            Err(error) => {
+                self.foreign.get_or_insert(error);
+                false
+            }
         }
-        number < known
     }
 }
 
 unsafe extern "C" fn take_segment(context: *mut c_void, segment: *const Segment) -> u32 {
-    // SAFETY: the context is the inlet of the call that is going on; the segment lives for this call. The edge is read as the
+    // SAFETY: the context is the sink of the call that is going on; the segment lives for this call. The edge is read as the
     // number that it is in memory: a reference to the segment is made only where that number is an edge.
     unsafe {
-        let inlet = &mut *context.cast::<Inlet<'_>>();
+        let sink_of_host = &mut *context.cast::<HostSink<'_>>();
         let edge = (&raw const (*segment).stop_on.edge).cast::<u32>().read();
-        if !inlet.knows(edge, Edge::COUNT, "the edge of a segment") {
+        if !sink_of_host.knows::<Edge>(edge, "the edge of a segment") {
             return FAILED;
         }
-        inlet.take(|sink| sink.segment(&*segment))
+        sink_of_host.take(|sink| sink.segment(&*segment))
     }
 }
 
 unsafe extern "C" fn take_block(context: *mut c_void, report: *const BlockReport) -> u32 {
     // SAFETY: as above, with what limits the block.
     unsafe {
-        let inlet = &mut *context.cast::<Inlet<'_>>();
+        let sink_of_host = &mut *context.cast::<HostSink<'_>>();
         let limited_by = (&raw const (*report).limited_by).cast::<u32>().read();
-        if !inlet.knows(limited_by, LimitedBy::COUNT, "limited_by of a block") {
+        if !sink_of_host.knows::<LimitedBy>(limited_by, "limited_by of a block") {
             return FAILED;
         }
-        inlet.take(|sink| sink.block(&*report))
+        sink_of_host.take(|sink| sink.block(&*report))
     }
 }
 
 /// The host's side: a planner behind its table.
-struct Linked {
-    table: &'static Table,
-    handle: Handle,
-}
+struct Linked(Calls);
 
 /// Opens a planner behind its table.
 pub fn open(table: &'static Table, name: &'static str, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
-    // SAFETY: everything lives for the call.
-    let handle = Handle::open([Method::PlannerNew, Method::PlannerDrop], table.close, |handle, error| unsafe {
-        (table.open)(name, options, context, handle, error)
-    })?;
-    Ok(Box::new(Linked { table, handle }))
+    Ok(Box::new(Linked(Calls::make(table, name, options, context)?)))
 }
 
-// SAFETY of the calls: the handle is open, `ask` gives places to write to, references live for the call.
+/// A curve as it crosses: a null pointer where there is none.
+fn crossing<'a, 'b>(curve: &'b Option<Curve<'a>>) -> *const Curve<'a> {
+    curve.as_ref().map_or(ptr::null(), ptr::from_ref::<Curve<'a>>)
+}
+
 impl Planner for Linked {
     fn describe(&self) -> PlannerDescription {
-        let asked = ask(Method::PlannerDescribe, |answer, error| unsafe {
-            (self.table.describe)(self.handle.instance, answer, error)
-        });
-        // It has panicked, and says so with the first block.
-        asked.unwrap_or_else(|_| PlannerDescription::order_2())
+        // One that has panicked says so with the first block.
+        self.0.describe().unwrap_or_else(|_| PlannerDescription::order_2())
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
-        ask(Method::PlannerCheck, |answer, error| unsafe {
-            (self.table.check)(self.handle.instance, block, answer, error)
-        })
+    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        self.0.check(block, crossing(&curve))
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
-        let answer = ask(Method::PlannerAccept, |answer, error| unsafe {
-            (self.table.accept)(self.handle.instance, block, answer, error)
-        })?;
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+        let answer = self.0.accept(block, crossing(&curve))?;
         beat();
-        Accepted::of_number(answer).ok_or_else(|| foreign(Method::PlannerAccept, "its answer", answer, "0 and 1"))
+        choice(Method::PlannerAccept, "its answer", answer)
     }
 
     fn finish(&mut self) {
-        // It has panicked, and says so when it is to advance.
-        let _ = ask(Method::PlannerFinish, |answer, error| unsafe {
-            (self.table.finish)(self.handle.instance, answer, error)
-        });
+        // One that has panicked says so when it is to advance.
+        let _ = self.0.finish();
     }
 
     fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
-        let mut inlet = Inlet { sink, emitted: 0, panic: None, foreign: None };
-        let context = (&raw mut inlet).cast();
+        let mut host = HostSink { sink, emitted: 0, panic: None, foreign: None };
+        let context = (&raw mut host).cast();
         let sink = Sink { context, segment: take_segment, block: take_block };
-        let advanced = ask(Method::PlannerAdvance, |answer, error| unsafe {
-            (self.table.advance)(self.handle.instance, duration_s, &raw const sink, answer, error)
-        });
-        match (inlet.panic, inlet.foreign) {
+        let advanced = self.0.advance(duration_s, &raw const sink);
+        match (host.panic, host.foreign) {
             (Some(panic), _) => resume_unwind(panic),
             (None, Some(foreign)) => Err(foreign),
             (None, None) => advanced,
@@ -286,10 +174,8 @@ impl Planner for Linked {
     }
 
     fn reset(&mut self, position: &AxisVector) {
-        // It has panicked, and says so with the next block.
-        let _ = ask(Method::PlannerReset, |answer, error| unsafe {
-            (self.table.reset)(self.handle.instance, position, answer, error)
-        });
+        // One that has panicked says so with the next block.
+        let _ = self.0.reset(position);
     }
 }
 

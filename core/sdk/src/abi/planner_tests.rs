@@ -1,11 +1,13 @@
 //! A planner of another side, which writes what it likes.
 
+use super::super::entry::Handle;
 use super::*;
+use crate::Slice;
 
-unsafe extern "C" fn unused_describe(_: *const c_void, _: *mut PlannerDescription, _: Errors) -> u32 {
+unsafe extern "C" fn unused_describe(_: *mut c_void, _: *mut PlannerDescription, _: Errors) -> u32 {
     unreachable!("it is not asked")
 }
-unsafe extern "C" fn unused_check(_: *const c_void, _: *const Block, _: *mut (), _: Errors) -> u32 {
+unsafe extern "C" fn unused_check(_: *mut c_void, _: *const Block, _: *const Curve<'_>, _: *mut (), _: Errors) -> u32 {
     unreachable!("it is not asked")
 }
 unsafe extern "C" fn unused_finish(_: *mut c_void, _: *mut (), _: Errors) -> u32 {
@@ -14,18 +16,24 @@ unsafe extern "C" fn unused_finish(_: *mut c_void, _: *mut (), _: Errors) -> u32
 unsafe extern "C" fn unused_reset(_: *mut c_void, _: *const AxisVector, _: *mut (), _: Errors) -> u32 {
     unreachable!("it is not asked")
 }
-unsafe extern "C" fn unused_open(
-    _: RawSlice<u8>,
-    _: RawSlice<u8>,
+unsafe extern "C" fn unused_make(
+    _: Slice<'static, u8>,
+    _: Slice<'_, u8>,
     _: *const PlannerContext,
     _: *mut *mut c_void,
     _: Errors,
 ) -> u32 {
     unreachable!("it is open")
 }
-unsafe extern "C" fn close(_: *mut c_void) {}
+unsafe extern "C" fn free(_: *mut c_void) {}
 
-unsafe extern "C" fn accept_250(_: *mut c_void, _: *const Block, answer: *mut u32, _: Errors) -> u32 {
+unsafe extern "C" fn accept_250(
+    _: *mut c_void,
+    _: *const Block,
+    _: *const Curve<'_>,
+    answer: *mut u32,
+    _: Errors,
+) -> u32 {
     unsafe { answer.write(250) };
     DONE
 }
@@ -34,7 +42,6 @@ unsafe extern "C" fn accept_250(_: *mut c_void, _: *const Block, answer: *mut u3
 unsafe fn emit(sink: *const Sink, answer: *mut Advanced, bad_segment: bool) -> u32 {
     let mut segment = std::mem::MaybeUninit::new(Segment::rest(&AxisVector::ZERO, 1.0));
     let mut report = std::mem::MaybeUninit::new(BlockReport {
-        size: size_of_contract::<BlockReport>(),
         limited_by: LimitedBy::Feed,
         block: 0,
         start_feed_mm_per_s: 0.0,
@@ -66,9 +73,8 @@ unsafe extern "C" fn bad_report(_: *mut c_void, _: f64, sink: *const Sink, answe
 
 const fn table(advance: unsafe extern "C" fn(*mut c_void, f64, *const Sink, *mut Advanced, Errors) -> u32) -> Table {
     Table {
-        size: size_of_contract::<Table>(),
-        open: unused_open,
-        close,
+        make: unused_make,
+        free,
         describe: unused_describe,
         check: unused_check,
         accept: accept_250,
@@ -84,11 +90,11 @@ static BAD_REPORT: Table = table(bad_report);
 fn planner(table: &'static Table) -> Linked {
     let opened = |handle: *mut *mut c_void, _: Errors| {
         // SAFETY: the place is one to write to.
-        unsafe { handle.write(std::ptr::null_mut()) };
+        unsafe { handle.write(ptr::null_mut()) };
         DONE
     };
-    let handle = Handle::open([Method::PlannerNew, Method::PlannerDrop], close, opened);
-    Linked { table, handle: handle.unwrap() }
+    let handle = Handle::open([Method::PlannerNew, Method::PlannerDrop], free, opened);
+    Linked(Calls { table, handle: handle.unwrap() })
 }
 
 #[derive(Default)]
@@ -106,7 +112,7 @@ impl SegmentSink for Taken {
 
 #[test]
 fn an_answer_that_is_no_choice_is_an_error_with_its_number() {
-    let error = planner(&BAD_SEGMENT).accept(&Block::at(AxisVector::ZERO)).unwrap_err();
+    let error = planner(&BAD_SEGMENT).accept(&Block::at(AxisVector::ZERO), None).unwrap_err();
     assert_eq!(error.message(), "its accept gives 250 as its answer: 0 and 1 are known");
 }
 

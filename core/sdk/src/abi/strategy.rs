@@ -1,29 +1,40 @@
 //! Feed strategies across the border.
 
-use std::ffi::c_void;
-use std::marker::PhantomData;
-
-use super::Descriptor;
-use super::entry::{self, Handle, Instance, ask, foreign, function};
-use super::layout::{layout, table};
+use super::contract::contract;
+use super::entry::{self, foreign};
+use super::layout::layout;
 use super::watch::Method;
-use crate::{
-    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, PluginKind, PluginOptions, RawSlice, Request,
-    StrategyContext, Window, size_of_contract,
-};
+use crate::{Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, Request, Slice, StrategyContext, Window};
 
-type Errors = *mut PluginError;
-
-/// What a strategy says of itself.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct Description {
-    max_ratio_change_per_s: f64,
-    signal_count: u32,
-    signals: [RawSlice<u8>; MAX_SIGNALS],
+contract! {
+    /// The functions of a feed strategy. Each writes its answer, or an error.
+    feed_strategy: FeedStrategy, FeedStrategy(StrategyContext), StrategyNew, StrategyDrop;
+    ref signals(plugin) -> Signals = StrategySignals { Signals::new(plugin.signals()) }
+    ref max_ratio_change_per_s(plugin) -> f64 = StrategyMaxRatioChange { Ok(plugin.max_ratio_change_per_s()) }
+    mut update(plugin, window: *const Window<'_>) -> Reply = StrategyUpdate {
+        plugin.update(&*window).map(|answer| Reply::new(&answer))
+    }
 }
 
-layout!(Description { max_ratio_change_per_s, signal_count, signals });
+/// The names of a strategy's signals. They live as long as its library, which is never unloaded.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct Signals {
+    count: u32,
+    names: [Slice<'static, u8>; MAX_SIGNALS],
+}
+
+layout!(Signals { count, names });
+
+impl Signals {
+    fn new(names: &'static [&'static str]) -> Result<Self, PluginError> {
+        if names.len() > MAX_SIGNALS {
+            return Err(PluginError::new(format!("it names {} signals; {MAX_SIGNALS} are possible", names.len())));
+        }
+        let name = |i: usize| names.get(i).map_or(Slice::default(), |name| Slice::new(name.as_bytes()));
+        Ok(Self { count: names.len() as u32, names: std::array::from_fn(name) })
+    }
+}
 
 /// An [`Answer`] on its way: what is asked for is a number until it has been looked at.
 #[derive(Clone, Copy)]
@@ -60,92 +71,9 @@ impl Reply {
     }
 }
 
-table! {
-    /// The functions of a feed strategy. Each that answers writes its answer, or an error.
-    pub struct Table {
-        size: u32,
-        open: unsafe extern "C" fn(RawSlice<u8>, RawSlice<u8>, *const StrategyContext, *mut *mut c_void, Errors) -> u32,
-        close: unsafe extern "C" fn(*mut c_void),
-        describe: unsafe extern "C" fn(*const c_void, *mut Description, Errors) -> u32,
-        update: unsafe extern "C" fn(*mut c_void, *const Window<'_>, *mut Reply, Errors) -> u32,
-    }
-}
-
-/// The plugin `name` of the strategy that `open` makes from its options.
-pub const fn feed_strategy<T, O, F>(name: &'static str, version: &'static str, _open: F) -> Descriptor
-where
-    T: FeedStrategy + 'static,
-    O: PluginOptions + 'static,
-    F: Fn(&O, &StrategyContext) -> Result<T, PluginError> + Copy + 'static,
-{
-    Descriptor::new(PluginKind::FeedStrategy, (name, version), entry::describe::<O>, &Side::<T, O, F>::TABLE)
-}
-
-/// The plugin's side.
-struct Side<T, O, F>(PhantomData<(T, O, F)>);
-
-impl<T, O, F> Side<T, O, F>
-where
-    T: FeedStrategy + 'static,
-    O: PluginOptions + 'static,
-    F: Fn(&O, &StrategyContext) -> Result<T, PluginError> + Copy + 'static,
-{
-    const TABLE: Table = Table {
-        size: size_of_contract::<Table>(),
-        open: Self::open,
-        close: entry::close::<T>,
-        describe: describe::<T>,
-        update: update::<T>,
-    };
-
-    unsafe extern "C" fn open(
-        name: RawSlice<u8>,
-        options: RawSlice<u8>,
-        context: *const StrategyContext,
-        handle: *mut *mut c_void,
-        error: Errors,
-    ) -> u32 {
-        // SAFETY: the host gives what lives for the call.
-        unsafe { entry::open([name, options], handle, error, |options: &O| function::<F>()(options, &*context)) }
-    }
-}
-
-// SAFETY of both: the host passes the handle that `open` gave, places that can be written to, and references that live
-// for the call; it calls a strategy from one thread at a time.
-
-unsafe extern "C" fn describe<T: FeedStrategy>(this: *const c_void, answer: *mut Description, error: Errors) -> u32 {
-    let this = unsafe { &*this.cast::<Instance<T>>() };
-    unsafe { this.fault.guard("signals", answer, error, || description(this)) }
-}
-
-fn description(this: &Instance<impl FeedStrategy>) -> Result<Description, PluginError> {
-    let names = this.plugin.signals();
-    if names.len() > MAX_SIGNALS {
-        return Err(PluginError::new(format!("it names {} signals; {MAX_SIGNALS} are possible", names.len())));
-    }
-    let mut signals = [RawSlice::EMPTY; MAX_SIGNALS];
-    for (place, name) in signals.iter_mut().zip(names) {
-        *place = RawSlice::new(name.as_bytes());
-    }
-    let most = || this.plugin.max_ratio_change_per_s();
-    let max_ratio_change_per_s = this.fault.run("max_ratio_change_per_s", most)?;
-    Ok(Description { max_ratio_change_per_s, signal_count: names.len() as u32, signals })
-}
-
-unsafe extern "C" fn update<T: FeedStrategy>(
-    this: *mut c_void,
-    window: *const Window<'_>,
-    answer: *mut Reply,
-    error: Errors,
-) -> u32 {
-    let Instance { plugin, fault } = unsafe { &mut *this.cast::<Instance<T>>() };
-    unsafe { fault.guard("update", answer, error, || plugin.update(&*window).map(|answer| Reply::new(&answer))) }
-}
-
-/// The host's side: a strategy behind its table.
+/// The host's side: a strategy behind its table, and what it says of itself.
 struct Linked {
-    table: &'static Table,
-    handle: Handle,
+    calls: Calls,
     max_ratio_change_per_s: f64,
     signals: &'static [&'static str],
 }
@@ -157,17 +85,13 @@ pub fn open(
     options: &str,
     context: &StrategyContext,
 ) -> Made<dyn FeedStrategy> {
-    let (name, options) = (RawSlice::new(name.as_bytes()), RawSlice::new(options.as_bytes()));
-    // SAFETY: everything lives for the call; the handle is open; names live as long as their library, which stays.
-    let handle = Handle::open([Method::StrategyNew, Method::StrategyDrop], table.close, |handle, error| unsafe {
-        (table.open)(name, options, context, handle, error)
-    })?;
-    let described =
-        ask(Method::StrategyDescribe, |answer, error| unsafe { (table.describe)(handle.instance, answer, error) })?;
-    let names = &described.signals[..(described.signal_count as usize).min(MAX_SIGNALS)];
+    let calls = Calls::make(table, name, options, context)?;
+    let named = calls.signals()?;
+    let max_ratio_change_per_s = calls.max_ratio_change_per_s()?;
+    let names = &named.names[..(named.count as usize).min(MAX_SIGNALS)];
     // The contract hands names out for good, and few strategies are opened: their list is never freed.
-    let signals = names.iter().map(|name| unsafe { entry::text(*name) }).collect::<Vec<_>>().leak();
-    Ok(Box::new(Linked { table, handle, max_ratio_change_per_s: described.max_ratio_change_per_s, signals }))
+    let signals = names.iter().map(|name| entry::text(*name)).collect::<Vec<_>>().leak();
+    Ok(Box::new(Linked { calls, max_ratio_change_per_s, signals }))
 }
 
 impl FeedStrategy for Linked {
@@ -180,11 +104,7 @@ impl FeedStrategy for Linked {
     }
 
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
-        // SAFETY: the handle is open, `ask` gives places to write to, the window lives for the call.
-        let reply: Reply = ask(Method::StrategyUpdate, |answer, error| unsafe {
-            (self.table.update)(self.handle.instance, window, answer, error)
-        })?;
-        reply.read()
+        self.calls.update(window)?.read()
     }
 }
 

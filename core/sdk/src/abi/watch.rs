@@ -50,7 +50,8 @@ methods!(
     PlannerReset = Planner "reset",
     StrategyNew = FeedStrategy "its constructor",
     StrategyDrop = FeedStrategy "drop",
-    StrategyDescribe = FeedStrategy "signals",
+    StrategySignals = FeedStrategy "signals",
+    StrategyMaxRatioChange = FeedStrategy "max_ratio_change_per_s",
     StrategyUpdate = FeedStrategy "update",
     DriverNew = Driver "its constructor",
     DriverDrop = Driver "drop",
@@ -66,7 +67,7 @@ methods!(
     KinematicsNew = Kinematics "its constructor",
     KinematicsDrop = Kinematics "drop",
     KinematicsJointCount = Kinematics "joint_count",
-    KinematicsConvert = Kinematics "to_joints, to_axes or joint_direction",
+    KinematicsConvert = Kinematics "to_joints or to_axes",
     KinematicsHealth = Kinematics "health",
 );
 

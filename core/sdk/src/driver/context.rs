@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::abi::layout::layout;
-use crate::{AxisLimits, AxisVector, MAX_AXES, size_of_contract};
+use crate::{AxisLimits, AxisVector, MAX_AXES};
 
 /// A short name that crosses the contract by value: UTF-8, cut at a character where it is too long, filled up with zeros.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -62,8 +62,6 @@ layout!(JointDescription { name, rotary, homing_method, homing_torque_percent, l
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DriverContext {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Number of joints.
     pub joint_count: u32,
     /// Fine period: the time between two calls of `exchange`, s.
@@ -84,12 +82,9 @@ pub struct DriverContext {
     pub spindle: u32,
     /// 1 where the loops run in real time. On the virtual clock, 0, what takes a simulated driver time costs the computer none.
     pub real_time: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
 }
 
 layout!(DriverContext {
-    size,
     joint_count,
     fine_period_s,
     start_position,
@@ -99,8 +94,7 @@ layout!(DriverContext {
     outputs,
     analog,
     spindle,
-    real_time,
-    reserved
+    real_time
 });
 
 impl DriverContext {
@@ -116,7 +110,6 @@ impl DriverContext {
             limits: AxisLimits::unlimited(),
         };
         Self {
-            size: size_of_contract::<Self>(),
             joint_count: joint_count as u32,
             fine_period_s,
             start_position: AxisVector::ZERO,
@@ -127,7 +120,6 @@ impl DriverContext {
             analog: 0,
             spindle: 0,
             real_time: 0,
-            reserved: 0,
         }
     }
 }
@@ -136,8 +128,6 @@ impl DriverContext {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct DriverDescription {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// 1 where no metal moves: `guard.mode = "count"` and the virtual clock are permitted.
     pub simulated: u32,
     /// 1 where the drives themselves fault when a joint is too far from its setpoint. A real driver that does not needs
@@ -159,16 +149,7 @@ pub struct DriverDescription {
     pub disable_s: f64,
 }
 
-layout!(DriverDescription {
-    size,
-    simulated,
-    watches_following,
-    slow,
-    hexadecimal_codes,
-    gives_phase,
-    enable_s,
-    disable_s
-});
+layout!(DriverDescription { simulated, watches_following, slow, hexadecimal_codes, gives_phase, enable_s, disable_s });
 
 /// Longest time that a driver may ask a host to wait for, s: ten minutes. What brings a bus up is done in
 /// [`crate::Driver::start`] and has no limit; contactors and brakes are done within seconds.
@@ -187,7 +168,6 @@ impl DriverDescription {
     /// A driver with real drives behind it. Any loop; does not allocate.
     pub const fn real() -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             simulated: 0,
             watches_following: 0,
             slow: 0,

@@ -1,7 +1,7 @@
 //! What goes to the drives and comes back in every fine period.
 
 use crate::abi::layout::layout;
-use crate::{AxisVector, JointState, MAX_AXES, size_of_contract};
+use crate::{AxisVector, JointState, MAX_AXES};
 
 /// Most latches a driver reports at once.
 pub const MAX_LATCHES: usize = 4;
@@ -28,8 +28,6 @@ layout!(Arm { input, edge });
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Setpoint {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// 1 while the drives are to hold or move, 0 to let go. A drive that lets go holds its torque until its brake is closed.
     pub enable: u32,
     /// 1 for one period to reset the drives' faults; after an operator's reset and never else.
@@ -40,8 +38,6 @@ pub struct Setpoint {
     /// Bit per joint that is being homed with a torque limit: its drive keeps to
     /// [`crate::JointDescription::homing_torque_percent`], and has its own limit back where the bit is 0.
     pub limited: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
     /// Number of the fine period.
     pub tick: u64,
     /// Digital outputs, bit n is output n.
@@ -59,12 +55,10 @@ pub struct Setpoint {
 }
 
 layout!(Setpoint {
-    size,
     enable,
     reset,
     homing,
     limited,
-    reserved,
     tick,
     outputs,
     arm,
@@ -77,12 +71,10 @@ layout!(Setpoint {
 impl Default for Setpoint {
     fn default() -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             enable: 0,
             reset: 0,
             homing: 0,
             limited: 0,
-            reserved: 0,
             tick: 0,
             outputs: 0,
             arm: Arm::default(),
@@ -104,8 +96,6 @@ pub struct Latch {
     pub edge: u32,
     /// Bit per joint whose position was caught; the position of another one is not read.
     pub joints: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
     /// How long before the feedback of this exchange was taken the edge came, s; positions that were not caught are found between
     /// the feedback of this period and of those before by it.
     pub before_s: f64,
@@ -113,14 +103,12 @@ pub struct Latch {
     pub position: AxisVector,
 }
 
-layout!(Latch { input, edge, joints, reserved, before_s, position });
+layout!(Latch { input, edge, joints, before_s, position });
 
 /// What the drives report each fine period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Feedback {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Bit per joint whose drive has found its reference in the homing that it was handed over for.
     pub homed: u32,
     /// State per joint.
@@ -157,7 +145,6 @@ pub struct Feedback {
 }
 
 layout!(Feedback {
-    size,
     homed,
     state,
     fault_code,
@@ -180,7 +167,6 @@ impl Default for Feedback {
     /// Joints without torque at zero, everything new, the spindle as it is told to be.
     fn default() -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             homed: 0,
             state: [JointState::Disabled; MAX_AXES],
             fault_code: [0; MAX_AXES],

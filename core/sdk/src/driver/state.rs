@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::abi::layout::{Layout, START, fold, fold_text, layout};
-use crate::{AxisVector, MAX_AXES, size_of_contract};
+use crate::{AxisVector, MAX_AXES};
 
 /// State of one joint's drive: one of seven numbers. It is no `enum`, because drivers write it in every fine period, and what a
 /// driver writes that is none of them is told as that number.
@@ -64,15 +64,11 @@ impl Layout for JointState {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Attached {
-    /// Size of this structure in bytes.
-    pub size: u32,
     /// Bit per joint whose position is known: an absolute encoder, or the same power-on as when it was homed. The position of
     /// another one counts from wherever it stood at power-on.
     pub known: u32,
     /// Bit per joint whose drive says that it is homed.
     pub homed: u32,
-    /// Reserved, zero.
-    pub reserved: u32,
     /// Position per joint, mm or rad.
     pub position: AxisVector,
     /// State per joint.
@@ -84,7 +80,7 @@ pub struct Attached {
     pub delay_periods: [u32; MAX_AXES],
 }
 
-layout!(Attached { size, known, homed, reserved, position, state, fault_code, delay_periods });
+layout!(Attached { known, homed, position, state, fault_code, delay_periods });
 
 /// Most periods that feedback may be behind the setpoint.
 pub const MAX_DELAY_PERIODS: u32 = 15;
@@ -93,10 +89,8 @@ impl Attached {
     /// Joints that stand at `position` and know it, disabled, without delay. Any loop; does not allocate.
     pub fn at(position: AxisVector) -> Self {
         Self {
-            size: size_of_contract::<Self>(),
             known: u32::MAX,
             homed: u32::MAX,
-            reserved: 0,
             position,
             state: [JointState::Disabled; MAX_AXES],
             fault_code: [0; MAX_AXES],

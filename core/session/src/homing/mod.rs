@@ -78,7 +78,7 @@ impl Homing {
                 self.travel(axis, axis.home_mm - self.position[axis.index], f64::INFINITY, Edge::None, items);
                 // The end is the home position itself, whatever the rounding of the way there.
                 self.position[axis.index] = axis.home_mm;
-                if let Some(Item::Block(block)) = items.last_mut() {
+                if let Some(Item::Block(block, _)) = items.last_mut() {
                     block.end[axis.index] = axis.home_mm;
                 }
                 items.push(self.event(EventKind::Homed, axis, 0.0));
@@ -112,7 +112,7 @@ impl Homing {
             self.position = block.end;
         }
         self.blocks += 1;
-        items.push(Item::Block(block));
+        items.push(Item::Block(block, None));
     }
 
     fn fail(&mut self, why: String) {
@@ -129,8 +129,7 @@ impl Homing {
         let more = program.next_items(items)?;
         for item in &mut items[before..] {
             match item {
-                Item::Block(block) => block.index += self.blocks,
-                Item::Curve(curve) => curve.facts_mut().index += self.blocks,
+                Item::Block(block, _) => block.index += self.blocks,
                 Item::Event(event) => event.before_block += self.blocks,
                 Item::Wait(wait) => wait.before_block += self.blocks,
                 Item::End => {}

@@ -28,7 +28,7 @@ fn next(homing: &mut Homing) -> Vec<Item> {
 }
 
 fn block(items: &[Item]) -> (f64, f64, Edge) {
-    let Some(Item::Block(block)) = items.first() else { panic!("{items:?}") };
+    let Some(Item::Block(block, _)) = items.first() else { panic!("{items:?}") };
     (block.end[0], block.feed_mm_per_s, block.stop_on.edge)
 }
 

@@ -186,7 +186,7 @@ impl JogController {
         while let Some(jog) = inner.waiting.pop_front() {
             match self.begin(&mut inner, jog) {
                 Ok(block) => {
-                    items.push(Item::Block(block));
+                    items.push(Item::Block(block, None));
                     return (true, refused);
                 }
                 Err(why) => refused.push(why),
@@ -237,7 +237,7 @@ impl JogController {
             feed_mm_per_s: jog.feed_mm_per_s,
             ..Block::at(inner.position)
         };
-        check_block(&self.machine, inner.judge.as_ref(), &block)?;
+        check_block(&self.machine, inner.judge.as_ref(), &block, None)?;
         inner.blocks += 1;
         inner.moving = Some(Moving { jog, end });
         inner.ended_by_word = false;

@@ -42,7 +42,7 @@ impl Rig {
     fn begins(&self) -> Option<AxisVector> {
         let mut items = vec![];
         self.jogs.next(&mut items);
-        items.first().map(|item| if let Item::Block(block) = item { block.end } else { unreachable!("only lines") })
+        items.first().map(|item| if let Item::Block(block, _) = item { block.end } else { unreachable!("only lines") })
     }
 
     fn is_let_go(&self) -> bool {

@@ -107,7 +107,7 @@ impl Timing {
 }
 
 fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, reliefs: &Reliefs, s_mm: f64) -> Node {
-    let along = bounds.context.limits.along(&at.position, &at.direction);
+    let along = bounds.context.limits.along(&at.direction);
     let cap = leg.smooth_cap_mm_per_s(at, bounds);
     Node {
         s_mm,

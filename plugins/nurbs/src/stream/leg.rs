@@ -103,7 +103,7 @@ impl Leg {
     pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
         let curvature = self.course.counted_length(&at.curvature);
         let chord = chord_feed_mm_per_s(curvature, bounds.chord_error_mm, bounds.context.fine_period_s);
-        let along = bounds.context.limits.along(&at.position, &at.direction);
+        let along = bounds.context.limits.along(&at.direction);
         let axes = if self.block.kind == BlockKind::Rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s };
         let mut cap = self.feed_mm_per_s.min(chord).min(axes);
         for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
@@ -165,7 +165,7 @@ impl Least {
         let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
         let directions = [0.0, 0.23, 0.47, 0.71, 1.0].map(|s| course.at(stretch, s * length_mm, &mut place).direction);
         let tops = directions.map(|direction| {
-            let along = bounds.context.limits.along(&bounds.context.position, &direction);
+            let along = bounds.context.limits.along(&direction);
             if rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s }
         });
         let speed_mm_per_s = tops.into_iter().fold(0.0, f64::max).min(feed_mm_per_s);

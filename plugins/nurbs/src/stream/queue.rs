@@ -107,7 +107,7 @@ impl Queue {
 fn feed_mm_per_s(block: &Block, course: &Course, bounds: &Bounds) -> f64 {
     if block.kind == BlockKind::Rapid {
         let direction = course.at(0, 0.0, &mut Place::default()).direction;
-        return bounds.context.limits.along(&block.start, &direction).rapid_mm_per_s;
+        return bounds.context.limits.along(&direction).rapid_mm_per_s;
     }
     block.command_feed_mm_per_s() * bounds.context.max_feed_ratio
 }

@@ -4,8 +4,9 @@
 pub mod measure;
 
 use tandem_nurbs::{NurbsPlanner, Options};
+use tandem_rig::Given;
 pub use tandem_rig::{Collected, case, numbers};
-use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, OwnedBlock, PlannerContext};
+use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, PlannerContext};
 
 pub fn canonical(name: &str) -> (NurbsData, f64) {
     let case = case("002_nurbs_eval");
@@ -21,12 +22,12 @@ pub fn canonical(name: &str) -> (NurbsData, f64) {
 }
 
 /// A block along `data`, at `feed_mm_per_s`.
-pub fn curve_block(data: NurbsData, length_mm: f64, feed_mm_per_s: f64) -> OwnedBlock {
+pub fn curve_block(data: NurbsData, length_mm: f64, feed_mm_per_s: f64) -> Given {
     let mut block = Block::at(data.control_points[0]);
     block.end = data.control_points[data.control_points.len() - 1];
     (block.kind, block.line) = (BlockKind::Nurbs, 1);
     (block.length_mm, block.feed_mm_per_s) = (length_mm, feed_mm_per_s);
-    OwnedBlock::new(block, Some(data.into()))
+    (block, Some(data.into()))
 }
 
 /// A machine with two linear axes, 5000 mm/s² and 4e5 mm/s³, at a fine period of 2 ms.
@@ -37,7 +38,7 @@ pub fn context(position: AxisVector) -> PlannerContext {
 }
 
 /// All motion of `blocks`.
-pub fn run(options: &str, context: &PlannerContext, blocks: &[OwnedBlock]) -> Collected {
+pub fn run(options: &str, context: &PlannerContext, blocks: &[Given]) -> Collected {
     let mut planner = NurbsPlanner::new(&Options::parse(options).unwrap(), context).unwrap();
     tandem_rig::drive(&mut planner, blocks, 0.008)
 }

@@ -42,10 +42,6 @@ impl Kinematics for Hostile {
         self.with_first("to_axes", joints, -self.bend * joints[1] * joints[1])
     }
 
-    fn joint_direction(&self, position: &AxisVector, direction: &AxisVector) -> AxisVector {
-        self.with_first("joint_direction", direction, 2.0 * self.bend * position[1] * direction[1])
-    }
-
     fn health(&self) -> Result<(), PluginError> {
         self.mischief.of("health").map(|_| ())
     }

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, LimitedBy, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink, size_of_contract,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, LimitedBy, Planner, PlannerContext,
+    PlannerDescription, PluginError, Segment, SegmentFlags, SegmentSink
 };
 
 use crate::mischief::{Misbehave, Mischief, Options};
@@ -53,7 +53,6 @@ impl Hostile {
 
     fn emit(&mut self, block: &Block, what: Misbehave, sink: &mut dyn SegmentSink) -> f64 {
         let mut report = BlockReport {
-            size: size_of_contract::<BlockReport>(),
             limited_by: LimitedBy::Feed,
             block: block.index,
             start_feed_mm_per_s: 0.0,
@@ -92,7 +91,7 @@ impl Planner for Hostile {
         PlannerDescription::order_2()
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         self.mischief.of("check")?;
         let sound = block.start.is_finite() && block.end.is_finite() && block.command_feed_mm_per_s() > 0.0;
         match block.kind {
@@ -102,7 +101,7 @@ impl Planner for Hostile {
         }
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let what = self.mischief.of("accept")?;
         if self.blocks.len() == MOST_BLOCKS || what == Misbehave::Dawdle {
             return Ok(Accepted::Full);

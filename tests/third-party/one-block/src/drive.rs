@@ -1,8 +1,7 @@
 //! One block: speeding up, cruising, slowing down.
 
 use tandem_sdk::{
-    AxisVector, Block, BlockKind, BlockReport, LimitedBy, PlannerContext, Segment, SegmentFlags, SegmentSink,
-    size_of_contract,
+    AxisVector, Block, BlockKind, BlockReport, LimitedBy, PlannerContext, Segment, SegmentFlags, SegmentSink
 };
 
 /// Planners stay this far inside the limits.
@@ -60,7 +59,7 @@ impl Drive {
 
     fn plan(&mut self, rapid: bool, context: &PlannerContext, acceleration_share: f64) {
         self.direction = (self.end - self.start) * (1.0 / self.length_mm);
-        let limits = context.limits.along(&self.start, &self.direction);
+        let limits = context.limits.along(&self.direction);
         let acceleration = WITHIN * acceleration_share * limits.acceleration_mm_per_s2;
         let most = WITHIN * if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
         let feed = (self.blank.feed_mm_per_s * context.max_feed_ratio).min(most);
@@ -141,7 +140,6 @@ impl Drive {
 
     fn report(&self) -> BlockReport {
         BlockReport {
-            size: size_of_contract::<BlockReport>(),
             limited_by: if self.feed_reached { LimitedBy::Feed } else { LimitedBy::Acceleration },
             block: self.blank.block,
             start_feed_mm_per_s: 0.0,

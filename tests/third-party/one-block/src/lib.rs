@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use drive::Drive;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Planner, PlannerContext, PlannerDescription, PluginError,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext, PlannerDescription, PluginError,
     SegmentSink,
 };
 
@@ -51,7 +51,7 @@ impl Planner for OneBlock {
         PlannerDescription::order_2()
     }
 
-    fn check(&self, block: &Block) -> Result<(), PluginError> {
+    fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         let sound = block.start.is_finite() && block.end.is_finite() && block.length_mm > 0.0;
         match block.kind {
             BlockKind::Dwell if block.dwell_s >= 0.0 && block.dwell_s.is_finite() => Ok(()),
@@ -64,11 +64,11 @@ impl Planner for OneBlock {
         }
     }
 
-    fn accept(&mut self, block: &Block) -> Result<Accepted, PluginError> {
+    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         if self.waiting.len() == self.options.buffer_blocks {
             return Ok(Accepted::Full);
         }
-        self.check(block)?;
+        self.check(block, curve)?;
         self.finished = false;
         self.waiting.push_back(Drive::new(block, &self.context, self.options.acceleration_share));
         Ok(Accepted::Accepted)

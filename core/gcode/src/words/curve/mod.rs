@@ -7,7 +7,7 @@ mod places;
 use std::sync::Arc;
 
 use tandem_motion::nurbs::{Nurbs, NurbsError};
-use tandem_sdk::{AxisVector, Block, BlockKind, NurbsData, OwnedBlock};
+use tandem_sdk::{AxisVector, Block, BlockKind, NurbsData};
 
 use super::{Action, Group, Shape, Word};
 use crate::fault::{Checked, Fault, Span};
@@ -254,7 +254,7 @@ fn push_curve(line: &mut Line, origin: &Origin, data: NurbsData) -> Checked<()> 
     let block = Block { kind: BlockKind::Nurbs, end, line: origin.line, length_mm, feed_mm_per_s, ..blank };
     line.state.path.position = end;
     line.state.path.advance_to(end);
-    line.out.push(Item::Curve(OwnedBlock::new(block, Some(Arc::new(data)))));
+    line.out.push(Item::Block(block, Some(Arc::new(data))));
     Ok(())
 }
 
