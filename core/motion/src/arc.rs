@@ -78,7 +78,8 @@ impl Arc {
 
     /// On a circle the direction turns evenly, and its axes do so alone.
     pub(crate) fn third(&self, s_mm: f64) -> AxisVector {
-        let (direction, squared) = (self.direction(s_mm), self.rad_per_mm * self.rad_per_mm);
+        let direction = self.direction(s_mm);
+        let squared = self.rad_per_mm * self.rad_per_mm;
         self.with_plane(AxisVector::ZERO, self.plane.map(|axis| -squared * direction[usize::from(axis)]))
     }
 
@@ -86,8 +87,10 @@ impl Arc {
     /// peak at the ends of the arc or at a multiple of π/2 inside it, and those of a joint lane where its sine and cosine
     /// are in phase.
     pub(crate) fn largest(&self, value: impl Fn(f64) -> AxisVector) -> AxisVector {
-        let (from, to) = (self.start_angle_rad, self.start_angle_rad + self.sweep_rad);
-        let (low, high) = (from.min(to), from.max(to));
+        let from = self.start_angle_rad;
+        let to = self.start_angle_rad + self.sweep_rad;
+        let low = from.min(to);
+        let high = from.max(to);
         let mut largest = value(low).map(f64::abs);
         let mut consider = |angle: f64| {
             let at = value(angle);
@@ -107,7 +110,8 @@ impl Arc {
             // A lane is p·sin φ + q·cos φ + r: it peaks where tan φ = p/q, half a turn apart.
             let [east, north, west] = [0.0, FRAC_PI_2, PI].map(&value);
             for lane in lanes.first()..lanes.first() + lanes.weights().len() {
-                let (q, r) = (0.5 * (east[lane] - west[lane]), 0.5 * (east[lane] + west[lane]));
+                let q = 0.5 * (east[lane] - west[lane]);
+                let r = 0.5 * (east[lane] + west[lane]);
                 let peak = (north[lane] - r).atan2(q);
                 let first = ((low - peak) / PI).ceil();
                 [first, first + 1.0]
@@ -128,7 +132,8 @@ impl Arc {
         let turn = ((y.atan2(x) - self.start_angle_rad) * self.sweep_rad.signum()).rem_euclid(TAU);
         let axes = self.lanes.map_or(self.rise.0.len(), JointLanes::first);
         let per_rad = self.rise.0[..axes].iter().map(|rise| rise / self.rad_per_mm.abs());
-        let (mut square, mut along) = (0.0, 0.0);
+        let mut square = 0.0;
+        let mut along = 0.0;
         for (axis, rise) in per_rad.enumerate() {
             square += rise * rise;
             along += rise * (point[axis] - start[axis]);
@@ -183,7 +188,8 @@ impl Helix {
         // Half of the derivative at `x` from the turn towards the rise: below zero at 0, and concave up to half a turn.
         let slope = |x: f64| self.pull * x.sin() + self.square * (x - way);
         let steepest = if self.square < self.pull { (-self.square / self.pull).acos() } else { PI };
-        let (mut low, mut high) = (0.0, if way <= PI { way } else { steepest });
+        let mut low = 0.0;
+        let mut high = if way <= PI { way } else { steepest };
         if slope(high) < 0.0 {
             return turn;
         }
@@ -236,7 +242,8 @@ mod tests {
             rise in -5.0..5.0f64, at in 0.05..0.95f64,
         ) {
             let path = helix(radius, start, if sign { sweep } else { -sweep }, rise);
-            let (s, h) = (at * path.length_mm(), 1e-4 * path.length_mm().min(radius));
+            let s = at * path.length_mm();
+            let h = 1e-4 * path.length_mm().min(radius);
             let numeric = (path.position(s + h) - path.position(s - h)) * (0.5 / h);
             let bend = (path.direction(s + h) - path.direction(s - h)) * (0.5 / h);
             let twist = (path.curvature(s + h) - path.curvature(s - h)) * (0.5 / h);
@@ -288,7 +295,8 @@ mod tests {
     fn a_sample_beside_a_steep_helix_is_as_far_away_as_it_is() {
         let path = helix(2.0, 0.0, 3.0, 60.0);
         // The binormal of a helix is at right angles to it: 10 µm along it are 10 µm from the path.
-        let (at, rise) = (1.0f64, 20.0);
+        let at = 1.0f64;
+        let rise = 20.0;
         let mut point = path.position(path.length_mm() / 3.0);
         let length = 2.0f64.hypot(rise);
         for (axis, part) in [rise * at.sin(), -rise * at.cos(), 2.0].into_iter().enumerate() {

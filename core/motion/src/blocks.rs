@@ -172,7 +172,8 @@ mod tests {
     #[test]
     fn a_dwell_in_parts_begins_once_and_ends_once_however_its_parts_round() {
         for parts in [[0.3, 0.4, 9.0], [1e-12, 1e-13, 9e9], [0.7, 0.6, 0.0]] {
-            let (mut writer, mut kept) = (BlockWriter::new(3), Kept::default());
+            let mut writer = BlockWriter::new(3);
+            let mut kept = Kept::default();
             let at = AxisVector::from_slice(&[1.0, 2.0]);
             let duration_s = if parts[2] > 1e9 { 1e6 } else { 1.0 };
             writer.begin_dwell(BlockId { index: 7, line: 9 }, &at, duration_s, 5.0, &mut kept);

@@ -27,7 +27,8 @@ impl Profile {
             return [0.0, self.length_mm / self.peak_mm_per_s, 0.0];
         }
         let [up_mm, down_mm] = self.ramps_mm();
-        let (per_acceleration, peak) = (1.0 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
+        let per_acceleration = 1.0 / self.acceleration_mm_per_s2;
+        let peak = self.peak_mm_per_s;
         let cruise_s = (self.length_mm - (up_mm + down_mm)) / peak;
         [
             (peak - self.start_mm_per_s) * per_acceleration,
@@ -46,7 +47,8 @@ impl Profile {
         if self.is_level() {
             return [0.0; 2];
         }
-        let (per_2a, peak) = (0.5 / self.acceleration_mm_per_s2, self.peak_mm_per_s);
+        let per_2a = 0.5 / self.acceleration_mm_per_s2;
+        let peak = self.peak_mm_per_s;
         [self.start_mm_per_s, self.end_mm_per_s].map(|end| (peak - end) * (peak + end) * per_2a)
     }
 
@@ -54,7 +56,8 @@ impl Profile {
     /// 1e-12 s) have none.
     pub fn pieces(&self, durations_s: [f64; 3]) -> [SpeedPiece; 3] {
         let [up, cruise, down] = durations_s;
-        let (a, peak) = (self.acceleration_mm_per_s2, self.peak_mm_per_s);
+        let a = self.acceleration_mm_per_s2;
+        let peak = self.peak_mm_per_s;
         // The last ramp is laid from the end of the block, so that rounding falls into the cruise.
         let [up_mm, down_mm] = self.ramps_mm();
         let piece = |duration_s, start_mm, speed_mm_per_s, acceleration_mm_per_s2| SpeedPiece {

@@ -67,7 +67,8 @@ impl Builder {
     /// Writes duration and polynomials of the segment that drives `piece`; the rest of it is the planner's.
     /// `piece.duration_s` is at most [`Builder::longest_s`].
     pub fn draw(&self, path: &Path, piece: &SpeedPiece, segment: &mut Segment) {
-        let (speed, half_acceleration) = (piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0);
+        let speed = piece.speed_mm_per_s;
+        let half_acceleration = piece.acceleration_mm_per_s2 / 2.0;
         segment.duration_s = piece.duration_s;
         segment.path = [self.path_start_mm + piece.start_mm, speed, half_acceleration, 0.0, 0.0, 0.0];
         if path.is_straight() {
@@ -98,7 +99,8 @@ fn quintic(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_AX
 
 /// Position, velocity and acceleration per axis at local time `t_s` of `piece`. Rough loop; does not allocate.
 pub fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
-    let (s_mm, speed) = (piece.path_mm(t_s), piece.speed(t_s));
+    let s_mm = piece.path_mm(t_s);
+    let speed = piece.speed(t_s);
     let direction = path.direction(s_mm);
     let acceleration = direction * piece.acceleration_mm_per_s2 + path.curvature(s_mm) * (speed * speed);
     [path.position(s_mm), direction * speed, acceleration]
@@ -107,14 +109,16 @@ pub fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
 /// The quintic with value, first and second derivative `from` at 0 and `to` at `h`, in the powers of t. Any loop; does not
 /// allocate.
 pub fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
-    let (c1, c2) = (from[1], from[2] / 2.0);
+    let c1 = from[1];
+    let c2 = from[2] / 2.0;
     let position = to[0] - from[0] - h * (c1 + h * c2);
     let velocity = (to[1] - c1 - 2.0 * c2 * h) * h;
     let acceleration = (to[2] - from[2]) * h * h;
     let c3 = 10.0 * position - 4.0 * velocity + acceleration / 2.0;
     let c4 = -15.0 * position + 7.0 * velocity - acceleration;
     let c5 = 6.0 * position - 3.0 * velocity + acceleration / 2.0;
-    let (h3, h4) = (h * h * h, h * h * h * h);
+    let h3 = h * h * h;
+    let h4 = h * h * h * h;
     [from[0], c1, c2, c3 / h3, c4 / h4, c5 / (h4 * h)]
 }
 

@@ -64,7 +64,8 @@ impl JointLanes {
     pub(crate) fn narrowed(&self, limits: &Limits) -> Limits {
         let mut narrow = Limits { count: self.first, ..*limits };
         for (lane, weights) in self.weights().iter().enumerate() {
-            let (of, weights) = (&limits.axes[self.first() + lane], &weights.0[..self.first()]);
+            let of = &limits.axes[self.first() + lane];
+            let weights = &weights.0[..self.first()];
             let axes = &mut narrow.axes[..self.first()];
             share(axes, weights, of.feed_mm_per_s, |axis| &mut axis.feed_mm_per_s);
             share(axes, weights, of.rapid_mm_per_s, |axis| &mut axis.rapid_mm_per_s);
@@ -128,7 +129,8 @@ mod tests {
         belts().fill(&mut vector);
         assert_eq!(vector, AxisVector::from_slice(&[5.0, 2.0, 9.0, 7.0, 3.0]));
         let mut polynomials = [[0.0; 6]; MAX_AXES];
-        (polynomials[0], polynomials[1]) = ([1.0; 6], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        polynomials[0] = [1.0; 6];
+        polynomials[1] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         belts().fill_polynomials(&mut polynomials);
         assert_eq!(polynomials[3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(polynomials[4], [1.0, 0.0, -1.0, -2.0, -3.0, -4.0]);

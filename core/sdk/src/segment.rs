@@ -218,7 +218,8 @@ mod tests {
     fn derivatives_match_differences() {
         let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
         segment.coefficients[1] = [1.0, -2.0, 3.0, -4.0, 5.0, -6.0];
-        let (t, h) = (0.3, 1e-5);
+        let t = 0.3;
+        let h = 1e-5;
         let rate = (segment.position(t + h)[1] - segment.position(t - h)[1]) / (2.0 * h);
         assert!((segment.velocity(t)[1] - rate).abs() < 1e-8);
         let curve = (segment.velocity(t + h)[1] - segment.velocity(t - h)[1]) / (2.0 * h);

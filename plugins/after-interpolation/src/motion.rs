@@ -88,7 +88,8 @@ impl Motion {
         let begin_s = self.signal.end_s();
         self.signal.push_path(path, feed_mm_per_s);
         let moves_until_s = self.signal.end_s() + self.filter.settle_s();
-        let (axes, moved) = (&self.context.axes, path.max_direction());
+        let axes = &self.context.axes;
+        let moved = path.max_direction();
         let linear = (0..axes.count()).any(|axis| !axes.is_rotary(axis) && moved[axis] != 0.0);
         self.feeds.push(blank.feed_mm_per_s, moves_until_s, linear);
         if stops {
@@ -109,7 +110,8 @@ impl Motion {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
         }
         self.path_mm = segment.path_mm(segment.duration_s);
-        (self.knot, self.now_s) = (knot, end_s);
+        self.knot = knot;
+        self.now_s = end_s;
         self.move_on(driving, over);
         Some(segment)
     }
@@ -140,7 +142,9 @@ impl Motion {
 
     /// The segment from now to `end_s`, at rest on the goal there if `at_goal`, and the knot at its end.
     fn segment(&mut self, driving: &Driving, end_s: f64, at_goal: bool) -> (Segment, Knot) {
-        let (now_s, filter, signal) = (self.now_s, &self.filter, &self.signal);
+        let now_s = self.now_s;
+        let filter = &self.filter;
+        let signal = &self.signal;
         let middle_s = f64::midpoint(now_s, end_s);
         let from = self.knot;
         let settled = Knot::rest(&driving.goal);
@@ -154,7 +158,8 @@ impl Motion {
         };
         let mut segment = Segment { duration_s: piece.duration_s, ..driving.blank };
         segment.coefficients = piece.coefficients();
-        let (feeds, axes) = (&self.feeds, &self.context.axes);
+        let feeds = &self.feeds;
+        let axes = &self.context.axes;
         segment.path = piece.path(&segment, self.path_mm, |velocity| feeds.counted(velocity, axes, middle_s));
         segment.feed_mm_per_s = self.feeds.highest_mm_per_s(middle_s);
         if at_goal {

@@ -64,7 +64,8 @@ fn norm(a: &AxisVector) -> f64 {
 
 /// The quintic with value, first and second derivative `from` at 0 and `to` at `h`, in the powers of t.
 fn through(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
-    let (c1, c2) = (from[1], from[2] / 2.0);
+    let c1 = from[1];
+    let c2 = from[2] / 2.0;
     if h < SHORT_S {
         let c2 = if h > RESOLUTION_S { (to[1] - from[1]) / (2.0 * h) } else { c2 };
         return [from[0], c1, c2, 0.0, 0.0, 0.0];

@@ -80,7 +80,8 @@ impl Buffer {
     pub fn new(capacity: usize, tau_s: f64) -> Self {
         // Three more than the capacity: two blocks that are being driven, and one to spare.
         let room = (capacity + 3).next_power_of_two();
-        let (entries, corners) = (vec![Entry::blank(); room], vec![Corner::default(); room]);
+        let entries = vec![Entry::blank(); room];
+        let corners = vec![Corner::default(); room];
         Self {
             ring: Ring { entries, corners, mask: room - 1, first: 0, end: 0 },
             capacity,
@@ -111,7 +112,10 @@ impl Buffer {
 
     /// Forgets all blocks; the next one speeds up with `tau_s`.
     pub fn clear(&mut self, tau_s: f64) {
-        (self.ring.first, self.ring.end, self.planned, self.finished) = (0, 0, 0, false);
+        self.ring.first = 0;
+        self.ring.end = 0;
+        self.planned = 0;
+        self.finished = false;
         self.before = Before { feed_mm_per_s: None, tau_s };
     }
 
@@ -154,7 +158,8 @@ impl Buffer {
         let ring = &self.ring;
         for (k, (feed, mode)) in self.plan.feeds.iter().zip(&self.plan.modes).enumerate() {
             let slot = (ring.first + k) & ring.mask;
-            (self.feeds[slot], self.modes[slot]) = (*feed, *mode);
+            self.feeds[slot] = *feed;
+            self.modes[slot] = *mode;
         }
         self.planned = ring.end;
     }
@@ -163,7 +168,8 @@ impl Buffer {
         let number = self.ring.first;
         let slots = [number & self.ring.mask, (number + 1) & self.ring.mask];
         let [block, next] = slots.map(|slot| &self.ring.entries[slot]);
-        let (mode, corner) = (self.modes[slots[0]], self.ring.corners[slots[0]]);
+        let mode = self.modes[slots[0]];
+        let corner = self.ring.corners[slots[0]];
         let feed = self.feeds[slots[0]];
         let fixed = self.before.feed_mm_per_s.is_some();
         let mut taken = Taken { number, feed_mm_per_s: feed, mode, corner, ..Taken::default() };
@@ -172,7 +178,8 @@ impl Buffer {
             let feeds = [feed, if mode == Mode::Rest { feed } else { self.feeds[slots[1]] }];
             let blocks = [block, if mode == Mode::Rest { block } else { next }];
             taken.join = Join::new(rules, &corner, blocks, feeds, mode);
-            (taken.next_feed_mm_per_s, self.before.tau_s) = (feeds[1], corner.tau_s);
+            taken.next_feed_mm_per_s = feeds[1];
+            self.before.tau_s = corner.tau_s;
         }
         self.before.feed_mm_per_s = (mode != Mode::Rest).then_some(taken.next_feed_mm_per_s);
         self.up_s = taken.join.up_s;

@@ -129,18 +129,22 @@ const CURVED: f64 = 1.1;
 /// For equal feeds `F·τ/4·sin(θ/2)`. Else the point is at `s/(1−s) = r`, r the positive root of
 /// `b²·r³ + a·b·c·r² − a·b·c·r − a² = 0` with a and b half of feed times τ and c = cos θ. Does not allocate.
 pub fn corner_error_mm(before_mm_per_s: f64, after_mm_per_s: f64, tau_s: f64, turn_rad: f64) -> f64 {
-    let (a, b, c) = (before_mm_per_s * tau_s / 2.0, after_mm_per_s * tau_s / 2.0, turn_rad.cos());
+    let a = before_mm_per_s * tau_s / 2.0;
+    let b = after_mm_per_s * tau_s / 2.0;
+    let c = turn_rad.cos();
     if a <= 0.0 || b <= 0.0 {
         return 0.0;
     }
     let value = |r: f64| ((b * b * r + a * b * c) * r - a * b * c) * r - a * a;
-    let (mut low, mut high) = (0.0, 2.0 * (1.0 + (a / b).max(1.0)));
+    let mut low = 0.0;
+    let mut high = 2.0 * (1.0 + (a / b).max(1.0));
     for _ in 0..80 {
         let middle = f64::midpoint(low, high);
         *(if value(middle) > 0.0 { &mut high } else { &mut low }) = middle;
     }
     let s = low / (1.0 + low);
-    let (p, q) = (a * (1.0 - s) * (1.0 - s), b * s * s);
+    let p = a * (1.0 - s) * (1.0 - s);
+    let q = b * s * s;
     // |p·u₁ − q·u₂|² = (p − q)² + 2·p·q·(1 − cos θ), in the form that does not cancel.
     ((p - q).powi(2) + 4.0 * p * q * (turn_rad / 2.0).sin().powi(2)).sqrt()
 }

@@ -47,7 +47,10 @@ impl Drive {
 
     /// At rest at the start of the run's path.
     pub fn reset(&mut self) {
-        (self.older, self.newer, self.next_at, self.path_mm) = (None, None, None, 0.0);
+        self.older = None;
+        self.newer = None;
+        self.next_at = None;
+        self.path_mm = 0.0;
     }
 
     /// Whether a block moves.
@@ -113,7 +116,9 @@ impl Drive {
         let Some(newer) = self.newer.take() else { return };
         let entry = ring.numbered(newer.number);
         let mut rest = Segment::rest(&entry.end, 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) = (entry.index, entry.line, feed(entry));
+        rest.block = entry.index;
+        rest.line = entry.line;
+        rest.feed_mm_per_s = feed(entry);
         rest.flags = rest.flags.with(flags(entry));
         rest.path[0] = self.path_mm;
         sink.segment(&rest);
@@ -126,7 +131,9 @@ impl Drive {
         let older = self.older.as_ref().map(|older| (ring.numbered(older.number), older.piece(ticks)));
         let segment = &mut self.segment;
         segment.duration_s = piece.duration_s;
-        (segment.block, segment.line, segment.feed_mm_per_s) = (entry.index, entry.line, feed(entry));
+        segment.block = entry.index;
+        segment.line = entry.line;
+        segment.feed_mm_per_s = feed(entry);
         segment.stop_deceleration_mm_per_s2 = newer.stop_mm_per_s2;
         segment.flags = flags(entry);
         if self.begins {
@@ -177,7 +184,9 @@ fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]]) {
     let direction = &entry.directions[0];
     let [mm, speed, half] = [piece.start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
     for (c, (start, direction)) in coefficients.iter_mut().zip(entry.start.0.iter().zip(&direction.0)) {
-        (c[0], c[1], c[2]) = (start + direction * mm, direction * speed, direction * half);
+        c[0] = start + direction * mm;
+        c[1] = direction * speed;
+        c[2] = direction * half;
     }
     if let Some((entry, piece)) = older {
         let left_mm = entry.length_mm - piece.start_mm;

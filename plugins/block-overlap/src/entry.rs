@@ -95,17 +95,24 @@ impl Entry {
     /// Takes what `block` says by itself; `taus_s` are the time constants of its ramps, on a tick. In place: entries are
     /// large.
     pub fn set(&mut self, block: &Block, rules: &Rules, taus_s: [f64; 2]) {
-        (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
+        self.index = block.index;
+        self.line = block.line;
+        self.kind = block.kind;
         self.rests = [block.starts_at_rest(), block.ends_at_rest()];
         self.tau_s = taus_s[1];
         self.command_mm_per_s = block.command_feed_mm_per_s();
         let stated = block.path_tolerance_mm;
         self.tolerance_mm = if stated.is_nan() { rules.tolerance_mm } else { stated };
-        (self.start, self.end) = (block.start, block.end);
-        (self.bend, self.curvature_per_mm, self.arc) = (0.0, 0.0, None);
+        self.start = block.start;
+        self.end = block.end;
+        self.bend = 0.0;
+        self.curvature_per_mm = 0.0;
+        self.arc = None;
         match block.kind {
             BlockKind::Dwell => {
-                (self.dwell_s, self.length_mm, self.feed_mm_per_s) = (block.dwell_s, 0.0, 0.0);
+                self.dwell_s = block.dwell_s;
+                self.length_mm = 0.0;
+                self.feed_mm_per_s = 0.0;
                 return;
             }
             BlockKind::Arc => self.set_arc(block, rules),
@@ -129,11 +136,13 @@ impl Entry {
         let Some(path) = Path::with_lanes(block, rules.joint_lanes) else { return };
         self.length_mm = path.length_mm();
         self.directions = [path.direction(0.0), path.direction(self.length_mm)];
-        let (turn, radius_mm) = (path.rad_per_mm(), path.radius_mm());
+        let turn = path.rad_per_mm();
+        let radius_mm = path.radius_mm();
         let plane = block.arc.plane.map(|axis| axis as usize);
         let mut weak = greater(rules.per_acceleration[plane[0]], rules.per_acceleration[plane[1]]);
         let mut rise = self.directions[0];
-        (rise[plane[0]], rise[plane[1]]) = (0.0, 0.0);
+        rise[plane[0]] = 0.0;
+        rise[plane[1]] = 0.0;
         let mut rising = 0.0;
         if let Some(lanes) = rules.joint_lanes {
             lanes.fill(&mut rise);
@@ -154,7 +163,8 @@ impl Entry {
     /// `most` is the largest share of each axis in the path.
     fn set_feed(&mut self, block: &Block, rules: &Rules, most: &AxisVector) {
         let rapid = block.kind == BlockKind::Rapid;
-        let (command, policy) = (block.feed_mm_per_s * rules.feed_ratio, block.feed_cap_mm_per_s);
+        let command = block.feed_mm_per_s * rules.feed_ratio;
+        let policy = block.feed_cap_mm_per_s;
         let mut feed = lesser(command, policy);
         for (speed, share) in rules.axis_mm_per_s[usize::from(rapid)].0.iter().zip(&most.0).take(rules.axes) {
             if feed * share.abs() > *speed {

@@ -50,7 +50,8 @@ impl Plan {
     pub fn new(capacity: usize) -> Self {
         let feeds = || Vec::with_capacity(capacity);
         let modes = || Vec::with_capacity(capacity);
-        let (own, better) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let own = Vec::with_capacity(capacity);
+        let better = Vec::with_capacity(capacity);
         let earlier = (feeds(), modes());
         Self {
             feeds: feeds(),
@@ -67,7 +68,8 @@ impl Plan {
 
     /// Plans the blocks of `ring`, to rest after the last one. `false` where what is fixed before does not allow it.
     pub fn make(&mut self, rules: &Rules, ring: &Ring, before: &Before) -> bool {
-        (self.fixed, self.capped) = (before.feed_mm_per_s.is_some(), false);
+        self.fixed = before.feed_mm_per_s.is_some();
+        self.capped = false;
         self.own_feeds(rules, ring, before);
         self.reach.clear();
         self.reach.extend(self.own.iter().map(|own| own[0]));
@@ -135,9 +137,13 @@ impl Plan {
 
     /// How long the window takes, s: length over feed, and half of each ramp that nothing overlaps.
     fn time_s(&self, rules: &Rules, ring: &Ring, tau_s: f64) -> f64 {
-        let (mut time_s, mut tau_s, mut before) = (0.0, tau_s, if self.fixed { Mode::Flow } else { Mode::Rest });
+        let mut time_s = 0.0;
+        let mut tau_s = tau_s;
+        let mut before = if self.fixed { Mode::Flow } else { Mode::Rest };
         for k in 0..ring.len() {
-            let (block, feed, mode) = (ring.entry(k), self.feeds[k], self.modes[k]);
+            let block = ring.entry(k);
+            let feed = self.feeds[k];
+            let mode = self.modes[k];
             if block.is_dwell() {
                 continue;
             }
@@ -153,7 +159,8 @@ impl Plan {
                 let next_s = self.feeds[k + 1] * next.slope_s2_per_mm;
                 time_s -= late_overlap_s(rules, ring.corner(k), [block, next], lesser(ramp_s, next_s));
             }
-            (tau_s, before) = (ring.corner(k).tau_s, mode);
+            tau_s = ring.corner(k).tau_s;
+            before = mode;
         }
         time_s
     }
@@ -163,7 +170,8 @@ impl Plan {
         self.own.clear();
         let mut tau_s = before.tau_s;
         for k in 0..ring.len() {
-            let (block, corner) = (ring.entry(k), ring.corner(k));
+            let block = ring.entry(k);
+            let corner = ring.corner(k);
             let taus_s = [tau_s, corner.tau_s];
             if !block.is_dwell() {
                 tau_s = corner.tau_s;
@@ -276,7 +284,8 @@ impl Plan {
     /// Lowers the feed of block `k`. What it loses counts where it is much beside a ramp: along short blocks, feeds that
     /// rise and fall step by step are no loss.
     fn lower(&mut self, ring: &Ring, k: usize, feed_mm_per_s: f64) {
-        let (block, from) = (ring.entry(k), self.feeds[k]);
+        let block = ring.entry(k);
+        let from = self.feeds[k];
         let lost_s = block.length_mm * (1.0 / feed_mm_per_s - 1.0 / from);
         if lost_s > RAMP_SHARE * from * block.slope_s2_per_mm {
             self.lost_s += lost_s;
@@ -324,7 +333,8 @@ impl Plan {
     /// The published rounding: whole ticks where both ends have the time constant, and the axes still take the feed.
     fn round_to_ticks(&mut self, rules: &Rules, ring: &Ring, mut tau_s: f64) {
         for k in 0..ring.len() {
-            let (block, corner) = (ring.entry(k), ring.corner(k));
+            let block = ring.entry(k);
+            let corner = ring.corner(k);
             let taus_s = [tau_s, corner.tau_s];
             if block.is_dwell() {
                 continue;
@@ -381,7 +391,8 @@ fn slowed_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
 
 /// The same where a ramp may be longer than its time constant, because the axes ask for it: every combination holds.
 fn ramped_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
-    let (l, h) = (block.length_mm, block.slope_s2_per_mm);
+    let l = block.length_mm;
+    let h = block.slope_s2_per_mm;
     if h == 0.0 {
         return f64::INFINITY;
     }

@@ -67,7 +67,7 @@ impl Join {
         let slope = greater(blocks[0].slope_s2_per_mm, blocks[1].slope_s2_per_mm);
         let stop = if slope > 0.0 {
             let bent = ARC_OVERLAP * greater(blocks[0].bend, blocks[1].bend) * fastest * fastest;
-            greater(1.0 - fastest * corner.turn_s2_per_mm / tau_s - bent, LEAST_STOP) / slope
+            greater(1.0 - fastest * corner.turn_s2_per_mm / tau_s - bent, MIN_STOP) / slope
         } else {
             rules.weakest_mm_per_s2
         };
@@ -88,14 +88,14 @@ impl Join {
         let bent = bent_share(blocks, overlap_s);
         // A short overlap leaves half, a long one what turning leaves.
         let turning = if turn + bent <= TURN_SHARE { 1.0 - turn - bent } else { 0.0 };
-        let halved = if overlap_s <= HALF * ramp_s { HALF } else { LEAST_STOP };
+        let halved = if overlap_s <= HALF * ramp_s { HALF } else { MIN_STOP };
         let left = greater(turning, halved);
         Self { down_s, up_s, overlap_s, stop_mm_per_s2: left / slope }
     }
 }
 
 /// Least share of the acceleration that [`TURN_SHARE`] leaves, to rounding.
-const LEAST_STOP: f64 = 0.19;
+const MIN_STOP: f64 = 0.19;
 
 /// The shortest overlap that the axes allow at these feeds, s.
 fn needed_s(corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2]) -> f64 {

@@ -34,7 +34,8 @@ impl Mover {
         if entry.is_dwell() {
             return None;
         }
-        let (feed, tick_s) = (taken.feed_mm_per_s, rules.tick_s);
+        let feed = taken.feed_mm_per_s;
+        let tick_s = rules.tick_s;
         let per_tick = 1.0 / tick_s;
         let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s * per_tick, rules.grid));
         let cruise = round(entry.length_mm / feed * per_tick + (up - down) / 2.0, rules.grid);
@@ -104,7 +105,9 @@ impl Mover {
 
     /// The motion from here on for `ticks`, up to the next knot.
     pub fn piece(&self, ticks: f64) -> SpeedPiece {
-        let (at, tick_s, feed) = (self.at, self.tick_s, self.feed_mm_per_s);
+        let at = self.at;
+        let tick_s = self.tick_s;
+        let feed = self.feed_mm_per_s;
         let [up, _, end] = self.knots;
         let duration_s = ticks * tick_s;
         if self.phase == 0 {

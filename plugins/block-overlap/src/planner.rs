@@ -45,7 +45,8 @@ impl BlockOverlap {
     /// A buffer of fewer than four blocks, or beyond reason; no time constant.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         if !(4..=MAX_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
-            let (asked, most) = (options.buffer_blocks, MAX_BUFFER_BLOCKS);
+            let asked = options.buffer_blocks;
+            let most = MAX_BUFFER_BLOCKS;
             return Err(PluginError::new(format!("buffer_blocks = {asked}: from 4 to {most}")));
         }
         if !(context.time_constant_s > 0.0 && context.time_constant_s.is_finite()) {
@@ -73,7 +74,8 @@ impl BlockOverlap {
         let stated = block.time_constant_s;
         let stated_s = if stated.is_nan() { self.context.time_constant_s } else { stated };
         if stated_s != self.stated_s {
-            (self.stated_s, self.on_tick_s) = (stated_s, self.rules.on_tick_s(stated_s));
+            self.stated_s = stated_s;
+            self.on_tick_s = self.rules.on_tick_s(stated_s);
         }
         self.on_tick_s
     }

@@ -12,7 +12,8 @@ const SAME: f64 = 1e-9;
 
 /// What held the feed of `entry` down; where nothing did, what made `next` start late.
 pub fn limited_by(rules: &Rules, entry: &Entry, next: &Entry, taken: &Taken) -> LimitedBy {
-    let (feed, corner) = (taken.feed_mm_per_s, &taken.corner);
+    let feed = taken.feed_mm_per_s;
+    let corner = &taken.corner;
     if feed >= entry.feed_mm_per_s * (1.0 - SAME) {
         return match taken.mode {
             Mode::Late => late_by(entry, next, taken),
@@ -42,7 +43,8 @@ const SAME_OVERLAP: f64 = 1e-6;
 /// What bounds the overlap of a late start: the tolerance, the time constant, the ramps themselves where only the feeds
 /// differ, or turning.
 fn late_by(entry: &Entry, next: &Entry, taken: &Taken) -> LimitedBy {
-    let (join, corner) = (&taken.join, &taken.corner);
+    let join = &taken.join;
+    let corner = &taken.corner;
     let reaches = |bound_s: f64| join.overlap_s >= bound_s * (1.0 - SAME_OVERLAP);
     let slope = lesser(entry.slope_s2_per_mm, next.slope_s2_per_mm);
     match () {

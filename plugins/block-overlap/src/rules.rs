@@ -92,7 +92,8 @@ impl Rules {
     /// the axes that there are: one after the other they are added up, and each costs its time.
     #[inline]
     pub fn turn(&self, from: &AxisVector, to: &AxisVector) -> (f64, f64) {
-        let (mut most, mut squares) = (0.0, 0.0);
+        let mut most = 0.0;
+        let mut squares = 0.0;
         for axis in 0..self.axes.min(MAX_AXES) {
             let step = to[axis] - from[axis];
             most = greater(most, (step * self.per_acceleration[axis]).abs());

@@ -78,7 +78,10 @@ impl Buffer {
 
     /// Forgets all blocks.
     pub fn clear(&mut self) {
-        (self.first, self.dirty, self.end, self.open) = (0, 0, 0, false);
+        self.first = 0;
+        self.dirty = 0;
+        self.end = 0;
+        self.open = false;
     }
 
     /// Adds the block that `write` puts into its slot; with it the one before becomes ready to be planned.
@@ -113,7 +116,8 @@ impl Buffer {
         let own = entry.own_square;
         let node = &mut self.nodes[self.end & self.mask];
         node.cap = lesser(lesser(entry.junction_mm_per_s.powi(2), own), self.last_own);
-        (node.reach, node.start) = (0.0, 0.0);
+        node.reach = 0.0;
+        node.start = 0.0;
         self.last_own = own;
         self.end += 1;
     }

@@ -26,7 +26,9 @@ impl Drive {
         self.taken = taken;
         self.builder = Builder::new(path, path_start_mm);
         self.pieces = plan.profile.pieces(plan.durations_s);
-        (self.piece, self.in_piece_s, self.in_block_s) = (0, 0.0, 0.0);
+        self.piece = 0;
+        self.in_piece_s = 0.0;
+        self.in_block_s = 0.0;
         self.lead = plan.steps[0];
     }
 
@@ -117,7 +119,9 @@ impl Drive {
     /// The programmed position itself, for the sample at rest.
     fn rest(&self, path: &Path, segment: &mut Segment, sink: &mut dyn SegmentSink) {
         let mut rest = Segment::rest(path.end(), 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) = (segment.block, segment.line, segment.feed_mm_per_s);
+        rest.block = segment.block;
+        rest.line = segment.line;
+        rest.feed_mm_per_s = segment.feed_mm_per_s;
         rest.flags = segment.flags.without(SegmentFlags::BLOCK_ENDS).with(SegmentFlags::ENDS_AT_REST);
         rest.path[0] = self.builder.path_start_mm() + path.length_mm();
         sink.segment(&rest);
@@ -126,7 +130,9 @@ impl Drive {
 
 /// Writes into `segment` what all segments of a block share.
 pub fn begin(segment: &mut Segment, entry: &Entry, plan: &Plan) {
-    (segment.block, segment.line, segment.feed_mm_per_s) = (entry.index, entry.line, entry.command_mm_per_s);
+    segment.block = entry.index;
+    segment.line = entry.line;
+    segment.feed_mm_per_s = entry.command_mm_per_s;
     segment.stop_deceleration_mm_per_s2 = plan.profile.acceleration_mm_per_s2;
     segment.step_acceleration = (plan.steps[0] + plan.steps[1]) * (1.0 / plan.duration_s());
     segment.flags = SegmentFlags::BLOCK_BEGINS;

@@ -76,8 +76,11 @@ impl Entry {
     ///
     /// In place, field by field: entries are large, and moving them costs more than computing them.
     pub fn set(&mut self, block: &Block, caps: &FeedCaps<'_>) {
-        (self.index, self.line, self.kind) = (block.index, block.line, block.kind);
-        (self.starts_at_rest, self.ends_at_rest) = (block.starts_at_rest(), block.ends_at_rest());
+        self.index = block.index;
+        self.line = block.line;
+        self.kind = block.kind;
+        self.starts_at_rest = block.starts_at_rest();
+        self.ends_at_rest = block.ends_at_rest();
         self.command_mm_per_s = block.command_feed_mm_per_s();
         self.junction_mm_per_s = 0.0;
         self.half_step = AxisVector::ZERO;
@@ -91,7 +94,8 @@ impl Entry {
     }
 
     fn set_feed(&mut self, block: &Block, caps: &FeedCaps<'_>) {
-        (self.feed_mm_per_s, self.feed_reason) = (0.0, LimitedBy::Feed);
+        self.feed_mm_per_s = 0.0;
+        self.feed_reason = LimitedBy::Feed;
         let Some(path) = &self.path else { return };
         let command = block.feed_mm_per_s * caps.feed_ratio;
         let policy = block.feed_cap_mm_per_s;

@@ -76,7 +76,9 @@ impl Rule {
     pub fn limit(&self, entry: &mut Entry, end: &End<'_>, transfer: &mut Transfer) {
         transfer.clear();
         let Some(path) = &entry.path else { return };
-        let (most, bend, length_mm) = (path.max_direction(), path.max_curvature(), path.length_mm());
+        let most = path.max_direction();
+        let bend = path.max_curvature();
+        let length_mm = path.length_mm();
         if self.kind == Junction::Tangent {
             let row = Row { h: 1.0, k: 0.0, a: self.smallest_acceleration(entry) };
             entry.rows.push(row);
@@ -153,7 +155,8 @@ impl Costs {
     fn reaches_as_far(&self, one: &Row, other: &Row) -> bool {
         let slow = lesser(self.ends_mm_per_s[0], self.ends_mm_per_s[1]).powi(2);
         let reach = |r: &Row| (r.h * slow + 2.0 * self.length_mm * r.a, r.h + 2.0 * self.length_mm * r.k);
-        let (one, other) = (reach(one), reach(other));
+        let one = reach(one);
+        let other = reach(other);
         one.0 >= self.feed_mm_per_s.powi(2) * one.1 || one.0 * other.1 >= other.0 * one.1
     }
 }

@@ -97,7 +97,8 @@ impl Least {
     #[inline]
     pub fn and(&mut self, (n, d): (f64, f64)) {
         if n * self.d < self.n * d {
-            (self.n, self.d) = (n, d);
+            self.n = n;
+            self.d = d;
         }
     }
 

@@ -29,9 +29,11 @@ impl Adaptive {
 
     /// Duration, and feed at the start, highest and at the end.
     pub fn summary(&self, course: &Course) -> (f64, [f64; 3]) {
-        let (mut time_s, mut feeds) = (0.0, [f64::NAN, 0.0, 0.0]);
+        let mut time_s = 0.0;
+        let mut feeds = [f64::NAN, 0.0, 0.0];
         for (index, stretch) in course.stretches().iter().enumerate() {
-            let (mut s_mm, mut place) = (0.0, Place::default());
+            let mut s_mm = 0.0;
+            let mut place = Place::default();
             while s_mm < stretch.length_mm {
                 let piece = self.piece(course, index, s_mm, &mut place);
                 let speed = piece.speed_mm_per_s;

@@ -119,14 +119,16 @@ impl Baseline {
 
     fn begin_motion(&mut self, block: &Block, course: Course, sink: &mut dyn SegmentSink) {
         let (feed_mm_per_s, limited_by) = self.feed_mm_per_s(block, &course);
-        let (chord_error_mm, period_s) = (self.chord_error_mm, self.context.fine_period_s);
+        let chord_error_mm = self.chord_error_mm;
+        let period_s = self.context.fine_period_s;
         let profile = Adaptive { feed_mm_per_s, chord_error_mm, period_s };
         let (time_s, feeds) = profile.summary(&course);
         let slowed = feeds[1] < feed_mm_per_s;
         let limited_by = if slowed { LimitedBy::Tolerance } else { limited_by };
         sink.block(&report(block.index, limited_by, feeds, time_s));
         self.segment = self.blank(block);
-        (self.end, self.ends_at_rest) = (*course.end(), block.ends_at_rest());
+        self.end = *course.end();
+        self.ends_at_rest = block.ends_at_rest();
         self.driving = Some(Driving { course, profile, stretch: 0, s_mm: 0.0, place: Place::default(), piece: None });
         self.moving = true;
     }
@@ -205,7 +207,8 @@ impl Driving {
             return true;
         }
         self.stretch += 1;
-        (self.s_mm, self.place) = (0.0, Place::default());
+        self.s_mm = 0.0;
+        self.place = Place::default();
         false
     }
 

@@ -5,7 +5,7 @@ use tandem_motion::nurbs::{AlongPath, ArcLength, Nurbs, NurbsError, Piece, Place
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, NurbsData, PlannerContext};
 
 /// A stretch no longer than this is rounding, mm.
-const LEAST_MM: f64 = 1e-9;
+const MIN_MM: f64 = 1e-9;
 
 /// Where a curve turns on less than this it is driven from rest to rest, mm: even with 100 m/s² it would be passed at 0.01 mm/s,
 /// which gains nothing, and no grid of places is as fine as the path beside it.
@@ -72,7 +72,7 @@ impl Course {
         };
         // Between points of a polygon that coincide there is nothing to drive.
         let pieces = curve.pieces().into_iter().flat_map(|piece| between_hairpins(&curve, piece)).collect::<Vec<_>>();
-        let stretches = pieces.iter().map(stretch).filter(|stretch| stretch.length_mm > LEAST_MM).collect();
+        let stretches = pieces.iter().map(stretch).filter(|stretch| stretch.length_mm > MIN_MM).collect();
         Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end, axes: count }))
     }
 

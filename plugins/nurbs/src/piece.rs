@@ -29,7 +29,8 @@ impl Piece {
     /// The piece from `t_s` on, `duration_s` long.
     #[must_use]
     pub fn part(&self, t_s: f64, duration_s: f64) -> Self {
-        let (a, j) = (self.acceleration_mm_per_s2, self.jerk_mm_per_s3);
+        let a = self.acceleration_mm_per_s2;
+        let j = self.jerk_mm_per_s3;
         Self {
             start_mm: self.start_mm + t_s * (self.speed_mm_per_s + t_s * (a / 2.0 + t_s * j / 6.0)),
             speed_mm_per_s: self.speed_mm_per_s + t_s * (a + t_s * j / 2.0),
@@ -59,7 +60,8 @@ impl Piece {
             part.duration_s /= 2.0;
         }
         segment.duration_s = part.duration_s;
-        let (a, j) = (self.acceleration_mm_per_s2 / 2.0, self.jerk_mm_per_s3 / 6.0);
+        let a = self.acceleration_mm_per_s2 / 2.0;
+        let j = self.jerk_mm_per_s3 / 6.0;
         segment.path = [self.start_mm, self.speed_mm_per_s, a, j, 0.0, 0.0];
         let left_s = self.duration_s - part.duration_s;
         (left_s > 0.0).then(|| self.part(part.duration_s, left_s))

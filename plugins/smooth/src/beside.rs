@@ -49,7 +49,8 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
         let across: Lanes<L> = each(|l| way[l] - along * chord.direction[l]);
         dot(&across, &across) / (chord.tolerance * chord.tolerance)
     };
-    let (mut best, mut found) = (look(near), near);
+    let mut best = look(near);
+    let mut found = near;
     for step in 1..SEARCHED {
         if best < NEAR_ENOUGH * NEAR_ENOUGH || step > 3 && best <= DEVIATION * DEVIATION {
             break;
@@ -74,7 +75,8 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
 #[inline(always)]
 pub fn stretch<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>, bulge: f64) -> f64 {
     let chords = run.chords;
-    let (first, last) = (a.chord.min(b.chord), a.chord.max(b.chord));
+    let first = a.chord.min(b.chord);
+    let last = a.chord.max(b.chord);
     let mut tolerance = chords[first].tolerance;
     let mut between = 0.0f64;
     if first < last {
@@ -125,7 +127,8 @@ pub fn closer<const L: usize>(
 /// The squared distance of `point` from the line between `a` and `b`.
 #[inline(always)]
 pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) -> f64 {
-    let (chord, way) = (minus(b, a), minus(point, a));
+    let chord = minus(b, a);
+    let way = minus(point, a);
     let squared = dot(&chord, &chord);
     let along = if squared > 0.0 { (dot(&way, &chord) / squared).clamp(0.0, 1.0) } else { 0.0 };
     let across: Lanes<L> = each(|l| way[l] - along * chord[l]);

@@ -126,7 +126,8 @@ impl<const L: usize> Core<L> {
     fn plan_from_rest(&mut self) -> bool {
         self.route.begin_run(self.at);
         let run = self.route.run(self.at, self.finished);
-        let (frame, at) = (&self.frame, self.at);
+        let frame = &self.frame;
+        let at = self.at;
         let here = run.chord_at(at, 0);
         let mut start = Start {
             state: [self.position, [0.0; L], [0.0; L]],
@@ -169,13 +170,16 @@ impl<const L: usize> Core<L> {
     fn commit(&mut self) {
         let window = &mut self.window;
         let whole_s = window.duration_s();
-        let (mut most, mut found) = (0.0, whole_s);
+        let mut most = 0.0;
+        let mut found = whole_s;
         if !window.whole {
             for piece in &window.pieces {
-                let (t, v) = (piece.end_s(), piece.velocity(piece.duration_s));
+                let t = piece.end_s();
+                let v = piece.velocity(piece.duration_s);
                 let speed = v.iter().map(|v| v * v).sum::<f64>().sqrt();
                 if (COMMIT.0 * whole_s..=COMMIT.1 * whole_s).contains(&t) && speed >= EQUAL * most {
-                    (most, found) = (speed.max(most), t);
+                    most = speed.max(most);
+                    found = t;
                 }
             }
         }

@@ -10,7 +10,7 @@ use crate::route::{Item, Leg};
 /// Share of the jerk limits on which a stop counts: the plan takes the rest.
 const STOP_JERK: f64 = 0.5;
 /// Least duration of a segment, s: the derivatives of a shorter one are rounding.
-const LEAST_S: f64 = 5e-5;
+const MIN_S: f64 = 5e-5;
 
 /// What segments say beside their motion.
 #[derive(Debug)]
@@ -81,8 +81,8 @@ impl<const L: usize> Core<L> {
         let period_s = self.frame.period_s;
         let k = self.window.piece_at(from_s);
         let mut until_s = self.window.pieces[k].end_s().min(self.window.commit_s);
-        if from_s + left_s < until_s - LEAST_S {
-            until_s = from_s + left_s.max(LEAST_S);
+        if from_s + left_s < until_s - MIN_S {
+            until_s = from_s + left_s.max(MIN_S);
         }
         let mut merged_feed = 0.0f64;
         let mut ends = false;
@@ -175,7 +175,8 @@ impl<const L: usize> Core<L> {
         let mut named = BlockId { index: self.emitter.blank.block, line: self.emitter.blank.line };
         let mut ended = false;
         while let Some(leg) = self.route.front().filter(|leg| leg.end <= end + 1e-9) {
-            (exact, ended) = (leg.block.end, true);
+            exact = leg.block.end;
+            ended = true;
             named = BlockId::from(&leg.block);
             self.report_last(&leg.clone(), sink);
             self.pop_leg();

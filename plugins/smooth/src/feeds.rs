@@ -1,42 +1,43 @@
 //! The feeds along a window: what an interval may have before it is planned, and what a piece of motion has of it.
 
-use tandem_motion::tube::{Lanes, Site};
+use tandem_motion::tube::{Lanes, Waypoint};
 
 use crate::frame::{dot, minus};
 use crate::route::Run;
 use crate::verify::larger;
 use crate::window::{Piece, Window};
 
-/// The feed of intervals, asked for in order: the lowest of the chords whose sites lie in or next to one. A vertex has both
+/// The feed of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
 /// of its chords: speed at the end of an interval is what the next one allows.
 pub struct Feeds<'a, const L: usize> {
     pub run: &'a Run<'a, L>,
-    /// Path coordinates and chords of the sites.
+    /// Path coordinates and chords of the waypoints.
     pub along: &'a [(f64, u32)],
-    pub sites: &'a [Site<L>],
+    pub waypoints: &'a [Waypoint<L>],
     pub at: usize,
 }
 
 impl<const L: usize> Feeds<'_, L> {
     /// The feed of interval `k`.
     pub fn of(&mut self, k: usize) -> f64 {
-        while self.at + 1 < self.sites.len() && (self.sites[self.at + 1].interval as usize) < k {
+        while self.at + 1 < self.waypoints.len() && (self.waypoints[self.at + 1].interval as usize) < k {
             self.at += 1;
         }
         let mut feed = f64::INFINITY;
         let mut n = self.at;
-        while n < self.sites.len() {
-            let (s, chord) = (self.along[n].0, self.along[n].1 as usize);
+        while n < self.waypoints.len() {
+            let s = self.along[n].0;
+            let chord = self.along[n].1 as usize;
             feed = feed.min(self.run.chords[chord].feed);
             if chord > 0 && s <= self.run.chords[chord].s {
                 feed = feed.min(self.run.chords[chord - 1].feed);
             }
-            if (self.sites[n].interval as usize) > k {
+            if (self.waypoints[n].interval as usize) > k {
                 break;
             }
             n += 1;
         }
-        if feed.is_infinite() && self.sites.is_empty() {
+        if feed.is_infinite() && self.waypoints.is_empty() {
             feed = self.run.chords.iter().fold(f64::INFINITY, |least, chord| least.min(chord.feed));
         }
         feed
@@ -79,10 +80,12 @@ impl<const L: usize> Feeder<'_, L> {
         let chords = self.run.chords;
         // What jerk can add to a speed between two looks.
         let between = jerk * (piece.duration_s / 16.0).powi(2) / 8.0;
-        let (mut most, mut i) = (0.0, self.chord);
+        let mut most = 0.0;
+        let mut i = self.chord;
         for n in 0..=16 {
             let t = f64::from(n) / 16.0 * piece.duration_s;
-            let (at, v) = (piece.position(t), piece.velocity(t));
+            let at = piece.position(t);
+            let v = piece.velocity(t);
             let passed = |i: usize| dot(&minus(&at, &chords[i].start), &chords[i].direction);
             while i + 1 < chords.len() && passed(i + 1) > 0.0 {
                 i += 1;

@@ -15,7 +15,7 @@ const HALVINGS: u32 = 5;
 /// How much shorter the next chord is that is tried.
 const SHORTER: f64 = 0.6;
 /// What is no longer than that is its own chord, mm: less than the sagitta of the least tolerance.
-const LEAST_MM: f64 = 1e-6;
+const MIN_MM: f64 = 1e-6;
 /// Shortest chord that is tried first, and longest one of a curved block, mm.
 const SHORTEST_MM: f64 = 1e-4;
 const LONGEST_MM: f64 = 1.0;
@@ -97,7 +97,9 @@ impl<const L: usize> Flat<L> {
 
     /// The chords of a smooth part of a curve.
     fn lay_piece(&mut self, part: &Smooth<L>) {
-        let (length, mut place, mut s) = (part.table.length().mm, Place::default(), 0.0);
+        let length = part.table.length().mm;
+        let mut place = Place::default();
+        let mut s = 0.0;
         let mut from = part.at(s, &mut place);
         while s < length && self.points.len() <= MAX_CHORDS {
             let reach = part.reach(s, &mut place);
@@ -108,7 +110,8 @@ impl<const L: usize> Flat<L> {
                 at = part.at(to, &mut place);
             }
             self.points.push(at);
-            (s, from) = (to, at);
+            s = to;
+            from = at;
         }
     }
 }
@@ -129,7 +132,8 @@ impl<const L: usize> Smooth<'_, L> {
 
     /// A guess of the length of the chord at `s`; where the curve bends more sharply further on, that counts.
     fn reach(&self, s: f64, place: &mut Place) -> f64 {
-        let (first, length) = (self.step(s, place), self.table.length().mm);
+        let first = self.step(s, place);
+        let length = self.table.length().mm;
         let further = [0.5, 1.0].map(|share| self.step((s + share * first).min(length), place));
         further.into_iter().fold(first, |least, next| least.min(next.max(0.3 * first)))
     }
@@ -155,7 +159,7 @@ impl<const L: usize> Smooth<'_, L> {
         // The chord of a circle meets it exactly; rounding is not to make it shorter.
         let most = (1.001 * self.sagitta).powi(2);
         let near = |at: &AxisVector| to_chord(&self.frame.lanes(at), start, end) <= most;
-        to - from <= LEAST_MM
+        to - from <= MIN_MM
             || to - from <= straight + 2.0 * self.sagitta && self.curve.lies_inside(range, HALVINGS, &near)
     }
 }
@@ -229,7 +233,8 @@ mod tests {
     fn chain_and_curve(data: &NurbsData) -> (Vec<Lanes<4>>, Nurbs) {
         let (axes, frame) = machine();
         let mut block = Block::at(data.control_points[0]);
-        (block.kind, block.end) = (BlockKind::Nurbs, data.control_points[data.degree]);
+        block.kind = BlockKind::Nurbs;
+        block.end = data.control_points[data.degree];
         let mut flat = Flat::default();
         flat.lay(&axes, &frame, (&block, Some(data.curve())), SAGITTA / SAGITTA_SHARE).unwrap();
         let mut chain = vec![frame.lanes(&block.start)];

@@ -2,7 +2,7 @@
 //! the shortest time, also where blocks are short.
 //!
 //! 1. A guess of the timing of the path gives pseudo-time ([`timing`]).
-//! 2. In pseudo-time the spline of least jerk is laid through boxes around the path ([`sites`], `tandem_motion::tube`).
+//! 2. In pseudo-time the spline of least jerk is laid through boxes around the path ([`waypoints`], `tandem_motion::tube`).
 //! 3. That motion is driven as fast as the limits allow; the times found are the timing of the next round ([`plan`]).
 //! 4. The quintics that come out are checked as they are, up to their rest at the end ([`verify`]).
 //! 5. The first part is driven; the next window begins in a state on it ([`core`]).
@@ -27,10 +27,10 @@ mod planner;
 mod profile;
 mod report;
 mod route;
-mod sites;
 mod timing;
 mod travel;
 mod verify;
+mod waypoints;
 mod window;
 
 pub use options::Options;

@@ -53,7 +53,7 @@ impl Options {
         Tuning {
             step_s: self.grid_ms / 1000.0,
             window_s: self.window_ms / 1000.0,
-            box_share: self.tolerance_share / crate::sites::BOX_SHARE,
+            box_share: self.tolerance_share / crate::waypoints::BOX_SHARE,
             rounds: self.rounds as usize,
             repairs: 3,
         }

@@ -90,7 +90,8 @@ impl<'a, const L: usize> Walker<'a, L> {
             if next == self.chords.len() || !self.is_near(next, before, sample) {
                 return false;
             }
-            (self.chord, self.along) = (next, 0.0);
+            self.chord = next;
+            self.along = 0.0;
         }
     }
 
@@ -126,7 +127,8 @@ fn within<const L: usize>(chord: &Chord<L>, [low, high]: [f64; 2], sample: &Lane
     let foot = dot(&way, &chord.direction);
     let across = minus(&way, &chord.direction.map(|d| foot * d));
     let half = (most * most - dot(&across, &across)).sqrt();
-    let (first, last) = (low.max(foot - half), high.min(foot + half).min(chord.length));
+    let first = low.max(foot - half);
+    let last = high.min(foot + half).min(chord.length);
     // Where it is too far on the whole chord, half is no number.
     (half >= 0.0 && first <= last).then_some([first, last])
 }

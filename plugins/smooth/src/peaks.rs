@@ -82,7 +82,8 @@ fn close_in<const L: usize, const N: usize>(
 
 /// The control points of both halves (de Casteljau).
 fn halves<const L: usize, const N: usize>(control: &[Lanes<L>; N]) -> [[Lanes<L>; N]; 2] {
-    let (mut left, mut right) = (*control, *control);
+    let mut left = *control;
+    let mut right = *control;
     for level in 1..N {
         for n in 0..N - level {
             right[n] = each(|l| f64::midpoint(right[n][l], right[n + 1][l]));
@@ -101,8 +102,11 @@ struct Derivatives<const L: usize> {
 
 #[inline(always)]
 fn control_of<const L: usize>(piece: &Piece<L>) -> Derivatives<L> {
-    let (c, t) = (&piece.c, piece.duration_s);
-    let (t2, t3, t4) = (t * t, t * t * t, t * t * t * t);
+    let c = &piece.c;
+    let t = piece.duration_s;
+    let t2 = t * t;
+    let t3 = t * t * t;
+    let t4 = t * t * t * t;
     let [p0, p1]: [Lanes<L>; 2] = [c[1], each(|l| 2.0 * t * c[2][l])];
     let [p2, p3]: [Lanes<L>; 2] = [each(|l| 3.0 * t2 * c[3][l]), each(|l| 4.0 * t3 * c[4][l])];
     let velocity = [
@@ -182,13 +186,14 @@ pub fn derivatives<const L: usize>(
         jerk: highest(&jerk, JERK, &share_of(&frame.jerk)),
         bend: hull(&acceleration, &|a| dot(a, a)).sqrt(),
     };
-    let (v, a) = (&velocity[4], &acceleration[3]);
+    let v = &velocity[4];
+    let a = &acceleration[3];
     leave(stop, frame, v, a, squared(v).sqrt());
     reached
 }
 
 /// Share of an acceleration limit that counts as left at least, for the moment that turning takes all of it.
-const LEAST_LEFT: f64 = 0.02;
+const MIN_LEFT: f64 = 0.02;
 
 /// Notes what is left for a stop: with d the direction and n what turns, `A − max(0, −sign(d)·n)` over |d|.
 #[inline(always)]
@@ -202,7 +207,7 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
     for l in 0..L {
         let turning = (a[l] - along * v[l]) * v[l].signum();
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
-        stop.time_s = stop.time_s.max(v[l].abs() / left.max(LEAST_LEFT * frame.acceleration[l]));
+        stop.time_s = stop.time_s.max(v[l].abs() / left.max(MIN_LEFT * frame.acceleration[l]));
         stop.jerk_per_speed = stop.jerk_per_speed.min(frame.jerk[l] / v[l].abs().max(1e-9));
     }
 }
@@ -234,7 +239,8 @@ mod tests {
             speed_difference_mm_per_s: 0.0,
         };
         let frame = Frame::<2>::new(&tandem_rig::context(&[axis; 2], 1e-3));
-        let (mut stop, v) = (Stop::default(), [5e-4, 0.0]);
+        let mut stop = Stop::default();
+        let v = [5e-4, 0.0];
         leave(&mut stop, &frame, &v, &[0.0; 2], v[0]);
         assert!((stop.time_s - 0.5).abs() < 1e-9 && (stop.jerk_per_speed - 20.0).abs() < 1e-9, "{stop:?}");
     }

@@ -6,10 +6,10 @@ use tandem_motion::tube::{Asked, Lanes, Pacer, Place, Smoother, Spline, each};
 use crate::feeds::Feeds;
 use crate::frame::Frame;
 use crate::route::Run;
-use crate::sites::{Grid, Keep, Sites};
 use crate::timing::{Mark, Reach, Timing};
 use crate::travel::Travel;
 use crate::verify::{Checked, Checker};
+use crate::waypoints::{Grid, Keep, Waypoints};
 use crate::window::{Piece, State, Window};
 
 /// Shares of the limits that the solution may take: the rest covers what lies between the places asked.
@@ -26,7 +26,7 @@ const FIRM_INTERVALS: usize = 12;
 /// Intervals of a window at least and at most.
 pub const INTERVALS: (usize, usize) = (7, 420);
 /// Largest rate squared.
-const MOST: f64 = 16.0;
+const MAX_RATE_SQUARED: f64 = 16.0;
 /// Mean complementarity asked of the last round, and of those before.
 const GAP: f64 = 1e-5;
 const LOOSE: f64 = 3e-3;
@@ -93,7 +93,7 @@ pub struct Planning<const L: usize> {
     pub tuning: Tuning,
     pub effort: Effort,
     timing: Timing,
-    sites: Sites<L>,
+    waypoints: Waypoints<L>,
     spline: Spline<L>,
     smoother: Smoother<L>,
     pacer: Pacer<L>,
@@ -124,7 +124,7 @@ impl<const L: usize> Planning<L> {
             tuning,
             effort: Effort::default(),
             timing: Timing::default(),
-            sites: Sites::default(),
+            waypoints: Waypoints::default(),
             spline: Spline::default(),
             smoother: Smoother::default(),
             pacer: Pacer::default(),
@@ -152,7 +152,7 @@ impl<const L: usize> Planning<L> {
             return false;
         }
         let end = self.marks[self.marks.len() - 1].s;
-        self.sites.gather(run, start.s, end);
+        self.waypoints.gather(run, start.s, end);
         let travel = frame.travel.around(run, (start.s, end), &start.state[0]);
         let mut shares = Shares {
             jerk: JERK_SHARE,
@@ -165,7 +165,9 @@ impl<const L: usize> Planning<L> {
         let mut before_s = self.marks[self.marks.len() - 1].t;
         // Without the timing of a window before there is more to be found.
         let rounds = if start.old.is_none() { 2 * self.tuning.rounds } else { self.tuning.rounds };
-        let (mut round, mut repairs, mut settled) = (1, 0, false);
+        let mut round = 1;
+        let mut repairs = 0;
+        let mut settled = false;
         loop {
             let last = settled || round >= rounds;
             self.effort.rounds += 1;
@@ -237,9 +239,9 @@ impl<const L: usize> Planning<L> {
         self.lay_spline(run, start, &grid);
         let ends = (start.s, self.marks[self.marks.len() - 1].s);
         let keep = Keep { share: shares.boxes, travel, margin: shares.margin, ends };
-        self.sites.choose(run, &self.marks, grid, &keep);
+        self.waypoints.choose(run, &self.marks, grid, &keep);
         self.smoother.firm = if start.resting { (0, 1.0) } else { (FIRM_INTERVALS, shares.firm) };
-        let smoothed = self.smoother.smooth(&mut self.spline, &self.sites.chosen, &frame.jerk);
+        let smoothed = self.smoother.smooth(&mut self.spline, &self.waypoints.chosen, &frame.jerk);
         self.fill_pacer(run, frame, shares, counted);
         let asked = if last {
             Asked { gap: GAP, violation: INFEASIBLE, iterations: 25 }
@@ -257,16 +259,19 @@ impl<const L: usize> Planning<L> {
 
     /// The spline's first guess: the path at the Greville places of its control points.
     fn lay_spline(&mut self, run: &Run<'_, L>, start: &Start<'_, L>, grid: &Grid) {
-        let (marks, h) = (&self.marks, grid.step_s);
+        let marks = &self.marks;
+        let h = grid.step_s;
         self.spline.step_s = h;
         self.spline.points.clear();
-        let (mut at, mut chord) = (0, run.chord_at(start.s, 0));
+        let mut at = 0;
+        let mut chord = run.chord_at(start.s, 0);
         for index in 0..grid.intervals + 3 {
             let t = (index as f64 - 1.0) * h;
             while at + 2 < marks.len() && marks[at + 1].t < t {
                 at += 1;
             }
-            let (a, b) = (marks[at], marks[at + 1]);
+            let a = marks[at];
+            let b = marks[at + 1];
             let s = a.s + (b.s - a.s) * ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
             chord = run.chord_at(s, chord);
             self.spline.points.push(run.chords[chord].at(s));
@@ -282,16 +287,17 @@ impl<const L: usize> Planning<L> {
         let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
         let per_jerk: Lanes<L> = frame.jerk.map(|j| 1.0 / (shares.jerk * j));
         let per_acceleration: Lanes<L> = frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
-        let mut feeds = Feeds { run, along: &self.sites.along, sites: &self.sites.chosen, at: 0 };
+        let mut feeds = Feeds { run, along: &self.waypoints.along, waypoints: &self.waypoints.chosen, at: 0 };
         let place = |[_, first, second, _]: &[Lanes<L>; 4], feed: f64| {
-            let (mut squared, mut axis) = (0.0, 0.0f64);
+            let mut squared = 0.0;
+            let mut axis = 0.0f64;
             for l in 0..L {
                 squared += (counted[l] * first[l]).powi(2);
                 let share = (first[l] * per_speed[l]).abs();
                 axis = if share > axis { share } else { axis };
             }
             let most = (shares.feed * feed).powi(2) / squared.max(1e-12);
-            let most = most.min(1.0 / (axis * axis).max(1e-12)).min(MOST);
+            let most = most.min(1.0 / (axis * axis).max(1e-12)).min(MAX_RATE_SQUARED);
             Place { first: *first, second: *second, most }
         };
         self.pacer.begin();
@@ -308,9 +314,10 @@ impl<const L: usize> Planning<L> {
         }
     }
 
-    /// The times of the knots, and the marks: when the motion passes the sites.
+    /// The times of the knots, and the marks: when the motion passes the waypoints.
     fn lay_marks(&mut self, from: f64) -> bool {
-        let (rate, h) = (&self.pacer.rate, self.spline.step_s);
+        let rate = &self.pacer.rate;
+        let h = self.spline.step_s;
         self.times.clear();
         self.times.push(0.0);
         let mut t = 0.0;
@@ -321,9 +328,9 @@ impl<const L: usize> Planning<L> {
         let end = self.marks[self.marks.len() - 1].s;
         self.marks.clear();
         self.marks.push(Mark { t: 0.0, s: from });
-        for (site, (s, _)) in self.sites.chosen.iter().zip(&self.sites.along) {
-            let k = site.interval as usize;
-            let time = self.times[k] + rate.time_s(k, site.z, h);
+        for (waypoint, (s, _)) in self.waypoints.chosen.iter().zip(&self.waypoints.along) {
+            let k = waypoint.interval as usize;
+            let time = self.times[k] + rate.time_s(k, waypoint.z, h);
             self.marks.push(Mark { t: time, s: *s });
         }
         self.marks.push(Mark { t, s: end });
@@ -344,7 +351,8 @@ impl<const L: usize> Planning<L> {
         let mut from = state(0, 0.0);
         for k in 0..self.spline.intervals() {
             let to = state(k, 1.0);
-            let (start_s, end_s) = (self.times[k], self.times[k + 1]);
+            let start_s = self.times[k];
+            let end_s = self.times[k + 1];
             window.pieces.push(Piece::between(&from, &to, start_s, end_s - start_s));
             from = to;
         }

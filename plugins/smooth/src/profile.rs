@@ -31,7 +31,8 @@ impl Along {
 
     /// The highest speed on a way of `length` from rest to rest.
     fn peak(&self, length: f64) -> f64 {
-        let (a, j) = (self.acceleration, self.jerk);
+        let a = self.acceleration;
+        let j = self.jerk;
         let rise = a / j;
         // With constant acceleration: v²/a + v·a/j = length; without: 2·v·√(v/j) = length.
         let long = a / 2.0 * ((rise * rise + 4.0 * length / a).sqrt() - rise);
@@ -67,7 +68,10 @@ pub fn drive<const L: usize>(
     window.marks.clear();
     window.marks.push(Mark { t: 0.0, s: from });
     let bound = if peak >= limits.speed { Bound::Feed } else { Bound::Jerk };
-    let (mut t, mut way, mut v, mut a) = (0.0, 0.0, 0.0, 0.0);
+    let mut t = 0.0;
+    let mut way = 0.0;
+    let mut v = 0.0;
+    let mut a = 0.0;
     for (time, j) in phases.into_iter().filter(|(time, _)| *time > 1e-12) {
         let start = chord.at(from + way);
         let c = [start, direction.map(|d| d * v), direction.map(|d| d * a / 2.0), direction.map(|d| d * j / 6.0)];

@@ -26,7 +26,8 @@ pub fn of_leg<const L: usize>(
         path_speed(counted, &piece.velocity((t - piece.start_s).clamp(0.0, piece.duration_s)))
     };
     let start = speed(first, from_s);
-    let (mut peak, mut last) = (start, first);
+    let mut peak = start;
+    let mut last = first;
     // Time by what binds.
     let mut bound_s = [0.0f64; 5];
     for (n, piece) in window.pieces.iter().enumerate().skip(first) {
@@ -39,7 +40,8 @@ pub fn of_leg<const L: usize>(
         peak = peak.max(speed(n, until));
     }
     let end = speed(last, to_s);
-    let (driven, whole) = (window.along(to_s) - leg.start.max(window.along(from_s)), leg.end - leg.start);
+    let driven = window.along(to_s) - leg.start.max(window.along(from_s));
+    let whole = leg.end - leg.start;
     let time_s = if driven > 0.0 && leg.end > window.end() + 1e-9 {
         (to_s - from_s) * (whole / driven).max(1.0)
     } else {
@@ -69,7 +71,8 @@ pub fn path<const L: usize>(
 ) -> f64 {
     let t = piece.duration_s;
     let speed = |at: f64| path_speed(counted, &piece.velocity(at * t));
-    let (v0, v1) = (speed(0.0), speed(1.0));
+    let v0 = speed(0.0);
+    let v1 = speed(1.0);
     // Simpson's rule on quarters.
     let length = t / 12.0 * (v0 + 4.0 * (speed(0.25) + speed(0.75)) + 2.0 * speed(0.5) + v1);
     let along = |v: &Lanes<L>, a: &Lanes<L>, speed: f64| {

@@ -178,10 +178,12 @@ impl<const L: usize> Route<L> {
             _ => false,
         };
         let mut before = self.chords.last().filter(|_| joins).map(|chord| chord.direction);
-        let (start, first_chord) = (self.end, self.first + self.chords.len() as u64);
+        let start = self.end;
+        let first_chord = self.first + self.chords.len() as u64;
         let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
         let least = |limits: &Lanes<L>| limits[..frame.count].iter().fold(f64::INFINITY, |least, v| v.min(least));
-        let (jerk, acceleration) = (least(&frame.jerk), least(&frame.acceleration));
+        let jerk = least(&frame.jerk);
+        let acceleration = least(&frame.acceleration);
         let mut from = frame.lanes(&block.start);
         if flat.points.len() > MANY {
             self.chords.reserve_exact(flat.points.len());
@@ -209,7 +211,9 @@ impl<const L: usize> Route<L> {
             let fastest = along(limits, &direction);
             let fastest = if speed > 0.0 { fastest.min(feed / speed.sqrt()) } else { fastest };
             let turn_s = 2.0 * (fastest / jerk).sqrt() + fastest / acceleration;
-            let (start, s, speed) = (from, self.end, fastest);
+            let start = from;
+            let s = self.end;
+            let speed = fastest;
             self.chords.push(Chord { start, direction, s, length, feed, tolerance, speed, turn_s, turn });
             self.end += length;
             from = *point;
@@ -241,10 +245,14 @@ impl<const L: usize> Route<L> {
     /// The path around `s` from the last rest to the next.
     pub fn run(&self, s: f64, finished: bool) -> Run<'_, L> {
         let legs = self.items.iter().map_while(|item| if let Item::Leg(leg) = item { Some(leg) } else { None });
-        let (mut end, mut closed, mut rotary, mut rapid) = (self.first, false, false, false);
+        let mut end = self.first;
+        let mut closed = false;
+        let mut rotary = false;
+        let mut rapid = false;
         for (n, leg) in legs.enumerate() {
             end = leg.first_chord + u64::from(leg.chords);
-            (rotary, rapid) = (leg.rotary, leg.block.kind == BlockKind::Rapid || rapid && n > 0);
+            rotary = leg.rotary;
+            rapid = leg.block.kind == BlockKind::Rapid || rapid && n > 0;
             if leg.rests {
                 closed = true;
                 break;
@@ -274,6 +282,8 @@ impl<const L: usize> Route<L> {
     pub fn clear(&mut self) {
         self.items.clear();
         self.chords.clear();
-        (self.first, self.run_first, self.end) = (0, 0, 0.0);
+        self.first = 0;
+        self.run_first = 0;
+        self.end = 0.0;
     }
 }

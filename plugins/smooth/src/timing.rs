@@ -83,7 +83,8 @@ fn cap<const L: usize>(looker: &Looker<'_, L>, frame: &Frame<L>, s: f64, most: f
     let mut v = most;
     for _ in 0..80 {
         let way = v * corner_s;
-        let (from, to) = (looker.direction_at(s - way), looker.direction_at(s + way));
+        let from = looker.direction_at(s - way);
+        let to = looker.direction_at(s + way);
         let mut fits = true;
         for l in 0..L {
             let bend = (from[l] - 2.0 * here[l] + to[l]).abs();
@@ -114,7 +115,8 @@ impl Timing {
         let last = self.nodes.len() - 1;
         self.nodes[last].speed = 0.0;
         for i in (1..last).rev() {
-            let (next, node) = (self.nodes[i + 1], &mut self.nodes[i]);
+            let next = self.nodes[i + 1];
+            let node = &mut self.nodes[i];
             node.speed = node.speed.min(gain(&next, next.s - node.s));
         }
         let mut t = marks.last().map_or(0.0, |mark| mark.t);
@@ -122,7 +124,8 @@ impl Timing {
             let way = pair[1].s - pair[0].s;
             let cell_s = 2.0 * way / (pair[0].speed + pair[1].speed);
             // From rest and to rest way goes with the third power of time.
-            let (from_rest, to_rest) = (pair[0].speed == 0.0, pair[1].speed == 0.0);
+            let from_rest = pair[0].speed == 0.0;
+            let to_rest = pair[1].speed == 0.0;
             let cell_s = if from_rest || to_rest { 1.5 * cell_s } else { cell_s };
             if from_rest != to_rest {
                 for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
@@ -140,7 +143,9 @@ impl Timing {
         self.nodes.clear();
         let mut looker = Looker { chords: run.chords, at: run.chord_at(reach.s, 0) };
         let limits = frame.speed[usize::from(run.rapid)];
-        let (mut s, mut t, mut last_cap) = (reach.s, 0.0, f64::INFINITY);
+        let mut s = reach.s;
+        let mut t = 0.0;
+        let mut last_cap = f64::INFINITY;
         // Where the next sharp turn before and the last one behind are.
         let mut ahead = looker.at;
         let mut grown = 0.25;

@@ -58,8 +58,11 @@ impl<const L: usize> Travel<L> {
     /// The travel around the path from `from` to `to`, where a motion within the tolerance may come to an end of it; none where
     /// it cannot. A path that is itself beyond an end, of axes that are not homed, may be followed there.
     pub fn around(&self, run: &Run<'_, L>, (from, to): (f64, f64), here: &Lanes<L>) -> Option<Self> {
-        let (first, last) = (run.chord_at(from, 0), run.chord_at(to, 0));
-        let (mut low, mut high, mut tolerance) = (*here, *here, 0.0f64);
+        let first = run.chord_at(from, 0);
+        let last = run.chord_at(to, 0);
+        let mut low = *here;
+        let mut high = *here;
+        let mut tolerance = 0.0f64;
         for chord in &run.chords[first..=last] {
             low = each(|l| low[l].min(chord.start[l]));
             high = each(|l| high[l].max(chord.start[l]));
@@ -101,12 +104,16 @@ impl<const L: usize> Travel<L> {
     pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64, way: f64) {
         for l in 0..L {
             let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]).min(SLOPE * way);
-            let (above, below) = (self.high[l] - free - middle[l], middle[l] - self.low[l] - free);
+            let above = self.high[l] - free - middle[l];
+            let below = middle[l] - self.low[l] - free;
             // What is cut off on one side is not to draw the motion far to the other.
-            let (up, down) = (half[l].min(below.max(ASIDE * way)), half[l].min(above.max(ASIDE * way)));
-            let (high, low) = (middle[l] + above.min(up), middle[l] - below.min(down));
+            let up = half[l].min(below.max(ASIDE * way));
+            let down = half[l].min(above.max(ASIDE * way));
+            let high = middle[l] + above.min(up);
+            let low = middle[l] - below.min(down);
             if high > low {
-                (middle[l], half[l]) = (f64::midpoint(low, high), (high - low) / 2.0);
+                middle[l] = f64::midpoint(low, high);
+                half[l] = (high - low) / 2.0;
             }
         }
         // A joint takes of all lanes alike: the box is made smaller until its corners are inside.

@@ -14,8 +14,8 @@ use crate::order::Order;
 use crate::peaks::{bound, derivatives, highest, positions};
 use crate::plan::Start;
 use crate::route::Run;
-use crate::sites::Timer;
 use crate::travel::Travel;
+use crate::waypoints::Timer;
 use crate::window::{Stop, Window};
 
 /// Share of a limit that the motion may reach at an instant.
@@ -146,7 +146,8 @@ impl<const L: usize> Checker<L> {
                 return Checked { deviation: FAR, ..checked };
             }
             let (off, bulge) = self.vertices_off(run, start, window, frame.period_s);
-            (checked.deviation, checked.bulge) = (checked.deviation.max(off), bulge);
+            checked.deviation = checked.deviation.max(off);
+            checked.bulge = bulge;
         }
         checked
     }
@@ -172,7 +173,9 @@ impl<const L: usize> Checker<L> {
     /// between two of this one is looked at again where it matters.
     #[inline(always)]
     fn motion_off(&self, run: &Run<'_, L>, window: &Window<L>, period_s: f64, before: usize) -> f64 {
-        let (mut worst, mut mark, mut piece) = (0.0f64, 0, 0);
+        let mut worst = 0.0f64;
+        let mut mark = 0;
+        let mut piece = 0;
         let mut near = run.chord_at(window.marks[0].s, 0);
         let mut last: Option<Beside<L>> = None;
         for (n, sample) in self.samples[before..].iter().enumerate() {
@@ -180,7 +183,8 @@ impl<const L: usize> Checker<L> {
             while mark + 2 < window.marks.len() && window.marks[mark + 1].t <= t {
                 mark += 1;
             }
-            let (a, b) = (window.marks[mark], window.marks[mark + 1]);
+            let a = window.marks[mark];
+            let b = window.marks[mark + 1];
             let s = a.s + (b.s - a.s) * ((t - a.t) / (b.t - a.t).max(1e-12)).clamp(0.0, 1.0);
             near = run.chord_at(s, near);
             let here = beside(run, near, sample);
@@ -211,9 +215,12 @@ impl<const L: usize> Checker<L> {
     /// lies between samples of that, as a share of the tolerance.
     #[inline(always)]
     fn vertices_off(&self, run: &Run<'_, L>, start: &Start<'_, L>, window: &Window<L>, period_s: f64) -> (f64, f64) {
-        let (from, to) = (start.s - AROUND, window.end());
+        let from = start.s - AROUND;
+        let to = window.end();
         let mut timer = Timer { marks: &window.marks, at: 0 };
-        let (mut worst, mut most_bulge, mut piece) = (0.0f64, 0.0f64, 0);
+        let mut worst = 0.0f64;
+        let mut most_bulge = 0.0f64;
+        let mut piece = 0;
         let mut i = run.chord_at(from, 0).max(1);
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
@@ -251,8 +258,10 @@ impl<const L: usize> Checker<L> {
         let bend = self.bends[around].iter().fold(0.0, |most, bend| larger(most, *bend));
         let piece = &window.pieces[near];
         let local = (t - piece.start_s).clamp(0.0, piece.duration_s);
-        let (v, a) = (piece.velocity(local), piece.acceleration(local));
-        let (squared, along) = (dot(&v, &v), dot(&v, &a));
+        let v = piece.velocity(local);
+        let a = piece.acceleration(local);
+        let squared = dot(&v, &v);
+        let along = dot(&v, &a);
         let across = (dot(&a, &a) - along * along / squared.max(1e-12)).max(0.0).sqrt();
         let change = self.jerks[near] * period_s;
         let turned = (bend * period_s / squared.sqrt().max(1e-9)).min(1.0);
@@ -269,7 +278,8 @@ impl<const L: usize> Checker<L> {
         let allowed = DEVIATION * tolerance;
         let mut best = f64::INFINITY;
         for step in 0..SEARCHED {
-            let (below, above) = (near.checked_sub(step).filter(|n| *n >= first), near + step);
+            let below = near.checked_sub(step).filter(|n| *n >= first);
+            let above = near + step;
             if let Some(below) = below {
                 best = smaller(best, to_chord(vertex, &self.samples[below], &self.samples[below + 1]));
             }

@@ -4,11 +4,11 @@ use tandem_motion::hermite;
 use tandem_motion::tube::{Lanes, each};
 
 use crate::plan::INTERVALS;
-use crate::sites::{MAX_SITES, Timer};
 use crate::timing::Mark;
+use crate::waypoints::{MAX_WAYPOINTS, Timer};
 
-/// Most marks of a window: its sites, and its two ends.
-const MAX_MARKS: usize = MAX_SITES + 2;
+/// Most marks of a window: its waypoints, and its two ends.
+const MAX_MARKS: usize = MAX_WAYPOINTS + 2;
 
 /// Position, velocity and acceleration.
 pub type State<const L: usize> = [Lanes<L>; 3];
@@ -157,7 +157,8 @@ impl<const L: usize> Window<L> {
     /// Path coordinate at `t`.
     pub fn along(&self, t: f64) -> f64 {
         let at = self.marks.partition_point(|mark| mark.t <= t).clamp(1, self.marks.len() - 1);
-        let (a, b) = (self.marks[at - 1], self.marks[at]);
+        let a = self.marks[at - 1];
+        let b = self.marks[at];
         let time = b.t - a.t;
         if time > 0.0 { a.s + (b.s - a.s) * ((t - a.t) / time).clamp(0.0, 1.0) } else { b.s }
     }

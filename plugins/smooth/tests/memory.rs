@@ -14,7 +14,7 @@ use tandem_smooth::{BUFFER_CHORDS, Options, SmoothPlanner};
 
 /// Bytes held at most where few blocks are.
 const MAX_BYTES: usize = 16_000_000;
-/// And where as many are held as may be: a block takes about 600 bytes with its chord and its site.
+/// And where as many are held as may be: a block takes about 600 bytes with its chord and its waypoint.
 const MAX_BYTES_FULL: usize = 900 * BUFFER_CHORDS;
 
 fn peak_of(blocks: &[Block], options: &Options, tolerance_mm: f64) -> usize {

@@ -74,7 +74,8 @@ impl ArcLength {
     fn add_part(&mut self, curve: &Nurbs, range: (f64, f64), least_mm: f64) {
         let span = self.next_span;
         self.next_span += 1;
-        let (from, to) = (curve.knots()[span].max(range.0), curve.knots()[span + 1].min(range.1));
+        let from = curve.knots()[span].max(range.0);
+        let to = curve.knots()[span + 1].min(range.1);
         let whole = if to > from { curve.gauss(span, from, to) } else { 0.0 };
         if to > from && whole >= least_mm {
             let start_mm = self.built.mm;

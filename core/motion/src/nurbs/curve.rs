@@ -106,7 +106,8 @@ fn homogeneous(point: &AxisVector, weight: f64) -> Wide {
 }
 
 fn check_points(data: &NurbsData) -> Result<(), NurbsError> {
-    let (degree, points) = (data.degree, data.control_points.len());
+    let degree = data.degree;
+    let points = data.control_points.len();
     if !(1..=MAX_DEGREE).contains(&degree) {
         return Err(NurbsError::Degree(degree));
     }
@@ -131,7 +132,9 @@ fn check_points(data: &NurbsData) -> Result<(), NurbsError> {
 }
 
 fn check_knots(data: &NurbsData) -> Result<(), NurbsError> {
-    let (degree, points, knots) = (data.degree, data.control_points.len(), &data.knots);
+    let degree = data.degree;
+    let points = data.control_points.len();
+    let knots = &data.knots;
     if knots.len() != points + degree + 1 {
         return Err(NurbsError::Knots { points, degree, knots: knots.len() });
     }
@@ -142,7 +145,8 @@ fn check_knots(data: &NurbsData) -> Result<(), NurbsError> {
         }
         before = value;
     }
-    let (first, last) = (knots[degree], knots[points]);
+    let first = knots[degree];
+    let last = knots[points];
     if last <= first {
         return Err(NurbsError::Empty(first));
     }
@@ -175,7 +179,8 @@ fn check_spacing(data: &NurbsData, first: f64, last: f64) -> Result<(), NurbsErr
 /// No span moves only axes that path speed does not count.
 fn check_spans(data: &NurbsData, counted: &AxisVector) -> Result<(), NurbsError> {
     for span in data.degree..data.control_points.len() {
-        let (from, to) = (data.knots[span], data.knots[span + 1]);
+        let from = data.knots[span];
+        let to = data.knots[span + 1];
         let points = &data.control_points[span - data.degree..=span];
         let same = |axis: usize| points.iter().all(|point| point[axis] == points[0][axis]);
         let stands = (0..MAX_AXES).all(|axis| counted[axis] == 0.0 || same(axis));

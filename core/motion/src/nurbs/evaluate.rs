@@ -18,7 +18,8 @@ impl Nurbs {
     /// [`Nurbs::span`] found by marching from the span `hint`: constant work where `u` lies in it or the next.
     #[inline]
     pub fn span_from(&self, hint: usize, u: f64) -> usize {
-        let (mut span, last) = (hint.clamp(self.degree, self.points() - 1), self.points() - 1);
+        let mut span = hint.clamp(self.degree, self.points() - 1);
+        let last = self.points() - 1;
         while span < last && u >= self.knots[span + 1] {
             span += 1;
         }
@@ -191,7 +192,8 @@ impl Nurbs {
 #[inline]
 fn basis<const P: usize>(knots: &[f64], span: usize, u: f64) -> [Row; 4] {
     let near = &knots[span + 1 - P..span + 1 + P];
-    let (mut rows, mut row) = ([Row::default(); 4], Row::default());
+    let mut rows = [Row::default(); 4];
+    let mut row = Row::default();
     row[0] = 1.0;
     raise::<P, 0>(&mut row, near, u, &mut rows);
     raise::<P, 1>(&mut row, near, u, &mut rows);
@@ -211,7 +213,8 @@ fn raise<const P: usize, const D: usize>(row: &mut Row, near: &[f64], u: f64, ro
     }
     let mut saved = 0.0;
     for index in 0..D {
-        let (left, right) = (u - near[P + index - D], near[P + index] - u);
+        let left = u - near[P + index - D];
+        let right = near[P + index] - u;
         let share = row[index] / (right + left);
         row[index] = saved + right * share;
         saved = left * share;

@@ -70,7 +70,8 @@ impl Fit {
 fn hermite(curve: &Nurbs, span: usize, (from, to): (f64, f64), length: f64) -> Option<[f64; 8]> {
     let [a, b] = [curve.along_path_in(span, from)?.parameter, curve.along_path_in(span, to)?.parameter];
     let width = to - from;
-    let (l2, l3) = (length * length, length * length * length);
+    let l2 = length * length;
+    let l3 = length * length * length;
     let c = [a[0] * length, a[1] * l2 / 2.0, a[2] * l3 / 6.0];
     let r0 = width - (c[0] + c[1] + c[2]);
     let r1 = b[0] * length - (c[0] + 2.0 * c[1] + 3.0 * c[2]);

@@ -35,7 +35,8 @@ impl Nurbs {
         let at = |n: u32| from + (to - from) * (f64::from(n) / f64::from(LOOKS));
         let fastest = (0..=LOOKS).map(|n| look(at(n)).0).fold(0.0, f64::max);
         for n in 0..LOOKS {
-            let (mut low, mut high) = (at(n), at(n + 1));
+            let mut low = at(n);
+            let mut high = at(n + 1);
             let ends = [low, high].map(look);
             let falls_and_rises = ends[0].1 < 0.0 && ends[1].1 > 0.0;
             if !falls_and_rises || ends[0].0.min(ends[1].0) > SLOW * fastest {

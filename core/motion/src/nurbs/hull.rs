@@ -101,11 +101,13 @@ impl Hull {
 
 /// De Boor's triangle on `span` with a parameter of its own at each level.
 fn blossom(curve: &Nurbs, span: usize, parameter: impl Fn(usize) -> f64) -> Wide {
-    let (degree, first) = (curve.degree, span - curve.degree);
+    let degree = curve.degree;
+    let first = span - curve.degree;
     let mut points: [Wide; MAX_DEGREE + 1] = std::array::from_fn(|index| curve.levels.point(first + index.min(degree)));
     for level in 1..=degree {
         for index in (level..=degree).rev() {
-            let (low, high) = (curve.knots[first + index], curve.knots[span + 1 + index - level]);
+            let low = curve.knots[first + index];
+            let high = curve.knots[span + 1 + index - level];
             let share = (parameter(level) - low) / (high - low);
             points[index] = between(&points[index - 1], &points[index], share);
         }

@@ -60,7 +60,8 @@ impl Nurbs {
 
     fn refine(&self, span: usize, (from, to): (f64, f64), whole: f64, halving: Halving) -> Length {
         let middle = 0.5 * (from + to);
-        let (left, right) = (self.gauss(span, from, middle), self.gauss(span, middle, to));
+        let left = self.gauss(span, from, middle);
+        let right = self.gauss(span, middle, to);
         let error_mm = (left + right - whole).abs();
         let error_mm = error_mm + self.hidden_mm(span, (from, to), left + right);
         let agrees = error_mm <= RELATIVE * halving.scale_mm;
@@ -85,7 +86,8 @@ impl Nurbs {
     /// The 8-point rule over a part of a span, mm.
     #[inline]
     pub(super) fn gauss(&self, span: usize, from: f64, to: f64) -> f64 {
-        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        let middle = 0.5 * (from + to);
+        let half = 0.5 * (to - from);
         let speed = |u: f64| self.speed_in(span, u);
         let sum: f64 = RULE.iter().map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x))).sum();
         sum * half

@@ -58,11 +58,13 @@ impl Nurbs {
 
     /// No point of `span` is nearer to `point` than this, mm: it stays between its control points.
     fn least_distance_mm(&self, span: usize, point: &AxisVector) -> f64 {
-        let (mut low, mut high) = (AxisVector([f64::INFINITY; MAX_AXES]), AxisVector([f64::NEG_INFINITY; MAX_AXES]));
+        let mut low = AxisVector([f64::INFINITY; MAX_AXES]);
+        let mut high = AxisVector([f64::NEG_INFINITY; MAX_AXES]);
         for index in span - self.degree..=span {
             let (at, _) = self.control_point(index);
             for axis in 0..MAX_AXES {
-                (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]));
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis]);
             }
         }
         let off = |axis: usize| (low[axis] - point[axis]).max(point[axis] - high[axis]).max(0.0);
@@ -92,7 +94,8 @@ impl Nurbs {
     }
 
     fn nearest_in(&self, span: usize, point: &AxisVector, best: &mut Nearest) {
-        let (from, to) = (self.knots[span], self.knots[span + 1]);
+        let from = self.knots[span];
+        let to = self.knots[span + 1];
         let at = |step: usize| (from + (to - from) * step as f64 / TRIED as f64).min(to);
         let tried: [f64; TRIED + 1] =
             std::array::from_fn(|step| distance(point, &self.derivatives_in(span, at(step)).position));
@@ -109,7 +112,8 @@ impl Nurbs {
 
     /// Improves a foot within `span`, with the derivatives inside: at a corner those behind it say nothing of it.
     fn improve(&self, span: usize, point: &AxisVector, mut best: Nearest) -> Nearest {
-        let (from, to) = (self.knots[span], self.knots[span + 1]);
+        let from = self.knots[span];
+        let to = self.knots[span + 1];
         let mut share = 1.0;
         for _ in 0..ROUNDS {
             let at = self.derivatives_in(span, best.u);

@@ -90,7 +90,8 @@ impl Nurbs {
     }
 
     fn stands_still_in(&self, span: usize, first: &AxisVector) -> bool {
-        let (from, to) = (self.knots[span], self.knots[span + 1]);
+        let from = self.knots[span];
+        let to = self.knots[span + 1];
         self.counted_length(first) * (to - from) <= STANDS_STILL * self.gauss(span, from, to)
     }
 
@@ -107,7 +108,8 @@ impl Nurbs {
         let spans = (self.degree..self.points()).filter(|span| self.knots[span + 1] > self.knots[*span]);
         let mut knots = spans.flat_map(|span| [(span, self.knots[span]), (span, self.knots[span + 1])]);
         let alone = knots.find(|(span, knot)| {
-            let (first, width) = (self.derivatives_in(*span, *knot).first, self.knots[span + 1] - self.knots[*span]);
+            let first = self.derivatives_in(*span, *knot).first;
+            let width = self.knots[span + 1] - self.knots[*span];
             uncounted(first * width, MOVES_RAD) && self.stands_still_in(*span, &first)
         });
         alone.map(|(_, knot)| knot)

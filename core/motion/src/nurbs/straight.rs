@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-13;
 const SHORT: f64 = ROUNDING / TURN_RAD;
 /// Parts of a span that are looked at: more are needed only where rounding, of coordinates and of weights far apart, looks
 /// like turns.
-const MOST_PARTS: u32 = 2000;
+const MAX_PARTS: u32 = 2000;
 /// Most that the length along a line may differ from the distance of its ends, as a share.
 const OFF_LENGTH: f64 = 1e-9;
 /// The same of rounding of positions, mm.
@@ -44,7 +44,8 @@ impl Line {
         }
         Hull::of_span(curve, span).line()?;
         let [start, end] = [from, to].map(|u| curve.derivatives_in(span, u).position);
-        let (way, length_mm) = (end - start, end_mm - start_mm);
+        let way = end - start;
+        let length_mm = end_mm - start_mm;
         let runs_one_way = (curve.counted_length(&way) - length_mm).abs() <= OFF_LENGTH * length_mm + OFF_MM;
         runs_one_way.then(|| Self { start_mm, end_mm, position: start, direction: way * (1.0 / length_mm) })
     }
@@ -65,7 +66,8 @@ impl Nurbs {
                 if let Some(line) = hull.line() {
                     let far = hull.position(0).0.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
                     let least = ROUNDING * hull.along(&line).fold(far, |most, v| f64::max(most, v.abs()));
-                    let (mut last, mut parts) = (None, MOST_PARTS);
+                    let mut last = None;
+                    let mut parts = MAX_PARTS;
                     let before = found.len();
                     self.turns(span, &hull, (&line, least), (HALVINGS, &mut parts), &mut last, &mut found);
                     if parts == 0 {
@@ -98,7 +100,8 @@ impl Nurbs {
             let look = |half| self.turns(span, half, (line, least), (halvings - 1, parts), last, found);
             return halves.iter().for_each(look);
         }
-        let (middle, way) = (f64::midpoint(part.range.0, part.range.1), if forth { 1.0 } else { -1.0 });
+        let middle = f64::midpoint(part.range.0, part.range.1);
+        let way = if forth { 1.0 } else { -1.0 };
         if let Some((before, other)) = *last
             && other != way
         {

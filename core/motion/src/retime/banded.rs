@@ -19,7 +19,8 @@ impl Pentadiagonal {
         let size = self.rows.len();
         for i in 0..size {
             let [d, e, f] = self.rows[i];
-            let (l1, l2) = (e / d, f / d);
+            let l1 = e / d;
+            let l2 = f / d;
             if i + 1 < size {
                 self.rows[i + 1][0] -= l1 * e;
                 self.rows[i + 1][1] -= l1 * f;

@@ -1,6 +1,6 @@
 //! One interval's share of the Newton system.
 
-use super::rows::{Form, LEAST, Pair, Single, dot};
+use super::rows::{Form, MIN_RATE_SQUARED, Pair, Single, dot};
 
 /// Hessian (upper triangle by rows) and gradient over the three coefficients, and the largest violation seen.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,7 +45,7 @@ impl Share {
     /// The time that an interval takes, `b^(−1/2)` with `b = w·β`.
     #[inline]
     pub fn time(&mut self, w: &Form, beta: &Form) {
-        let b = dot(w, beta).max(LEAST);
+        let b = dot(w, beta).max(MIN_RATE_SQUARED);
         let slope = -0.5 / (b * b.sqrt());
         self.square(w, -1.5 * slope / b);
         self.slope(w, slope);
@@ -54,11 +54,13 @@ impl Share {
     /// Rows `weight·w·β ± form·β ≤ right` of some lanes at one place, where `common` is `weight·w·β`.
     #[inline]
     pub fn pairs(&mut self, forms: &[Form], pairs: &mut [Pair], place: &Place, target: f64) {
-        let (mut sum, mut slope) = (0.0, 0.0);
+        let mut sum = 0.0;
+        let mut slope = 0.0;
         let mut mixed = [0.0; 3];
         for (form, pair) in forms.iter().zip(pairs) {
             let value = dot(form, &place.beta);
-            let (left, right) = (place.common + value, place.common - value);
+            let left = place.common + value;
+            let right = place.common - value;
             let over = [left - place.right, right - place.right];
             let mut rows = [[0.0; 2]; 2];
             for n in 0..2 {
@@ -66,7 +68,8 @@ impl Share {
                 let residual = over[n] + pair.slack[n];
                 rows[0][n] = pair.multiplier[n] * per_slack;
                 rows[1][n] = (target + pair.multiplier[n] * residual) * per_slack;
-                (pair.change[n], pair.answer[n]) = (residual, per_slack);
+                pair.change[n] = residual;
+                pair.answer[n] = per_slack;
             }
             let [[d0, d1], [g0, g1]] = rows;
             let over = (place.common + value.abs() - place.right) / place.right;
@@ -91,7 +94,8 @@ impl Share {
     pub fn single(&mut self, w: &Form, sign: f64, over: f64, single: &mut Single, target: f64) {
         let per_slack = 1.0 / single.slack;
         let residual = over + single.slack;
-        (single.change, single.answer) = (residual, per_slack);
+        single.change = residual;
+        single.answer = per_slack;
         self.violation = if over > self.violation { over } else { self.violation };
         self.square(w, single.multiplier * per_slack);
         self.slope(w, sign * (target + single.multiplier * residual) * per_slack);
@@ -131,7 +135,8 @@ impl Reach {
             let per_slack = pair.answer[n];
             let change = -pair.change[n] - side;
             let answer = (target - pair.multiplier[n] * (pair.slack[n] + change)) * per_slack;
-            (pair.change[n], pair.answer[n]) = (change, answer);
+            pair.change[n] = change;
+            pair.answer[n] = answer;
             let shares = [-change * per_slack, -answer / pair.multiplier[n]];
             self.slack[n] = if shares[0] > self.slack[n] { shares[0] } else { self.slack[n] };
             self.multiplier[n] = if shares[1] > self.multiplier[n] { shares[1] } else { self.multiplier[n] };
@@ -144,7 +149,8 @@ impl Reach {
         let per_slack = single.answer;
         let change = -single.change - change;
         let answer = (target - single.multiplier * (single.slack + change)) * per_slack;
-        (single.change, single.answer) = (change, answer);
+        single.change = change;
+        single.answer = answer;
         let shares = [-change * per_slack, -answer / single.multiplier];
         self.slack[0] = if shares[0] > self.slack[0] { shares[0] } else { self.slack[0] };
         self.multiplier[0] = if shares[1] > self.multiplier[0] { shares[1] } else { self.multiplier[0] };

@@ -8,9 +8,9 @@ use super::{PLACES, Point};
 /// Share of an acceleration limit that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
 /// Least rate squared.
-pub const LEAST: f64 = 1e-3;
+pub const MIN_RATE_SQUARED: f64 = 1e-3;
 /// A bound on the rate squared where none is stated: sixteen times the speed of the first timing.
-const MOST: f64 = 256.0;
+const MAX_RATE_SQUARED: f64 = 256.0;
 
 /// A linear form of an interval's three coefficients.
 pub type Form = [f64; 3];
@@ -45,7 +45,7 @@ pub struct Site {
 
 impl Site {
     pub fn new(interval: usize, z: [f64; PLACES], points: &[Point; PLACES]) -> Self {
-        Self { interval, values: z.map(|z| weights(z)[0]), most: points.map(|p| p.most.min(MOST)), z }
+        Self { interval, values: z.map(|z| weights(z)[0]), most: points.map(|p| p.most.min(MAX_RATE_SQUARED)), z }
     }
 
     /// The coefficients that count here.
@@ -69,13 +69,16 @@ impl Site {
 /// Adds the forms of a site in shares of their limits: jerk at each place per lane, then acceleration at its first two
 /// places per lane.
 pub fn push_forms(forms: &mut Vec<Form>, site: &Site, points: &[Point; PLACES], task: &Task) {
-    let (limits, step_s) = (&task.limits, task.step_s);
+    let limits = &task.limits;
+    let step_s = task.step_s;
     let scales = [1.0, 1.0 / step_s, 1.0 / (step_s * step_s)];
     let places: [[Form; 3]; PLACES] = site.z.map(weights);
     for (point, [value, slope, curve]) in points.iter().zip(&places) {
         for lane in 0..limits.lanes {
             let per = 1.0 / (task.jerk_share * point.jerk_share * limits.jerk[lane]);
-            let (x1, x2, x3) = (point.first[lane], point.second[lane], point.third[lane]);
+            let x1 = point.first[lane];
+            let x2 = point.second[lane];
+            let x3 = point.third[lane];
             forms.push(std::array::from_fn(|n| {
                 per * (x3 * value[n] + 1.5 * x2 * slope[n] * scales[1] + 0.5 * x1 * curve[n] * scales[2])
             }));
@@ -84,7 +87,8 @@ pub fn push_forms(forms: &mut Vec<Form>, site: &Site, points: &[Point; PLACES], 
     for (point, [value, slope, _]) in points.iter().zip(&places).take(2) {
         for lane in 0..limits.lanes {
             let per = 1.0 / (ACCELERATION_SHARE * point.acceleration_share * limits.acceleration[lane]);
-            let (x1, x2) = (point.first[lane], point.second[lane]);
+            let x1 = point.first[lane];
+            let x2 = point.second[lane];
             forms.push(std::array::from_fn(|n| per * (x2 * value[n] + 0.5 * x1 * slope[n] * scales[1])));
         }
     }
@@ -95,8 +99,8 @@ pub fn push_forms(forms: &mut Vec<Form>, site: &Site, points: &[Point; PLACES], 
 /// `J·b^(−1/2)` is convex, its tangent `3/2·b₀^(−1/2) − 1/2·b₀^(−3/2)·b` lies below.
 #[inline]
 pub fn tangent(b: f64) -> (f64, f64) {
-    let inverse = 1.0 / b.max(LEAST).sqrt();
-    (1.5 * inverse, 0.5 * inverse / b.max(LEAST))
+    let inverse = 1.0 / b.max(MIN_RATE_SQUARED).sqrt();
+    (1.5 * inverse, 0.5 * inverse / b.max(MIN_RATE_SQUARED))
 }
 
 #[inline]

@@ -2,7 +2,7 @@
 
 use super::banded::Pentadiagonal;
 use super::newton::{Place, Reach, Share};
-use super::rows::{Form, LEAST, Pair, Single, Site, dot, push_forms, tangent};
+use super::rows::{Form, MIN_RATE_SQUARED, Pair, Single, Site, dot, push_forms, tangent};
 use super::timing::Rate;
 use super::{Between, End, LaneLimits, PLACES, Point};
 
@@ -105,7 +105,8 @@ impl Retimer {
     }
 
     fn prepare(&mut self, task: &Task) {
-        (self.lanes, self.intervals) = (task.limits.lanes, task.points.len());
+        self.lanes = task.limits.lanes;
+        self.intervals = task.points.len();
         self.forms.clear();
         self.sites.clear();
         let grid = task.points.iter().enumerate().map(|(k, points)| (k, GRID, points));
@@ -182,7 +183,7 @@ impl Retimer {
             for (most, value) in site.most.iter().zip(&site.values) {
                 self.singles.push(single(most - dot(value, &beta)));
             }
-            self.singles.push(single(dot(&site.values[1], &beta) - LEAST));
+            self.singles.push(single(dot(&site.values[1], &beta) - MIN_RATE_SQUARED));
         }
     }
 
@@ -198,7 +199,8 @@ impl Retimer {
         self.matrix.clear(self.unknowns);
         self.step.clear();
         self.step.resize(self.unknowns, 0.0);
-        let (lanes, per_site) = (self.lanes, (PLACES + 2) * self.lanes);
+        let lanes = self.lanes;
+        let per_site = (PLACES + 2) * self.lanes;
         let mut violation = 0.0f64;
         let mut forms = self.forms.chunks_exact(per_site);
         let mut pairs = self.pairs.chunks_exact_mut(per_site);
@@ -221,7 +223,7 @@ impl Retimer {
             for ((place, most), single) in places.iter().zip(&site.most).zip(&mut *singles) {
                 share.single(&place.w, 1.0, dot(&place.w, &beta) - most, single, target);
             }
-            let under = LEAST - dot(&site.values[1], &beta);
+            let under = MIN_RATE_SQUARED - dot(&site.values[1], &beta);
             share.single(&site.values[1], -1.0, under, &mut singles[PLACES], target);
             violation = violation.max(share.violation);
             scatter(&self.unknown[site.interval..site.interval + 3], &share, &mut self.matrix, &mut self.step);
@@ -252,7 +254,8 @@ impl Retimer {
 
     /// Replaces residuals by the changes of slacks and multipliers; gives how far these may go.
     fn turn_into_changes(&mut self, target: f64) -> [f64; 2] {
-        let (lanes, per_site) = (self.lanes, (PLACES + 2) * self.lanes);
+        let lanes = self.lanes;
+        let per_site = (PLACES + 2) * self.lanes;
         let mut reach = Reach::default();
         let mut forms = self.forms.chunks_exact(per_site);
         let mut pairs = self.pairs.chunks_exact_mut(per_site);

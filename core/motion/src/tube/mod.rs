@@ -22,5 +22,5 @@ mod spline;
 
 pub use lanes::{Lanes, each};
 pub use pacer::{Asked, PaceStatus, Pacer, Place};
-pub use smoother::{Site, SmoothStatus, Smoother};
+pub use smoother::{SmoothStatus, Smoother, Waypoint};
 pub use spline::Spline;

@@ -80,7 +80,8 @@ impl<const L: usize> Share<L> {
         self.violation = each(|l| larger(self.violation[l], over + value[l].abs()));
         let [mut d, mut g] = [[[0.0; L]; 2]; 2];
         for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-            let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
+            let slack = &rows.slack[group][n];
+            let multiplier = &rows.multiplier[group][n];
             let residual: Lanes<L> = each(|l| over + sign * value[l] + slack[l]);
             rows.residual[group][n] = residual;
             let inverse: Lanes<L> = each(|l| 1.0 / (slack[l] * multiplier[l]));
@@ -109,7 +110,8 @@ impl<const L: usize> Share<L> {
     /// Adds the single row `sign·w·β ≤ …` that is `over` its right side.
     #[inline(always)]
     pub fn single(&mut self, w: &[f64; 3], sign: f64, over: f64, rows: &mut Rows<L>, index: usize, target: f64) {
-        let (slack, multiplier) = (rows.single_slack[index], rows.single_multiplier[index]);
+        let slack = rows.single_slack[index];
+        let multiplier = rows.single_multiplier[index];
         rows.single_residual[index] = over + slack;
         self.violation[0] = larger(self.violation[0], over);
         let per_slack = 1.0 / slack;
@@ -130,7 +132,8 @@ impl<const L: usize> Share<L> {
     /// The sums over the lanes.
     #[inline(always)]
     pub fn sums(&self) -> ([f64; 6], [f64; 3]) {
-        let (h, g) = (&self.hessian, &self.gradient);
+        let h = &self.hessian;
+        let g = &self.gradient;
         ([sum(&h[0]), sum(&h[1]), sum(&h[2]), sum(&h[3]), sum(&h[4]), sum(&h[5])], [sum(&g[0]), sum(&g[1]), sum(&g[2])])
     }
 }

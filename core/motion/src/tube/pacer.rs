@@ -9,7 +9,7 @@ const START: f64 = 0.05;
 /// Weights of b at the start, in the middle and at the end of an interval.
 const VALUES: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.125, 0.75, 0.125], [0.0, 0.5, 0.5]];
 /// Least rate squared.
-const LEAST: f64 = 0.01;
+const MIN_RATE_SQUARED: f64 = 0.01;
 /// Mean complementarity that no solvable problem comes to.
 const HOPELESS: f64 = 1e3;
 /// How near to its bound a step may go.
@@ -90,7 +90,7 @@ fn dot(w: &[f64; 3], beta: &[f64; 3]) -> f64 {
 #[inline(always)]
 fn sides(z: f64, beta: &[f64; 3]) -> Sides {
     let w = weights(z)[0];
-    let b = larger(dot(&w, beta), LEAST);
+    let b = larger(dot(&w, beta), MIN_RATE_SQUARED);
     let inverse = 1.0 / b.sqrt();
     let weight = 0.5 * inverse / b;
     Sides { w, weight, common: weight * b, right: 1.5 * inverse }
@@ -120,18 +120,22 @@ impl<const L: usize> Pacer<L> {
         (per_acceleration, per_jerk): (&Lanes<L>, &Lanes<L>),
         step_s: f64,
     ) {
-        let (r1, r2) = (1.0 / step_s, 1.0 / (step_s * step_s));
+        let r1 = 1.0 / step_s;
+        let r2 = 1.0 / (step_s * step_s);
         let jerk = |z: f64, x1: &Lanes<L>, x2: &Lanes<L>| -> Form<L> {
             let [value, slope, curve] = weights(z);
             let entry = |n: usize| -> Lanes<L> {
-                let (w0, w1, w2) = (value[n], 1.5 * r1 * slope[n], 0.5 * r2 * curve[n]);
+                let w0 = value[n];
+                let w1 = 1.5 * r1 * slope[n];
+                let w2 = 0.5 * r2 * curve[n];
                 each(|l| per_jerk[l] * (third[l] * w0 + x2[l] * w1 + x1[l] * w2))
             };
             [entry(0), entry(1), entry(2)]
         };
         let [value, slope, _] = weights(0.0);
         let entry = |n: usize| -> Lanes<L> {
-            let (w0, w1) = (value[n], 0.5 * r1 * slope[n]);
+            let w0 = value[n];
+            let w1 = 0.5 * r1 * slope[n];
             each(|l| per_acceleration[l] * (start.second[l] * w0 + start.first[l] * w1))
         };
         let acceleration = [entry(0), entry(1), entry(2)];
@@ -212,14 +216,15 @@ impl<const L: usize> Pacer<L> {
         self.rate.coefficients.resize(self.forms.len() + 2, 1.0);
         for (forms, most) in self.forms.iter().zip(&self.most) {
             // At b = 1 all right sides are 1: that of the jerk rows is 3/2 less the 1/2 that b takes.
-            let (mut slack, mut multiplier) = ([[[0.0; L]; 2]; GROUPS], [[[0.0; L]; 2]; GROUPS]);
+            let mut slack = [[[0.0; L]; 2]; GROUPS];
+            let mut multiplier = [[[0.0; L]; 2]; GROUPS];
             for (group, form) in forms.iter().enumerate() {
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                     slack[group][n] = each(|l| larger(1.0 - sign * (form[0][l] + form[1][l] + form[2][l]), 0.1));
                     multiplier[group][n] = each(|l| START / slack[group][n][l]);
                 }
             }
-            let single_slack = [larger(most[0] - 1.0, 0.1), larger(most[1] - 1.0, 0.1), 1.0 - LEAST];
+            let single_slack = [larger(most[0] - 1.0, 0.1), larger(most[1] - 1.0, 0.1), 1.0 - MIN_RATE_SQUARED];
             self.rows.push(Rows {
                 slack,
                 multiplier,
@@ -252,7 +257,9 @@ impl<const L: usize> Pacer<L> {
         let mut violation = [0.0; L];
         for k in 0..self.forms.len() {
             let beta = self.beta(k);
-            let (forms, rows, most) = (&self.forms[k], &mut self.rows[k], &self.most[k]);
+            let forms = &self.forms[k];
+            let rows = &mut self.rows[k];
+            let most = &self.most[k];
             let mut share = Share::<L>::default();
             let places = places(&beta);
             for (group, place) in places.iter().enumerate() {
@@ -264,8 +271,8 @@ impl<const L: usize> Pacer<L> {
                 share.single(&place.w, 1.0, dot(&place.w, &beta) - most[n], rows, n, target);
             }
             let middle = &places[1].w;
-            let b = larger(dot(middle, &beta), LEAST);
-            share.single(middle, -1.0, LEAST - dot(middle, &beta), rows, 2, target);
+            let b = larger(dot(middle, &beta), MIN_RATE_SQUARED);
+            share.single(middle, -1.0, MIN_RATE_SQUARED - dot(middle, &beta), rows, 2, target);
             let slope = -0.5 / (b * b.sqrt());
             share.add(middle, -1.5 * slope / b, slope);
             violation = each(|l| larger(violation[l], share.violation[l]));
@@ -304,12 +311,14 @@ impl<const L: usize> Pacer<L> {
     #[inline(always)]
     fn advance(&mut self, target: f64) -> f64 {
         let (length, back) = self.turn_into_changes(target);
-        let (mut pairs, mut singles) = ([0.0; L], 0.0);
+        let mut pairs = [0.0; L];
+        let mut singles = 0.0;
         for rows in &mut self.rows {
             for group in 0..GROUPS {
                 for n in 0..2 {
                     let change = rows.residual[group][n];
-                    let (slack, multiplier) = (rows.slack[group][n], rows.multiplier[group][n]);
+                    let slack = rows.slack[group][n];
+                    let multiplier = rows.multiplier[group][n];
                     rows.slack[group][n] = each(|l| slack[l] + length * change[l]);
                     let inverse = &rows.inverse[group][n];
                     // Δλ = (target − λ·(s + Δs))/s.
@@ -317,7 +326,8 @@ impl<const L: usize> Pacer<L> {
                         let per_slack = multiplier[l] * inverse[l];
                         multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) * per_slack
                     });
-                    let (slack, multiplier) = (&rows.slack[group][n], &rows.multiplier[group][n]);
+                    let slack = &rows.slack[group][n];
+                    let multiplier = &rows.multiplier[group][n];
                     pairs = each(|l| pairs[l] + slack[l] * multiplier[l]);
                 }
             }
@@ -342,11 +352,13 @@ impl<const L: usize> Pacer<L> {
     #[inline(always)]
     fn turn_into_changes(&mut self, target: f64) -> (f64, f64) {
         // The largest relative decrease of a slack and of a multiplier.
-        let (mut most, mut most_back) = ([0.0; L], [0.0; L]);
+        let mut most = [0.0; L];
+        let mut most_back = [0.0; L];
         for k in 0..self.forms.len() {
             let change = |n: usize| usize::try_from(self.unknown[k + n]).map_or(0.0, |u| self.step[u]);
             let step = [change(0), change(1), change(2)];
-            let (forms, rows) = (&self.forms[k], &mut self.rows[k]);
+            let forms = &self.forms[k];
+            let rows = &mut self.rows[k];
             let along = [dot(&VALUES[0], &step), dot(&VALUES[1], &step), dot(&VALUES[2], &step), 0.0];
             for group in 0..GROUPS {
                 let form = &forms[group];
@@ -366,7 +378,8 @@ impl<const L: usize> Pacer<L> {
             }
             for n in 0..SINGLES {
                 let along = along[usize::from(n > 0)] * if n == 2 { -1.0 } else { 1.0 };
-                let (slack, multiplier) = (rows.single_slack[n], rows.single_multiplier[n]);
+                let slack = rows.single_slack[n];
+                let multiplier = rows.single_multiplier[n];
                 let change = -rows.single_residual[n] - along;
                 rows.single_residual[n] = change;
                 most[0] = larger(most[0], -change / slack);

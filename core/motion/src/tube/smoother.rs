@@ -21,7 +21,7 @@ const CLOSING: f64 = 0.9 * HINGE;
 
 /// A box that the motion passes at a given pseudo-time.
 #[derive(Clone, Copy, Debug)]
-pub struct Site<const L: usize> {
+pub struct Waypoint<const L: usize> {
     /// Interval.
     pub interval: u32,
     /// Place in the interval, 0 to 1.
@@ -41,7 +41,7 @@ pub struct SmoothStatus {
     pub violation: f64,
 }
 
-/// A site as rows `±(B·c − p)/w ≤ 1`, their slacks, multipliers and residuals.
+/// A waypoint as rows `±(B·c − p)/w ≤ 1`, their slacks, multipliers and residuals.
 #[derive(Clone, Copy, Debug)]
 struct Rows<const L: usize> {
     interval: usize,
@@ -83,27 +83,42 @@ fn combine<const L: usize>(w: &[f64; 4], c: &[Lanes<L>; 4]) -> Lanes<L> {
 impl<const L: usize> Smoother<L> {
     /// Moves the control points of `spline`, but for the first and the last three, to where the jerk is least:
     /// `Σ 0.05·r² + ½·max(0, |r| − 0.7)²` with r the jerk of each interval in units of `jerk_mm_per_s3`. Rough loop.
-    pub fn smooth(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
+    pub fn smooth(
+        &mut self,
+        spline: &mut Spline<L>,
+        waypoints: &[Waypoint<L>],
+        jerk_mm_per_s3: &Lanes<L>,
+    ) -> SmoothStatus {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.smooth_wide(spline, sites, jerk_mm_per_s3) };
+            return unsafe { self.smooth_wide(spline, waypoints, jerk_mm_per_s3) };
         }
-        self.smooth_any(spline, sites, jerk_mm_per_s3)
+        self.smooth_any(spline, waypoints, jerk_mm_per_s3)
     }
 
     /// The same in wider instructions; the numbers are the same bit for bit.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn smooth_wide(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
-        self.smooth_any(spline, sites, jerk_mm_per_s3)
+    fn smooth_wide(
+        &mut self,
+        spline: &mut Spline<L>,
+        waypoints: &[Waypoint<L>],
+        jerk_mm_per_s3: &Lanes<L>,
+    ) -> SmoothStatus {
+        self.smooth_any(spline, waypoints, jerk_mm_per_s3)
     }
 
     #[inline(always)]
-    fn smooth_any(&mut self, spline: &mut Spline<L>, sites: &[Site<L>], jerk_mm_per_s3: &Lanes<L>) -> SmoothStatus {
+    fn smooth_any(
+        &mut self,
+        spline: &mut Spline<L>,
+        waypoints: &[Waypoint<L>],
+        jerk_mm_per_s3: &Lanes<L>,
+    ) -> SmoothStatus {
         let cube = spline.step_s * spline.step_s * spline.step_s;
         self.scale = each(|l| 1.0 / (cube * jerk_mm_per_s3[l]));
-        self.begin(spline, sites);
+        self.begin(spline, waypoints);
         let mut gap = self.gap();
         let mut shrink = [0.1; L];
         let mut status = SmoothStatus { iterations: 0, violation: f64::INFINITY };
@@ -124,17 +139,19 @@ impl<const L: usize> Smoother<L> {
     }
 
     #[inline(always)]
-    fn begin(&mut self, spline: &Spline<L>, sites: &[Site<L>]) {
+    fn begin(&mut self, spline: &Spline<L>, waypoints: &[Waypoint<L>]) {
         self.rows.clear();
-        for site in sites {
-            let (interval, w) = (site.interval as usize, weights(site.z));
-            let per_half: Lanes<L> = each(|l| 1.0 / site.half[l]);
+        for waypoint in waypoints {
+            let interval = waypoint.interval as usize;
+            let w = weights(waypoint.z);
+            let per_half: Lanes<L> = each(|l| 1.0 / waypoint.half[l]);
             let at = combine(&w, control(spline, interval));
-            let value: Lanes<L> = each(|l| (at[l] - site.point[l]) * per_half[l]);
+            let value: Lanes<L> = each(|l| (at[l] - waypoint.point[l]) * per_half[l]);
             let slack = [each(|l| larger(1.0 - value[l], 0.2)), each(|l| larger(1.0 + value[l], 0.2))];
             let multiplier = [each(|l| 0.05 / slack[0][l]), each(|l| 0.05 / slack[1][l])];
-            let (residual, inverse) = ([[0.0; L]; 2], [[0.0; L]; 2]);
-            let point = site.point;
+            let residual = [[0.0; L]; 2];
+            let inverse = [[0.0; L]; 2];
+            let point = waypoint.point;
             self.rows.push(Rows { interval, weights: w, point, per_half, slack, multiplier, residual, inverse });
         }
     }
@@ -168,9 +185,11 @@ impl<const L: usize> Smoother<L> {
             let value = combine(&row.weights, control(spline, row.interval));
             let value: Lanes<L> = each(|l| (value[l] - row.point[l]) * row.per_half[l]);
             violation = each(|l| larger(violation[l], value[l].abs() - 1.0));
-            let (mut weight, mut slope) = ([0.0; L], [0.0; L]);
+            let mut weight = [0.0; L];
+            let mut slope = [0.0; L];
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                let (slack, multiplier) = (&row.slack[n], &row.multiplier[n]);
+                let slack = &row.slack[n];
+                let multiplier = &row.multiplier[n];
                 row.residual[n] = each(|l| sign * value[l] - 1.0 + slack[l]);
                 let inverse: Lanes<L> = each(|l| 1.0 / (slack[l] * multiplier[l]));
                 let per_slack: Lanes<L> = each(|l| multiplier[l] * inverse[l]);
@@ -181,7 +200,8 @@ impl<const L: usize> Smoother<L> {
             let weight: Lanes<L> = each(|l| weight[l] * row.per_half[l] * row.per_half[l]);
             let slope: Lanes<L> = each(|l| slope[l] * row.per_half[l]);
             for i in 0..4 {
-                let (at, wi) = (row.interval + i, row.weights[i]);
+                let at = row.interval + i;
+                let wi = row.weights[i];
                 for j in i..4 {
                     let entry = &mut self.matrix[at][j - i];
                     let w = wi * row.weights[j];
@@ -223,7 +243,8 @@ impl<const L: usize> Smoother<L> {
         self.step[..3].fill([0.0; L]);
         self.step[count - 3..].fill([0.0; L]);
         // The largest relative decrease of a slack and of a multiplier.
-        let (mut most, mut most_back) = ([0.0; L], [0.0; L]);
+        let mut most = [0.0; L];
+        let mut most_back = [0.0; L];
         for row in &mut self.rows {
             let steps = self.step[row.interval..].first_chunk().expect("four control points");
             let along = combine(&row.weights, steps);
@@ -242,7 +263,9 @@ impl<const L: usize> Smoother<L> {
         let back: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most_back[l], 1e-9)));
         for row in &mut self.rows {
             for n in 0..2 {
-                let (slack, multiplier, change) = (row.slack[n], row.multiplier[n], row.residual[n]);
+                let slack = row.slack[n];
+                let multiplier = row.multiplier[n];
+                let change = row.residual[n];
                 row.slack[n] = each(|l| slack[l] + length[l] * change[l]);
                 let inverse = &row.inverse[n];
                 // Δλ = (target − λ·(s + Δs))/s.

@@ -20,7 +20,8 @@ impl<const L: usize> Default for Spline<L> {
 /// Weights of the four control points at `z` of an interval.
 #[inline(always)]
 pub fn weights(z: f64) -> [f64; 4] {
-    let (y, zz) = (1.0 - z, z * z);
+    let y = 1.0 - z;
+    let zz = z * z;
     [
         y * y * y / 6.0,
         (3.0 * zz * z - 6.0 * zz + 4.0) / 6.0,
@@ -55,9 +56,11 @@ impl<const L: usize> Spline<L> {
     pub fn at(&self, k: usize, z: f64) -> [Lanes<L>; 4] {
         let &[c0, c1, c2, c3] = self.points[k..].first_chunk().expect("the interval exists");
         let rate = 1.0 / self.step_s;
-        let (y, w) = (1.0 - z, weights(z));
+        let y = 1.0 - z;
+        let w = weights(z);
         let f1 = 0.5 + z - z * z;
-        let (s1, s2) = (3.0 * z - 2.0, 1.0 - 3.0 * z);
+        let s1 = 3.0 * z - 2.0;
+        let s2 = 1.0 - 3.0 * z;
         [
             each(|l| w[0] * c0[l] + w[1] * c1[l] + w[2] * c2[l] + w[3] * c3[l]),
             each(|l| rate * (z * z / 2.0 * (c3[l] - c2[l]) + f1 * (c2[l] - c1[l]) + y * y / 2.0 * (c1[l] - c0[l]))),
@@ -80,7 +83,8 @@ mod tests {
         for (value, wanted) in start.iter().zip([[1.0, 2.0], [3.0, -4.0], [5.0, 6.0]]) {
             assert!((value[0] - wanted[0]).abs() < 1e-12 && (value[1] - wanted[1]).abs() < 1e-12);
         }
-        let (z, e) = (0.4, 1e-4);
+        let z = 0.4;
+        let e = 1e-4;
         for order in 0..3 {
             let [low, here, high] = [z - e, z, z + e].map(|z| spline.at(3, z));
             for lane in 0..2 {

@@ -49,13 +49,13 @@ macro_rules! contract {
             F: Fn(&O $(, &$context)?) -> Result<T, $crate::PluginError> + Copy + 'static,
         {
             let options = $crate::abi::entry::describe::<O>;
-            $crate::abi::Descriptor::new($crate::PluginKind::$kind, (name, version), options, &Side::<T, O, F>::TABLE)
+            $crate::abi::Descriptor::new($crate::PluginKind::$kind, (name, version), options, &Adapter::<T, O, F>::TABLE)
         }
 
         /// The plugin's side: the types that a table forgets.
-        struct Side<T, O, F>(std::marker::PhantomData<(T, O, F)>);
+        struct Adapter<T, O, F>(std::marker::PhantomData<(T, O, F)>);
 
-        impl<T, O, F> Side<T, O, F>
+        impl<T, O, F> Adapter<T, O, F>
         where
             T: $contract + 'static,
             O: $crate::PluginOptions + 'static,

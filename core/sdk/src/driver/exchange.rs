@@ -192,7 +192,8 @@ impl Feedback {
     /// does not allocate.
     #[inline]
     pub fn follow(&mut self, setpoint: &Setpoint, joints: usize) {
-        (self.position, self.speed) = (setpoint.position, setpoint.velocity);
+        self.position = setpoint.position;
+        self.speed = setpoint.velocity;
         let state = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
         // To fill the first of them takes 2 ns longer: it is made to do many at once, and finds out how many there are.
         for (joint, own) in self.state.iter_mut().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::motion::Driven;
 use super::timing::Timing;
-use crate::stream::relief::Reliefs;
+use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Cursor, Job, Route, State, window_s};
 use crate::windowed::{Care, Corner, Grade, Limit, Ramp, Rounds, STEP_S, Spot, Survey, Tangential};
 
@@ -29,20 +29,20 @@ pub struct First {
 impl First {
     /// To rest at the end of the run or of the window. In motion it follows the window that is driven for the lead. Gives
     /// whether it goes to the end.
-    pub fn make(&mut self, job: &Job<Driven>, reliefs: &Reliefs) -> bool {
+    pub fn make(&mut self, job: &Job<Driven>, slowdowns: &Slowdowns) -> bool {
         let Job { route, bounds, start, end_mm, before, .. } = *job;
         self.lead_s = before.map_or(0.0, |(window, now_s)| window.motion.lead_s(&window.times, now_s));
         let start = &before.map_or(start.state, |(window, now_s)| window.at(now_s + self.lead_s));
         let window_s = window_s(route, start.speed_mm_per_s);
         let mut cursor = Cursor::default();
-        let mut look = |at_mm: f64| spot(route, bounds, reliefs, at_mm, &mut cursor);
+        let mut look = |at_mm: f64| spot(route, bounds, slowdowns, at_mm, &mut cursor);
         let begin = Corner { at_mm: start.s_mm, speed_mm_per_s: start.speed_mm_per_s };
         let whole = self.survey.make(begin, end_mm, window_s, &mut look);
         self.steps.steps.clear();
         if HASTE.iter().any(|haste| self.ramp(start, *haste)) {
             return whole;
         }
-        self.steps.make(route, bounds, reliefs, start, (end_mm, window_s))
+        self.steps.make(route, bounds, slowdowns, start, (end_mm, window_s))
     }
 
     /// The ramps, with a multiple of acceleration and jerk; false where the speed at the start is too high for them.
@@ -69,7 +69,8 @@ impl First {
 
     /// Path coordinate and acceleration over time, asked for in order.
     pub fn motion(&self, job: &Job<Driven>) -> impl FnMut(f64) -> [f64; 2] {
-        let (mut at, mut start_s) = (0, self.lead_s);
+        let mut at = 0;
+        let mut start_s = self.lead_s;
         move |t_s| {
             if let Some((window, now_s)) = job.before.filter(|_| t_s < self.lead_s) {
                 let state = window.at((now_s + t_s).max(0.0));
@@ -89,7 +90,7 @@ impl First {
     }
 }
 
-fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &mut Cursor) -> Spot {
+fn spot(route: &Route, bounds: &Bounds, slowdowns: &Slowdowns, at_mm: f64, cursor: &mut Cursor) -> Spot {
     let (at, leg) = route.at(at_mm, cursor);
     let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
@@ -97,7 +98,7 @@ fn spot(route: &Route, bounds: &Bounds, reliefs: &Reliefs, at_mm: f64, cursor: &
     let step_mm = (0.15 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(2e-3, 0.3);
     let most_mm = if leg.course.is_straight() { STEP_S * cap } else { f64::INFINITY };
     Spot {
-        speed_mm_per_s: reliefs.at(at_mm)[0] * cap.min(step_cap),
+        speed_mm_per_s: slowdowns.at(at_mm)[0] * cap.min(step_cap),
         tangential: Tangential {
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,

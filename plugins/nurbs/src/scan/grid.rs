@@ -5,7 +5,7 @@ use tandem_motion::retime::{Between, PLACES, Point};
 
 use super::motion::Rated;
 use super::spline::evaluate;
-use crate::stream::relief::Reliefs;
+use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Cursor, Leg, Route};
 
 /// Turns of the path in an interval that ask for more places, rad, and where these are.
@@ -25,9 +25,9 @@ const YIELDED: [f64; 3] = [1.0008, 1.006, 1.02];
 #[derive(Clone, Copy, Debug, Default)]
 struct Place {
     s_mm: f64,
-    /// Bound on the rate squared without reliefs.
+    /// Bound on the rate squared without slowdowns.
     most: f64,
-    /// Factor of the speed by reliefs.
+    /// Factor of the speed by slowdowns.
     speed: f64,
     /// At the start of a window in motion.
     yields: bool,
@@ -44,7 +44,7 @@ pub struct Grid {
 
 impl Grid {
     /// Lays the grid of `intervals` along `motion`.
-    pub fn lay(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize, reliefs: &Reliefs) {
+    pub fn lay(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize, slowdowns: &Slowdowns) {
         self.points.clear();
         self.between.clear();
         self.places.clear();
@@ -62,7 +62,7 @@ impl Grid {
                     _ => route.at(state[0], &mut cursor).0,
                 };
                 let leg = route.find(state[0], &mut cursor);
-                laid[n] = place(leg, bounds, reliefs, (state, f64::INFINITY), &at);
+                laid[n] = place(leg, bounds, slowdowns, (state, f64::INFINITY), &at);
                 if n == 1 {
                     turn = leg.course.counted_length(&at.curvature) * (states[2][0] - states[0][0]);
                 }
@@ -72,9 +72,9 @@ impl Grid {
             self.places.push(laid.map(|(_, place)| place));
             let more = MORE.iter().find(|(much, _)| turn > *much).map_or(&[][..], |(_, more)| more);
             for z in more {
-                self.look(route, bounds, motion, reliefs, (k, *z), &mut cursor);
+                self.look(route, bounds, motion, slowdowns, (k, *z), &mut cursor);
             }
-            self.look_at_knots(route, bounds, motion, reliefs, (k, [states[0][0], states[2][0]]));
+            self.look_at_knots(route, bounds, motion, slowdowns, (k, [states[0][0], states[2][0]]));
         }
     }
 
@@ -84,11 +84,11 @@ impl Grid {
         route: &Route,
         bounds: &Bounds,
         motion: &Rated,
-        reliefs: &Reliefs,
+        slowdowns: &Slowdowns,
         (interval, z): (usize, f64),
     ) {
         let around = [z / 2.0, z, f64::midpoint(z, 1.0)];
-        self.look(route, bounds, motion, reliefs, (interval, around), &mut Cursor::default());
+        self.look(route, bounds, motion, slowdowns, (interval, around), &mut Cursor::default());
     }
 
     /// Three more places of an interval.
@@ -97,14 +97,14 @@ impl Grid {
         route: &Route,
         bounds: &Bounds,
         motion: &Rated,
-        reliefs: &Reliefs,
+        slowdowns: &Slowdowns,
         (interval, z): (usize, [f64; PLACES]),
         cursor: &mut Cursor,
     ) {
         let laid = z.map(|z| {
             let state = evaluate(&motion.coefficients, interval, z, motion.step_s);
             let (at, leg) = route.at(state[0], cursor);
-            place(leg, bounds, reliefs, (&state, f64::INFINITY), &at)
+            place(leg, bounds, slowdowns, (&state, f64::INFINITY), &at)
         });
         self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
         self.more.push(laid.map(|(_, place)| place));
@@ -116,10 +116,11 @@ impl Grid {
         route: &Route,
         bounds: &Bounds,
         motion: &Rated,
-        reliefs: &Reliefs,
+        slowdowns: &Slowdowns,
         (interval, [from_mm, to_mm]): (usize, [f64; 2]),
     ) {
-        let (mut cursor, mut from_mm) = (Cursor::default(), from_mm);
+        let mut cursor = Cursor::default();
+        let mut from_mm = from_mm;
         for _ in 0..KNOTS {
             let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) else { return };
             from_mm = knot_mm;
@@ -132,7 +133,7 @@ impl Grid {
             let step_cap = Leg::step_cap_mm_per_s(&sides, bounds);
             let [before, behind] = sides;
             let laid = [(state, before, step_cap), (state, behind, step_cap), (last, other, f64::INFINITY)];
-            let laid = laid.map(|(state, at, cap)| place(leg, bounds, reliefs, (&state, cap), &at));
+            let laid = laid.map(|(state, at, cap)| place(leg, bounds, slowdowns, (&state, cap), &at));
             self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
             self.more.push(laid.map(|(_, place)| place));
         }
@@ -155,13 +156,13 @@ impl Grid {
         }
     }
 
-    /// What reliefs leave of jerk and speed; false where the speed becomes so much less that the grid is to be laid anew.
-    pub fn ease(&mut self, reliefs: &Reliefs) -> bool {
+    /// What slowdowns leave of jerk and speed; false where the speed becomes so much less that the grid is to be laid anew.
+    pub fn ease(&mut self, slowdowns: &Slowdowns) -> bool {
         let points = self.points.iter_mut().chain(self.between.iter_mut().map(|more| &mut more.points));
         let mut least = 1.0f64;
         for (points, places) in points.zip(self.places.iter().chain(&self.more)) {
             for (point, place) in points.iter_mut().zip(places) {
-                let [speed, jerk] = reliefs.at(place.s_mm);
+                let [speed, jerk] = slowdowns.at(place.s_mm);
                 point.jerk_share = if place.yields { YIELDED[2] * jerk } else { jerk };
                 point.most = place.most * speed * speed;
                 least = least.min(speed / place.speed);
@@ -175,14 +176,16 @@ impl Grid {
 fn place(
     leg: &Leg,
     bounds: &Bounds,
-    reliefs: &Reliefs,
+    slowdowns: &Slowdowns,
     ([s_mm, s1, s2, s3], cap): (&[f64; 4], f64),
     at: &AlongPath,
 ) -> (Point, Place) {
-    let [speed, jerk_share] = reliefs.at(*s_mm);
+    let [speed, jerk_share] = slowdowns.at(*s_mm);
     let mut point = Point { jerk_share, ..Point::default() };
     for lane in 0..bounds.context.limits.axes().len() {
-        let (x1, x2, x3) = (at.direction[lane], at.curvature[lane], at.third[lane]);
+        let x1 = at.direction[lane];
+        let x2 = at.curvature[lane];
+        let x3 = at.third[lane];
         point.first[lane] = x1 * s1;
         point.second[lane] = x2 * s1 * s1 + x1 * s2;
         point.third[lane] = x3 * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;

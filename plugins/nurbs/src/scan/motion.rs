@@ -43,7 +43,8 @@ impl Rated {
 
     /// Where in interval `k` the path coordinate is `s_mm`, by halving.
     pub fn place(&self, k: usize, s_mm: f64) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
+        let mut low = 0.0;
+        let mut high = 1.0;
         for _ in 0..30 {
             let middle = f64::midpoint(low, high);
             if evaluate(&self.coefficients, k, middle, self.step_s)[0] < s_mm { low = middle } else { high = middle }
@@ -60,11 +61,13 @@ impl Rated {
 
     /// Where it has the least acceleration between two times; the latest of those about equal.
     fn calmest_s(&self, times: &[f64], (from_s, to_s): (f64, f64)) -> Option<f64> {
-        let (mut least, mut found) = (f64::INFINITY, None);
+        let mut least = f64::INFINITY;
+        let mut found = None;
         for (k, t) in times.iter().copied().enumerate().filter(|(_, t)| (from_s..=to_s).contains(t)) {
             let size = self.at(k.min(times.len() - 2), 0.0).acceleration_mm_per_s2.abs();
             if size <= least.max(1.0) {
-                (least, found) = (size.min(least), Some(t));
+                least = size.min(least);
+                found = Some(t);
             }
         }
         found

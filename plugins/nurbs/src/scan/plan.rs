@@ -8,7 +8,7 @@ use super::motion::{Driven, Rated};
 use super::points::ease;
 use super::spline::fill;
 use crate::stream::check::{Look, check};
-use crate::stream::relief::Reliefs;
+use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Job, Planning, Window, lay_times};
 use crate::windowed::{Ramps, Windowed};
 
@@ -30,11 +30,11 @@ const MAX_INTERVALS: usize = 20_000;
 #[derive(Debug, Default)]
 pub struct Scan {
     first: First,
-    /// Time of the first timing of a window without reliefs, s.
+    /// Time of the first timing of a window without slowdowns, s.
     begun_s: f64,
     retimer: Retimer,
     grid: Grid,
-    reliefs: Reliefs,
+    slowdowns: Slowdowns,
     /// For paths on which no rate is found.
     windowed: Windowed,
     window: Window<Ramps>,
@@ -58,31 +58,31 @@ impl Planning for Scan {
 impl Scan {
     /// The window at the rate that the limits allow; false where no try keeps them.
     fn plan_rate(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
-        self.reliefs.keep_first(0);
+        self.slowdowns.keep_first(0);
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
         for n in 1..=TRIES {
-            let known = self.reliefs.count();
+            let known = self.slowdowns.count();
             self.solve(job, n > 1, window);
             if n == 1 {
                 self.begun_s = self.first.end().0;
             }
-            let kept_all = !self.dips(job, window) && check(job, window, Look::Segments, &mut self.reliefs).is_kept();
+            let kept_all = !self.dips(job, window) && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
             if !kept_all {
                 if n >= HOPELESS && kept.is_none() {
                     break;
                 }
                 continue;
             }
-            if n == TRIES || !ease(job.route, job.bounds, &window.motion.rated, &mut self.reliefs) {
+            if n == TRIES || !ease(job.route, job.bounds, &window.motion.rated, &mut self.slowdowns) {
                 return true;
             }
             kept = Some(known);
         }
         if let Some(known) = kept {
-            self.reliefs.keep_first(known);
+            self.slowdowns.keep_first(known);
             self.solve(job, false, window);
-            return !self.dips(job, window) && check(job, window, Look::Segments, &mut self.reliefs).is_kept();
+            return !self.dips(job, window) && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
         }
         false
     }
@@ -94,7 +94,7 @@ impl Scan {
         for k in 0..rated.rate.intervals() {
             let (z, least) = rated.rate.least(k);
             if least <= 0.0 {
-                self.grid.look_closer(job.route, job.bounds, rated, &self.reliefs, (k, z));
+                self.grid.look_closer(job.route, job.bounds, rated, &self.slowdowns, (k, z));
                 found = true;
             }
         }
@@ -119,7 +119,7 @@ impl Scan {
     fn solve(&mut self, job: &Job<Driven>, again: bool, window: &mut Window<Driven>) {
         window.motion.by_ramps = false;
         let motion = &mut window.motion.rated;
-        let again = again && self.grid.ease(&self.reliefs);
+        let again = again && self.grid.ease(&self.slowdowns);
         if !again {
             window.whole = self.make_motion(job, motion);
         }
@@ -139,19 +139,20 @@ impl Scan {
             self.retimer.solve(&task);
         }
         std::mem::swap(&mut motion.rate, &mut self.retimer.rate);
-        let (rate, step_s) = (&motion.rate, motion.step_s);
+        let rate = &motion.rate;
+        let step_s = motion.step_s;
         lay_times(&mut window.times, (0..rate.intervals()).map(|k| rate.time_s(k, 1.0, step_s)));
     }
 
     /// The motion in pseudo-time; gives whether it goes to the end.
     fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
-        let whole = self.first.make(job, &self.reliefs);
+        let whole = self.first.make(job, &self.slowdowns);
         let (total_s, end_mm) = self.first.end();
         let intervals = ((total_s / grid_s(job.bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
         fill(&mut motion.coefficients, self.first.motion(job), grid, &job.start.state, end_mm);
-        self.grid.lay(job.route, job.bounds, motion, intervals, &self.reliefs);
+        self.grid.lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
         if !job.rests() {
             self.grid.yield_at_start();
         }

@@ -2,7 +2,7 @@
 
 use super::motion::Rated;
 use crate::stream::check::{POINT, jerk_share};
-use crate::stream::relief::{Relief, Reliefs};
+use crate::stream::slowdown::{Slowdown, Slowdowns};
 use crate::stream::{Bounds, Cursor, Route};
 
 /// Share from which the next try takes something back.
@@ -20,10 +20,13 @@ const SLOWER: f64 = 0.9985;
 const FASTER: f64 = 1.0 + 1e-7;
 
 /// Adds the intervals in which the jerk exceeds its limit, or the speed the feed. Gives whether there was one.
-pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, reliefs: &mut Reliefs) -> bool {
-    let (mut cursor, known, mut over) = (Cursor::default(), reliefs.count(), false);
+pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, slowdowns: &mut Slowdowns) -> bool {
+    let mut cursor = Cursor::default();
+    let known = slowdowns.count();
+    let mut over = false;
     for k in 0..motion.rate.intervals() {
-        let (mut worst, mut faster) = (0.0f64, 0.0f64);
+        let mut worst = 0.0f64;
+        let mut faster = 0.0f64;
         let [from_mm, to_mm] = [0.0, 1.0].map(|z| motion.derivatives(k, z)[0]);
         let (at, leg) = route.at(f64::midpoint(from_mm, to_mm), &mut cursor);
         let turn = leg.course.counted_length(&at.curvature) * (to_mm - from_mm);
@@ -45,12 +48,12 @@ pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, reliefs: &mut Relief
             let jerk = if worst > NEAR { (AIM / worst).max(0.5) } else { 1.0 };
             let speed = if knot.is_some() && worst > POINT { jerk.cbrt() } else { 1.0 };
             let speed = if faster > FASTER { speed.min(SLOWER / faster) } else { speed };
-            reliefs.add(known, Relief { from_mm, to_mm, speed, jerk });
+            slowdowns.add(known, Slowdown { from_mm, to_mm, speed, jerk });
         }
         over |= worst > POINT || faster > FASTER;
     }
     if !over {
-        reliefs.keep_first(known);
+        slowdowns.keep_first(known);
     }
     over
 }

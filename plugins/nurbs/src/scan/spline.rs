@@ -7,7 +7,8 @@ pub fn evaluate(coefficients: &[f64], k: usize, z: f64, step_s: f64) -> [f64; 4]
     // Relative to the first one: path coordinates are large, their differences are what counts.
     let base = coefficients[k];
     let [c1, c2, c3] = [1, 2, 3].map(|n| coefficients[k + n] - base);
-    let (y, zz) = (1.0 - z, z * z);
+    let y = 1.0 - z;
+    let zz = z * z;
     let value =
         ((3.0 * zz * z - 6.0 * zz + 4.0) * c1 + (-3.0 * zz * z + 3.0 * zz + 3.0 * z + 1.0) * c2 + zz * z * c3) / 6.0;
     let first = ((3.0 * zz - 4.0 * z) * c1 + (-3.0 * zz + 2.0 * z + 1.0) * c2 + zz * c3) / 2.0 / step_s;
@@ -32,7 +33,8 @@ pub fn fill(
         let [s_mm, acceleration] = motion(t);
         to.push(s_mm - step_s * step_s / 6.0 * acceleration);
     }
-    let (v, a) = (start.speed_mm_per_s * step_s, start.acceleration_mm_per_s2 * step_s * step_s);
+    let v = start.speed_mm_per_s * step_s;
+    let a = start.acceleration_mm_per_s2 * step_s * step_s;
     let middle = start.s_mm - a / 6.0;
     to[..3].copy_from_slice(&[middle + a / 2.0 - v, middle, middle + a / 2.0 + v]);
     let count = to.len();
@@ -52,7 +54,9 @@ mod tests {
     fn a_spline_over_a_motion_with_a_sharp_stop_never_goes_back() {
         // It stops within one interval, and starts again.
         let motion = |t: f64| if t < 0.5 { [t, -40.0] } else { [0.5 + 0.01 * (t - 0.5), 40.0] };
-        let (intervals, step_s, end_mm) = (40, 0.025, 0.505);
+        let intervals = 40;
+        let step_s = 0.025;
+        let end_mm = 0.505;
         let mut coefficients = vec![];
         let start = State { s_mm: 0.0, speed_mm_per_s: 1.0, acceleration_mm_per_s2: 0.0 };
         fill(&mut coefficients, motion, (intervals, step_s), &start, end_mm);

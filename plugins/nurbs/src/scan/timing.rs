@@ -2,7 +2,7 @@
 
 use tandem_motion::nurbs::AlongPath;
 
-use crate::stream::relief::Reliefs;
+use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Cursor, Leg, Route, State};
 
 /// Time between nodes at most, s.
@@ -34,11 +34,11 @@ impl Timing {
         &mut self,
         route: &Route,
         bounds: &Bounds,
-        reliefs: &Reliefs,
+        slowdowns: &Slowdowns,
         start: &State,
         (end_mm, window_s): (f64, f64),
     ) -> bool {
-        let whole = self.place_nodes(route, bounds, reliefs, start, (end_mm, window_s));
+        let whole = self.place_nodes(route, bounds, slowdowns, start, (end_mm, window_s));
         self.nodes[0].speed_mm_per_s = start.speed_mm_per_s;
         let last = self.nodes.len() - 1;
         self.nodes[last].speed_mm_per_s = 0.0;
@@ -65,7 +65,8 @@ impl Timing {
         while *at + 2 < self.steps.len() && self.steps[*at + 1].0 < t_s {
             *at += 1;
         }
-        let (a, b) = (self.steps[*at], self.steps[*at + 1]);
+        let a = self.steps[*at];
+        let b = self.steps[*at + 1];
         a.1 + (b.1 - a.1) * ((t_s - a.0) / (b.0 - a.0)).clamp(0.0, 1.0)
     }
 
@@ -74,15 +75,17 @@ impl Timing {
         &mut self,
         route: &Route,
         bounds: &Bounds,
-        reliefs: &Reliefs,
+        slowdowns: &Slowdowns,
         start: &State,
         (end_mm, window_s): (f64, f64),
     ) -> bool {
         self.nodes.clear();
-        let (mut cursor, mut s_mm, mut t) = (Cursor::default(), start.s_mm, 0.0);
+        let mut cursor = Cursor::default();
+        let mut s_mm = start.s_mm;
+        let mut t = 0.0;
         loop {
             let (at, leg) = route.at(s_mm, &mut cursor);
-            let mut node = node(leg, &at, bounds, reliefs, s_mm);
+            let mut node = node(leg, &at, bounds, slowdowns, s_mm);
             let cap = node.speed_mm_per_s;
             if let Some(before) = self.nodes.last() {
                 let way = s_mm - before.s_mm;
@@ -106,12 +109,12 @@ impl Timing {
     }
 }
 
-fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, reliefs: &Reliefs, s_mm: f64) -> Node {
+fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, slowdowns: &Slowdowns, s_mm: f64) -> Node {
     let along = bounds.context.limits.along(&at.direction);
     let cap = leg.smooth_cap_mm_per_s(at, bounds);
     Node {
         s_mm,
-        speed_mm_per_s: reliefs.at(s_mm)[0] * cap,
+        speed_mm_per_s: slowdowns.at(s_mm)[0] * cap,
         acceleration: along.acceleration_mm_per_s2,
         jerk: along.jerk_mm_per_s3,
     }

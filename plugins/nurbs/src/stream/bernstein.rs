@@ -27,7 +27,8 @@ impl<const N: usize> Table<N> {
         let mut shares = [[0.0; N]; N];
         let mut j = 0;
         while j < N {
-            let (mut i, mut share) = (0, 1.0);
+            let mut i = 0;
+            let mut share = 1.0;
             while i <= j {
                 shares[j][i] = share;
                 share *= (j - i) as f64 / (N - 1 - i + (i == N - 1) as usize) as f64;
@@ -58,7 +59,8 @@ fn higher<const N: usize>(coefficients: &[f64; N], enough: f64, close: f64, halv
     if most <= enough || most - reached <= close || halvings == 0 {
         return most;
     }
-    let (mut left, mut right) = (*coefficients, *coefficients);
+    let mut left = *coefficients;
+    let mut right = *coefficients;
     // De Casteljau: the left half keeps the first of each round, the right half the last.
     for (round, kept) in left.iter_mut().enumerate().skip(1) {
         for i in 0..N - round {

@@ -4,7 +4,7 @@ use tandem_motion::nurbs::AlongPath;
 use tandem_sdk::{AxisVector, BlockKind, LimitedBy, Segment, SegmentFlags};
 
 use super::draw::{Drawn, Pen, draw};
-use super::relief::{Relief, Reliefs};
+use super::slowdown::{Slowdown, Slowdowns};
 use super::trail::{Found, Trail};
 use super::window::Reserve;
 use super::{Bounds, Cursor, Job, Leg, Motion, Route, State, Window};
@@ -60,9 +60,9 @@ impl Worst {
     }
 
     /// What would keep the limits, between two path coordinates.
-    fn relief(&self, from_mm: f64, to_mm: f64) -> Relief {
+    fn slowdown(&self, from_mm: f64, to_mm: f64) -> Slowdown {
         let over = self.acceleration.max(self.jerk);
-        Relief {
+        Slowdown {
             from_mm,
             to_mm,
             speed: if self.speed > 1.0 { (0.9985 / self.speed).max(0.3) } else { 1.0 },
@@ -81,8 +81,8 @@ pub enum Look {
 }
 
 /// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
-/// `reliefs` get what would keep it.
-pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, reliefs: &mut Reliefs) -> Worst {
+/// `slowdowns` get what would keep it.
+pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, slowdowns: &mut Slowdowns) -> Worst {
     let Job { route, bounds, start, .. } = job;
     window.samples.clear();
     window.samples.extend(start.history);
@@ -90,13 +90,17 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
     window.first_tick_s = start.first_tick_s;
     window.reserves.clear();
     window.most_mm_per_s = 0.0;
-    let (period_s, duration_s, known) = (bounds.context.fine_period_s, window.duration_s(), reliefs.count());
+    let period_s = bounds.context.fine_period_s;
+    let duration_s = window.duration_s();
+    let known = slowdowns.count();
     if let Some(lost) = window.times.windows(2).position(|ends| !ends[1].is_finite()) {
         let from_mm = window.motion.at(lost, 0.0).s_mm;
-        reliefs.add(known, Relief { from_mm, to_mm: from_mm + LOST_MM, speed: 0.5, jerk: 1.0 });
+        slowdowns.add(known, Slowdown { from_mm, to_mm: from_mm + LOST_MM, speed: 0.5, jerk: 1.0 });
         return Worst { speed: f64::NAN, ..Worst::default() };
     }
-    let (mut cursor, mut worst, mut before_mm) = (Cursor::default(), Worst::default(), [start.state.s_mm; 3]);
+    let mut cursor = Cursor::default();
+    let mut worst = Worst::default();
+    let mut before_mm = [start.state.s_mm; 3];
     let mut rests = 0;
     while rests < 4 {
         let count = window.samples.len() - start.history.len();
@@ -105,7 +109,8 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         let state = window.at(t.min(duration_s));
         // No limit says that a motion goes forward.
         if state.speed_mm_per_s < -BACK_MM_PER_S || !state.speed_mm_per_s.is_finite() {
-            reliefs.add(known, Relief { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
+            slowdowns
+                .add(known, Slowdown { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
             return Worst { speed: f64::NAN, ..worst };
         }
         let (at, leg) = route.at(state.s_mm, &mut cursor);
@@ -117,24 +122,33 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, rel
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.
             let beside_mm = if here.speed > 1.0 { state.s_mm - first } else { 0.0 };
-            reliefs.add(known, here.relief(before_mm[0] - beside_mm, state.s_mm + beside_mm));
+            slowdowns.add(known, here.slowdown(before_mm[0] - beside_mm, state.s_mm + beside_mm));
         }
         worst.join(&here);
         before_mm = [before_mm[1], before_mm[2], state.s_mm];
     }
     if look == Look::Segments && worst.is_kept() {
-        worst.join(&check_segments(job, window, known, reliefs));
+        worst.join(&check_segments(job, window, known, slowdowns));
     }
     worst
 }
 
 /// Draws the window as it will be driven, to its end, and bounds what samples at any phase show of that.
-fn check_segments<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, known: usize, reliefs: &mut Reliefs) -> Worst {
+fn check_segments<M: Motion, N>(
+    job: &Job<N>,
+    window: &mut Window<M>,
+    known: usize,
+    slowdowns: &mut Slowdowns,
+) -> Worst {
     let Job { bounds, driven, .. } = job;
     let mut trail = std::mem::take(&mut window.trail);
     trail.begin(driven.segments.iter(), bounds);
-    let (mut route, mut worst, duration_s) = (Some(*job.route), Worst::default(), window.duration_s());
-    let (mut from_s, mut at, mut segment) = (0.0, driven.at, Segment::rest(&driven.at, 0.0));
+    let mut route = Some(*job.route);
+    let mut worst = Worst::default();
+    let duration_s = window.duration_s();
+    let mut from_s = 0.0;
+    let mut at = driven.at;
+    let mut segment = Segment::rest(&driven.at, 0.0);
     while let Some(ahead) = route.filter(|_| from_s < duration_s) {
         segment.flags =
             SegmentFlags(if ahead.front().block.kind == BlockKind::Rapid { SegmentFlags::RAPID.0 } else { 0 });
@@ -142,7 +156,7 @@ fn check_segments<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, known: usi
         from_s = until_s;
         if segment.duration_s > 0.0 {
             at = segment.position(segment.duration_s);
-            worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, reliefs));
+            worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, slowdowns));
         }
         if leg_over {
             route = ahead.behind_front();
@@ -150,7 +164,7 @@ fn check_segments<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, known: usi
     }
     let mut rest = Segment::rest(&at, 3.0 * bounds.context.fine_period_s);
     rest.path[0] = segment.path_mm(segment.duration_s);
-    worst.join(&judge_last(&mut trail, job.route, bounds, &rest, known, reliefs));
+    worst.join(&judge_last(&mut trail, job.route, bounds, &rest, known, slowdowns));
     window.trail = trail;
     worst
 }
@@ -162,7 +176,7 @@ fn judge_last(
     bounds: &Bounds,
     segment: &Segment,
     known: usize,
-    reliefs: &mut Reliefs,
+    slowdowns: &mut Slowdowns,
 ) -> Worst {
     trail.push(segment, bounds);
     let Found { mut worst, from_mm, to_mm, stepped } = trail.judge(bounds);
@@ -183,7 +197,7 @@ fn judge_last(
         worst.speed = worst.speed.max(worst.acceleration).max(worst.jerk);
     }
     let (from_mm, to_mm) = if from_mm <= to_mm { (from_mm, to_mm) } else { (to_mm, from_mm) };
-    reliefs.add(known, worst.relief(from_mm, to_mm));
+    slowdowns.add(known, worst.slowdown(from_mm, to_mm));
     worst
 }
 
@@ -211,7 +225,9 @@ fn compare(
 ) -> Worst {
     let rapid = leg.block.kind == BlockKind::Rapid;
     let mut here = differences(bounds, samples, rapid);
-    let (velocity, feed, mut chord_share) = (here.speed, state.speed_mm_per_s / leg.feed_mm_per_s, 0.0);
+    let velocity = here.speed;
+    let feed = state.speed_mm_per_s / leg.feed_mm_per_s;
+    let mut chord_share = 0.0;
     let mean_mm_per_s = (state.s_mm - before_mm) / bounds.context.fine_period_s;
     here.speed = here.speed.max(state.speed_mm_per_s.max(mean_mm_per_s) / (leg.feed_mm_per_s * (1.0 - 1e-9)));
     if before_mm < state.s_mm && !rapid {
@@ -229,7 +245,8 @@ fn compare(
 /// The differences that end at the last sample.
 pub fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Worst {
     let &[p0, p1, p2, p3] = samples.last_chunk().expect("three samples stand in front");
-    let (rate, mut here) = (1.0 / bounds.context.fine_period_s, Worst::default());
+    let rate = 1.0 / bounds.context.fine_period_s;
+    let mut here = Worst::default();
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
         let [d0, d1, d2] = [p1[axis] - p0[axis], p2[axis] - p1[axis], p3[axis] - p2[axis]];
         let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
@@ -251,7 +268,9 @@ fn chord_error_mm(
     samples: &[AxisVector],
     curvature: f64,
 ) -> f64 {
-    let (way_mm, far_mm, axes) = (to_mm - from_mm, FAR * bounds.chord_error_mm, bounds.context.axes.count());
+    let way_mm = to_mm - from_mm;
+    let far_mm = FAR * bounds.chord_error_mm;
+    let axes = bounds.context.axes.count();
     let dot = |a: &AxisVector, b: &AxisVector| -> f64 { a.0[..axes].iter().zip(b.0).map(|(a, b)| a * b).sum() };
     // Half of that error would be no reason to look.
     if curvature * way_mm * way_mm < 1e-3 * far_mm {
@@ -277,7 +296,9 @@ fn chord_error_mm(
 pub fn jerk_share(bounds: &Bounds, at: &AlongPath, [v, a, j]: [f64; 3]) -> f64 {
     let axes = bounds.context.limits.axes().iter().enumerate();
     let shares = axes.map(|(axis, limits)| {
-        let (x1, x2, x3) = (at.direction[axis], at.curvature[axis], at.third[axis]);
+        let x1 = at.direction[axis];
+        let x2 = at.curvature[axis];
+        let x3 = at.third[axis];
         (x3 * v * v * v + 3.0 * x2 * v * a + x1 * j).abs() / limits.jerk_mm_per_s3
     });
     shares.fold(0.0, f64::max)

@@ -12,12 +12,12 @@ const OFF_MM: f64 = 1e-8;
 /// Most that the jerk at the end of a segment may be off, as a share of the limit; and what is not looked for below, mm:
 /// the path by arc length is no smoother.
 const JERK_OFF: f64 = 0.004;
-const LEAST_OFF_MM: f64 = 1.5e-9;
+const MIN_OFF_MM: f64 = 1.5e-9;
 /// Halvings of an interval until a segment follows the path.
 const MAX_HALVINGS: u32 = 30;
 
 /// Least duration of a segment through both its ends, s: the derivatives of a shorter one are rounding.
-const LEAST_S: f64 = 5e-5;
+const MIN_S: f64 = 5e-5;
 /// The same in a sharp turn, s, where the rounding of positions takes less than a share of the jerk.
 const SHARP_S: f64 = 4e-6;
 const NOISE: f64 = 0.002;
@@ -52,11 +52,13 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
     let k = window.interval(from_s);
     let border_s = window.times[k + 1];
     let context = &bounds.context;
-    let asked_s = from_s + context.rough_period_s.max(4.0 * context.fine_period_s).max(LEAST_S);
-    let mut until_s = if border_s - asked_s < LEAST_S { border_s } else { asked_s };
+    let asked_s = from_s + context.rough_period_s.max(4.0 * context.fine_period_s).max(MIN_S);
+    let mut until_s = if border_s - asked_s < MIN_S { border_s } else { asked_s };
     let mut cursor = Cursor::default();
     // The last way of a rest takes long where jerk is low: near the end is the end only where the window ends.
-    let (leg_end_mm, same_mm, duration_s) = (route.front().end_mm, route.front().same_mm(), window.duration_s());
+    let leg_end_mm = route.front().end_mm;
+    let same_mm = route.front().same_mm();
+    let duration_s = window.duration_s();
     let is_over =
         |end: &State, until_s: f64| end.s_mm >= leg_end_mm || until_s >= duration_s && end.s_mm > leg_end_mm - same_mm;
     let start = window.at_in(k, from_s);
@@ -69,7 +71,7 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         None => {}
     }
     let mut end = window.at_in(k, until_s);
-    if until_s - from_s < LEAST_S {
+    if until_s - from_s < MIN_S {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, sliver);
         // At the end of the travel it meets its end: what it drifts is more than rounding there.
         if !stays(bounds, segment, false) {
@@ -77,7 +79,8 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         }
         return Drawn { until_s, leg_over: is_over(&end, until_s) };
     }
-    let (jerk_mm_per_s3, least_s) = (route.front().least.jerk_mm_per_s3, least_s(bounds, pen.at));
+    let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
+    let least_s = least_s(bounds, pen.at);
     for _ in 0..MAX_HALVINGS {
         fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
         if until_s - from_s < 2.0 * least_s
@@ -97,7 +100,7 @@ fn least_s(bounds: &Bounds, at: &AxisVector) -> f64 {
     let lanes = bounds.context.limits.axes().iter().zip(at.0);
     let noise =
         lanes.map(|(limits, x)| 60.0 * f64::EPSILON * x.abs().max(1.0) / limits.jerk_mm_per_s3).fold(0.0, f64::max);
-    (noise / NOISE).cbrt().clamp(SHARP_S, LEAST_S)
+    (noise / NOISE).cbrt().clamp(SHARP_S, MIN_S)
 }
 
 /// Where a segment ends before it would.
@@ -145,7 +148,8 @@ fn fill(
     let [from, to] = ends;
     let mut states = [(from, Side::Behind), (to, Side::Before)].map(|(end, side)| {
         let at = route.at_side(end.s_mm, side, cursor);
-        let (v, a) = (end.speed_mm_per_s, end.acceleration_mm_per_s2);
+        let v = end.speed_mm_per_s;
+        let a = end.acceleration_mm_per_s2;
         [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
     });
     states[0][0] = *pen.at;
@@ -176,7 +180,8 @@ fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
     let period_s = bounds.context.fine_period_s;
     bounds.context.limits.axes().iter().zip(&segment.coefficients).all(|(limits, c)| {
         let rounding = 2.0 * f64::EPSILON * c[0].abs().max(1.0) / period_s;
-        let (low, high) = (limits.min_mm - rounding, limits.max_mm + rounding);
+        let low = limits.min_mm - rounding;
+        let high = limits.max_mm + rounding;
         let b = bernstein(c, segment.duration_s);
         let beyond = |end: f64| end < low || end > high;
         meets_ends && (beyond(b[0]) || beyond(b[5]))
@@ -187,7 +192,7 @@ fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
 /// A quintic that is off by e in its middle has a third derivative that is off by 384·e/T³ at its ends.
 fn follows(route: &Route, cursor: &mut Cursor, jerk_mm_per_s3: f64, segment: &Segment) -> bool {
     let of_jerk_mm = JERK_OFF * jerk_mm_per_s3 * segment.duration_s.powi(3) / 384.0;
-    let most_mm = OFF_MM.min(of_jerk_mm.max(LEAST_OFF_MM));
+    let most_mm = OFF_MM.min(of_jerk_mm.max(MIN_OFF_MM));
     [0.25, 0.5, 0.75].iter().all(|share| {
         let t_s = share * segment.duration_s;
         let off = route.at(segment.path_mm(t_s), cursor).0.position - segment.position(t_s);

@@ -162,7 +162,8 @@ impl Least {
     /// Of the axes that move at some of a few places of a stretch, which is to be driven at `feed_mm_per_s`.
     pub fn on(course: &Course, stretch: usize, bounds: &Bounds, rapid: bool, feed_mm_per_s: f64) -> Self {
         let length_mm = course.stretches()[stretch].length_mm;
-        let (mut place, mut least) = (Place::default(), [f64::INFINITY; 2]);
+        let mut place = Place::default();
+        let mut least = [f64::INFINITY; 2];
         let directions = [0.0, 0.23, 0.47, 0.71, 1.0].map(|s| course.at(stretch, s * length_mm, &mut place).direction);
         let tops = directions.map(|direction| {
             let along = bounds.context.limits.along(&direction);

@@ -15,8 +15,8 @@ mod draw;
 mod leg;
 mod planner;
 mod queue;
-pub mod relief;
 mod route;
+pub mod slowdown;
 mod trail;
 mod window;
 
@@ -107,7 +107,8 @@ pub fn window_s(route: &Route, speed_mm_per_s: f64) -> f64 {
 /// Longest time in which the axes that move on the path ahead stop from `speed_mm_per_s`, s.
 fn stop_s(route: &Route, speed_mm_per_s: f64) -> f64 {
     let of = |least: &Least| {
-        let (a, j) = (least.acceleration_mm_per_s2, least.jerk_mm_per_s3);
+        let a = least.acceleration_mm_per_s2;
+        let j = least.jerk_mm_per_s3;
         speed_mm_per_s.min(least.speed_mm_per_s) / a + a / j
     };
     route.legs().map(|leg| of(&leg.least)).fold(0.0, f64::max)

@@ -119,7 +119,8 @@ impl<P: Planning> Streamer<P> {
 
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
         let behind_mm = self.queue.begin_at_zero();
-        (self.at_mm, self.from_mm) = (self.at_mm - behind_mm, self.from_mm + behind_mm);
+        self.at_mm -= behind_mm;
+        self.from_mm += behind_mm;
         match self.queue.items.front() {
             None => return Ok(None),
             Some(Item::Dwell(block)) => {
@@ -264,11 +265,13 @@ impl<P: Planning> Streamer<P> {
     /// What the window leaves for a stop there.
     fn declare(&self, (from_s, until_s): (f64, f64), segment: &mut Segment) {
         let reserve = self.window.reserve((from_s, until_s), self.bounds.context.fine_period_s);
-        let (a, j) = (reserve.stop_mm_per_s2, STOP_JERK * reserve.stop_mm_per_s3);
+        let a = reserve.stop_mm_per_s2;
+        let j = STOP_JERK * reserve.stop_mm_per_s3;
         let speeds = [from_s, until_s].map(|t_s| self.window.at(t_s).speed_mm_per_s);
         let v = speeds[0].max(speeds[1]).max(1e-9);
         segment.stop_deceleration_mm_per_s2 = a;
-        (segment.max_sigma_rate_per_s, segment.max_sigma_acceleration_per_s2) = (a / v, j / v);
+        segment.max_sigma_rate_per_s = a / v;
+        segment.max_sigma_acceleration_per_s2 = j / v;
     }
 
     /// Rest where the window ends: exactly at the end of the block, where that is there.

@@ -32,7 +32,8 @@ impl Queue {
             self.items.push_back(Item::Dwell(*block));
             return;
         };
-        let (count, feed_mm_per_s) = (course.stretches().len(), feed_mm_per_s(block, &course, bounds));
+        let count = course.stretches().len();
+        let feed_mm_per_s = feed_mm_per_s(block, &course, bounds);
         for stretch in 0..count {
             let length_mm = course.stretches()[stretch].length_mm;
             let leg = Leg {
@@ -91,7 +92,8 @@ impl Queue {
 
     /// Where the run from the front ends, mm, and whether it is known to end there.
     pub fn run_end(&self, finished: bool) -> (f64, bool) {
-        let (mut end_mm, mut index) = (0.0, 0);
+        let mut end_mm = 0.0;
+        let mut index = 0;
         while let Some(leg) = self.leg(index) {
             end_mm = leg.end_mm;
             index += 1;

@@ -62,7 +62,8 @@ impl<'a> Route<'a> {
 
     /// The legs from the front on that join each other.
     pub fn legs(&self) -> impl Iterator<Item = &'a Leg> {
-        let (route, mut goes_on) = (*self, true);
+        let route = *self;
+        let mut goes_on = true;
         (0..).map_while(move |index| {
             let leg = route.leg(index).filter(|_| goes_on)?;
             goes_on = leg.joined;
@@ -101,7 +102,8 @@ impl<'a> Route<'a> {
     pub fn at_side(&self, s_mm: f64, side: Side, cursor: &mut Cursor) -> AlongPath {
         let (at, leg) = self.at(s_mm, cursor);
         let near_mm = leg.near_mm();
-        let (starts, ends) = (s_mm < leg.start_mm + near_mm, s_mm > leg.end_mm - near_mm);
+        let starts = s_mm < leg.start_mm + near_mm;
+        let ends = s_mm > leg.end_mm - near_mm;
         let joint = starts && cursor.leg > 0 || ends && leg.joined;
         // Beside a rest there is one side only, and where that is a cusp its very end says nothing of the way to it.
         let knot = !starts && !ends && leg.next_break_mm(s_mm - near_mm) <= s_mm + near_mm;

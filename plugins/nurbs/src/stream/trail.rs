@@ -69,7 +69,8 @@ impl Trail {
         let lanes = bounds.context.limits.axes();
         let rapid = segment.flags.contains(SegmentFlags::RAPID);
         let rests = segment.coefficients.iter().all(|c| c[1..] == [0.0; 5]);
-        let (mut reached, mut steps) = ([[0.0; PERIODS]; MAX_AXES], [[0.0; PERIODS]; MAX_AXES]);
+        let mut reached = [[0.0; PERIODS]; MAX_AXES];
+        let mut steps = [[0.0; PERIODS]; MAX_AXES];
         for (lane, limits) in lanes.iter().enumerate() {
             let c = &segment.coefficients[lane];
             let h = segment.duration_s;
@@ -85,7 +86,8 @@ impl Trail {
                 steps[lane] = std::array::from_fn(|n| (start[n] - end[n]).abs());
             }
         }
-        let (coefficients, path) = (segment.coefficients, segment.path);
+        let coefficients = segment.coefficients;
+        let path = segment.path;
         self.spans.push_back(Span { duration_s: segment.duration_s, coefficients, path, reached, steps, rapid, rests });
         let most_s = PERIODS as f64 * bounds.context.fine_period_s;
         let mut behind_s: f64 = self.spans.iter().rev().skip(1).map(|span| span.duration_s).sum();
@@ -135,7 +137,8 @@ impl Trail {
 
     /// What the periods before and in the last segment reach.
     fn around(&self, lane: usize, period_s: f64) -> Around {
-        let (mut around, mut start_s) = (Around::default(), 0.0);
+        let mut around = Around::default();
+        let mut start_s = 0.0;
         let last = self.spans.len() - 1;
         for (n, span) in self.spans.iter().enumerate().rev() {
             if n < last {
@@ -265,7 +268,8 @@ impl Found {
             _ => &mut worst.jerk,
         };
         *most = most.max(share);
-        (self.from_mm, self.to_mm) = (self.from_mm.min(from_mm), self.to_mm.max(to_mm));
+        self.from_mm = self.from_mm.min(from_mm);
+        self.to_mm = self.to_mm.max(to_mm);
         self.stepped |= stepped;
     }
 }

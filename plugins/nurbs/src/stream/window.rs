@@ -58,7 +58,9 @@ impl<M: Motion> Window<M> {
         std::mem::swap(&mut self.samples, &mut other.samples);
         std::mem::swap(&mut self.bounds, &mut other.bounds);
         std::mem::swap(&mut self.reserves, &mut other.reserves);
-        (self.whole, self.first_tick_s, self.most_mm_per_s) = (other.whole, other.first_tick_s, other.most_mm_per_s);
+        self.whole = other.whole;
+        self.first_tick_s = other.first_tick_s;
+        self.most_mm_per_s = other.most_mm_per_s;
     }
 
     /// What is left everywhere between two times: the least of the ticks there and of those around.
@@ -102,7 +104,8 @@ impl<M: Motion> Window<M> {
 
     /// The time at which `s_mm` is reached between two times, by halving.
     pub fn time_at(&self, s_mm: f64, (from_s, to_s): (f64, f64)) -> f64 {
-        let (mut low, mut high) = (from_s, to_s);
+        let mut low = from_s;
+        let mut high = to_s;
         for _ in 0..50 {
             let middle = f64::midpoint(low, high);
             if self.at(middle).s_mm < s_mm { low = middle } else { high = middle }

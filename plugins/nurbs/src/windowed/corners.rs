@@ -84,7 +84,9 @@ impl Survey {
     fn look_around(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {
         self.places.clear();
         self.tangential = None;
-        let (mut at_mm, mut time_s, mut speed) = (start.at_mm, 0.0, start.speed_mm_per_s);
+        let mut at_mm = start.at_mm;
+        let mut time_s = 0.0;
+        let mut speed = start.speed_mm_per_s;
         loop {
             let spot = look(at_mm);
             self.places.push(Corner { at_mm, speed_mm_per_s: spot.speed_mm_per_s });
@@ -136,12 +138,14 @@ fn lowest((mut from, mut to): (f64, f64), sections: usize, speed: &mut dyn FnMut
     for _ in 0..sections {
         if speeds[0] <= speeds[1] {
             to = inner[1];
-            (inner[1], speeds[1]) = (inner[0], speeds[0]);
+            inner[1] = inner[0];
+            speeds[1] = speeds[0];
             inner[0] = to - share * (to - from);
             speeds[0] = speed(inner[0]);
         } else {
             from = inner[0];
-            (inner[0], speeds[0]) = (inner[1], speeds[1]);
+            inner[0] = inner[1];
+            speeds[0] = speeds[1];
             inner[1] = from + share * (to - from);
             speeds[1] = speed(inner[1]);
         }

@@ -24,7 +24,8 @@ impl Motion for Ramps {
     /// At the latest time where the speed is level there, else at the last border before, where there is no
     /// acceleration either.
     fn commit_s(&self, times: &[f64], latest_s: f64) -> f64 {
-        let (whole_s, until_s) = (times[times.len() - 1], latest_s);
+        let whole_s = times[times.len() - 1];
+        let until_s = latest_s;
         let [_, b, c, d] = self.0[interval(times, until_s)].speed;
         if [b, c, d] == [0.0; 3] {
             return until_s;

@@ -8,7 +8,7 @@ use super::ramp::Tangential;
 use super::ramps::{Care, Rounds};
 use super::ripple::Corner;
 use crate::stream::check::{Look, check};
-use crate::stream::relief::Reliefs;
+use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, window_s};
 
 /// Share of acceleration and jerk of the first try.
@@ -27,7 +27,7 @@ const TRIES: [usize; 2] = [12, 30];
 pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
 
 /// Samples of a window at most: slower than that is no motion.
-const MOST_SAMPLES: f64 = 4e5;
+const MAX_SAMPLES: f64 = 4e5;
 
 /// Time between places of a line at most, s.
 pub const STEP_S: f64 = 0.1;
@@ -46,7 +46,7 @@ struct Slower {
 pub struct Windowed {
     survey: Survey,
     rounds: Rounds,
-    reliefs: Reliefs,
+    slowdowns: Slowdowns,
     grade: Option<Grade>,
 }
 
@@ -56,7 +56,7 @@ impl Planning for Windowed {
     fn plan(&mut self, job: &Job<Ramps>, window: &mut Window<Ramps>) -> bool {
         let rests = job.rests();
         let mut slower = Slower { speed: 1.0, jerk: SHARE };
-        self.reliefs.keep_first(0);
+        self.slowdowns.keep_first(0);
         self.look_around(job, window);
         self.grade.iter_mut().for_each(Grade::level);
         let tries = TRIES[usize::from(rests)];
@@ -64,11 +64,11 @@ impl Planning for Windowed {
             if !self.solve(job, &slower, window) {
                 return false;
             }
-            let known = self.reliefs.count();
-            let mut worst = check(job, window, Look::Samples, &mut self.reliefs);
+            let known = self.slowdowns.count();
+            let mut worst = check(job, window, Look::Samples, &mut self.slowdowns);
             // After some tries samples alone count.
             if worst.is_kept() && (n > LOCAL_TRIES || !self.ease(job, window)) {
-                worst = check(job, window, Look::Segments, &mut self.reliefs);
+                worst = check(job, window, Look::Segments, &mut self.slowdowns);
                 if worst.is_kept() {
                     return true;
                 }
@@ -101,7 +101,7 @@ impl Windowed {
     /// Lowers the speed where samples exceed acceleration or jerk: what ramps with less jerk do not mend is of the path.
     fn slow_there(&mut self, known: usize, window: &Window<Ramps>) {
         let mut limit = Limit::new(&self.survey.places);
-        for part in self.reliefs.since(known).filter(|part| part.jerk < 1.0) {
+        for part in self.slowdowns.since(known).filter(|part| part.jerk < 1.0) {
             let middle_mm = f64::midpoint(part.from_mm, part.to_mm);
             let driven = window.at(window.time_at(middle_mm, (0.0, window.duration_s()))).speed_mm_per_s;
             // It may be slower there than the limit, which is what becomes lower.
@@ -113,12 +113,12 @@ impl Windowed {
     fn ease(&mut self, job: &Job<Ramps>, window: &Window<Ramps>) -> bool {
         let mut limit = Limit::new(&self.survey.places);
         let grade = self.grade.as_mut();
-        grade.is_some_and(|grade| ease(job, &window.motion.0, &mut limit, grade, &mut self.reliefs))
+        grade.is_some_and(|grade| ease(job, &window.motion.0, &mut limit, grade, &mut self.slowdowns))
     }
 
     /// False where the speed at the start is too high for what follows, or a speed so low that the window has no end.
     fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
-        let parts = self.reliefs.parts().iter().map(|part| ([part.from_mm, part.to_mm], part.speed));
+        let parts = self.slowdowns.parts().iter().map(|part| ([part.from_mm, part.to_mm], part.speed));
         self.survey.slow(slower.speed, parts);
         let Some(least) = self.survey.tangential else { return false };
         let least = Tangential {
@@ -132,7 +132,7 @@ impl Windowed {
         let ramps = &mut window.motion.0;
         self.rounds.make(corners, self.survey.feed_mm_per_s, grade, &mut limit, &CARE, ramps);
         lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
-        let most_s = MOST_SAMPLES * job.bounds.context.fine_period_s;
+        let most_s = MAX_SAMPLES * job.bounds.context.fine_period_s;
         corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
             && window.times.len() > 1
             && window.duration_s() <= most_s

@@ -7,7 +7,7 @@ use super::grade::Grade;
 use super::motion::Ramps;
 use super::ramp::Ramp;
 use crate::stream::check::{POINT, jerk_share};
-use crate::stream::relief::{Relief, Reliefs};
+use crate::stream::slowdown::{Slowdown, Slowdowns};
 use crate::stream::{Cursor, Job};
 
 /// What the next try aims at.
@@ -19,8 +19,9 @@ const TURNING: f64 = 0.6;
 
 /// Takes something back where the jerk of an axis exceeds its limit: of the jerk of the ramp, which turning adds to, or where
 /// turning takes the most of it of the speed, with whose third power it goes. Gives whether there was such a place.
-pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Grade, reliefs: &mut Reliefs) -> bool {
-    let (known, mut found) = (reliefs.count(), false);
+pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Grade, slowdowns: &mut Slowdowns) -> bool {
+    let known = slowdowns.count();
+    let mut found = false;
     let step_s = PART * job.bounds.context.fine_period_s;
     for ramp in ramps {
         let mut left = 1.0f64;
@@ -37,8 +38,9 @@ pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Gra
                 left = left.min((AIM - turning) / (worst - turning));
             } else {
                 // A ramp may be slower there than the limit of the speed, which is what becomes lower.
-                let (way_mm, speed) = (step_s * v, (AIM / worst).cbrt().max(0.8) * (v / limit.at(s_mm)).min(1.0));
-                reliefs.add(known, Relief { from_mm: s_mm - way_mm, to_mm: s_mm + way_mm, speed, jerk: 1.0 });
+                let way_mm = step_s * v;
+                let speed = (AIM / worst).cbrt().max(0.8) * (v / limit.at(s_mm)).min(1.0);
+                slowdowns.add(known, Slowdown { from_mm: s_mm - way_mm, to_mm: s_mm + way_mm, speed, jerk: 1.0 });
             }
         });
         if left < 1.0 {
@@ -50,7 +52,8 @@ pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Gra
 
 /// The path along a ramp, and where the ramp is there: every `step_s`, and at knots on both sides.
 fn look(job: &Job<Ramps>, ramp: &Ramp, step_s: f64, mut of: impl FnMut(&AlongPath, [f64; 4])) {
-    let (mut cursor, mut from_mm) = (Cursor::default(), ramp.start_mm);
+    let mut cursor = Cursor::default();
+    let mut from_mm = ramp.start_mm;
     let looks = (ramp.duration_s / step_s).ceil().max(1.0);
     for n in 0..=looks as usize {
         let t_s = ramp.duration_s * n as f64 / looks;

@@ -1,7 +1,7 @@
 //! A window of the published method: a change of speed as a cubic of time, without acceleration at its ends.
 
 /// Least duration of a ramp, s. A shorter one would change the speed by less than 0.003 mm/s.
-pub const LEAST_S: f64 = 2e-4;
+pub const MIN_S: f64 = 2e-4;
 
 /// What a ramp may use along the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl Tangential {
         if change == 0.0 {
             return 0.0;
         }
-        (1.5 * change / self.acceleration_mm_per_s2).max((6.0 * change / self.jerk_mm_per_s3).sqrt()).max(LEAST_S)
+        (1.5 * change / self.acceleration_mm_per_s2).max((6.0 * change / self.jerk_mm_per_s3).sqrt()).max(MIN_S)
     }
 
     /// Way of that change, mm: a cubic is symmetric, so the mean speed is that of its ends.
@@ -54,7 +54,10 @@ const ENOUGH_MM: f64 = 1e-12;
 /// The highest value between two up to which there is `room`, which falls, and which there is at the lower one: false
 /// position after Illinois, so a few steps.
 pub fn highest((least, most): (f64, f64), room: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high, mut rooms, mut side) = (least, most, [room(least), room(most)], 0);
+    let mut low = least;
+    let mut high = most;
+    let mut rooms = [room(least), room(most)];
+    let mut side = 0;
     if rooms[1] >= 0.0 || rooms[0] <= 0.0 {
         return if rooms[1] >= 0.0 { most } else { least };
     }
@@ -62,11 +65,13 @@ pub fn highest((least, most): (f64, f64), room: impl Fn(f64) -> f64) -> f64 {
         let middle = low + (high - low) * rooms[0] / (rooms[0] - rooms[1]);
         let found = room(middle);
         if found >= 0.0 {
-            (low, rooms[0]) = (middle, found);
+            low = middle;
+            rooms[0] = found;
             rooms[1] *= if side == 1 { 0.5 } else { 1.0 };
             side = 1;
         } else {
-            (high, rooms[1]) = (middle, found);
+            high = middle;
+            rooms[1] = found;
             rooms[0] *= if side == 2 { 0.5 } else { 1.0 };
             side = 2;
         }

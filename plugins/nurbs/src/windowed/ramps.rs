@@ -2,16 +2,16 @@
 
 use super::corners::Limit;
 use super::grade::Grade;
-use super::ramp::{LEAST_S, Ramp, Tangential};
+use super::ramp::{MIN_S, Ramp, Tangential};
 use super::ripple::{Corner, propagate, ramps};
 
 /// Corners nearer to each other are one, mm: beside a cusp speeds fall to nothing, and the least time says nothing.
 const APART_MM: f64 = 1e-9;
 /// Corners of a window at most: ramps that exceed the limit with so many are left to the check of the samples.
-const MOST_CORNERS: usize = 40_000;
+const MAX_CORNERS: usize = 40_000;
 
 /// Looks along a ramp at most: one that takes hours is refused later, and must not take them in planning.
-const MOST_LOOKS: f64 = 1e5;
+const MAX_LOOKS: f64 = 1e5;
 
 /// How closely ramps are compared with the limit.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ impl Rounds {
             let found = self.pairs.iter().flat_map(|pair| pair.found.into_iter().flatten());
             let count = corners.len();
             corners.extend(found);
-            if corners.len() == count || corners.len() > MOST_CORNERS {
+            if corners.len() == count || corners.len() > MAX_CORNERS {
                 return;
             }
             corners.sort_unstable_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
@@ -89,7 +89,7 @@ fn merge(corners: &mut Vec<Corner>) {
     let end = corners[corners.len() - 1];
     corners.dedup_by(|next, kept| {
         let mean = f64::midpoint(next.speed_mm_per_s, kept.speed_mm_per_s);
-        let near = next.at_mm - kept.at_mm < (LEAST_S * mean).max(APART_MM);
+        let near = next.at_mm - kept.at_mm < (MIN_S * mean).max(APART_MM);
         if near {
             kept.speed_mm_per_s = kept.speed_mm_per_s.min(next.speed_mm_per_s);
         }
@@ -104,8 +104,9 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
     }
-    let looks = (ramp.duration_s / care.look_s).ceil().clamp(1.0, MOST_LOOKS);
-    let (mut most, mut found) = (1.0 + care.over, None);
+    let looks = (ramp.duration_s / care.look_s).ceil().clamp(1.0, MAX_LOOKS);
+    let mut most = 1.0 + care.over;
+    let mut found = None;
     for n in 0..=looks as usize {
         let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
         let allowed = limit.at(at_mm);

@@ -1,6 +1,6 @@
 //! Look-ahead over corners: what a corner asks of those before it, and the ramps between them.
 
-use super::ramp::{LEAST_S, Ramp, Tangential, highest};
+use super::ramp::{MIN_S, Ramp, Tangential, highest};
 
 /// A place with a speed that is not to be exceeded there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,11 +16,13 @@ pub struct Corner {
 /// `limits` are those of the ramps up and down from each corner to the next.
 pub fn propagate(corners: &mut [Corner], limits: &[[Tangential; 2]]) {
     for i in (1..corners.len()).rev() {
-        let (way, speed) = (corners[i].at_mm - corners[i - 1].at_mm, corners[i - 1].speed_mm_per_s);
+        let way = corners[i].at_mm - corners[i - 1].at_mm;
+        let speed = corners[i - 1].speed_mm_per_s;
         corners[i - 1].speed_mm_per_s = limits[i - 1][1].reach_mm_per_s(corners[i].speed_mm_per_s, way, speed);
     }
     for i in 1..corners.len() {
-        let (way, speed) = (corners[i].at_mm - corners[i - 1].at_mm, corners[i].speed_mm_per_s);
+        let way = corners[i].at_mm - corners[i - 1].at_mm;
+        let speed = corners[i].speed_mm_per_s;
         corners[i].speed_mm_per_s = limits[i - 1][0].reach_mm_per_s(corners[i - 1].speed_mm_per_s, way, speed);
     }
 }
@@ -35,10 +37,10 @@ pub fn ramps(from: &Corner, to: &Corner, feed_mm_per_s: f64, [up, down]: &[Tange
     let peak = highest((least, feed_mm_per_s.max(least)), |peak| length - way_mm(peak));
     let [mut up_s, mut down_s] = [up.duration_s(peak - start), down.duration_s(peak - end)];
     let mut level_s = if peak > 0.0 { (length - way_mm(peak)).max(0.0) / peak } else { 0.0 };
-    if level_s < LEAST_S && up_s > down_s {
+    if level_s < MIN_S && up_s > down_s {
         up_s += level_s * peak / f64::midpoint(start, peak);
         level_s = 0.0;
-    } else if level_s < LEAST_S && down_s > 0.0 {
+    } else if level_s < MIN_S && down_s > 0.0 {
         down_s += level_s * peak / f64::midpoint(peak, end);
         level_s = 0.0;
     }

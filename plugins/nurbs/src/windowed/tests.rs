@@ -75,7 +75,9 @@ fn cubics_meet_their_ends() {
     let case = case("002_cubic");
     for row in list(&case["coefficients"]) {
         let get = |key: &str| number(&row[key]);
-        let (duration_s, speeds, accelerations) = (get("T"), [get("v0"), get("vf")], [get("a0"), get("af")]);
+        let duration_s = get("T");
+        let speeds = [get("v0"), get("vf")];
+        let accelerations = [get("a0"), get("af")];
         let speed = cubic(speeds, accelerations, duration_s);
         // The case states twelve digits; d of a window that needs none is their rounding.
         for (value, (key, scale)) in speed.iter().zip([("a", 1.0), ("b", 1.0), ("c", 1e3), ("d", 1e5)]) {
@@ -145,7 +147,8 @@ fn windows_are_as_published() {
         let rows = list(&case["windows"]);
         let mut published_s = 0.0;
         for (n, row) in rows.iter().enumerate() {
-            let (duration_s, speed) = (number(&row["T_s"]), numbers(&row["abcd"]));
+            let duration_s = number(&row["T_s"]);
+            let speed = numbers(&row["abcd"]);
             let known = Ramp { start_mm: number(&row["s0_mm"]), duration_s, speed: speed.clone().try_into().unwrap() };
             let [end_mm, end, ..] = known.at(duration_s);
             let ramp = Ramp::new(known.start_mm, [speed[0], end], duration_s);
@@ -154,14 +157,15 @@ fn windows_are_as_published() {
             for (value, expected) in half[0].iter().zip(half[1]) {
                 close(*value, expected, 1e-5, 1.0);
             }
-            assert!(LIMITS.duration_s(end - speed[0]) <= duration_s.max(super::ramp::LEAST_S) * (1.0 + 1e-5), "{row}");
+            assert!(LIMITS.duration_s(end - speed[0]) <= duration_s.max(super::ramp::MIN_S) * (1.0 + 1e-5), "{row}");
             if let Some(next) = rows.get(n + 1) {
                 close(end_mm, number(&next["s0_mm"]), 0.0, 1e-5);
             }
             published_s += duration_s;
         }
         let (curve, table) = canonical(name);
-        let (mut found, mut plan) = (survey(&curve, &table), Vec::new());
+        let mut found = survey(&curve, &table);
+        let mut plan = Vec::new();
         Rounds::default().make(
             &mut found.corners,
             FEED,

@@ -2,7 +2,7 @@
 
 /// What a part of the path gets less of.
 #[derive(Clone, Copy, Debug)]
-pub struct Relief {
+pub struct Slowdown {
     /// Path coordinates of its ends, mm.
     pub from_mm: f64,
     pub to_mm: f64,
@@ -13,9 +13,9 @@ pub struct Relief {
 
 /// The parts, as they were found.
 #[derive(Debug, Default)]
-pub struct Reliefs(Vec<Relief>);
+pub struct Slowdowns(Vec<Slowdown>);
 
-impl Reliefs {
+impl Slowdowns {
     /// Number of parts.
     pub fn count(&self) -> usize {
         self.0.len()
@@ -27,23 +27,24 @@ impl Reliefs {
     }
 
     /// Adds a part. Of what was added since there were `known`, the last one becomes longer where they touch.
-    pub fn add(&mut self, known: usize, part: Relief) {
+    pub fn add(&mut self, known: usize, part: Slowdown) {
         match self.0[known..].last_mut() {
             Some(last) if last.to_mm >= part.from_mm => {
                 last.to_mm = last.to_mm.max(part.to_mm);
-                (last.speed, last.jerk) = (last.speed.min(part.speed), last.jerk.min(part.jerk));
+                last.speed = last.speed.min(part.speed);
+                last.jerk = last.jerk.min(part.jerk);
             }
             _ => self.0.push(part),
         }
     }
 
     /// The parts that were found after the first `known`.
-    pub fn since(&mut self, known: usize) -> impl Iterator<Item = &mut Relief> {
+    pub fn since(&mut self, known: usize) -> impl Iterator<Item = &mut Slowdown> {
         self.0.iter_mut().skip(known)
     }
 
     /// The parts, as they were found.
-    pub fn parts(&self) -> &[Relief] {
+    pub fn parts(&self) -> &[Slowdown] {
         &self.0
     }
 

@@ -1,6 +1,6 @@
 //! Where the motion must pass, and how near.
 
-use tandem_motion::tube::{Lanes, Site, each};
+use tandem_motion::tube::{Lanes, Waypoint, each};
 
 use crate::frame::{dot, largest, minus};
 use crate::plan::INTERVALS;
@@ -10,7 +10,7 @@ use crate::travel::Travel;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
-/// A turn by more than this always has a site.
+/// A turn by more than this always has a waypoint.
 const SHARP: f64 = 0.1;
 /// Share of a feed below which another is another feed.
 const OTHER_FEED: f64 = 0.99;
@@ -25,36 +25,36 @@ const SWING_STEPS: f64 = 4.0;
 const LONGEST_SWING: f64 = 10.0;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
-/// Firm sites in a step at most.
+/// Firm waypoints in a step at most.
 const DENSEST: f64 = 16.0;
-/// Most sites of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
-pub const MAX_SITES: usize = (DENSEST as usize + 2) * INTERVALS.1;
+/// Most waypoints of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
+pub const MAX_WAYPOINTS: usize = (DENSEST as usize + 2) * INTERVALS.1;
 /// Vertices looked at on each side.
 const LOOKS: usize = 24;
 
-/// A place that may become a site.
+/// A place that may become a waypoint.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<const L: usize> {
     pub s: f64,
     chord: u32,
     /// At the start of the chord.
     vertex: bool,
-    /// It is always a site.
+    /// It is always a waypoint.
     firm: bool,
     /// Half widths, once they are known.
     half: Option<Lanes<L>>,
 }
 
-/// Sites of a window; keeps its memory.
+/// Waypoints of a window; keeps its memory.
 #[derive(Debug)]
-pub struct Sites<const L: usize> {
+pub struct Waypoints<const L: usize> {
     candidates: Vec<Candidate<L>>,
-    /// The sites chosen, with their path coordinates and chords.
-    pub chosen: Vec<Site<L>>,
+    /// The waypoints chosen, with their path coordinates and chords.
+    pub chosen: Vec<Waypoint<L>>,
     pub along: Vec<(f64, u32)>,
 }
 
-impl<const L: usize> Default for Sites<L> {
+impl<const L: usize> Default for Waypoints<L> {
     fn default() -> Self {
         Self { candidates: Vec::new(), chosen: Vec::new(), along: Vec::new() }
     }
@@ -81,7 +81,7 @@ pub struct Keep<const L: usize> {
     pub ends: (f64, f64),
 }
 
-impl<const L: usize> Sites<L> {
+impl<const L: usize> Waypoints<L> {
     /// Vertices between two path coordinates, and middles of chords that bulge between them.
     pub fn gather(&mut self, run: &Run<'_, L>, from: f64, to: f64) {
         self.candidates.clear();
@@ -103,7 +103,7 @@ impl<const L: usize> Sites<L> {
         }
     }
 
-    /// Chooses sites by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
+    /// Chooses waypoints by the timing `marks`: firm ones, others at least a third of a step apart, and places between so that no
     /// gap exceeds three quarters of a step. Firm ones that are much nearer than the spline can tell apart are left to the
     /// check. Boxes are what `keep` leaves of them.
     pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, keep: &Keep<L>) {
@@ -111,7 +111,8 @@ impl<const L: usize> Sites<L> {
         self.along.clear();
         let h = grid.step_s;
         let end_s = grid.intervals as f64 * h;
-        let (mut timer, mut last_t) = (Timer { marks, at: 0 }, 0.0);
+        let mut timer = Timer { marks, at: 0 };
+        let mut last_t = 0.0;
         for n in 0..self.candidates.len() {
             let candidate = self.candidates[n];
             let t = timer.time(candidate.s);
@@ -146,7 +147,8 @@ impl<const L: usize> Sites<L> {
             while mark + 1 < marks.len() && marks[mark].t <= time {
                 mark += 1;
             }
-            let (a, b) = (marks[mark - 1], marks[mark]);
+            let a = marks[mark - 1];
+            let b = marks[mark];
             let s = a.s + (b.s - a.s) * ((time - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
             at = run.chord_at(s, at);
             let candidate = Candidate { s, chord: at as u32, vertex: false, firm: false, half: None };
@@ -159,12 +161,13 @@ impl<const L: usize> Sites<L> {
         let place = t / grid.step_s;
         let interval = (place as usize).min(grid.intervals - 1);
         let point = run.chords[candidate.chord as usize].at(candidate.s);
-        let (mut point, mut half) = (point, each(|l| keep.share * half[l]));
+        let mut point = point;
+        let mut half = each(|l| keep.share * half[l]);
         if let Some(travel) = &keep.travel {
             let way = (candidate.s - keep.ends.0).min(keep.ends.1 - candidate.s).max(0.0);
             travel.cut(&mut point, &mut half, keep.margin, way);
         }
-        self.chosen.push(Site { interval: interval as u32, z: place - interval as f64, point, half });
+        self.chosen.push(Waypoint { interval: interval as u32, z: place - interval as f64, point, half });
         self.along.push((candidate.s, candidate.chord));
     }
 }
@@ -182,7 +185,8 @@ impl Timer<'_> {
         while self.at + 2 < self.marks.len() && self.marks[self.at + 1].s <= s {
             self.at += 1;
         }
-        let (a, b) = (self.marks[self.at], self.marks[self.at + 1]);
+        let a = self.marks[self.at];
+        let b = self.marks[self.at + 1];
         let way = b.s - a.s;
         if way > 0.0 { a.t + (b.t - a.t) * ((s - a.s) / way).clamp(0.0, 1.0) } else { b.t }
     }
@@ -192,7 +196,8 @@ impl Timer<'_> {
 /// that turn get most of it. Along the path the box may be longer.
 fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
     let chords = run.chords;
-    let (i, s) = (candidate.chord as usize, candidate.s);
+    let i = candidate.chord as usize;
+    let s = candidate.s;
     let lanes = grid.lanes;
     let before = if candidate.vertex && i > 0 { &chords[i - 1] } else { &chords[i] };
     let swing = chords[i].speed.max(before.speed) * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
@@ -235,7 +240,8 @@ fn is_marked<const L: usize>(chords: &[Chord<L>], v: usize) -> bool {
 /// How far along the path the motion may be off vertex `v` in its time, mm: where the feed changes, no more than the lower
 /// one covers in a fraction of a fine period. Infinite where it does not change.
 fn timely<const L: usize>(chords: &[Chord<L>], v: usize) -> f64 {
-    let (last, feed) = (chords[v - 1].feed, chords[v].feed);
+    let last = chords[v - 1].feed;
+    let feed = chords[v].feed;
     if last.min(feed) < OTHER_FEED * last.max(feed) { TIMELY_S * last.min(feed) } else { f64::INFINITY }
 }
 
@@ -252,7 +258,9 @@ struct Needs<const L: usize> {
 /// What lies around `s`.
 fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
     let chords = run.chords;
-    let (mut need, mut sharp_way, mut in_time) = ([0.0; L], f64::INFINITY, f64::INFINITY);
+    let mut need = [0.0; L];
+    let mut sharp_way = f64::INFINITY;
+    let mut in_time = f64::INFINITY;
     let mut look = |v: usize| {
         let turn = minus(&chords[v].direction, &chords[v - 1].direction);
         for l in 0..L {
