@@ -1,5 +1,7 @@
 //! The command line.
 
+#[cfg(feature = "ethercat")]
+mod bus;
 mod plugin;
 mod trace;
 
@@ -8,6 +10,8 @@ use std::path::PathBuf;
 
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 
+#[cfg(feature = "ethercat")]
+pub use bus::{Bus, Sdo, Which};
 pub use plugin::{Kind, Plugin};
 pub use trace::Trace;
 
@@ -50,6 +54,10 @@ pub enum Command {
     /// List plugins and their options; make and check plugins of one's own
     #[command(subcommand)]
     Plugin(Plugin),
+    /// Look at an EtherCAT bus: its devices, states, objects and frames; nothing is enabled
+    #[cfg(feature = "ethercat")]
+    #[command(subcommand)]
+    Bus(Bus),
     /// Measure how late the fine loop wakes on this computer, as a histogram
     Latency(Latency),
 }

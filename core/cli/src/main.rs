@@ -11,6 +11,8 @@ macro_rules! say {
 mod args;
 mod broken;
 mod built_in;
+#[cfg(feature = "ethercat")]
+mod bus;
 mod calibrate;
 mod check;
 mod clock;
@@ -60,6 +62,8 @@ fn main() -> ExitCode {
         Command::Trace(command) => trace::trace(&command),
         Command::Script(command) => script::script(&command),
         Command::Plugin(command) => plugin::plugin(&command),
+        #[cfg(feature = "ethercat")]
+        Command::Bus(command) => bus::bus(&command),
         Command::Latency(options) => latency::latency(&options),
     };
     // What plugins said before something was refused, or after the last run.

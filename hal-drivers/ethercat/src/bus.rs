@@ -105,7 +105,7 @@ impl Bus {
         })
     }
 
-    /// The emulator, where it is one.
+    /// What its frames go over.
     pub(crate) fn link_mut(&mut self) -> &mut Link {
         &mut self.link
     }
@@ -191,7 +191,7 @@ impl Bus {
     }
 
     /// One exchange at the time when it is due, with what was sent last.
-    fn turn(&mut self) {
+    pub(crate) fn turn(&mut self) {
         let setpoint = self.last;
         self.link.wait_until(self.next_ns);
         self.exchange_at_once(&setpoint);

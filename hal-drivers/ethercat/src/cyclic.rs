@@ -143,11 +143,6 @@ impl Cyclic {
         })
     }
 
-    /// Bytes of the frame.
-    pub(crate) fn bytes(&self) -> usize {
-        self.frame.len()
-    }
-
     /// The outputs of a device, which stay as they are until they are changed.
     pub(crate) fn outputs(&mut self, device: usize) -> &mut [u8] {
         match self.devices[device].outputs {

@@ -18,6 +18,8 @@ mod map;
 mod master;
 mod options;
 mod probe;
+mod recorder;
+mod survey;
 mod time;
 mod words;
 
@@ -28,5 +30,16 @@ pub use options::{
     AnalogOptions, CodeOptions, DeviceOptions, Encoder, HomingOptions, MapBy, Mode, Options, ProbeOptions, SpindleMode,
     SpindleOptions, StartupOptions, Sync,
 };
+pub use survey::{Found, State, Survey, Value, Watched, context_of, watch};
+
+/// Index and sub-index of an object as people write it, `0x6085` or `0x6099:1`. Any loop; does not allocate.
+pub fn object(text: &str) -> Option<(u16, u8)> {
+    options::object(text)
+}
+
+/// A number as people write it, `0x0402` or `1026`. Any loop; does not allocate.
+pub fn number(text: &str) -> Option<u32> {
+    options::number(text)
+}
 
 tandem_sdk::plugin!(driver "ethercat" = EthercatDrives::new);

@@ -1,8 +1,10 @@
 //! What frames go over: a network interface, or the emulator in this process on virtual or real time.
 
 use std::fs::File;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::recorder::Recorder;
 use tandem_ethercat_emulator::{BusDescription, MAX_FRAME, RawSocket, Wire, is_ethercat};
 
 /// How long an emulated bus on the wall clock is not looked at where nothing is on its way.
@@ -18,6 +20,7 @@ pub(crate) struct Link {
     /// When it was opened; none on virtual time.
     opened: Option<Instant>,
     virtual_ns: u64,
+    recorder: Option<Box<Recorder>>,
 }
 
 #[derive(Debug)]
@@ -30,7 +33,12 @@ impl Link {
     /// The emulator, with its devices just powered on.
     pub(crate) fn emulated(bus: &BusDescription, real_time: bool) -> Result<Self, String> {
         let wire = Wire::new(bus).map_err(|error| format!("the emulated bus: {error}"))?;
-        Ok(Self { medium: Medium::Emulated(Box::new(wire)), opened: real_time.then(Instant::now), virtual_ns: 0 })
+        Ok(Self {
+            medium: Medium::Emulated(Box::new(wire)),
+            opened: real_time.then(Instant::now),
+            virtual_ns: 0,
+            recorder: None,
+        })
     }
 
     /// A network interface that no other process drives, and on whose wire no other master is.
@@ -38,7 +46,7 @@ impl Link {
         let lock = lock(name)?;
         let socket = RawSocket::open(name).map_err(|error| error.to_string())?;
         let medium = Medium::Interface { socket, buffer: Box::new([0; MAX_FRAME]), _lock: lock };
-        let mut link = Self { medium, opened: Some(Instant::now()), virtual_ns: 0 };
+        let mut link = Self { medium, opened: Some(Instant::now()), virtual_ns: 0, recorder: None };
         let mut frame = [0; MAX_FRAME];
         let until_ns = link.now_ns() + LISTEN_NS;
         while let Some(length) = link.receive(until_ns, &mut frame) {
@@ -71,9 +79,23 @@ impl Link {
         }
     }
 
+    /// Writes every frame from here on into a file.
+    pub(crate) fn record(&mut self, path: &Path) -> Result<(), String> {
+        self.recorder = Some(Box::new(Recorder::create(path)?));
+        Ok(())
+    }
+
+    fn note(&mut self, frame: &[u8]) {
+        let now_ns = self.now_ns();
+        if let Some(recorder) = &mut self.recorder {
+            recorder.add(now_ns, frame);
+        }
+    }
+
     /// Sends a frame; one that cannot be sent is one that is not answered.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         let now_ns = self.now_ns();
+        self.note(frame);
         match &mut self.medium {
             Medium::Emulated(wire) => wire.send(now_ns, frame),
             Medium::Interface { socket, .. } => drop(socket.send(frame)),
@@ -82,6 +104,12 @@ impl Link {
 
     /// The next frame that comes by `until_ns`, and its length.
     pub(crate) fn receive(&mut self, until_ns: u64, into: &mut [u8; MAX_FRAME]) -> Option<usize> {
+        let length = self.receive_next(until_ns, into)?;
+        self.note(&into[..length]);
+        Some(length)
+    }
+
+    fn receive_next(&mut self, until_ns: u64, into: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.is_virtual() {
             return self.receive_virtual(until_ns, into);
         }

@@ -53,7 +53,10 @@ impl Master {
         let (tx, rx, pdu_loop) = storage.try_split().ok()?;
         let timeouts = Timeouts {
             wait_loop_delay: Duration::from_micros(100),
-            mailbox_response: Duration::from_millis(500),
+            // A computer without real-time scheduling may keep a process waiting for so long.
+            pdu: Duration::from_millis(100),
+            eeprom: Duration::from_millis(500),
+            mailbox_response: Duration::from_millis(1000),
             ..Timeouts::default()
         };
         let config = MainDeviceConfig {
