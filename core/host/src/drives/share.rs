@@ -158,4 +158,18 @@ mod tests {
         assert_eq!((all.runs().len(), all.to_own(u64::MAX), all.to_machine(u64::MAX)), (1, u64::MAX, u64::MAX));
         assert_eq!(Numbers::default().to_machine(u64::MAX), 0);
     }
+
+    #[test]
+    fn a_driver_is_told_of_its_own_joints_in_its_own_order() {
+        let owned = Owned { joints: vec!["u".into(), "x".into()], ..Owned::default() };
+        let share = Share::of(&owned, &["x", "y", "z", "u"]).unwrap();
+        let mut whole = DriverContext::new(4, 0.001);
+        whole.start_position = AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]);
+        let own = share.context(&whole);
+        assert_eq!((own.joint_count, own.start_position), (2, AxisVector::from_slice(&[4.0, 1.0])));
+        let beyond = Owned { joints: vec!["x".into(); MAX_AXES + 1], ..Owned::default() };
+        assert_eq!(Share::of(&beyond, &["x"]).unwrap_err(), "x");
+        let none = Owned { joints: vec!["w".into()], ..Owned::default() };
+        assert_eq!(Share::of(&none, &["x"]).unwrap_err(), "w");
+    }
 }

@@ -237,3 +237,7 @@ impl Driver for Slow {
 fn does_not_answer() -> PluginError {
     PluginError::fixed("its device does not answer: a call has not come back")
 }
+
+#[cfg(test)]
+#[path = "slow_tests.rs"]
+mod tests;
