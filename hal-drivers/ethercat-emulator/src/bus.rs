@@ -224,7 +224,8 @@ impl Bus {
         self.measure();
     }
 
-    pub(crate) fn now_ns(&self) -> u64 {
+    /// Up to when the devices have lived, ns from power-on.
+    pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
 }

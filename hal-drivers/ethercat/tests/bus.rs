@@ -1,0 +1,401 @@
+//! The driver against the emulator, exchange by exchange on virtual time.
+
+use proptest::prelude::*;
+use tandem_ethercat::{EthercatDrives, Options};
+use tandem_ethercat_emulator::{AlCode, AlState, DriveState, What};
+use tandem_sdk::{
+    Arm, Attached, AxisVector, Driver, DriverContext, Feedback, JointState, Latch, MAX_LATCHES, Name, PluginOptions,
+    Setpoint,
+};
+
+const PERIOD_S: f64 = 0.001;
+/// Counts for a mm, or for a rad times 2π.
+const COUNTS: f64 = 8388.608;
+
+struct Rig {
+    driver: EthercatDrives,
+    setpoint: Setpoint,
+    feedback: Feedback,
+    attached: Attached,
+}
+
+fn drive(position: u32, joint: &str, more: &str) -> String {
+    format!(
+        "[[devices]]\nposition = {position}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{joint}\"\ncounts_per_mm = {COUNTS}\n{more}\n"
+    )
+}
+
+fn emulated(more: &str) -> String {
+    format!("[[emulated.devices]]\nkind = \"drive\"\n{more}\n")
+}
+
+impl Rig {
+    fn open(text: &str, names: &[&str]) -> (EthercatDrives, DriverContext) {
+        let options = Options::read(&format!("interface = \"emulated\"\n{text}")).unwrap();
+        let driver = EthercatDrives::new(&options).unwrap();
+        let mut context = DriverContext::new(names.len(), PERIOD_S);
+        for (joint, name) in context.joints.iter_mut().zip(names) {
+            joint.name = Name::new(name);
+        }
+        (driver, context)
+    }
+
+    fn of(text: &str, names: &[&str]) -> Self {
+        let (driver, context) = Self::open(text, names);
+        Self::with(driver, &context)
+    }
+
+    fn with(mut driver: EthercatDrives, context: &DriverContext) -> Self {
+        driver.open(context).unwrap();
+        let attached = driver.start().unwrap();
+        let setpoint = Setpoint { position: attached.position, ..Setpoint::default() };
+        let feedback = Feedback { position: attached.position, state: attached.state, ..Feedback::default() };
+        Self { driver, setpoint, feedback, attached }
+    }
+
+    fn exchange(&mut self) {
+        self.setpoint.tick += 1;
+        self.driver.exchange(&self.setpoint, &mut self.feedback).unwrap();
+        self.setpoint.reset = 0;
+    }
+
+    /// Until joint 0 is in a state; fails after 2 s.
+    fn until(&mut self, state: JointState) {
+        for _ in 0..2000 {
+            self.exchange();
+            if self.feedback.state[0] == state {
+                return;
+            }
+        }
+        panic!("it stays {:?} {:x}", self.feedback.state[0], self.feedback.fault_code[0]);
+    }
+
+    fn enable(&mut self) {
+        self.setpoint.enable = 1;
+        self.until(JointState::Enabled);
+        self.setpoint.position = self.feedback.position;
+    }
+
+    /// Moves joint 0 by so much in every period.
+    fn go(&mut self, step: f64) {
+        self.setpoint.position[0] += step;
+        self.setpoint.velocity[0] = step / PERIOD_S;
+        self.exchange();
+    }
+
+    fn latch(&self) -> Option<Latch> {
+        self.feedback.latches.iter().find(|latch| latch.edge != 0).copied()
+    }
+
+    fn emulator<T>(&mut self, look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T) -> T {
+        self.driver.with_emulator(look).unwrap()
+    }
+
+    fn inject(&mut self, what: What) {
+        self.emulator(|wire| wire.inject(what, None)).unwrap();
+    }
+
+    fn drive_state(&mut self) -> (AlState, Option<AlCode>, DriveState) {
+        self.emulator(|wire| {
+            let device = &wire.bus().devices()[0];
+            (device.al_state(), device.al_code(), device.drive_state().unwrap())
+        })
+    }
+
+    fn place_mm(&mut self) -> f64 {
+        self.emulator(|wire| wire.bus().devices()[0].position_and_velocity_counts().unwrap().0 / COUNTS)
+    }
+}
+
+/// A probe's edge in each period of a motion, and between periods: the position is the drive's, whenever the edge comes.
+#[test]
+fn an_edge_in_any_period_is_told_once_with_the_drives_own_position() {
+    for edge in 0..40 {
+        let at_mm = 1.0 + f64::from(edge) * 0.0137;
+        let probe = drive(0, "x", "probe = { input = 5, latch = 1 }");
+        let probes = format!("drive = {{ probes_counts = [{:?}, 1e12] }}", at_mm * COUNTS);
+        let mut rig = Rig::of(&format!("{probe}{}", emulated(&probes)), &["x"]);
+        rig.enable();
+        rig.setpoint.arm = Arm { input: 5, edge: 1 };
+        (0..5).for_each(|_| rig.exchange());
+        let mut caught = vec![];
+        for _ in 0..200 {
+            rig.go(0.01);
+            caught.extend(rig.latch());
+        }
+        // Back and over it again: it is not armed anew.
+        for step in [-0.01, 0.01] {
+            for _ in 0..150 {
+                rig.go(step);
+                caught.extend(rig.latch());
+            }
+        }
+        assert_eq!(caught.len(), 1, "{at_mm}: {caught:?}");
+        let latch = caught[0];
+        assert_eq!((latch.input, latch.edge, latch.joints), (5, 1, 1));
+        assert!((latch.position[0] - at_mm).abs() < 2.0 / COUNTS, "{at_mm}: {}", latch.position[0]);
+        assert!((0.0..0.004).contains(&latch.before_s), "{}", latch.before_s);
+        // A second touch, armed anew.
+        rig.setpoint.arm = Arm::default();
+        (0..150).for_each(|_| rig.go(-0.01));
+        rig.setpoint.arm = Arm { input: 5, edge: 1 };
+        (0..5).for_each(|_| rig.exchange());
+        let second = (0..200).filter_map(|_| {
+            rig.go(0.01);
+            rig.latch()
+        });
+        assert_eq!(second.count(), 1, "{at_mm}: the second touch");
+        // Armed behind the edge, nothing comes.
+        rig.setpoint.arm = Arm::default();
+        (0..5).for_each(|_| rig.exchange());
+        rig.setpoint.arm = Arm { input: 5, edge: 1 };
+        let late = (0..100).filter(|_| {
+            rig.go(0.01);
+            rig.latch().is_some()
+        });
+        assert_eq!(late.count(), 0, "{at_mm}: armed too late");
+    }
+    assert!(MAX_LATCHES > 1);
+}
+
+#[test]
+fn counts_go_on_past_the_end_of_32_bits_both_ways() {
+    for (start, step) in [(i64::from(i32::MAX) - 2000, 0.01), (i64::from(i32::MIN) + 2000, -0.01)] {
+        let of_drive = drive(0, "x", &format!("zero_counts = {start}"));
+        let place = emulated(&format!("drive = {{ position_counts = {start}.0 }}"));
+        let mut rig = Rig::of(&format!("{of_drive}{place}"), &["x"]);
+        assert_eq!(rig.attached.position[0], 0.0);
+        rig.enable();
+        (0..100).for_each(|_| rig.go(step));
+        rig.setpoint.velocity[0] = 0.0;
+        (0..100).for_each(|_| rig.exchange());
+        let moved = rig.feedback.position[0];
+        assert!((moved - 100.0 * step).abs() < 2.0 / COUNTS, "{moved}");
+        let really = rig.place_mm() - start as f64 / COUNTS;
+        assert!((really - 100.0 * step).abs() < 2.0 / COUNTS, "the axis itself: {really}");
+    }
+}
+
+/// A drive that stands anywhere does not move when it is enabled, whatever the host says before.
+#[test]
+fn nothing_moves_when_a_drive_is_enabled() {
+    let place = emulated("drive = { position_counts = 314572.8, brake_open_ms = 50.0 }");
+    let mut rig = Rig::of(&format!("{}{place}", drive(0, "x", "")), &["x"]);
+    assert!((rig.attached.position[0] - 37.5).abs() < 1e-3);
+    // A host that plans from elsewhere: until the joint is enabled its setpoint does not count.
+    rig.setpoint.position[0] = 0.0;
+    rig.setpoint.enable = 1;
+    let mut farthest = 0.0_f64;
+    while rig.feedback.state[0] != JointState::Enabled {
+        rig.exchange();
+        let place_mm = rig.place_mm();
+        farthest = farthest.max((place_mm - 37.5).abs());
+    }
+    rig.setpoint.position[0] = rig.feedback.position[0];
+    for _ in 0..100 {
+        rig.exchange();
+        let place_mm = rig.place_mm();
+        farthest = farthest.max((place_mm - 37.5).abs());
+    }
+    assert!(farthest < 3.0 / COUNTS, "it moved by {farthest} mm");
+}
+
+/// A drive's fault in each of its states is told with its code, stays until a reset, and is gone behind it.
+#[test]
+fn a_fault_in_any_state_stays_until_it_is_reset() {
+    for before in [JointState::Disabled, JointState::Enabling, JointState::Enabled, JointState::QuickStop] {
+        let place = emulated("drive = { brake_open_ms = 50.0 }");
+        let mut rig = Rig::of(&format!("{}{place}", drive(0, "x", "")), &["x"]);
+        match before {
+            JointState::Disabled => rig.exchange(),
+            JointState::Enabling => {
+                rig.setpoint.enable = 1;
+                (0..10).for_each(|_| rig.exchange());
+            }
+            _ => rig.enable(),
+        }
+        if before == JointState::QuickStop {
+            (0..50).for_each(|_| rig.go(0.05));
+            rig.driver.quick_stop();
+            (0..3).for_each(|_| rig.exchange());
+        }
+        assert_eq!(rig.feedback.state[0], before);
+        rig.inject(What::DriveFault { device: 0, code: 0x7305, stays: false });
+        rig.until(JointState::Fault);
+        assert_eq!(rig.feedback.fault_code[0], 0x7305, "{before:?}");
+        assert_eq!(rig.driver.explain(0, 0x7305).as_str(), "device 0: encoder 1");
+        for enable in [1, 0, 1, 0] {
+            rig.setpoint.enable = enable;
+            rig.setpoint.position = rig.feedback.position;
+            rig.setpoint.velocity = AxisVector::ZERO;
+            for _ in 0..20 {
+                rig.exchange();
+                assert_eq!(rig.feedback.state[0], JointState::Fault, "{before:?}: without a reset");
+            }
+        }
+        rig.setpoint.reset = 1;
+        rig.until(JointState::Disabled);
+        rig.enable();
+    }
+}
+
+/// A joint that is lost stays so until the bus is brought up anew, and is as before then.
+#[test]
+fn a_lost_drive_stays_lost_until_the_bus_is_brought_up_again() {
+    let mut rig = Rig::of(&format!("{}{}", drive(0, "x", ""), emulated("")), &["x"]);
+    rig.enable();
+    (0..100).for_each(|_| rig.go(0.02));
+    rig.inject(What::AlError { device: 0, state: AlState::SafeOp, code: AlCode::FATAL_SYNC_ERROR });
+    rig.setpoint.velocity = AxisVector::ZERO;
+    rig.until(JointState::Lost);
+    assert_eq!(rig.feedback.fault_code[0], 0x1_002C);
+    assert!(rig.driver.explain(0, 0x1_002C).as_str().contains("it left OP: 002C, fatal synchronization error"));
+    rig.setpoint.reset = 1;
+    for _ in 0..50 {
+        rig.exchange();
+        assert_eq!(rig.feedback.state[0], JointState::Lost);
+    }
+    rig.driver.stop().unwrap();
+    let attached = rig.driver.start().unwrap();
+    assert_eq!(attached.state[0], JointState::Fault, "its drive says why it stopped");
+    (rig.setpoint, rig.feedback) =
+        (Setpoint { position: attached.position, ..Setpoint::default() }, Feedback::default());
+    rig.setpoint.reset = 1;
+    rig.until(JointState::Disabled);
+    rig.enable();
+    (0..50).for_each(|_| rig.go(0.02));
+}
+
+/// The devices' own watchdog stops the drives where the master falls silent: it was set to `watchdog_ms`.
+#[test]
+fn a_master_that_falls_silent_is_noticed_after_its_watchdog_ms() {
+    let mut rig = Rig::of(&format!("watchdog_ms = 7\n{}{}", drive(0, "x", ""), emulated("")), &["x"]);
+    rig.enable();
+    (0..50).for_each(|_| rig.go(0.02));
+    let now_ns = rig.emulator(|wire| wire.bus().now_ns());
+    rig.emulator(|wire| wire.advance(now_ns + 6_500_000));
+    assert_eq!(rig.drive_state(), (AlState::Op, None, DriveState::OperationEnabled));
+    rig.emulator(|wire| wire.advance(now_ns + 7_600_000));
+    let (state, code, _) = rig.drive_state();
+    assert_eq!((state, code), (AlState::SafeOp, Some(AlCode::WATCHDOG)));
+}
+
+#[test]
+fn quick_stop_ramps_by_the_drive_and_holds_until_it_is_let_go() {
+    let mut rig = Rig::of(&format!("{}{}", drive(0, "x", ""), emulated("")), &["x"]);
+    rig.enable();
+    (0..200).for_each(|_| rig.go(0.05));
+    rig.driver.quick_stop();
+    for _ in 0..200 {
+        rig.go(0.05);
+    }
+    let velocity = rig.emulator(|wire| wire.bus().devices()[0].position_and_velocity_counts().unwrap().1);
+    assert!(velocity.abs() < 10.0, "it still moves by {velocity} counts/s");
+    assert_ne!(rig.feedback.state[0], JointState::Enabled);
+    assert_eq!(rig.feedback.fault_code[0], 0);
+    rig.setpoint.enable = 0;
+    rig.setpoint.velocity = AxisVector::ZERO;
+    rig.until(JointState::Disabled);
+    rig.enable();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
+
+    /// Whatever the drifts and the shift, no SYNC0 is without a new setpoint, and the frame keeps its phase.
+    #[test]
+    fn with_distributed_clocks_no_sync0_is_without_a_setpoint(
+        ppm in prop::array::uniform3(-100.0..100.0_f64),
+        phase_us in 200.0..800.0_f64,
+    ) {
+        let names = ["x", "y", "z"];
+        let drives: String = (0..).zip(names).map(|(position, name)| drive(position, name, "")).collect();
+        let clocks: String = ppm.iter().map(|ppm| emulated(&format!("drift_ppm = {ppm:?}"))).collect();
+        let mut rig = Rig::of(&format!("sync = \"dc\"\nphase_us = {phase_us:?}\n{drives}{clocks}"), &names);
+        let before: Vec<u64> = counters(&mut rig, |counters| counters.sync0_without_outputs);
+        let mut worst_ns = 0;
+        for _ in 0..2000 {
+            rig.exchange();
+            prop_assert_eq!(rig.feedback.has_phase, 1);
+            worst_ns = worst_ns.max(rig.feedback.phase_ns.abs());
+        }
+        prop_assert!(counters(&mut rig, |counters| counters.sync0).iter().all(|sync0| *sync0 > 2000));
+        prop_assert_eq!(counters(&mut rig, |counters| counters.sync0_without_outputs), before);
+        prop_assert!(worst_ns < 10_000, "phase error {worst_ns} ns");
+        prop_assert_eq!(rig.attached.delay_periods[0], 2);
+    }
+}
+
+fn counters(rig: &mut Rig, of: impl Fn(tandem_ethercat_emulator::Counters) -> u64) -> Vec<u64> {
+    rig.emulator(|wire| wire.bus().devices().iter().map(|device| of(device.counters())).collect())
+}
+
+/// What goes wrong with a clock in operation is a lost joint with the reason, never a silent one.
+#[test]
+fn missed_sync0_and_lost_clocks_are_told() {
+    let of = |more: &str| {
+        format!("sync = \"dc\"\n{}{}{}{}", drive(0, "x", ""), drive(1, "y", ""), emulated(more), emulated(""))
+    };
+    let mut rig = Rig::of(&of(""), &["x", "y"]);
+    rig.enable();
+    // A jump is slewed back.
+    rig.inject(What::ClockJump { device: 1, by_ns: 50_000 });
+    (0..1000).for_each(|_| rig.exchange());
+    assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
+    rig.inject(What::AlError { device: 0, state: AlState::SafeOp, code: AlCode::SYNC_ERROR });
+    rig.until(JointState::Lost);
+    assert_eq!(rig.feedback.fault_code[0], 0x1_001A);
+    assert_eq!(rig.feedback.state[1], JointState::Enabled, "the other one goes on");
+}
+
+/// Terminals: bits and words of any device are the lines and values that the options name.
+#[test]
+fn lines_and_analog_values_of_terminals() {
+    let text = "[[devices]]\nposition = 0\nproduct = \"0x0e1a:0x0402\"\njoint = \"x\"\ncounts_per_mm = 1000\n\
+                [[devices]]\nposition = 1\nproduct = \"2:0x03f03052\"\ninputs = [-1, 7, 2]\n\
+                [[devices]]\nposition = 2\nproduct = \"2:0x07d83052\"\noutputs = [4, -1, 1]\n\
+                [[devices]]\nposition = 3\nproduct = \"2:0x0bbc3052\"\nanalog = [{ input = 1, byte = 2, scale = 0.5, offset = 3 }]\n";
+    let mut rig = Rig::of(text, &["x"]);
+    rig.emulator(|wire| {
+        wire.bus_mut().device_mut(1).unwrap().set_input(1, true);
+        wire.bus_mut().device_mut(3).unwrap().set_analog_input(0, -100);
+    });
+    rig.setpoint.outputs = 1 << 1 | 1 << 63;
+    (0..5).for_each(|_| rig.exchange());
+    assert_eq!(rig.feedback.inputs, 1 << 7);
+    assert_eq!(rig.feedback.analog[1], -47.0);
+    let outputs = rig.emulator(|wire| {
+        let device = &wire.bus().devices()[2];
+        [0, 1, 2].map(|output| device.output(output).unwrap())
+    });
+    assert_eq!(outputs, [false, false, true]);
+}
+
+/// Options that go with no machine, or not with this one, are refused with the key.
+#[test]
+fn options_are_refused_with_their_key() {
+    let refused = |text: &str| {
+        let options = Options::read(text).unwrap();
+        let of_machine = |driver: EthercatDrives| {
+            let (_, context) = Rig::open(&drive(0, "x", ""), &["x"]);
+            driver.check(&context).err()
+        };
+        let error = EthercatDrives::new(&options).map_or_else(Some, of_machine).unwrap();
+        (error.option().unwrap_or_default().to_string(), error.message().to_string())
+    };
+    let ok = format!("interface = \"emulated\"\n{}", drive(0, "x", ""));
+    let with = |from: &str, to: &str| refused(&ok.replace(from, to));
+    assert_eq!(refused("").0, "interface");
+    assert_eq!(with("0x0e1a:0x0402", "0e1a").0, "devices[0].product");
+    assert_eq!(with("position = 0", "").0, "devices[0]");
+    assert_eq!(with("position = 0", "position = 4").0, "devices[0].position");
+    assert_eq!(with("joint = \"x\"", "joint = \"q\"").1, "\"q\": this driver's joints are x");
+    assert_eq!(with(&format!("counts_per_mm = {COUNTS}"), "counts_per_turn = 3").0, "devices[0]");
+    assert_eq!(with("[[devices]]", "watchdog_ms = 1\n[[devices]]").0, "watchdog_ms");
+    assert_eq!(with("[[devices]]", "phase_us = 1000\n[[devices]]").0, "phase_us");
+    let startup = "joint = \"x\"\nstartup = [{ sdo = \"6o85\", u32 = 1 }]";
+    assert_eq!(with("joint = \"x\"", startup).0, "devices[0].startup[0].sdo");
+    let startup = "joint = \"x\"\nstartup = [{ sdo = \"0x6085\", u32 = 1, i8 = 1 }]";
+    assert_eq!(with("joint = \"x\"", startup).0, "devices[0].startup[0]");
+    assert_eq!(with("interface = \"emulated\"", "interface = \"eth9\"\nemulated = {}").0, "emulated");
+}
