@@ -35,6 +35,7 @@
 mod change;
 mod data;
 mod error;
+mod linuxcnc;
 mod place;
 mod queue;
 mod rows;
@@ -48,6 +49,7 @@ pub use data::{
     WorkOffsets,
 };
 pub use error::StateError;
+pub use linuxcnc::{AtLine, LinearUnit, LinuxCnc};
 pub use place::default_path;
 pub use store::{Owner, Reader, Recorder, Store};
 pub use write::{MAX_TOOL_NUMBER, MAX_TOOLS};

@@ -6,15 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{change, owner};
+use common::{any_state, any_tool, change, machine_of, owner};
 use tandem_rig::Random;
-use tandem_sdk::{Axes, AxisVector, MAX_AXES};
+use tandem_sdk::{Axes, AxisVector};
 use tandem_state::{
     Alarm, Change, Driven, Job, JobEnd, JobKind, LastingState, Outcome, Owner, Reader, StateError, Store, Tool,
-    ToolLife, WorkOffsets,
+    ToolLife,
 };
-
-const LETTERS: [char; 9] = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
 
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -30,80 +28,12 @@ fn open(path: &Path, axes: &Axes) -> Result<Store, StateError> {
     Store::open(path, owner(axes))
 }
 
-/// A machine of any axes in any order.
-fn any_axes(random: &mut Random) -> Axes {
-    let mut letters = LETTERS.map(|letter| (letter, random.unit() < 0.4)).to_vec();
-    for last in (1..letters.len()).rev() {
-        letters.swap(last, random.below(last as u64 + 1) as usize);
-    }
-    letters.truncate(1 + random.below(MAX_AXES as u64) as usize);
-    Axes::new(&letters).unwrap()
-}
-
-fn any_vector(random: &mut Random, axes: &Axes) -> AxisVector {
-    let mut vector = AxisVector::ZERO;
-    for axis in 0..axes.count() {
-        vector[axis] = (random.unit() - 0.5) * 10f64.powi(random.below(12) as i32 - 6);
-    }
-    vector
-}
-
-fn any_tool(random: &mut Random, axes: &Axes, number: u32) -> Tool {
-    Tool {
-        number,
-        pocket: (random.unit() < 0.5).then(|| random.below(100) as u32),
-        name: "end mill Ø6 \"x\"; DROP TABLE tool".into(),
-        offset: any_vector(random, axes),
-        wear: any_vector(random, axes),
-        diameter_mm: random.unit() * 20.0,
-        wear_diameter_mm: -random.unit(),
-        corner_radius_mm: random.unit(),
-        front_angle_deg: random.unit() * 90.0,
-        back_angle_deg: -random.unit(),
-        orientation: random.below(10) as u32,
-        life: ToolLife {
-            used_s: random.unit() * 1e5,
-            limit_s: (random.unit() < 0.5).then(|| random.unit()),
-            uses: random.below(1 << 40),
-            limit_uses: (random.unit() < 0.5).then(|| random.below(99)),
-        },
-        remark: "für Alu".into(),
-    }
-}
-
-fn any_state(random: &mut Random, axes: &Axes) -> LastingState {
-    let mut state = LastingState {
-        offsets: WorkOffsets {
-            origins: std::array::from_fn(|_| any_vector(random, axes)),
-            rotations_rad: std::array::from_fn(|_| random.unit() - 0.5),
-            active_system: random.below(9) as usize,
-            g92: any_vector(random, axes),
-            g92_stored: any_vector(random, axes),
-        },
-        reference: std::array::from_fn(|_| (random.unit() < 0.5).then(|| any_vector(random, axes))),
-        tool_in_spindle: random.below(100_000) as u32,
-        last_position: (random.unit() < 0.5).then(|| any_vector(random, axes)),
-        ..LastingState::default()
-    };
-    for _ in 0..random.below(20) {
-        state.parameters.insert(31 + random.below(4970) as usize, random.unit() * 1e9 - 5e8);
-        let number = 1 + random.below(99_999) as u32;
-        let tool = any_tool(random, axes, number);
-        state.tools.insert(number, tool);
-        state.policy_parameters.insert(format!("p{}", random.below(1000)), random.unit());
-    }
-    for axis in 0..axes.count() {
-        state.turns[axis] = random.below(1 << 50).cast_signed() - (1 << 49);
-    }
-    state
-}
-
 #[test]
 fn any_state_of_any_machine_is_there_again_bit_for_bit() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let (_folder, path) = folder();
-        let axes = any_axes(&mut random);
+        let axes = machine_of(&mut random);
         let state = any_state(&mut random, &axes);
         let store = open(&path, &axes).unwrap();
         assert!(store.is_new(), "seed {seed}");
