@@ -89,14 +89,7 @@ mod tests {
     #[test]
     fn a_joint_that_was_not_caught_is_found_between_its_samples() {
         let mut at_edge = feedback(0);
-        at_edge.latches[0] = Latch {
-            input: 3,
-            edge: 1,
-            joints: 2,
-            before_s: 0.00125,
-            position: AxisVector([9.0; 8]),
-            ..Latch::default()
-        };
+        at_edge.latches[0] = Latch { input: 3, edge: 1, joints: 2, before_s: 0.00125, position: AxisVector([9.0; 8]) };
         let found = find(&EdgeWatch::default(), &probing(Edge::Rising), &at_edge).unwrap();
         assert_eq!((found[0], found[1], found[2]), (3.75, 9.0, 3.75));
     }

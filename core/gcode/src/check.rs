@@ -71,6 +71,9 @@ impl CheckReport {
     }
 }
 
+/// Asks whether a block, with its curve where it is a NURBS, can be driven; says why not.
+pub type PerBlock<'a> = dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String> + 'a;
+
 /// Runs the whole of `program` on the machine `config`. Each block goes to `per_block` (a policy, a planner's check),
 /// whose refusal becomes an error of the block's line. M66 is taken to have timed out, a probe to
 /// have touched at its end; what is wrong with numbers that follow from that is left to the run.
@@ -80,7 +83,7 @@ impl CheckReport {
 pub fn check(
     program: &mut Program,
     config: &Config,
-    per_block: &mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
+    per_block: &mut PerBlock<'_>,
 ) -> Result<CheckReport, ProgramError> {
     program.subroutines.clear();
     let mut pass = FirstPass::new(program, config, per_block);
@@ -95,17 +98,13 @@ pub fn check(
 
 struct FirstPass<'a> {
     execution: Execution,
-    per_block: &'a mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
+    per_block: &'a mut PerBlock<'a>,
     items: Vec<Item>,
     report: CheckReport,
 }
 
 impl<'a> FirstPass<'a> {
-    fn new(
-        program: &mut Program,
-        config: &Config,
-        per_block: &'a mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
-    ) -> Self {
+    fn new(program: &mut Program, config: &Config, per_block: &'a mut PerBlock<'a>) -> Self {
         let execution = Execution::new(program, config, Pass::First);
         Self { execution, per_block, items: Vec::new(), report: CheckReport::default() }
     }
@@ -217,7 +216,7 @@ impl<'a> FirstPass<'a> {
 /// Counts a block and asks whether the planner can drive it. `place` is the program and the text of the block's line.
 fn judge_block(
     report: &mut CheckReport,
-    per_block: &mut dyn FnMut(&Block, Option<Curve<'_>>) -> Result<(), String>,
+    per_block: &mut PerBlock<'_>,
     (block, curve): (&Block, Option<Curve<'_>>),
     place: (&Arc<str>, &[u8]),
 ) {

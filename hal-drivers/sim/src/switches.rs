@@ -93,7 +93,7 @@ fn caught(edge: Arm, joints: u32, mut position: AxisVector, before_s: f64) -> La
     for joint in (0..MAX_AXES).filter(|joint| joints >> joint & 1 == 0) {
         position[joint] = 0.0;
     }
-    Latch { input: edge.input, edge: edge.edge, joints, before_s, position, ..Latch::default() }
+    Latch { input: edge.input, edge: edge.edge, joints, before_s, position }
 }
 
 /// The next bit of an xorshift generator.

@@ -68,12 +68,11 @@ impl AfterInterpolation {
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
         let Some(Waiting { block, stops: Some(stops) }) = self.waiting.front().copied() else { return false };
         self.waiting.pop_front();
-        match Path::with_lanes(&block, self.context.joint_lanes) {
-            Some(path) => self.begin_motion(&block, &path, stops, sink),
-            None => {
-                let path_mm = self.motion.path_mm();
-                self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, path_mm, sink);
-            }
+        if let Some(path) = Path::with_lanes(&block, self.context.joint_lanes) {
+            self.begin_motion(&block, &path, stops, sink);
+        } else {
+            let path_mm = self.motion.path_mm();
+            self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, path_mm, sink);
         }
         true
     }

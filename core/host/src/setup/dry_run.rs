@@ -39,9 +39,8 @@ impl<S: Source> Source for DryRun<S> {
         let before = items.len();
         let more = self.source.next_items(items)?;
         for item in &mut items[before..] {
-            match item {
-                Item::Block(block, _) => self.set_feed(block),
-                _ => {}
+            if let Item::Block(block, _) = item {
+                self.set_feed(block);
             }
         }
         Ok(more)

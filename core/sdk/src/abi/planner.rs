@@ -136,8 +136,8 @@ pub fn open(table: &'static Table, name: &'static str, options: &str, context: &
 }
 
 /// A curve as it crosses: a null pointer where there is none.
-fn crossing<'a, 'b>(curve: &'b Option<Curve<'a>>) -> *const Curve<'a> {
-    curve.as_ref().map_or(ptr::null(), ptr::from_ref::<Curve<'a>>)
+fn crossing<'a>(curve: Option<&Curve<'a>>) -> *const Curve<'a> {
+    curve.map_or(ptr::null(), ptr::from_ref)
 }
 
 impl Planner for Linked {
@@ -147,11 +147,11 @@ impl Planner for Linked {
     }
 
     fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.0.check(block, crossing(&curve))
+        self.0.check(block, crossing(curve.as_ref()))
     }
 
     fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        let answer = self.0.accept(block, crossing(&curve))?;
+        let answer = self.0.accept(block, crossing(curve.as_ref()))?;
         beat();
         choice(Method::PlannerAccept, "its answer", answer)
     }
