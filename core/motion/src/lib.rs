@@ -10,6 +10,7 @@ mod path;
 mod profile;
 pub mod retime;
 mod segment;
+pub mod stream;
 pub mod tube;
 
 pub use geometry::{half_angle_turn_rad, one_minus_cos};

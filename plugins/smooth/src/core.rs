@@ -1,10 +1,11 @@
 //! Windows one after the other: what is driven, what is planned next, and what is done where a plan is refused.
 
 use tandem_motion::blocks::{BlockId, report};
+use tandem_motion::stream::{Blocks, Emitted, Next, Planned, Stream, Windows};
 use tandem_motion::tube::Lanes;
 use tandem_sdk::{AxisVector, Block, Curve, PlannerContext, PluginError, SegmentSink};
 
-use crate::emit::Emitter;
+use crate::emit::DrivenPath;
 use crate::flatten::{self, Flat};
 use crate::frame::Frame;
 use crate::plan::{Effort, Planning, Start, Tuning};
@@ -28,23 +29,27 @@ const HELD: (f64, f64) = (1.2, 0.3);
 /// The planner for machines of at most `L` axes. Rough loop; allocates while its memory grows to the size of a window.
 #[derive(Debug)]
 pub struct Core<const L: usize> {
+    stream: Stream,
+    ahead: PathAhead<L>,
+}
+
+/// The path ahead, and the window that is driven on it.
+#[derive(Debug)]
+pub struct PathAhead<const L: usize> {
     pub(crate) frame: Frame<L>,
     context: PlannerContext,
     pub(crate) route: Route<L>,
     planning: Planning<L>,
     pub(crate) window: Window<L>,
     next: Window<L>,
-    /// How far the window is driven, s; none at rest.
-    pub(crate) driven_s: Option<f64>,
     flat: Flat<L>,
     before: Vec<Lanes<L>>,
-    pub(crate) emitter: Emitter,
+    pub(crate) driven: DrivenPath,
     /// Path coordinate and position at rest.
     pub(crate) at: f64,
     pub(crate) position: Lanes<L>,
     /// Least time that the blocks held take, s.
     pub(crate) held_s: f64,
-    finished: bool,
 }
 
 /// What the planner for any number of axes asks of one.
@@ -65,6 +70,12 @@ pub trait AnyCore: Send + std::fmt::Debug {
 impl<const L: usize> Core<L> {
     /// At rest.
     pub fn new(context: &PlannerContext, tuning: Tuning) -> Self {
+        Self { stream: Stream::new(&context.position), ahead: PathAhead::new(context, tuning) }
+    }
+}
+
+impl<const L: usize> PathAhead<L> {
+    fn new(context: &PlannerContext, tuning: Tuning) -> Self {
         let frame = Frame::new(context);
         Self {
             frame,
@@ -73,59 +84,32 @@ impl<const L: usize> Core<L> {
             planning: Planning::new(tuning),
             window: Window::new(),
             next: Window::new(),
-            driven_s: None,
             flat: Flat::default(),
             before: Vec::with_capacity(BEFORE),
-            emitter: Emitter::new(&context.position),
+            driven: DrivenPath::default(),
             at: 0.0,
             position: frame.lanes(&context.position),
             held_s: 0.0,
-            finished: false,
-        }
-    }
-
-    /// At rest: the next dwell or window.
-    fn begin(&mut self, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
-        match self.route.items.front() {
-            None => Ok(None),
-            Some(Item::Dwell(_)) => {
-                if let Some(Item::Dwell(block)) = self.route.pop() {
-                    self.emitter.begin_dwell(&block, sink);
-                }
-                Ok(Some(0.0))
-            }
-            Some(Item::Leg(leg)) if leg.end <= self.at + 1e-12 => {
-                self.skip(sink);
-                Ok(Some(0.0))
-            }
-            Some(Item::Leg(leg)) => {
-                let line = leg.block.line;
-                if !self.plan_from_rest() {
-                    return Err(PluginError::new(format!("line {line}: no motion from rest keeps the limits")));
-                }
-                self.driven_s = Some(0.0);
-                self.emitter.begin_window();
-                Ok(Some(0.0))
-            }
         }
     }
 
     /// A block too short to be a motion: it begins and ends.
-    fn skip(&mut self, sink: &mut dyn SegmentSink) {
+    fn skip(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
         if let Some(Item::Leg(leg)) = self.route.pop() {
             self.held_s -= leg.least_s;
-            if !self.emitter.knows(&leg.block) {
-                sink.block(&report(leg.block.index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0));
+            if !blocks.is_reported(&leg.block) {
+                let index = leg.block.index;
+                blocks.report(&report(index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0), sink);
             }
             self.position = self.frame.lanes(&leg.block.end);
-            self.emitter.rest(BlockId::from(&leg.block), &leg.block.end, sink);
+            blocks.rest(BlockId::from(&leg.block), &leg.block.end, self.driven.path_mm, sink);
         }
     }
 
     /// The longest window from rest that passes; in the end one chord.
-    fn plan_from_rest(&mut self) -> bool {
+    fn longest_from_rest(&mut self, finished: bool) {
         self.route.begin_run(self.at);
-        let run = self.route.run(self.at, self.finished);
+        let run = self.route.run(self.at, finished);
         let frame = &self.frame;
         let at = self.at;
         let here = run.chord_at(at, 0);
@@ -145,8 +129,7 @@ impl<const L: usize> Core<L> {
                 start.end = end;
                 if self.planning.plan(&run, frame, &start, &mut self.next) {
                     std::mem::swap(&mut self.window, &mut self.next);
-                    self.commit();
-                    return true;
+                    return;
                 }
                 // The next try ends where the path first turns, or has half the chords.
                 let last = run.chord_at(end.min(self.planning.end()) - 1e-9, here);
@@ -158,7 +141,15 @@ impl<const L: usize> Core<L> {
         let chord = run.chords[here];
         let counted = frame.counted(run.rotary);
         profile::drive(&run, frame, &counted, &chord, (at, chord.end()), &mut self.window);
-        true
+    }
+
+    /// Forgets everything: at rest at `position`.
+    fn reset(&mut self, position: &AxisVector) {
+        self.route.clear();
+        self.at = 0.0;
+        self.held_s = 0.0;
+        self.position = self.frame.lanes(position);
+        self.driven = DrivenPath::default();
     }
 
     fn tolerance_mm(&self, block: &Block) -> f64 {
@@ -166,9 +157,9 @@ impl<const L: usize> Core<L> {
         if stated.is_nan() { self.context.path_tolerance_mm } else { stated }
     }
 
-    /// Chooses until when the window is driven: to its end where that is a rest of the program, else to where it is fastest.
-    fn commit(&mut self) {
-        let window = &mut self.window;
+    /// Until when the window is driven, s: to its end where that is a rest of the program, else to where it is fastest.
+    fn commit_s(&self) -> f64 {
+        let window = &self.window;
         let whole_s = window.duration_s();
         let mut most = 0.0;
         let mut found = whole_s;
@@ -183,12 +174,47 @@ impl<const L: usize> Core<L> {
                 }
             }
         }
-        window.commit_s = found;
+        found
+    }
+
+    /// Until when the window is driven on where no other was found, s: for a while, near its end to its rest.
+    fn later_s(&self, now_s: f64) -> f64 {
+        let window = &self.window;
+        let whole_s = window.duration_s();
+        let later_s = now_s + LATER * whole_s;
+        let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
+        let commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
+        if commit_s > 0.97 * whole_s { whole_s } else { commit_s }
+    }
+}
+
+impl<const L: usize> Windows for PathAhead<L> {
+    fn next(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) -> Next {
+        match self.route.items.front() {
+            None => Next::Nothing,
+            Some(Item::Dwell(block)) => {
+                let block = *block;
+                self.route.pop();
+                self.position = self.frame.lanes(&block.end);
+                Next::Dwell(block, self.driven.path_mm)
+            }
+            Some(Item::Leg(leg)) if leg.end <= self.at + 1e-12 => {
+                self.skip(blocks, sink);
+                Next::Again
+            }
+            Some(Item::Leg(_)) => Next::Path,
+        }
+    }
+
+    fn plan_from_rest(&mut self, finished: bool) -> Result<f64, PluginError> {
+        self.longest_from_rest(finished);
+        self.driven.begin_window();
+        Ok(self.commit_s())
     }
 
     /// The next window, from the state where this one is left; where it is refused, or nothing more of the path is known,
     /// this one is driven on for a while.
-    fn go_on(&mut self, now_s: f64) {
+    fn plan_on(&mut self, now_s: f64, finished: bool) -> Planned {
         let window = &self.window;
         let period_s = self.context.fine_period_s;
         self.before.clear();
@@ -200,7 +226,7 @@ impl<const L: usize> Core<L> {
         }
         let state: State<L> = window.state(now_s);
         let s = window.along(now_s);
-        let run = self.route.run(s, self.finished);
+        let run = self.route.run(s, finished);
         let window_s = self.planning.tuning.window_s;
         let start = Start {
             state,
@@ -213,95 +239,87 @@ impl<const L: usize> Core<L> {
         };
         let known = run.end() <= self.window.end() + 1e-9;
         let closed = run.closed;
-        if !known && self.planning.plan(&run, &self.frame, &start, &mut self.next) {
+        let planned = if !known && self.planning.plan(&run, &self.frame, &start, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
-            self.driven_s = Some(0.0);
-            self.emitter.begin_window();
-            self.commit();
+            self.driven.begin_window();
+            Planned::NextWindow { commit_s: self.commit_s() }
         } else {
             self.window.whole |= known && closed;
-            self.drive_on(now_s);
-        }
+            Planned::SameWindow { commit_s: self.later_s(now_s) }
+        };
         self.route.forget(s);
+        planned
     }
 
-    /// Drives the window on for a while, near its end to its rest.
-    fn drive_on(&mut self, now_s: f64) {
-        let window = &mut self.window;
-        let whole_s = window.duration_s();
-        let later_s = now_s + LATER * whole_s;
-        let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
-        window.commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
-        if window.commit_s > 0.97 * whole_s {
-            window.commit_s = whole_s;
-        }
+    fn duration_s(&self) -> f64 {
+        self.window.duration_s()
+    }
+
+    fn emit(
+        &mut self,
+        from_s: f64,
+        commit_s: f64,
+        left_s: f64,
+        blocks: &mut Blocks,
+        sink: &mut dyn SegmentSink,
+    ) -> Emitted {
+        self.emit_motion((from_s, commit_s), left_s, blocks, sink)
+    }
+
+    fn rest(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
+        self.planning.effort.stops += u64::from(!self.window.whole);
+        self.emit_rest(blocks, sink);
     }
 }
 
 impl<const L: usize> AnyCore for Core<L> {
     fn has_room(&self, most_chords: usize) -> bool {
-        let held_s = self.held_s - self.front_driven_s();
-        let enough_s = HELD.0 * self.planning.tuning.window_s + HELD.1;
-        let held = self.route.chord_count().max(self.route.items.len());
-        self.route.items.is_empty() || held < most_chords && held_s < enough_s
+        let Self { stream, ahead } = self;
+        let driven_s = stream.driven_s().map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
+        let enough_s = HELD.0 * ahead.planning.tuning.window_s + HELD.1;
+        let held = ahead.route.chord_count().max(ahead.route.items.len());
+        ahead.route.items.is_empty() || held < most_chords && ahead.held_s - driven_s < enough_s
     }
 
     fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        let tolerance_mm = self.tolerance_mm(block);
-        flatten::check(&self.context.axes, &self.frame, (block, curve), tolerance_mm)
+        let ahead = &self.ahead;
+        let tolerance_mm = ahead.tolerance_mm(block);
+        flatten::check(&ahead.context.axes, &ahead.frame, (block, curve), tolerance_mm)
     }
 
     fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.finished = false;
+        self.stream.accepted();
+        let ahead = &mut self.ahead;
         if block.kind == tandem_sdk::BlockKind::Dwell {
-            self.route.push_dwell(block);
+            ahead.route.push_dwell(block);
             return Ok(());
         }
-        let tolerance_mm = self.tolerance_mm(block);
-        self.flat.lay(&self.context.axes, &self.frame, (block, curve), tolerance_mm)?;
-        self.held_s += self.route.push(block, &self.flat, &self.frame, self.context.max_feed_ratio, tolerance_mm);
-        self.flat.forget();
+        let tolerance_mm = ahead.tolerance_mm(block);
+        ahead.flat.lay(&ahead.context.axes, &ahead.frame, (block, curve), tolerance_mm)?;
+        let feed_ratio = ahead.context.max_feed_ratio;
+        ahead.held_s += ahead.route.push(block, &ahead.flat, &ahead.frame, feed_ratio, tolerance_mm);
+        ahead.flat.forget();
         Ok(())
     }
 
     fn finish(&mut self) {
-        self.finished = true;
+        self.stream.finish();
     }
 
     fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
-        if let Some(time_s) = self.emitter.writer.emit_dwell(left_s, sink) {
-            self.position = self.frame.lanes(&self.emitter.position);
-            return Ok(Some(time_s));
-        }
-        let Some(driven_s) = self.driven_s else { return self.begin(sink) };
-        if driven_s < self.window.commit_s {
-            return Ok(Some(self.emit_motion(driven_s, left_s, sink)));
-        }
-        if self.window.commit_s >= self.window.duration_s() {
-            let stopped = !self.window.whole;
-            self.emit_rest(sink);
-            self.planning.effort.stops += u64::from(stopped);
-        } else {
-            self.go_on(driven_s);
-        }
-        Ok(Some(0.0))
+        self.stream.emit(&mut self.ahead, left_s, sink)
     }
 
     fn is_done(&self) -> bool {
-        self.finished && self.route.items.is_empty() && self.driven_s.is_none() && !self.emitter.writer.is_dwelling()
+        self.stream.is_done(self.ahead.route.items.is_empty())
     }
 
     fn reset(&mut self, position: &AxisVector) {
-        self.route.clear();
-        self.driven_s = None;
-        self.finished = false;
-        self.at = 0.0;
-        self.held_s = 0.0;
-        self.position = self.frame.lanes(position);
-        self.emitter = Emitter::new(position);
+        self.stream = Stream::new(position);
+        self.ahead.reset(position);
     }
 
     fn effort(&self) -> Effort {
-        self.planning.effort
+        self.ahead.planning.effort
     }
 }

@@ -1,9 +1,10 @@
 //! Windows as segments.
 
-use tandem_motion::blocks::{BlockId, BlockWriter};
-use tandem_sdk::{AxisVector, Block, MAX_AXES, Segment, SegmentFlags, SegmentSink};
+use tandem_motion::blocks::BlockId;
+use tandem_motion::stream::{Blocks, Emitted};
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
-use crate::core::Core;
+use crate::core::PathAhead;
 use crate::report::{of_leg, path};
 use crate::route::{Item, Leg};
 
@@ -12,75 +13,42 @@ const STOP_JERK: f64 = 0.5;
 /// Least duration of a segment, s: the derivatives of a shorter one are rounding.
 const MIN_S: f64 = 5e-5;
 
-/// What segments say beside their motion.
-#[derive(Debug)]
-pub struct Emitter {
-    /// What segments of the present block say.
-    blank: Segment,
-    /// The block whose report was given last.
-    reported: Option<u64>,
-    pub(crate) writer: BlockWriter,
+/// The path coordinate of what was emitted.
+#[derive(Debug, Default)]
+pub struct DrivenPath {
     /// Length driven, mm.
-    path_mm: f64,
+    pub path_mm: f64,
     /// Path coordinate polynomial of the piece at `piece`, mm.
     path: [f64; 6],
     piece: Option<usize>,
-    /// Where the last rest is.
-    pub position: AxisVector,
 }
 
-impl Emitter {
-    /// At rest at `position`.
-    pub fn new(position: &AxisVector) -> Self {
-        Self {
-            blank: Segment::rest(position, 0.0),
-            reported: None,
-            writer: BlockWriter::new(3),
-            path_mm: 0.0,
-            path: [0.0; 6],
-            piece: None,
-            position: *position,
-        }
-    }
-
-    /// Whether the report of `block` was given.
-    pub fn knows(&self, block: &Block) -> bool {
-        self.reported == Some(block.index)
-    }
-
+impl DrivenPath {
     /// Another window begins.
     pub fn begin_window(&mut self) {
         self.piece = None;
     }
-
-    /// Begins a rest of the program.
-    pub fn begin_dwell(&mut self, block: &Block, sink: &mut dyn SegmentSink) {
-        self.position = block.end;
-        self.reported = Some(block.index);
-        self.writer.begin_dwell(BlockId::from(block), &block.end, block.dwell_s, self.path_mm, sink);
-    }
-
-    /// Rest at `position`, in or at the end of `block`.
-    pub fn rest(&mut self, block: BlockId, position: &AxisVector, sink: &mut dyn SegmentSink) {
-        self.position = *position;
-        self.reported = Some(block.index);
-        sink.segment(&self.writer.rest(block, position, self.path_mm));
-    }
 }
 
-impl<const L: usize> Core<L> {
-    /// Least time of the driven part of the leg in front, s.
-    pub(crate) fn front_driven_s(&self) -> f64 {
-        let (Some(leg), Some(t)) = (self.route.front(), self.driven_s) else { return 0.0 };
-        let share = (self.window.along(t) - leg.start) / (leg.end - leg.start).max(1e-12);
+impl<const L: usize> PathAhead<L> {
+    /// Least time of the part of the leg in front that is driven when `driven_s` of the window are, s.
+    pub(crate) fn front_driven_s(&self, driven_s: f64) -> f64 {
+        let Some(leg) = self.route.front() else { return 0.0 };
+        let share = (self.window.along(driven_s) - leg.start) / (leg.end - leg.start).max(1e-12);
         leg.least_s * share.clamp(0.0, 1.0)
     }
 
     /// Emits a segment: to the end of the piece, of the block, or of `left_s`.
-    pub(crate) fn emit_motion(&mut self, from_s: f64, left_s: f64, sink: &mut dyn SegmentSink) -> f64 {
+    pub(crate) fn emit_motion(
+        &mut self,
+        (from_s, commit_s): (f64, f64),
+        left_s: f64,
+        blocks: &mut Blocks,
+        sink: &mut dyn SegmentSink,
+    ) -> Emitted {
         let period_s = self.frame.period_s;
         let k = self.window.piece_at(from_s);
-        let mut until_s = self.window.pieces[k].end_s().min(self.window.commit_s);
+        let mut until_s = self.window.pieces[k].end_s().min(commit_s);
         if from_s + left_s < until_s - MIN_S {
             until_s = from_s + left_s.max(MIN_S);
         }
@@ -88,12 +56,12 @@ impl<const L: usize> Core<L> {
         let mut ends = false;
         while let Some(leg) = self.route.front() {
             let end_s = if leg.end < self.window.end() - 1e-9 { self.window.time_of(leg.end) } else { f64::INFINITY };
-            self.begin_leg(from_s, end_s, sink);
+            self.begin_leg(from_s, end_s, blocks, sink);
             // Blocks of which less than a fine period is left share a segment: it is named by the last of them, and has the
             // highest of their feeds.
             let another = self.route.items.len() > 1;
             if end_s < from_s + period_s && another {
-                merged_feed = merged_feed.max(self.emitter.blank.feed_mm_per_s);
+                merged_feed = merged_feed.max(blocks.blank.feed_mm_per_s);
                 self.pop_leg();
                 continue;
             }
@@ -103,31 +71,28 @@ impl<const L: usize> Core<L> {
             }
             break;
         }
-        let mut segment = self.draw(k, from_s, until_s);
+        let mut segment = self.draw(k, from_s, until_s, &blocks.blank);
         segment.feed_mm_per_s = segment.feed_mm_per_s.max(merged_feed);
         if ends {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
             self.pop_leg();
         }
-        self.emitter.blank.flags = self.emitter.blank.flags.without(SegmentFlags::BLOCK_BEGINS);
-        self.driven_s = Some(until_s);
+        blocks.has_begun();
         segment.duration_s = until_s - from_s;
         sink.segment(&segment);
-        segment.duration_s
+        Emitted { until_s, duration_s: segment.duration_s }
     }
 
     /// Gives the report of the leg in front, where that was not done.
-    fn begin_leg(&mut self, from_s: f64, end_s: f64, sink: &mut dyn SegmentSink) {
+    fn begin_leg(&self, from_s: f64, end_s: f64, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
         let Some(leg) = self.route.front() else { return };
-        if self.emitter.knows(&leg.block) {
+        if blocks.is_reported(&leg.block) {
             return;
         }
         let to_s = end_s.min(self.window.duration_s()).max(from_s);
         let start_s = self.window.time_of(leg.start).min(from_s).min(to_s);
-        sink.block(&of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (start_s, to_s)));
-        let block = leg.block;
-        self.emitter.reported = Some(block.index);
-        self.emitter.blank = self.emitter.writer.blank(&block);
+        let report = of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (start_s, to_s));
+        blocks.begin(&leg.block, &report, sink);
     }
 
     fn pop_leg(&mut self) {
@@ -137,15 +102,15 @@ impl<const L: usize> Core<L> {
     }
 
     /// The part of piece `k` from `from_s` to `until_s`.
-    fn draw(&mut self, k: usize, from_s: f64, until_s: f64) -> Segment {
+    fn draw(&mut self, k: usize, from_s: f64, until_s: f64, blank: &Segment) -> Segment {
         let piece = &self.window.pieces[k];
         let rotary = self.route.front().is_some_and(|leg| leg.rotary);
-        if self.emitter.piece != Some(k) {
+        if self.driven.piece != Some(k) {
             let counted = self.frame.counted(rotary);
-            self.emitter.path_mm = path(&counted, piece, self.emitter.path_mm, &mut self.emitter.path);
-            self.emitter.piece = Some(k);
+            self.driven.path_mm = path(&counted, piece, self.driven.path_mm, &mut self.driven.path);
+            self.driven.piece = Some(k);
         }
-        let mut segment = self.emitter.blank;
+        let mut segment = *blank;
         let t = from_s - piece.start_s;
         for axis in 0..self.frame.count {
             let lane: [f64; 6] = std::array::from_fn(|n| piece.c[n][axis] / self.frame.scale[axis]);
@@ -154,7 +119,7 @@ impl<const L: usize> Core<L> {
         for axis in self.frame.count..MAX_AXES {
             segment.coefficients[axis] = [0.0; 6];
         }
-        segment.path = shifted(&self.emitter.path, t);
+        segment.path = shifted(&self.driven.path, t);
         segment.duration_s = until_s - from_s;
         let a = self.window.stop.deceleration();
         let v = self.window.stop.speed.max(1e-9);
@@ -165,38 +130,33 @@ impl<const L: usize> Core<L> {
     }
 
     /// Rest where the window ends: exactly at the end of a block, where one ends there.
-    pub(crate) fn emit_rest(&mut self, sink: &mut dyn SegmentSink) {
+    pub(crate) fn emit_rest(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
         let end = self.window.end();
         let end_state = self.window.state(self.window.duration_s());
-        self.driven_s = None;
         self.at = end;
         self.position = end_state[0];
         let mut exact = self.frame.axes(&self.position);
-        let mut named = BlockId { index: self.emitter.blank.block, line: self.emitter.blank.line };
+        let mut named = blocks.present();
         let mut ended = false;
         while let Some(leg) = self.route.front().filter(|leg| leg.end <= end + 1e-9) {
             exact = leg.block.end;
             ended = true;
             named = BlockId::from(&leg.block);
-            self.report_last(&leg.clone(), sink);
+            self.report_last(leg, blocks, sink);
             self.pop_leg();
         }
         if ended {
             self.position = self.frame.lanes(&exact);
         }
-        self.emitter.rest(named, &exact, sink);
-        if !ended {
-            // The block in front goes on behind the rest, and its report is given.
-            self.emitter.reported = Some(named.index);
-        }
+        blocks.rest(named, &exact, self.driven.path_mm, sink);
     }
 
-    fn report_last(&mut self, leg: &Leg, sink: &mut dyn SegmentSink) {
-        if !self.emitter.knows(&leg.block) {
+    fn report_last(&self, leg: &Leg, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
+        if !blocks.is_reported(&leg.block) {
             let to_s = self.window.duration_s();
             let from_s = self.window.time_of(leg.start).min(to_s);
-            sink.block(&of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (from_s, to_s)));
-            self.emitter.reported = Some(leg.block.index);
+            let report = of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (from_s, to_s));
+            blocks.report(&report, sink);
         }
     }
 }

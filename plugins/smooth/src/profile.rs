@@ -89,7 +89,6 @@ pub fn drive<const L: usize>(
     }
     window.stop = stop(frame, counted, direction, peak);
     window.whole = true;
-    window.commit_s = t;
 }
 
 /// What is left for a stop on a straight path: all of the limits.

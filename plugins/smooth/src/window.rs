@@ -89,8 +89,6 @@ pub struct Window<const L: usize> {
     pub marks: Vec<Mark>,
     /// It ends where the run ends, and the run is closed.
     pub whole: bool,
-    /// Until when it is to be driven, s.
-    pub commit_s: f64,
     /// What it leaves for a stop.
     pub stop: Stop,
 }
@@ -127,7 +125,6 @@ impl<const L: usize> Window<L> {
             pieces: Vec::with_capacity(INTERVALS.1),
             marks: Vec::with_capacity(MAX_MARKS),
             whole: false,
-            commit_s: 0.0,
             stop: Stop::default(),
         }
     }
