@@ -7,6 +7,7 @@ use tandem_sdk::{
 };
 
 use crate::error::{HostError, refusal};
+use crate::plugins::hang::HangWatch;
 use crate::plugins::{loading, plugin_log};
 
 /// The plugins a host knows. It names none itself: they are registered from outside, or loaded by path.
@@ -154,8 +155,10 @@ fn refused(plugin: Plugin, error: &PluginError) -> PluginRefusal {
     PluginRefusal { option: error.option().map(str::to_string), cause }
 }
 
-/// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. Host.
+/// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. The drivers are made
+/// under watch, for a constructor that does not come back is told as such. Host.
 pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
+    let _watch = HangWatch::of(machine);
     machine.drivers.iter().any(|driver| is_real(driver, registry))
 }
 

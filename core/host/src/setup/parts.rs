@@ -15,6 +15,7 @@ use tandem_sdk::{
 use crate::error::HostError;
 use crate::joints::{CoupledJoints, JointSpace};
 use crate::messages::roles;
+use crate::plugins::hang::HangWatch;
 use crate::plugins::registry::Registry;
 use crate::policy::{Means, PolicyHost, Tuner};
 use crate::setup::dry_run::DryRun;
@@ -99,6 +100,7 @@ fn tool(tool: &tandem_machine::Tool) -> Tool {
 /// # Errors
 /// The planner is not there or refuses its options; or what is wrong with the joints.
 pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
+    let _watch = HangWatch::of(machine);
     planner_on(machine, registry, &Arc::new(JointSpace::of(machine, registry)?))
 }
 
