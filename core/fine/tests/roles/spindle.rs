@@ -2,12 +2,13 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::{FaultKind, InputFault};
+use tandem_fine::{FaultKind, FineConfig, InputFault, Roles};
 use tandem_rig::Random;
 use tandem_rings::{MachineState, RestCause, Sample, StopCause};
-use tandem_sdk::{AxisVector, StopOn};
+use tandem_sdk::{Attached, AxisVector, EventKind, MAX_AXES, StopOn};
 
-use crate::bench::{AT_SPEED_WITHIN_S, Bench, Doing, Role, SPIN_UP, SPINDLE_RAD_PER_S};
+use crate::bench::{self, AT_SPEED_WITHIN_S, Bench, Doing, Role, SPIN_UP, SPINDLE_RAD_PER_S};
+use crate::demanding::{self, Script};
 
 /// Exchanges behind which the drives have answered.
 const ANSWERED: usize = 2;
@@ -31,7 +32,7 @@ fn bench(role: Role, spin_up: u32) -> Bench {
 }
 
 /// Setpoints from the one that turned the spindle to the first that moved behind it, and the first that moved.
-fn waited(bench: &Bench) -> (usize, AxisVector) {
+fn waited(bench: &demanding::Bench) -> (usize, AxisVector) {
     let told = &bench.script().told;
     let turned = told.iter().position(|(told, _)| told.spindle_rad_per_s != 0.0).unwrap();
     let moved = turned + told[turned..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO).unwrap();
@@ -74,6 +75,35 @@ fn a_cut_begins_when_the_spindle_turns_and_not_before() {
         bench.queue_move(StopOn::default());
         bench.ticks(2);
         assert_ne!(bench.told().velocity, AxisVector::ZERO, "seed {seed}");
+    }
+}
+
+/// A driver whose answers are behind says in the first of them that the spindle turns as it was told before.
+#[test]
+fn a_cut_waits_until_the_drives_with_their_delay_have_answered_to_the_new_speed() {
+    for seed in 1..=40 {
+        let mut random = Random::new(seed);
+        let (delay, spin_up) = (random.below(8) as usize, random.below(6) as u32);
+        let mut attached = Attached::default();
+        // One joint is slower than the other.
+        attached.delay_periods[random.below(2) as usize] = delay as u32;
+        // The positions of these drives are not late, which would be judged.
+        let max_following_error_mm = AxisVector([f64::INFINITY; MAX_AXES]);
+        let config = FineConfig { attached, max_following_error_mm, ..bench::config(Roles::default(), 0) };
+        let mut bench = demanding::Bench::new(&config, Script { spin_up, ..bench::script(0) });
+        assert_eq!(bench.rest(100).map(|rest| rest.cause), Some(RestCause::Attached));
+        bench.queue_event(EventKind::Spindle, 0, SPINDLE_RAD_PER_S);
+        bench.queue(0, 0.2, 1.0, StopOn::default());
+        bench.ticks(30);
+        let expected = (spin_up as usize + 1).max(ANSWERED + delay);
+        assert_eq!(waited(&bench).0, expected, "seed {seed}: delay {delay}, turns behind {spin_up}");
+        bench.ticks(MOVE + 100);
+        // What is to stand is waited for by nothing.
+        bench.queue_event(EventKind::Spindle, 0, 0.0);
+        bench.queue(0, 0.2, 1.0, StopOn::default());
+        bench.ticks(2);
+        assert_eq!((bench.fault(), bench.told().spindle_rad_per_s), (None, 0.0), "seed {seed}");
+        assert_ne!(bench.told().velocity, AxisVector::ZERO, "seed {seed}: delay {delay}");
     }
 }
 
