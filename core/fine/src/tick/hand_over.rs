@@ -53,7 +53,7 @@ impl FineLoop {
         let (bit, state) = (1_u32 << hand.joint, self.feedback.state[hand.joint]);
         let is_new = self.feedback.age_periods[hand.joint] == 0;
         hand.begun |= is_new && (state == JointState::Homing || self.feedback.homed & bit == 0);
-        let homed = hand.told && hand.begun && is_new && self.feedback.homed & bit != 0;
+        let homed = hand.told && hand.begun && self.feedback.homed & bit != 0;
         hand.given_up |= self.given.abort || self.is_jog_let_go();
         if is_new && state == JointState::Enabled && (homed || hand.given_up) {
             self.take_back(hand.joint);
