@@ -1,5 +1,9 @@
 //! EtherCAT drives behind the host, on the emulator and on virtual time: what goes wrong in any frame of a program.
 
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
 use tandem_host::{Clock, Run, Switches};
 use tandem_machine::Machine;
 use tandem_rig::Random;
@@ -295,4 +299,77 @@ fn runs_repeat_to_the_bit() {
         assert!(one.samples.0.len() > 20);
         assert!(format!("{:?}", one.samples.0) == format!("{:?}", two.samples.0), "{options}");
     }
+}
+
+fn example() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/ethercat.toml")
+}
+
+/// Homes the example machine by its drives and runs a program on it.
+fn run_on_the_example(text: &str) -> Ran {
+    let machine = Machine::read(&example(), &[]).unwrap();
+    let switches = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
+    let run = Run::prepare(machine, &registry(), program(text), switches).unwrap_or_else(|error| panic!("{error}"));
+    let mut samples = Samples::default();
+    let outcome = run.drive(Clock::Virtual, &[], &mut samples).unwrap();
+    assert_eq!((outcome.summary.limit_violations, outcome.summary.guard_stops), (0, 0));
+    Ran { samples, fault: outcome.summary.fault, refused: false }
+}
+
+/// The whole tower: drives that home themselves, programs, a spindle that is waited for.
+#[test]
+fn the_example_machine_homes_and_runs_the_example_programs() {
+    for name in ["square", "spiral", "serpentine", "raster"] {
+        let program = example().with_file_name(format!("../programs/{name}.ngc"));
+        let program = std::fs::read_to_string(program).unwrap();
+        let ran = run_on_the_example(&program.replacen("G64", "M3 S3000\nG64", 1));
+        assert_eq!(ran.fault, None, "{name}");
+        let last = ran.samples.0.last().unwrap();
+        for axis in 0..3 {
+            let away = (last.feedback[axis] - last.command[axis]).abs();
+            // Feedback is a period behind, and a drive settles for some more.
+            assert!(away < 0.02, "{name}: axis {axis} stands {away} mm off");
+        }
+    }
+}
+
+/// The probe closes an input of every drive: what each caught at the edge is the point.
+#[test]
+fn the_example_machine_touches_off() {
+    let ran = run_on_the_example("G21 G90 G94 F300\nG38.2 Z-30\nG1 Z5\nM2\n");
+    assert_eq!(ran.fault, None);
+    let lowest = ran.samples.0.iter().map(|sample| sample.command[2]).fold(f64::INFINITY, f64::min);
+    assert!((-20.5..-20.0).contains(&lowest), "the plate is at -20 mm: {lowest}");
+}
+
+/// A fault in mid-program, its reset, and on: as an operator does it, through the command.
+#[test]
+fn a_fault_is_reset_and_the_machine_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("machine.toml");
+    let what = "kind = \"drive-fault\", device = 1, code = 0x7305, stays = false";
+    std::fs::write(&path, std::fs::read_to_string(example()).unwrap() + &fault("ms = 14000.0", "", what)).unwrap();
+    let tandem = |arguments: &[&str], input: &str| {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_tandem"))
+            .args(arguments)
+            .arg("--machine")
+            .arg(&path)
+            .args(["--home", "--clock", "virtual"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let told = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        (output.status.code(), told.to_string())
+    };
+    let words = "fault: driver bus (ethercat): the drive of axis Y reports fault 0x7305 (device 1: encoder 1)";
+    let (status, told) = tandem(&["mdi"], "G90 G1 X30 F600\n!reset\nG1 X5 Y2\nquit\n");
+    assert!(told.contains(words), "{told}");
+    assert!(told.contains("x_mm 5.0000  y_mm 2.0000  z_mm 0.0000"), "{told}");
+    assert_eq!(status, Some(0), "{told}");
+    let (status, told) = tandem(&["run", "-"], "G21 G90 G94 F300\nG1 X30\nM2\n");
+    assert!(status == Some(3) && told.contains(words), "{status:?} {told}");
 }

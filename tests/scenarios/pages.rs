@@ -173,6 +173,7 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md", 2;
+    ethercat: "docs/ethercat.md", 1;
     faults: "docs/faults.md", 2;
     force_control: "docs/force-control.md", 1;
     homing: "docs/homing.md", 1;

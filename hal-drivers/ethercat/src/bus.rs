@@ -6,7 +6,7 @@ use tandem_sdk::{Attached, AxisVector, DriverContext, Feedback, JointState, MAX_
 use crate::bring_up::{self, Ready, refuses};
 use crate::check::emulated;
 use crate::cyclic::Cyclic;
-use crate::drive::Moves;
+use crate::drive::{Drive, Moves};
 use crate::link::Link;
 use crate::map::u16_at;
 use crate::master::Master;
@@ -44,6 +44,18 @@ struct Member {
     al_code: u16,
     /// Its inputs, as they came last.
     inputs: Vec<u8>,
+}
+
+/// How a device is.
+pub(crate) struct Seen<'a> {
+    pub(crate) called: &'a str,
+    /// Registers 0x0130 and 0x0134.
+    pub(crate) al: u16,
+    pub(crate) al_code: u16,
+    /// Status word of a drive.
+    pub(crate) status: Option<u16>,
+    /// Why it counts as lost.
+    pub(crate) lost: Option<u32>,
 }
 
 /// Exchanges and what became of them, since the start.
@@ -306,9 +318,8 @@ impl Bus {
                 }
             }
         }
-        if came {
-            self.phase_ns = cyclic.clock_ns().map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
-        }
+        let clock_ns = if came { cyclic.clock_ns() } else { None };
+        self.phase_ns = clock_ns.map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
         self.ask_on(came);
     }
 
@@ -362,9 +373,8 @@ impl Bus {
             // The contract has no state for a spindle: what stops the axes on their ramps is a joint's.
             (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE + code);
         }
-        if let Some(phase_ns) = self.phase_ns {
-            (feedback.has_phase, feedback.phase_ns) = (1, phase_ns);
-        }
+        // Where nothing was heard, the clock is not steered by what was heard before.
+        (feedback.has_phase, feedback.phase_ns) = self.phase_ns.map_or((0, 0), |phase_ns| (1, phase_ns));
     }
 
     /// Where the joints stand.
@@ -379,7 +389,7 @@ impl Bus {
         for member in &self.members {
             let options = &self.options.devices[member.ready.options];
             if let (Some(Moves::Joint(joint)), Encoder::Incremental) =
-                (member.ready.drive.as_ref().map(crate::drive::Drive::moves), options.encoder)
+                (member.ready.drive.as_ref().map(Drive::moves), options.encoder)
             {
                 attached.known &= !(1 << joint);
                 attached.homed &= !(1 << joint);
@@ -407,13 +417,17 @@ impl Bus {
         self.members.clear();
     }
 
-    /// Device, state of the bus, status word of its drive, whether it is lost: for people who watch.
-    pub(crate) fn watch(&self) -> Vec<(String, u16, u16, Option<u16>, Option<u32>)> {
-        let line = |member: &Member| {
-            let status = member.ready.drive.as_ref().map(crate::drive::Drive::status);
-            (member.ready.called.clone(), member.al, member.al_code, status, member.lost)
-        };
-        self.members.iter().map(line).collect()
+    /// How every device is, for people who watch.
+    pub(crate) fn watch(&self) -> Vec<Seen<'_>> {
+        let members = self.members.iter();
+        let seen = members.map(|member| Seen {
+            called: &member.ready.called,
+            al: member.al,
+            al_code: member.al_code,
+            status: member.ready.drive.as_ref().map(Drive::status),
+            lost: member.lost,
+        });
+        seen.collect()
     }
 
     /// How far the last exchange was from its phase, ns.

@@ -17,6 +17,9 @@ const EMULATED_RESERVE: f64 = 4.0;
 /// Travel that an emulated drive made of options lags by before it faults, mm or rad.
 const EMULATED_WINDOW: f64 = 5.0;
 
+/// Behind the last number of a line.
+const MAX_LINE: i32 = MAX_DIGITAL as i32;
+
 fn wrong(key: impl Into<String>, words: impl Into<String>) -> PluginError {
     PluginError::of_option(key, words)
 }
@@ -100,7 +103,7 @@ fn judge_device(device: &DeviceOptions) -> Result<(), (String, String)> {
         return refuse("probe", "latch is 1 or 2, input 0 to 63, of a drive that moves a joint".to_string());
     }
     for (key, lines) in [("inputs", &device.inputs), ("outputs", &device.outputs)] {
-        if lines.iter().any(|line| !(-1..MAX_DIGITAL as i32).contains(line)) || lines.len() > MAX_DIGITAL {
+        if lines.iter().any(|line| *line < -1 || *line >= MAX_LINE) || lines.len() > MAX_DIGITAL {
             return refuse(key, "numbers of the driver's lines, 0 to 63, or -1 for a bit that is none".to_string());
         }
     }

@@ -101,6 +101,7 @@ pub(crate) struct Constants {
 
 /// One drive.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "each is asked for by itself")]
 pub(crate) struct Drive {
     constants: Constants,
     places: Places,

@@ -19,7 +19,7 @@ const SILENT_PERIODS: u64 = 3;
 
 /// A bus of drives and terminals behind the driver contract.
 ///
-/// On the wall clock a thread of ordinary priority exchanges where the host does not: between the start and the first exchange,
+/// On the wall clock a thread exchanges where the host does not, with real-time priority where the system grants it: between the start and the first exchange,
 /// and behind the last one. It holds enabled joints where they are; joints that move while the host falls silent are stopped by
 /// their drives.
 #[derive(Debug)]
@@ -107,6 +107,7 @@ impl EthercatDrives {
         self.keeper = std::thread::Builder::new()
             .name("ethercat".to_string())
             .spawn(move || {
+                ask_for_priority();
                 while !shared.ends.load(Ordering::Relaxed) {
                     let begun = Instant::now();
                     let heard_ns = shared.heard_ns.load(Ordering::Acquire);
@@ -241,6 +242,16 @@ impl Driver for EthercatDrives {
             None => Words::new(words),
         }
     }
+}
+
+/// Real-time priority of the keeper: above every ordinary program, below the fine loop (`loops.fine_priority`, 80).
+const KEEPER_PRIORITY: i32 = 40;
+
+/// Asks for real-time priority for this thread; a computer that grants none keeps the bus alive as well as it can.
+fn ask_for_priority() {
+    let parameter = libc::sched_param { sched_priority: KEEPER_PRIORITY };
+    // SAFETY: the thread is this one, and the structure is read only.
+    let _ = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameter) };
 }
 
 /// The keeper had the bus for too long: nothing was heard in this period.

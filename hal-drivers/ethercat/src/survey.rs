@@ -9,7 +9,7 @@ use tandem_ethercat_emulator::BusDescription;
 use tandem_sdk::{DriverContext, Name};
 
 use crate::bring_up::{self, Identity};
-use crate::bus::{Bus, Counters};
+use crate::bus::{Bus, Counters, Seen};
 use crate::check::MAX_DEVICES;
 use crate::coe::Objects;
 use crate::link::Link;
@@ -288,13 +288,14 @@ pub fn watch(
 }
 
 fn watched(bus: &Bus) -> Vec<Watched> {
-    let line = |(called, al, code, word, lost): (String, u16, u16, Option<u16>, Option<u32>)| {
+    let line = |seen: Seen<'_>| {
+        let (al, code) = (seen.al, seen.al_code);
         let error = if al & 0x10 != 0 { format!(", {code:04X}: {}", al_code(code)) } else { String::new() };
         Watched {
-            called,
+            called: seen.called.to_string(),
             state: format!("{}{error}", al_state(al)),
-            status: word.map(|word| format!("{word:04X} {}", status(word))),
-            lost: lost.map(joint_code),
+            status: seen.status.map(|word| format!("{word:04X} {}", status(word))),
+            lost: seen.lost.map(joint_code),
         }
     };
     bus.watch().into_iter().map(line).collect()

@@ -239,6 +239,62 @@ fn a_fault_in_any_state_stays_until_it_is_reset() {
     }
 }
 
+/// A reply that comes late, twice or out of order is never the one awaited: feedback is old where it is, and never old as new.
+#[test]
+fn no_reply_of_another_exchange_is_taken_for_the_one_awaited() {
+    let ride = |what: Option<What>| {
+        let mut rig = Rig::of(&format!("{}{}", drive(0, "x", ""), emulated("")), &["x"]);
+        rig.enable();
+        let mut seen = vec![];
+        for n in 0..60 {
+            if let Some(what) = what.clone().filter(|_| n == 20) {
+                rig.inject(what);
+            }
+            rig.go(0.02);
+            seen.push((rig.feedback.age_periods[0], rig.feedback.position[0]));
+        }
+        seen
+    };
+    let whole = ride(None);
+    for (what, old) in [
+        (What::Late { by_us: 900.0 }, 1),
+        (What::Late { by_us: 1500.0 }, 1),
+        (What::Late { by_us: 255_000.0 }, 1),
+        (What::Duplicate { after_us: 950.0 }, 0),
+        (What::Duplicate { after_us: 2001.0 }, 0),
+        (What::Swapped, 1),
+        (What::Foreign, 0),
+        (What::Stray, 0),
+        (What::LostReply, 1),
+    ] {
+        let seen = ride(Some(what.clone()));
+        assert_eq!(seen.iter().map(|(age, _)| u64::from(*age)).sum::<u64>(), old, "{what:?}");
+        for (n, ((age, position), (_, undisturbed))) in seen.iter().zip(&whole).enumerate() {
+            assert!(*age > 0 || position == undisturbed, "{what:?}: exchange {n}: {position} is not new");
+        }
+    }
+}
+
+/// Eight drives in periods of 250 µs: one frame holds them, and they are in OP within 3 s of their power-on.
+#[test]
+fn eight_drives_are_up_within_three_seconds_and_exchange_every_250_us() {
+    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
+    for sync in ["free-run", "dc"] {
+        let drives: String = (0..).zip(names).map(|(position, name)| drive(position, name, "")).collect();
+        let (driver, mut context) = Rig::open(&format!("sync = \"{sync}\"\n{drives}"), &names);
+        context.fine_period_s = 250e-6;
+        let mut rig = Rig::with(driver, &context);
+        let up_ns = rig.emulator(|wire| wire.bus().now_ns());
+        assert!(up_ns < 3_000_000_000, "{sync}: {} ms", up_ns / 1_000_000);
+        println!("{sync}: eight drives are in OP {} ms behind their power-on", up_ns / 1_000_000);
+        rig.setpoint.enable = 1;
+        (0..400).for_each(|_| rig.exchange());
+        assert_eq!(rig.feedback.state, [JointState::Enabled; 8], "{sync}");
+        let counters = rig.driver.counters();
+        assert_eq!((counters.lost, counters.short, counters.strays), (0, 0, 0), "{sync}");
+    }
+}
+
 /// A joint that is lost stays so until the bus is brought up anew, and is as before then.
 #[test]
 fn a_lost_drive_stays_lost_until_the_bus_is_brought_up_again() {
