@@ -304,18 +304,15 @@ impl Bus {
         }
         for (number, member) in self.members.iter_mut().enumerate() {
             let inputs = if came { cyclic.inputs(number) } else { None };
-            match inputs.filter(|_| cyclic.took(number)) {
-                Some(inputs) => {
-                    member.silent = 0;
-                    member.inputs.copy_from_slice(inputs);
-                    if let Some(drive) = &mut member.ready.drive {
-                        drive.answer(&member.inputs);
-                    }
+            if let Some(inputs) = inputs.filter(|_| cyclic.took(number)) {
+                member.silent = 0;
+                member.inputs.copy_from_slice(inputs);
+                if let Some(drive) = &mut member.ready.drive {
+                    drive.answer(&member.inputs);
                 }
-                None => {
-                    self.counters.short += u64::from(came);
-                    member.miss(came, self.options.max_lost_frames);
-                }
+            } else {
+                self.counters.short += u64::from(came);
+                member.miss(came, self.options.max_lost_frames);
             }
         }
         let clock_ns = if came { cyclic.clock_ns() } else { None };
@@ -490,7 +487,7 @@ fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Lat
     let same = latches[..count].iter_mut().find(|other| other.input == latch.input && other.edge == latch.edge);
     if let Some(other) = same {
         other.joints |= latch.joints;
-        other.position = other.position + latch.position;
+        other.position += latch.position;
         return count;
     }
     match latches.get_mut(count) {

@@ -18,7 +18,8 @@ const EMULATED_RESERVE: f64 = 4.0;
 const EMULATED_WINDOW: f64 = 5.0;
 
 /// Behind the last number of a line.
-const MAX_LINE: i32 = MAX_DIGITAL as i32;
+const MAX_LINE: i32 = 64;
+const _: () = assert!(MAX_LINE as usize == MAX_DIGITAL);
 
 fn wrong(key: impl Into<String>, words: impl Into<String>) -> PluginError {
     PluginError::of_option(key, words)

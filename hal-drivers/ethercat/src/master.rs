@@ -56,7 +56,7 @@ impl Master {
             // A computer without real-time scheduling may keep a process waiting for so long.
             pdu: Duration::from_millis(100),
             eeprom: Duration::from_millis(500),
-            mailbox_response: Duration::from_millis(1000),
+            mailbox_response: Duration::from_secs(1),
             ..Timeouts::default()
         };
         let config = MainDeviceConfig {

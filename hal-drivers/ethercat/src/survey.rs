@@ -129,7 +129,7 @@ impl Survey {
     /// What does not answer, or cannot be set up.
     pub fn scan(&mut self) -> Result<Vec<Found>, String> {
         let (master, link) = self.parts()?;
-        let found = master.run(link, |main| async move {
+        master.run(link, |main| async move {
             let group: SubDeviceGroup<MAX_DEVICES, MAX_BYTES> =
                 main.init_single_group(time::now_ns).await.map_err(|error| failed(&error))?;
             let mut found = vec![];
@@ -157,8 +157,7 @@ impl Survey {
             }
             bring_up::leave(main).await;
             Ok(found)
-        });
-        found
+        })
     }
 
     /// The states of all devices, which stay as they are.
