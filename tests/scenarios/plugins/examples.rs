@@ -106,7 +106,8 @@ fn options_are_listed_with_meaning_and_default() {
     let library = third_party("one-block");
     let (status, out, _) = tandem(&["plugin", "list", "-v", library.to_str().unwrap()]);
     assert_eq!(status, 0);
-    for words in ["planner", "one-block", "1.0.0", "plugin contract 3", "buffer_blocks = 64", "Blocks taken ahead"] {
+    let contract = format!("plugin contract {}", tandem_sdk::ABI_VERSION);
+    for words in ["planner", "one-block", "1.0.0", &contract, "buffer_blocks = 64", "Blocks taken ahead"] {
         assert!(out.contains(words), "{words}: {out}");
     }
     let (_, out, _) = tandem(&["plugin", "list", "--verbose"]);
