@@ -244,7 +244,8 @@ fn no_reply_of_another_exchange_is_taken_for_the_one_awaited() {
         let mut rig = Rig::of(&format!("{}{}", drive(0, "x", ""), emulated("")), &["x"]);
         rig.enable();
         let mut seen = vec![];
-        for n in 0..60 {
+        // As many as a number of eight bits takes to come round, and more.
+        for n in 0..300 {
             if let Some(what) = what.clone().filter(|_| n == 20) {
                 rig.inject(what);
             }
@@ -257,7 +258,7 @@ fn no_reply_of_another_exchange_is_taken_for_the_one_awaited() {
     for (what, old) in [
         (What::Late { by_us: 900.0 }, 1),
         (What::Late { by_us: 1500.0 }, 1),
-        (What::Late { by_us: 255_000.0 }, 1),
+        (What::Late { by_us: 256_000.0 }, 1),
         (What::Duplicate { after_us: 950.0 }, 0),
         (What::Duplicate { after_us: 2001.0 }, 0),
         (What::Swapped, 1),
