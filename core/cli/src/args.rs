@@ -39,6 +39,12 @@ pub enum Command {
     Home(Home),
     /// Move single axes by hand: with keys, over a socket, or by lines of a pipe; q, or the line quit, ends
     Jog(Box<Jog>),
+    /// Stay: one process that keeps drives, offsets and tools, and takes programs, lines, jogs and homing from its clients
+    Serve(Box<Serve>),
+    /// Say in one line what a controller's machine does
+    Status(Status),
+    /// Send one request to a controller, and print the answer
+    Ask(Ask),
     /// Say how long part programs take; nothing moves
     Estimate(Estimate),
     /// Find out by an experiment how a control takes its time, for estimates
@@ -162,6 +168,60 @@ pub struct Operator {
     /// The token that clients over TCP name first; a random one is made where the file does not exist
     #[arg(long, value_name = "F", requires = "listen_tcp")]
     pub token_file: Option<PathBuf>,
+}
+
+#[derive(Group)]
+pub struct Serve {
+    #[command(flatten)]
+    pub machine: MachineFile,
+    /// The file in which offsets, parameters and tools last; where it lies otherwise, docs/controller.md says
+    #[arg(long, value_name = "FILE.sqlite")]
+    pub state: Option<PathBuf>,
+    /// Keep nothing beyond this process
+    #[arg(long, conflicts_with = "state")]
+    pub no_state: bool,
+    #[command(flatten)]
+    pub operator: Operator,
+    /// The folder of the programs that clients may load by their path
+    #[arg(long, value_name = "FOLDER")]
+    pub programs: Option<PathBuf>,
+    /// Enable real drives at once; simulated ones are enabled without it
+    #[arg(long)]
+    pub enable: bool,
+    /// Leave the drives disabled until a client enables them
+    #[arg(long, conflicts_with = "enable")]
+    pub disabled: bool,
+    /// The clock; virtual replays --requests, exactly and as fast as the processor allows
+    #[arg(long, default_value = "wall")]
+    pub clock: Clock,
+    /// What clients ask, by fine periods: JSON lines as docs/controller.md has them
+    #[arg(long, value_name = "F.jsonl")]
+    pub requests: Option<PathBuf>,
+    /// For tests: fine periods that are counted before the first
+    #[arg(long, value_name = "N", default_value = "0", hide = true)]
+    pub uptime_periods: u64,
+}
+
+#[derive(Group)]
+pub struct Status {
+    /// The controller's socket
+    #[arg(long, value_name = "SOCKET")]
+    pub connect: PathBuf,
+    /// Go on, a line whenever it is another
+    #[arg(long)]
+    pub watch: bool,
+}
+
+#[derive(Group)]
+pub struct Ask {
+    /// The controller's socket
+    #[arg(long, value_name = "SOCKET")]
+    pub connect: PathBuf,
+    /// The request, as in mdi, start, home
+    pub request: String,
+    /// What goes with it, as in line='G0 X5'
+    #[arg(value_name = "KEY=VALUE", value_parser = key_value)]
+    pub with: Vec<(String, String)>,
 }
 
 #[derive(Group)]

@@ -16,6 +16,7 @@ mod bus;
 mod calibrate;
 mod check;
 mod clock;
+mod connect;
 mod corners;
 mod curves;
 mod estimate;
@@ -32,6 +33,7 @@ mod progress;
 mod report;
 mod run;
 mod script;
+mod serve;
 mod tolerances;
 mod trace;
 mod warnings;
@@ -56,6 +58,9 @@ fn main() -> ExitCode {
         Command::Jog(options) => jog::jog(&options),
         Command::Check(options) => check::check(&options),
         Command::Home(options) => home::home(&options),
+        Command::Serve(options) => serve::serve(&options),
+        Command::Status(options) => connect::status(&options),
+        Command::Ask(options) => connect::ask(&options),
         Command::Estimate(options) => estimate::estimate(&options),
         Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Identify(options) => identify::identify(&options),

@@ -125,6 +125,8 @@ pub struct RoughLoop {
     pub(crate) waited_s: f64,
     /// The last block waits for an edge: where it ends is not known before it has.
     pub(crate) edge_awaited: bool,
+    /// More may come in time: the plan is left open.
+    awaits_more: bool,
     line: u32,
     last_block: u64,
     pub(crate) done: bool,
@@ -152,6 +154,7 @@ impl RoughLoop {
             waiting: None,
             waited_s: 0.0,
             edge_awaited: false,
+            awaits_more: false,
             line: 0,
             last_block: 0,
             done: false,
@@ -192,6 +195,9 @@ impl RoughLoop {
         let mut short = 0;
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
             self.feed(observer)?;
+            if self.awaits_more {
+                return Ok(());
+            }
             let before_s = self.queue.emitted_s();
             let advanced =
                 self.planner.advance(advance_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
@@ -232,6 +238,7 @@ impl RoughLoop {
 
     /// Offers blocks until the planner is full or the program gives no more for now.
     fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
+        self.awaits_more = false;
         while !self.awaits_answer() && self.load()? {
             match &self.items[self.next] {
                 Item::Block(block, curve) => {
@@ -255,11 +262,18 @@ impl RoughLoop {
             self.finished = false;
             self.next += 1;
         }
-        if !self.finished {
+        self.awaits_more = !self.finished && self.may_wait_for_more();
+        if !self.finished && !self.awaits_more {
             self.planner.finish();
             self.finished = true;
         }
         Ok(())
+    }
+
+    /// Whether what is queued lasts until more may have come: a rough period longer than a stop asks for.
+    fn may_wait_for_more(&mut self) -> bool {
+        let streams = self.source.streams() && !self.dry && !self.awaits_answer();
+        streams && !self.queue.plan_rests() && self.queue.is_deep(self.config.rough_period_s)
     }
 
     /// Whether the program can go on only when the machine has answered: an input (M66), or where a probe has touched.
@@ -270,6 +284,10 @@ impl RoughLoop {
     /// Sees to it that there is a next item; `false` where the program is over, or gives nothing for now.
     fn load(&mut self) -> Result<bool, RoughError> {
         while self.next == self.items.len() && !self.dry {
+            if self.source.streams() && self.finished && !self.stretch_over {
+                // What was given before is planned to its end first; what has come since goes on from there.
+                return Ok(false);
+            }
             let driven = self.finished && self.queue.is_driven();
             if !self.source.may_go_on(driven) {
                 return Ok(false);

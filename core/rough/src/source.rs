@@ -18,6 +18,12 @@ pub trait Source {
         true
     }
 
+    /// Whether more may come in time, from somebody who sends as it is driven: then the machine is not told to come to rest at the
+    /// end of what is there before the queue has become as short as a stop asks.
+    fn streams(&self) -> bool {
+        false
+    }
+
     /// A rough period begins. Soft side; for sources that follow machine time.
     fn period(&mut self) {}
 
@@ -44,6 +50,10 @@ impl<S: Source + ?Sized> Source for Box<S> {
 
     fn may_go_on(&mut self, driven: bool) -> bool {
         (**self).may_go_on(driven)
+    }
+
+    fn streams(&self) -> bool {
+        (**self).streams()
     }
 
     fn period(&mut self) {

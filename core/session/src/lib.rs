@@ -3,6 +3,7 @@
 //! Each of them is a source of blocks that a run of the host pulls ([`tandem_rough::Source`]), and goes on by what the machine
 //! answers. The host knows none of them.
 
+pub mod controller;
 mod homing;
 pub mod jog;
 mod mdi;

@@ -122,7 +122,11 @@ impl<'r> Resident<'r> {
         let Some((driver, attached)) = plugins.claim.into_parts() else {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
-        let unknown_axes = plugins.joints.axes_moved_by(!(attached.known | attached.homed));
+        let mut unknown_axes = plugins.joints.axes_moved_by(!(attached.known | attached.homed));
+        if machine.require_homing {
+            // As for a run: whatever the drives say, the machine file asks for it once.
+            unknown_axes |= machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis);
+        }
         let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
         if let Some(watch) = &watch {
             watch.begin(Arc::clone(&controls), Arc::clone(&status));

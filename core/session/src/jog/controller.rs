@@ -51,7 +51,7 @@ struct Moving {
 
 impl JogController {
     /// Nothing asked yet; `judge` is a planner that only judges blocks.
-    pub(super) fn new(machine: &Machine, judge: Box<dyn Planner>) -> Self {
+    pub(crate) fn new(machine: &Machine, judge: Box<dyn Planner>) -> Self {
         let inner = Inner {
             judge,
             controls: None,
@@ -147,20 +147,20 @@ impl JogController {
 
     /// A run begins with these atomics; it homes first, or is `ready`. Of the axes `unknown`, a bit each, it is not known where
     /// they are, nor will it be then.
-    pub(super) fn enable(&self, controls: Arc<Controls>, ready: bool, unknown: u32) {
+    pub(crate) fn enable(&self, controls: Arc<Controls>, ready: bool, unknown: u32) {
         let mut inner = self.lock();
         (inner.controls, inner.ready, inner.unknown) = (Some(controls), ready, unknown);
     }
 
     /// The run is over: the machine stands at `position`.
-    pub(super) fn disable(&self, position: AxisVector) {
+    pub(crate) fn disable(&self, position: AxisVector) {
         let mut inner = self.lock();
         (inner.controls, inner.moving, inner.position, inner.ready) = (None, None, position, false);
         inner.waiting.clear();
     }
 
     /// Everything is driven and the machine stands: whether a jog is over by that.
-    pub(super) fn arrived(&self) -> Option<JogRest> {
+    pub(crate) fn arrived(&self) -> Option<JogRest> {
         let mut inner = self.lock();
         let moved = inner.moving.take()?;
         inner.disarm();
@@ -169,7 +169,7 @@ impl JogController {
     }
 
     /// The fine loop has reported a rest on the path: whether a jog is over by that.
-    pub(super) fn rests(&self, rest: &Rest) -> Option<JogRest> {
+    pub(crate) fn rests(&self, rest: &Rest) -> Option<JogRest> {
         let mut inner = self.lock();
         let moved = inner.moving.take();
         inner.disarm();
@@ -179,7 +179,7 @@ impl JogController {
     }
 
     /// At rest: the next jog as a block, with the words for those that cannot be; `false` where nothing more will come.
-    pub(super) fn next(&self, items: &mut Vec<Item>) -> (bool, Vec<String>) {
+    pub(crate) fn next(&self, items: &mut Vec<Item>) -> (bool, Vec<String>) {
         let mut inner = self.lock();
         inner.ready = true;
         let mut refused = vec![];

@@ -5,15 +5,15 @@ use std::time::{Duration, Instant};
 
 use rustix::event::PollFlags;
 
-use super::hub::OperatorHub;
+use super::house::Talk;
 use super::lease::Lease;
-use super::listen::{Comer, Stream};
+use super::listen::Stream;
 use super::outbox::Outbox;
-use super::reply::{self, Problem};
-use super::session::{Answer, Session};
+use super::reply::Problem;
+use super::session::Answer;
 
-/// Longest line of a client, bytes.
-pub const MAX_LINE: usize = 4096;
+/// Bytes that are read of a client at a time.
+const CHUNK: usize = 4096;
 /// How long a client may take to read its last line.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long a client may take to say who it is.
@@ -38,7 +38,7 @@ pub struct Client {
     is_guest: bool,
     incoming: Vec<u8>,
     outbox: Outbox,
-    session: Session,
+    session: Box<dyn Talk>,
     phase: Phase,
     /// Since when it is in its phase.
     since: Instant,
@@ -56,10 +56,12 @@ enum Phase {
 
 impl Client {
     /// A client that has just come.
-    pub fn new(comer: Comer, door: usize, number: u64, now: Instant) -> Self {
-        let Comer { stream, token, is_guest } = comer;
-        let session = Session::new(number, token);
-        let outbox = Outbox::default();
+    pub fn new(stream: Box<dyn Stream>, is_guest: bool, session: Box<dyn Talk>, door: usize, now: Instant) -> Self {
+        let mut outbox = Outbox::default();
+        if let Some(greeting) = session.greeting() {
+            // There is nothing in it yet.
+            let _ = outbox.answer(&greeting);
+        }
         Self { stream, door, is_guest, incoming: vec![], outbox, session, phase: Phase::Talking, since: now }
     }
 
@@ -79,7 +81,7 @@ impl Client {
 
     /// The client's number.
     pub fn number(&self) -> u64 {
-        self.session.client
+        self.session.client()
     }
 
     /// Whether it may give commands, as far as its connection goes.
@@ -108,11 +110,11 @@ impl Client {
 
     /// Reads, answers, sends: whatever can be done without waiting. A stranger that names the token becomes an owner
     /// where its door `has_place` for one.
-    pub fn serve(&mut self, hub: &OperatorHub, lease: &mut Lease, has_place: bool, now: Instant) {
-        self.session.has_place = has_place;
-        self.read(hub, lease, now);
+    pub fn serve(&mut self, lease: &mut Lease, has_place: bool, now: Instant) {
+        self.session.set_has_place(has_place);
+        self.read(lease, now);
         if self.phase == Phase::Talking && self.session.is_due(now) {
-            self.outbox.telemetry(|lost| reply::telemetry(&hub.status(), lost));
+            self.outbox.telemetry(|lost| self.session.telemetry(lost));
         }
         self.send(now);
         let most = if self.phase == Phase::Talking { TOKEN_WITHIN } else { PATIENCE };
@@ -125,9 +127,9 @@ impl Client {
     }
 
     /// The run is over: its last line.
-    pub fn dismiss(&mut self, hub: &OperatorHub, now: Instant) {
+    pub fn dismiss(&mut self, now: Instant) {
         if self.is_talking() {
-            self.outbox.last(|lost| reply::ended(&hub.status(), lost));
+            self.outbox.last(|lost| self.session.ended(lost));
         }
         self.leave(now);
     }
@@ -154,20 +156,26 @@ impl Client {
         }
     }
 
+    /// The lease was asked for, or lost.
+    pub fn tell_of_lease(&mut self, news: super::lease::News, now: Instant) {
+        let line = self.session.tell_of_lease(news);
+        self.tell(&line, now);
+    }
+
     /// A line that it has not asked for.
     pub fn tell(&mut self, line: &str, now: Instant) {
         self.take(&Answer { line: line.to_string(), last: false }, now);
         self.send(now);
     }
 
-    fn read(&mut self, hub: &OperatorHub, lease: &mut Lease, now: Instant) {
-        let mut chunk = [0; MAX_LINE];
+    fn read(&mut self, lease: &mut Lease, now: Instant) {
+        let mut chunk = [0; CHUNK];
         // One chunk a round: a client that never stops sending does not keep the others waiting.
         match self.stream.read(&mut chunk) {
             Ok(0) => self.hang_up(now),
             Ok(count) if self.phase == Phase::Talking => {
                 self.incoming.extend_from_slice(&chunk[..count]);
-                self.lines(hub, lease, now);
+                self.lines(lease, now);
             }
             Err(error) if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 self.phase = Phase::Gone;
@@ -185,16 +193,17 @@ impl Client {
         }
     }
 
-    fn lines(&mut self, hub: &OperatorHub, lease: &mut Lease, now: Instant) {
+    fn lines(&mut self, lease: &mut Lease, now: Instant) {
         while self.phase == Phase::Talking {
+            let most = self.session.max_line_bytes();
             let end = self.incoming.iter().position(|byte| *byte == b'\n');
             let answer = match end {
-                Some(end) if end <= MAX_LINE => {
+                Some(end) if end <= most => {
                     let line: Vec<u8> = self.incoming.drain(..=end).collect();
-                    self.session.line(&String::from_utf8_lossy(&line[..end]), hub, lease, now)
+                    self.session.line(&String::from_utf8_lossy(&line[..end]), lease, now)
                 }
-                None if self.incoming.len() <= MAX_LINE => return,
-                _ => self.session.too_long(MAX_LINE),
+                None if self.incoming.len() <= most => return,
+                _ => self.session.too_long(),
             };
             self.take(&answer, now);
         }

@@ -146,6 +146,25 @@ impl OperatorHub {
         Err(words.to_string())
     }
 
+    /// Another job of a machine that stays begins, or its fault is taken back: what was said of the one before is over. Host.
+    pub fn begin_job(&self) {
+        let mut latest = self.latest();
+        (latest.fault, latest.stopped, latest.waits_on_line) = (None, None, None);
+        (latest.waits_for_reset, latest.ended, latest.progress, latest.sigma) = (false, false, 0.0, 1.0);
+        drop(latest);
+        self.go_on.store(false, Release);
+    }
+
+    /// The machine stands at `position`, mm or rad, though no sample says so. Host.
+    pub fn stands_at(&self, position: &AxisVector) {
+        self.latest().position = *position;
+    }
+
+    /// Where the machine is by the last sample, mm or rad.
+    pub fn position(&self) -> AxisVector {
+        self.latest().position
+    }
+
     /// The session stands in `fault`: from now on a reset is taken. Host.
     pub fn begin_fault(&self, fault: &str) {
         let mut latest = self.latest();
@@ -160,6 +179,11 @@ impl OperatorHub {
     /// The highest feed override that the machine allows.
     pub fn max_feed_ratio(&self) -> f64 {
         self.max_feed_ratio
+    }
+
+    /// The operator's atomics, for a job to come.
+    pub(crate) fn shared_controls(&self) -> Arc<Controls> {
+        Arc::clone(&self.controls)
     }
 
     /// The operator's atomics as they stand.

@@ -10,6 +10,7 @@
 //! owner out. The protocol is docs/operator.md.
 
 mod client;
+mod house;
 mod hub;
 mod lease;
 mod listen;
@@ -23,7 +24,12 @@ mod socket_file;
 mod status;
 mod token;
 
+pub(crate) use house::{House, Talk};
 pub use hub::OperatorHub;
+pub(crate) use lease::{Lease, News};
 pub use listen::Listen;
+pub(crate) use reply::Problem;
 pub use server::Server;
+pub(crate) use session::{Answer, MAX_OWNERS};
 pub use status::{Counters, Position, StatusLine};
+pub(crate) use token::is_same;

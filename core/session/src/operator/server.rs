@@ -11,11 +11,11 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::client::{Client, Standing};
+use super::house::{House, OneRun};
 use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::listen::{Door, Listen};
 use super::places::{crowded, has_place, make_place_for_stranger};
-use super::reply;
 
 /// Most clients that are let in at a door before those who are there are served again.
 const MAX_COMERS: usize = 64;
@@ -43,10 +43,18 @@ impl Server {
     /// # Errors
     /// The place with the cause: it is taken, or not allowed.
     pub fn start(hub: Arc<OperatorHub>, listen: &Listen) -> Result<Self, String> {
+        Self::of(Arc::new(OneRun(hub)), listen)
+    }
+
+    /// The same for whoever lives behind the doors.
+    ///
+    /// # Errors
+    /// The place with the cause: it is taken, or not allowed.
+    pub(crate) fn of(house: Arc<dyn House>, listen: &Listen) -> Result<Self, String> {
         let doors = Door::open(listen)?;
         let address = doors.iter().find_map(Door::address);
         let over = Arc::new(AtomicBool::new(false));
-        let mut room = Room::new(hub, doors);
+        let mut room = Room::new(house, doors);
         let seen = Arc::clone(&over);
         let builder = thread::Builder::new().name("tandem-operator".to_string()).stack_size(STACK_BYTES);
         let handle = builder.spawn(move || room.serve(&seen));
@@ -67,7 +75,7 @@ impl Drop for Server {
 
 /// Everybody who is there.
 struct Room {
-    hub: Arc<OperatorHub>,
+    house: Arc<dyn House>,
     doors: Vec<Door>,
     /// Until when nobody is let in at each door: the system refuses to.
     shut_until: Vec<Option<Instant>>,
@@ -78,9 +86,9 @@ struct Room {
 }
 
 impl Room {
-    fn new(hub: Arc<OperatorHub>, doors: Vec<Door>) -> Self {
+    fn new(house: Arc<dyn House>, doors: Vec<Door>) -> Self {
         let shut_until = doors.iter().map(|_| None).collect();
-        Self { hub, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
+        Self { house, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
     }
 
     fn serve(&mut self, over: &AtomicBool) {
@@ -103,8 +111,8 @@ impl Room {
     fn round(&mut self, now: Instant) {
         for at in 0..self.clients.len() {
             let has_place = has_place(&self.clients, self.clients[at].door, Standing::Owner);
-            let (hub, lease, client) = (&self.hub, &mut self.lease, &mut self.clients[at]);
-            let served = catch_unwind(AssertUnwindSafe(|| client.serve(hub, lease, has_place, now)));
+            let (lease, client) = (&mut self.lease, &mut self.clients[at]);
+            let served = catch_unwind(AssertUnwindSafe(|| client.serve(lease, has_place, now)));
             if served.is_err() {
                 let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
                 if failed.is_err() {
@@ -114,11 +122,24 @@ impl Room {
         }
         for (number, news) in self.lease.news() {
             if let Some(client) = self.clients.iter_mut().find(|client| client.number() == number) {
-                client.tell(&reply::lease(news), now);
+                client.tell_of_lease(news, now);
             }
         }
+        self.deliver(now);
         self.clients.retain(|client| !client.is_gone());
-        self.hub.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
+        self.house.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
+    }
+
+    /// Hands out what nobody has asked for in this moment.
+    fn deliver(&mut self, now: Instant) {
+        if let Some(mut bell) = self.house.bell() {
+            // What rang does not matter.
+            let _ = std::io::Read::read(&mut bell, &mut [0; 64]);
+        }
+        for (to, line) in self.house.post() {
+            let for_it = |client: &&mut Client| client.is_talking() && to.is_none_or(|to| client.number() == to);
+            self.clients.iter_mut().filter(for_it).for_each(|client| client.tell(&line, now));
+        }
     }
 
     /// Lets in who waits at the doors, a bounded number of them.
@@ -144,7 +165,8 @@ impl Room {
                     }
                 };
                 self.comers += 1;
-                let mut client = Client::new(comer, at, self.comers, now);
+                let talk = self.house.newcomer(self.comers, comer.token);
+                let mut client = Client::new(comer.stream, comer.is_guest, talk, at, now);
                 let standing = client.standing();
                 if has_place(&self.clients, at, standing) {
                     self.clients.push(client);
@@ -168,7 +190,8 @@ impl Room {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)
         });
-        let mut all: Vec<PollFd<'_>> = doors.chain(clients).collect();
+        let bell = self.house.bell().map(|bell| PollFd::new(bell, PollFlags::IN));
+        let mut all: Vec<PollFd<'_>> = doors.chain(clients).chain(bell).collect();
         let timeout = Timespec { tv_sec: 0, tv_nsec: i64::from(sleep.subsec_nanos()) };
         // A signal ends the sleep early: a round more does no harm.
         let _ = poll(&mut all, Some(&timeout));
@@ -179,7 +202,7 @@ impl Room {
         self.doors.clear();
         let start = Instant::now();
         for client in &mut self.clients {
-            client.dismiss(&self.hub, start);
+            client.dismiss(start);
         }
         while !self.clients.is_empty() && start.elapsed() < FAREWELL {
             self.round(Instant::now());

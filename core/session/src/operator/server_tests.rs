@@ -10,7 +10,7 @@ use serde_json::Value;
 use tandem_machine::Machine;
 
 use super::*;
-use crate::operator::listen::{Comer, Stream};
+use crate::operator::listen::Stream;
 
 /// A client whose handling panics.
 struct Defective(UnixStream);
@@ -42,14 +42,14 @@ impl Stream for Defective {
 fn room() -> Room {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let machine = Machine::read(&path, &[]).unwrap();
-    Room::new(Arc::new(OperatorHub::new(&machine, Arc::default(), Arc::default())), vec![])
+    Room::new(Arc::new(OneRun(Arc::new(OperatorHub::new(&machine, Arc::default(), Arc::default())))), vec![])
 }
 
 impl Room {
     fn comes(&mut self, stream: Box<dyn Stream>, token: Option<&str>, now: Instant) {
-        let comer = Comer { stream, token: token.map(str::to_string), is_guest: false };
         self.comers += 1;
-        self.clients.push(Client::new(comer, 0, self.comers, now));
+        let talk = self.house.newcomer(self.comers, token.map(str::to_string));
+        self.clients.push(Client::new(stream, false, talk, 0, now));
     }
 
     /// A client that is known, with its end.

@@ -1,0 +1,76 @@
+//! Requests of the protocol of a controller, line by line.
+
+use serde_json::{Map, Value};
+
+/// One line of a client, read.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// The client's number for it; the answer bears it.
+    pub id: u64,
+    /// What is asked for.
+    pub request: String,
+    /// The other keys.
+    pub with: Map<String, Value>,
+}
+
+/// Reads a line.
+///
+/// # Errors
+/// What is wrong with it, with its id where it has one.
+pub fn read(text: &str) -> Result<Asked, (Option<u64>, String)> {
+    let value: Value = serde_json::from_str(text).map_err(|e| (None, format!("it is no JSON: {e}")))?;
+    let Value::Object(mut with) = value else { return Err((None, "it is no JSON object".to_string())) };
+    let id = with.remove("id").and_then(|id| id.as_u64());
+    let Some(id) = id else { return Err((None, "it has no \"id\", a whole number that its answer bears".to_string())) };
+    match with.remove("request") {
+        Some(Value::String(request)) => Ok(Asked { id, request, with }),
+        _ => Err((Some(id), "it has no \"request\", the name of what is asked for".to_string())),
+    }
+}
+
+impl Asked {
+    /// The text of `key`.
+    ///
+    /// # Errors
+    /// It is not there, or no text.
+    pub fn text(&self, key: &str) -> Result<&str, String> {
+        self.with.get(key).and_then(Value::as_str).ok_or_else(|| format!("{} needs \"{key}\", a text", self.request))
+    }
+
+    /// The number of `key`.
+    ///
+    /// # Errors
+    /// It is not there, or no number.
+    pub fn number(&self, key: &str) -> Result<f64, String> {
+        let number = self.with.get(key).and_then(Value::as_f64);
+        number.ok_or_else(|| format!("{} needs \"{key}\", a number", self.request))
+    }
+
+    /// The number of `key`, if it is there.
+    ///
+    /// # Errors
+    /// It is no number.
+    pub fn number_if_any(&self, key: &str) -> Result<Option<f64>, String> {
+        if self.with.contains_key(key) { self.number(key).map(Some) } else { Ok(None) }
+    }
+
+    /// The switch `on`.
+    ///
+    /// # Errors
+    /// It is not there, or neither true nor false.
+    pub fn on(&self) -> Result<bool, String> {
+        let on = self.with.get("on").and_then(Value::as_bool);
+        on.ok_or_else(|| format!("{} needs \"on\", true or false", self.request))
+    }
+
+    /// Refuses keys that the request does not know.
+    ///
+    /// # Errors
+    /// The first that it does not know, and those that it does.
+    pub fn only(&self, keys: &[&str]) -> Result<(), String> {
+        match self.with.keys().find(|key| !keys.contains(&key.as_str())) {
+            Some(key) => Err(format!("{} does not know \"{key}\"; it knows {}", self.request, keys.join(", "))),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Who lives behind the doors: a run with its protocol, or a controller that stays with another.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::hub::OperatorHub;
+use super::lease::Lease;
+use super::reply::{self, Problem};
+use super::session::{Answer, Session};
+
+/// One client's conversation, in whichever protocol. On the thread that serves clients.
+pub trait Talk: Send {
+    /// The client's number.
+    fn client(&self) -> u64;
+    /// Whether the client has said who it is, or need not.
+    fn is_known(&self) -> bool;
+    /// Whether its door has a place for one more who has named the token.
+    fn set_has_place(&mut self, has_place: bool);
+    /// What the client is told before it says anything.
+    fn greeting(&self) -> Option<String> {
+        None
+    }
+    /// Longest line, bytes.
+    fn max_line_bytes(&self) -> usize;
+    /// Answers a line.
+    fn line(&mut self, text: &str, lease: &mut Lease, now: Instant) -> Answer;
+    /// The end of a client that is not understood.
+    fn close(&self, problem: &Problem) -> Answer;
+    /// A line was cut off before it was read.
+    fn too_long(&mut self) -> Answer;
+    /// Whether a status line is due now.
+    fn is_due(&mut self, now: Instant) -> bool;
+    /// When the next status line is due.
+    fn due(&self) -> Option<Instant>;
+    /// A status line that was subscribed to; so many were lost before it.
+    fn telemetry(&self, lost: u64) -> String;
+    /// The last line.
+    fn ended(&self, lost: u64) -> String;
+    /// The lease was asked for, or lost.
+    fn tell_of_lease(&self, news: super::lease::News) -> String {
+        reply::lease(news)
+    }
+}
+
+/// What the thread that serves clients needs of the machine.
+pub trait House: Send + Sync {
+    /// Somebody has come, whose first line must name `token`.
+    fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk>;
+    /// So many clients could give commands now.
+    fn set_clients(&self, count: usize);
+    /// Lines for a client, or for all, that nobody has asked for in this moment.
+    fn post(&self) -> Vec<(Option<u64>, String)> {
+        vec![]
+    }
+    /// Becomes readable when there is post.
+    fn bell(&self) -> Option<&std::os::unix::net::UnixStream> {
+        None
+    }
+}
+
+/// A run, or a session of runs, that ends with its process.
+pub struct OneRun(pub Arc<OperatorHub>);
+
+impl House for OneRun {
+    fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
+        Box::new(Protocol1 { hub: Arc::clone(&self.0), session: Session::new(number, token) })
+    }
+
+    fn set_clients(&self, count: usize) {
+        self.0.set_clients(count);
+    }
+}
+
+/// Longest line of the protocol of a run, bytes.
+pub const MAX_LINE: usize = 4096;
+
+/// The protocol of a run.
+struct Protocol1 {
+    hub: Arc<OperatorHub>,
+    session: Session,
+}
+
+impl Talk for Protocol1 {
+    fn client(&self) -> u64 {
+        self.session.client
+    }
+
+    fn is_known(&self) -> bool {
+        self.session.is_known()
+    }
+
+    fn set_has_place(&mut self, has_place: bool) {
+        self.session.has_place = has_place;
+    }
+
+    fn max_line_bytes(&self) -> usize {
+        MAX_LINE
+    }
+
+    fn line(&mut self, text: &str, lease: &mut Lease, now: Instant) -> Answer {
+        self.session.line(text, &self.hub, lease, now)
+    }
+
+    fn close(&self, problem: &Problem) -> Answer {
+        self.session.close(problem)
+    }
+
+    fn too_long(&mut self) -> Answer {
+        self.session.too_long(MAX_LINE)
+    }
+
+    fn is_due(&mut self, now: Instant) -> bool {
+        self.session.is_due(now)
+    }
+
+    fn due(&self) -> Option<Instant> {
+        self.session.due()
+    }
+
+    fn telemetry(&self, lost: u64) -> String {
+        reply::telemetry(&self.hub.status(), lost)
+    }
+
+    fn ended(&self, lost: u64) -> String {
+        reply::ended(&self.hub.status(), lost)
+    }
+}
