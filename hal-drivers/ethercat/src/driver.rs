@@ -14,8 +14,10 @@ use crate::check;
 use crate::options::{EMULATED, Options, number};
 use crate::words::joint_code;
 
-/// Periods without an exchange of the host's, after which the driver keeps its bus alive by itself.
+/// Periods without an exchange of the host's, after which the driver keeps its bus alive by itself, and the share of the devices'
+/// watchdog, where that is longer: a host that is only late is not taken for a silent one, which stops what moves.
 const SILENT_PERIODS: u64 = 3;
+const WATCHDOG_SHARE: f64 = 0.5;
 
 /// A bus of drives and terminals behind the driver contract.
 ///
@@ -103,7 +105,8 @@ impl EthercatDrives {
         shared.ends.store(false, Ordering::Relaxed);
         shared.heard_ns.store(0, Ordering::Relaxed);
         let period = self.period();
-        let silent_ns = period.as_nanos() as u64 * SILENT_PERIODS;
+        let half_ns = (self.options.watchdog_ms * 1e6 * WATCHDOG_SHARE) as u64;
+        let silent_ns = half_ns.max(period.as_nanos() as u64 * SILENT_PERIODS);
         self.keeper = std::thread::Builder::new()
             .name("ethercat".to_string())
             .spawn(move || {
