@@ -57,6 +57,22 @@ fn what_a_program_switches_up_to_its_end() {
 }
 
 #[test]
+fn words_that_no_sample_shows_have_rows_too() {
+    let program = "G21 G90 F3000\nT1 M6\nM67 E1 Q4\nG1 X5\nM68 E0 Q2\nM19 R90\nM101 P3\nM2\n";
+    let done = Scenario::text(program).with(&["--set", "user_commands.M101=\"/bin/false\""]).events().run();
+    assert_eq!(done.status(), 0, "simulations run no command: {}", done.errors());
+    let expected = [
+        "2 tool made ready 1 program",
+        "2 tool change 1 program",
+        "3 analog output 1 4 program",
+        "5 analog output 0 2 program",
+        "6 spindle angle 90 program",
+        "7 M101 3 program",
+    ];
+    assert_eq!(words(&done), expected);
+}
+
+#[test]
 fn an_emergency_stop_switches_off_in_its_period() {
     let done = Scenario::text(PROGRAM).with(&KEPT).events().commands("100,emergency-stop\n").run();
     assert_eq!(done.status(), 3);

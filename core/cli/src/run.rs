@@ -162,7 +162,8 @@ impl Sinks {
         let mut broken = self.broken;
         broken.note(self.trace.map_or(Ok(()), TraceSink::finish));
         broken.note(self.blocks.map_or(Ok(()), BlocksCsv::finish));
-        broken.note(self.events.map_or(Ok(()), |events| events.finish(left)));
+        let completed = summary.fault.is_none() && summary.stopped.is_none();
+        broken.note(self.events.map_or(Ok(()), |events| events.finish(left, completed)));
         summary.record_errors = broken.errors().to_vec();
         if let (Some(report), Some(path)) = (self.report, &options.report) {
             broken.note(report.write(path, summary));

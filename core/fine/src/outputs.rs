@@ -84,7 +84,13 @@ impl Outputs {
                 self.hand_over = Some(((event.index.unsigned_abs() as usize).min(MAX_AXES - 1), event.value));
             }
             EventKind::Homed => self.unhomed &= !(1 << event.index.clamp(0, 31)),
-            EventKind::ToolSelect | EventKind::SpindleOverride | EventKind::FeedHold => {}
+            // The first two no drive has: programs for drives that move something are refused them.
+            EventKind::AnalogOutput
+            | EventKind::OrientSpindle
+            | EventKind::UserCommand
+            | EventKind::ToolSelect
+            | EventKind::SpindleOverride
+            | EventKind::FeedHold => {}
         }
     }
 

@@ -204,7 +204,7 @@ impl<'a> FirstPass<'a> {
                     judge_block(&mut self.report, &mut self.per_block, (block, curve), (&program.name, text));
                 }
                 Item::Wait(_) => waits = true,
-                Item::Event(_) | Item::End => {}
+                Item::Event(_) | Item::Command(_) | Item::End => {}
             }
         }
         if waits {

@@ -29,7 +29,7 @@ pub struct ProbeInput {
     pub inverted: bool,
 }
 
-/// Digital lines of one direction that somebody has: the others are wired to nobody.
+/// Lines of one direction that somebody has: the others are wired to nobody.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lines {
     /// Bit n is line n.
@@ -42,6 +42,11 @@ impl Lines {
     /// All of them.
     pub fn all() -> Self {
         Self { mask: u64::MAX, shown: String::new() }
+    }
+
+    /// None of them.
+    pub fn none() -> Self {
+        Self { mask: 0, shown: String::new() }
     }
 
     /// Why line `number` cannot be used, where nobody has it; `what` it is, as in "output".
@@ -79,6 +84,14 @@ pub struct Config {
     pub outputs: Lines,
     /// Inputs that M66 may read.
     pub inputs: Lines,
+    /// Analogue outputs that M67 and M68 may set.
+    pub analog_outputs: Lines,
+    /// Analogue inputs that M66 may read.
+    pub analog_inputs: Lines,
+    /// Somebody turns the spindle to an angle (M19).
+    pub orients_spindle: bool,
+    /// Numbers of the commands M100 to M199 that programs may use.
+    pub user_commands: Vec<u32>,
     /// Folders in which the files of subroutines are looked up, the first first.
     pub subroutine_path: Vec<PathBuf>,
     /// How many lines a program with O-words may execute in the first pass, and in the second without an item.
@@ -87,6 +100,11 @@ pub struct Config {
     /// nothing but this machine.
     pub lasting: Option<Arc<Lasting>>,
 }
+
+/// The first of the numbers of commands of the machine's own: M100.
+pub const FIRST_USER_COMMAND: u32 = 100;
+/// The last of them: M199.
+pub const LAST_USER_COMMAND: u32 = 199;
 
 /// Lines that a program with O-words may execute where the machine file does not say: some ten seconds.
 pub const DEFAULT_MAX_STEPS: u64 = 50_000_000;
@@ -107,6 +125,10 @@ impl Config {
             probe: None,
             outputs: Lines::all(),
             inputs: Lines::all(),
+            analog_outputs: Lines::all(),
+            analog_inputs: Lines::all(),
+            orients_spindle: true,
+            user_commands: Vec::new(),
             subroutine_path: Vec::new(),
             max_steps: DEFAULT_MAX_STEPS,
             lasting: None,

@@ -17,6 +17,7 @@ use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
 use crate::syntax::parse::{O_WORDS, parse};
 use crate::syntax::scan::Scanner;
+use crate::words::compensation::{self, Compensation};
 use crate::words::coolant::Coolant;
 use crate::words::orders::{Orders, polar_misplaced};
 use crate::words::{curve, modal, probe, stop};
@@ -190,6 +191,7 @@ impl Interpreter {
     /// Tells where the machine really stands after an abort or a jog, machine coordinates, mm or rad.
     pub fn set_position(&mut self, position: AxisVector) {
         self.state.path.set(position);
+        self.state.compensation = Compensation::default();
     }
 
     /// Manual input: an abort, a fault or an emergency stop has switched spindle and coolant off, and outputs as the machine file
@@ -268,8 +270,9 @@ impl Interpreter {
             return Err(Diagnostic::whole_line(&self.file, last_line, b"", "truncated", why.into()));
         }
         let open = self.state.curves.end();
+        let beside = compensation::off(&mut self.execution(out));
         stop::end(&mut self.execution(out));
-        open.map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
+        open.and(beside).map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
     }
 
     /// The current line with the state that it changes.
@@ -382,8 +385,9 @@ impl Interpreter {
         } else {
             self.ended_by_percent = Some((self.state.line, self.phase == Phase::Opened));
             let open = self.state.curves.end();
+            let beside = compensation::off(&mut self.execution(out));
             stop::end(&mut self.execution(out));
-            open?;
+            open.and(beside)?;
         }
         Ok(None)
     }

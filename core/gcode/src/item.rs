@@ -15,6 +15,8 @@ pub enum Item {
     Event(Event),
     /// M66: the program goes on when the input has answered.
     Wait(InputWait),
+    /// M100 to M199: the machine is at rest, and the program goes on when the command is over. Simulations pass over it.
+    Command(UserCommand),
     /// The program is over (M2, M30, `%` or the end of the file). Nothing follows.
     End,
 }
@@ -31,6 +33,8 @@ impl Item {
 pub enum Input {
     /// Digital input P.
     Digital(u32),
+    /// Analogue input E; its value is the answer.
+    Analog(u32),
 }
 
 /// What M66 waits for (the L word).
@@ -61,6 +65,21 @@ pub struct InputWait {
     pub mode: InputMode,
     /// Longest wait, s; after it the answer is −1. Zero for [`InputMode::Immediate`].
     pub timeout_s: f64,
+}
+
+/// A command of the machine's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UserCommand {
+    /// Line of the part program, from 1.
+    pub line: u32,
+    /// The command lies before the block of this index.
+    pub before_block: u64,
+    /// 100 for M100; one of those that [`crate::Config::user_commands`] lists.
+    pub number: u32,
+    /// Its argument P.
+    pub p: Option<f64>,
+    /// Its argument Q.
+    pub q: Option<f64>,
 }
 
 /// What became of a probe, in machine coordinates of axis space, mm or rad.

@@ -181,6 +181,8 @@ impl Interpreter {
         let Moment { mut state, written } = moment;
         std::mem::swap(&mut state.path, &mut self.state.path);
         state.curves = crate::words::curve::Curves::default();
+        state.compensation = crate::words::compensation::Compensation::default();
+        state.saved = crate::words::modal::SavedStates::default();
         (state.ended, state.line) = (false, self.state.line);
         self.state = *state;
         self.parameters.write(written);
@@ -194,6 +196,9 @@ impl Interpreter {
         self.state.modes = fresh.modes;
         self.state.permits = fresh.permits;
         self.state.cycles = fresh.cycles;
+        self.state.saved = fresh.saved;
+        self.state.compensation = fresh.compensation;
+        self.state.spindle.surface = None;
         self.state.curves = fresh.curves;
         self.state.ended = false;
     }
@@ -212,7 +217,10 @@ impl Interpreter {
         words.push(either(modes.unit_mm == 1.0, "G21", "G20"));
         words.push(either(modes.absolute, "G90", "G91"));
         words.push(either(modes.arc_absolute, "G90.1", "G91.1"));
-        words.push(either(modes.feed.inverse_time, "G93", "G94"));
+        words.push(modes.feed.mode.code().to_string());
+        words.extend(modes.diameter.then(|| "G7".to_string()));
+        words.extend(self.state.spindle.surface.map(|_| "G96".to_string()));
+        words.push(self.state.compensation.word().to_string());
         words.push(system_code(coordinates.active()));
         words.push(either(modes.exact_stop, "G61", "G64"));
         words.push(either(*coordinates.tool() == AxisVector::ZERO, "G49", "G43"));

@@ -1,6 +1,6 @@
 //! Part programs to blocks and events.
 //!
-//! The language is RS274/NGC as LinuxCNC reads it and Fanuc-style CAM output writes it, without flow control. What is
+//! The language is RS274/NGC as LinuxCNC reads it and Fanuc-style CAM output writes it. What is
 //! supported and what is refused stands in one table; [`docs`] prints it. Two passes make a run: [`check`] reads the
 //! whole program and lists its errors, [`Stream`] hands out its items on demand. [`Interpreter`] is the part in
 //! between for single lines.
@@ -58,10 +58,10 @@ mod testing;
 mod words;
 
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
-pub use config::{Config, DEFAULT_MAX_STEPS, Lines, ProbeInput, Tool};
+pub use config::{Config, DEFAULT_MAX_STEPS, FIRST_USER_COMMAND, LAST_USER_COMMAND, Lines, ProbeInput, Tool};
 pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
-pub use item::{Input, InputMode, InputWait, Item, ProbeResult};
+pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
 pub use lasting::{Lasting, Ledger, Moment, WORK_SYSTEMS, system_code};
 pub use program::{Program, ProgramError};
 pub use stream::Stream;

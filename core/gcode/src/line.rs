@@ -11,15 +11,17 @@ use crate::item::Item;
 use crate::state::letters::{AXIS_MASK, Letters, mask};
 use crate::state::{MotionMode, State};
 use crate::syntax::line_words::LineWords;
+use crate::words::modes::FeedMode;
 use crate::words::orders::Orders;
-use crate::words::{Action, Group, Shape, modes, motion, spindle, tool};
+use crate::words::{Action, Group, Shape, compensation, modes, motion, spindle, tool};
 
 /// Rounding that a travel limit forgives, mm or rad.
 const TRAVEL_ROUNDING: f64 = 1e-9;
 /// Groups that take effect before F, and those between T and S. The units and the feed mode of a line hold for all its
 /// words, unlike in LinuxCNC: `G20 F10` is 10 inches a minute.
-const BEFORE_FEED: u32 = Group::Units.bit() | Group::FeedMode.bit();
-const BEFORE_SPEED: u32 = Group::ModalState.bit() | Group::InputOutput.bit() | Group::ToolChange.bit();
+const BEFORE_FEED: u32 = Group::Units.bit() | Group::FeedMode.bit() | Group::LatheDiameter.bit();
+const BEFORE_SPEED: u32 =
+    Group::ModalState.bit() | Group::InputOutput.bit() | Group::ToolChange.bit() | Group::SpindleMode.bit();
 const BEFORE_MOTION: u32 = (Group::Motion.bit() - 1) & !(BEFORE_FEED | BEFORE_SPEED);
 /// Modes that later lines are read with.
 const MODES: u32 = Group::Plane.bit()
@@ -44,6 +46,10 @@ impl Line<'_> {
     /// Obeys the words in LinuxCNC's order.
     #[inline]
     pub fn execute(&mut self) -> Checked<()> {
+        if self.state.compensation.is_on() && self.orders.get(Group::CutterRadius).is_none_or(|word| word.tenths != 400)
+        {
+            compensation::refuse_company(self)?;
+        }
         self.act(BEFORE_FEED)?;
         modes::feed(self)?;
         modes::time_constant(self)?;
@@ -104,6 +110,7 @@ impl Line<'_> {
         // Errors of what follows have been reported already, or do not matter now.
         let _ = self.act(BEFORE_FEED).and_then(|()| modes::feed(self)).and_then(|()| self.act(MODES));
         self.set_motion();
+        self.state.compensation.spoil();
         if matches!(self.orders.motion, Some(MotionMode::Refused)) {
             self.state.motion = MotionMode::Refused;
         }
@@ -141,7 +148,7 @@ impl Line<'_> {
     pub fn named_axes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (0..self.letters.count()).filter_map(|axis| {
             let value = self.words.get(self.letters.letter(axis))?;
-            Some((axis, value * self.state.modes.scale(self.letters, axis)))
+            Some((axis, value * self.state.modes.word_scale(self.letters, axis)))
         })
     }
 
@@ -161,7 +168,7 @@ impl Line<'_> {
         }
         for axis in 0..self.letters.count() {
             let Some(value) = self.words.get(self.letters.letter(axis)) else { continue };
-            let value = value * self.state.modes.scale(self.letters, axis);
+            let value = value * self.state.modes.word_scale(self.letters, axis);
             let base = match (machine, absolute) {
                 (true, _) => 0.0,
                 (_, true) => self.state.coordinates.total()[axis],
@@ -228,13 +235,29 @@ impl Line<'_> {
     #[inline]
     pub fn feed(&self, length_mm: f64, linear: bool) -> Checked<f64> {
         let feed = &self.state.modes.feed;
-        if feed.inverse_time {
+        if feed.mode == FeedMode::PerRevolution {
+            return self.feed_a_revolution();
+        }
+        if feed.mode == FeedMode::InverseTime {
             return match self.words.get(b'F') {
                 Some(inverse) if inverse > 0.0 => Ok(length_mm * inverse / 60.0),
                 _ => Err(self.no_inverse_time()),
             };
         }
         let feed = if linear { feed.linear_mm_per_s } else { feed.rotary_rad_per_s };
+        if feed > 0.0 { Ok(feed) } else { Err(self.no_feed()) }
+    }
+
+    /// G95: the feed at the speed that the spindle is commanded.
+    #[cold]
+    fn feed_a_revolution(&self) -> Checked<f64> {
+        let speed_rad_per_s = self.state.spindle.speed_rad_per_s;
+        if speed_rad_per_s <= 0.0 {
+            return Err(
+                self.motion_fault("feed-missing", "G95 is a feed a revolution, and the spindle has no speed (S)")
+            );
+        }
+        let feed = self.state.modes.feed.mm_per_revolution * speed_rad_per_s / std::f64::consts::TAU;
         if feed > 0.0 { Ok(feed) } else { Err(self.no_feed()) }
     }
 
@@ -268,6 +291,17 @@ impl Line<'_> {
     #[inline]
     #[allow(clippy::large_types_passed_by_value, reason = "built in place: a reference would copy once more")]
     pub fn push(&mut self, block: Block) {
+        if self.state.compensation.holds() {
+            return self.state.compensation.hold(Item::Block(block, None));
+        }
+        self.state.path.advance_to(block.end);
+        self.out.push(Item::Block(block, None));
+    }
+
+    /// Appends a block whose turn has come only now.
+    #[allow(clippy::large_types_passed_by_value, reason = "as in `push`")]
+    pub fn emit(&mut self, mut block: Block) {
+        block.index = self.state.path.next_index;
         self.state.path.advance_to(block.end);
         self.out.push(Item::Block(block, None));
     }
@@ -275,7 +309,11 @@ impl Line<'_> {
     /// Appends an event before the next block.
     pub fn event(&mut self, kind: EventKind, index: u32, value: f64) {
         let (line, before_block) = (self.state.line, self.state.path.next_index);
-        self.out.push(Item::Event(Event::new(kind, line, before_block, index.cast_signed(), value)));
+        let event = Item::Event(Event::new(kind, line, before_block, index.cast_signed(), value));
+        if self.state.compensation.holds() {
+            return self.state.compensation.hold(event);
+        }
+        self.out.push(event);
     }
 
     /// Brings the machine to rest: an event that needs it follows.

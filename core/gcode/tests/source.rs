@@ -115,7 +115,7 @@ fn binary_files_are_no_programs() {
 
 #[test]
 fn errors_are_listed_up_to_a_thousand_and_then_counted() {
-    let report = report_of("G41\n".repeat(1500).as_bytes());
+    let report = report_of("G76\n".repeat(1500).as_bytes());
     assert_eq!((report.diagnostics.len(), report.unlisted), (MAX_DIAGNOSTICS, 500));
 }
 

@@ -47,6 +47,7 @@ pub use plugins::registry::{PluginRefusal, Registry, moves_metal};
 pub use policy::PolicySetup;
 pub use resident::{JobOutcome, PreparedJob, Resident};
 pub use run::{Outcome, Run};
+pub use setup::commands::with_user_commands;
 pub use setup::parts::{axis_limits, interpreter_config, planner};
 pub use setup::ready::{Memory, check_block, check_program, each_block};
 pub use setup::stand_in::with_stand_ins;

@@ -140,6 +140,8 @@ static MACHINE: &[Key] = &[
     key("tools.without_table", "text", "none", "zero: instead of `table`, every tool has length zero; simulated drives do so without it"),
     key("program.subroutine_path", "file", "none", "Folder of files that O-word calls look up: `o<name> call` runs `name.ngc`"),
     key("program.max_steps", "number", "50000000", "Lines that a program with O-words may execute in the check"),
+    key("user_commands.<command>", "file", "none", "Program that the word runs at rest, M100 to M199, with the values of P and Q as its arguments; nothing is run that is not listed"),
+    key("user_commands.time_limit_s", "s", "60", "Time that such a program has; then it is ended, and the run faults"),
 ];
 
 #[rustfmt::skip]

@@ -246,7 +246,7 @@ impl Tables {
             policy: optional("policy").and_then(|s| Policy::read(&s)),
             spindle: Spindle::read(&root.section("spindle")),
             probe: optional("probe").and_then(|s| Probe::read(&s)),
-            program: ProgramRules::read(&root.section("program")),
+            program: ProgramRules::read(&root.section("program"), &root.section("user_commands")),
             operator: Operator::read(&root.section("operator")),
         }
     }

@@ -28,6 +28,12 @@ pub fn resolve_paths(table: &mut Table, path: &Path) {
     for (section, key) in FILES {
         each_table(table, &[section], &mut |section| resolve(section, key, path));
     }
+    each_table(table, &["user_commands"], &mut |section| {
+        let commands: Vec<String> = section.iter().map(|(key, _)| key.clone()).collect();
+        for key in &commands {
+            resolve(section, key, path);
+        }
+    });
     for section in PLUGINS {
         each_table(table, section, &mut |section| resolve(section, "plugin", path));
     }

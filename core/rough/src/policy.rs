@@ -173,7 +173,7 @@ fn is_block(item: &Item) -> bool {
 
 /// Whether nothing is known of what follows until the machine has answered.
 fn ends_stretch(item: &Item) -> bool {
-    matches!(item, Item::Wait(_) | Item::End) || item.is_probe()
+    matches!(item, Item::Wait(_) | Item::Command(_) | Item::End) || item.is_probe()
 }
 
 fn block_of(item: &Item) -> (&Block, Option<Curve<'_>>) {

@@ -257,6 +257,8 @@ impl RoughLoop {
                     self.queue.event(*event);
                 }
                 Item::Wait(wait) => self.waiting = Some(*wait),
+                // Who runs commands takes them out of what they hand on.
+                Item::Command(_) => {}
                 Item::End => self.dry = true,
             }
             self.finished = false;
@@ -330,7 +332,10 @@ fn planner_error(line: Option<u32>, cause: &str) -> RoughError {
 /// The answer of an input now, if what is waited for is there. Edges are taken as levels: the machine was at rest
 /// before the wait began, and an edge shorter than a rough period is not promised to be seen.
 fn read_input(wait: &InputWait, inputs: u64) -> Option<f64> {
-    let Input::Digital(number) = wait.input;
+    let Input::Digital(number) = wait.input else {
+        // Only simulated drives are asked: their analogue inputs are 0.
+        return Some(0.0);
+    };
     let high = inputs >> number.min(63) & 1 == 1;
     let met = match wait.mode {
         InputMode::Immediate => true,

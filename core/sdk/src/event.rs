@@ -37,6 +37,13 @@ pub enum EventKind {
     Homed = 14,
     /// Axis `index` is handed over to its drive, which homes it by its own means within `value` s. The machine is at rest.
     HomeByDrive = 15,
+    /// An analogue output: `index` is its number (0 to 63), `value` what it is set to (M67, M68).
+    AnalogOutput = 16,
+    /// The spindle, which has stopped, turns to the angle `value`, rad, and holds it (M19). The machine is at rest.
+    OrientSpindle = 17,
+    /// A command of the machine's own: `index` is 100 for M100, `value` its P, or −1. The machine is at rest; who runs it
+    /// is the soft side, this only tells.
+    UserCommand = 18,
 }
 
 /// A non-motion word. It takes effect in the fine period in which the path reaches its place.

@@ -9,7 +9,9 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::{Interpreter, Item, ProbeResult};
-use tandem_host::{HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal, planner};
+use tandem_host::{
+    HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal, planner, with_user_commands,
+};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
@@ -76,7 +78,8 @@ impl<'a> MdiSession<'a> {
     /// # Errors
     /// The plugins refuse, or do not go together.
     pub fn enable(&self) -> Result<Run, HostError> {
-        let source = Box::new(Lines(Arc::clone(&self.manual)));
+        let lines = Box::new(Lines(Arc::clone(&self.manual)));
+        let source = with_user_commands(&self.machine, self.registry, self.switches, lines);
         let name = "manual input".to_string();
         let mut run = Run::of_source(self.machine.clone(), self.registry, name, source, self.switches)?;
         run.begin_switched(&self.switched);

@@ -10,6 +10,7 @@ use tandem_sdk::{Block, PathMode};
 
 use crate::config::Config;
 use crate::words::Word;
+use crate::words::compensation::Compensation;
 use crate::words::coolant::Coolant;
 use crate::words::curve::Curves;
 use crate::words::cycles::Cycles;
@@ -49,6 +50,7 @@ pub(crate) struct State {
     pub permits: Permits,
     pub outputs: Outputs,
     pub curves: Curves,
+    pub compensation: Compensation,
     /// What M70 and M73 have saved.
     pub saved: SavedStates,
     pub cycles: Cycles,
@@ -96,6 +98,7 @@ impl State {
             permits: Permits::default(),
             outputs: Outputs::default(),
             curves: Curves::default(),
+            compensation: Compensation::default(),
             saved: SavedStates::default(),
             cycles: Cycles::default(),
             ended: false,

@@ -6,7 +6,7 @@ use tandem_sdk::AxisVector;
 
 use super::State;
 use super::letters::{AXIS_LETTERS, Letters};
-use crate::words::modes::Plane;
+use crate::words::modes::{FeedMode, Plane};
 
 /// Highest number of a parameter.
 pub(crate) const LAST: usize = 5602;
@@ -274,7 +274,7 @@ pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> 
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
         // What calls say of themselves has its value elsewhere; here it only cannot be assigned. There are no remaps.
-        b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" | b"_units_per_rev" => 0.0,
+        b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" => 0.0,
         // 0 in previews of LinuxCNC, which this interpreter has none of.
         b"_task" => 1.0,
         b"_line" => f64::from(state.line),
@@ -284,8 +284,14 @@ pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> 
             Plane::Zx => 180.0,
             Plane::Yz => 190.0,
         },
-        b"_inverse_time" => flag(state.modes.feed.inverse_time),
-        b"_units_per_minute" => flag(!state.modes.feed.inverse_time),
+        b"_inverse_time" => flag(state.modes.feed.mode == FeedMode::InverseTime),
+        b"_units_per_minute" => flag(state.modes.feed.mode == FeedMode::PerMinute),
+        b"_units_per_rev" => flag(state.modes.feed.mode == FeedMode::PerRevolution),
+        b"_spindle_css_mode" => flag(state.spindle.surface.is_some()),
+        b"_spindle_rpm_mode" => flag(state.spindle.surface.is_none()),
+        b"_lathe_diameter_mode" => flag(state.modes.diameter),
+        b"_lathe_radius_mode" => flag(!state.modes.diameter),
+        b"_ccomp" => f64::from(state.compensation.code()),
         b"_tool_offset" => flag(*state.coordinates.tool() != AxisVector::ZERO),
         b"_retract_r_plane" => flag(!state.cycles.return_to_initial()),
         b"_retract_old_z" => flag(state.cycles.return_to_initial()),

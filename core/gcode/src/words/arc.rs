@@ -4,7 +4,7 @@ use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 
 use super::circle::{Ends, Part, Parts, extent};
 use super::modes::Plane;
-use super::{Action, Group, Shape, Word};
+use super::{Action, Group, Shape, Word, compensation};
 use crate::fault::{Checked, Fault, Span};
 use crate::line::Line;
 
@@ -35,6 +35,7 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
     line.advance();
     line.refuse_machine_coordinates()?;
     let plane = plane(line)?;
+    let compensated = line.state.compensation.is_on();
     let (start, end) = (line.state.path.last_end, line.state.path.block_end());
     let turns = line.words.integer(b'P', 1..=MAX_TURNS)?.unwrap_or(1);
     let pick = |v: &AxisVector| plane.map(|axis| v[axis]);
@@ -42,6 +43,9 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
     if plane.iter().any(|axis| uncertain >> axis & 1 != 0) {
         line.state.path.last_end = line.state.path.position;
         return Ok(());
+    }
+    if compensated {
+        return beside_arc(line, ends, plane);
     }
     let parts = circle(line, &ends, plane)?;
     let mut helix = end - start;
@@ -52,30 +56,51 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
     push_arcs(line, &parts, plane, end, &helix)
 }
 
+/// The arc with radius compensation: it begins where the programmed path has come to.
+#[cold]
+fn beside_arc(line: &mut Line, ends: Ends, plane: [usize; 2]) -> Checked<()> {
+    let ends = Ends { start: line.state.compensation.begins(ends.start), ..ends };
+    let parts = circle(line, &ends, plane)?;
+    compensation::bent(line, &ends, &parts, plane)
+}
+
 /// One block a part; the axes outside the plane move in proportion to the swept angle.
-fn push_arcs(line: &mut Line, parts: &Parts, plane: [usize; 2], end: AxisVector, helix: &AxisVector) -> Checked<()> {
-    let parts = parts.as_slice();
+fn push_arcs(line: &mut Line, all: &Parts, plane: [usize; 2], end: AxisVector, helix: &AxisVector) -> Checked<()> {
+    let parts = all.as_slice();
     let along = if line.moves_linear(helix) { line.config.axes.path_length(helix) } else { 0.0 };
     let swept: f64 = parts.iter().map(|part| part.arc.sweep_rad).sum();
-    let length = |part: &Part| (part.arc.radius_mm * part.arc.sweep_rad).hypot(along * part.arc.sweep_rad / swept);
-    let feed_mm_per_s = line.feed(parts.iter().map(length).sum(), true)?;
-    for (n, part) in parts.iter().enumerate() {
-        let mut block = line.state.blank_block();
-        block.end = end;
-        if n + 1 < parts.len() {
-            block.end = block.start + *helix * (part.arc.sweep_rad / swept);
-            block.end[plane[0]] = part.end[0];
-            block.end[plane[1]] = part.end[1];
-        }
-        let arc = ArcGeometry { plane: plane.map(|axis| axis as u32), ..part.arc };
-        let length_mm = length(part);
-        line.push(Block { kind: BlockKind::Arc, arc, length_mm, feed_mm_per_s, ..block });
-    }
+    let feed_mm_per_s = line.feed(parts.iter().map(|part| length_of(part, along, swept)).sum(), true)?;
+    let block = Block { end, feed_mm_per_s, ..line.state.blank_block() };
+    push_parts(line, all, plane, &block, helix);
     Ok(())
 }
 
+/// One block a part of an arc that is otherwise as `whole`.
+pub(super) fn push_parts(line: &mut Line, parts: &Parts, plane: [usize; 2], whole: &Block, helix: &AxisVector) {
+    let parts = parts.as_slice();
+    let along = if line.moves_linear(helix) { line.config.axes.path_length(helix) } else { 0.0 };
+    let swept: f64 = parts.iter().map(|part| part.arc.sweep_rad).sum();
+    let mut start = whole.start;
+    for (n, part) in parts.iter().enumerate() {
+        let mut end = whole.end;
+        if n + 1 < parts.len() {
+            end = start + *helix * (part.arc.sweep_rad / swept);
+            end[plane[0]] = part.end[0];
+            end[plane[1]] = part.end[1];
+        }
+        let arc = ArcGeometry { plane: plane.map(|axis| axis as u32), ..part.arc };
+        let length_mm = length_of(part, along, swept);
+        line.emit(Block { kind: BlockKind::Arc, arc, length_mm, start, end, ..*whole });
+        start = end;
+    }
+}
+
+fn length_of(part: &Part, along: f64, swept: f64) -> f64 {
+    (part.arc.radius_mm * part.arc.sweep_rad).hypot(along * part.arc.sweep_rad / swept)
+}
+
 /// The axes of the plane in force.
-fn plane(line: &Line) -> Checked<[usize; 2]> {
+pub(super) fn plane(line: &Line) -> Checked<[usize; 2]> {
     let letters = line.state.modes.plane.letters();
     let axes = letters.map(|letter| line.letters.axis(letter));
     match axes {

@@ -2,6 +2,7 @@
 
 use tandem_sdk::{AxisVector, BlockKind, EventKind};
 
+use super::modes::FeedMode;
 use super::overrides::{self, FEED, SPINDLE};
 use super::{Action, Group, Shape, Word, motion, spindle};
 use crate::fault::{Checked, Fault};
@@ -220,7 +221,7 @@ fn cycle(line: &mut Line, kind: Kind) -> Checked<()> {
         let message = format!("{} needs at least one of X Y Z", line.orders.motion_code());
         return Err(line.motion_fault("axis-missing", message));
     }
-    if line.state.modes.feed.inverse_time {
+    if line.state.modes.feed.mode == FeedMode::InverseTime {
         return Err(line.motion_fault("conflict", "canned cycles do not go with G93"));
     }
     let mut at = line.state.coordinates.to_program(&line.state.path.position);

@@ -8,11 +8,13 @@
 
 pub(crate) mod arc;
 pub(crate) mod circle;
+pub(crate) mod compensation;
 pub(crate) mod coolant;
 pub(crate) mod coordinates;
 pub(crate) mod curve;
 pub(crate) mod cycles;
 mod dwell;
+pub(crate) mod lathe;
 pub(crate) mod modal;
 pub(crate) mod modes;
 pub(crate) mod motion;
@@ -24,6 +26,7 @@ mod refused;
 pub(crate) mod spindle;
 pub(crate) mod stop;
 pub(crate) mod tool;
+mod user;
 
 use std::fmt::Write as _;
 
@@ -37,9 +40,11 @@ use crate::state::letters::mask;
 pub(crate) enum Group {
     Units,
     FeedMode,
+    LatheDiameter,
     ModalState,
     InputOutput,
     ToolChange,
+    SpindleMode,
     Spindle,
     CoolantOff,
     Mist,
@@ -53,12 +58,10 @@ pub(crate) enum Group {
     ToolLength,
     CoordinateSystem,
     PathControl,
-    SpindleMode,
     CycleReturn,
     Polar,
     Scaling,
     Rotation,
-    LatheDiameter,
     NonModal,
     CycleCancel,
     Motion,
@@ -204,7 +207,7 @@ const fn tenths(code: &str) -> u16 {
 }
 
 /// The words of all subjects.
-static SUBJECTS: [&[Word]; 16] = [
+static SUBJECTS: [&[Word]; 19] = [
     motion::WORDS,
     arc::WORDS,
     curve::WORDS,
@@ -212,13 +215,16 @@ static SUBJECTS: [&[Word]; 16] = [
     probe::WORDS,
     modes::WORDS,
     modal::WORDS,
+    compensation::WORDS,
     coordinates::WORDS,
     dwell::WORDS,
     tool::WORDS,
     spindle::WORDS,
+    lathe::WORDS,
     coolant::WORDS,
     outputs::WORDS,
     overrides::WORDS,
+    user::WORDS,
     stop::WORDS,
     refused::WORDS,
 ];
@@ -251,7 +257,9 @@ const fn index(letter: u8) -> [(u8, u8); SPAN] {
 #[inline]
 pub(crate) fn find(letter: u8, tenths: u16) -> Option<&'static Word> {
     let index = if letter == b'G' { &G_INDEX } else { &M_INDEX };
-    let (subject, row) = *index.get(tenths as usize)?;
+    // M100 to M199 share one row.
+    let user = letter == b'M' && user::TENTHS.contains(&tenths) && tenths.is_multiple_of(10);
+    let (subject, row) = *index.get(if user { 1000 } else { tenths as usize })?;
     SUBJECTS.get(subject as usize)?.get(row as usize)
 }
 

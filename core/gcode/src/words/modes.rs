@@ -12,7 +12,15 @@ pub(super) const WORDS: &[Word] = &[
     Word::new("G20", Group::Units, "", "inches", Action::Act(inches), "G20"),
     Word::new("G21", Group::Units, "", "millimetres", Action::Act(millimetres), "G21"),
     Word::new("G93", Group::FeedMode, "", "inverse time: a line takes 1/F minutes", Action::Act(inverse_time), "G93"),
-    Word::new("G94", Group::FeedMode, "", "feed a minute", Action::Act(feed_per_minute), "G94"),
+    Word::new("G94", Group::FeedMode, "", "feed a minute; F is forgotten", Action::Act(feed_per_minute), "G94"),
+    Word::new(
+        "G95",
+        Group::FeedMode,
+        "",
+        "feed a revolution of the spindle; F is forgotten",
+        Action::Act(feed_per_revolution),
+        "G95 F0.1",
+    ),
     Word::new("G17", Group::Plane, "", "arcs in the plane XY", Action::Act(plane_xy), "G17"),
     Word::new("G18", Group::Plane, "", "arcs in the plane ZX", Action::Act(plane_zx), "G18"),
     Word::new("G19", Group::Plane, "", "arcs in the plane YZ", Action::Act(plane_yz), "G19"),
@@ -45,7 +53,6 @@ pub(super) const WORDS: &[Word] = &[
         "G64 P0.05",
     ),
     Word::new("G15", Group::Polar, "", "polar coordinates off (nothing to do)", Action::Act(nothing), "G15"),
-    Word::new("G40", Group::CutterRadius, "", "cutter radius compensation off", Action::Act(nothing), "G40"),
     Word::new("G50", Group::Scaling, "", "scaling off (nothing to do)", Action::Act(nothing), "G50"),
     Word::new("G69", Group::Rotation, "", "rotation off (nothing to do)", Action::Act(nothing), "G69"),
 ];
@@ -80,21 +87,48 @@ impl Plane {
     }
 }
 
+/// What F means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum FeedMode {
+    /// G94.
+    #[default]
+    PerMinute,
+    /// G93: the inverse of the line's duration.
+    InverseTime,
+    /// G95.
+    PerRevolution,
+}
+
+impl FeedMode {
+    /// The word that selects it.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::PerMinute => "G94",
+            Self::InverseTime => "G93",
+            Self::PerRevolution => "G95",
+        }
+    }
+}
+
 /// The feed: F is kept in both units, because an axis that turns reads it in degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Feed {
-    /// G93: F is the inverse of the line's duration.
-    pub inverse_time: bool,
+    pub mode: FeedMode,
+    /// G95.
+    pub mm_per_revolution: f64,
     pub linear_mm_per_s: f64,
     pub rotary_rad_per_s: f64,
 }
 
 /// The modes.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::struct_excessive_bools, reason = "modes that are independent of each other in the language")]
 pub(crate) struct Modes {
     pub plane: Plane,
     /// Millimetres a program unit of length.
     pub unit_mm: f64,
+    /// G7: X words are diameters.
+    pub diameter: bool,
     pub absolute: bool,
     pub arc_absolute: bool,
     pub feed: Feed,
@@ -110,6 +144,7 @@ impl Default for Modes {
         Self {
             plane: Plane::Xy,
             unit_mm: 1.0,
+            diameter: false,
             absolute: true,
             arc_absolute: false,
             feed: Feed::default(),
@@ -134,18 +169,28 @@ impl Modes {
         if letters.is_rotary(axis) { PI / 180.0 } else { self.unit_mm }
     }
 
-    fn set_feed_mode(&mut self, inverse_time: bool) {
-        if inverse_time != self.feed.inverse_time {
-            self.feed = Feed { inverse_time, ..Feed::default() };
-        }
+    /// The same for an axis word: X may be a diameter.
+    #[inline]
+    pub fn word_scale(&self, letters: &Letters, axis: usize) -> f64 {
+        let scale = self.scale(letters, axis);
+        if self.diameter && letters.letter(axis) == b'X' { 0.5 * scale } else { scale }
+    }
+
+    /// Each word of the feed mode forgets F, as in LinuxCNC, also where the mode stays.
+    fn set_feed_mode(&mut self, mode: FeedMode) {
+        self.feed = Feed { mode, ..Feed::default() };
     }
 
     /// F. With G93 it holds for its line only, which reads it itself.
     #[inline]
     fn set_feed(&mut self, feed: f64) {
-        if !self.feed.inverse_time {
-            self.feed.linear_mm_per_s = feed * self.unit_mm / 60.0;
-            self.feed.rotary_rad_per_s = feed * PI / 180.0 / 60.0;
+        match self.feed.mode {
+            FeedMode::PerMinute => {
+                self.feed.linear_mm_per_s = feed * self.unit_mm / 60.0;
+                self.feed.rotary_rad_per_s = feed * PI / 180.0 / 60.0;
+            }
+            FeedMode::InverseTime => {}
+            FeedMode::PerRevolution => self.feed.mm_per_revolution = feed * self.unit_mm,
         }
     }
 }
@@ -161,12 +206,17 @@ fn millimetres(line: &mut Line) -> Checked<()> {
 }
 
 fn inverse_time(line: &mut Line) -> Checked<()> {
-    line.state.modes.set_feed_mode(true);
+    line.state.modes.set_feed_mode(FeedMode::InverseTime);
     Ok(())
 }
 
 fn feed_per_minute(line: &mut Line) -> Checked<()> {
-    line.state.modes.set_feed_mode(false);
+    line.state.modes.set_feed_mode(FeedMode::PerMinute);
+    Ok(())
+}
+
+fn feed_per_revolution(line: &mut Line) -> Checked<()> {
+    line.state.modes.set_feed_mode(FeedMode::PerRevolution);
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use tandem_sdk::{Block, BlockKind};
 
-use super::{Action, Group, Shape, Word};
+use super::{Action, Group, Shape, Word, compensation, lathe};
 use crate::fault::Checked;
 use crate::line::Line;
 
@@ -56,6 +56,18 @@ fn feed(line: &mut Line) -> Checked<()> {
 /// A straight line from where the last block ended to the programmed position.
 #[inline]
 pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
+    if line.state.compensation.is_on() {
+        return compensation::straight(line, kind);
+    }
+    if line.state.spindle.surface.is_some() {
+        return lathe::straight_at_surface_speed(line, kind);
+    }
+    line_to(line, kind)
+}
+
+/// The same in one block.
+#[inline]
+pub(super) fn line_to(line: &mut Line, kind: BlockKind) -> Checked<()> {
     let end = line.state.path.block_end();
     let displacement = end - line.state.path.last_end;
     let length_mm = line.config.axes.path_length(&displacement);

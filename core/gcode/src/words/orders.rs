@@ -215,7 +215,9 @@ pub(crate) fn polar_misplaced(polar: &Polar) -> Fault {
 
 #[cold]
 fn conflict(word: &Word, other: &Word, span: Span) -> Fault {
-    let message = if word.tenths == other.tenths {
+    let message = if word.group == Group::User {
+        "a line holds one of the commands M100 to M199".to_owned()
+    } else if word.tenths == other.tenths {
         format!("{} stands in this line twice", word.code)
     } else {
         format!("{} and {} exclude each other in a line (group: {})", word.code, other.code, word.group.name())
@@ -245,11 +247,7 @@ impl Claims {
 #[cold]
 fn unknown(letter: char, code: Code) -> Fault {
     let word = written(letter, code.tenths);
-    let message = match code.tenths {
-        1000..=1999 if letter == 'M' => format!("{word}: user-defined commands are not supported"),
-        _ => format!("{word} is not known"),
-    };
-    Fault::new(code.span, "unknown-code", message)
+    Fault::new(code.span, "unknown-code", format!("{word} is not known"))
 }
 
 #[cold]

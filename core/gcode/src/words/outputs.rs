@@ -1,4 +1,4 @@
-//! M62 to M66: digital outputs, and waiting for inputs.
+//! M62 to M68: outputs, and waiting for inputs.
 
 use tandem_sdk::EventKind;
 
@@ -12,13 +12,39 @@ pub(super) const WORDS: &[Word] = &[
     Word::new("M63", Group::InputOutput, "P", "digital output P off, with the motion", WITH_MOTION_OFF, "M63 P1"),
     Word::new("M64", Group::InputOutput, "P", "digital output P on, at rest", AT_REST_ON, "M64 P1"),
     Word::new("M65", Group::InputOutput, "P", "digital output P off, at rest", AT_REST_OFF, "M65 P1"),
-    Word::new("M66", Group::InputOutput, "PELQ", "wait for digital input P", Action::Act(wait), "M66 P3 L1 Q2"),
+    Word::new(
+        "M66",
+        Group::InputOutput,
+        "PELQ",
+        "wait for digital input P, or read analogue input E",
+        Action::Act(wait),
+        "M66 P3 L1 Q2",
+    ),
+    Word::new(
+        "M67",
+        Group::InputOutput,
+        "EQ",
+        "analogue output E to the value Q, with the motion",
+        ANALOG_WITH_MOTION,
+        "M67 E1 Q0.5",
+    ),
+    Word::new(
+        "M68",
+        Group::InputOutput,
+        "EQ",
+        "analogue output E to the value Q, at rest",
+        ANALOG_AT_REST,
+        "M68 E1 Q0.5",
+    ),
 ];
 
 const WITH_MOTION_ON: Action = Action::Act(|line| switch(line, true, false));
 const WITH_MOTION_OFF: Action = Action::Act(|line| switch(line, false, false));
 const AT_REST_ON: Action = Action::Act(|line| switch(line, true, true));
 const AT_REST_OFF: Action = Action::Act(|line| switch(line, false, true));
+
+const ANALOG_WITH_MOTION: Action = Action::Act(|line| set_analog(line, false));
+const ANALOG_AT_REST: Action = Action::Act(|line| set_analog(line, true));
 
 /// Highest output of M62 to M65; the two above it are mist and flood coolant.
 const MAX_OUTPUT: u32 = 61;
@@ -69,14 +95,37 @@ fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
     Ok(())
 }
 
+/// M67 and M68.
+fn set_analog(line: &mut Line, at_rest: bool) -> Checked<()> {
+    let missing = |what| line.orders.fault(Group::InputOutput, "word-missing", what);
+    let number = line.words.integer(b'E', 0..=63)?.ok_or_else(|| missing("E, the number of the output, is missing"))?;
+    let value = line.words.get(b'Q').ok_or_else(|| missing("Q, the value of the output, is missing"))?;
+    if let Some(refusal) = line.config.analog_outputs.refusal("analogue output", number) {
+        return Err(line.words.fault(b'E', "output", refusal));
+    }
+    if at_rest {
+        line.rest();
+    }
+    line.event(EventKind::AnalogOutput, number, value);
+    Ok(())
+}
+
 fn wait(line: &mut Line) -> Checked<()> {
     let input = match (line.words.integer(b'P', 0..=63)?, line.words.integer(b'E', 0..=63)?) {
         (Some(number), None) => match line.config.inputs.refusal("input", number) {
             Some(refusal) => return Err(line.words.fault(b'P', "input", refusal)),
             None => Input::Digital(number),
         },
-        (_, Some(_)) => return Err(wait_fault(line, "M66 E: there are no analogue inputs, only digital ones (P)")),
-        (None, None) => return Err(wait_fault(line, "M66 needs P, the number of a digital input")),
+        (None, Some(number)) => match line.config.analog_inputs.refusal("analogue input", number) {
+            Some(refusal) => return Err(line.words.fault(b'E', "input", refusal)),
+            None => Input::Analog(number),
+        },
+        (Some(_), Some(_)) => {
+            return Err(wait_fault(line, "M66 takes either P, a digital input, or E, an analogue one"));
+        }
+        (None, None) => {
+            return Err(wait_fault(line, "M66 needs P, the number of a digital input, or E, an analogue one"));
+        }
     };
     let mode = match line.words.integer(b'L', 0..=4)? {
         None | Some(0) => InputMode::Immediate,
@@ -86,6 +135,9 @@ fn wait(line: &mut Line) -> Checked<()> {
         Some(_) => InputMode::Low,
     };
     let timeout_s = line.words.not_negative(b'Q')?.unwrap_or(0.0);
+    if mode != InputMode::Immediate && matches!(input, Input::Analog(_)) {
+        return Err(wait_fault(line, "an analogue input (E) is read at once: M66 E goes with L0 only"));
+    }
     if mode != InputMode::Immediate && timeout_s == 0.0 {
         return Err(wait_fault(line, "M66 needs Q, the longest wait in seconds, greater than zero"));
     }
@@ -101,7 +153,8 @@ fn wait_fault(line: &Line, message: &str) -> Fault {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::assert_items;
+    use crate::Lines;
+    use crate::testing::{assert_items, messages, mill, run_on};
 
     #[test]
     fn outputs_that_do_not_go_with_the_motion_switch_at_rest() {
@@ -137,6 +190,34 @@ mod tests {
                 "4: Rapid 2 to 0 0 0 0",
                 "End",
             ],
+        );
+    }
+
+    #[test]
+    fn analogue_outputs_go_with_the_motion_or_wait_for_rest() {
+        assert_items(
+            "F60\nG1 X1\nM67 E1 Q0.5\nX2\nM68 E0 Q-3\nM66 E2\nG0 X[#5399+3]",
+            &[
+                "2: Line 0 to 1 0 0 0 length 1 feed 1",
+                "3: AnalogOutput 1 0.5 before 1",
+                "4: Line 1 to 2 0 0 0 length 1 feed 1",
+                "5: Dwell 2 to 2 0 0 0 for 0",
+                "5: AnalogOutput 0 -3 before 3",
+                "6: Wait Analog(2) Immediate 0 before 3",
+                "7: Rapid 3 to 3 0 0 0",
+                "End",
+            ],
+        );
+        for wrong in ["M67 E1", "M68 Q1", "M66 P1 E1", "M66 E1 L1 Q2", "M67 E64 Q1"] {
+            assert_eq!(messages(wrong).len(), 1, "{wrong}");
+        }
+        let mut config = mill();
+        (config.analog_outputs, config.analog_inputs) = (Lines::none(), Lines::none());
+        let (_, errors) = run_on(config, "M67 E1 Q1\nM66 E1");
+        let shown: Vec<_> = errors.iter().map(|e| &*e.message).collect();
+        assert_eq!(
+            shown,
+            ["no driver has analogue output 1; there is none", "no driver has analogue input 1; there is none"]
         );
     }
 }

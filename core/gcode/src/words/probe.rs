@@ -2,6 +2,7 @@
 
 use tandem_sdk::{AxisVector, Block, BlockKind, Edge, StopOn};
 
+use super::modes::FeedMode;
 use super::{Action, Group, Shape, Word};
 use crate::fault::Checked;
 use crate::item::ProbeResult;
@@ -114,7 +115,7 @@ fn refuse_company(line: &Line, word: &str) -> Checked<()> {
     if line.words.named() == 0 {
         return Err(line.motion_fault("axis-missing", format!("{word} needs at least one axis word")));
     }
-    if line.state.modes.feed.inverse_time {
+    if line.state.modes.feed.mode == FeedMode::InverseTime {
         let message = format!("{word} does not go with G93: where it ends is not known, so its time is not either");
         return Err(line.motion_fault("conflict", message));
     }

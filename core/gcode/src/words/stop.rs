@@ -2,7 +2,7 @@
 
 use tandem_sdk::EventKind;
 
-use super::{Action, Group, Word, coolant, spindle};
+use super::{Action, Group, Word, compensation, coolant, spindle};
 use crate::fault::Checked;
 use crate::item::Item;
 use crate::line::Line;
@@ -27,6 +27,7 @@ fn optional_stop(line: &mut Line) -> Checked<()> {
 }
 
 fn program_end(line: &mut Line) -> Checked<()> {
+    compensation::off(line)?;
     line.rest();
     switch_off(line);
     line.event(EventKind::ProgramEnd, 0, 0.0);

@@ -89,11 +89,26 @@ fn offset_of(line: &mut Line, number: u32) -> Checked<AxisVector> {
     Ok(AxisVector::ZERO)
 }
 
+/// The diameter of a tool, mm; 0 for no tool.
+pub(super) fn diameter_of(line: &mut Line, number: u32) -> Checked<f64> {
+    if let Some(tool) = line.state.tools.find(number) {
+        return Ok(tool.diameter_mm);
+    }
+    let without_table = line.config.tools.is_empty() && line.config.zero_length_without_table;
+    if number != 0 && !without_table {
+        return Err(line.orders.fault(Group::CutterRadius, "tool", no_tool(line, number)));
+    }
+    if number != 0 {
+        line.state.tools.assumed_zero.get_or_insert(line.state.line);
+    }
+    Ok(0.0)
+}
+
 #[cold]
 fn no_tool(line: &Line, number: u32) -> String {
     if line.config.tools.is_empty() {
         return format!(
-            "the length of tool {number} is not known: the machine file names no tool table \
+            "the size of tool {number} is not known: the machine file names no tool table \
              ([tools] table, or without_table = \"zero\" where every length is zero)"
         );
     }

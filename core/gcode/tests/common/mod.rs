@@ -14,6 +14,7 @@ pub fn mill() -> Config {
     config.travel_mm[0] = (-250.0, 250.0);
     config.travel_mm[1] = (-250.0, 250.0);
     config.travel_mm[2] = (-100.0, 100.0);
+    config.user_commands = vec![100, 101, 199];
     config.probe = Some(ProbeInput { input: 7, inverted: false });
     for (number, length) in [(1, 20.0), (2, 25.0)] {
         let offset = AxisVector::from_slice(&[0.0, 0.0, length]);
@@ -90,6 +91,7 @@ fn show(item: &Item) -> String {
             let (input, mode) = (w.input, w.mode);
             format!("{}: Wait {input:?} {mode:?} {} before {}", w.line, short(w.timeout_s), w.before_block)
         }
+        Item::Command(c) => format!("{}: Command {} {:?} {:?} before {}", c.line, c.number, c.p, c.q, c.before_block),
         Item::End => "End".into(),
     }
 }

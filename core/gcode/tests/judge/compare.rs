@@ -82,7 +82,9 @@ pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
                     stream.provide_probe(&ProbeResult { touched: Some(block.end), rest: block.end });
                     return Ok(Driven { moves: moving(moves), whole: false });
                 }
-                Item::Wait(_) | Item::Block(_, Some(_)) => return Ok(Driven { moves: moving(moves), whole: false }),
+                Item::Wait(_) | Item::Command(_) | Item::Block(_, Some(_)) => {
+                    return Ok(Driven { moves: moving(moves), whole: false });
+                }
                 Item::Block(block, None) => moves.push(step(&block)),
                 Item::Event(_) | Item::End => {}
             }

@@ -295,3 +295,52 @@ pub fn with_offsets(seed: u64) -> String {
     writer.line("M2");
     writer.text
 }
+
+/// Contours with radius compensation in XY and ZX: lines and arcs, inside and outside corners, moves across, entry and exit.
+pub fn with_compensation(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 0);
+    let zx = writer.below(4) == 0;
+    let (a, b, across) = if zx { ('Z', 'X', 'Y') } else { ('X', 'Y', 'Z') };
+    let start = writer.random.pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Y-2", "G54"]);
+    writer.line(&format!("{}\n{start}", if zx { "G18" } else { "G17" }));
+    if !zx && writer.below(3) == 0 {
+        writer.line("G10 L2 P1 R30");
+    }
+    for _ in 0..2 {
+        let word = writer.random.pick(&["G41.1 D2", "G42.1 D2", "G41 D1", "G42 D2", "G41.1 D6", "G42.1 D0.5"]);
+        writer.line(&format!("G0 X0 Y0 Z0\n{word}\nG1 {a}20 {b}5"));
+        let mut at = [20.0, 5.0];
+        for _ in 0..2 + writer.below(6) {
+            at = contour_move(&mut writer, at, [a, b]);
+            if writer.below(5) == 0 {
+                let depth = writer.below(9);
+                writer.line(&format!("G1 {across}-{depth}"));
+            }
+        }
+        writer.line(&format!("G40\nG1 {a}90 {b}90"));
+    }
+    writer.line("M2");
+    writer.text
+}
+
+/// A line, or an arc by its centre, from `at`; where it ends.
+fn contour_move(writer: &mut Writer, at: [f64; 2], [a, b]: [char; 2]) -> [f64; 2] {
+    let steps = [10.0, 15.0, -10.0, -15.0, 0.0, 20.0];
+    let mut step = [writer.random.pick(&steps), writer.random.pick(&steps)];
+    if step == [0.0; 2] {
+        step[0] = 10.0;
+    }
+    let end = [at[0] + step[0], at[1] + step[1]];
+    if writer.below(5) < 3 {
+        let word = if writer.below(8) == 0 { "G0" } else { "G1" };
+        writer.line(&format!("{word} {a}{:.4} {b}{:.4}", end[0], end[1]));
+        return end;
+    }
+    // The centre lies on the line that halves the chord.
+    let share = writer.random.pick(&[0.0, 0.5, -0.5, 1.0]);
+    let center = [step[0] / 2.0 - share * step[1], step[1] / 2.0 + share * step[0]];
+    let word = writer.random.pick(&["G2", "G3"]);
+    let [i, j] = if a == 'Z' { ['K', 'I'] } else { ['I', 'J'] };
+    writer.line(&format!("{word} {a}{:.4} {b}{:.4} {i}{:.4} {j}{:.4}", end[0], end[1], center[0], center[1]));
+    end
+}

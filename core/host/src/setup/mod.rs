@@ -1,6 +1,7 @@
 //! From a machine and a program to everything that a run needs: what is refused is refused here.
 
 pub mod claim;
+pub mod commands;
 pub mod density;
 pub mod dry_run;
 pub mod lines;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tandem_fine::{FineConfig, MissedLimits};
-use tandem_gcode::{Config, ProbeInput, Stream, Tool};
+use tandem_gcode::{Config, Lines, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
@@ -18,6 +18,7 @@ use crate::messages::roles;
 use crate::plugins::hang::HangWatch;
 use crate::plugins::registry::Registry;
 use crate::policy::{Means, PolicyHost, Tuner};
+use crate::setup::commands::with_user_commands;
 use crate::setup::dry_run::DryRun;
 use crate::setup::lines;
 use crate::setup::stand_in::AssumedEdges;
@@ -44,6 +45,12 @@ pub fn interpreter_config(machine: &Machine, simulated: bool, switches: Switches
     (config.outputs, config.inputs) = (outputs, inputs);
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config.zero_length_without_table = machine.tools.path.is_none() && (machine.tools.zero_without_table || simulated);
+    // Drives that are simulated take what no real one is known to have.
+    if !simulated {
+        (config.analog_outputs, config.analog_inputs) = (Lines::none(), Lines::none());
+        config.orients_spindle = false;
+    }
+    config.user_commands = machine.program.user_commands.keys().copied().collect();
     config.subroutine_path = machine.program.subroutine_path.iter().cloned().collect();
     config.max_steps = u64::from(machine.program.max_steps);
     config
@@ -71,6 +78,7 @@ pub fn source(
     if let Some(policy) = policy {
         source = Box::new(Tuned::new(source, Tuner::new(policy.clone(), planner_on(machine, registry, joints)?)));
     }
+    let source = with_user_commands(machine, registry, switches, source);
     Ok(behind_homing(machine, source, switches))
 }
 

@@ -19,6 +19,8 @@ pub struct EventsCsv {
     last: Switched,
     /// Words of the program that have not been seen to switch.
     ahead: VecDeque<Word>,
+    /// Words that no sample shows: they are written when the path comes to them.
+    told: VecDeque<Word>,
     /// A cut waits for the spindle.
     waits: bool,
     /// It has been told that no further row can be written.
@@ -31,6 +33,34 @@ enum What {
     Spindle,
     /// Coolant too.
     Output(u32),
+    /// Made ready, and changed in.
+    ToolSelect(u32),
+    ToolChange(u32),
+    Analog(u32),
+    Orient,
+    Command(u32),
+}
+
+impl What {
+    /// As the list calls it.
+    fn shown(self) -> String {
+        match self {
+            Self::Spindle => "spindle".to_string(),
+            Self::Output(MIST) => "mist".to_string(),
+            Self::Output(FLOOD) => "flood".to_string(),
+            Self::Output(output) => format!("output {output}"),
+            Self::ToolSelect(_) => "tool made ready".to_string(),
+            Self::ToolChange(_) => "tool change".to_string(),
+            Self::Analog(output) => format!("analog output {output}"),
+            Self::Orient => "spindle angle".to_string(),
+            Self::Command(number) => format!("M{number}"),
+        }
+    }
+
+    /// Whether a sample shows it.
+    fn is_sampled(self) -> bool {
+        matches!(self, Self::Spindle | Self::Output(_))
+    }
 }
 
 /// A word of the program that switches.
@@ -50,10 +80,20 @@ impl Word {
             EventKind::Mist => What::Output(MIST),
             EventKind::Flood => What::Output(FLOOD),
             EventKind::DigitalOutput => What::Output(event.index.unsigned_abs()),
+            EventKind::ToolSelect => What::ToolSelect(event.index.unsigned_abs()),
+            EventKind::ToolChange => What::ToolChange(event.index.unsigned_abs()),
+            EventKind::AnalogOutput => What::Analog(event.index.unsigned_abs()),
+            EventKind::OrientSpindle => What::Orient,
+            EventKind::UserCommand => What::Command(event.index.unsigned_abs()),
             _ => return None,
         };
         let is_on = f64::from(u8::from(event.value != 0.0));
-        let value = if what == What::Spindle { event.value } else { is_on };
+        let value = match what {
+            What::Output(_) => is_on,
+            What::ToolSelect(number) | What::ToolChange(number) => f64::from(number),
+            What::Orient => event.value.to_degrees(),
+            What::Spindle | What::Analog(_) | What::Command(_) => event.value,
+        };
         Some(Self { what, value, line: event.line, before_block: event.before_block })
     }
 }
@@ -77,15 +117,15 @@ impl EventsCsv {
     pub fn create(path: &Path, fine_period_s: f64) -> Result<Self, String> {
         let mut out = Output::create(path)?;
         writeln!(out, "time_s,tick,line,word,value,by").map_err(|e| format!("{}: {e}", path.display()))?;
-        let (last, ahead) = (Switched::default(), VecDeque::new());
-        Ok(Self { out, period_s: fine_period_s, last, ahead, waits: false, failed: false })
+        let (last, ahead, told) = (Switched::default(), VecDeque::new(), VecDeque::new());
+        Ok(Self { out, period_s: fine_period_s, last, ahead, told, waits: false, failed: false })
     }
 
     /// An event of the program is on its way to the drives.
     pub fn event(&mut self, event: &Event) {
-        if !self.failed {
-            self.ahead.extend(Word::of(event));
-        }
+        let Some(word) = Word::of(event).filter(|_| !self.failed) else { return };
+        let queue = if word.what.is_sampled() { &mut self.ahead } else { &mut self.told };
+        queue.push_back(word);
     }
 
     /// A sample was sent: what it switches is written. After an error all further ones are left out.
@@ -101,33 +141,42 @@ impl EventsCsv {
         written
     }
 
-    /// Ends the file. The period that ends a program switches too, and has no sample: that is what is `left`.
+    /// Ends the file of a run, which has `completed` its program or not. The period that ends a program switches too, and has no sample: that is what is `left`.
     ///
     /// # Errors
     /// The last rows cannot be written, or the file cannot take its name. What [`EventsCsv::sample`] has told is not told
     /// again.
-    pub fn finish(mut self, left: &Left) -> Result<(), RecordError> {
+    pub fn finish(mut self, left: &Left, completed: bool) -> Result<(), RecordError> {
         if self.failed {
             return Ok(());
         }
         let Left { tick, block, line, switched } = *left;
         self.period(&Period { tick, block, line, switched, waits: false })?;
+        if completed {
+            // Words behind the last motion have been reached too.
+            self.period(&Period { tick, block: u64::MAX - 1, line, switched, waits: false })?;
+        }
         self.out.finish_record("events")
     }
 
     fn period(&mut self, period: &Period) -> Result<(), RecordError> {
-        if self.failed || (period.switched == self.last && period.waits == self.waits) {
+        let comes = self.told.front().is_some_and(|word| word.before_block <= period.block);
+        if self.failed || (period.switched == self.last && period.waits == self.waits && !comes) {
             return Ok(());
         }
         self.rows(period).map_err(|error| {
             self.failed = true;
             self.ahead.clear();
+            self.told.clear();
             RecordError::of("events", &mut self.out, error)
         })
     }
 
     fn rows(&mut self, period: &Period) -> std::io::Result<()> {
         let (now, last) = (period.switched, std::mem::replace(&mut self.last, period.switched));
+        while let Some(word) = self.told.pop_front_if(|word| word.before_block <= period.block) {
+            self.told_row(period, &word)?;
+        }
         if now.spindle_rad_per_s != last.spindle_rad_per_s {
             self.row(period, What::Spindle, now.spindle_rad_per_s)?;
         }
@@ -141,16 +190,16 @@ impl EventsCsv {
         Ok(())
     }
 
+    fn told_row(&mut self, period: &Period, word: &Word) -> std::io::Result<()> {
+        let (time_s, tick) = (TraceCsv::t_s(period.tick, self.period_s), period.tick);
+        writeln!(self.out, "{time_s},{tick},{},{},{},program", word.line, word.what.shown(), word.value)
+    }
+
     fn row(&mut self, period: &Period, what: What, value: f64) -> std::io::Result<()> {
         let Period { tick, block, line, switched, .. } = period;
         let by_word = (switched.by == SwitchedBy::Program).then(|| self.line_of(what, value, *block)).flatten();
         let (time_s, line) = (TraceCsv::t_s(*tick, self.period_s), by_word.unwrap_or(*line));
-        let (word, shown) = match what {
-            What::Spindle => ("spindle".to_string(), rpm(value)),
-            What::Output(MIST) => ("mist".to_string(), value),
-            What::Output(FLOOD) => ("flood".to_string(), value),
-            What::Output(output) => (format!("output {output}"), value),
-        };
+        let (word, shown) = (what.shown(), if what == What::Spindle { rpm(value) } else { value });
         // Names and numbers: nothing that a CSV would have to quote.
         writeln!(self.out, "{time_s},{tick},{line},{word},{shown},{}", switched.by.name())
     }

@@ -132,6 +132,7 @@ impl Homing {
                 Item::Block(block, _) => block.index += self.blocks,
                 Item::Event(event) => event.before_block += self.blocks,
                 Item::Wait(wait) => wait.before_block += self.blocks,
+                Item::Command(command) => command.before_block += self.blocks,
                 Item::End => {}
             }
         }

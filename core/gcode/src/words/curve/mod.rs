@@ -9,6 +9,7 @@ use std::sync::Arc;
 use tandem_motion::nurbs::{Nurbs, NurbsError};
 use tandem_sdk::{AxisVector, Block, BlockKind, NurbsData};
 
+use super::modes::FeedMode;
 use super::{Action, Group, Shape, Word};
 use crate::fault::{Checked, Fault, Span};
 use crate::item::Item;
@@ -192,7 +193,7 @@ pub(crate) fn open_curve(line: &mut Line, dialect: Dialect, uncertain: u32) -> C
         weights: Vec::new(),
         knots: Vec::new(),
         places: Places::default(),
-        inverse_time: line.words.get(b'F').filter(|_| line.state.modes.feed.inverse_time),
+        inverse_time: line.words.get(b'F').filter(|_| line.state.modes.feed.mode == FeedMode::InverseTime),
         broken: uncertain != 0,
     });
     line.refuse_machine_coordinates()?;
