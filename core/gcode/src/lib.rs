@@ -11,7 +11,7 @@
 //!
 //! let config = Config::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
 //! let mut program = Program::spool("part.ngc", &b"G21 F600\nG1 X10\nG2 X20 I5\nM2\n"[..]).unwrap();
-//! let report = check(&mut program, &config, &mut |_block| Ok(())).unwrap();
+//! let report = check(&mut program, &config, &mut |_block, _curve| Ok(())).unwrap();
 //! assert!(report.is_ok() && report.blocks == 3);
 //!
 //! let mut stream = Stream::new(program, &config).unwrap();

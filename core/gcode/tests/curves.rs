@@ -74,7 +74,7 @@ fn inverse_time() {
 fn blocks_go_on_behind_a_curve() {
     let (items, errors) = run_on(mill(), "F60\nG1 X1\nG5.2 L2\nX2\nG5.3\nG1 X5\nX7");
     assert!(errors.is_empty());
-    assert_eq!(only_blocks(&items).iter().map(|b| b.index).collect::<Vec<_>>(), [0, 2, 3]);
+    assert_eq!(only_blocks(&items).iter().map(|b| b.index).collect::<Vec<_>>(), [0, 1, 2, 3]);
 }
 
 #[test]
