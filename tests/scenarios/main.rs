@@ -50,6 +50,7 @@ mod smooth;
 mod smooth_limits;
 mod smooth_peers;
 mod starvation;
+mod state;
 mod stopping_time;
 mod stops;
 mod switched;

@@ -3,6 +3,7 @@
 #[cfg(feature = "ethercat")]
 mod bus;
 mod plugin;
+mod state;
 mod trace;
 
 use std::net::SocketAddr;
@@ -13,6 +14,7 @@ use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 #[cfg(feature = "ethercat")]
 pub use bus::{Bus, Sdo, Which};
 pub use plugin::{Kind, Plugin};
+pub use state::{Files, Of, State};
 pub use trace::Trace;
 
 /// Tandem, an open CNC motion controller.
@@ -66,6 +68,16 @@ pub enum Command {
     Bus(Bus),
     /// Measure how late the fine loop wakes on this computer, as a histogram
     Latency(Latency),
+    /// Look at what lasts of a machine, and exchange it with LinuxCNC
+    #[command(subcommand)]
+    State(State),
+    /// Print what a shell completes on the command line
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page
+    Man,
 }
 
 #[derive(Group)]

@@ -1,5 +1,7 @@
 //! The `tandem` command: the only crate that prints.
 
+#![allow(clippy::doc_markdown, reason = "LinuxCNC and EtherCAT are names, not code")]
+
 /// A line to standard error. A reader that has gone away is no reason to fail.
 macro_rules! say {
     ($($text:tt)*) => {{
@@ -20,6 +22,7 @@ mod connect;
 mod corners;
 mod curves;
 mod estimate;
+mod generate;
 mod hang;
 mod home;
 mod identify;
@@ -34,6 +37,7 @@ mod report;
 mod run;
 mod script;
 mod serve;
+mod state;
 mod tolerances;
 mod trace;
 mod warnings;
@@ -70,6 +74,9 @@ fn main() -> ExitCode {
         #[cfg(feature = "ethercat")]
         Command::Bus(command) => bus::bus(&command),
         Command::Latency(options) => latency::latency(&options),
+        Command::State(command) => state::state(&command),
+        Command::Completions { shell } => Ok(generate::completions(shell)),
+        Command::Man => generate::man().map_err(Into::into),
     };
     // What plugins said before something was refused, or after the last run.
     tandem_host::drain_plugin_log(&mut |line| say!("{line}"));

@@ -232,7 +232,7 @@ impl LinuxCnc<'_> {
             let before = state.tools.remove(&read.number).unwrap_or_default();
             let (name, life, corner_radius_mm) = (before.name, before.life, before.corner_radius_mm);
             let remark = remark.trim().to_owned();
-            state.tools.insert(read.number, Tool { name, life, corner_radius_mm, remark, ..read });
+            state.tools.insert(read.number, Tool { name, corner_radius_mm, life, remark, ..read });
         }
         Ok(left)
     }
