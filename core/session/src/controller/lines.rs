@@ -8,7 +8,7 @@ use tandem_host::check_block;
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, Block, Planner};
+use tandem_sdk::{AxisVector, NurbsData, Planner};
 
 /// Lines that may wait before they are planned.
 const MOST_WAITING: usize = 1000;
@@ -125,13 +125,9 @@ impl Lines {
         let number = self.count + 1;
         let first_block = tried.next_block();
         tried.line(number, text.as_bytes(), &mut items).map_err(|e| e.to_string())?;
-        let judge = |block: &Block| check_block(&self.machine, self.judge.as_ref(), block);
         for item in &items {
-            let judged = match item {
-                Item::Block(block) => judge(block),
-                Item::Curve(curve) => curve.with(judge),
-                _ => Ok(()),
-            };
+            let Item::Block(block, curve) = item else { continue };
+            let judged = check_block(&self.machine, self.judge.as_ref(), block, curve.as_deref().map(NurbsData::curve));
             judged.map_err(|why| format!("input:{number}: {why}"))?;
         }
         self.asks = items.iter().any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
