@@ -33,14 +33,20 @@ pub fn heap_use_of(work: impl FnOnce()) -> HeapUse {
     let before = USED.get();
     work();
     let after = USED.get();
-    HeapUse { allocations: after.allocations - before.allocations, frees: after.frees - before.frees }
+    HeapUse {
+        allocations: after.allocations - before.allocations,
+        frees: after.frees - before.frees,
+    }
 }
 
 /// How many bytes `work` holds at most beyond what was held before, on this thread.
 #[allow(dead_code, reason = "each user takes its own part")]
 pub fn peak_bytes_of(work: impl FnOnce()) -> usize {
     let before = BYTES.get().now;
-    BYTES.set(Bytes { now: before, peak: before });
+    BYTES.set(Bytes {
+        now: before,
+        peak: before,
+    });
     work();
     BYTES.get().peak - before
 }
@@ -51,20 +57,36 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let used = USED.get();
-        USED.set(HeapUse { allocations: used.allocations + 1, ..used });
+        USED.set(HeapUse {
+            allocations: used.allocations + 1,
+            ..used
+        });
         let Bytes { now, peak } = BYTES.get();
         let now = now.wrapping_add(layout.size());
         // What another thread has given away may be freed here, so that the number may fall below zero and wrap.
-        BYTES.set(Bytes { now, peak: if now < usize::MAX / 2 { peak.max(now) } else { peak } });
+        BYTES.set(Bytes {
+            now,
+            peak: if now < usize::MAX / 2 {
+                peak.max(now)
+            } else {
+                peak
+            },
+        });
         // SAFETY: the caller's promise, passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         let used = USED.get();
-        USED.set(HeapUse { frees: used.frees + 1, ..used });
+        USED.set(HeapUse {
+            frees: used.frees + 1,
+            ..used
+        });
         let Bytes { now, peak } = BYTES.get();
-        BYTES.set(Bytes { now: now.wrapping_sub(layout.size()), peak });
+        BYTES.set(Bytes {
+            now: now.wrapping_sub(layout.size()),
+            peak,
+        });
         // SAFETY: the caller's promise, passed on.
         unsafe { System.dealloc(pointer, layout) }
     }

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Plugin, PluginError,
-    RawOptions, Setpoint, Words, local_plugin, parse_options,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Plugin,
+    PluginError, RawOptions, Setpoint, Words, local_plugin, parse_options,
 };
 
 /// What the driver called `name` was told; tests use names of their own.
@@ -94,7 +94,12 @@ struct Plan {
 /// of each, an analog value, and the age of its first joint.
 pub const MEASURED_INPUTS: usize = 3;
 pub fn measured(tick: u64) -> (u64, [u16; MEASURED_INPUTS], f64, u32) {
-    (tick & 7, std::array::from_fn(|input| ((tick + input as u64) % 3) as u16), 0.5 * tick as f64, (tick % 4) as u32)
+    (
+        tick & 7,
+        std::array::from_fn(|input| ((tick + input as u64) % 3) as u16),
+        0.5 * tick as f64,
+        (tick % 4) as u32,
+    )
 }
 
 pub struct Double {
@@ -115,13 +120,24 @@ impl Double {
     fn made(options: &RawOptions) -> Result<Self, PluginError> {
         let plan: Plan = parse_options(&options.0)?;
         let faulty = plan.faulty;
-        Ok(Self { plan, joints: 0, position: AxisVector::ZERO, faulty, last: None, has_stalled: false })
+        Ok(Self {
+            plan,
+            joints: 0,
+            position: AxisVector::ZERO,
+            faulty,
+            last: None,
+            has_stalled: false,
+        })
     }
 
     /// Stays away once, where it is to.
     fn stall(&mut self, setpoint: &Setpoint) {
         let rests = setpoint.velocity == AxisVector::ZERO;
-        if self.plan.stall_ms > 0 && !self.has_stalled && setpoint.tick > 0 && rests == self.plan.stalls_at_rest {
+        if self.plan.stall_ms > 0
+            && !self.has_stalled
+            && setpoint.tick > 0
+            && rests == self.plan.stalls_at_rest
+        {
             self.has_stalled = true;
             thread::sleep(Duration::from_millis(self.plan.stall_ms));
         }
@@ -131,7 +147,10 @@ impl Double {
         let mut logs = logs();
         if !logs.contains_key(&self.plan.name) {
             // It never grows, so that who counts allocations sees none of this double.
-            let log = Log { calls: Vec::with_capacity(MAX_CALLS), ..Log::default() };
+            let log = Log {
+                calls: Vec::with_capacity(MAX_CALLS),
+                ..Log::default()
+            };
             logs.insert(self.plan.name.clone(), log);
         }
         if let Some(log) = logs.get_mut(&self.plan.name) {
@@ -142,7 +161,11 @@ impl Double {
 
 impl Driver for Double {
     fn describe(&self) -> DriverDescription {
-        let description = if self.plan.real { DriverDescription::real() } else { DriverDescription::simulated() };
+        let description = if self.plan.real {
+            DriverDescription::real()
+        } else {
+            DriverDescription::simulated()
+        };
         let gives_phase = u32::from(self.plan.phase);
         let slow = u32::from(self.plan.slow_ms > 0);
         DriverDescription {
@@ -162,8 +185,13 @@ impl Driver for Double {
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         let joints = context.joint_count as usize;
-        let names = context.joints[..joints].iter().map(|joint| joint.name.as_str().to_string()).collect();
-        self.note(|log| (log.opened, log.joints, log.names) = (log.opened + 1, context.joint_count, names));
+        let names = context.joints[..joints]
+            .iter()
+            .map(|joint| joint.name.as_str().to_string())
+            .collect();
+        self.note(|log| {
+            (log.opened, log.joints, log.names) = (log.opened + 1, context.joint_count, names)
+        });
         if self.plan.refuses_to_open {
             return Err(PluginError::of_option("name", "it is not there"));
         }
@@ -186,9 +214,16 @@ impl Driver for Double {
         Ok(attached)
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         let began = Instant::now();
-        let silent = self.plan.silent_after.is_some_and(|count| log(&self.plan.name).exchanges >= count);
+        let silent = self
+            .plan
+            .silent_after
+            .is_some_and(|count| log(&self.plan.name).exchanges >= count);
         let takes_ms = if silent { 10_000 } else { self.plan.slow_ms };
         if takes_ms > 0 {
             thread::sleep(Duration::from_millis(takes_ms));
@@ -198,7 +233,8 @@ impl Driver for Double {
         if setpoint.enable != 0 && !self.plan.never_enables {
             self.position = setpoint.position;
         }
-        let step = (0..self.joints).map(|i| (setpoint.position[i] - self.last.unwrap_or(self.position)[i]).abs());
+        let step = (0..self.joints)
+            .map(|i| (setpoint.position[i] - self.last.unwrap_or(self.position)[i]).abs());
         let step = step.fold(0.0, f64::max);
         self.last = Some(setpoint.position);
         let position = setpoint.position;
@@ -211,7 +247,9 @@ impl Driver for Double {
             log.enabled += u64::from(setpoint.enable);
             log.outputs |= setpoint.outputs;
             log.turned |= setpoint.spindle_rad_per_s != 0.0;
-            log.largest_step = log.largest_step.max(if setpoint.enable == 0 { 0.0 } else { step });
+            log.largest_step = log
+                .largest_step
+                .max(if setpoint.enable == 0 { 0.0 } else { step });
             log.positions.clear();
             log.positions.extend_from_slice(&position.0[..joints]);
         });
@@ -229,7 +267,10 @@ impl Driver for Double {
         if self.faulty {
             (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, 0x7210);
         }
-        let fails = self.plan.fails_at.is_some_and(|tick| setpoint.tick >= tick && setpoint.enable != 0);
+        let fails = self
+            .plan
+            .fails_at
+            .is_some_and(|tick| setpoint.tick >= tick && setpoint.enable != 0);
         match self.plan.how.as_str() {
             _ if !fails => Ok(()),
             "exchange" => Err(PluginError::fixed("the line is cut")),

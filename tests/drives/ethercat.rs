@@ -18,7 +18,10 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
     let mut random = Random::new(seed);
     let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
     let period_ms = random.pick(&[1, 2]);
-    text += &format!("[loops]\nfine_period_ms = {period_ms}\nrough_period_ms = {}\n", 8 * period_ms);
+    text += &format!(
+        "[loops]\nfine_period_ms = {period_ms}\nrough_period_ms = {}\n",
+        8 * period_ms
+    );
     for axis in ["x", "y", "z"] {
         text += &format!(
             "[axes.{axis}]\ntravel_mm = [-250, 250]\nmax_feed_mm_per_min = {}\nmax_acceleration_mm_per_s2 = {}\n\
@@ -29,10 +32,17 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
     }
     text += "[drivers.bus]\nplugin = \"ethercat\"\njoints = [\"x\", \"y\", \"z\"]\ninputs = [0, 1, 2, 3]\n\
              [drivers.bus.options]\ninterface = \"emulated\"\n";
-    text += &format!("max_lost_frames = 2\nwatchdog_ms = {}\n{options}\n", 20 * period_ms);
+    text += &format!(
+        "max_lost_frames = 2\nwatchdog_ms = {}\n{options}\n",
+        20 * period_ms
+    );
     for (position, axis) in ["x", "y", "z"].iter().enumerate() {
         let counts = 1000 + random.below(9000);
-        let zero = if *axis == "y" { i64::from(i32::MAX) - 500 } else { 0 };
+        let zero = if *axis == "y" {
+            i64::from(i32::MAX) - 500
+        } else {
+            0
+        };
         text += &format!(
             "[[drivers.bus.options.devices]]\nposition = {position}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{axis}\"\n\
              counts_per_mm = {counts}\ninvert = {}\nzero_counts = {zero}\n",
@@ -51,8 +61,14 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
 }
 
 fn fault(at: &str, lasts: &str, what: &str) -> String {
-    let lasts = if lasts.is_empty() { String::new() } else { format!("lasts = {{ {lasts} }}\n") };
-    format!("[[drivers.bus.options.emulated.faults]]\nat = {{ {at} }}\n{lasts}what = {{ {what} }}\n")
+    let lasts = if lasts.is_empty() {
+        String::new()
+    } else {
+        format!("lasts = {{ {lasts} }}\n")
+    };
+    format!(
+        "[[drivers.bus.options.emulated.faults]]\nat = {{ {at} }}\n{lasts}what = {{ {what} }}\n"
+    )
 }
 
 fn machine(text: &str) -> Machine {
@@ -64,7 +80,10 @@ fn machine(text: &str) -> Machine {
 
 /// How many machines are tried.
 fn seeds() -> u64 {
-    std::env::var("TANDEM_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(1)
+    std::env::var("TANDEM_SEEDS")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(1)
 }
 
 /// What a run came to: its samples, and the words of its fault or of its refusal.
@@ -78,12 +97,26 @@ fn ran(text: &str) -> Ran {
     let machine = machine(text);
     let run = match Run::prepare(machine, &registry(), program(SHORT), Switches::default()) {
         Ok(run) => run,
-        Err(error) => return Ran { samples: Samples::default(), fault: Some(error.to_string()), refused: true },
+        Err(error) => {
+            return Ran {
+                samples: Samples::default(),
+                fault: Some(error.to_string()),
+                refused: true,
+            };
+        }
     };
     let mut samples = Samples::default();
     match run.drive(Clock::Virtual, &[], &mut samples) {
-        Ok(outcome) => Ran { samples, fault: outcome.summary.fault, refused: false },
-        Err(error) => Ran { samples, fault: Some(error.to_string()), refused: true },
+        Ok(outcome) => Ran {
+            samples,
+            fault: outcome.summary.fault,
+            refused: false,
+        },
+        Err(error) => Ran {
+            samples,
+            fault: Some(error.to_string()),
+            refused: true,
+        },
     }
 }
 
@@ -96,9 +129,15 @@ fn judge(case: &str, text: &str, samples: &Samples) {
             let before = (at(1) - at(0)) / machine.fine_period_s;
             let after = (at(2) - at(1)) / machine.fine_period_s;
             let limit = machine.limits.axes()[axis];
-            assert!(after.abs() <= limit.feed_mm_per_s * (1.0 + 1e-9), "{case}: axis {axis}: {after} mm/s");
+            assert!(
+                after.abs() <= limit.feed_mm_per_s * (1.0 + 1e-9),
+                "{case}: axis {axis}: {after} mm/s"
+            );
             let change = (after - before).abs() / machine.fine_period_s;
-            assert!(change <= limit.acceleration_mm_per_s2 * (1.0 + 1e-6), "{case}: axis {axis}: {change} mm/s²");
+            assert!(
+                change <= limit.acceleration_mm_per_s2 * (1.0 + 1e-6),
+                "{case}: axis {axis}: {change} mm/s²"
+            );
         }
     }
     if let [.., before, last] = &samples.0[..] {
@@ -112,9 +151,18 @@ fn frames(seed: u64) -> (u64, u64) {
     assert_eq!(whole.fault, None);
     // A reply that is lost in frame n is missing in sample n − first.
     for n in (1..4000).step_by(20) {
-        let lost = fault(&format!("cycle = {n}"), "cycles = 1", "kind = \"lost-reply\"");
+        let lost = fault(
+            &format!("cycle = {n}"),
+            "cycles = 1",
+            "kind = \"lost-reply\"",
+        );
         let ran = ran(&table(seed, &lost, ""));
-        if let Some(seen) = ran.samples.0.iter().position(|sample| sample.age_periods[0] > 0) {
+        if let Some(seen) = ran
+            .samples
+            .0
+            .iter()
+            .position(|sample| sample.age_periods[0] > 0)
+        {
             return (n - seen as u64, whole.samples.0.len() as u64);
         }
     }
@@ -129,8 +177,16 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
         for (lasts, what, words) in [
             ("ms = 1e6", "kind = \"lost-reply\"", "no frame comes back"),
             ("ms = 1e6", "kind = \"lost-request\"", "no frame comes back"),
-            ("", "kind = \"cut\", behind = 1", "device 2: the working counter says"),
-            ("", "kind = \"deaf\", device = 1", "device 1: the working counter says"),
+            (
+                "",
+                "kind = \"cut\", behind = 1",
+                "device 2: the working counter says",
+            ),
+            (
+                "",
+                "kind = \"deaf\", device = 1",
+                "device 1: the working counter says",
+            ),
             (
                 "",
                 "kind = \"drive-fault\", device = 2, code = 0x7305",
@@ -146,16 +202,29 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
                 "kind = \"al-error\", device = 0, state = \"safe-op\", code = 0x2c",
                 "device 0: it left OP: 002C, fatal",
             ),
-            ("", "kind = \"disables-itself\", device = 0", "device 0: it let go by itself"),
-            ("", "kind = \"torque-off\", device = 1", "device 1: it let go by itself"),
+            (
+                "",
+                "kind = \"disables-itself\", device = 0",
+                "device 0: it let go by itself",
+            ),
+            (
+                "",
+                "kind = \"torque-off\", device = 1",
+                "device 1: it let go by itself",
+            ),
             ("", "kind = \"power-cycle\", device = 1", "device 1: "),
         ] {
             for n in first..first + count - 4 {
-                let case = format!("seed {seed}: {what} in frame {n}, {} of the program", n - first);
+                let case = format!(
+                    "seed {seed}: {what} in frame {n}, {} of the program",
+                    n - first
+                );
                 let text = table(seed, &fault(&format!("cycle = {n}"), lasts, what), "");
                 let ran = ran(&text);
                 judge(&case, &text, &ran.samples);
-                let told = ran.fault.unwrap_or_else(|| panic!("{case}: nobody noticed"));
+                let told = ran
+                    .fault
+                    .unwrap_or_else(|| panic!("{case}: nobody noticed"));
                 assert!(!ran.refused && told.contains(words), "{case}: {told}");
             }
         }
@@ -168,7 +237,13 @@ fn what_passes_within_patience_changes_no_command() {
     for seed in 0..seeds() {
         let (first, count) = frames(seed);
         let whole = ran(&table(seed, "", ""));
-        let commands = |ran: &Ran| ran.samples.0.iter().map(|sample| sample.command).collect::<Vec<_>>();
+        let commands = |ran: &Ran| {
+            ran.samples
+                .0
+                .iter()
+                .map(|sample| sample.command)
+                .collect::<Vec<_>>()
+        };
         let undisturbed = commands(&whole);
         for (lasts, what, old) in [
             ("cycles = 1", "kind = \"lost-reply\"", 1),
@@ -186,11 +261,27 @@ fn what_passes_within_patience_changes_no_command() {
             ("cycles = 2", "kind = \"deaf\", device = 1", 2),
         ] {
             for n in first..first + count - 6 {
-                let case = format!("seed {seed}: {what} in frame {n}, {} of the program", n - first);
-                let ran = ran(&table(seed, &fault(&format!("cycle = {n}"), lasts, what), ""));
+                let case = format!(
+                    "seed {seed}: {what} in frame {n}, {} of the program",
+                    n - first
+                );
+                let ran = ran(&table(
+                    seed,
+                    &fault(&format!("cycle = {n}"), lasts, what),
+                    "",
+                ));
                 assert_eq!(ran.fault, None, "{case}");
-                assert!(commands(&ran) == undisturbed, "{case}: another command was sent");
-                let oldest = ran.samples.0.iter().map(|sample| sample.age_periods[1]).max().unwrap();
+                assert!(
+                    commands(&ran) == undisturbed,
+                    "{case}: another command was sent"
+                );
+                let oldest = ran
+                    .samples
+                    .0
+                    .iter()
+                    .map(|sample| sample.age_periods[1])
+                    .max()
+                    .unwrap();
                 assert_eq!(oldest, old, "{case}: age of the feedback");
                 let back = ran.samples.0.last().unwrap().age_periods[1];
                 assert_eq!(back, 0, "{case}: it is new again");
@@ -208,8 +299,14 @@ fn what_is_wrong_from_the_start_is_refused_in_words() {
             "kind = \"refuse-state\", device = 2, state = \"safe-op\", code = 0x1d",
             "device 2 (z): it refuses SAFE-OP and is in PRE-OP: 001D",
         ),
-        ("kind = \"refuse-state\", device = 2, state = \"safe-op\", code = 0x1e", "001E, invalid input configuration"),
-        ("kind = \"refuse-state\", device = 0, state = \"safe-op\", code = 0x35", "0035, the cycle time of SYNC0"),
+        (
+            "kind = \"refuse-state\", device = 2, state = \"safe-op\", code = 0x1e",
+            "001E, invalid input configuration",
+        ),
+        (
+            "kind = \"refuse-state\", device = 0, state = \"safe-op\", code = 0x35",
+            "0035, the cycle time of SYNC0",
+        ),
         (
             "kind = \"refuse-state\", device = 1, state = \"op\", code = 0x32",
             "device 1 (y): it refuses OP and is in SAFE-OP: 0032",
@@ -230,18 +327,39 @@ fn what_is_wrong_from_the_start_is_refused_in_words() {
             "kind = \"sdo-abort\", device = 1, index = 0x1600, sub = 1, abort = 0x06040041",
             "device 1 (y): writing 1600:01: it refuses",
         ),
-        ("kind = \"silent-mailbox\", device = 2", "device 2 (z): reading 6502:00: its mailbox does not answer"),
-        ("kind = \"mode-shown\", device = 0, mode = 3", "another mode of operation (6061)"),
-        ("kind = \"never-enables\", device = 1", "device 1: it was told to enable, and its status (6041) stays at"),
+        (
+            "kind = \"silent-mailbox\", device = 2",
+            "device 2 (z): reading 6502:00: its mailbox does not answer",
+        ),
+        (
+            "kind = \"mode-shown\", device = 0, mode = 3",
+            "another mode of operation (6061)",
+        ),
+        (
+            "kind = \"never-enables\", device = 1",
+            "device 1: it was told to enable, and its status (6041) stays at",
+        ),
         ("kind = \"brake\", device = 1, open_ms = 6000.0", "axis Y"),
     ] {
         let text = table(3, &always(what), "");
         let ran = ran(&text);
-        let told = ran.fault.unwrap_or_else(|| panic!("{what}: nobody noticed"));
+        let told = ran
+            .fault
+            .unwrap_or_else(|| panic!("{what}: nobody noticed"));
         assert!(told.contains(words), "{what}: {told}");
-        assert!(ran.samples.0.windows(2).all(|pair| pair[0].command == pair[1].command), "{what}: it moved");
+        assert!(
+            ran.samples
+                .0
+                .windows(2)
+                .all(|pair| pair[0].command == pair[1].command),
+            "{what}: it moved"
+        );
     }
-    let slow = ran(&table(3, &always("kind = \"brake\", device = 1, open_ms = 3000.0"), ""));
+    let slow = ran(&table(
+        3,
+        &always("kind = \"brake\", device = 1, open_ms = 3000.0"),
+        "",
+    ));
     assert_eq!(slow.fault, None, "a brake of 3 s is waited for");
 }
 
@@ -271,8 +389,16 @@ fn another_bus_is_refused_with_what_is_there() {
             },
             "device 0 (x): its vendor is 0x0002, and the machine file wants 0x0e1a",
         ),
-        ("vendor", text.replacen("0x0e1a:0x0402", "0x0e1b:0x0402", 1), "device 0 (x): its vendor is 0x0e1a"),
-        ("product", text.replacen("0x0e1a:0x0402", "0x0e1a:0x0403", 1), "device 0 (x): its product is 0x0402"),
+        (
+            "vendor",
+            text.replacen("0x0e1a:0x0402", "0x0e1b:0x0402", 1),
+            "device 0 (x): its vendor is 0x0e1a",
+        ),
+        (
+            "product",
+            text.replacen("0x0e1a:0x0402", "0x0e1a:0x0403", 1),
+            "device 0 (x): its product is 0x0402",
+        ),
         (
             "revision",
             text.replacen(of_file, &format!("{of_file}revision = 7\n"), 1),
@@ -280,11 +406,17 @@ fn another_bus_is_refused_with_what_is_there() {
         ),
         (
             "alias",
-            text.replacen(of_file, "[[drivers.bus.options.devices]]\nalias = 1001\n", 1),
+            text.replacen(
+                of_file,
+                "[[drivers.bus.options.devices]]\nalias = 1001\n",
+                1,
+            ),
             "devices[1]: no device on the bus has the alias 1001",
         ),
     ] {
-        let told = ran(&changed).fault.unwrap_or_else(|| panic!("{case}: nobody noticed"));
+        let told = ran(&changed)
+            .fault
+            .unwrap_or_else(|| panic!("{case}: nobody noticed"));
         assert!(told.contains(words), "{case}: {told}");
     }
 }
@@ -293,11 +425,18 @@ fn another_bus_is_refused_with_what_is_there() {
 #[test]
 fn runs_repeat_to_the_bit() {
     for options in ["", "sync = \"dc\"\nphase_us = 250.0"] {
-        let text = table(5, "", options).replacen("kind = \"drive\"\n", "kind = \"drive\"\ndrift_ppm = 80.0\n", 1);
+        let text = table(5, "", options).replacen(
+            "kind = \"drive\"\n",
+            "kind = \"drive\"\ndrift_ppm = 80.0\n",
+            1,
+        );
         let (one, two) = (ran(&text), ran(&text));
         assert_eq!(one.fault, None, "{options}");
         assert!(one.samples.0.len() > 20);
-        assert!(format!("{:?}", one.samples.0) == format!("{:?}", two.samples.0), "{options}");
+        assert!(
+            format!("{:?}", one.samples.0) == format!("{:?}", two.samples.0),
+            "{options}"
+        );
     }
 }
 
@@ -308,12 +447,26 @@ fn example() -> PathBuf {
 /// Homes the example machine by its drives and runs a program on it.
 fn run_on_the_example(text: &str) -> Ran {
     let machine = Machine::read(&example(), &[]).unwrap();
-    let switches = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
-    let run = Run::prepare(machine, &registry(), program(text), switches).unwrap_or_else(|error| panic!("{error}"));
+    let switches = Switches {
+        home: Some(tandem_session::HOMING),
+        ..Switches::default()
+    };
+    let run = Run::prepare(machine, &registry(), program(text), switches)
+        .unwrap_or_else(|error| panic!("{error}"));
     let mut samples = Samples::default();
     let outcome = run.drive(Clock::Virtual, &[], &mut samples).unwrap();
-    assert_eq!((outcome.summary.limit_violations, outcome.summary.guard_stops), (0, 0));
-    Ran { samples, fault: outcome.summary.fault, refused: false }
+    assert_eq!(
+        (
+            outcome.summary.limit_violations,
+            outcome.summary.guard_stops
+        ),
+        (0, 0)
+    );
+    Ran {
+        samples,
+        fault: outcome.summary.fault,
+        refused: false,
+    }
 }
 
 /// The whole tower: drives that home themselves, programs, a spindle that is waited for.
@@ -338,8 +491,16 @@ fn the_example_machine_homes_and_runs_the_example_programs() {
 fn the_example_machine_touches_off() {
     let ran = run_on_the_example("G21 G90 G94 F300\nG38.2 Z-30\nG1 Z5\nM2\n");
     assert_eq!(ran.fault, None);
-    let lowest = ran.samples.0.iter().map(|sample| sample.command[2]).fold(f64::INFINITY, f64::min);
-    assert!((-20.5..-20.0).contains(&lowest), "the plate is at -20 mm: {lowest}");
+    let lowest = ran
+        .samples
+        .0
+        .iter()
+        .map(|sample| sample.command[2])
+        .fold(f64::INFINITY, f64::min);
+    assert!(
+        (-20.5..-20.0).contains(&lowest),
+        "the plate is at -20 mm: {lowest}"
+    );
 }
 
 /// A fault in mid-program, its reset, and on: as an operator does it, through the command.
@@ -348,7 +509,11 @@ fn a_fault_is_reset_and_the_machine_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("machine.toml");
     let what = "kind = \"drive-fault\", device = 1, code = 0x7305, stays = false";
-    std::fs::write(&path, std::fs::read_to_string(example()).unwrap() + &fault("ms = 14000.0", "", what)).unwrap();
+    std::fs::write(
+        &path,
+        std::fs::read_to_string(example()).unwrap() + &fault("ms = 14000.0", "", what),
+    )
+    .unwrap();
     let tandem = |arguments: &[&str], input: &str| {
         let mut child = Command::new(env!("CARGO_BIN_EXE_tandem"))
             .args(arguments)
@@ -360,16 +525,28 @@ fn a_fault_is_reset_and_the_machine_goes_on() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(input.as_bytes())
+            .unwrap();
         let output = child.wait_with_output().unwrap();
-        let told = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        let told =
+            String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         (output.status.code(), told.to_string())
     };
     let words = "fault: driver bus (ethercat): the drive of axis Y reports fault 0x7305 (device 1: encoder 1)";
     let (status, told) = tandem(&["mdi"], "G90 G1 X30 F600\n!reset\nG1 X5 Y2\nquit\n");
     assert!(told.contains(words), "{told}");
-    assert!(told.contains("x_mm 5.0000  y_mm 2.0000  z_mm 0.0000"), "{told}");
+    assert!(
+        told.contains("x_mm 5.0000  y_mm 2.0000  z_mm 0.0000"),
+        "{told}"
+    );
     assert_eq!(status, Some(0), "{told}");
     let (status, told) = tandem(&["run", "-"], "G21 G90 G94 F300\nG1 X30\nM2\n");
-    assert!(status == Some(3) && told.contains(words), "{status:?} {told}");
+    assert!(
+        status == Some(3) && told.contains(words),
+        "{status:?} {told}"
+    );
 }

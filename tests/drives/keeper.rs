@@ -12,8 +12,8 @@ use serde::Deserialize;
 use tandem_host::{Clock, Run, RunObserver, Switches};
 use tandem_rings::{Controls, Sample};
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Plugin, PluginError,
-    RawOptions, Setpoint, local_plugin, parse_options,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Plugin,
+    PluginError, RawOptions, Setpoint, local_plugin, parse_options,
 };
 
 use crate::{machine, program, registry};
@@ -115,13 +115,21 @@ impl Keeper {
         let options: Options = parse_options(&options.0)?;
         let bus = bus(&options.name);
         lock(&bus).faults_at = options.faults_at;
-        Ok(Self { bus, keeps: Arc::default(), thread: None })
+        Ok(Self {
+            bus,
+            keeps: Arc::default(),
+            thread: None,
+        })
     }
 }
 
 impl Driver for Keeper {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { watches_following: 1, enable_s: 1.0, ..DriverDescription::real() }
+        DriverDescription {
+            watches_following: 1,
+            enable_s: 1.0,
+            ..DriverDescription::real()
+        }
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
@@ -145,7 +153,11 @@ impl Driver for Keeper {
         Ok(Attached::at(drives.position))
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         let mut drives = lock(&self.bus);
         drives.called("exchange");
         (drives.silent, drives.exchanges) = (0, drives.exchanges + 1);
@@ -159,8 +171,9 @@ impl Driver for Keeper {
         // A drive in fault closes its brake by itself.
         drives.has_torque &= !drives.is_faulty;
         if drives.state() == JointState::Enabled && setpoint.enable != 0 {
-            let away =
-                (setpoint.position - drives.position).0[..drives.joints].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            let away = (setpoint.position - drives.position).0[..drives.joints]
+                .iter()
+                .fold(0.0, |a: f64, b| a.max(b.abs()));
             if !drives.has_torque {
                 drives.jump = drives.jump.max(away);
             }
@@ -180,17 +193,29 @@ impl Driver for Keeper {
         // The bus lives to here: the drives have been heard of in between.
         lock(&self.bus).called("stop");
         self.keeps.store(false, Relaxed);
-        self.thread.take().map_or(Ok(()), |thread| thread.join().map_err(|_| PluginError::fixed("its bus has ended")))
+        self.thread.take().map_or(Ok(()), |thread| {
+            thread
+                .join()
+                .map_err(|_| PluginError::fixed("its bus has ended"))
+        })
     }
 }
 
 /// A machine with this driver; `more` of its options.
 fn prepare(name: &str, more: &str, text: &str) -> Result<Run, String> {
     let patient = "[loops]\nmax_missed_periods = 100000\nmax_missed_share = 1\n";
-    let drivers = format!("[driver]\nplugin = \"keeper\"\noptions = {{ name = \"{name}\"{more} }}\n{patient}");
+    let drivers = format!(
+        "[driver]\nplugin = \"keeper\"\noptions = {{ name = \"{name}\"{more} }}\n{patient}"
+    );
     let mut registry = registry();
     registry.register(plugin()).unwrap();
-    Run::prepare(machine(&drivers), &registry, program(text), Switches::default()).map_err(|error| error.to_string())
+    Run::prepare(
+        machine(&drivers),
+        &registry,
+        program(text),
+        Switches::default(),
+    )
+    .map_err(|error| error.to_string())
 }
 
 /// Until the driver has kept its bus alive for some cycles more: as long as a program is to be checked.
@@ -216,51 +241,97 @@ impl RunObserver for Operator {
 
 /// Watchdogs bit in good runs too: while a program was checked before its first exchange, and while it was reported.
 #[test]
-fn drives_with_torque_are_exchanged_with_until_their_brakes_are_closed_and_the_others_are_left_to_their_driver() {
+fn drives_with_torque_are_exchanged_with_until_their_brakes_are_closed_and_the_others_are_left_to_their_driver()
+ {
     let abort: fn(&Controls) -> &AtomicBool = |controls| &controls.abort;
     let stop: fn(&Controls) -> &AtomicBool = |controls| &controls.emergency_stop;
     for (name, more, operator, fault) in [
         ("kept-to-its-end", "", None, None),
         ("kept-aborted", "", Some(abort), None),
         ("kept-stopped", "", Some(stop), Some("emergency stop")),
-        ("kept-faulty", ", faults_at = 60", None, Some("the drive of axis X reports fault")),
+        (
+            "kept-faulty",
+            ", faults_at = 60",
+            None,
+            Some("the drive of axis X reports fault"),
+        ),
     ] {
         let run = prepare(name, more, MOVES).unwrap();
         wait(name);
         let mut operator = Operator(run.controls(), operator);
         let summary = run.drive(Clock::Wall, &[], &mut operator).unwrap().summary;
         let words = summary.fault.unwrap_or_default();
-        assert!(fault.map_or(words.is_empty(), |fault| words.contains(fault)), "{name}: {words}");
+        assert!(
+            fault.map_or(words.is_empty(), |fault| words.contains(fault)),
+            "{name}: {words}"
+        );
         let bus = bus(name);
         let drives = lock(&bus);
         let is_fault = fault.is_some();
         let calls: &[&str] = if is_fault {
-            &["open", "start", "exchange", "quick stop", "exchange", "stop"]
+            &[
+                "open",
+                "start",
+                "exchange",
+                "quick stop",
+                "exchange",
+                "stop",
+            ]
         } else {
             &["open", "start", "exchange", "stop"]
         };
         assert_eq!(drives.calls, calls, "{name}");
-        assert_eq!((drives.bites, drives.has_torque), (0, false), "{name}: nothing holds that nobody exchanges with");
-        assert!(drives.kept >= 30, "{name}: {} cycles on its own", drives.kept);
-        assert!(drives.jump < 20.0 * CREEP, "{name}: what has crept meanwhile is enabled where it is: {}", drives.jump);
+        assert_eq!(
+            (drives.bites, drives.has_torque),
+            (0, false),
+            "{name}: nothing holds that nobody exchanges with"
+        );
+        assert!(
+            drives.kept >= 30,
+            "{name}: {} cycles on its own",
+            drives.kept
+        );
+        assert!(
+            drives.jump < 20.0 * CREEP,
+            "{name}: what has crept meanwhile is enabled where it is: {}",
+            drives.jump
+        );
         // A drive in fault has no torque any more: its brake is not waited for.
         let let_go = if name == "kept-faulty" { 1 } else { BRAKES };
-        assert!(drives.letting_go >= let_go, "{name}: {} exchanges to let go in", drives.letting_go);
+        assert!(
+            drives.letting_go >= let_go,
+            "{name}: {} exchanges to let go in",
+            drives.letting_go
+        );
     }
 }
 
 /// What refuses a run behind `start` lets go of what was started, and exchanges with nobody.
 #[test]
 fn drives_that_were_started_for_nothing_are_stopped_without_an_exchange() {
-    let refused = prepare("kept-refused", "", "G21 G90 G94 F6000\nG1 X5\nG1 X9999\nM2\n").err().unwrap();
+    let refused = prepare(
+        "kept-refused",
+        "",
+        "G21 G90 G94 F6000\nG1 X5\nG1 X9999\nM2\n",
+    )
+    .err()
+    .unwrap();
     assert!(refused.contains("errors in the program"), "{refused}");
     drop(prepare("kept-dropped", "", MOVES).unwrap());
     let on_the_wrong_clock = prepare("kept-virtual", "", MOVES).unwrap();
     wait("kept-virtual");
-    assert!(on_the_wrong_clock.drive(Clock::Virtual, &[], &mut ()).is_err());
+    assert!(
+        on_the_wrong_clock
+            .drive(Clock::Virtual, &[], &mut ())
+            .is_err()
+    );
     for name in ["kept-refused", "kept-dropped", "kept-virtual"] {
         let bus = bus(name);
         let drives = lock(&bus);
-        assert_eq!((&drives.calls[..], drives.exchanges), (&["open", "start", "stop"][..], 0), "{name}");
+        assert_eq!(
+            (&drives.calls[..], drives.exchanges),
+            (&["open", "start", "stop"][..], 0),
+            "{name}"
+        );
     }
 }

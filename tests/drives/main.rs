@@ -21,7 +21,12 @@ use tandem_rings::Sample;
 /// A registry with the driver for tests beside those that are needed.
 fn registry() -> Registry {
     let mut registry = Registry::default();
-    for plugin in [tandem_sim::PLUGIN, tandem_look_ahead::PLUGIN, tandem_ethercat::PLUGIN, double::plugin()] {
+    for plugin in [
+        tandem_sim::PLUGIN,
+        tandem_look_ahead::PLUGIN,
+        tandem_ethercat::PLUGIN,
+        double::plugin(),
+    ] {
         registry.register(plugin).unwrap();
     }
     registry

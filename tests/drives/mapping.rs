@@ -8,8 +8,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tandem_host::{Run, Switches, attached_driver};
 use tandem_rig::Random;
 use tandem_sdk::{
-    Arm, Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, Plugin,
-    PluginError, RawOptions, Setpoint, Words, local_plugin,
+    Arm, Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState,
+    Latch, Plugin, PluginError, RawOptions, Setpoint, Words, local_plugin,
 };
 
 use crate::{machine, program};
@@ -46,7 +46,9 @@ impl Reflecting {
 
 #[allow(clippy::unnecessary_wraps)] // the form of a constructor
 fn made(options: &RawOptions) -> Result<Reflecting, PluginError> {
-    Ok(Reflecting(options.0.split('"').nth(1).unwrap_or_default().to_string()))
+    Ok(Reflecting(
+        options.0.split('"').nth(1).unwrap_or_default().to_string(),
+    ))
 }
 
 fn plugin() -> Plugin {
@@ -55,7 +57,10 @@ fn plugin() -> Plugin {
 
 impl Driver for Reflecting {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { watches_following: 1, ..DriverDescription::real() }
+        DriverDescription {
+            watches_following: 1,
+            ..DriverDescription::real()
+        }
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         self.with(|mirror| mirror.context = Some(*context));
@@ -67,7 +72,11 @@ impl Driver for Reflecting {
     fn send(&mut self, setpoint: &Setpoint) {
         self.with(|mirror| mirror.sent = Some(*setpoint));
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.with(|mirror| {
             mirror.told = Some(*setpoint);
             if mirror.fails {
@@ -104,26 +113,40 @@ struct Own {
 /// What is told and answered in one numbering, as sets and lists that know nothing of runs and masks.
 impl Own {
     fn bits(&self, of: impl Fn(usize) -> bool) -> u32 {
-        self.joints.iter().enumerate().fold(0, |bits, (own, joint)| bits | u32::from(of(*joint)) << own)
+        self.joints
+            .iter()
+            .enumerate()
+            .fold(0, |bits, (own, joint)| bits | u32::from(of(*joint)) << own)
     }
     fn vector(&self, of: &AxisVector) -> AxisVector {
         let own: Vec<f64> = self.joints.iter().map(|joint| of[*joint]).collect();
         AxisVector::from_slice(&own)
     }
     fn lines(numbers: &[u32], of: u64) -> u64 {
-        numbers.iter().enumerate().fold(0, |own, (i, number)| own | (of >> number & 1) << i)
+        numbers
+            .iter()
+            .enumerate()
+            .fold(0, |own, (i, number)| own | (of >> number & 1) << i)
     }
 }
 
 /// Deals everything out to two or three drivers, in any order.
 fn dealt(random: &mut Random, seed: u64) -> Vec<Own> {
     let count = 2 + random.below(2) as usize;
-    let mut all: Vec<Own> = (0..count).map(|i| Own { name: format!("m{seed}-{i}"), ..Own::default() }).collect();
+    let mut all: Vec<Own> = (0..count)
+        .map(|i| Own {
+            name: format!("m{seed}-{i}"),
+            ..Own::default()
+        })
+        .collect();
     let mut shuffled = |count: u64| {
         let mut left: Vec<u64> = (0..count).collect();
         let mut order = vec![];
         while !left.is_empty() {
-            order.push((left.remove(random.below(left.len() as u64) as usize), random.below(1 << 32) as usize % 97));
+            order.push((
+                left.remove(random.below(left.len() as u64) as usize),
+                random.below(1 << 32) as usize % 97,
+            ));
         }
         order
     };
@@ -165,11 +188,19 @@ fn text(all: &[Own]) -> String {
 }
 
 fn drawn_answer(random: &mut Random) -> Feedback {
-    let mut answer =
-        Feedback { homed: random.below(256) as u32, inputs: random.below(u64::MAX), ..Feedback::default() };
+    let mut answer = Feedback {
+        homed: random.below(256) as u32,
+        inputs: random.below(u64::MAX),
+        ..Feedback::default()
+    };
     for joint in 0..8 {
-        answer.state[joint] = random.pick(&[JointState::Enabled, JointState::Homing, JointState::QuickStop]);
-        (answer.fault_code[joint], answer.age_periods[joint]) = (random.below(99) as u32, random.below(9) as u32);
+        answer.state[joint] = random.pick(&[
+            JointState::Enabled,
+            JointState::Homing,
+            JointState::QuickStop,
+        ]);
+        (answer.fault_code[joint], answer.age_periods[joint]) =
+            (random.below(99) as u32, random.below(9) as u32);
         answer.position[joint] = random.unit();
         (answer.speed[joint], answer.current_a[joint]) = (random.unit(), random.unit());
     }
@@ -182,7 +213,11 @@ fn drawn_answer(random: &mut Random) -> Feedback {
         position: AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]),
         ..Latch::default()
     };
-    (answer.spindle_rad_per_s, answer.spindle_angle_rad, answer.spindle_at_speed) = (random.unit(), random.unit(), 1);
+    (
+        answer.spindle_rad_per_s,
+        answer.spindle_angle_rad,
+        answer.spindle_at_speed,
+    ) = (random.unit(), random.unit(), 1);
     answer
 }
 
@@ -192,7 +227,10 @@ fn drawn_setpoint(random: &mut Random) -> Setpoint {
         homing: random.below(16) as u32,
         limited: random.below(16) as u32,
         outputs: random.below(u64::MAX),
-        arm: Arm { input: random.below(64) as u32, edge: random.below(3) as u32 },
+        arm: Arm {
+            input: random.below(64) as u32,
+            edge: random.below(3) as u32,
+        },
         spindle_rad_per_s: random.unit(),
         tick: random.below(1000),
         ..Setpoint::default()
@@ -208,15 +246,50 @@ fn drawn_setpoint(random: &mut Random) -> Setpoint {
 fn assert_told(own: &Own, whole: &Setpoint, first: bool, case: &str) {
     let mirror = mirrors()[&own.name].clone();
     let told = mirror.told.unwrap();
-    assert_eq!(mirror.sent, Some(told).filter(|_| !first), "{case}: sent to all before anybody is received from");
-    assert_eq!((told.enable, told.reset, told.tick), (whole.enable, whole.reset, whole.tick), "{case}");
-    assert_eq!(told.homing, own.bits(|joint| whole.homing >> joint & 1 == 1), "{case}");
-    assert_eq!(told.limited, own.bits(|joint| whole.limited >> joint & 1 == 1), "{case}");
-    assert_eq!(told.outputs, Own::lines(&own.outputs, whole.outputs), "{case}");
-    let armed = own.inputs.iter().position(|input| *input == whole.arm.input).filter(|_| whole.arm.edge != 0);
-    let arm = armed.map_or(Arm::default(), |input| Arm { input: input as u32, edge: whole.arm.edge });
+    assert_eq!(
+        mirror.sent,
+        Some(told).filter(|_| !first),
+        "{case}: sent to all before anybody is received from"
+    );
+    assert_eq!(
+        (told.enable, told.reset, told.tick),
+        (whole.enable, whole.reset, whole.tick),
+        "{case}"
+    );
+    assert_eq!(
+        told.homing,
+        own.bits(|joint| whole.homing >> joint & 1 == 1),
+        "{case}"
+    );
+    assert_eq!(
+        told.limited,
+        own.bits(|joint| whole.limited >> joint & 1 == 1),
+        "{case}"
+    );
+    assert_eq!(
+        told.outputs,
+        Own::lines(&own.outputs, whole.outputs),
+        "{case}"
+    );
+    let armed = own
+        .inputs
+        .iter()
+        .position(|input| *input == whole.arm.input)
+        .filter(|_| whole.arm.edge != 0);
+    let arm = armed.map_or(Arm::default(), |input| Arm {
+        input: input as u32,
+        edge: whole.arm.edge,
+    });
     assert_eq!(told.arm, arm, "{case}");
-    assert_eq!(told.spindle_rad_per_s, if own.spindle { whole.spindle_rad_per_s } else { 0.0 }, "{case}");
+    assert_eq!(
+        told.spindle_rad_per_s,
+        if own.spindle {
+            whole.spindle_rad_per_s
+        } else {
+            0.0
+        },
+        "{case}"
+    );
     assert_eq!(
         [told.position, told.velocity, told.acceleration],
         [&whole.position, &whole.velocity, &whole.acceleration].map(|vector| own.vector(vector)),
@@ -229,17 +302,32 @@ fn assert_answered(own: &Own, whole: &Feedback, latches: &mut Vec<Latch>, case: 
     let answer = mirrors()[&own.name].answer;
     for (i, joint) in own.joints.iter().enumerate() {
         assert_eq!(whole.homed >> joint & 1, answer.homed >> i & 1, "{case}");
-        assert_eq!((whole.state[*joint], whole.fault_code[*joint]), (answer.state[i], answer.fault_code[i]), "{case}");
+        assert_eq!(
+            (whole.state[*joint], whole.fault_code[*joint]),
+            (answer.state[i], answer.fault_code[i]),
+            "{case}"
+        );
         assert_eq!(whole.age_periods[*joint], answer.age_periods[i], "{case}");
         assert_eq!(
-            [whole.position[*joint], whole.speed[*joint], whole.current_a[*joint]],
+            [
+                whole.position[*joint],
+                whole.speed[*joint],
+                whole.current_a[*joint]
+            ],
             [answer.position[i], answer.speed[i], answer.current_a[i]],
             "{case}"
         );
     }
     for (i, input) in own.inputs.iter().enumerate() {
-        assert_eq!(whole.inputs >> input & 1, answer.inputs >> i & 1, "{case}: input {input}");
-        assert_eq!(whole.input_age_periods[*input as usize], answer.input_age_periods[i], "{case}: input {input}");
+        assert_eq!(
+            whole.inputs >> input & 1,
+            answer.inputs >> i & 1,
+            "{case}: input {input}"
+        );
+        assert_eq!(
+            whole.input_age_periods[*input as usize], answer.input_age_periods[i],
+            "{case}: input {input}"
+        );
     }
     for (i, analog) in own.analog.iter().enumerate() {
         assert_eq!(whole.analog[*analog], answer.analog[i], "{case}");
@@ -254,8 +342,18 @@ fn assert_answered(own: &Own, whole: &Feedback, latches: &mut Vec<Latch>, case: 
         assert_eq!(is.spindle_at_speed, of.spindle_at_speed, "{case}");
     }
     let caught = answer.latches[0];
-    let Some(input) = own.inputs.get(caught.input as usize).filter(|_| caught.edge != 0) else { return };
-    let mut latch = Latch { input: *input, joints: 0, ..caught };
+    let Some(input) = own
+        .inputs
+        .get(caught.input as usize)
+        .filter(|_| caught.edge != 0)
+    else {
+        return;
+    };
+    let mut latch = Latch {
+        input: *input,
+        joints: 0,
+        ..caught
+    };
     for (i, joint) in own.joints.iter().enumerate() {
         latch.joints |= (caught.joints >> i & 1) << joint;
         latch.position[*joint] = caught.position[i];
@@ -285,45 +383,92 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
         }
         let mut stands = Attached::default();
         for own in &all {
-            let mut attached = Attached { known: random.below(16) as u32, homed: random.below(16) as u32, ..stands };
+            let mut attached = Attached {
+                known: random.below(16) as u32,
+                homed: random.below(16) as u32,
+                ..stands
+            };
             for joint in 0..4 {
                 attached.position[joint] = random.unit();
                 attached.state[joint] = random.pick(&[JointState::Disabled, JointState::Fault]);
                 (attached.fault_code[joint], attached.delay_periods[joint]) =
                     (random.below(99) as u32, random.below(9) as u32);
             }
-            mirrors().insert(own.name.clone(), Mirror { attached, ..Mirror::default() });
+            mirrors().insert(
+                own.name.clone(),
+                Mirror {
+                    attached,
+                    ..Mirror::default()
+                },
+            );
         }
         let (mut driver, attached) = attached_driver(&machine(&tables), &registry()).unwrap();
         for own in &all {
-            let (context, stood) = mirrors().get(&own.name).map(|own| (own.context.unwrap(), own.attached)).unwrap();
-            let names: Vec<_> =
-                context.joints[..context.joint_count as usize].iter().map(|of| of.name.as_str().to_string()).collect();
-            assert_eq!(names, own.joints.iter().map(|joint| AXES[*joint]).collect::<Vec<_>>(), "seed {seed}");
+            let (context, stood) = mirrors()
+                .get(&own.name)
+                .map(|own| (own.context.unwrap(), own.attached))
+                .unwrap();
+            let names: Vec<_> = context.joints[..context.joint_count as usize]
+                .iter()
+                .map(|of| of.name.as_str().to_string())
+                .collect();
+            assert_eq!(
+                names,
+                own.joints
+                    .iter()
+                    .map(|joint| AXES[*joint])
+                    .collect::<Vec<_>>(),
+                "seed {seed}"
+            );
             let mask = claimed.iter().fold(0_u64, |mask, input| mask | 1 << input);
             assert_eq!(context.inputs, Own::lines(&own.inputs, mask), "seed {seed}");
-            assert_eq!(context.outputs, Own::lines(&own.outputs, u64::MAX), "seed {seed}");
+            assert_eq!(
+                context.outputs,
+                Own::lines(&own.outputs, u64::MAX),
+                "seed {seed}"
+            );
             assert_eq!(context.spindle, u32::from(own.spindle), "seed {seed}");
-            let wanted = own.analog.iter().enumerate().filter(|(_, analog)| measured.contains(analog));
-            assert_eq!(u64::from(context.analog), wanted.fold(0, |mask, (i, _)| mask | 1 << i), "seed {seed}");
+            let wanted = own
+                .analog
+                .iter()
+                .enumerate()
+                .filter(|(_, analog)| measured.contains(analog));
+            assert_eq!(
+                u64::from(context.analog),
+                wanted.fold(0, |mask, (i, _)| mask | 1 << i),
+                "seed {seed}"
+            );
             for (i, joint) in own.joints.iter().enumerate() {
                 assert_eq!(
                     (attached.known >> joint & 1, attached.homed >> joint & 1),
                     (stood.known >> i & 1, stood.homed >> i & 1)
                 );
-                assert_eq!((attached.position[*joint], attached.state[*joint]), (stood.position[i], stood.state[i]));
+                assert_eq!(
+                    (attached.position[*joint], attached.state[*joint]),
+                    (stood.position[i], stood.state[i])
+                );
                 assert_eq!(
                     (attached.fault_code[*joint], attached.delay_periods[*joint]),
                     (stood.fault_code[i], stood.delay_periods[i])
                 );
                 let words = driver.explain(*joint as u32, 7);
-                assert_eq!(words.as_str(), format!("{i} of {}", own.name), "seed {seed}");
+                assert_eq!(
+                    words.as_str(),
+                    format!("{i} of {}", own.name),
+                    "seed {seed}"
+                );
             }
         }
         stands = attached;
-        let mut feedback = Feedback { position: stands.position, ..Feedback::default() };
+        let mut feedback = Feedback {
+            position: stands.position,
+            ..Feedback::default()
+        };
         for period in 0..20 {
-            let (whole, case) = (drawn_setpoint(&mut random), format!("seed {seed}, period {period}"));
+            let (whole, case) = (
+                drawn_setpoint(&mut random),
+                format!("seed {seed}, period {period}"),
+            );
             for own in &all {
                 mirrors().get_mut(&own.name).unwrap().answer = drawn_answer(&mut random);
             }
@@ -333,12 +478,23 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
                 assert_told(own, &whole, i == 0, &case);
                 assert_answered(own, &feedback, &mut latches, &case);
             }
-            let given: Vec<_> = feedback.latches.iter().filter(|latch| latch.edge != 0).copied().collect();
+            let given: Vec<_> = feedback
+                .latches
+                .iter()
+                .filter(|latch| latch.edge != 0)
+                .copied()
+                .collect();
             assert_eq!(given.len(), latches.len(), "{case}");
             for (given, latch) in given.iter().zip(&latches) {
-                assert_eq!((given.input, given.edge, given.joints), (latch.input, latch.edge, latch.joints), "{case}");
+                assert_eq!(
+                    (given.input, given.edge, given.joints),
+                    (latch.input, latch.edge, latch.joints),
+                    "{case}"
+                );
                 let caught = (0..4).filter(|joint| latch.joints >> joint & 1 == 1);
-                caught.for_each(|joint| assert_eq!(given.position[joint], latch.position[joint], "{case}"));
+                caught.for_each(|joint| {
+                    assert_eq!(given.position[joint], latch.position[joint], "{case}")
+                });
             }
         }
     }
@@ -356,27 +512,74 @@ fn one_whose_line_is_cut_is_old_and_lost_until_a_reset_finds_it_again() {
         spindle,
         ..Own::default()
     };
-    let all = [deal("cut-none", &[2, 0], &[7], false), deal("cut", &[3, 1], &[40, 3], true)];
+    let all = [
+        deal("cut-none", &[2, 0], &[7], false),
+        deal("cut", &[3, 1], &[40, 3], true),
+    ];
     for own in &all {
-        let mut answer = Feedback { homed: 3, ..drawn_answer(&mut random) };
+        let mut answer = Feedback {
+            homed: 3,
+            ..drawn_answer(&mut random)
+        };
         (answer.age_periods, answer.input_age_periods) = ([0; 8], [0; 64]);
-        answer.latches[0] = Latch { input: 0, edge: 1, joints: 1, ..Latch::default() };
+        answer.latches[0] = Latch {
+            input: 0,
+            edge: 1,
+            joints: 1,
+            ..Latch::default()
+        };
         (answer.has_phase, answer.phase_ns) = (u32::from(own.spindle), 9);
-        mirrors().insert(own.name.clone(), Mirror { answer, ..Mirror::default() });
+        mirrors().insert(
+            own.name.clone(),
+            Mirror {
+                answer,
+                ..Mirror::default()
+            },
+        );
     }
     let (mut driver, _) = attached_driver(&machine(&text(&all)), &registry()).unwrap();
-    let (mut setpoint, mut feedback) = (Setpoint { enable: 1, ..Setpoint::default() }, Feedback::default());
+    let (mut setpoint, mut feedback) = (
+        Setpoint {
+            enable: 1,
+            ..Setpoint::default()
+        },
+        Feedback::default(),
+    );
     driver.exchange(&setpoint, &mut feedback).unwrap();
-    assert_eq!((feedback.homed, feedback.has_phase, feedback.phase_ns), (0b1111, 1, 9));
-    assert_eq!(feedback.latches.iter().filter(|latch| latch.edge != 0).count(), 2);
+    assert_eq!(
+        (feedback.homed, feedback.has_phase, feedback.phase_ns),
+        (0b1111, 1, 9)
+    );
+    assert_eq!(
+        feedback
+            .latches
+            .iter()
+            .filter(|latch| latch.edge != 0)
+            .count(),
+        2
+    );
     mirrors().get_mut("cut").unwrap().fails = true;
-    let failed = (1..=30_u32).filter(|_| driver.exchange(&setpoint, &mut feedback).is_err()).count();
+    let failed = (1..=30_u32)
+        .filter(|_| driver.exchange(&setpoint, &mut feedback).is_err())
+        .count();
     assert_eq!((failed, feedback.spindle_at_speed), (1, 0));
     let (states, ages) = (feedback.state, feedback.age_periods);
-    assert_eq!((states[3], states[1], ages), (JointState::Lost, JointState::Lost, [0, 30, 0, 30, 0, 0, 0, 0]));
+    assert_eq!(
+        (states[3], states[1], ages),
+        (
+            JointState::Lost,
+            JointState::Lost,
+            [0, 30, 0, 30, 0, 0, 0, 0]
+        )
+    );
     let inputs = feedback.input_age_periods;
     assert_eq!((inputs[40], inputs[3], inputs[7]), (30, 30, 0));
-    let given: Vec<_> = feedback.latches.iter().filter(|latch| latch.edge != 0).map(|latch| latch.input).collect();
+    let given: Vec<_> = feedback
+        .latches
+        .iter()
+        .filter(|latch| latch.edge != 0)
+        .map(|latch| latch.input)
+        .collect();
     assert_eq!(given, [7], "an edge of before is not caught again");
     let mut mirror = mirrors();
     let cut = mirror.get_mut("cut").unwrap();
@@ -387,8 +590,15 @@ fn one_whose_line_is_cut_is_old_and_lost_until_a_reset_finds_it_again() {
     assert_eq!(feedback.state[3], JointState::Lost, "nobody has reset it");
     setpoint.reset = 1;
     driver.exchange(&setpoint, &mut feedback).unwrap();
-    assert_eq!((feedback.state[3], feedback.age_periods[3]), (mirrors()["cut"].answer.state[0], 0));
-    assert_eq!((feedback.homed, feedback.has_phase), (0b101, 0), "what it says no more");
+    assert_eq!(
+        (feedback.state[3], feedback.age_periods[3]),
+        (mirrors()["cut"].answer.state[0], 0)
+    );
+    assert_eq!(
+        (feedback.homed, feedback.has_phase),
+        (0b101, 0),
+        "what it says no more"
+    );
     driver.quick_stop();
     assert!(driver.stop().is_err());
     for own in &all {
@@ -401,15 +611,31 @@ fn one_whose_line_is_cut_is_old_and_lost_until_a_reset_finds_it_again() {
 #[test]
 fn the_skew_of_a_gantry_is_judged_by_joints_that_know_where_they_stand() {
     for (known, skew) in [(u32::MAX, true), (0b11101, false), (0b11110, false)] {
-        let mut attached = Attached { known, ..Attached::at(AxisVector::ZERO) };
+        let mut attached = Attached {
+            known,
+            ..Attached::at(AxisVector::ZERO)
+        };
         attached.position[1] = 50.0;
-        mirrors().insert("skew".to_string(), Mirror { attached, ..Mirror::default() });
+        mirrors().insert(
+            "skew".to_string(),
+            Mirror {
+                attached,
+                ..Mirror::default()
+            },
+        );
         let gantry = "[driver]\nplugin = \"mirror\"\noptions = { name = \"skew\" }\n\
                       [joints.x1]\naxis = \"x\"\n[joints.x2]\naxis = \"x\"\n";
-        let switches = Switches { unhomed: true, ..Switches::default() };
+        let switches = Switches {
+            unhomed: true,
+            ..Switches::default()
+        };
         let run = Run::prepare(machine(gantry), &registry(), program("G21\nM2\n"), switches);
         let refused = run.err().map(|error| error.to_string()).unwrap_or_default();
-        assert_eq!(refused.contains("the gantry is skew"), skew, "{known:b}: {refused}");
+        assert_eq!(
+            refused.contains("the gantry is skew"),
+            skew,
+            "{known:b}: {refused}"
+        );
     }
 }
 
@@ -418,15 +644,27 @@ fn the_skew_of_a_gantry_is_judged_by_joints_that_know_where_they_stand() {
 fn a_start_that_makes_no_sense_is_refused_by_the_names_of_driver_and_joints_and_stopped() {
     type Change = fn(&mut Attached);
     let mostly: [(&str, Change, Option<&str>); 9] = [
-        ("number", |own| own.position[1] = f64::NAN, Some("its start gives no finite number as the position of x")),
+        (
+            "number",
+            |own| own.position[1] = f64::NAN,
+            Some("its start gives no finite number as the position of x"),
+        ),
         (
             "state",
             |own| own.state[0] = JointState(99),
             Some("its start gives a number as the state of z that stands for none"),
         ),
-        ("delay", |own| own.delay_periods = [16; 8], Some("the feedback of x, z is more than 15 fine periods behind")),
+        (
+            "delay",
+            |own| own.delay_periods = [16; 8],
+            Some("the feedback of x, z is more than 15 fine periods behind"),
+        ),
         ("delay-at-limit", |own| own.delay_periods = [15; 8], None),
-        ("lost", |own| own.state[1] = JointState::Lost, Some("the drive of x cannot be reached")),
+        (
+            "lost",
+            |own| own.state[1] = JointState::Lost,
+            Some("the drive of x cannot be reached"),
+        ),
         (
             "unknown",
             |own| (own.known, own.homed) = (0, 0),
@@ -453,19 +691,43 @@ fn a_start_that_makes_no_sense_is_refused_by_the_names_of_driver_and_joints_and_
             if own.name.ends_with("bus") || ["delay", "unknown"].contains(&name) {
                 change(&mut attached);
             }
-            mirrors().insert(own.name.clone(), Mirror { attached, ..Mirror::default() });
+            mirrors().insert(
+                own.name.clone(),
+                Mirror {
+                    attached,
+                    ..Mirror::default()
+                },
+            );
         }
-        let switches = Switches { reset: name == "reset", ..Switches::default() };
-        let run = Run::prepare(machine(&text(&all)), &registry(), program("G21\nG1 X1 F600\nM2\n"), switches);
+        let switches = Switches {
+            reset: name == "reset",
+            ..Switches::default()
+        };
+        let run = Run::prepare(
+            machine(&text(&all)),
+            &registry(),
+            program("G21\nG1 X1 F600\nM2\n"),
+            switches,
+        );
         let refused = run.as_ref().err().map(ToString::to_string);
         let expected = words.map(|words| format!("driver {name}-bus (mirror): {words}"));
-        let (is, told) = (refused.clone().unwrap_or_default(), expected.clone().unwrap_or_default());
-        assert!(refused.is_some() == expected.is_some() && is.contains(&told), "{name}: {is}");
+        let (is, told) = (
+            refused.clone().unwrap_or_default(),
+            expected.clone().unwrap_or_default(),
+        );
+        assert!(
+            refused.is_some() == expected.is_some() && is.contains(&told),
+            "{name}: {is}"
+        );
         drop(run);
         for own in &all {
             let mirror = mirrors()[&own.name].clone();
             assert_eq!(mirror.stops, 1, "{name}: all are let go of");
-            assert_eq!(mirror.context.unwrap().real_time, 1, "{name}: real drives live in real time");
+            assert_eq!(
+                mirror.context.unwrap().real_time,
+                1,
+                "{name}: real drives live in real time"
+            );
         }
     }
 }

@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use tandem_host::{Clock, Run, Switches};
 use tandem_sdk::{
-    Answer, FeedStrategy, FineSample, MAX_SIGNALS, PluginError, RawOptions, Request, StrategyContext, Window,
-    local_plugin,
+    Answer, FeedStrategy, FineSample, MAX_SIGNALS, PluginError, RawOptions, Request,
+    StrategyContext, Window, local_plugin,
 };
 
 use crate::double::{MEASURED_INPUTS, measured};
@@ -19,8 +19,14 @@ struct Witness;
 
 impl FeedStrategy for Witness {
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
-        SEEN.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(window.samples());
-        Ok(Answer { ratio: 1.0, request: Request::None, signals: [0.0; MAX_SIGNALS] })
+        SEEN.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .extend_from_slice(window.samples());
+        Ok(Answer {
+            ratio: 1.0,
+            request: Request::None,
+            signals: [0.0; MAX_SIGNALS],
+        })
     }
 }
 
@@ -35,10 +41,21 @@ fn shown(drivers: &str) -> Vec<FineSample> {
         "{drivers}[loops]\nmax_missed_periods = 100000\nmax_missed_share = 1\n[feed_strategy]\nplugin = \"witness\"\n"
     );
     let mut registry = registry();
-    registry.register(local_plugin!(feed_strategy "witness" = open)).unwrap();
+    registry
+        .register(local_plugin!(feed_strategy "witness" = open))
+        .unwrap();
     SEEN.lock().unwrap_or_else(PoisonError::into_inner).clear();
-    let run = Run::prepare(machine(&text), &registry, program(SQUARE), Switches::default()).unwrap();
-    assert_eq!(run.drive(Clock::Wall, &[], &mut ()).unwrap().summary.fault, None);
+    let run = Run::prepare(
+        machine(&text),
+        &registry,
+        program(SQUARE),
+        Switches::default(),
+    )
+    .unwrap();
+    assert_eq!(
+        run.drive(Clock::Wall, &[], &mut ()).unwrap().summary.fault,
+        None
+    );
     SEEN.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
@@ -46,7 +63,9 @@ fn shown(drivers: &str) -> Vec<FineSample> {
 #[test]
 fn inputs_and_analog_values_reach_a_strategy_with_their_ages_by_the_numbers_of_the_machine() {
     let plan = |name: &str, more: &str| {
-        format!("plugin = \"double\"\noptions = {{ name = \"measures-{name}\", real = true, {more} }}\n")
+        format!(
+            "plugin = \"double\"\noptions = {{ name = \"measures-{name}\", real = true, {more} }}\n"
+        )
     };
     let one = format!("[driver]\n{}", plan("one", "measures = true"));
     let two = format!(
@@ -62,14 +81,28 @@ fn inputs_and_analog_values_reach_a_strategy_with_their_ages_by_the_numbers_of_t
         for sample in &seen {
             let (inputs, ages, value, age) = measured(sample.tick);
             let bits = |of: &dyn Fn(usize) -> bool| {
-                (0..MEASURED_INPUTS).filter(|own| of(*own)).fold(0_u64, |bits, own| bits | 1 << lines[own])
+                (0..MEASURED_INPUTS)
+                    .filter(|own| of(*own))
+                    .fold(0_u64, |bits, own| bits | 1 << lines[own])
             };
-            assert_eq!(sample.inputs, bits(&|own| inputs >> own & 1 == 1), "{sample:?}");
+            assert_eq!(
+                sample.inputs,
+                bits(&|own| inputs >> own & 1 == 1),
+                "{sample:?}"
+            );
             assert_eq!(sample.old_inputs, bits(&|own| ages[own] > 0), "{sample:?}");
-            assert_eq!((sample.analog[analog], sample.analog[1]), (value, 0.0), "{sample:?}");
+            assert_eq!(
+                (sample.analog[analog], sample.analog[1]),
+                (value, 0.0),
+                "{sample:?}"
+            );
             let mut expected = [0; tandem_sdk::MAX_AXES];
             expected[joint] = age;
-            assert_eq!((sample.age_periods, sample.is_new()), (expected, age == 0), "{sample:?}");
+            assert_eq!(
+                (sample.age_periods, sample.is_new()),
+                (expected, age == 0),
+                "{sample:?}"
+            );
         }
     }
 }

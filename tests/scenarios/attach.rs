@@ -32,13 +32,22 @@ const MACHINES: [Machine; 5] = [
     Machine {
         found: FOUND_MM,
         file: "mill-3axis.toml",
-        axes: &[("x", -200.0, 200.0), ("y", -200.0, 200.0), ("z", -80.0, 80.0)],
+        axes: &[
+            ("x", -200.0, 200.0),
+            ("y", -200.0, 200.0),
+            ("z", -80.0, 80.0),
+        ],
         joints: <[f64]>::to_vec,
     },
     Machine {
         found: FOUND_ROTARY,
         file: "mill-4axis.toml",
-        axes: &[("x", -200.0, 200.0), ("y", -200.0, 200.0), ("z", -80.0, 80.0), ("a", -300.0, 300.0)],
+        axes: &[
+            ("x", -200.0, 200.0),
+            ("y", -200.0, 200.0),
+            ("z", -80.0, 80.0),
+            ("a", -300.0, 300.0),
+        ],
         joints: |axes| vec![axes[0], axes[1], axes[2], axes[3].to_radians()],
     },
     Machine {
@@ -50,13 +59,22 @@ const MACHINES: [Machine; 5] = [
     Machine {
         found: FOUND_MM,
         file: "gantry.toml",
-        axes: &[("x", -200.0, 200.0), ("y", -100.0, 100.0), ("z", -80.0, 80.0)],
+        axes: &[
+            ("x", -200.0, 200.0),
+            ("y", -100.0, 100.0),
+            ("z", -80.0, 80.0),
+        ],
         joints: |axes| vec![axes[0], axes[1], axes[1], axes[2]],
     },
     Machine {
         found: FOUND_ROTARY,
         file: "rotary-table.toml",
-        axes: &[("x", 50.0, 250.0), ("y", -500.0, 500.0), ("z", 10.0, 60.0), ("v", -20.0, 20.0)],
+        axes: &[
+            ("x", 50.0, 250.0),
+            ("y", -500.0, 500.0),
+            ("z", 10.0, 60.0),
+            ("v", -20.0, 20.0),
+        ],
         joints: |axes| vec![axes[0], axes[1] / 30.0, axes[2], axes[3]],
     },
 ];
@@ -70,25 +88,57 @@ struct Attached {
 
 fn attach(machine: &Machine, seed: u64, relative: bool, settings: &[&str]) -> Attached {
     let mut random = Random::new(seed);
-    let place: Vec<_> = machine.axes.iter().map(|(_, low, high)| random.between(*low, *high)).collect();
-    let joints: Vec<_> = (machine.joints)(&place).iter().map(ToString::to_string).collect();
-    let first = if relative { "G91\nG1 X7 Y-5\nG90\n" } else { "" };
-    let middle: Vec<_> = machine.axes[..2].iter().map(|(_, low, high)| f64::midpoint(*low, *high)).collect();
+    let place: Vec<_> = machine
+        .axes
+        .iter()
+        .map(|(_, low, high)| random.between(*low, *high))
+        .collect();
+    let joints: Vec<_> = (machine.joints)(&place)
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let first = if relative {
+        "G91\nG1 X7 Y-5\nG90\n"
+    } else {
+        ""
+    };
+    let middle: Vec<_> = machine.axes[..2]
+        .iter()
+        .map(|(_, low, high)| f64::midpoint(*low, *high))
+        .collect();
     let (x, y) = (middle[0] + 10.0, middle[1] - 4.0);
-    let program =
-        format!("G21 G90 G17 G64\nF4000\n{first}G1 X{x} Y{y}\nG2 X{} Y{y} I-5\nG1 Y{}\nM2\n", x - 10.0, y + 6.0);
-    let options = format!("driver.options={{seed={seed},start_mm=[{}],{DEMANDING}}}", joints.join(","));
+    let program = format!(
+        "G21 G90 G17 G64\nF4000\n{first}G1 X{x} Y{y}\nG2 X{} Y{y} I-5\nG1 Y{}\nM2\n",
+        x - 10.0,
+        y + 6.0
+    );
+    let options = format!(
+        "driver.options={{seed={seed},start_mm=[{}],{DEMANDING}}}",
+        joints.join(",")
+    );
     let file = root().join("examples/machines").join(machine.file);
-    let done = Scenario::text(&program).on(&file).with(&["--set", &options]).with(settings).run();
+    let done = Scenario::text(&program)
+        .on(&file)
+        .with(&["--set", &options])
+        .with(settings)
+        .run();
     let path = done.file("program.ngc");
-    Attached { done, place, program: path }
+    Attached {
+        done,
+        place,
+        program: path,
+    }
 }
 
 impl Attached {
     /// Where the trace begins, per axis.
     fn first(&self, machine: &Machine) -> Vec<f64> {
         let unit = |axis: &str| if axis == "a" { "deg" } else { "mm" };
-        machine.axes.iter().map(|(axis, ..)| self.done.column(&format!("{axis}_cmd_{}", unit(axis)))[0]).collect()
+        machine
+            .axes
+            .iter()
+            .map(|(axis, ..)| self.done.column(&format!("{axis}_cmd_{}", unit(axis)))[0])
+            .collect()
     }
 
     /// The oracle's machine file: the example, standing where the trace begins.
@@ -111,7 +161,10 @@ impl Attached {
             assert_eq!(done.number(count), 0.0, "{what}: {count}");
         }
         for (at, place) in self.first(machine).iter().zip(&self.place) {
-            assert!((at - place).abs() < machine.found, "{what}: it begins at {at} and stood at {place}");
+            assert!(
+                (at - place).abs() < machine.found,
+                "{what}: it begins at {at} and stood at {place}"
+            );
         }
         self.assert_oracle_passes(machine, what, rounds_corners);
     }
@@ -144,8 +197,18 @@ fn the_machine_starts_where_its_drives_stand() {
 fn every_planner_starts_there() {
     let planners: [&[&str]; 3] = [
         &["--set", "planner.plugin=block-overlap"],
-        &["--set", "planner.plugin=smooth", "--set", "motion.jerk=limit"],
-        &["--set", "planner.plugin=nurbs", "--set", "motion.jerk=limit"],
+        &[
+            "--set",
+            "planner.plugin=smooth",
+            "--set",
+            "motion.jerk=limit",
+        ],
+        &[
+            "--set",
+            "planner.plugin=nurbs",
+            "--set",
+            "motion.jerk=limit",
+        ],
     ];
     for (seed, settings) in (11..).zip(planners) {
         let what = format!("{settings:?}");
@@ -158,7 +221,9 @@ fn every_planner_starts_there() {
 fn a_joint_that_gravity_pulls_does_not_sink_while_it_waits_for_another() {
     let options = "driver.options={start_mm=[0,0,40],enable_s=[3,0.1,0.1],brake_s=[0,0,0.1],sag_mm_per_s=[0,0,-20],\
                    encoder_count_mm=0.001}";
-    let done = Scenario::text("G21 G91\nF3000\nG1 X5 Z5\nM2\n").with(&["--set", options]).run();
+    let done = Scenario::text("G21 G91\nF3000\nG1 X5 Z5\nM2\n")
+        .with(&["--set", options])
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     let z = done.column("z_cmd_mm");
     assert!((z[0] - 40.0).abs() <= 0.01, "it sank by {} mm", 40.0 - z[0]);
@@ -169,18 +234,30 @@ fn a_joint_that_gravity_pulls_does_not_sink_while_it_waits_for_another() {
 #[test]
 fn an_encoder_that_counts_from_power_on_is_no_place_to_start_from() {
     let program = "G21 G91\nF3000\nG1 X5\nM2\n";
-    let options = ["--set", "driver.options={encoder=\"incremental\",start_mm=[37.5]}"];
+    let options = [
+        "--set",
+        "driver.options={encoder=\"incremental\",start_mm=[37.5]}",
+    ];
     let refused = Scenario::text(program).with(&options).run();
-    assert!(refused.status() == 1 && refused.errors().contains("it is not known where"), "{}", refused.errors());
+    assert!(
+        refused.status() == 1 && refused.errors().contains("it is not known where"),
+        "{}",
+        refused.errors()
+    );
 }
 
 /// A drive that never comes up is not waited for without end: it is named, with its state.
 #[test]
 fn a_drive_that_never_comes_up_is_named() {
-    let done =
-        Scenario::text("G21 G91\nF3000\nG1 X5\nM2\n").with(&["--set", "driver.options={enable_s=[0.1,inf]}"]).run();
+    let done = Scenario::text("G21 G91\nF3000\nG1 X5\nM2\n")
+        .with(&["--set", "driver.options={enable_s=[0.1,inf]}"])
+        .run();
     assert_eq!(done.status(), 3, "{}", done.errors());
-    assert!(done.errors().contains("Enabling") || done.errors().contains("enabl"), "{}", done.errors());
+    assert!(
+        done.errors().contains("Enabling") || done.errors().contains("enabl"),
+        "{}",
+        done.errors()
+    );
 }
 
 /// Row by row: a fault has its words, a drive that falls out of the bus is no good run, and frames that are lost for longer than
@@ -189,16 +266,28 @@ fn a_drive_that_never_comes_up_is_named() {
 fn drives_that_fail_in_motion_are_told_by_name() {
     let program = "G21 G91\nF3000\nG1 X50 Y20\nM2\n";
     let cases = [
-        ("faults=[{joint=1,tick=300,code=29200,text=\"brake chopper\"}]", "brake chopper"),
+        (
+            "faults=[{joint=1,tick=300,code=29200,text=\"brake chopper\"}]",
+            "brake chopper",
+        ),
         ("faults=[{joint=0,tick=300,lost=true}]", "axis X"),
-        ("lost_frames={ticks=[300],periods=5},patience_periods=4", "lost"),
+        (
+            "lost_frames={ticks=[300],periods=5},patience_periods=4",
+            "lost",
+        ),
     ];
     for (options, words) in cases {
-        let done = Scenario::text(program).with(&["--set", &format!("driver.options={{{options}}}")]).run();
+        let done = Scenario::text(program)
+            .with(&["--set", &format!("driver.options={{{options}}}")])
+            .run();
         assert_eq!(done.status(), 3, "{options}: {}", done.errors());
         let said = done.errors();
         assert!(said.contains(words), "{options}: {said}");
-        assert_eq!((done.number("limit_violations"), done.number("guard_stops")), (0.0, 0.0), "{options}");
+        assert_eq!(
+            (done.number("limit_violations"), done.number("guard_stops")),
+            (0.0, 0.0),
+            "{options}"
+        );
     }
 }
 
@@ -207,12 +296,17 @@ fn drives_that_fail_in_motion_are_told_by_name() {
 fn lost_frames_up_to_the_patience_change_no_command() {
     let program = "G21 G91\nF3000\nG1 X50 Y20\nG1 Y-30\nM2\n";
     let run = |options: &str| {
-        let done = Scenario::text(program).with(&["--set", &format!("driver.options={{{options}}}")]).run();
+        let done = Scenario::text(program)
+            .with(&["--set", &format!("driver.options={{{options}}}")])
+            .run();
         assert_eq!(done.status(), 0, "{}", done.errors());
         (done.cells("x_cmd_mm"), done.cells("y_cmd_mm"))
     };
     let whole = run("");
-    for options in ["lost_frames={probability=0.05},patience_periods=20", "late_frames={ticks=[200,700],periods=3}"] {
+    for options in [
+        "lost_frames={probability=0.05},patience_periods=20",
+        "late_frames={ticks=[200,700],periods=3}",
+    ] {
         assert!(run(options) == whole, "{options}");
     }
 }

@@ -21,7 +21,10 @@ fn refused(program: &[u8], expected: &[&str]) {
 
 #[test]
 fn programs_that_cannot_run_say_why() {
-    refused(b"G21\nF100\nG1 X1\nG1 X9999\nM2\n", &["bad.ngc:4:", "X", "travel", "^"]);
+    refused(
+        b"G21\nF100\nG1 X1\nG1 X9999\nM2\n",
+        &["bad.ngc:4:", "X", "travel", "^"],
+    );
     refused(b"G1 X1\n", &["bad.ngc:1:", "feed"]);
     refused(b"F100\nG2 X10 Y0 I3 J0\n", &["bad.ngc:2:", "radius"]);
     refused(b"F100\nG1 X1 C4\n", &["bad.ngc:2:7", "C"]);
@@ -48,12 +51,24 @@ fn all_errors_of_a_file_are_listed() {
 
 #[test]
 fn a_wrong_machine_key_names_the_nearest() {
-    let done = Scenario::text("M2\n").with(&["--set", "planner.plugn=look-ahead"]).run();
+    let done = Scenario::text("M2\n")
+        .with(&["--set", "planner.plugn=look-ahead"])
+        .run();
     assert_eq!(done.status(), 1);
-    assert!(done.errors().contains("planner.plugin"), "{}", done.errors());
-    let done = Scenario::text("M2\n").with(&["--set", "planner.plugin=look-ahed"]).run();
+    assert!(
+        done.errors().contains("planner.plugin"),
+        "{}",
+        done.errors()
+    );
+    let done = Scenario::text("M2\n")
+        .with(&["--set", "planner.plugin=look-ahed"])
+        .run();
     assert_eq!(done.status(), 1);
-    assert!(done.errors().contains("look-ahed") && done.errors().contains("look-ahead"), "{}", done.errors());
+    assert!(
+        done.errors().contains("look-ahed") && done.errors().contains("look-ahead"),
+        "{}",
+        done.errors()
+    );
 }
 
 #[test]
@@ -64,14 +79,23 @@ fn what_is_read_is_not_written_over_and_nothing_is_written_twice() {
     let path = program.to_string_lossy().into_owned();
     let done = Scenario::of(&program).with(&["--report", &path]).run();
     assert_eq!(done.status(), 1);
-    assert!(done.errors().contains("the run reads this file"), "{}", done.errors());
-    assert_eq!(std::fs::read_to_string(&program).unwrap(), "F600\nG1 X1\nM2\n");
+    assert!(
+        done.errors().contains("the run reads this file"),
+        "{}",
+        done.errors()
+    );
+    assert_eq!(
+        std::fs::read_to_string(&program).unwrap(),
+        "F600\nG1 X1\nM2\n"
+    );
 }
 
 #[test]
 fn a_device_is_written_and_not_replaced() {
     let device = std::path::Path::new("/dev/null");
-    let done = Scenario::text("F600\nG1 X1\nM2\n").with(&["--report", "/dev/null"]).run();
+    let done = Scenario::text("F600\nG1 X1\nM2\n")
+        .with(&["--report", "/dev/null"])
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     assert!(!device.metadata().unwrap().is_file());
     assert!(!std::path::Path::new("/dev/null.part").exists());
@@ -79,10 +103,14 @@ fn a_device_is_written_and_not_replaced() {
 
 #[test]
 fn options_beyond_reason_are_refused() {
-    let done = Scenario::text("M2\n").with(&["--set", "planner.options.buffer_blocks=1000000000000"]).run();
+    let done = Scenario::text("M2\n")
+        .with(&["--set", "planner.options.buffer_blocks=1000000000000"])
+        .run();
     assert_eq!(done.status(), 1);
     assert!(
-        done.errors().contains("planner.options.buffer_blocks: planner look-ahead: 1000000000000: must be from 2"),
+        done.errors().contains(
+            "planner.options.buffer_blocks: planner look-ahead: 1000000000000: must be from 2"
+        ),
         "{}",
         done.errors()
     );
@@ -91,13 +119,24 @@ fn options_beyond_reason_are_refused() {
 #[test]
 fn a_command_file_is_told_all_that_is_wrong_with_it() {
     let program = "G21 G90\nF3000\nG1 X20\nM2\n";
-    let done = Scenario::text(program).commands("# a comment\n5,hodl\n\n9,hold\nx,resume\n3,resume\n").run();
+    let done = Scenario::text(program)
+        .commands("# a comment\n5,hodl\n\n9,hold\nx,resume\n3,resume\n")
+        .run();
     let errors = done.errors();
     let place = |line: u32, words: &str| errors.contains(&format!("commands.csv:{line}: {words}"));
-    assert!(place(2, "no command is called \"hodl\"") && place(5, "\"x\" is not"), "{errors}");
+    assert!(
+        place(2, "no command is called \"hodl\"") && place(5, "\"x\" is not"),
+        "{errors}"
+    );
     assert!(place(6, "tick 3 comes after tick 9"), "{errors}");
     assert_eq!((done.status(), errors.lines().count()), (1, 3), "{errors}");
-    let done = Scenario::text(program).commands(&"1,hodl\n".repeat(250)).run();
+    let done = Scenario::text(program)
+        .commands(&"1,hodl\n".repeat(250))
+        .run();
     assert_eq!(done.errors().lines().count(), 101);
-    assert!(done.errors().ends_with("and 150 more\n"), "{}", done.errors());
+    assert!(
+        done.errors().ends_with("and 150 more\n"),
+        "{}",
+        done.errors()
+    );
 }

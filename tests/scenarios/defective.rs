@@ -9,8 +9,8 @@ use tandem_oracle::Kind;
 use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext, PlannerDescription, Plugin,
-    PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext,
+    PlannerDescription, Plugin, PluginError, Segment, SegmentSink,
 };
 
 use crate::harness::{judge_trace, mill};
@@ -27,26 +27,44 @@ macro_rules! optimist {
     };
 }
 
-optimist!(too_fast, |context| context.limits.axes.iter_mut().for_each(|axis| {
-    axis.feed_mm_per_s *= 1.01;
-    axis.rapid_mm_per_s *= 1.01;
-}));
-optimist!(too_hard, |context| context.limits.axes.iter_mut().for_each(|axis| axis.acceleration_mm_per_s2 *= 1.011));
+optimist!(too_fast, |context| context.limits.axes.iter_mut().for_each(
+    |axis| {
+        axis.feed_mm_per_s *= 1.01;
+        axis.rapid_mm_per_s *= 1.01;
+    }
+));
+optimist!(too_hard, |context| context
+    .limits
+    .axes
+    .iter_mut()
+    .for_each(|axis| axis.acceleration_mm_per_s2 *= 1.011));
 /// 1 % faster than programmed, and it says that the feed was higher.
 fn too_keen(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut keen = *context;
     keen.max_feed_ratio = 1.01;
     let bend = |segment: &mut Segment| segment.feed_mm_per_s *= 1.01;
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent { inner: LookAhead::new(options, &keen)?, bend, allowed })
+    Ok(Bent {
+        inner: LookAhead::new(options, &keen)?,
+        bend,
+        allowed,
+    })
 }
 
 /// Steps where blocks meet twice as large as allowed, not declared.
 fn too_abrupt(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut rough = *context;
-    rough.limits.axes.iter_mut().for_each(|axis| axis.speed_difference_mm_per_s *= 4.0);
+    rough
+        .limits
+        .axes
+        .iter_mut()
+        .for_each(|axis| axis.speed_difference_mm_per_s *= 4.0);
     let inner = LookAhead::new(options, &rough)?;
-    Ok(Bent { inner, bend: |_| {}, allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s) })
+    Ok(Bent {
+        inner,
+        bend: |_| {},
+        allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s),
+    })
 }
 
 /// Off the path by a hundredth of a millimetre in Z, everywhere between the ends.
@@ -56,14 +74,22 @@ fn off_the_path(options: &Options, context: &PlannerContext) -> Result<Bent, Plu
         segment.coefficients[2][0] += 1e-3 * (std::f64::consts::PI * at.clamp(0.0, 1.0)).sin();
     };
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent { inner: LookAhead::new(options, context)?, bend, allowed })
+    Ok(Bent {
+        inner: LookAhead::new(options, context)?,
+        bend,
+        allowed,
+    })
 }
 
 /// Everything 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let bend = |segment: &mut Segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent { inner: LookAhead::new(options, context)?, bend, allowed })
+    Ok(Bent {
+        inner: LookAhead::new(options, context)?,
+        bend,
+        allowed,
+    })
 }
 
 /// Changes what another planner emits.
@@ -88,7 +114,10 @@ impl SegmentSink for BentSink<'_> {
 
 impl Planner for Bent {
     fn describe(&self) -> PlannerDescription {
-        PlannerDescription { speed_difference_mm_per_s: self.allowed, ..self.inner.describe() }
+        PlannerDescription {
+            speed_difference_mm_per_s: self.allowed,
+            ..self.inner.describe()
+        }
     }
     fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         self.inner.check(block, curve)
@@ -99,8 +128,13 @@ impl Planner for Bent {
     fn finish(&mut self) {
         self.inner.finish();
     }
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
-        self.inner.advance(duration_s, &mut BentSink(sink, self.bend))
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
+        self.inner
+            .advance(duration_s, &mut BentSink(sink, self.bend))
     }
     fn reset(&mut self, position: &AxisVector) {
         self.inner.reset(position);
@@ -139,8 +173,8 @@ fn run(plugin: Plugin, text: &str, guard: &str) -> Ran {
     let (program, trace) = (folder.path().join("p.ngc"), folder.path().join("trace.csv"));
     std::fs::write(&program, text).unwrap();
     let machine_path = mill();
-    let overrides =
-        [("guard.mode", guard), ("planner.plugin", "defective")].map(|(k, v)| (k.to_string(), v.to_string()));
+    let overrides = [("guard.mode", guard), ("planner.plugin", "defective")]
+        .map(|(k, v)| (k.to_string(), v.to_string()));
     let machine = Machine::read(&machine_path, &overrides).unwrap();
     let mut registry = Registry::default();
     registry.register(tandem_sim::PLUGIN).unwrap();
@@ -155,15 +189,24 @@ fn run(plugin: Plugin, text: &str, guard: &str) -> Ran {
     let mut tracing = Tracing(TraceCsv::create(&trace, &machine, &[]).unwrap());
     let outcome = run.drive(Clock::Virtual, &[], &mut tracing).unwrap();
     tracing.0.finish().unwrap();
-    Ran { outcome, folder, machine: machine_path }
+    Ran {
+        outcome,
+        folder,
+        machine: machine_path,
+    }
 }
 
 fn kinds(ran: &Ran, ends_early: bool) -> Vec<Kind> {
-    let verdict = judge_trace(&ran.at("trace.csv"), &ran.at("p.ngc"), Path::new(&ran.machine), |options| {
-        options.ends_early = ends_early;
-        options.sample_tolerance_mm = Some(if ends_early { 1e3 } else { 2e-6 });
-        options.vertex_tolerance_mm = Some(1e3);
-    });
+    let verdict = judge_trace(
+        &ran.at("trace.csv"),
+        &ran.at("p.ngc"),
+        Path::new(&ran.machine),
+        |options| {
+            options.ends_early = ends_early;
+            options.sample_tolerance_mm = Some(if ends_early { 1e3 } else { 2e-6 });
+            options.vertex_tolerance_mm = Some(1e3);
+        },
+    );
     assert!(verdict.not_judged.is_none(), "{verdict}");
     verdict.kinds()
 }
@@ -174,17 +217,26 @@ const LINE: &str = "G21 G90\nF3000\nG1 X40\nM2\n";
 
 #[test]
 fn the_guard_stops_what_exceeds_a_limit_and_ramps_out_within_limits() {
-    for (plugin, text, word) in [(defective!(too_abrupt), CORNER, "acceleration"), (defective!(too_abrupt), RAPID, "")]
-    {
+    for (plugin, text, word) in [
+        (defective!(too_abrupt), CORNER, "acceleration"),
+        (defective!(too_abrupt), RAPID, ""),
+    ] {
         let ran = run(plugin, text, "stop");
         if word.is_empty() {
             assert_eq!(ran.outcome.summary.fault, None, "nothing steps here");
             continue;
         }
         let fault = ran.outcome.summary.fault.clone().unwrap();
-        assert!(fault.contains(word) && fault.contains("defective") && fault.contains("axis"), "{fault}");
+        assert!(
+            fault.contains(word) && fault.contains("defective") && fault.contains("axis"),
+            "{fault}"
+        );
         assert_eq!(ran.outcome.summary.guard_stops, 1);
-        assert_eq!(kinds(&ran, true), [], "what was sent, to standstill, is within limits");
+        assert_eq!(
+            kinds(&ran, true),
+            [],
+            "what was sent, to standstill, is within limits"
+        );
     }
 }
 
@@ -193,7 +245,11 @@ fn the_governor_slows_what_exceeds_a_limit_and_counts_it() {
     for plugin in [defective!(too_fast), defective!(too_hard)] {
         let ran = run(plugin, RAPID, "stop");
         assert!(ran.outcome.summary.governed_samples > 0 || ran.outcome.summary.guard_stops > 0);
-        assert_eq!(kinds(&ran, ran.outcome.fault.is_some()), [], "what was sent is within limits");
+        assert_eq!(
+            kinds(&ran, ran.outcome.fault.is_some()),
+            [],
+            "what was sent is within limits"
+        );
     }
 }
 
@@ -205,18 +261,31 @@ fn the_oracle_sees_a_feed_one_percent_too_high() {
 
 #[test]
 fn the_oracle_sees_an_axis_one_percent_too_fast_or_accelerating_too_hard() {
-    assert_eq!(kinds(&run(defective!(too_fast), RAPID, "count"), false), [Kind::Velocity, Kind::Feed]);
-    assert_eq!(kinds(&run(defective!(too_hard), RAPID, "count"), false), [Kind::SpeedStep]);
+    assert_eq!(
+        kinds(&run(defective!(too_fast), RAPID, "count"), false),
+        [Kind::Velocity, Kind::Feed]
+    );
+    assert_eq!(
+        kinds(&run(defective!(too_hard), RAPID, "count"), false),
+        [Kind::SpeedStep]
+    );
 }
 
 #[test]
 fn the_oracle_sees_a_travel_one_percent_too_far() {
     let text = "G21 G90\nF6000\nG1 X249\nG1 X0\nM2\n";
     let found = kinds(&run(defective!(too_far), text, "count"), false);
-    assert!(found.contains(&Kind::Travel) && found.contains(&Kind::PathDeviation), "{found:?}");
+    assert!(
+        found.contains(&Kind::Travel) && found.contains(&Kind::PathDeviation),
+        "{found:?}"
+    );
     let ran = run(defective!(too_far), text, "stop");
     assert!(
-        ran.outcome.summary.fault.as_ref().is_some_and(|f| f.contains("travel")),
+        ran.outcome
+            .summary
+            .fault
+            .as_ref()
+            .is_some_and(|f| f.contains("travel")),
         "{:?}",
         ran.outcome.summary.fault
     );
@@ -225,7 +294,11 @@ fn the_oracle_sees_a_travel_one_percent_too_far() {
 #[test]
 fn the_oracle_sees_a_planner_off_the_path() {
     let ran = run(defective!(off_the_path), LINE, "count");
-    assert!(kinds(&ran, false).contains(&Kind::PathDeviation), "{:?}", kinds(&ran, false));
+    assert!(
+        kinds(&ran, false).contains(&Kind::PathDeviation),
+        "{:?}",
+        kinds(&ran, false)
+    );
 }
 
 #[test]

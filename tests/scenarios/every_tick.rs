@@ -35,7 +35,10 @@ impl<'a> HoldCheck<'a> {
         Self {
             free: &free.samples,
             plan: Plan::new(&free.segments),
-            acceleration: axes.iter().map(|axis| axis.max_acceleration_mm_per_s2).collect(),
+            acceleration: axes
+                .iter()
+                .map(|axis| axis.max_acceleration_mm_per_s2)
+                .collect(),
             period_s: bench.judging.fine_period_s,
         }
     }
@@ -62,12 +65,18 @@ impl<'a> HoldCheck<'a> {
         }
         let (now, free) = (held[tick].feed_mm_per_s, self.free[tick].feed_mm_per_s);
         if now >= free && !self.is_excused(held, tick) {
-            return Err(format!("sample {tick} is at {now} mm/s, {free} without the hold"));
+            return Err(format!(
+                "sample {tick} is at {now} mm/s, {free} without the hold"
+            ));
         }
         self.slows_to_rest(&self.path_mm(held), tick, until)?;
         let rest = &held[tick + PAUSE / 2..until];
-        let quiet = rest.iter().all(|sample| sample.feed_mm_per_s == 0.0 && sample.state == MachineState::Holding);
-        quiet.then_some(()).ok_or("it does not stand still in the state holding".to_string())
+        let quiet = rest
+            .iter()
+            .all(|sample| sample.feed_mm_per_s == 0.0 && sample.state == MachineState::Holding);
+        quiet
+            .then_some(())
+            .ok_or("it does not stand still in the state holding".to_string())
     }
 
     /// Whether the sample `tick` need not be slower: an axis brakes at its limit, or nothing moves.
@@ -78,7 +87,9 @@ impl<'a> HoldCheck<'a> {
 
     /// Whether the plan is such between two program times that a held machine need not be slower than before.
     fn may_keep(&self, from_s: f64, until_s: f64) -> bool {
-        self.plan.brakes_at_limit(from_s, until_s, &self.acceleration) || self.plan.rests(from_s, until_s)
+        self.plan
+            .brakes_at_limit(from_s, until_s, &self.acceleration)
+            || self.plan.rests(from_s, until_s)
     }
 
     fn slows_to_rest(&self, path_mm: &[f64], tick: usize, until: usize) -> Result<(), String> {
@@ -87,12 +98,17 @@ impl<'a> HoldCheck<'a> {
             if path_mm[index] == path_mm[index - 1] {
                 break;
             }
-            let (from_s, to_s) = (self.plan.time_s(path_mm[index - 1]), self.plan.time_s(path_mm[index]));
+            let (from_s, to_s) = (
+                self.plan.time_s(path_mm[index - 1]),
+                self.plan.time_s(path_mm[index]),
+            );
             let passed_s = to_s - from_s;
             let slower = passed_s < last_s || self.may_keep(from_s, from_s + self.period_s);
             // Path coordinates are sums of a thousand samples; near a rest a rounding of them is much program time.
             if !slower || passed_s > last_s + TIME_TOLERANCE * self.period_s {
-                return Err(format!("sample {index} passes {passed_s} s of the plan, the one before {last_s}"));
+                return Err(format!(
+                    "sample {index} passes {passed_s} s of the plan, the one before {last_s}"
+                ));
             }
             last_s = passed_s;
         }
@@ -118,10 +134,14 @@ fn hold_at_every_tick() {
         check.check(&ran.samples, tick, tick + PAUSE)?;
         passed(&bench.judge(&ran, |_| ()))?;
         // A hold that comes one period late must not pass for one that comes in time.
-        let seen = check.check(&held(tick + 1).samples, tick, tick + PAUSE).is_err();
+        let seen = check
+            .check(&held(tick + 1).samples, tick, tick + PAUSE)
+            .is_err();
         late_ones_seen += usize::from(seen);
         let excused = check.is_excused(&ran.samples, tick);
-        (seen || excused).then_some(()).ok_or("a hold one period later passes the same check".to_string())
+        (seen || excused)
+            .then_some(())
+            .ok_or("a hold one period later passes the same check".to_string())
     });
     println!("a hold one period late was noticed in {late_ones_seen} periods");
 }
@@ -130,11 +150,15 @@ fn hold_at_every_tick() {
 fn emergency_stop_at_every_tick() {
     let bench = bench();
     let free = bench.run("");
-    for_each_tick("emergency_stop_at_every_tick", 1..free.samples.len() - 1, |tick| {
-        let ran = bench.run(&format!("{tick},emergency-stop"));
-        // The stop comes before the sample of its period is made.
-        expect_fault(&bench, &ran, FaultKind::EmergencyStop, tick, tick - 1)
-    });
+    for_each_tick(
+        "emergency_stop_at_every_tick",
+        1..free.samples.len() - 1,
+        |tick| {
+            let ran = bench.run(&format!("{tick},emergency-stop"));
+            // The stop comes before the sample of its period is made.
+            expect_fault(&bench, &ran, FaultKind::EmergencyStop, tick, tick - 1)
+        },
+    );
 }
 
 #[test]
@@ -153,15 +177,25 @@ fn abort_at_every_tick() {
 fn failing_exchange_at_every_tick() {
     let bench = bench();
     let free = bench.run("");
-    for_each_tick("failing_exchange_at_every_tick", 1..free.samples.len() - 1, |tick| {
-        let wrap = format!("[{{kind = \"fail\", from_tick = {tick}}}]");
-        let ran = bench.run_with("", &[("faults.wrap", &wrap)]);
-        expect_fault(&bench, &ran, FaultKind::Driver, tick, tick)
-    });
+    for_each_tick(
+        "failing_exchange_at_every_tick",
+        1..free.samples.len() - 1,
+        |tick| {
+            let wrap = format!("[{{kind = \"fail\", from_tick = {tick}}}]");
+            let ran = bench.run_with("", &[("faults.wrap", &wrap)]);
+            expect_fault(&bench, &ran, FaultKind::Driver, tick, tick)
+        },
+    );
 }
 
 /// A fault of that kind in that period; on the path up to `path_until`, within limits to the standstill, and faulted.
-fn expect_fault(bench: &Bench, ran: &Ran, kind: FaultKind, tick: usize, path_until: usize) -> Result<(), String> {
+fn expect_fault(
+    bench: &Bench,
+    ran: &Ran,
+    kind: FaultKind,
+    tick: usize,
+    path_until: usize,
+) -> Result<(), String> {
     let fault = ran.outcome.fault.ok_or("no fault")?;
     if (fault.kind, fault.tick) != (kind, tick as u64) {
         return Err(format!("{fault:?}"));
@@ -180,18 +214,29 @@ fn the_ring_runs_dry_wherever_the_rough_loop_can_be_late() {
     let free = bench.run("");
     let mut places = BTreeSet::new();
     let rough = 8;
-    for_each_tick("the_ring_runs_dry", (0..free.samples.len()).step_by(rough), |tick| {
-        let ran = bench.run(&format!("{tick},stall-rough,60"));
-        ran.expect_clean()?;
-        ran.expect_known_changes()?;
-        places.extend(starved_at(&ran));
-        if ran.ends() != free.ends() {
-            return Err("it ends elsewhere".to_string());
-        }
-        passed(&bench.judge(&ran, |_| ()))
-    });
-    println!("the ring ran dry at {} places of {} segments", places.len(), free.segments.len());
-    assert!(places.len() > 20 || std::env::var("TANDEM_TICK").is_ok(), "{places:?}");
+    for_each_tick(
+        "the_ring_runs_dry",
+        (0..free.samples.len()).step_by(rough),
+        |tick| {
+            let ran = bench.run(&format!("{tick},stall-rough,60"));
+            ran.expect_clean()?;
+            ran.expect_known_changes()?;
+            places.extend(starved_at(&ran));
+            if ran.ends() != free.ends() {
+                return Err("it ends elsewhere".to_string());
+            }
+            passed(&bench.judge(&ran, |_| ()))
+        },
+    );
+    println!(
+        "the ring ran dry at {} places of {} segments",
+        places.len(),
+        free.segments.len()
+    );
+    assert!(
+        places.len() > 20 || std::env::var("TANDEM_TICK").is_ok(),
+        "{places:?}"
+    );
 }
 
 /// The lines and path coordinates, µm, at which the machine stood because the queue was dry.
@@ -209,19 +254,30 @@ fn starved_at(ran: &Ran) -> BTreeSet<(u32, u64)> {
 /// cruises; one that brakes uses its queue up faster, and meets the end of it in motion.
 #[test]
 fn half_the_depth_of_the_ring_is_not_enough() {
-    let bench = Bench::text("G21 G90 G64\nF5000\nG1 X40\nG1 X0\nG1 X40\nG1 X0\nG1 X40\nG1 X0\nM2\n");
+    let bench =
+        Bench::text("G21 G90 G64\nF5000\nG1 X40\nG1 X0\nG1 X40\nG1 X0\nG1 X40\nG1 X0\nM2\n");
     let wrong = |planner: &str| {
         let mut counts = (0, 0);
         for tick in (20..3000).step_by(8) {
-            let ran = bench.run_with(&format!("{tick},stall-rough,60"), &[("planner.plugin", planner)]);
-            let ended = ran.expect_clean().and_then(|()| passed(&bench.judge(&ran, |_| ())));
+            let ran = bench.run_with(
+                &format!("{tick},stall-rough,60"),
+                &[("planner.plugin", planner)],
+            );
+            let ended = ran
+                .expect_clean()
+                .and_then(|()| passed(&bench.judge(&ran, |_| ())));
             let starved = usize::from(ran.outcome.summary.starvations > 0);
-            counts = (counts.0 + starved, counts.1 + starved * usize::from(ended.is_err()));
+            counts = (
+                counts.0 + starved,
+                counts.1 + starved * usize::from(ended.is_err()),
+            );
         }
         counts
     };
     let (right_depth, half_depth) = (wrong("watched"), wrong("boastful"));
-    println!("starved runs, and how many went wrong: right depth {right_depth:?}, half of it {half_depth:?}");
+    println!(
+        "starved runs, and how many went wrong: right depth {right_depth:?}, half of it {half_depth:?}"
+    );
     assert!(right_depth.0 > 100 && right_depth.1 == 0);
     assert!(half_depth.1 > 10);
 }

@@ -20,7 +20,10 @@ pub fn machine_of(program: &std::path::Path) -> std::path::PathBuf {
 fn every_example_runs_within_limits() {
     let programs = std::fs::read_dir(root().join("examples/programs")).unwrap();
     let mut count = 0;
-    for program in programs.map(|entry| entry.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "ngc")) {
+    for program in programs
+        .map(|entry| entry.unwrap().path())
+        .filter(|p| p.extension().is_some_and(|e| e == "ngc"))
+    {
         let done = Scenario::of(&program).on(&machine_of(&program)).run();
         done.assert_within_limits();
         assert_eq!(done.number("starvations"), 0.0);
@@ -31,8 +34,16 @@ fn every_example_runs_within_limits() {
 
 #[test]
 fn long_tests_of_the_path_run_within_limits() {
-    for name in ["circle-in-chords", "full-reversal", "arc-at-speed", "mixture"] {
-        let path = root().join("tests/fixtures/programs").join(name).with_extension("ngc");
+    for name in [
+        "circle-in-chords",
+        "full-reversal",
+        "arc-at-speed",
+        "mixture",
+    ] {
+        let path = root()
+            .join("tests/fixtures/programs")
+            .join(name)
+            .with_extension("ngc");
         Scenario::of(&path).run().assert_within_limits();
     }
 }
@@ -40,48 +51,94 @@ fn long_tests_of_the_path_run_within_limits() {
 #[test]
 fn rotary_axes_run_within_limits() {
     let program = root().join("tests/fixtures/programs/rotary.ngc");
-    Scenario::of(&program).on(&root().join("examples/machines/mill-4axis.toml")).run().assert_within_limits();
+    Scenario::of(&program)
+        .on(&root().join("examples/machines/mill-4axis.toml"))
+        .run()
+        .assert_within_limits();
 }
 
 #[test]
 fn the_published_path_takes_the_published_time() {
     let loop_machine = root().join("examples/machines/two-step-loop.toml");
-    for (name, time_s) in [("two-step-square.ngc", 1.871_080), ("two-step-arcs.ngc", 3.292_509)] {
+    for (name, time_s) in [
+        ("two-step-square.ngc", 1.871_080),
+        ("two-step-arcs.ngc", 3.292_509),
+    ] {
         let done = Scenario::of(&example(name)).on(&loop_machine).run();
         assert_eq!(done.status(), 0, "{}", done.errors());
         let taken_s = done.number("motion_time_s");
         // The last sample is the first one at rest, and the first one is at rest too.
-        assert!((time_s..time_s + 2.0 * 0.0005).contains(&taken_s), "{name}: {taken_s}");
+        assert!(
+            (time_s..time_s + 2.0 * 0.0005).contains(&taken_s),
+            "{name}: {taken_s}"
+        );
     }
 }
 
 #[test]
 fn the_published_junction_feeds_are_in_the_blocks_file() {
     let loop_machine = root().join("examples/machines/two-step-loop.toml");
-    let done = Scenario::of(&example("two-step-arcs.ngc")).on(&loop_machine).run();
+    let done = Scenario::of(&example("two-step-arcs.ngc"))
+        .on(&loop_machine)
+        .run();
     let mut reader = csv::Reader::from_path(done.file("blocks.csv")).unwrap();
-    let column = reader.headers().unwrap().iter().position(|h| h == "start_feed_mm_s").unwrap();
-    let feeds: Vec<f64> = reader.records().map(|r| r.unwrap()[column].parse::<f64>().unwrap() * 60.0).collect();
-    for (block, feed) in [(1, 100.0), (2, 100.0), (20, 3118.13), (50, 1143.43), (70, 554.26), (79, 100.0)] {
-        assert!((feeds[block] - feed).abs() < 0.005, "block {block}: {} instead of {feed}", feeds[block]);
+    let column = reader
+        .headers()
+        .unwrap()
+        .iter()
+        .position(|h| h == "start_feed_mm_s")
+        .unwrap();
+    let feeds: Vec<f64> = reader
+        .records()
+        .map(|r| r.unwrap()[column].parse::<f64>().unwrap() * 60.0)
+        .collect();
+    for (block, feed) in [
+        (1, 100.0),
+        (2, 100.0),
+        (20, 3118.13),
+        (50, 1143.43),
+        (70, 554.26),
+        (79, 100.0),
+    ] {
+        assert!(
+            (feeds[block] - feed).abs() < 0.005,
+            "block {block}: {} instead of {feed}",
+            feeds[block]
+        );
     }
 }
 
 #[test]
 fn the_forms_that_break_limits_do_not_start_under_the_guard() {
-    for set in [&["--set", "planner.options.junction=tangent"][..], &["--set", "planner.plugin=after-interpolation"]] {
+    for set in [
+        &["--set", "planner.options.junction=tangent"][..],
+        &["--set", "planner.plugin=after-interpolation"],
+    ] {
         let refused = Scenario::of(&example("square.ngc")).with(set).run();
         assert_eq!(refused.status(), 1);
-        assert!(refused.errors().contains("guard.mode = \"count\""), "{}", refused.errors());
+        assert!(
+            refused.errors().contains("guard.mode = \"count\""),
+            "{}",
+            refused.errors()
+        );
         assert!(!refused.file("trace.csv").exists());
-        let counted = Scenario::of(&example("square.ngc")).with(set).with(&["--set", "guard.mode=count"]).run();
+        let counted = Scenario::of(&example("square.ngc"))
+            .with(set)
+            .with(&["--set", "guard.mode=count"])
+            .run();
         assert_eq!(counted.status(), 0, "{}", counted.errors());
     }
 }
 
 #[test]
 fn a_jerk_limit_that_is_meant_refuses_a_planner_that_keeps_none() {
-    let refused = Scenario::of(&example("square.ngc")).with(&["--set", "motion.jerk=limit"]).run();
+    let refused = Scenario::of(&example("square.ngc"))
+        .with(&["--set", "motion.jerk=limit"])
+        .run();
     assert_eq!(refused.status(), 1);
-    assert!(refused.errors().contains("motion.jerk = \"report\""), "{}", refused.errors());
+    assert!(
+        refused.errors().contains("motion.jerk = \"report\""),
+        "{}",
+        refused.errors()
+    );
 }

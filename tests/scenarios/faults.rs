@@ -12,9 +12,15 @@ const PERIOD_S: f64 = 1e-3;
 /// A run of an example with the entries of `faults.wrap`, as inline tables, and further settings.
 fn faulty(program: &str, wrap: &str, settings: &[&str]) -> Done {
     let mut arguments = vec![String::from("--set"), format!("faults.wrap=[{wrap}]")];
-    arguments.extend(settings.iter().flat_map(|setting| ["--set".to_string(), (*setting).to_string()]));
+    arguments.extend(
+        settings
+            .iter()
+            .flat_map(|setting| ["--set".to_string(), (*setting).to_string()]),
+    );
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    Scenario::of(&root().join("examples/programs").join(program)).with(&arguments).run()
+    Scenario::of(&root().join("examples/programs").join(program))
+        .with(&arguments)
+        .run()
 }
 
 fn free(program: &str) -> Done {
@@ -23,14 +29,27 @@ fn free(program: &str) -> Done {
 
 /// The command columns as they stand in the trace, byte for byte.
 fn commands(done: &Done) -> Vec<Vec<String>> {
-    ["t_s", "line", "x_cmd_mm", "y_cmd_mm", "z_cmd_mm", "feed_mm_s"].map(|name| done.cells(name)).into()
+    [
+        "t_s",
+        "line",
+        "x_cmd_mm",
+        "y_cmd_mm",
+        "z_cmd_mm",
+        "feed_mm_s",
+    ]
+    .map(|name| done.cells(name))
+    .into()
 }
 
 /// The tick that the fault names.
 fn fault_tick(done: &Done) -> u64 {
     let errors = done.errors();
-    let tick = errors.split("tick ").nth(1).and_then(|rest| rest.split(',').next());
-    tick.and_then(|tick| tick.parse().ok()).unwrap_or_else(|| panic!("no tick in {errors}"))
+    let tick = errors
+        .split("tick ")
+        .nth(1)
+        .and_then(|rest| rest.split(',').next());
+    tick.and_then(|tick| tick.parse().ok())
+        .unwrap_or_else(|| panic!("no tick in {errors}"))
 }
 
 /// Exit status 3, the driver and `words` named, at rest in the state `fault`, limits kept to the standstill, and on the
@@ -38,7 +57,10 @@ fn fault_tick(done: &Done) -> u64 {
 fn assert_stopped(done: &Done, words: &str) -> u64 {
     let errors = done.errors();
     assert_eq!(done.status(), 3, "{errors}");
-    assert!(errors.contains("fault: driver sim: ") && errors.contains(words), "{words:?} is not in {errors}");
+    assert!(
+        errors.contains("fault: driver sim: ") && errors.contains(words),
+        "{words:?} is not in {errors}"
+    );
     let tick = fault_tick(done);
     let verdict = done.judge(|options| {
         options.ends_early = true;
@@ -46,18 +68,30 @@ fn assert_stopped(done: &Done, words: &str) -> u64 {
         options.path_until_s = Some(tick as f64 * PERIOD_S);
     });
     assert!(verdict.passed(), "fault at {tick}: {verdict}");
-    assert_eq!(done.cells("state").last().unwrap(), "fault", "fault at {tick}");
+    assert_eq!(
+        done.cells("state").last().unwrap(),
+        "fault",
+        "fault at {tick}"
+    );
     for name in ["x_cmd_mm", "y_cmd_mm", "z_cmd_mm"] {
         let command = done.column(name);
-        let [.., before, last] = command[..] else { continue };
-        assert!(before == last || command.len() <= 2, "fault at {tick}: {name} still moves");
+        let [.., before, last] = command[..] else {
+            continue;
+        };
+        assert!(
+            before == last || command.len() <= 2,
+            "fault at {tick}: {name} still moves"
+        );
     }
     tick
 }
 
 /// Ticks of a run of `samples` samples: the first and last ones, and every `step`-th between.
 fn ticks(samples: usize, step: usize) -> BTreeSet<usize> {
-    (1..4).chain((4..samples).step_by(step)).chain(samples - 3..samples).collect()
+    (1..4)
+        .chain((4..samples).step_by(step))
+        .chain(samples - 3..samples)
+        .collect()
 }
 
 #[test]
@@ -65,7 +99,11 @@ fn a_failing_exchange_stops_within_limits_at_whatever_tick() {
     for (program, step) in [("square.ngc", 23), ("serpentine.ngc", 131)] {
         let samples = free(program).column("t_s").len();
         for tick in ticks(samples, step) {
-            let done = faulty(program, &format!("{{kind = \"fail\", from_tick = {tick}}}"), &[]);
+            let done = faulty(
+                program,
+                &format!("{{kind = \"fail\", from_tick = {tick}}}"),
+                &[],
+            );
             assert_eq!(assert_stopped(&done, "the exchange failed"), tick as u64);
         }
     }
@@ -74,8 +112,16 @@ fn a_failing_exchange_stops_within_limits_at_whatever_tick() {
 #[test]
 fn every_nth_exchange_fails_and_the_first_failure_counts() {
     for (every, calls) in [(1, 1), (7, 7), (50, 50), (333, 333)] {
-        let done = faulty("square.ngc", &format!("{{kind = \"fail\", every = {every}}}"), &[]);
-        let at_call = faulty("square.ngc", &format!("{{kind = \"fail\", at_call = {calls}}}"), &[]);
+        let done = faulty(
+            "square.ngc",
+            &format!("{{kind = \"fail\", every = {every}}}"),
+            &[],
+        );
+        let at_call = faulty(
+            "square.ngc",
+            &format!("{{kind = \"fail\", at_call = {calls}}}"),
+            &[],
+        );
         assert!(assert_stopped(&done, "the exchange failed") < every);
         assert_eq!(commands(&done), commands(&at_call), "every {every}");
     }
@@ -97,8 +143,14 @@ fn the_check_of_a_fault_can_fail() {
         judge(&trace, &program, &machine, &options).passed()
     };
     assert!(passes(&|_| ()));
-    assert!(!passes(&|trace| trace.rows[400].command[0] += 1e-3), "off the path before the fault");
-    assert!(!passes(&|trace| trace.rows.last_mut().unwrap().command[0] += 0.1), "a jump after it");
+    assert!(
+        !passes(&|trace| trace.rows[400].command[0] += 1e-3),
+        "off the path before the fault"
+    );
+    assert!(
+        !passes(&|trace| trace.rows.last_mut().unwrap().command[0] += 0.1),
+        "a jump after it"
+    );
 }
 
 #[test]
@@ -106,7 +158,10 @@ fn what_is_lost_repeated_or_late_does_not_disturb_the_commands() {
     for program in ["square.ngc", "serpentine.ngc"] {
         let free = free(program);
         let expected = commands(&free);
-        assert!(free.cells("x_fb_mm") == free.cells("x_cmd_mm"), "ideal drives are where they are told to be");
+        assert!(
+            free.cells("x_fb_mm") == free.cells("x_cmd_mm"),
+            "ideal drives are where they are told to be"
+        );
         for fault in [
             "{kind = \"drop\", every = 50, periods = 5}",
             "{kind = \"drop\", probability = 0.02, from_tick = 100, until_tick = 900}",
@@ -119,7 +174,10 @@ fn what_is_lost_repeated_or_late_does_not_disturb_the_commands() {
             assert_eq!(done.status(), 0, "{fault}: {}", done.errors());
             done.assert_within_limits();
             assert!(commands(&done) == expected, "{program}, {fault}");
-            assert!(done.cells("x_fb_mm") != done.cells("x_cmd_mm"), "{fault} did nothing");
+            assert!(
+                done.cells("x_fb_mm") != done.cells("x_cmd_mm"),
+                "{fault} did nothing"
+            );
         }
     }
 }
@@ -128,11 +186,18 @@ fn what_is_lost_repeated_or_late_does_not_disturb_the_commands() {
 fn drives_that_hear_nothing_for_too_long_stop_by_themselves() {
     for (fault, first) in [
         ("{kind = \"drop\", from_tick = 300, until_tick = 306}", 306),
-        ("{kind = \"duplicate\", from_tick = 300, until_tick = 310}", 305),
+        (
+            "{kind = \"duplicate\", from_tick = 300, until_tick = 310}",
+            305,
+        ),
         ("{kind = \"delay\", periods = 6, from_tick = 300}", 305),
     ] {
         let done = faulty("square.ngc", fault, &[]);
-        assert_eq!(assert_stopped(&done, "axis X reports fault 1"), first, "{fault}");
+        assert_eq!(
+            assert_stopped(&done, "axis X reports fault 1"),
+            first,
+            "{fault}"
+        );
         let patient = faulty("square.ngc", fault, &["driver.options.watchdog_periods=20"]);
         assert_eq!(patient.status(), 0, "{fault}: {}", patient.errors());
     }
@@ -142,13 +207,23 @@ fn drives_that_hear_nothing_for_too_long_stop_by_themselves() {
 fn the_feedback_shows_the_ramp_of_drives_whose_host_is_silent() {
     // The drives get no new setpoint, the host still hears them, and takes no notice but for the fault itself.
     let settings = ["driver.options.quick_stop_deceleration_mm_per_s2=1000"];
-    let done = faulty("square.ngc", "{kind = \"duplicate\", from_tick = 200}", &settings);
+    let done = faulty(
+        "square.ngc",
+        "{kind = \"duplicate\", from_tick = 200}",
+        &settings,
+    );
     let tick = assert_stopped(&done, "reports fault 1") as usize;
     let x = done.column("x_fb_mm");
-    let speed: Vec<f64> = x.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_S).collect();
+    let speed: Vec<f64> = x
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / PERIOD_S)
+        .collect();
     for index in tick..x.len() - 2 {
         let slower = speed[index - 1] - speed[index];
-        assert!(speed[index] < 1.0 || (slower - 1.0).abs() < 1e-6, "period {index} slows by {slower} mm/s");
+        assert!(
+            speed[index] < 1.0 || (slower - 1.0).abs() < 1e-6,
+            "period {index} slows by {slower} mm/s"
+        );
     }
     assert!(speed[tick - 2] > 50.0, "it moved");
 }
@@ -157,7 +232,9 @@ fn the_feedback_shows_the_ramp_of_drives_whose_host_is_silent() {
 fn feedback_that_is_no_number_is_a_fault_of_the_driver() {
     for (value, joint, axis) in [("nan", 0, 'X'), ("inf", 2, 'Z')] {
         for tick in [1, 250, 700] {
-            let wrap = format!("{{kind = \"corrupt\", value = \"{value}\", joint = {joint}, from_tick = {tick}}}");
+            let wrap = format!(
+                "{{kind = \"corrupt\", value = \"{value}\", joint = {joint}, from_tick = {tick}}}"
+            );
             let done = faulty("square.ngc", &wrap, &[]);
             let words = format!("the feedback of axis {axis} is not a finite number");
             assert_eq!(assert_stopped(&done, &words), tick);
@@ -206,7 +283,11 @@ fn nonsense_in_a_machine_file_is_refused_at_its_place() {
         done.errors()
     };
     for (faults, line, words) in [
-        ("sed = 7\n", 3, "1: faults.sed: unknown key `sed`; did you mean `seed`?"),
+        (
+            "sed = 7\n",
+            3,
+            "1: faults.sed: unknown key `sed`; did you mean `seed`?",
+        ),
         (
             "[[faults.wrap]]\nkind = \"frieze\"\n",
             4,
@@ -235,5 +316,7 @@ fn nonsense_in_a_machine_file_is_refused_at_its_place() {
 }
 
 fn run_on(machine: &Path) -> Done {
-    Scenario::of(&root().join("examples/programs/square.ngc")).on(machine).run()
+    Scenario::of(&root().join("examples/programs/square.ngc"))
+        .on(machine)
+        .run()
 }

@@ -8,16 +8,22 @@ use crate::replay::for_each_seed;
 
 /// The machine with a specimen: its identified friction and inertia are in the file.
 fn machine(specimen: &str) -> PathBuf {
-    root().join("examples/machines").join(format!("force-{specimen}.toml"))
+    root()
+        .join("examples/machines")
+        .join(format!("force-{specimen}.toml"))
 }
 
 fn scenario(specimen: &str, settings: &[&str]) -> Scenario {
-    let program = root().join("examples/programs").join(format!("force-{specimen}.ngc"));
+    let program = root()
+        .join("examples/programs")
+        .join(format!("force-{specimen}.ngc"));
     with(Scenario::of(&program).on(&machine(specimen)), settings)
 }
 
 fn with(scenario: Scenario, settings: &[&str]) -> Scenario {
-    settings.iter().fold(scenario, |scenario, setting| scenario.with(&["--set", setting]))
+    settings.iter().fold(scenario, |scenario, setting| {
+        scenario.with(&["--set", setting])
+    })
 }
 
 /// What a run did between two places.
@@ -33,10 +39,18 @@ struct Cut {
 
 fn cut(done: &Done, [from, to]: [f64; 2]) -> Cut {
     let (places, feeds) = (done.column("x_fb_mm"), done.column("feed_mm_s"));
-    let (truth, estimate) = (done.column("sig_true_torque_nm"), done.column("sig_torque_nm"));
-    let rows: Vec<usize> = (0..places.len()).filter(|i| (from..=to).contains(&places[*i])).collect();
-    let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|i| of(*i)).sum::<f64>() / rows.len() as f64;
-    let feed = |pick: fn(f64, f64) -> f64, start: f64| rows.iter().map(|i| feeds[*i] * 60.0).fold(start, pick);
+    let (truth, estimate) = (
+        done.column("sig_true_torque_nm"),
+        done.column("sig_torque_nm"),
+    );
+    let rows: Vec<usize> = (0..places.len())
+        .filter(|i| (from..=to).contains(&places[*i]))
+        .collect();
+    let mean =
+        |of: &dyn Fn(usize) -> f64| rows.iter().map(|i| of(*i)).sum::<f64>() / rows.len() as f64;
+    let feed = |pick: fn(f64, f64) -> f64, start: f64| {
+        rows.iter().map(|i| feeds[*i] * 60.0).fold(start, pick)
+    };
     Cut {
         total_s: places.len() as f64 * 1e-3,
         in_window_s: rows.len() as f64 * 1e-3,
@@ -51,7 +65,13 @@ fn cut(done: &Done, [from, to]: [f64; 2]) -> Cut {
 /// Within limits, at ratios up to 2.
 fn assert_within_limits(done: &Done) {
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in ["limit_violations", "guard_stops", "governed_samples", "starvations", "late_ratios"] {
+    for count in [
+        "limit_violations",
+        "guard_stops",
+        "governed_samples",
+        "starvations",
+        "late_ratios",
+    ] {
         assert_eq!(done.number(count), 0.0, "{count}");
     }
     let verdict = done.judge(|options| {
@@ -87,8 +107,15 @@ fn the_reference_is_held_on_both_specimens() {
             cut.peak_nm,
             1e3 * cut.estimate_rms_nm
         );
-        assert!((cut.total_s / total_s - 1.0).abs() < 0.02 && (cut.in_window_s / cut_s - 1.0).abs() < 0.02);
-        assert!(1.0 - cut.in_window_s / safe_s > saving, "{specimen} {law}: {} s", cut.in_window_s);
+        assert!(
+            (cut.total_s / total_s - 1.0).abs() < 0.02
+                && (cut.in_window_s / cut_s - 1.0).abs() < 0.02
+        );
+        assert!(
+            1.0 - cut.in_window_s / safe_s > saving,
+            "{specimen} {law}: {} s",
+            cut.in_window_s
+        );
         assert!(cut.rms_error_nm <= 6e-3 && cut.estimate_rms_nm <= 2e-3 && cut.peak_nm < 0.13);
         assert!(cut.feeds_mm_per_min.0 > 10.0 && cut.feeds_mm_per_min.1 < 300.0);
     }
@@ -97,18 +124,36 @@ fn the_reference_is_held_on_both_specimens() {
 #[test]
 fn the_safe_feed_and_the_published_law_are_what_they_are_compared_with() {
     let constant = |feed: &str| {
-        let keys = ["min_feed_mm_per_min", "max_feed_mm_per_min", "air_feed_mm_per_min", "entry_feed_mm_per_min"];
+        let keys = [
+            "min_feed_mm_per_min",
+            "max_feed_mm_per_min",
+            "air_feed_mm_per_min",
+            "entry_feed_mm_per_min",
+        ];
         let settings = keys.map(|key| format!("feed_strategy.options.{key}={feed}"));
         settings.to_vec()
     };
-    for (specimen, window, feed, cut_s) in [("step", STEP, "112.5", 17.065), ("roof", ROOF, "100.0", 21.599)] {
+    for (specimen, window, feed, cut_s) in [
+        ("step", STEP, "112.5", 17.065),
+        ("roof", ROOF, "100.0", 21.599),
+    ] {
         let settings = constant(feed);
-        let done = scenario(specimen, &settings.iter().map(String::as_str).collect::<Vec<_>>()).run();
+        let done = scenario(
+            specimen,
+            &settings.iter().map(String::as_str).collect::<Vec<_>>(),
+        )
+        .run();
         assert_within_limits(&done);
         let cut = cut(&done, window);
-        assert!((cut.in_window_s / cut_s - 1.0).abs() < 2e-3 && (cut.peak_nm - 0.1).abs() < 4e-3, "{specimen}");
+        assert!(
+            (cut.in_window_s / cut_s - 1.0).abs() < 2e-3 && (cut.peak_nm - 0.1).abs() < 4e-3,
+            "{specimen}"
+        );
     }
-    let proportional = cut(&scenario("roof", &["feed_strategy.options.law=p"]).run(), ROOF);
+    let proportional = cut(
+        &scenario("roof", &["feed_strategy.options.law=p"]).run(),
+        ROOF,
+    );
     assert!(
         (proportional.peak_nm - 0.12).abs() < 5e-3,
         "20 % above the reference at the ridge: {}",
@@ -123,14 +168,25 @@ fn without_friction_compensation_the_laws_fail() {
         let law = format!("feed_strategy.options.law={law}");
         let neglected = "feed_strategy.options.axes.x.friction={}";
         let cut = cut(&scenario("step", &[&law, neglected]).run(), STEP);
-        println!("{law}, friction neglected: {:.3} s, mean {:.4} N·m", cut.total_s, cut.mean_nm);
-        assert!(cut.mean_nm < 0.05 && cut.total_s > 30.0 && cut.rms_error_nm > 0.05, "{law}");
+        println!(
+            "{law}, friction neglected: {:.3} s, mean {:.4} N·m",
+            cut.total_s, cut.mean_nm
+        );
+        assert!(
+            cut.mean_nm < 0.05 && cut.total_s > 30.0 && cut.rms_error_nm > 0.05,
+            "{law}"
+        );
     }
 }
 
 #[test]
 fn delay_noise_and_wrong_inertia_leave_the_loop_stable() {
-    let inertia = |share: f64| format!("feed_strategy.options.axes.x.inertia_kg_m2={}", 1.842e-4 * share);
+    let inertia = |share: f64| {
+        format!(
+            "feed_strategy.options.axes.x.inertia_kg_m2={}",
+            1.842e-4 * share
+        )
+    };
     let (low, high) = (inertia(0.8), inertia(1.2));
     let noise = "driver.options.seed=77";
     let delay = "faults={ seed = 1, wrap = [{ kind = \"delay\", periods = 4, from_tick = 1, until_tick = 1000000 }] }";
@@ -150,8 +206,15 @@ fn delay_noise_and_wrong_inertia_leave_the_loop_stable() {
             let done = scenario("step", &settings).run();
             assert_eq!(done.status(), 0, "{what}: {}", done.errors());
             let cut = cut(&done, STEP);
-            println!("{what}, {law}: rms error {:.2} mN·m, peak {:.4} N·m", 1e3 * cut.rms_error_nm, cut.peak_nm);
-            assert!(cut.rms_error_nm < most_nm && cut.peak_nm < 0.14, "{what} {law}");
+            println!(
+                "{what}, {law}: rms error {:.2} mN·m, peak {:.4} N·m",
+                1e3 * cut.rms_error_nm,
+                cut.peak_nm
+            );
+            assert!(
+                cut.rms_error_nm < most_nm && cut.peak_nm < 0.14,
+                "{what} {law}"
+            );
         }
     }
 }
@@ -174,7 +237,8 @@ const GUARD_S: f64 = (8.0 + 12.0 + 16.0 + 50.0 + 34.0) * 1e-3;
 fn random_specimens_keep_torque_feed_and_limits() {
     for_each_seed("random_specimens_keep_torque_feed_and_limits", 4, |seed| {
         for (law, radius) in [("pi", 5.0), ("ratio", 5.0), ("pi", 0.0)] {
-            random_specimen(seed, law, radius).map_err(|cause| format!("{law}, radius {radius}: {cause}"))?;
+            random_specimen(seed, law, radius)
+                .map_err(|cause| format!("{law}, radius {radius}: {cause}"))?;
         }
         Ok(())
     });
@@ -187,7 +251,8 @@ fn random_specimen(seed: u64, law: &str, radius: f64) -> Result<(), String> {
         format!("driver.options.cutting.workpiece.entry_radius_mm={radius:?}"),
         format!("feed_strategy.options.law={law}"),
     ];
-    let program = Scenario::text("G21 G90\nS900 M3\nG1 X60 F150\nG1 Y15\nG1 X0\nM5\nM2\n").on(&machine("random"));
+    let program = Scenario::text("G21 G90\nS900 M3\nG1 X60 F150\nG1 Y15\nG1 X0\nM5\nM2\n")
+        .on(&machine("random"));
     let done = with(program, &settings.each_ref().map(String::as_str)).run();
     let held = done.errors().contains("asks for a hold");
     let verdict = done.judge(|options| {
@@ -196,7 +261,11 @@ fn random_specimen(seed: u64, law: &str, radius: f64) -> Result<(), String> {
     });
     let above_s = above_guard_s(&done);
     let fastest = done.column("feed_mm_s").into_iter().fold(0.0, f64::max) * 60.0;
-    let slowest = done.column("sig_asked_feed_mm_per_min").into_iter().skip(16).fold(f64::MAX, f64::min);
+    let slowest = done
+        .column("sig_asked_feed_mm_per_min")
+        .into_iter()
+        .skip(16)
+        .fold(f64::MAX, f64::min);
     println!(
         "seed {seed}, {law}, radius {radius} mm: held {held}, above the guard's level {above_s} s, \
          {slowest:.1} to {fastest:.1} mm/min"
@@ -205,11 +274,23 @@ fn random_specimen(seed: u64, law: &str, radius: f64) -> Result<(), String> {
         (verdict.passed(), verdict.to_string()),
         (done.status() == if held { 3 } else { 0 }, done.errors()),
         (!held || radius == 0.0, "held by the guard".to_string()),
-        (above_s <= GUARD_S, format!("{above_s} s above the guard's level")),
-        (fastest <= 300.001 && slowest >= 9.999, format!("feeds {slowest} to {fastest} mm/min")),
-        (done.number("limit_violations") + done.number("governed_samples") == 0.0, "limits".to_string()),
+        (
+            above_s <= GUARD_S,
+            format!("{above_s} s above the guard's level"),
+        ),
+        (
+            fastest <= 300.001 && slowest >= 9.999,
+            format!("feeds {slowest} to {fastest} mm/min"),
+        ),
+        (
+            done.number("limit_violations") + done.number("governed_samples") == 0.0,
+            "limits".to_string(),
+        ),
     ];
-    checks.into_iter().find(|(passed, _)| !passed).map_or(Ok(()), |(_, cause)| Err(cause))
+    checks
+        .into_iter()
+        .find(|(passed, _)| !passed)
+        .map_or(Ok(()), |(_, cause)| Err(cause))
 }
 
 /// A jump from 1 to 7 mm that no round tool would meet.
@@ -223,11 +304,19 @@ fn the_guard_holds_on_the_path_says_so_and_the_operator_goes_on() {
     assert_eq!(done.status(), 0, "{}", done.errors());
     let errors = done.errors();
     assert!(
-        errors.contains("line 4: the feed strategy force-control asks for a hold") && errors.contains("torque_nm = "),
+        errors.contains("line 4: the feed strategy force-control asks for a hold")
+            && errors.contains("torque_nm = "),
         "{errors}"
     );
     let stops = done.summary()["stops"].clone();
-    assert_eq!((&stops[0]["cause"], errors.matches("asks for a hold").count()), (&"hold".into(), 1), "{errors}");
+    assert_eq!(
+        (
+            &stops[0]["cause"],
+            errors.matches("asks for a hold").count()
+        ),
+        (&"hold".into(), 1),
+        "{errors}"
+    );
     let above_s = above_guard_s(&done);
     println!("above the guard's level {above_s} s, stops {stops}");
     assert!(above_s <= GUARD_S, "{above_s} s");
@@ -240,7 +329,9 @@ fn a_lower_air_feed_keeps_the_torque_of_an_entry_low() {
         let air = format!("feed_strategy.options.air_feed_mm_per_min={air}");
         let wall = "driver.options.cutting.workpiece.steps=[[8, 4], [40, 0]]";
         let done = scenario("step", &[wall, SHARP, &air]).run();
-        done.column("sig_true_torque_nm").into_iter().fold(0.0, f64::max)
+        done.column("sig_true_torque_nm")
+            .into_iter()
+            .fold(0.0, f64::max)
     };
     let (fast, slow) = (peak("300"), peak("100"));
     println!("entered at 300 mm/min {fast:.3} N·m, at 100 mm/min {slow:.3} N·m");
@@ -251,12 +342,19 @@ fn a_lower_air_feed_keeps_the_torque_of_an_entry_low() {
 fn a_diagonal_cut_over_xy_counts_as_one_torque() {
     let xy = "driver.options.cutting.workpiece={ over = \"xy\", origin_mm = [4, 3], direction_deg = 36.869897645844, steps = \
               [[8, 2], [18, 3], [34, 0]], entry_radius_mm = 5 }";
-    let program = Scenario::text("G21 G90\nS900 M3\nG1 X36 Y27 F150\nM5\nM2\n").on(&machine("demo"));
+    let program =
+        Scenario::text("G21 G90\nS900 M3\nG1 X36 Y27 F150\nM5\nM2\n").on(&machine("demo"));
     let done = with(program, &[xy]).run();
     assert_within_limits(&done);
     let cut = cut(&done, [12.0, 26.0]);
-    println!("rms error {:.2} mN·m, estimate {:.2} mN·m rms", 1e3 * cut.rms_error_nm, 1e3 * cut.estimate_rms_nm);
-    assert!(cut.rms_error_nm < 7e-3 && cut.estimate_rms_nm < 2e-3 && (cut.mean_nm - 0.1).abs() < 2e-3);
+    println!(
+        "rms error {:.2} mN·m, estimate {:.2} mN·m rms",
+        1e3 * cut.rms_error_nm,
+        1e3 * cut.estimate_rms_nm
+    );
+    assert!(
+        cut.rms_error_nm < 7e-3 && cut.estimate_rms_nm < 2e-3 && (cut.mean_nm - 0.1).abs() < 2e-3
+    );
 }
 
 #[test]
@@ -268,7 +366,10 @@ fn tooth_ripple_does_not_reach_the_feed() {
         feeds
     };
     // Over 8 ms alone the published loop swings from 78 to 261 mm/min. 40 teeth: their period is below a rough one.
-    let (whole, rough) = (rates(&[ripple]), rates(&[ripple, "feed_strategy.options.teeth=40"]));
+    let (whole, rough) = (
+        rates(&[ripple]),
+        rates(&[ripple, "feed_strategy.options.teeth=40"]),
+    );
     assert!(whole.0 > 110.0 && whole.1 < 230.0 && rough.0 < 80.0);
 }
 
@@ -278,13 +379,28 @@ fn a_feed_programmed_above_the_bound_is_not_driven_and_a_hold_is_asked_for_once(
     let text = "G21 G90\nS900 M3\nG1 X20 F600\nG0 Y10\nG1 X0\nM5\nM2\n";
     let done = Scenario::text(text).on(&machine("step")).run();
     let errors = done.errors();
-    assert_eq!((done.status(), errors.matches("asks for a hold").count()), (3, 1), "{errors}");
+    assert_eq!(
+        (done.status(), errors.matches("asks for a hold").count()),
+        (3, 1),
+        "{errors}"
+    );
     let (lines, feeds) = (done.column("line"), done.column("feed_mm_s"));
     // The first ratio acts in the third rough period.
-    let cutting = feeds.iter().zip(lines).skip(24).filter(|(_, line)| *line == 3.0).map(|(feed, _)| feed * 60.0);
+    let cutting = feeds
+        .iter()
+        .zip(lines)
+        .skip(24)
+        .filter(|(_, line)| *line == 3.0)
+        .map(|(feed, _)| feed * 60.0);
     let (fastest, most) = (cutting.fold(0.0, f64::max), 300.001);
-    let asked = done.column("sig_asked_feed_mm_per_min").into_iter().fold(0.0, f64::max);
-    assert!(fastest > 250.0 && fastest <= most && asked <= most, "{fastest} driven, {asked} asked");
+    let asked = done
+        .column("sig_asked_feed_mm_per_min")
+        .into_iter()
+        .fold(0.0, f64::max);
+    assert!(
+        fastest > 250.0 && fastest <= most && asked <= most,
+        "{fastest} driven, {asked} asked"
+    );
 }
 
 #[test]
@@ -292,7 +408,8 @@ fn where_joints_are_not_the_axes_nobody_guesses_whose_current_it_is() {
     for name in ["corexy", "gantry"] {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mine.toml");
-        let [its, x] = [format!("{name}.toml"), "force-demo-x.toml".into()].map(|n| machine("step").with_file_name(n));
+        let [its, x] = [format!("{name}.toml"), "force-demo-x.toml".into()]
+            .map(|n| machine("step").with_file_name(n));
         let text = format!(
             "format = 1\ninclude = [{its:?}, {x:?}]\n[feed_strategy]\nplugin = \"force-control\"\n\
              [feed_strategy.options.axes.x]\nlead_mm = 20\ntorque_constant_nm_per_a = 0.378\n"
@@ -300,15 +417,24 @@ fn where_joints_are_not_the_axes_nobody_guesses_whose_current_it_is() {
         std::fs::write(&path, text).unwrap();
         let done = Scenario::text("G21 G90\nG1 X1 F150\nM2\n").on(&path).run();
         let errors = done.errors();
-        assert!(done.status() == 1 && errors.contains("mine.toml:4:1: feed_strategy.plugin"), "{name}: {errors}");
-        assert!(errors.contains("each axis has one motor of its own"), "{name}: {errors}");
+        assert!(
+            done.status() == 1 && errors.contains("mine.toml:4:1: feed_strategy.plugin"),
+            "{name}: {errors}"
+        );
+        assert!(
+            errors.contains("each axis has one motor of its own"),
+            "{name}: {errors}"
+        );
         let output = std::process::Command::new(env!("CARGO_BIN_EXE_tandem"))
             .args(["identify", "--axis", "x", "--machine"])
             .arg(&path)
             .output()
             .unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(!output.status.success() && errors.contains("one motor of its own"), "{name}: {errors}");
+        assert!(
+            !output.status.success() && errors.contains("one motor of its own"),
+            "{name}: {errors}"
+        );
     }
 }
 
@@ -324,28 +450,65 @@ fn refused(settings: &[&str], words: &[&str]) {
 #[test]
 fn options_that_make_no_sense_are_refused_where_they_stand() {
     let strategy = |text: &str| format!("feed_strategy.options.{text}");
-    refused(&[&strategy("gain_mm_per_min_per_nm=9000")], &["stability", "stable up to", "force-demo.toml"]);
-    refused(&[&strategy("reference_torque_nm=-1")], &["reference_torque_nm", "-1"]);
-    refused(&[&strategy("axes.x.inertia_kg_m2=nan")], &["axes.x.inertia_kg_m2"]);
-    refused(&[&strategy("axes.w={ lead_mm = 5, torque_constant_nm_per_a = 1 }")], &["no such axis"]);
-    refused(&[&strategy("axes.z={ lead_mm = 5, torque_constant_nm_per_a = 1 }")], &["tandem identify --axis z"]);
-    refused(&[&strategy("axes.x.confidence={ inertia_percent = 30 }")], &["axes.x.confidence", "must be 0 to 20"]);
-    refused(&["driver.analog=[\"torque_nm\"]"], &["driver.analog", "torque_nm"]);
-    refused(&["driver.options.cutting.workpiece.slopes=[[0, 1]]"], &["steps, slopes or random"]);
+    refused(
+        &[&strategy("gain_mm_per_min_per_nm=9000")],
+        &["stability", "stable up to", "force-demo.toml"],
+    );
+    refused(
+        &[&strategy("reference_torque_nm=-1")],
+        &["reference_torque_nm", "-1"],
+    );
+    refused(
+        &[&strategy("axes.x.inertia_kg_m2=nan")],
+        &["axes.x.inertia_kg_m2"],
+    );
+    refused(
+        &[&strategy(
+            "axes.w={ lead_mm = 5, torque_constant_nm_per_a = 1 }",
+        )],
+        &["no such axis"],
+    );
+    refused(
+        &[&strategy(
+            "axes.z={ lead_mm = 5, torque_constant_nm_per_a = 1 }",
+        )],
+        &["tandem identify --axis z"],
+    );
+    refused(
+        &[&strategy("axes.x.confidence={ inertia_percent = 30 }")],
+        &["axes.x.confidence", "must be 0 to 20"],
+    );
+    refused(
+        &["driver.analog=[\"torque_nm\"]"],
+        &["driver.analog", "torque_nm"],
+    );
+    refused(
+        &["driver.options.cutting.workpiece.slopes=[[0, 1]]"],
+        &["steps, slopes or random"],
+    );
     refused(&["driver.options.model=ideal"], &["model = \"servo\""]);
     // In a file: its name, the line and the key.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
-    let mut text = format!("format = 1\ninclude = [{:?}]\n", machine("step").display().to_string());
+    let mut text = format!(
+        "format = 1\ninclude = [{:?}]\n",
+        machine("step").display().to_string()
+    );
     text.push_str("[feed_strategy.options]\nreference_nm = 0.2\n");
     std::fs::write(&path, &text).unwrap();
     let errors = scenario("step", &[]).on(&path).run().errors();
-    assert!(errors.contains("mine.toml:4:") && errors.contains("reference_nm"), "{errors}");
+    assert!(
+        errors.contains("mine.toml:4:") && errors.contains("reference_nm"),
+        "{errors}"
+    );
     let mut text = text.replace("reference_nm = 0.2", "guard_samples = 0");
     writeln!(text, "[[driver.options.servo]]\nlead_mm = 0").unwrap();
     std::fs::write(&path, &text).unwrap();
     let errors = scenario("step", &[]).on(&path).run().errors();
-    assert!(errors.contains("mine.toml:6:") && errors.contains("servo[0].lead_mm"), "{errors}");
+    assert!(
+        errors.contains("mine.toml:6:") && errors.contains("servo[0].lead_mm"),
+        "{errors}"
+    );
 }
 
 /// What `tandem identify` writes for axis X.
@@ -358,18 +521,28 @@ fn identified(servo: &str) -> toml::Table {
         .args(["--out".as_ref(), path.as_os_str()])
         .output()
         .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let text = std::fs::read_to_string(&path).unwrap();
     println!("{text}");
     let table: toml::Table = text.parse().unwrap();
-    table["feed_strategy"]["options"]["axes"]["x"].as_table().unwrap().clone()
+    table["feed_strategy"]["options"]["axes"]["x"]
+        .as_table()
+        .unwrap()
+        .clone()
 }
 
 #[test]
 fn an_axis_is_identified_with_its_friction_and_cuts_with_it() {
-    for (coulomb_nm, viscous, stribeck_nm, constant_nm) in
-        [(0.0, 0.0, 0.0, 0.0), (0.01, 5e-5, 0.0, 0.0), (0.06, 6e-4, 0.0, -0.05), (0.06, 6e-4, 0.02, 0.0)]
-    {
+    for (coulomb_nm, viscous, stribeck_nm, constant_nm) in [
+        (0.0, 0.0, 0.0, 0.0),
+        (0.01, 5e-5, 0.0, 0.0),
+        (0.06, 6e-4, 0.0, -0.05),
+        (0.06, 6e-4, 0.02, 0.0),
+    ] {
         let servo = format!(
             "driver.options.servo=[{{ encoder_counts = 8192, current_noise_ma = 5, friction = {{ coulomb_nm = {coulomb_nm:?}, \
              viscous_nm_s_per_rad = {viscous:?}, stribeck_nm = {stribeck_nm:?}, constant_nm = {constant_nm:?} }} }}]"
@@ -379,15 +552,27 @@ fn an_axis_is_identified_with_its_friction_and_cuts_with_it() {
         let error = axis["inertia_kg_m2"].as_float().unwrap() / 1.842e-4 - 1.0;
         assert!(error.abs() < 5e-3, "inertia off by {error}");
         assert!((number("friction", "viscous_nm_s_per_rad") - viscous).abs() < 5e-5);
-        assert!((number("friction", "constant_nm") - constant_nm).abs() < 5e-4, "weight");
+        assert!(
+            (number("friction", "constant_nm") - constant_nm).abs() < 5e-4,
+            "weight"
+        );
         let at_rest = number("friction", "coulomb_nm") + number("friction", "stribeck_nm");
-        assert!((at_rest - coulomb_nm - stribeck_nm).abs() < 2e-3, "{at_rest}");
-        assert!(number("confidence", "inertia_percent") < 5.0 && number("confidence", "friction_rms_nm") < 1e-3);
+        assert!(
+            (at_rest - coulomb_nm - stribeck_nm).abs() < 2e-3,
+            "{at_rest}"
+        );
+        assert!(
+            number("confidence", "inertia_percent") < 5.0
+                && number("confidence", "friction_rms_nm") < 1e-3
+        );
         axis.insert("lead_mm".into(), 20.into());
         axis.insert("torque_constant_nm_per_a".into(), 0.378.into());
         let values = format!("feed_strategy.options.axes.x={}", toml::Value::Table(axis));
         let cut = cut(&scenario("step", &[&servo, &values]).run(), STEP);
         println!("estimate {:.2} mN·m rms", 1e3 * cut.estimate_rms_nm);
-        assert!(cut.estimate_rms_nm < 2e-3 && cut.rms_error_nm < 6e-3, "a cut with what was identified");
+        assert!(
+            cut.estimate_rms_nm < 2e-3 && cut.rms_error_nm < 6e-3,
+            "a cut with what was identified"
+        );
     }
 }

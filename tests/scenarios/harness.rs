@@ -13,7 +13,10 @@ use tempfile::TempDir;
 
 /// The folder of the workspace.
 pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .canonicalize()
+        .unwrap()
 }
 
 /// The machine that every example runs on.
@@ -66,7 +69,8 @@ impl Scenario {
 
     /// With further arguments.
     pub fn with(mut self, arguments: &[&str]) -> Self {
-        self.arguments.extend(arguments.iter().map(|a| (*a).to_string()));
+        self.arguments
+            .extend(arguments.iter().map(|a| (*a).to_string()));
         self
     }
 
@@ -86,7 +90,12 @@ impl Scenario {
 
     /// With the file of what is switched.
     pub fn events(self) -> Self {
-        let path = self.folder.path().join("events.csv").to_string_lossy().into_owned();
+        let path = self
+            .folder
+            .path()
+            .join("events.csv")
+            .to_string_lossy()
+            .into_owned();
         self.with(&["--events", &path])
     }
 
@@ -109,14 +118,28 @@ impl Scenario {
             .spawn()
             .and_then(wait)
             .unwrap();
-        Done { output, folder: self.folder, program: self.program, machine: self.machine }
+        Done {
+            output,
+            folder: self.folder,
+            program: self.program,
+            machine: self.machine,
+        }
     }
 
     /// Keeps the case for the comparison of two builds, where one is asked for.
     fn record(&self) {
-        let arguments =
-            [OsStr::new("run"), self.program.as_os_str(), OsStr::new("--machine"), self.machine.as_os_str()];
-        record_case(arguments.into_iter().chain(self.arguments.iter().map(OsStr::new)), self.input);
+        let arguments = [
+            OsStr::new("run"),
+            self.program.as_os_str(),
+            OsStr::new("--machine"),
+            self.machine.as_os_str(),
+        ];
+        record_case(
+            arguments
+                .into_iter()
+                .chain(self.arguments.iter().map(OsStr::new)),
+            self.input,
+        );
     }
 }
 
@@ -146,7 +169,10 @@ const PATIENCE: u32 = 30_000;
 impl Done {
     /// Exit status.
     pub fn status(&self) -> i32 {
-        self.output.status.code().expect("the run was ended: it went on for minutes")
+        self.output
+            .status
+            .code()
+            .expect("the run was ended: it went on for minutes")
     }
 
     /// What was printed to standard error.
@@ -162,7 +188,8 @@ impl Done {
     /// The summary.
     pub fn summary(&self) -> Value {
         let text = std::fs::read_to_string(self.file("summary.json"));
-        serde_json::from_str(&text.unwrap_or_else(|_| panic!("no summary: {}", self.errors()))).unwrap()
+        serde_json::from_str(&text.unwrap_or_else(|_| panic!("no summary: {}", self.errors())))
+            .unwrap()
     }
 
     /// A number of the summary.
@@ -172,26 +199,48 @@ impl Done {
 
     /// A column of the trace.
     pub fn column(&self, name: &str) -> Vec<f64> {
-        self.cells(name).iter().map(|cell| cell.parse().unwrap()).collect()
+        self.cells(name)
+            .iter()
+            .map(|cell| cell.parse().unwrap())
+            .collect()
     }
 
     /// A column of the trace as text.
     pub fn cells(&self, name: &str) -> Vec<String> {
         let mut reader = csv::Reader::from_path(self.file("trace.csv")).unwrap();
-        let index = reader.headers().unwrap().iter().position(|h| h == name).unwrap();
-        reader.records().map(|row| row.unwrap()[index].to_string()).collect()
+        let index = reader
+            .headers()
+            .unwrap()
+            .iter()
+            .position(|h| h == name)
+            .unwrap();
+        reader
+            .records()
+            .map(|row| row.unwrap()[index].to_string())
+            .collect()
     }
 
     /// The oracle's verdict with the machine's own options, changed by `adjust`.
     pub fn judge(&self, adjust: impl FnOnce(&mut Options)) -> Verdict {
-        judge_trace(&self.file("trace.csv"), &self.program, &self.machine, adjust)
+        judge_trace(
+            &self.file("trace.csv"),
+            &self.program,
+            &self.machine,
+            adjust,
+        )
     }
 
     /// *Within limits* as the design defines it: exit 0, all blocks, end reached, nothing stopped or governed, and the
     /// oracle passes. The path is exact: samples on it, corners cut by no more than a chord between two samples.
     pub fn assert_within_limits(&self) -> Verdict {
         assert_eq!(self.status(), 0, "{}", self.errors());
-        for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples", "lost_samples"] {
+        for count in [
+            "limit_violations",
+            "guard_stops",
+            "governed_samples",
+            "jerk_relaxed_samples",
+            "lost_samples",
+        ] {
             assert_eq!(self.number(count), 0.0, "{count}");
         }
         let chord_mm = self.fastest_mm_per_s() * self.number("fine_period_s") / 2.0;
@@ -206,7 +255,13 @@ impl Done {
     /// The same of a planner that rounds corners within the tolerance in force and lets two blocks overlap.
     pub fn assert_within_tolerance(&self) -> Verdict {
         assert_eq!(self.status(), 0, "{}", self.errors());
-        for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples", "lost_samples"] {
+        for count in [
+            "limit_violations",
+            "guard_stops",
+            "governed_samples",
+            "jerk_relaxed_samples",
+            "lost_samples",
+        ] {
             assert_eq!(self.number(count), 0.0, "{count}");
         }
         let verdict = self.judge(overlapping);
@@ -221,15 +276,28 @@ impl Done {
 
 /// For a planner of continuous velocity with overlaps of at most 0.2 s, whatever planner the machine file names.
 pub fn overlapping(options: &mut Options) {
-    (options.speed_difference_mm_per_s, options.speed_difference_deg_per_s) = (Some(0.0), Some(0.0));
+    (
+        options.speed_difference_mm_per_s,
+        options.speed_difference_deg_per_s,
+    ) = (Some(0.0), Some(0.0));
     options.feed_window_s = Some(0.2);
 }
 
 /// The oracle's verdict on a trace file.
-pub fn judge_trace(trace: &Path, program: &Path, machine: &Path, adjust: impl FnOnce(&mut Options)) -> Verdict {
+pub fn judge_trace(
+    trace: &Path,
+    program: &Path,
+    machine: &Path,
+    adjust: impl FnOnce(&mut Options),
+) -> Verdict {
     let machine = Machine::read(machine).unwrap();
     let trace = Trace::read(trace).unwrap();
     let mut options = Options::for_machine(&machine);
     adjust(&mut options);
-    judge(&trace, &std::fs::read_to_string(program).unwrap(), &machine, &options)
+    judge(
+        &trace,
+        &std::fs::read_to_string(program).unwrap(),
+        &machine,
+        &options,
+    )
 }

@@ -4,7 +4,9 @@ use crate::harness::{Done, Scenario, root};
 
 fn held(program: &str, tick: usize, until: usize) -> Done {
     let path = root().join("examples/programs").join(program);
-    Scenario::of(&path).commands(&format!("{tick},hold\n{until},resume\n")).run()
+    Scenario::of(&path)
+        .commands(&format!("{tick},hold\n{until},resume\n"))
+        .run()
 }
 
 /// Within limits although σ was asked to be below 1.
@@ -14,9 +16,11 @@ fn assert_held_within_limits(done: &Done) {
 
 #[test]
 fn hold_anywhere_stops_and_goes_on_within_limits() {
-    for (program, step, until) in
-        [("square.ngc", 13, 3000), ("serpentine.ngc", 89, 6000), ("two-step-arcs.ngc", 97, 6000)]
-    {
+    for (program, step, until) in [
+        ("square.ngc", 13, 3000),
+        ("serpentine.ngc", 89, 6000),
+        ("two-step-arcs.ngc", 97, 6000),
+    ] {
         let free = Scenario::of(&root().join("examples/programs").join(program)).run();
         let free_feed = free.column("feed_mm_s");
         for tick in (5..free_feed.len() - 5).step_by(step) {
@@ -39,16 +43,23 @@ fn assert_slows_at_once(done: &Done, free_feed: &[f64], tick: usize, until: usiz
             feed[index]
         );
     }
-    let stopped =
-        feed[tick..until].iter().position(|f| *f == 0.0).unwrap_or_else(|| panic!("hold at {tick} never stops"));
-    assert!(feed[tick + stopped..until].iter().all(|f| *f == 0.0), "hold at {tick} creeps");
+    let stopped = feed[tick..until]
+        .iter()
+        .position(|f| *f == 0.0)
+        .unwrap_or_else(|| panic!("hold at {tick} never stops"));
+    assert!(
+        feed[tick + stopped..until].iter().all(|f| *f == 0.0),
+        "hold at {tick} creeps"
+    );
     assert_eq!(done.cells("state")[until - 1], "holding");
     assert!(feed.len() > until);
 }
 
 #[test]
 fn a_hold_on_a_line_takes_v_over_a() {
-    let done = Scenario::text("G21 G90\nF5000\nG1 X100\nM2\n").commands("500,hold\n900,resume\n").run();
+    let done = Scenario::text("G21 G90\nF5000\nG1 X100\nM2\n")
+        .commands("500,hold\n900,resume\n")
+        .run();
     assert_held_within_limits(&done);
     let feed = done.column("feed_mm_s");
     let speed = feed[499];
@@ -56,16 +67,25 @@ fn a_hold_on_a_line_takes_v_over_a() {
     assert!(feed[500] < speed, "the first sample of the hold is slower");
     let periods = feed[500..].iter().position(|f| *f == 0.0).unwrap();
     let ideal = speed / 1000.0 * 1000.0;
-    assert!((periods as f64 - ideal).abs() <= 1.0, "{periods} periods instead of {ideal}");
+    assert!(
+        (periods as f64 - ideal).abs() <= 1.0,
+        "{periods} periods instead of {ideal}"
+    );
 }
 
 #[test]
 fn an_emergency_stop_leaves_the_path_at_the_axis_limits() {
     let program = root().join("examples/programs/serpentine.ngc");
     for tick in (10u32..3000).step_by(371) {
-        let done = Scenario::of(&program).commands(&format!("{tick},emergency-stop\n")).run();
+        let done = Scenario::of(&program)
+            .commands(&format!("{tick},emergency-stop\n"))
+            .run();
         assert_eq!(done.status(), 3);
-        assert!(done.errors().contains("emergency stop"), "{}", done.errors());
+        assert!(
+            done.errors().contains("emergency stop"),
+            "{}",
+            done.errors()
+        );
         let verdict = done.judge(|options| {
             options.ends_early = true;
             options.path_until_s = Some((f64::from(tick) - 1.0) * 1e-3);
@@ -81,7 +101,9 @@ fn an_abort_rests_on_the_path_and_is_no_fault() {
     for program in ["square.ngc", "serpentine.ngc", "two-step-arcs.ngc"] {
         let program = root().join("examples/programs").join(program);
         for tick in (0..3000).step_by(307) {
-            let done = Scenario::of(&program).commands(&format!("{tick},abort\n")).run();
+            let done = Scenario::of(&program)
+                .commands(&format!("{tick},abort\n"))
+                .run();
             if tick as f64 > done.number("samples") {
                 continue;
             }
@@ -98,7 +120,11 @@ fn assert_aborted(done: &Done, tick: usize) {
         // The joints did not hold yet, so nothing was driven.
         None => "stopped by the operator before the first line".to_owned(),
     };
-    assert!(done.errors().contains(&words), "{words:?} is not in {}", done.errors());
+    assert!(
+        done.errors().contains(&words),
+        "{words:?} is not in {}",
+        done.errors()
+    );
     assert_eq!(done.summary()["stopped"], words.as_str());
     assert!(done.summary()["fault"].is_null());
     let states = done.cells("state");
@@ -106,7 +132,12 @@ fn assert_aborted(done: &Done, tick: usize) {
         return;
     }
     assert_eq!(states.last().unwrap(), "standstill", "abort at {tick}");
-    assert!(states.iter().all(|state| state != "fault" && state != "stopping"), "abort at {tick}");
+    assert!(
+        states
+            .iter()
+            .all(|state| state != "fault" && state != "stopping"),
+        "abort at {tick}"
+    );
     let verdict = done.judge(|options| {
         options.ends_early = true;
         options.sample_tolerance_mm = Some(2e-6);
@@ -118,7 +149,9 @@ fn assert_aborted(done: &Done, tick: usize) {
 fn an_abort_while_held_or_starved_ends_the_run_too() {
     let program = root().join("examples/programs/serpentine.ngc");
     for before in ["300,hold", "300,stall-rough,60"] {
-        let done = Scenario::of(&program).commands(&format!("{before}\n600,abort\n")).run();
+        let done = Scenario::of(&program)
+            .commands(&format!("{before}\n600,abort\n"))
+            .run();
         assert_aborted(&done, 600);
     }
 }

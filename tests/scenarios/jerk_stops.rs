@@ -40,7 +40,10 @@ fn stops(seed: u64, draw: &Draw, bench: &Bench, free: &Ran) -> Result<Vec<Stop>,
     let mut stops = vec![];
     for _ in 0..HOLDS {
         let tick = 1 + random.below(free.samples.len() as u64 - 1) as usize;
-        let path_mm: f64 = free.samples[..tick].iter().map(|sample| sample.feed_mm_per_s * draw.period_s).sum();
+        let path_mm: f64 = free.samples[..tick]
+            .iter()
+            .map(|sample| sample.feed_mm_per_s * draw.period_s)
+            .sum();
         if free.samples[tick - 1].feed_mm_per_s == 0.0 || free.samples[tick].feed_mm_per_s == 0.0 {
             continue;
         }
@@ -50,17 +53,32 @@ fn stops(seed: u64, draw: &Draw, bench: &Bench, free: &Ran) -> Result<Vec<Stop>,
             continue;
         }
         let most = (25.0 * least) as usize + 100;
-        let ran = bench.try_commands(&format!("{tick},hold\n{},abort\n", tick + most)).map_err(|e| e.to_string())?;
+        let ran = bench
+            .try_commands(&format!("{tick},hold\n{},abort\n", tick + most))
+            .map_err(|e| e.to_string())?;
         if let Some(fault) = &ran.outcome.summary.fault {
             return Err(fault.clone());
         }
-        let taken = ran.samples[tick..].iter().position(|sample| sample.feed_mm_per_s == 0.0).unwrap_or(most) as f64;
+        let taken = ran.samples[tick..]
+            .iter()
+            .position(|sample| sample.feed_mm_per_s == 0.0)
+            .unwrap_or(most) as f64;
         // Where the bound is near there is nothing to search for.
-        let found = if taken <= NEAR * least { least } else { plan.stop_s(p_s, 1.0) / draw.period_s };
+        let found = if taken <= NEAR * least {
+            least
+        } else {
+            plan.stop_s(p_s, 1.0) / draw.period_s
+        };
         let shortest = least.max(found / SLACK);
         if shortest >= LONG_PERIODS {
-            let what = format!("seed {seed}, hold at {tick}: {taken} periods, found {found:.1}, at least {least:.1}");
-            stops.push(Stop { ratio: taken / shortest, bound_ratio: taken / least, what });
+            let what = format!(
+                "seed {seed}, hold at {tick}: {taken} periods, found {found:.1}, at least {least:.1}"
+            );
+            stops.push(Stop {
+                ratio: taken / shortest,
+                bound_ratio: taken / least,
+                what,
+            });
         }
     }
     Ok(stops)
@@ -77,7 +95,8 @@ fn stops_are_short(planner: &str, test: &str, count: u64, share_of: f64) {
         let draw = Draw::new(planner, seed);
         let folder = tempfile::tempdir().unwrap();
         let bench = on(&draw, folder.path());
-        let free = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bench.try_commands("")));
+        let free =
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bench.try_commands("")));
         let Ok(Ok(free)) = free else { return Ok(()) };
         if free.outcome.summary.fault.is_some() || free.segments.is_empty() {
             return Ok(());
@@ -88,39 +107,81 @@ fn stops_are_short(planner: &str, test: &str, count: u64, share_of: f64) {
     assert!(!all.is_empty(), "no stop is long enough to say anything");
     all.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     let at = |of: f64| all[share(&all, of)].ratio;
-    println!("{test}: {} stops, median {:.3}, p90 {:.3}, p99 {:.3}", all.len(), at(0.5), at(0.9), at(0.99));
-    let bound = all.iter().fold(0.0, |most: f64, stop| most.max(stop.bound_ratio));
+    println!(
+        "{test}: {} stops, median {:.3}, p90 {:.3}, p99 {:.3}",
+        all.len(),
+        at(0.5),
+        at(0.9),
+        at(0.99)
+    );
+    let bound = all
+        .iter()
+        .fold(0.0, |most: f64, stop| most.max(stop.bound_ratio));
     println!("  of the bound at most {bound:.2}");
     for stop in all.iter().rev().take(12) {
         println!("  {:.3}: {}", stop.ratio, stop.what);
     }
-    assert!(at(share_of) <= MOST, "{} at the share {share_of}", at(share_of));
+    assert!(
+        at(share_of) <= MOST,
+        "{} at the share {share_of}",
+        at(share_of)
+    );
 }
 
 #[test]
 fn holds_on_smooth_take_little_more_than_the_shortest() {
-    stops_are_short("watched-smooth", "holds_on_smooth_take_little_more_than_the_shortest", 12, 0.99);
+    stops_are_short(
+        "watched-smooth",
+        "holds_on_smooth_take_little_more_than_the_shortest",
+        12,
+        0.99,
+    );
 }
 
 #[test]
 fn holds_on_nurbs_take_little_more_than_the_shortest() {
-    stops_are_short("watched-nurbs", "holds_on_nurbs_take_little_more_than_the_shortest", 40, 0.99);
+    stops_are_short(
+        "watched-nurbs",
+        "holds_on_nurbs_take_little_more_than_the_shortest",
+        40,
+        0.99,
+    );
 }
 
 /// On a line at constant speed the shortest stop has a closed form.
 #[test]
 fn the_search_finds_the_shortest_stop_on_a_line() {
-    for (speed, acceleration, jerk) in [(50.0, 1000.0, 20_000.0), (50.0, 300.0, 20_000.0), (10.0, 1000.0, 20_000.0)] {
-        let lane = Lane { name: "x".into(), parts: [1.0, 0.0, 0.0, 0.0], velocity: speed, acceleration, jerk };
+    for (speed, acceleration, jerk) in [
+        (50.0, 1000.0, 20_000.0),
+        (50.0, 300.0, 20_000.0),
+        (10.0, 1000.0, 20_000.0),
+    ] {
+        let lane = Lane {
+            name: "x".into(),
+            parts: [1.0, 0.0, 0.0, 0.0],
+            velocity: speed,
+            acceleration,
+            jerk,
+        };
         let mut segment = tandem_sdk::Segment::rest(&tandem_sdk::AxisVector::ZERO, 0.0);
-        (segment.duration_s, segment.coefficients[0][1], segment.path[1]) = (10.0, speed, speed);
+        (
+            segment.duration_s,
+            segment.coefficients[0][1],
+            segment.path[1],
+        ) = (10.0, speed, speed);
         let lanes = [lane];
         let plan = JerkPlan::new(&[segment], &lanes);
         let exact_s = scalar_stop_s(speed, 0.0, 1.002 * acceleration, 1.01 * jerk);
         for fineness in [1.0, 1.6] {
             let found_s = plan.stop_s(3.0, fineness);
-            println!("{speed} {acceleration} {jerk}: {:.4} of the closed form", found_s / exact_s);
-            assert!((0.999..SLACK).contains(&(found_s / exact_s)), "{found_s} for {exact_s}");
+            println!(
+                "{speed} {acceleration} {jerk}: {:.4} of the closed form",
+                found_s / exact_s
+            );
+            assert!(
+                (0.999..SLACK).contains(&(found_s / exact_s)),
+                "{found_s} for {exact_s}"
+            );
         }
     }
 }

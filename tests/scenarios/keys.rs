@@ -11,7 +11,12 @@ use crate::operator::{Client, LONG, Running, command, is_held, is_moving};
 
 /// A run on a terminal of its own; `None` where there is no `script`.
 fn on_a_terminal(arguments: &[&str]) -> Option<(Running, ChildStdin, Client<UnixStream>)> {
-    if Command::new("script").arg("--version").stdout(Stdio::null()).status().is_err() {
+    if Command::new("script")
+        .arg("--version")
+        .stdout(Stdio::null())
+        .status()
+        .is_err()
+    {
         println!("skipped: there is no script(1) to make a terminal with");
         return None;
     }
@@ -30,12 +35,23 @@ fn spawn(folder: &Path, arguments: &[&str]) -> Child {
 /// The same for any command.
 pub fn shell(folder: &Path, run: &Command) -> Child {
     let quoted = |word: &std::ffi::OsStr| format!("'{}'", word.to_str().unwrap());
-    let words: Vec<String> = std::iter::once(run.get_program()).chain(run.get_args()).map(quoted).collect();
+    let words: Vec<String> = std::iter::once(run.get_program())
+        .chain(run.get_args())
+        .map(quoted)
+        .collect();
     let inner = format!("echo $$ > pid; exec {}", words.join(" ")).replace('\'', "\"");
     let outer = format!("stty -a > before; sh -c '{inner}'; echo $? > status; stty -a > after");
     let mut script = Command::new("script");
-    script.current_dir(folder).args(["-q", "-c", &outer, "/dev/null"]).env("SHELL", "/bin/sh");
-    script.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    script
+        .current_dir(folder)
+        .args(["-q", "-c", &outer, "/dev/null"])
+        .env("SHELL", "/bin/sh");
+    script
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
 }
 
 fn press(keys: &mut ChildStdin, key: &str) {
@@ -50,13 +66,19 @@ fn assert_left_well(run: Running, keys: ChildStdin, status: &str) -> String {
     let read = |name: &str| std::fs::read_to_string(run.at(name)).unwrap();
     assert_eq!(read("status").trim(), status);
     assert_eq!(read("before"), read("after"));
-    assert!(read("before").contains(" icanon") && read("before").contains(" echo "), "{}", read("before"));
+    assert!(
+        read("before").contains(" icanon") && read("before").contains(" echo "),
+        "{}",
+        read("before")
+    );
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 #[test]
 fn every_key_does_what_it_says() {
-    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else { return };
+    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else {
+        return;
+    };
     press(&mut keys, " ");
     client.wait("held", is_held);
     press(&mut keys, " ");
@@ -71,26 +93,44 @@ fn every_key_does_what_it_says() {
     client.wait("block by block", |s| s["single_block"] == true);
     press(&mut keys, "s");
     client.wait("through", |s| s["single_block"] == false);
-    client.wait("long enough to see its progress", |s| s["tick"].as_u64().unwrap() > 500);
+    client.wait("long enough to see its progress", |s| {
+        s["tick"].as_u64().unwrap() > 500
+    });
     press(&mut keys, "q");
     assert!(client.hear()["ended"]["stopped"].is_string());
     let said = assert_left_well(run, keys, "3");
-    for words in ["feed hold", "resume", "feed override 120 %", "optional stop on", "abort", "running"] {
+    for words in [
+        "feed hold",
+        "resume",
+        "feed override 120 %",
+        "optional stop on",
+        "abort",
+        "running",
+    ] {
         assert!(said.contains(words), "{words}: {said}");
     }
 }
 
 #[test]
 fn e_is_an_emergency_stop() {
-    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else { return };
+    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else {
+        return;
+    };
     press(&mut keys, "e");
-    assert!(client.hear()["ended"]["fault"].as_str().unwrap().contains("emergency stop"));
+    assert!(
+        client.hear()["ended"]["fault"]
+            .as_str()
+            .unwrap()
+            .contains("emergency stop")
+    );
     assert_left_well(run, keys, "3");
 }
 
 #[test]
 fn ctrl_c_aborts() {
-    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else { return };
+    let Some((run, mut keys, mut client)) = on_a_terminal(&[]) else {
+        return;
+    };
     press(&mut keys, "\x03");
     assert!(client.hear()["ended"]["stopped"].is_string());
     assert_left_well(run, keys, "3");
@@ -98,8 +138,14 @@ fn ctrl_c_aborts() {
 
 #[test]
 fn a_signal_stops_on_the_path_and_gives_the_terminal_back() {
-    let Some((run, keys, mut client)) = on_a_terminal(&[]) else { return };
-    let pid = std::fs::read_to_string(run.at("pid")).unwrap().trim().parse().unwrap();
+    let Some((run, keys, mut client)) = on_a_terminal(&[]) else {
+        return;
+    };
+    let pid = std::fs::read_to_string(run.at("pid"))
+        .unwrap()
+        .trim()
+        .parse()
+        .unwrap();
     kill_process(Pid::from_raw(pid).unwrap(), Signal::TERM).unwrap();
     assert!(client.hear()["ended"]["stopped"].is_string());
     assert_left_well(run, keys, "3");

@@ -4,8 +4,14 @@ use tandem_oracle::Check;
 
 use crate::harness::{Scenario, root};
 
-const ADAPTIVE: [&str; 6] =
-    ["--set", "planner.plugin=nurbs", "--set", "planner.options.form=adaptive", "--set", "guard.mode=count"];
+const ADAPTIVE: [&str; 6] = [
+    "--set",
+    "planner.plugin=nurbs",
+    "--set",
+    "planner.options.form=adaptive",
+    "--set",
+    "guard.mode=count",
+];
 
 /// Several curves in both dialects, a corner inside one, lines and arcs between.
 const MIXTURE: &str = "\
@@ -46,40 +52,72 @@ fn curves_are_followed() {
             options.vertex_tolerance_mm = Some(0.025);
         });
         assert!(verdict.passed(), "{verdict}");
-        assert!(done.number("max_path_deviation_mm") < 1e-6, "{}", done.number("max_path_deviation_mm"));
+        assert!(
+            done.number("max_path_deviation_mm") < 1e-6,
+            "{}",
+            done.number("max_path_deviation_mm")
+        );
     }
 }
 
 #[test]
 fn the_judge_sees_another_curve() {
-    let butterfly = std::fs::read_to_string(root().join("tests/fixtures/programs/butterfly.ngc")).unwrap();
+    let butterfly =
+        std::fs::read_to_string(root().join("tests/fixtures/programs/butterfly.ngc")).unwrap();
     let done = Scenario::text(&butterfly).with(&ADAPTIVE).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     // One weight of fifty-one a hundredth off.
     let other = done.file("other.ngc");
     std::fs::write(&other, butterfly.replacen("R5", "R5.05", 1)).unwrap();
-    let judged = crate::harness::judge_trace(&done.file("trace.csv"), &other, &crate::harness::mill(), |options| {
-        options.checks = vec![Check::Path];
-        options.sample_tolerance_mm = Some(1e-6);
-    });
+    let judged = crate::harness::judge_trace(
+        &done.file("trace.csv"),
+        &other,
+        &crate::harness::mill(),
+        |options| {
+            options.checks = vec![Check::Path];
+            options.sample_tolerance_mm = Some(1e-6);
+        },
+    );
     assert!(!judged.passed());
 }
 
 #[test]
 fn planners_that_drive_no_curves_say_so() {
-    for set in [&[][..], &["--set", "planner.plugin=after-interpolation", "--set", "guard.mode=count"]] {
-        let refused = Scenario::text("F600 G1 X1\nG5.2\nX2\nX2 Y2\nG5.3\n").with(set).run();
+    for set in [
+        &[][..],
+        &[
+            "--set",
+            "planner.plugin=after-interpolation",
+            "--set",
+            "guard.mode=count",
+        ],
+    ] {
+        let refused = Scenario::text("F600 G1 X1\nG5.2\nX2\nX2 Y2\nG5.3\n")
+            .with(set)
+            .run();
         assert_eq!(refused.status(), 1);
         let errors = refused.errors();
-        assert!(errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"), "{errors}");
+        assert!(
+            errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"),
+            "{errors}"
+        );
     }
     // Also where they could not drive this machine at all: it is the curve that asks for another planner.
     let jerk_limited = root().join("examples/machines/mill-3axis-smooth.toml");
     for planner in ["look-ahead", "block-overlap", "after-interpolation"] {
         let set = format!("planner.plugin={planner}");
-        let on = |text: &str| Scenario::text(text).on(&jerk_limited).with(&["--set", &set]).run().errors();
+        let on = |text: &str| {
+            Scenario::text(text)
+                .on(&jerk_limited)
+                .with(&["--set", &set])
+                .run()
+                .errors()
+        };
         let errors = on("F600 G1 X1\nG5.2\nX2\nX2 Y2\nG5.3\n");
-        assert!(errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"), "{errors}");
+        assert!(
+            errors.contains("program.ngc:2:1:") && errors.contains("for NURBS use planner nurbs"),
+            "{errors}"
+        );
         let errors = on("F600 G1 X1\n");
         assert!(errors.starts_with("--set planner.plugin: "), "{errors}");
     }
@@ -93,9 +131,15 @@ fn a_curve_that_turns_alone_is_refused_by_the_check() {
     let instant = run("F600\nG5.2 L3\nX10 A10\nX10 A20\nX20 Y9 A30\nG5.3\n");
     assert_eq!(instant.status(), 1);
     let errors = instant.errors();
-    assert!(errors.contains("program.ngc:2:1:") && errors.contains("planner smooth drives it"), "{errors}");
+    assert!(
+        errors.contains("program.ngc:2:1:") && errors.contains("planner smooth drives it"),
+        "{errors}"
+    );
     let span = run("F600\nG5.2 L3\nX10\nX10 A10\nX10 A20\nX20 Y9 A30\nG5.3\n").errors();
-    assert!(span.contains("program.ngc:4:1: error: ") && span.contains("only rotary axes move"), "{span}");
+    assert!(
+        span.contains("program.ngc:4:1: error: ") && span.contains("only rotary axes move"),
+        "{span}"
+    );
     let done = run("F600\nG5.2 L3\nX10 A10\nX12 A20\nX20 Y9 A30\nG5.3\n");
     assert_eq!(done.status(), 0, "{}", done.errors());
 }
@@ -106,16 +150,31 @@ fn what_is_wrong_with_a_curve_is_shown_where_it_stands() {
     let refused = Scenario::text("F600\nG5.2 P1 L3\nX20 Y10\nX25 (far) Y900\nX-20\nG5.3\n").run();
     assert_eq!(refused.status(), 1);
     let errors = refused.errors();
-    assert!(errors.contains("program.ngc:4:11: error: Y would reach "), "{errors}");
-    assert!(errors.contains("\n  X25 (far) Y900\n            ^^^^"), "{errors}");
+    assert!(
+        errors.contains("program.ngc:4:11: error: Y would reach "),
+        "{errors}"
+    );
+    assert!(
+        errors.contains("\n  X25 (far) Y900\n            ^^^^"),
+        "{errors}"
+    );
 }
 
 #[test]
 fn the_baseline_does_not_start_under_the_guard() {
-    let set = ["--set", "planner.plugin=nurbs", "--set", "planner.options.form=adaptive"];
+    let set = [
+        "--set",
+        "planner.plugin=nurbs",
+        "--set",
+        "planner.options.form=adaptive",
+    ];
     let refused = Scenario::text(MIXTURE).with(&set).run();
     assert_eq!(refused.status(), 1);
-    assert!(refused.errors().contains("guard.mode = \"count\""), "{}", refused.errors());
+    assert!(
+        refused.errors().contains("guard.mode = \"count\""),
+        "{}",
+        refused.errors()
+    );
 }
 
 /// The forms that keep it on a machine whose jerk is a limit, with corners, tangent lines, arcs and dwells between the
@@ -125,11 +184,23 @@ fn curves_are_driven_within_the_jerk_limit() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
     let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
     for form in ["scan", "windowed"] {
-        for scenario in [Scenario::of(&butterfly), Scenario::text(MIXTURE), Scenario::text(&many_curves())] {
-            let done = scenario.on(&machine).with(&["--set", &format!("planner.options.form={form}")]).run();
+        for scenario in [
+            Scenario::of(&butterfly),
+            Scenario::text(MIXTURE),
+            Scenario::text(&many_curves()),
+        ] {
+            let done = scenario
+                .on(&machine)
+                .with(&["--set", &format!("planner.options.form={form}")])
+                .run();
             assert_eq!(done.status(), 0, "{}", done.errors());
-            for count in ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
-            {
+            for count in [
+                "limit_violations",
+                "guard_stops",
+                "starvations",
+                "governed_samples",
+                "jerk_relaxed_samples",
+            ] {
                 assert_eq!(done.number(count), 0.0, "{form} {count}");
             }
             let verdict = done.judge(|options| {
@@ -157,9 +228,17 @@ fn a_hold_on_the_butterfly_stays_within_the_limits() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
     let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
     let commands = "300,hold\n420,resume\n700,feed-override,0.4\n900,feed-override,1\n";
-    let done = Scenario::of(&butterfly).on(&machine).commands(commands).run();
+    let done = Scenario::of(&butterfly)
+        .on(&machine)
+        .commands(commands)
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in ["limit_violations", "guard_stops", "starvations", "jerk_relaxed_samples"] {
+    for count in [
+        "limit_violations",
+        "guard_stops",
+        "starvations",
+        "jerk_relaxed_samples",
+    ] {
         assert_eq!(done.number(count), 0.0, "{count}");
     }
 }
@@ -169,18 +248,33 @@ fn a_hold_on_the_butterfly_stays_within_the_limits() {
 #[test]
 fn holds_around_a_line_that_runs_into_an_arc() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
-    let contour =
-        "F9000 G1 X20\nG3 X27.0708 Y2.9282 J10\nG1 X35 Y10.8579\nG2 X42.0687 Y13.788 I7.0711 J-7.0711\nG1 X60\n";
+    let contour = "F9000 G1 X20\nG3 X27.0708 Y2.9282 J10\nG1 X35 Y10.8579\nG2 X42.0687 Y13.788 I7.0711 J-7.0711\nG1 X60\n";
     for tick in (60..260).step_by(5) {
-        let commands = format!("{tick},hold\n{},resume\n{},feed-override,0.5\n", tick + 120, tick + 170);
-        let done = Scenario::text(contour).on(&machine).commands(&commands).run();
+        let commands = format!(
+            "{tick},hold\n{},resume\n{},feed-override,0.5\n",
+            tick + 120,
+            tick + 170
+        );
+        let done = Scenario::text(contour)
+            .on(&machine)
+            .commands(&commands)
+            .run();
         assert_eq!(done.status(), 0, "hold at {tick}: {}", done.errors());
-        for count in ["limit_violations", "guard_stops", "starvations", "jerk_relaxed_samples"] {
+        for count in [
+            "limit_violations",
+            "guard_stops",
+            "starvations",
+            "jerk_relaxed_samples",
+        ] {
             assert_eq!(done.number(count), 0.0, "hold at {tick}: {count}");
         }
     }
     let done = Scenario::text(contour).on(&machine).run();
-    assert!(done.number("motion_time_s") < 0.65, "{} s: it rested", done.number("motion_time_s"));
+    assert!(
+        done.number("motion_time_s") < 0.65,
+        "{} s: it rested",
+        done.number("motion_time_s")
+    );
 }
 
 /// A script sees curves as one block each and lowers the feed of those it is asked to.
@@ -191,10 +285,20 @@ fn a_policy_script_slows_curves() {
     let plain = Scenario::text(MIXTURE).on(&machine).run();
     let done = Scenario::text(MIXTURE)
         .on(&machine)
-        .with(&["--set", &format!("policy.script={}", script.display()), "--set", "policy.parameters.ramp_mm=80"])
+        .with(&[
+            "--set",
+            &format!("policy.script={}", script.display()),
+            "--set",
+            "policy.parameters.ramp_mm=80",
+        ])
         .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in ["limit_violations", "guard_stops", "starvations", "governed_samples"] {
+    for count in [
+        "limit_violations",
+        "guard_stops",
+        "starvations",
+        "governed_samples",
+    ] {
         assert_eq!(done.number(count), 0.0, "{count}");
     }
     let policy = done.summary()["policy"].clone();
@@ -213,8 +317,17 @@ fn a_policy_script_slows_curves() {
 fn the_butterfly_takes_little_more_than_the_best_time_known() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
     let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
-    let begin = ["--set", "axes.x.start_mm=54.493", "--set", "axes.y.start_mm=52.139"];
-    let done = Scenario::of(&butterfly).on(&machine).with(&begin).with(&["--reference-time-s", "2.75293"]).run();
+    let begin = [
+        "--set",
+        "axes.x.start_mm=54.493",
+        "--set",
+        "axes.y.start_mm=52.139",
+    ];
+    let done = Scenario::of(&butterfly)
+        .on(&machine)
+        .with(&begin)
+        .with(&["--reference-time-s", "2.75293"])
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     let ratio = done.number("time_ratio");
     assert!((0.999..1.02).contains(&ratio), "{ratio}");
@@ -228,20 +341,44 @@ fn the_report_shows_what_binds_along_a_curve() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
     let butterfly = root().join("tests/fixtures/programs/butterfly.ngc");
     let path = page.to_string_lossy().into_owned();
-    let done = Scenario::of(&butterfly).on(&machine).with(&["--report", &path]).run();
+    let done = Scenario::of(&butterfly)
+        .on(&machine)
+        .with(&["--report", &path])
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("curvature of the curve") && html.contains("chord error on the curve"));
-    let words = html.split("what binds, of the time in motion<td>").nth(1).unwrap().split('<').next().unwrap();
+    let words = html
+        .split("what binds, of the time in motion<td>")
+        .nth(1)
+        .unwrap()
+        .split('<')
+        .next()
+        .unwrap();
     let share = |name: &str| {
-        let found = words.split(", ").find_map(|word| word.strip_prefix(name)).unwrap_or_else(|| panic!("{words}"));
+        let found = words
+            .split(", ")
+            .find_map(|word| word.strip_prefix(name))
+            .unwrap_or_else(|| panic!("{words}"));
         found.trim_end_matches('%').trim().parse::<f64>().unwrap()
     };
     // The chord error holds the feed down along most of it; something binds nearly everywhere.
-    assert!(share("chord error") > 15.0 && share("acceleration") > 10.0 && share("none of these") < 30.0, "{words}");
-    let plain = Scenario::text("F600 G1 X1\n").on(&machine).with(&["--report", &path]).run();
+    assert!(
+        share("chord error") > 15.0
+            && share("acceleration") > 10.0
+            && share("none of these") < 30.0,
+        "{words}"
+    );
+    let plain = Scenario::text("F600 G1 X1\n")
+        .on(&machine)
+        .with(&["--report", &path])
+        .run();
     assert_eq!(plain.status(), 0, "{}", plain.errors());
-    assert!(!std::fs::read_to_string(&page).unwrap().contains("curvature of the curve"));
+    assert!(
+        !std::fs::read_to_string(&page)
+            .unwrap()
+            .contains("curvature of the curve")
+    );
 }
 
 /// Curves that are hard to drive, through the binary and the judge: points that coincide, spans without length, weights
@@ -249,26 +386,45 @@ fn the_report_shows_what_binds_along_a_curve() {
 #[test]
 fn degenerate_curves_are_driven_to_their_ends() {
     let machine = root().join("examples/machines/nurbs-demo.toml");
-    let coincident = "F6000\nG5.2 P1 L4\nX10 Y0\nX10 Y0\nX20 Y10\nX20 Y10\nX20 Y10\nX30 Y0\nX40 Y0\nG5.3\n";
+    let coincident =
+        "F6000\nG5.2 P1 L4\nX10 Y0\nX10 Y0\nX20 Y10\nX20 Y10\nX20 Y10\nX30 Y0\nX40 Y0\nG5.3\n";
     let weights = "F6000\nG5.2 P1 L4\nX10 Y6 P10000\nX20 Y-6 P1\nX30 Y6 P10000\nX40 Y0 P1\nG5.3\n";
     let knots = "F6000\nG6.2 P3 K0 X0 Y0 R1\nK0 X5 Y5\nK0 X10 Y0\nK1 X15 Y5\nK1 X20 Y0\nK1.5 X25 Y5\nK3\nK3\nK3\n";
     let spread = "F6000\nG5.2 P1 L3\nX-40 Y-80 P73\nX-140 Y-146 P1.8\nX10 Y-100 P0.13\nX-148 Y26 P0.04\nX-140 Y25 P3\n\
                   X-135 Y-115 P86\nX-90 Y-71 P0.04\nG5.3\n";
     let corner = "F6000\nG5.2 P1 L3\nX10 Y0\nX10 Y0\nX10 Y0\nX20 Y10\nX0 Y0\nX0 Y0\nG5.3\nG1 X3\n";
-    let wave: Vec<String> =
-        (1..10_000).map(|n| format!("X{:.4} Y{:.6}\n", 0.02 * f64::from(n), (0.05 * f64::from(n)).sin())).collect();
+    let wave: Vec<String> = (1..10_000)
+        .map(|n| {
+            format!(
+                "X{:.4} Y{:.6}\n",
+                0.02 * f64::from(n),
+                (0.05 * f64::from(n)).sin()
+            )
+        })
+        .collect();
     let wave = format!("F6000\nG5.2 P1 L4\n{}G5.3\n", wave.concat());
     for program in [coincident, weights, spread, knots, corner, &wave] {
         let shown = &program[..program.len().min(120)];
         for form in ["scan", "windowed"] {
             let form = format!("planner.options.form={form}");
-            let done = Scenario::text(program).on(&machine).with(&["--set", &form]).run();
+            let done = Scenario::text(program)
+                .on(&machine)
+                .with(&["--set", &form])
+                .run();
             assert_eq!(done.status(), 0, "{shown}: {}", done.errors());
-            for count in ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
-            {
+            for count in [
+                "limit_violations",
+                "guard_stops",
+                "starvations",
+                "governed_samples",
+                "jerk_relaxed_samples",
+            ] {
                 assert_eq!(done.number(count), 0.0, "{form} {count}: {shown}");
             }
-            assert!(done.number("max_path_deviation_mm") < 1e-6, "{form} {shown}");
+            assert!(
+                done.number("max_path_deviation_mm") < 1e-6,
+                "{form} {shown}"
+            );
             // Ends are rests, met to 1e-6 mm.
             let verdict = done.judge(|options| options.sample_tolerance_mm = Some(2e-6));
             assert!(verdict.passed(), "{form}: {shown}\n{verdict}");
@@ -302,13 +458,26 @@ fn where_linear_axes_nearly_stand_still_the_others_are_driven_at_their_limits() 
         for form in ["scan", "windowed"] {
             let machine = root().join("examples/machines/nurbs-demo.toml");
             let form = format!("planner.options.form={form}");
-            let done = Scenario::text(text).on(&machine).with(&ROTARY).with(&["--set", &form]).run();
+            let done = Scenario::text(text)
+                .on(&machine)
+                .with(&ROTARY)
+                .with(&["--set", &form])
+                .run();
             // The judge knows the machine of the file alone, which has no axis A.
             assert_eq!(done.status(), 0, "{}", done.errors());
-            for count in ["limit_violations", "guard_stops", "governed_samples", "starvations"] {
+            for count in [
+                "limit_violations",
+                "guard_stops",
+                "governed_samples",
+                "starvations",
+            ] {
                 assert_eq!(done.number(count), 0.0, "{form}: {count}");
             }
-            assert!(done.number("motion_time_s") < most_s, "{form}: {} s", done.number("motion_time_s"));
+            assert!(
+                done.number("motion_time_s") < most_s,
+                "{form}: {} s",
+                done.number("motion_time_s")
+            );
         }
     }
 }
@@ -319,7 +488,10 @@ fn where_linear_axes_nearly_stand_still_the_others_are_driven_at_their_limits() 
 #[test]
 fn steps_of_velocity_between_lines_keep_acceleration_and_jerk() {
     let programs = [
-        ("small-turn", "F2507.093\nG1 X0.0551 Y0.0171 Z0.0000\nG1 X3.2931 Y1.0187 Z0.0000\n"),
+        (
+            "small-turn",
+            "F2507.093\nG1 X0.0551 Y0.0171 Z0.0000\nG1 X3.2931 Y1.0187 Z0.0000\n",
+        ),
         (
             "slow-jerk",
             "F2013.371\nG1 X21.0911 Y-5.7398 Z0.0000\nG1 X22.8720 Y-7.3211 Z-0.5179\nG1 X22.7259 Y-7.0584 Z-0.5179\n\
@@ -341,10 +513,18 @@ fn steps_of_velocity_between_lines_keep_acceleration_and_jerk() {
         for form in ["scan", "windowed"] {
             let machine = root().join(format!("tests/fixtures/machines/{name}.toml"));
             let set = format!("planner.options.form={form}");
-            let done = Scenario::text(program).on(&machine).with(&["--set", &set]).run();
+            let done = Scenario::text(program)
+                .on(&machine)
+                .with(&["--set", &set])
+                .run();
             assert_eq!(done.status(), 0, "{name} {form}: {}", done.errors());
-            for count in ["limit_violations", "guard_stops", "governed_samples", "starvations", "jerk_relaxed_samples"]
-            {
+            for count in [
+                "limit_violations",
+                "guard_stops",
+                "governed_samples",
+                "starvations",
+                "jerk_relaxed_samples",
+            ] {
                 assert_eq!(done.number(count), 0.0, "{name} {form}: {count}");
             }
         }

@@ -25,14 +25,19 @@ pub struct Running {
 
 impl Running {
     fn start(program: &str, arguments: &[&str]) -> Self {
-        Self::start_with(program, |folder| command(folder, arguments).spawn().unwrap())
+        Self::start_with(program, |folder| {
+            command(folder, arguments).spawn().unwrap()
+        })
     }
 
     pub fn start_with(program: &str, spawn: impl FnOnce(&Path) -> Child) -> Self {
         let folder = TempDir::new().unwrap();
         std::fs::write(folder.path().join("p.ngc"), program).unwrap();
         let child = spawn(folder.path());
-        Self { folder, child: Some(child) }
+        Self {
+            folder,
+            child: Some(child),
+        }
     }
 
     pub fn child(&mut self) -> &mut Child {
@@ -64,10 +69,19 @@ impl Running {
 
     /// The trace is within limits and on the path, to where it was ended.
     pub fn assert_sound(&self) {
-        let verdict =
-            judge_trace(&self.at("trace.csv"), &self.at("p.ngc"), &mill(), |options| options.ends_early = true);
+        let verdict = judge_trace(
+            &self.at("trace.csv"),
+            &self.at("p.ngc"),
+            &mill(),
+            |options| options.ends_early = true,
+        );
         assert!(verdict.passed(), "{verdict}");
-        for count in ["limit_violations", "guard_stops", "governed_samples", "lost_samples"] {
+        for count in [
+            "limit_violations",
+            "guard_stops",
+            "governed_samples",
+            "lost_samples",
+        ] {
             assert_eq!(self.summary()[count], 0, "{count}");
         }
     }
@@ -86,7 +100,10 @@ impl Drop for Running {
 /// computer that is busy with other tests.
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
-    command.current_dir(folder).args(["run", "p.ngc", "--listen", "s", "--machine"]).arg(mill());
+    command
+        .current_dir(folder)
+        .args(["run", "p.ngc", "--listen", "s", "--machine"])
+        .arg(mill());
     command.args([
         "--set",
         "loops.max_missed_periods=1000000",
@@ -98,8 +115,13 @@ pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     if !arguments.contains(&"--clock") {
         command.args(["--clock", "wall"]);
     }
-    command.args(["--trace", "trace.csv", "--summary", "summary.json"]).args(arguments);
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .args(["--trace", "trace.csv", "--summary", "summary.json"])
+        .args(arguments);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     command
 }
 
@@ -110,7 +132,10 @@ pub struct Client<S: Read> {
 
 impl<S: Read + Write> Client<S> {
     fn new(reader: S, stream: S) -> Self {
-        Self { lines: BufReader::new(reader), stream }
+        Self {
+            lines: BufReader::new(reader),
+            stream,
+        }
     }
 
     pub fn say(&mut self, line: &str) {
@@ -121,7 +146,11 @@ impl<S: Read + Write> Client<S> {
     pub fn hear(&mut self) -> Value {
         let mut line = String::new();
         self.lines.read_line(&mut line).unwrap();
-        if line.is_empty() { Value::Null } else { serde_json::from_str(&line).unwrap() }
+        if line.is_empty() {
+            Value::Null
+        } else {
+            serde_json::from_str(&line).unwrap()
+        }
     }
 
     pub fn ask(&mut self, line: &str) -> Value {
@@ -158,7 +187,10 @@ pub fn is_held(status: &Value) -> bool {
 fn hold_resume_override_and_emergency_stop_over_the_socket() {
     let run = Running::start(LONG, &[]);
     let mut client = run.connect();
-    assert_eq!(std::fs::metadata(run.at("s")).unwrap().mode() & 0o777, 0o600);
+    assert_eq!(
+        std::fs::metadata(run.at("s")).unwrap().mode() & 0o777,
+        0o600
+    );
     client.ask(r#"{"lease":"take"}"#);
     client.wait("moving", is_moving);
     assert_eq!(client.command("hold")["ok"]["command"], "hold");
@@ -169,14 +201,28 @@ fn hold_resume_override_and_emergency_stop_over_the_socket() {
     assert!(client.command("resume")["ok"].is_object());
     client.wait("moving again", is_moving);
     assert!(client.ask(r#"{"command":"feed-override","value":0.5}"#)["ok"].is_object());
-    client.wait("at half the feed", |s| (s["feed_mm_per_min"].as_f64().unwrap() - 300.0).abs() < 1.0);
+    client.wait("at half the feed", |s| {
+        (s["feed_mm_per_min"].as_f64().unwrap() - 300.0).abs() < 1.0
+    });
     assert!(
-        client.ask(r#"{"command":"feed-override","value":3}"#)["error"]["why"].as_str().unwrap().contains("max_feed")
+        client.ask(r#"{"command":"feed-override","value":3}"#)["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("max_feed")
     );
     assert!(client.command("emergency-stop")["ok"].is_object());
     let last = client.hear();
-    assert!(last["ended"]["fault"].as_str().unwrap().contains("emergency stop"), "{last}");
-    assert_eq!((last["status"]["state"].clone(), client.hear()), ("fault".into(), Value::Null));
+    assert!(
+        last["ended"]["fault"]
+            .as_str()
+            .unwrap()
+            .contains("emergency stop"),
+        "{last}"
+    );
+    assert_eq!(
+        (last["status"]["state"].clone(), client.hear()),
+        ("fault".into(), Value::Null)
+    );
     let (output, run) = run.finish();
     assert_eq!(output.status.code(), Some(3));
     assert!(!run.at("s").exists(), "the socket goes with the run");
@@ -191,7 +237,12 @@ fn one_client_commands_and_every_client_may_stop() {
     let (mut a, mut b) = (run.connect(), run.connect());
     assert!(a.ask(r#"{"lease":"take"}"#)["ok"].is_object());
     assert_eq!(b.ask(r#"{"lease":"take"}"#)["error"]["what"], "refused");
-    assert!(b.command("abort")["error"]["why"].as_str().unwrap().contains("lease"));
+    assert!(
+        b.command("abort")["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("lease")
+    );
     b.wait("moving", is_moving);
     assert!(b.command("hold")["ok"].is_object());
     b.wait("held", is_held);
@@ -216,7 +267,12 @@ fn one_client_commands_and_every_client_may_stop() {
     b.command("resume");
     b.wait("moving", is_moving);
     b.command("abort");
-    assert!(b.hear()["ended"]["stopped"].as_str().unwrap().contains("operator"));
+    assert!(
+        b.hear()["ended"]["stopped"]
+            .as_str()
+            .unwrap()
+            .contains("operator")
+    );
     let (output, run) = run.finish();
     assert_eq!(output.status.code(), Some(3));
     run.assert_sound();
@@ -232,7 +288,12 @@ fn a_malformed_line_closes_its_connection_and_no_other() {
     assert!(answer["error"]["why"].is_string());
     assert_eq!(bad.hear(), Value::Null);
     long.say(&"x".repeat(5000));
-    assert!(long.hear()["error"]["why"].as_str().unwrap().contains("longer than 4096"));
+    assert!(
+        long.hear()["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("longer than 4096")
+    );
     assert_eq!(long.hear(), Value::Null);
     good.wait("moving", is_moving);
     good.command("emergency-stop");
@@ -246,7 +307,12 @@ fn the_seventeenth_client_is_turned_away() {
     for client in &mut clients {
         assert!(client.ask(r#"{"status":{}}"#)["ok"].is_object());
     }
-    assert!(run.connect().hear()["error"]["why"].as_str().unwrap().contains("16 clients"));
+    assert!(
+        run.connect().hear()["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("16 clients")
+    );
     clients[0].command("emergency-stop");
     run.finish();
 }
@@ -260,7 +326,9 @@ fn a_slow_client_loses_telemetry_and_never_the_machines_time() {
     quick.ask(r#"{"lease":"take"}"#);
     let start = quick.wait("moving", is_moving)["tick"].as_u64().unwrap();
     quick.wait("much later", |s| s["tick"].as_u64().unwrap() > start + 4000);
-    let lost = (0..PATIENCE).map(|_| slow.hear()["lost"].as_u64().unwrap()).find(|lost| *lost > 0);
+    let lost = (0..PATIENCE)
+        .map(|_| slow.hear()["lost"].as_u64().unwrap())
+        .find(|lost| *lost > 0);
     assert!(lost.is_some_and(|lost| lost > 10), "{lost:?}");
     assert!(slow.hear()["status"]["position"]["x_mm"].is_number());
     quick.command("abort");
@@ -288,7 +356,10 @@ fn a_program_stop_waits_for_a_client_and_for_nobody_else() {
 
 #[test]
 fn on_the_virtual_clock_a_hold_waits_for_its_operator() {
-    let program = format!("G21 G90\nF600\nG1 X1\nM0\n{}M2\n", "G1 X200\nG1 X0\n".repeat(15));
+    let program = format!(
+        "G21 G90\nF600\nG1 X1\nM0\n{}M2\n",
+        "G1 X200\nG1 X0\n".repeat(15)
+    );
     let run = Running::start(&program, &["--clock", "virtual", "--pause"]);
     let mut client = run.connect();
     client.ask(r#"{"lease":"take"}"#);
@@ -307,18 +378,38 @@ fn on_the_virtual_clock_a_hold_waits_for_its_operator() {
 #[test]
 fn over_tcp_the_token_comes_first() {
     use std::net::TcpStream;
-    let run = Running::start(LONG, &["--listen-tcp", "127.0.0.1:0", "--token-file", "token"]);
+    let run = Running::start(
+        LONG,
+        &["--listen-tcp", "127.0.0.1:0", "--token-file", "token"],
+    );
     let mut unix = run.connect();
     // The port is said on standard error, behind the path of the socket.
     let mut run = run;
     let errors = run.child.as_mut().unwrap().stderr.take().unwrap();
     let mut said = BufReader::new(errors).lines().map(Result::unwrap);
-    let address = said.find_map(|line| line.strip_prefix("operators: 127").map(|port| format!("127{port}"))).unwrap();
-    let connect = || TcpStream::connect(&address).map(|s| Client::new(s.try_clone().unwrap(), s)).unwrap();
-    assert_eq!(std::fs::metadata(run.at("token")).unwrap().mode() & 0o777, 0o600);
+    let address = said
+        .find_map(|line| {
+            line.strip_prefix("operators: 127")
+                .map(|port| format!("127{port}"))
+        })
+        .unwrap();
+    let connect = || {
+        TcpStream::connect(&address)
+            .map(|s| Client::new(s.try_clone().unwrap(), s))
+            .unwrap()
+    };
+    assert_eq!(
+        std::fs::metadata(run.at("token")).unwrap().mode() & 0o777,
+        0o600
+    );
     let token = std::fs::read_to_string(run.at("token")).unwrap();
     let mut stranger = connect();
-    assert!(stranger.command("emergency-stop")["error"]["why"].as_str().unwrap().contains("token"));
+    assert!(
+        stranger.command("emergency-stop")["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("token")
+    );
     assert_eq!(stranger.hear(), Value::Null);
     let mut client = connect();
     assert!(client.ask(&format!("{{\"token\":\"{}\"}}", token.trim()))["ok"].is_object());
@@ -335,13 +426,26 @@ fn addresses_of_other_computers_and_files_in_the_way_are_refused() {
     std::fs::write(folder.path().join("p.ngc"), "G21\nM2\n").unwrap();
     let refused = |arguments: &[&str]| {
         let output = command(folder.path(), arguments).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
     };
     let (status, words) = refused(&["--listen-tcp", "0.0.0.0:0", "--token-file", "t"]);
-    assert!(status == Some(1) && words.contains("this computer alone"), "{words}");
-    assert_eq!(refused(&["--listen-tcp", "127.0.0.1:0"]).0, Some(2), "a token file is needed");
+    assert!(
+        status == Some(1) && words.contains("this computer alone"),
+        "{words}"
+    );
+    assert_eq!(
+        refused(&["--listen-tcp", "127.0.0.1:0"]).0,
+        Some(2),
+        "a token file is needed"
+    );
     std::fs::write(folder.path().join("s"), "a file").unwrap();
     let (status, words) = refused(&[]);
     assert!(status == Some(1) && words.contains("no socket"), "{words}");
-    assert_eq!(std::fs::read_to_string(folder.path().join("s")).unwrap(), "a file");
+    assert_eq!(
+        std::fs::read_to_string(folder.path().join("s")).unwrap(),
+        "a file"
+    );
 }

@@ -29,7 +29,9 @@ impl OptimalStop {
         let mut times_s = vec![[0.0; LEVELS + 1]];
         for step in steps.iter().rev() {
             let next = times_s[times_s.len() - 1];
-            times_s.push(std::array::from_fn(|level| step.best_s(sigma(level), &next, limit)));
+            times_s.push(std::array::from_fn(|level| {
+                step.best_s(sigma(level), &next, limit)
+            }));
             places_s.push(step.from_s);
         }
         places_s.reverse();
@@ -39,7 +41,10 @@ impl OptimalStop {
 
     /// Shortest time to rest at full rate from program time `at_s`, s.
     pub fn time_s(&self, at_s: f64) -> f64 {
-        let after = self.places_s.partition_point(|place_s| *place_s < at_s).clamp(1, self.places_s.len() - 1);
+        let after = self
+            .places_s
+            .partition_point(|place_s| *place_s < at_s)
+            .clamp(1, self.places_s.len() - 1);
         let (low_s, high_s) = (self.places_s[after - 1], self.places_s[after]);
         let share = ((at_s - low_s) / (high_s - low_s)).clamp(0.0, 1.0);
         (1.0 - share) * self.times_s[after - 1][LEVELS] + share * self.times_s[after][LEVELS]
@@ -62,7 +67,11 @@ fn steps(plan: &Plan, step_s: f64) -> Vec<Step> {
         for number in 0..count as u32 {
             let (from_s, until_s) = (at(f64::from(number)), at(f64::from(number + 1)));
             let ends = [stretch.at(from_s), stretch.at(until_s)];
-            steps.push(Step { from_s, length_s: until_s - from_s, ends });
+            steps.push(Step {
+                from_s,
+                length_s: until_s - from_s,
+                ends,
+            });
         }
     }
     steps
@@ -81,13 +90,19 @@ impl Step {
             return 2.0 * sigma / -hardest;
         }
         let (low, high) = self.range(y, limit, 2);
-        let choice = |number: usize| low + (high.min(0.0) - low).max(0.0) * number as f64 / CHOICES as f64;
-        let faster = (0..=3).map(|number| high.clamp(0.0, (1.0 - y) / self.length_s) * f64::from(number) / 3.0);
+        let choice =
+            |number: usize| low + (high.min(0.0) - low).max(0.0) * number as f64 / CHOICES as f64;
+        let faster = (0..=3)
+            .map(|number| high.clamp(0.0, (1.0 - y) / self.length_s) * f64::from(number) / 3.0);
         let time_s = |u: f64| {
             let after = (y + u * self.length_s).max(0.0).sqrt();
             2.0 * self.length_s / (sigma + after) + interpolated(next, after)
         };
-        (0..=CHOICES).map(choice).chain(faster).map(time_s).fold(f64::INFINITY, f64::min)
+        (0..=CHOICES)
+            .map(choice)
+            .chain(faster)
+            .map(time_s)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The smallest and largest u that keep every axis within its limit at the first `ends` ends of the step.

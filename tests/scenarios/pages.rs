@@ -20,7 +20,10 @@ struct Fence {
 }
 
 fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .canonicalize()
+        .unwrap()
 }
 
 fn fences(page: &str) -> Vec<Fence> {
@@ -32,7 +35,11 @@ fn fences(page: &str) -> Vec<Fence> {
             match &mut open {
                 Some((fence, indent)) => {
                     let (blank, rest) = line.split_at((*indent).min(line.len()));
-                    assert!(blank.trim().is_empty(), "line {}: less indented than its fence", index + 1);
+                    assert!(
+                        blank.trim().is_empty(),
+                        "line {}: less indented than its fence",
+                        index + 1
+                    );
                     fence.text += rest;
                     fence.text.push('\n');
                 }
@@ -67,14 +74,19 @@ fn file_to_write(fence: &Fence) -> Option<&str> {
         return None;
     }
     let paragraph = fence.before.trim_end().rsplit("\n\n").next()?;
-    let name = paragraph.split('`').find(|word| word.starts_with("target/") && word.contains('.'))?;
+    let name = paragraph
+        .split('`')
+        .find(|word| word.starts_with("target/") && word.contains('.'))?;
     paragraph.ends_with(':').then_some(name)
 }
 
 /// Whether `shown` is what the commands before it print: at most one paragraph stands between them.
 fn is_output(commands: &Fence, shown: &Fence) -> bool {
     let between = shown.before.trim();
-    commands.kind == "sh" && shown.kind == "text" && !between.contains("\n\n") && !between.starts_with('#')
+    commands.kind == "sh"
+        && shown.kind == "text"
+        && !between.contains("\n\n")
+        && !between.starts_with('#')
 }
 
 /// A folder in which the commands of the pages do what they do in the repository, with the binary under test.
@@ -85,10 +97,19 @@ fn reader_of_pages() -> tempfile::TempDir {
         symlink(root.join(name), folder.path().join(name)).unwrap();
     }
     // A reader may go there, and back by `..`.
-    let copied = Command::new("cp").arg("-r").arg(root.join("examples")).arg(folder.path()).status().unwrap();
+    let copied = Command::new("cp")
+        .arg("-r")
+        .arg(root.join("examples"))
+        .arg(folder.path())
+        .status()
+        .unwrap();
     assert!(copied.success());
     fs::create_dir_all(folder.path().join("target/release")).unwrap();
-    symlink(env!("CARGO_BIN_EXE_tandem"), folder.path().join("target/release/tandem")).unwrap();
+    symlink(
+        env!("CARGO_BIN_EXE_tandem"),
+        folder.path().join("target/release/tandem"),
+    )
+    .unwrap();
     folder
 }
 
@@ -113,7 +134,10 @@ chromium() {{ :; }}
 fn output(commands: &str, folder: &Path) -> String {
     let script = format!("exec 2>&1\n{}{commands}", stand_ins(folder));
     let mut shell = Command::new("bash");
-    shell.args(["-c", &script]).current_dir(folder).stdin(Stdio::null());
+    shell
+        .args(["-c", &script])
+        .current_dir(folder)
+        .stdin(Stdio::null());
     if std::env::var_os("CARGO").is_none() {
         shell.env("CARGO", "cargo");
     }
@@ -128,8 +152,14 @@ fn joined(text: &str) -> String {
 /// The first piece of what is shown that the output lacks.
 fn missing<'a>(shown: &'a str, printed: &str) -> Option<&'a str> {
     let mut rest = printed;
-    for piece in shown.split('…').map(str::trim).filter(|piece| !piece.is_empty()) {
-        let Some(at) = rest.find(piece) else { return Some(piece) };
+    for piece in shown
+        .split('…')
+        .map(str::trim)
+        .filter(|piece| !piece.is_empty())
+    {
+        let Some(at) = rest.find(piece) else {
+            return Some(piece);
+        };
         rest = &rest[at + piece.len()..];
     }
     None
@@ -151,7 +181,10 @@ fn judge(name: &str) -> usize {
         let printed = joined(&output(&all[index - 1].text, folder.path()));
         let shown = joined(&fence.text);
         if let Some(piece) = missing(&shown, &printed) {
-            panic!("{name}:{}: the command does not print\n  {piece}\nit prints\n  {printed}", fence.line);
+            panic!(
+                "{name}:{}: the command does not print\n  {piece}\nit prints\n  {printed}",
+                fence.line
+            );
         }
         judged += 1;
     }
@@ -202,7 +235,10 @@ fn every_page_with_an_output_is_judged() {
         let all = fences(&fs::read_to_string(root.join(name)).unwrap());
         let outputs = all.windows(2).filter(|pair| is_output(&pair[0], &pair[1]));
         let lines: Vec<usize> = outputs.map(|pair| pair[1].line).collect();
-        assert!(lines.is_empty(), "{name} shows outputs at {lines:?} and is in no row of `pages!`");
+        assert!(
+            lines.is_empty(),
+            "{name} shows outputs at {lines:?} and is in no row of `pages!`"
+        );
     }
 }
 

@@ -30,7 +30,9 @@ impl Plan {
         for segment in segments {
             // A rest without duration belongs to what comes before it.
             match pieces.last_mut() {
-                Some((_, last)) if segment.duration_s == 0.0 => last.flags = last.flags.with(segment.flags),
+                Some((_, last)) if segment.duration_s == 0.0 => {
+                    last.flags = last.flags.with(segment.flags)
+                }
                 _ if segment.duration_s == 0.0 => {}
                 _ => pieces.push((start_s, *segment)),
             }
@@ -41,18 +43,27 @@ impl Plan {
 
     /// Program time at the end, s.
     pub fn end_s(&self) -> f64 {
-        self.pieces.last().map_or(0.0, |(start_s, segment)| start_s + segment.duration_s)
+        self.pieces
+            .last()
+            .map_or(0.0, |(start_s, segment)| start_s + segment.duration_s)
     }
 
     /// Program time at which a path coordinate is reached first, s.
     pub fn time_s(&self, path_mm: f64) -> f64 {
         let behind = |(_, segment): &(f64, Segment)| segment.path_mm(segment.duration_s) < path_mm;
-        let index = self.pieces.partition_point(behind).min(self.pieces.len() - 1);
+        let index = self
+            .pieces
+            .partition_point(behind)
+            .min(self.pieces.len() - 1);
         let (start_s, segment) = &self.pieces[index];
         let (mut low, mut high) = (0.0, segment.duration_s);
         for _ in 0..60 {
             let middle = f64::midpoint(low, high);
-            let side = if segment.path_mm(middle) < path_mm { &mut low } else { &mut high };
+            let side = if segment.path_mm(middle) < path_mm {
+                &mut low
+            } else {
+                &mut high
+            };
             *side = middle;
         }
         start_s + high
@@ -60,11 +71,23 @@ impl Plan {
 
     /// What lies between two program times, segment by segment.
     pub fn stretches(&self, from_s: f64, until_s: f64) -> impl Iterator<Item = Stretch<'_>> {
-        let first = self.pieces.partition_point(|(start_s, _)| *start_s <= from_s).max(1) - 1;
-        self.pieces[first..].iter().take_while(move |(start_s, _)| *start_s < until_s).map(move |(start_s, segment)| {
-            let end_s = start_s + segment.duration_s;
-            Stretch { segment, start_s: *start_s, from_s: from_s.max(*start_s), until_s: until_s.min(end_s) }
-        })
+        let first = self
+            .pieces
+            .partition_point(|(start_s, _)| *start_s <= from_s)
+            .max(1)
+            - 1;
+        self.pieces[first..]
+            .iter()
+            .take_while(move |(start_s, _)| *start_s < until_s)
+            .map(move |(start_s, segment)| {
+                let end_s = start_s + segment.duration_s;
+                Stretch {
+                    segment,
+                    start_s: *start_s,
+                    from_s: from_s.max(*start_s),
+                    until_s: until_s.min(end_s),
+                }
+            })
     }
 
     /// Whether an axis brakes at its limit somewhere between two program times: then nothing can be slower.
@@ -75,7 +98,8 @@ impl Plan {
         };
         self.stretches(from_s, until_s).any(|stretch| {
             let ends = [stretch.at(stretch.from_s), stretch.at(stretch.until_s)];
-            ends.iter().any(|place| (0..limit.len()).any(|axis| brakes(place, axis)))
+            ends.iter()
+                .any(|place| (0..limit.len()).any(|axis| brakes(place, axis)))
         })
     }
 
@@ -92,10 +116,15 @@ impl Stretch<'_> {
     /// The place at a program time within the stretch.
     pub fn at(&self, time_s: f64) -> Place {
         let local_s = (time_s - self.start_s).clamp(0.0, self.segment.duration_s);
-        let (velocity, acceleration) = (self.segment.velocity(local_s), self.segment.acceleration(local_s));
+        let (velocity, acceleration) = (
+            self.segment.velocity(local_s),
+            self.segment.acceleration(local_s),
+        );
         let (lead, rate) = (self.segment.step_velocity, self.segment.step_acceleration);
         Place {
-            velocity: std::array::from_fn(|axis| velocity[axis] - lead[axis] + rate[axis] * local_s),
+            velocity: std::array::from_fn(|axis| {
+                velocity[axis] - lead[axis] + rate[axis] * local_s
+            }),
             acceleration: std::array::from_fn(|axis| acceleration[axis] + rate[axis]),
         }
     }

@@ -8,7 +8,8 @@ use tandem_gcode::Program;
 use tandem_host::{HostError, Registry, Run, Switches, check_program};
 use tandem_machine::Machine;
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions, Setpoint, local_plugin,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, RawOptions,
+    Setpoint, local_plugin,
 };
 use tempfile::TempDir;
 
@@ -53,16 +54,25 @@ fn listed(report: &tandem_gcode::CheckReport) -> String {
 
 fn by_check(machine: &Machine) -> String {
     let program = Program::spool("p.ngc", PROGRAM.as_bytes()).unwrap();
-    refusal(check_program(machine.clone(), &registry(), program, switches(machine)), listed)
+    refusal(
+        check_program(machine.clone(), &registry(), program, switches(machine)),
+        listed,
+    )
 }
 
 fn by_run(machine: &Machine) -> String {
     let program = Program::spool("p.ngc", PROGRAM.as_bytes()).unwrap();
-    refusal(Run::prepare(machine.clone(), &registry(), program, switches(machine)), |_| String::new())
+    refusal(
+        Run::prepare(machine.clone(), &registry(), program, switches(machine)),
+        |_| String::new(),
+    )
 }
 
 fn switches(machine: &Machine) -> Switches {
-    Switches { home: machine.require_homing.then_some(tandem_session::HOMING), ..Switches::default() }
+    Switches {
+        home: machine.require_homing.then_some(tandem_session::HOMING),
+        ..Switches::default()
+    }
 }
 
 /// The machine files of the examples, each with a few lines changed, dropped or added: what `check` takes the run takes,
@@ -78,28 +88,40 @@ fn a_machine_file_that_the_check_takes_the_run_takes_too() {
     }
     names.sort();
     let (mut taken, mut refused, mut unread, mut by_driver) = (0, 0, 0, 0);
-    for_each_seed("a_machine_file_that_the_check_takes_the_run_takes_too", 600, |seed| {
-        let mut random = Random::new(seed);
-        let name = &names[random.below(names.len() as u64) as usize];
-        let text = mutated(&std::fs::read_to_string(folder.path().join(name)).unwrap(), &mut random);
-        let path = folder.path().join("mutated.toml");
-        std::fs::write(&path, &text).unwrap();
-        let Ok(machine) = Machine::read(&path, &[]) else {
-            unread += 1;
-            return Ok(());
-        };
-        let (check, run) = (by_check(&machine), by_run(&machine));
-        if check != run {
-            return Err(format!("{name:?}\n{text}\ncheck: {check:?}\nrun: {run:?}"));
-        }
-        taken += u32::from(run.is_empty());
-        refused += u32::from(!run.is_empty());
-        by_driver += u32::from(run.contains("driver"));
-        Ok(())
-    });
-    println!("{taken} taken, {refused} refused, {by_driver} of them for the driver, {unread} not read");
+    for_each_seed(
+        "a_machine_file_that_the_check_takes_the_run_takes_too",
+        600,
+        |seed| {
+            let mut random = Random::new(seed);
+            let name = &names[random.below(names.len() as u64) as usize];
+            let text = mutated(
+                &std::fs::read_to_string(folder.path().join(name)).unwrap(),
+                &mut random,
+            );
+            let path = folder.path().join("mutated.toml");
+            std::fs::write(&path, &text).unwrap();
+            let Ok(machine) = Machine::read(&path, &[]) else {
+                unread += 1;
+                return Ok(());
+            };
+            let (check, run) = (by_check(&machine), by_run(&machine));
+            if check != run {
+                return Err(format!("{name:?}\n{text}\ncheck: {check:?}\nrun: {run:?}"));
+            }
+            taken += u32::from(run.is_empty());
+            refused += u32::from(!run.is_empty());
+            by_driver += u32::from(run.contains("driver"));
+            Ok(())
+        },
+    );
+    println!(
+        "{taken} taken, {refused} refused, {by_driver} of them for the driver, {unread} not read"
+    );
     let all = std::env::var("TANDEM_SEED").is_err() && std::env::var("TANDEM_SEEDS").is_err();
-    assert!(!all || taken > 20 && refused > 20 && by_driver > 5, "the mutations are not those that were meant");
+    assert!(
+        !all || taken > 20 && refused > 20 && by_driver > 5,
+        "the mutations are not those that were meant"
+    );
 }
 
 /// One to three changes.
@@ -119,8 +141,22 @@ fn mutated(text: &str, random: &mut Random) -> String {
 
 /// Another value for the key of a line, if there is one on it.
 fn change(line: &mut String, random: &mut Random) {
-    const VALUES: [&str; 14] =
-        ["0", "-1", "1e9", "1e-9", "nan", "inf", "7", "0.37", "\"x\"", "true", "[]", "[1, 2]", "\"sim\"", "\"smooth\""];
+    const VALUES: [&str; 14] = [
+        "0",
+        "-1",
+        "1e9",
+        "1e-9",
+        "nan",
+        "inf",
+        "7",
+        "0.37",
+        "\"x\"",
+        "true",
+        "[]",
+        "[1, 2]",
+        "\"sim\"",
+        "\"smooth\"",
+    ];
     let value = VALUES[random.below(VALUES.len() as u64) as usize];
     if let Some((key, _)) = line.clone().split_once('=') {
         *line = format!("{key}= {value}");
@@ -131,7 +167,9 @@ fn change(line: &mut String, random: &mut Random) {
 fn add(behind: &mut String, random: &mut Random) {
     let number = random.below(9);
     let table = match random.below(9) {
-        0 | 1 => format!("[[driver.options.switches]]\ninput = {number}\njoint = {number}\nabove_mm = 1"),
+        0 | 1 => {
+            format!("[[driver.options.switches]]\ninput = {number}\njoint = {number}\nabove_mm = 1")
+        }
         2 => format!("[driver.options]\nmodel = \"second-order\"\nnatural_frequency_hz = {number}"),
         3 => format!("[driver.options]\nmodel = \"servo\"\nwatchdog_periods = {number}"),
         4 => format!("[[faults.wrap]]\nkind = \"freeze\"\njoints = [{number}]\nat_call = 5"),
@@ -157,11 +195,15 @@ impl Untouched {
 
 impl Driver for Untouched {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { watches_following: 1, ..DriverDescription::real() }
+        DriverDescription {
+            watches_following: 1,
+            ..DriverDescription::real()
+        }
     }
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
         let fits = context.joint_count == 3;
-        fits.then_some(()).ok_or_else(|| PluginError::of_option("joints", "it has three amplifiers"))
+        fits.then_some(())
+            .ok_or_else(|| PluginError::of_option("joints", "it has three amplifiers"))
     }
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         CLAIMED.fetch_add(1, Relaxed);
@@ -171,7 +213,11 @@ impl Driver for Untouched {
         CLAIMED.fetch_add(1, Relaxed);
         Ok(Attached::default())
     }
-    fn exchange(&mut self, _setpoint: &Setpoint, _feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        _setpoint: &Setpoint,
+        _feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         CLAIMED.fetch_add(1, Relaxed);
         Ok(())
     }
@@ -189,7 +235,10 @@ fn a_check_claims_no_drives_and_asks_whether_they_go_with_the_machine() {
     };
     assert_eq!(by_check(&on(&mill())), "");
     let four = by_check(&on(&root().join("examples/machines/mill-4axis.toml")));
-    assert!(four.contains("driver.options.joints: driver real: it has three amplifiers"), "{four}");
+    assert!(
+        four.contains("driver.options.joints: driver real: it has three amplifiers"),
+        "{four}"
+    );
     assert_eq!(CLAIMED.load(Relaxed), 0);
     assert!(by_run(&on(&mill())).contains("the drives are claimed"));
 }

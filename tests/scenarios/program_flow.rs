@@ -16,9 +16,17 @@ fn stops_without_an_operator_are_logged_and_the_run_goes_on() {
 #[test]
 fn with_pause_they_wait_for_enter() {
     let free = Scenario::text(STOPS).run();
-    let done = Scenario::text(STOPS).with(&["--pause"]).typing("\n\n\n").run();
+    let done = Scenario::text(STOPS)
+        .with(&["--pause"])
+        .typing("\n\n\n")
+        .run();
     done.assert_within_limits();
-    assert_eq!(done.errors().matches("Enter goes on").count(), 3, "{}", done.errors());
+    assert_eq!(
+        done.errors().matches("Enter goes on").count(),
+        3,
+        "{}",
+        done.errors()
+    );
     assert!(done.cells("state").iter().any(|s| s == "holding"));
     assert!(done.number("samples") > free.number("samples"));
 }
@@ -27,22 +35,38 @@ fn with_pause_they_wait_for_enter() {
 fn where_nobody_can_press_enter_the_program_ends_at_its_stop() {
     let done = Scenario::text(STOPS).with(&["--pause"]).typing("\n").run();
     assert_eq!(done.status(), 3);
-    assert!(done.errors().contains("line 7: the program waits for an operator"), "{}", done.errors());
+    assert!(
+        done.errors()
+            .contains("line 7: the program waits for an operator"),
+        "{}",
+        done.errors()
+    );
     assert_eq!(done.column("x_cmd_mm").pop(), Some(20.0));
 }
 
 #[test]
 fn a_hold_that_nobody_ends_is_given_up_on_the_path() {
-    let done = Scenario::text("G21 G90\nF3000\nG1 X50\nM2\n").commands("200,hold\n").run();
+    let done = Scenario::text("G21 G90\nF3000\nG1 X50\nM2\n")
+        .commands("200,hold\n")
+        .run();
     assert_eq!(done.status(), 3);
-    assert!(done.errors().contains("no command is left"), "{}", done.errors());
+    assert!(
+        done.errors().contains("no command is left"),
+        "{}",
+        done.errors()
+    );
     let verdict = done.judge(|options| options.ends_early = true);
     assert!(verdict.passed(), "{verdict}");
 }
 
 #[test]
 fn a_dwell_lasts_as_long_as_it_says() {
-    let run = |dwell: &str| Scenario::text(&format!("G21 G90\nF3000\nG1 X10\nG4 P{dwell}\nG1 X20\nM2\n")).run();
+    let run = |dwell: &str| {
+        Scenario::text(&format!(
+            "G21 G90\nF3000\nG1 X10\nG4 P{dwell}\nG1 X20\nM2\n"
+        ))
+        .run()
+    };
     let (short, long) = (run("0.1"), run("0.6"));
     short.assert_within_limits();
     long.assert_within_limits();
@@ -57,29 +81,49 @@ fn an_input_is_waited_for_and_changes_the_path() {
     let done = Scenario::text(text).with(&["--set", switch]).run();
     assert_eq!(done.status(), 0, "{}", done.errors());
     assert_eq!(done.column("x_cmd_mm").pop(), Some(31.0));
-    let waited =
-        Scenario::text("G21 G90\nF3000\nG1 X10\nM66 P0 L3 Q1\nG1 X[20+#5399]\nM2\n").with(&["--set", switch]).run();
-    assert_eq!(waited.column("x_cmd_mm").pop(), Some(19.0), "{}", waited.errors());
-    assert!(waited.number("samples") > 1200.0, "it waited for its second");
+    let waited = Scenario::text("G21 G90\nF3000\nG1 X10\nM66 P0 L3 Q1\nG1 X[20+#5399]\nM2\n")
+        .with(&["--set", switch])
+        .run();
+    assert_eq!(
+        waited.column("x_cmd_mm").pop(),
+        Some(19.0),
+        "{}",
+        waited.errors()
+    );
+    assert!(
+        waited.number("samples") > 1200.0,
+        "it waited for its second"
+    );
 }
 
 #[test]
 fn exact_stops_are_sampled_at_the_programmed_position() {
-    let done = Scenario::text("G21 G90\nG61\nF3000\nG1 X10.123456 Y3\nG1 X20 Y-7.7\nG64\nG1 X0 Y0\nM2\n").run();
+    let done =
+        Scenario::text("G21 G90\nG61\nF3000\nG1 X10.123456 Y3\nG1 X20 Y-7.7\nG64\nG1 X0 Y0\nM2\n")
+            .run();
     done.assert_within_limits();
     let (x, y) = (done.column("x_cmd_mm"), done.column("y_cmd_mm"));
     for (px, py) in [(10.123_456, 3.0), (20.0, -7.7), (0.0, 0.0)] {
-        assert!(x.iter().zip(&y).any(|(x, y)| *x == px && *y == py), "({px}, {py}) is in no sample");
+        assert!(
+            x.iter().zip(&y).any(|(x, y)| *x == px && *y == py),
+            "({px}, {py}) is in no sample"
+        );
     }
 }
 
 #[test]
 fn m1_waits_while_the_optional_stop_is_on() {
     let waits = |arguments: &[&str], commands: &str| {
-        let done = Scenario::text(STOPS).with(arguments).commands(commands).typing("\n\n\n").run();
+        let done = Scenario::text(STOPS)
+            .with(arguments)
+            .commands(commands)
+            .typing("\n\n\n")
+            .run();
         done.assert_within_limits();
         let errors = done.errors();
-        (3..=9).filter(|line| errors.contains(&format!("line {line}: the program waits"))).collect::<Vec<i32>>()
+        (3..=9)
+            .filter(|line| errors.contains(&format!("line {line}: the program waits")))
+            .collect::<Vec<i32>>()
     };
     assert!(waits(&[], "").is_empty());
     assert_eq!(waits(&["--optional-stop"], ""), [9]);
@@ -88,25 +132,48 @@ fn m1_waits_while_the_optional_stop_is_on() {
     assert_eq!(waits(&["--pause"], "100,optional-stop,0"), [5, 7]);
 }
 
-const CUT: &str = "G21 G90\nS1000 M3\nM8\nF600\nG1 X20\nM64 P3\nG0 X0\nM0\nG93\nG1 X20 F30\nG94 F600\nM1\nM2\n";
+const CUT: &str =
+    "G21 G90\nS1000 M3\nM8\nF600\nG1 X20\nM64 P3\nG0 X0\nM0\nG93\nG1 X20 F30\nG94 F600\nM1\nM2\n";
 
 #[test]
 fn a_dry_run_drives_the_path_at_its_own_feed_and_switches_nothing() {
     let feed = "operator.dry_run_feed_mm_per_min=3000";
-    let done = Scenario::text(CUT).with(&["--dry-run", "--set", feed]).run();
+    let done = Scenario::text(CUT)
+        .with(&["--dry-run", "--set", feed])
+        .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for words in ["line 8: M0, program stop: a dry run", "line 12: M1, optional stop: a dry run"] {
+    for words in [
+        "line 8: M0, program stop: a dry run",
+        "line 12: M1, optional stop: a dry run",
+    ] {
         assert!(done.errors().contains(words), "{}", done.errors());
     }
     assert_eq!(done.summary()["dry_run"], true);
     assert!(String::from_utf8_lossy(&done.output.stdout).starts_with("dry run of "));
     let (feed, line) = (done.column("feed_mm_s"), done.column("line"));
-    let top = |number: f64| feed.iter().zip(&line).filter(|(_, l)| **l == number).map(|(f, _)| *f).fold(0.0, f64::max);
-    assert!((top(5.0) - 50.0).abs() < 1e-6 && (top(10.0) - 50.0).abs() < 1e-6, "{} {}", top(5.0), top(10.0));
+    let top = |number: f64| {
+        feed.iter()
+            .zip(&line)
+            .filter(|(_, l)| **l == number)
+            .map(|(f, _)| *f)
+            .fold(0.0, f64::max)
+    };
+    assert!(
+        (top(5.0) - 50.0).abs() < 1e-6 && (top(10.0) - 50.0).abs() < 1e-6,
+        "{} {}",
+        top(5.0),
+        top(10.0)
+    );
     assert!(top(7.0) > 100.0, "rapids stay rapids");
     let programmed = Scenario::text(CUT).with(&["--dry-run"]).run();
     programmed.assert_within_limits();
-    assert!(programmed.column("feed_mm_s").iter().zip(programmed.column("line")).all(|(f, l)| l != 5.0 || *f < 10.001));
+    assert!(
+        programmed
+            .column("feed_mm_s")
+            .iter()
+            .zip(programmed.column("line"))
+            .all(|(f, l)| l != 5.0 || *f < 10.001)
+    );
 }
 
 #[test]
@@ -117,7 +184,11 @@ fn m64_comes_to_rest_and_m62_does_not() {
         done.assert_within_limits();
         let (feed, x) = (done.column("feed_mm_s"), done.column("x_cmd_mm"));
         let slowest = |at: f64| {
-            let near = feed.iter().zip(&x).filter(|(_, x)| (**x - at).abs() < 2.0).map(|(feed, _)| *feed);
+            let near = feed
+                .iter()
+                .zip(&x)
+                .filter(|(_, x)| (**x - at).abs() < 2.0)
+                .map(|(feed, _)| *feed);
             near.fold(f64::INFINITY, f64::min)
         };
         assert_eq!(slowest(10.0) < 1.0, rests, "{word}: {}", slowest(10.0));

@@ -27,7 +27,12 @@ pub fn program(seed: u64) -> String {
 fn element(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
     match random.below(12) {
         0 => writeln!(text, "F{:.0}", random.between(50.0, 15000.0)).unwrap(),
-        1 => writeln!(text, "{}", ["G61", "G64", "G61.1", "G64 P0.02"][random.below(4) as usize]).unwrap(),
+        1 => writeln!(
+            text,
+            "{}",
+            ["G61", "G64", "G61.1", "G64 P0.02"][random.below(4) as usize]
+        )
+        .unwrap(),
         2 => writeln!(text, "G4 P{:.3}", random.between(0.0, 0.02)).unwrap(),
         3 => line(random, at, text, "G0", 30.0),
         4 => arc(random, at, text),
@@ -41,7 +46,11 @@ fn element(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
 fn line(random: &mut Random, at: &mut [f64; 3], text: &mut String, word: &str, reach: f64) {
     let axes = random.below(7) + 1;
     write!(text, "{word}").unwrap();
-    for (axis, letter) in "XYZ".chars().enumerate().filter(|(axis, _)| axes >> axis & 1 == 1) {
+    for (axis, letter) in "XYZ"
+        .chars()
+        .enumerate()
+        .filter(|(axis, _)| axes >> axis & 1 == 1)
+    {
         at[axis] = (at[axis] + random.between(-reach, reach)).clamp(-60.0, 60.0);
         write!(text, " {letter}{:.6}", at[axis]).unwrap();
         at[axis] = format!("{:.6}", at[axis]).parse().unwrap();
@@ -52,8 +61,11 @@ fn line(random: &mut Random, at: &mut [f64; 3], text: &mut String, word: &str, r
 /// A full circle or helix in one of the planes; it ends where it began in the plane.
 fn arc(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
     let word = if random.below(2) == 0 { "G2" } else { "G3" };
-    let (plane, first, second, across) =
-        [("G17", 'I', 'J', 2), ("G18", 'I', 'K', 1), ("G19", 'J', 'K', 0)][random.below(3) as usize];
+    let (plane, first, second, across) = [
+        ("G17", 'I', 'J', 2),
+        ("G18", 'I', 'K', 1),
+        ("G19", 'J', 'K', 0),
+    ][random.below(3) as usize];
     let (a, b) = (random.between(-8.0, 8.0), random.between(0.1, 8.0));
     write!(text, "{plane} {word} {first}{a:.4} {second}{b:.4}").unwrap();
     if random.below(2) == 0 {
@@ -66,8 +78,11 @@ fn arc(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
 
 /// A stretch of short chords along a bending path, as CAM writes it.
 fn chords(random: &mut Random, at: &mut [f64; 3], text: &mut String) {
-    let (mut angle, bend, step) =
-        (random.between(0.0, std::f64::consts::TAU), random.between(-0.2, 0.2), random.between(0.005, 0.4));
+    let (mut angle, bend, step) = (
+        random.between(0.0, std::f64::consts::TAU),
+        random.between(-0.2, 0.2),
+        random.between(0.005, 0.4),
+    );
     for _ in 0..random.below(60) + 5 {
         angle += bend;
         at[0] = (at[0] + step * angle.cos()).clamp(-60.0, 60.0);
@@ -99,7 +114,10 @@ fn random_holds_and_stalls_keep_the_limits() {
     for_each_seed("random_holds_and_stalls_keep_the_limits", 150, |seed| {
         let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
         attempted(|| {
-            Scenario::text(&program(seed)).commands(&lines).run().assert_within_limits();
+            Scenario::text(&program(seed))
+                .commands(&lines)
+                .run()
+                .assert_within_limits();
         })
     });
 }
@@ -143,7 +161,12 @@ fn program_with_constants(seed: u64) -> String {
     for line in program(seed).lines() {
         text.push_str(line);
         if line.starts_with("G1") && random.below(5) == 0 {
-            write!(text, " TA{}", [1, 2, 5, 10, 20, 50, 80, 150][random.below(8) as usize]).unwrap();
+            write!(
+                text,
+                " TA{}",
+                [1, 2, 5, 10, 20, 50, 80, 150][random.below(8) as usize]
+            )
+            .unwrap();
         }
         text.push('\n');
     }
@@ -153,29 +176,46 @@ fn program_with_constants(seed: u64) -> String {
 #[test]
 fn random_programs_overlap_within_limits_and_tolerance() {
     let blocks = AtomicU64::new(0);
-    for_each_seed("random_programs_overlap_within_limits_and_tolerance", 160, |seed| {
-        attempted(|| {
-            let limits = if seed % 4 == 0 { "stretch" } else { "slow" };
-            let option = format!("planner.options.limits={limits}");
-            let done = Scenario::text(&program_with_constants(seed)).with(OVERLAP).with(&["--set", &option]).run();
-            done.assert_within_tolerance();
-            assert_eq!(done.number("starvations"), 0.0);
-            blocks.fetch_add(done.number("blocks") as u64, Relaxed);
-        })
-    });
+    for_each_seed(
+        "random_programs_overlap_within_limits_and_tolerance",
+        160,
+        |seed| {
+            attempted(|| {
+                let limits = if seed % 4 == 0 { "stretch" } else { "slow" };
+                let option = format!("planner.options.limits={limits}");
+                let done = Scenario::text(&program_with_constants(seed))
+                    .with(OVERLAP)
+                    .with(&["--set", &option])
+                    .run();
+                done.assert_within_tolerance();
+                assert_eq!(done.number("starvations"), 0.0);
+                blocks.fetch_add(done.number("blocks") as u64, Relaxed);
+            })
+        },
+    );
     let judged = blocks.load(Relaxed);
     println!("{judged} blocks judged");
-    let all = ["TANDEM_SEED", "TANDEM_SEEDS"].iter().all(|name| std::env::var(name).is_err());
+    let all = ["TANDEM_SEED", "TANDEM_SEEDS"]
+        .iter()
+        .all(|name| std::env::var(name).is_err());
     assert!(judged >= 20_000 || !all, "{judged} blocks are too few");
 }
 
 #[test]
 fn random_holds_and_stalls_of_overlapping_blocks_keep_the_limits() {
-    for_each_seed("random_holds_and_stalls_of_overlapping_blocks_keep_the_limits", 80, |seed| {
-        let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
-        attempted(|| {
-            let text = program_with_constants(seed);
-            Scenario::text(&text).with(OVERLAP).commands(&lines).run().assert_within_tolerance();
-        })
-    });
+    for_each_seed(
+        "random_holds_and_stalls_of_overlapping_blocks_keep_the_limits",
+        80,
+        |seed| {
+            let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
+            attempted(|| {
+                let text = program_with_constants(seed);
+                Scenario::text(&text)
+                    .with(OVERLAP)
+                    .commands(&lines)
+                    .run()
+                    .assert_within_tolerance();
+            })
+        },
+    );
 }

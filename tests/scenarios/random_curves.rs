@@ -16,7 +16,11 @@ struct Program {
 /// `count` elements: curves in both dialects, smooth and hard to drive, between lines, arcs, rapids and dwells.
 pub fn program(seed: u64, count: u32) -> String {
     let text = String::from("G21 G90 G94 G17\nG64\nF4000\n");
-    let mut program = Program { random: Random::new(seed), at: [0.0; 3], text };
+    let mut program = Program {
+        random: Random::new(seed),
+        at: [0.0; 3],
+        text,
+    };
     for _ in 0..count {
         program.element();
     }
@@ -60,7 +64,11 @@ impl Program {
         for value in &mut place[..axes] {
             // Back from the border of the box: clamped points would lie on a line.
             let step = self.random.between(-reach, reach);
-            let to = if (*value + step).abs() > 50.0 { *value - step.abs() * value.signum() } else { *value + step };
+            let to = if (*value + step).abs() > 50.0 {
+                *value - step.abs() * value.signum()
+            } else {
+                *value + step
+            };
             *value = Self::rounded(to);
         }
         place
@@ -77,21 +85,37 @@ impl Program {
     }
 
     fn arc(&mut self) {
-        let (i, j) = (self.random.between(-6.0, 6.0), self.random.between(0.1, 6.0));
+        let (i, j) = (
+            self.random.between(-6.0, 6.0),
+            self.random.between(0.1, 6.0),
+        );
         writeln!(self.text, "G2 I{i:.4} J{j:.4}").unwrap();
     }
 
     fn quadratic(&mut self) {
-        let ([from, to], middle) = ([self.at, self.near(self.at, 8.0, 2)], self.near(self.at, 6.0, 2));
+        let ([from, to], middle) = (
+            [self.at, self.near(self.at, 8.0, 2)],
+            self.near(self.at, 6.0, 2),
+        );
         let [i, j] = [middle[0] - from[0], middle[1] - from[1]];
-        writeln!(self.text, "G5.1 X{:.4} Y{:.4} I{i:.4} J{j:.4}", to[0], to[1]).unwrap();
+        writeln!(
+            self.text,
+            "G5.1 X{:.4} Y{:.4} I{i:.4} J{j:.4}",
+            to[0], to[1]
+        )
+        .unwrap();
         self.at = to;
     }
 
     fn bezier(&mut self) {
         let to = self.near(self.at, 10.0, 2);
         let [i, j, p, q] = [6.0, 6.0, 6.0, 6.0].map(|reach| self.random.between(-reach, reach));
-        writeln!(self.text, "G5 X{:.4} Y{:.4} I{i:.4} J{j:.4} P{p:.4} Q{q:.4}", to[0], to[1]).unwrap();
+        writeln!(
+            self.text,
+            "G5 X{:.4} Y{:.4} I{i:.4} J{j:.4} P{p:.4} Q{q:.4}",
+            to[0], to[1]
+        )
+        .unwrap();
         self.at = to;
     }
 
@@ -118,7 +142,10 @@ impl Program {
 
     fn free_form(&mut self) {
         let order = self.random.below(4) + 3;
-        let (count, axes) = (order + self.random.below(12), 2 + self.random.below(2) as usize);
+        let (count, axes) = (
+            order + self.random.below(12),
+            2 + self.random.below(2) as usize,
+        );
         let reach = [0.3, 3.0, 12.0][self.random.below(3) as usize];
         let points = self.wander(count, reach, axes);
         self.curve(order, &points, |_| 1.0);
@@ -128,9 +155,19 @@ impl Program {
     fn smooth_on(&mut self) {
         let ([x, y, z], step) = (self.at, self.random.between(0.3, 4.0));
         // Along an axis, so that no rounding of the points makes a corner.
-        let along = if self.random.below(2) == 0 { [step, 0.0] } else { [0.0, step] };
+        let along = if self.random.below(2) == 0 {
+            [step, 0.0]
+        } else {
+            [0.0, step]
+        };
         let along = [along[0] * -x.signum(), along[1] * -y.signum()].map(Self::rounded);
-        let ahead = |n: f64| [Self::rounded(x + n * along[0]), Self::rounded(y + n * along[1]), z];
+        let ahead = |n: f64| {
+            [
+                Self::rounded(x + n * along[0]),
+                Self::rounded(y + n * along[1]),
+                z,
+            ]
+        };
         writeln!(self.text, "G1 {}", Self::words(ahead(1.0))).unwrap();
         if self.random.below(3) == 0 {
             let feed = self.random.between(300.0, 12_000.0);
@@ -148,7 +185,13 @@ impl Program {
         let ([x, y, z], to) = (self.at, self.near(self.at, 10.0, 2));
         let points: Vec<[f64; 3]> = (0..self.random.below(4) + 4)
             .map(|_| self.random.between(-0.5, 1.5))
-            .map(|share| [Self::rounded(x + share * (to[0] - x)), Self::rounded(y + share * (to[1] - y)), z])
+            .map(|share| {
+                [
+                    Self::rounded(x + share * (to[0] - x)),
+                    Self::rounded(y + share * (to[1] - y)),
+                    z,
+                ]
+            })
             .collect();
         self.curve(4, &points, |_| 1.0);
     }
@@ -158,7 +201,10 @@ impl Program {
         let some = self.wander(4, 5.0, 3);
         let mut points = Vec::new();
         for point in some {
-            points.extend(std::iter::repeat_n(point, self.random.below(3) as usize + 1));
+            points.extend(std::iter::repeat_n(
+                point,
+                self.random.below(3) as usize + 1,
+            ));
         }
         points.extend(self.wander(1, 5.0, 3));
         let order = 4.min(points.len() as u64);
@@ -166,7 +212,10 @@ impl Program {
     }
 
     fn weighted(&mut self) {
-        let (points, high) = (self.wander(7, 8.0, 2), [10.0, 100.0, 1000.0][self.random.below(3) as usize]);
+        let (points, high) = (
+            self.wander(7, 8.0, 2),
+            [10.0, 100.0, 1000.0][self.random.below(3) as usize],
+        );
         self.curve(4, &points, |n| if n % 3 == 1 { high } else { 1.0 });
     }
 
@@ -195,7 +244,9 @@ impl Program {
 
 fn on_the_demo_machine(text: &str, form: &str) -> Scenario {
     let machine = root().join("examples/machines/nurbs-demo.toml");
-    Scenario::text(text).on(&machine).with(&["--set", &format!("planner.options.form={form}")])
+    Scenario::text(text)
+        .on(&machine)
+        .with(&["--set", &format!("planner.options.form={form}")])
 }
 
 #[test]
@@ -215,30 +266,45 @@ fn random_curves_run_within_limits() {
 #[test]
 fn random_curves_are_held_and_overridden_within_limits() {
     for form in ["scan", "windowed"] {
-        for_each_seed("random_curves_are_held_and_overridden_within_limits", 2, |seed| {
-            attempted(|| {
-                let mut random = Random::new(seed);
-                let mut commands = String::new();
-                for n in 0..60 {
-                    let tick = 750 * n + random.below(500);
-                    match random.below(3) {
-                        0 => writeln!(commands, "{tick},hold\n{},resume", tick + 150).unwrap(),
-                        _ => writeln!(commands, "{tick},feed-override,{:.2}", random.between(0.3, 1.0)).unwrap(),
+        for_each_seed(
+            "random_curves_are_held_and_overridden_within_limits",
+            2,
+            |seed| {
+                attempted(|| {
+                    let mut random = Random::new(seed);
+                    let mut commands = String::new();
+                    for n in 0..60 {
+                        let tick = 750 * n + random.below(500);
+                        match random.below(3) {
+                            0 => writeln!(commands, "{tick},hold\n{},resume", tick + 150).unwrap(),
+                            _ => writeln!(
+                                commands,
+                                "{tick},feed-override,{:.2}",
+                                random.between(0.3, 1.0)
+                            )
+                            .unwrap(),
+                        }
                     }
-                }
-                let done = on_the_demo_machine(&program(seed, 200), form).commands(&commands).run();
-                assert_eq!(done.status(), 0, "{}", done.errors());
-                for count in
-                    ["limit_violations", "guard_stops", "starvations", "governed_samples", "jerk_relaxed_samples"]
-                {
-                    assert_eq!(done.number(count), 0.0, "{count}");
-                }
-                let verdict = done.judge(|options| {
-                    options.sample_tolerance_mm = Some(2e-6);
-                    options.vertex_tolerance_mm = Some(0.3);
-                });
-                assert!(verdict.passed(), "{verdict}");
-            })
-        });
+                    let done = on_the_demo_machine(&program(seed, 200), form)
+                        .commands(&commands)
+                        .run();
+                    assert_eq!(done.status(), 0, "{}", done.errors());
+                    for count in [
+                        "limit_violations",
+                        "guard_stops",
+                        "starvations",
+                        "governed_samples",
+                        "jerk_relaxed_samples",
+                    ] {
+                        assert_eq!(done.number(count), 0.0, "{count}");
+                    }
+                    let verdict = done.judge(|options| {
+                        options.sample_tolerance_mm = Some(2e-6);
+                        options.vertex_tolerance_mm = Some(0.3);
+                    });
+                    assert!(verdict.passed(), "{verdict}");
+                })
+            },
+        );
     }
 }

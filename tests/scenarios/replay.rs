@@ -7,7 +7,9 @@ pub fn for_each<T: std::fmt::Display + std::str::FromStr>(
     values: impl Iterator<Item = T>,
     mut attempt: impl FnMut(&T) -> Result<(), String>,
 ) {
-    let chosen = std::env::var(variable).ok().map(|text| text.parse().ok().expect("it is one of the test's values"));
+    let chosen = std::env::var(variable)
+        .ok()
+        .map(|text| text.parse().ok().expect("it is one of the test's values"));
     let values: Vec<T> = chosen.map_or_else(|| values.collect(), |value| vec![value]);
     for value in &values {
         attempt(value).unwrap_or_else(|cause| {
@@ -29,7 +31,8 @@ pub fn for_each_tick(
 
 /// Tries the seeds 1 to `count`, or the one that `TANDEM_SEED` names. `TANDEM_SEEDS` asks for another number of them.
 pub fn for_each_seed(test: &str, count: u64, mut attempt: impl FnMut(u64) -> Result<(), String>) {
-    let count = std::env::var("TANDEM_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"));
+    let count = std::env::var("TANDEM_SEEDS")
+        .map_or(count, |text| text.parse().expect("a number of seeds"));
     println!("{test}: seeds 1 to {count}, or TANDEM_SEED");
     for_each("TANDEM_SEED", test, 1..=count, |seed| attempt(*seed));
 }

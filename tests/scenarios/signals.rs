@@ -5,13 +5,18 @@ use std::process::Command;
 use crate::operator::{LONG, Running, command, is_moving};
 
 /// Those whose default is to end the process, with the first and the last of the real-time signals.
-const STOPS: [&str; 15] =
-    ["INT", "TERM", "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT", "34", "64"];
+const STOPS: [&str; 15] = [
+    "INT", "TERM", "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR",
+    "STKFLT", "34", "64",
+];
 const IGNORED: [&str; 5] = ["TSTP", "TTIN", "TTOU", "PIPE", "XFSZ"];
 
 fn send(run: &mut Running, signal: &str) {
     let pid = run.child().id().to_string();
-    let sent = Command::new("bash").args(["-c", &format!("kill -{signal} {pid}")]).status().unwrap();
+    let sent = Command::new("bash")
+        .args(["-c", &format!("kill -{signal} {pid}")])
+        .status()
+        .unwrap();
     assert!(sent.success(), "{signal}");
 }
 
@@ -29,7 +34,10 @@ fn every_signal_that_would_end_the_process_stops_the_machine_on_the_path() {
             client.wait("moving", is_moving);
             send(&mut run, signal);
             let last = client.hear();
-            assert!(last["ended"]["stopped"].is_string() && last["ended"]["fault"].is_null(), "{signal}: {last}");
+            assert!(
+                last["ended"]["stopped"].is_string() && last["ended"]["fault"].is_null(),
+                "{signal}: {last}"
+            );
             let (output, run) = run.finish();
             assert_eq!(output.status.code(), Some(3), "{signal}");
             run.assert_sound();
@@ -45,7 +53,9 @@ fn signals_that_would_put_the_process_to_sleep_change_nothing() {
     for signal in IGNORED {
         send(&mut run, signal);
     }
-    client.wait("moving on", |status| is_moving(status) && status["tick"].as_u64().unwrap() > before + 200);
+    client.wait("moving on", |status| {
+        is_moving(status) && status["tick"].as_u64().unwrap() > before + 200
+    });
     client.command("emergency-stop");
     run.finish();
 }

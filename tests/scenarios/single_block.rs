@@ -10,7 +10,10 @@ fn rests(done: &Done) -> Vec<(f64, f64, f64)> {
     let (feed, line) = (done.column("feed_mm_s"), done.column("line"));
     let (x, y) = (done.column("x_cmd_mm"), done.column("y_cmd_mm"));
     let begins = |i: &usize| feed[*i] == 0.0 && feed[i - 1] > 0.0;
-    (1..feed.len()).filter(begins).map(|i| (line[i], x[i], y[i])).collect()
+    (1..feed.len())
+        .filter(begins)
+        .map(|i| (line[i], x[i], y[i]))
+        .collect()
 }
 
 fn run(commands: &str) -> Done {
@@ -23,7 +26,14 @@ fn run(commands: &str) -> Done {
 fn every_line_ends_at_a_rest() {
     let resumes: Vec<String> = (1..8).map(|n| format!("{},resume", 1500 * n)).collect();
     let done = run(&format!("0,single-block,1\n{}\n", resumes.join("\n")));
-    let ends = [(10.0, 0.0), (20.0, 0.0), (30.0, 1.0), (40.0, 11.0), (0.0, 0.0), (5.0, 0.0)];
+    let ends = [
+        (10.0, 0.0),
+        (20.0, 0.0),
+        (30.0, 1.0),
+        (40.0, 11.0),
+        (0.0, 0.0),
+        (5.0, 0.0),
+    ];
     let rests = rests(&done);
     assert_eq!(rests.len(), ends.len(), "{rests:?}");
     for ((line, x, y), (end_x, end_y)) in rests.iter().zip(ends) {
@@ -35,18 +45,33 @@ fn every_line_ends_at_a_rest() {
 #[test]
 fn switched_on_in_motion_it_stops_at_the_first_line_end_that_can_be_met() {
     for tick in (10..900).step_by(37) {
-        let done = run(&format!("{tick},single-block,1\n2500,single-block,0\n2501,resume\n"));
+        let done = run(&format!(
+            "{tick},single-block,1\n2500,single-block,0\n2501,resume\n"
+        ));
         let (x, y) = (done.column("x_cmd_mm")[2400], done.column("y_cmd_mm")[2400]);
-        let ends = [(10.0, 0.0), (20.0, 0.0), (30.0, 1.0), (40.0, 11.0), (0.0, 0.0)];
-        assert!(ends.iter().any(|(a, b)| (x - a).hypot(y - b) < 0.011), "{tick}: at {x} {y}");
+        let ends = [
+            (10.0, 0.0),
+            (20.0, 0.0),
+            (30.0, 1.0),
+            (40.0, 11.0),
+            (0.0, 0.0),
+        ];
+        assert!(
+            ends.iter().any(|(a, b)| (x - a).hypot(y - b) < 0.011),
+            "{tick}: at {x} {y}"
+        );
     }
 }
 
 #[test]
 fn short_lines_are_passed_until_one_can_be_met() {
-    let lines: Vec<String> = (1..400).map(|n| format!("G1 X{:.3}", 0.05 * f64::from(n))).collect();
+    let lines: Vec<String> = (1..400)
+        .map(|n| format!("G1 X{:.3}", 0.05 * f64::from(n)))
+        .collect();
     let text = format!("G21 G90 G64\nF3000\n{}\nM2\n", lines.join("\n"));
-    let done = Scenario::text(&text).commands("200,single-block,1\n1000,single-block,0\n1001,resume\n").run();
+    let done = Scenario::text(&text)
+        .commands("200,single-block,1\n1000,single-block,0\n1001,resume\n")
+        .run();
     done.assert_within_limits();
     let x = done.column("x_cmd_mm")[900];
     let from_end = (x / 0.05 - (x / 0.05).round()).abs() * 0.05;
@@ -74,13 +99,20 @@ fn with_a_jerk_limit_it_rests_at_every_line_too() {
     for form in ["scan", "windowed"] {
         let machine = root().join("examples/machines/nurbs-demo.toml");
         let form = format!("planner.options.form={form}");
-        let done = Scenario::text(TANGENT).on(&machine).with(&["--set", &form]).commands(&commands).run();
+        let done = Scenario::text(TANGENT)
+            .on(&machine)
+            .with(&["--set", &form])
+            .commands(&commands)
+            .run();
         done.assert_within_limits();
         let (x, y) = (done.column("x_cmd_mm"), done.column("y_cmd_mm"));
         for (n, (end_x, end_y)) in TANGENT_ENDS.iter().enumerate() {
             // Just before it goes on.
             let off = (x[500 * (n + 1) - 5] - end_x).hypot(y[500 * (n + 1) - 5] - end_y);
-            assert!(off < 0.05, "{form}: rest {n} is {off} mm off the end of its line");
+            assert!(
+                off < 0.05,
+                "{form}: rest {n} is {off} mm off the end of its line"
+            );
         }
     }
 }

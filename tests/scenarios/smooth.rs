@@ -23,7 +23,13 @@ fn strict(options: &mut Options) {
 
 fn assert_strict(done: &Done) {
     assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in ["limit_violations", "guard_stops", "governed_samples", "jerk_relaxed_samples", "starvations"] {
+    for count in [
+        "limit_violations",
+        "guard_stops",
+        "governed_samples",
+        "jerk_relaxed_samples",
+        "starvations",
+    ] {
         assert_eq!(done.number(count), 0.0, "{count}");
     }
     let verdict = done.judge(strict);
@@ -32,11 +38,22 @@ fn assert_strict(done: &Done) {
 
 #[test]
 fn programs_are_driven_near_the_best_time_within_limits() {
-    for (name, most_s) in [("square", 1.41), ("serpentine", 2.82), ("raster", 28.95), ("spiral", 20.30)] {
-        let done = Scenario::of(&root().join(format!("examples/programs/{name}.ngc"))).on(&machine()).run();
+    for (name, most_s) in [
+        ("square", 1.41),
+        ("serpentine", 2.82),
+        ("raster", 28.95),
+        ("spiral", 20.30),
+    ] {
+        let done = Scenario::of(&root().join(format!("examples/programs/{name}.ngc")))
+            .on(&machine())
+            .run();
         assert_strict(&done);
         println!("{name}: {:.3} s", done.number("motion_time_s"));
-        assert!(done.number("motion_time_s") <= most_s, "{name}: {} s", done.number("motion_time_s"));
+        assert!(
+            done.number("motion_time_s") <= most_s,
+            "{name}: {} s",
+            done.number("motion_time_s")
+        );
     }
 }
 
@@ -128,7 +145,13 @@ fn feeds_that_alternate_hold_up_to_where_they_change() {
     for (low, high, length_mm) in [(600, 9000, 2.0), (100, 9000, 0.4), (20, 9000, 0.4)] {
         let mut program = "G21 G90 G94 G17 G64 P0.01\n".to_string();
         for n in 1..20 {
-            writeln!(program, "G1 X{:.1} F{}", length_mm * f64::from(n), if n % 2 == 1 { low } else { high }).unwrap();
+            writeln!(
+                program,
+                "G1 X{:.1} F{}",
+                length_mm * f64::from(n),
+                if n % 2 == 1 { low } else { high }
+            )
+            .unwrap();
         }
         assert_strict(&Scenario::text(&(program + "M2\n")).on(&machine()).run());
     }
@@ -136,7 +159,11 @@ fn feeds_that_alternate_hold_up_to_where_they_change() {
 
 #[test]
 fn a_curve_is_driven_inside_the_tolerance() {
-    assert_strict(&Scenario::of(&root().join("tests/fixtures/programs/butterfly.ngc")).on(&machine()).run());
+    assert_strict(
+        &Scenario::of(&root().join("tests/fixtures/programs/butterfly.ngc"))
+            .on(&machine())
+            .run(),
+    );
 }
 
 /// Corners, arcs, short lines and a rapid, with a tolerance that a policy lowers.
@@ -160,7 +187,11 @@ M2
 fn with_policy(script: &str, parameters: &[&str]) -> Done {
     let script = format!("policy.script={}", root().join(script).display());
     let settings = parameters.iter().flat_map(|setting| ["--set", setting]);
-    Scenario::text(POLICY).on(&machine()).with(&["--set", &script]).with(&settings.collect::<Vec<_>>()).run()
+    Scenario::text(POLICY)
+        .on(&machine())
+        .with(&["--set", &script])
+        .with(&settings.collect::<Vec<_>>())
+        .run()
 }
 
 #[test]
@@ -171,25 +202,47 @@ fn a_tolerance_that_a_policy_lowers_is_kept() {
     };
     let plain = Scenario::text(POLICY).on(&machine()).run();
     assert_strict(&plain);
-    assert!(!plain.judge(within_2_um).passed(), "without the policy the tolerance of the program is used");
+    assert!(
+        !plain.judge(within_2_um).passed(),
+        "without the policy the tolerance of the program is used"
+    );
     let done = with_policy("tests/fixtures/policies/good/close.wat", &[]);
     assert_strict(&done);
     let verdict = done.judge(within_2_um);
     assert!(verdict.passed(), "{verdict}");
     assert!(done.number("motion_time_s") > plain.number("motion_time_s"));
-    assert!(done.errors().contains("policy: line 3: path tolerance 0.02 -> 0.002 mm"), "{}", done.errors());
+    assert!(
+        done.errors()
+            .contains("policy: line 3: path tolerance 0.02 -> 0.002 mm"),
+        "{}",
+        done.errors()
+    );
 }
 
 #[test]
 fn a_feed_that_a_policy_caps_is_kept() {
-    let done = with_policy("scripts/policies/material-feed.wasm", &["policy.parameters.material=3"]);
+    let done = with_policy(
+        "scripts/policies/material-feed.wasm",
+        &["policy.parameters.material=3"],
+    );
     assert_strict(&done);
-    let rows = done.column("feed_mm_s").into_iter().zip(done.column("line"));
-    let fastest = rows.filter(|(_, line)| *line != 8.0).fold(0.0, |most: f64, (feed, _)| most.max(feed));
+    let rows = done
+        .column("feed_mm_s")
+        .into_iter()
+        .zip(done.column("line"));
+    let fastest = rows
+        .filter(|(_, line)| *line != 8.0)
+        .fold(0.0, |most: f64, (feed, _)| most.max(feed));
     let cap = 800.0 / 60.0;
-    assert!(fastest <= cap * (1.0 + 1e-6) && fastest > 0.99 * cap, "{fastest} mm/s of {cap}");
+    assert!(
+        fastest <= cap * (1.0 + 1e-6) && fastest > 0.99 * cap,
+        "{fastest} mm/s of {cap}"
+    );
     let blocks = std::fs::read_to_string(done.file("blocks.csv")).unwrap();
-    assert!(blocks.lines().any(|line| line.contains(",policy,")), "{blocks}");
+    assert!(
+        blocks.lines().any(|line| line.contains(",policy,")),
+        "{blocks}"
+    );
 }
 
 fn bench(text: &str) -> Bench {
@@ -206,7 +259,9 @@ fn check(bench: &Bench, ran: &Ran) -> Result<(), String> {
     };
     passed(&bench.judge(ran, judge))?;
     let relaxed = ran.outcome.summary.jerk_relaxed_samples;
-    (relaxed == 0).then_some(()).ok_or(format!("{relaxed} samples beyond the jerk limit"))
+    (relaxed == 0)
+        .then_some(())
+        .ok_or(format!("{relaxed} samples beyond the jerk limit"))
 }
 
 #[test]
@@ -223,18 +278,27 @@ fn random_programs_run_smoothly_within_limits() {
 
 #[test]
 fn smooth_holds_at_every_tick() {
-    let text = std::fs::read_to_string(root().join("tests/fixtures/programs/every-tick.ngc")).unwrap();
+    let text =
+        std::fs::read_to_string(root().join("tests/fixtures/programs/every-tick.ngc")).unwrap();
     let bench = bench(&text);
     let free = bench.run("");
     check(&bench, &free).unwrap();
     let mut worst = 0.0f64;
-    for_each_tick("smooth_holds_at_every_tick", 1..free.samples.len() - 1, |tick| {
-        let ran = bench.run(&format!("{tick},hold\n{},resume", tick + 400));
-        check(&bench, &ran)?;
-        worst = worst.max(jerk_share(&ran));
-        let stood = ran.samples[tick + 300..tick + 400].iter().all(|sample| sample.feed_mm_per_s == 0.0);
-        stood.then_some(()).ok_or("it does not stand still".to_string())
-    });
+    for_each_tick(
+        "smooth_holds_at_every_tick",
+        1..free.samples.len() - 1,
+        |tick| {
+            let ran = bench.run(&format!("{tick},hold\n{},resume", tick + 400));
+            check(&bench, &ran)?;
+            worst = worst.max(jerk_share(&ran));
+            let stood = ran.samples[tick + 300..tick + 400]
+                .iter()
+                .all(|sample| sample.feed_mm_per_s == 0.0);
+            stood
+                .then_some(())
+                .ok_or("it does not stand still".to_string())
+        },
+    );
     println!("{worst:.4} of the jerk limit at most");
 }
 
@@ -243,13 +307,26 @@ fn smooth_holds_at_every_tick() {
 fn smooth_holds_in_zigzags() {
     let mut text = "G21 G90 G64 P0.01\nF3000\n".to_string();
     for n in 1..20 {
-        writeln!(text, "G1 X{} Y{}", 0.35 * f64::from(n), 0.35 * f64::from(n % 2)).unwrap();
+        writeln!(
+            text,
+            "G1 X{} Y{}",
+            0.35 * f64::from(n),
+            0.35 * f64::from(n % 2)
+        )
+        .unwrap();
     }
     let bench = bench(&(text + "M2\n"));
     let free = bench.run("");
-    for_each_tick("smooth_holds_in_zigzags", (1..free.samples.len() - 1).step_by(3), |tick| {
-        check(&bench, &bench.run(&format!("{tick},hold\n{},resume", tick + 400)))
-    });
+    for_each_tick(
+        "smooth_holds_in_zigzags",
+        (1..free.samples.len() - 1).step_by(3),
+        |tick| {
+            check(
+                &bench,
+                &bench.run(&format!("{tick},hold\n{},resume", tick + 400)),
+            )
+        },
+    );
 }
 
 /// Corners of 90 degrees at the end of long lines, where resuming takes as long as the plan has jerk to spare.
@@ -257,9 +334,16 @@ fn smooth_holds_in_zigzags() {
 fn smooth_holds_on_the_square() {
     let bench = Bench::of(&root().join("examples/programs/square.ngc")).on(&machine());
     let free = bench.run("");
-    for_each_tick("smooth_holds_on_the_square", (2..free.samples.len() - 1).step_by(3), |tick| {
-        check(&bench, &bench.run(&format!("{tick},hold\n{},resume", tick + 400)))
-    });
+    for_each_tick(
+        "smooth_holds_on_the_square",
+        (2..free.samples.len() - 1).step_by(3),
+        |tick| {
+            check(
+                &bench,
+                &bench.run(&format!("{tick},hold\n{},resume", tick + 400)),
+            )
+        },
+    );
 }
 
 /// The largest jerk of the samples as a share of the limit.
@@ -274,17 +358,22 @@ fn jerk_share(ran: &Ran) -> f64 {
 
 #[test]
 fn the_ring_runs_dry_smoothly_wherever_the_rough_loop_can_be_late() {
-    let text = std::fs::read_to_string(root().join("tests/fixtures/programs/every-tick.ngc")).unwrap();
+    let text =
+        std::fs::read_to_string(root().join("tests/fixtures/programs/every-tick.ngc")).unwrap();
     let bench = bench(&text);
     let free = bench.run("");
     let mut starved = 0;
-    for_each_tick("the_ring_runs_dry_smoothly", (0..free.samples.len()).step_by(8), |tick| {
-        let ran = bench.run(&format!("{tick},stall-rough,100"));
-        starved += ran.outcome.summary.starvations;
-        check(&bench, &ran)?;
-        let same = ran.ends() == free.ends();
-        same.then_some(()).ok_or("it ends elsewhere".to_string())
-    });
+    for_each_tick(
+        "the_ring_runs_dry_smoothly",
+        (0..free.samples.len()).step_by(8),
+        |tick| {
+            let ran = bench.run(&format!("{tick},stall-rough,100"));
+            starved += ran.outcome.summary.starvations;
+            check(&bench, &ran)?;
+            let same = ran.ends() == free.ends();
+            same.then_some(()).ok_or("it ends elsewhere".to_string())
+        },
+    );
     println!("starved {starved} times");
     assert!(starved > 20 || std::env::var("TANDEM_TICK").is_ok());
 }
@@ -298,7 +387,12 @@ fn override_steps_are_followed_smoothly() {
         let mut tick = 0;
         for _ in 0..6 {
             tick += 1 + random.below(400);
-            writeln!(lines, "{tick},feed-override,{:.3}", random.between(0.0, 1.0)).unwrap();
+            writeln!(
+                lines,
+                "{tick},feed-override,{:.3}",
+                random.between(0.0, 1.0)
+            )
+            .unwrap();
             tick += 150;
         }
         writeln!(lines, "{tick},feed-override,1").unwrap();
@@ -320,11 +414,22 @@ fn the_summary_measures_micro_blocks_as_brute_force_does() {
     }
     let done = Scenario::text(&(text + "M2\n")).on(&machine()).run();
     assert_strict(&done);
-    let samples = done.column("x_cmd_mm").into_iter().zip(done.column("y_cmd_mm"));
-    let off = |(x, y): (f64, f64)| points.windows(2).map(|c| to_chord([x, y], c)).fold(f64::INFINITY, f64::min);
+    let samples = done
+        .column("x_cmd_mm")
+        .into_iter()
+        .zip(done.column("y_cmd_mm"));
+    let off = |(x, y): (f64, f64)| {
+        points
+            .windows(2)
+            .map(|c| to_chord([x, y], c))
+            .fold(f64::INFINITY, f64::min)
+    };
     let worst = samples.map(off).fold(0.0, f64::max);
     let said = done.number("max_path_deviation_mm");
-    assert!((said - worst).abs() < 1e-8, "{said} mm instead of {worst} mm");
+    assert!(
+        (said - worst).abs() < 1e-8,
+        "{said} mm instead of {worst} mm"
+    );
 }
 
 /// Distance of a point from a chord, mm.

@@ -9,18 +9,27 @@ use crate::replay::for_each_seed;
 
 #[test]
 fn a_stalled_rough_loop_stops_the_machine_on_the_path() {
-    for (program, step) in [("square.ngc", 57), ("serpentine.ngc", 211), ("spiral.ngc", 3001)] {
+    for (program, step) in [
+        ("square.ngc", 57),
+        ("serpentine.ngc", 211),
+        ("spiral.ngc", 3001),
+    ] {
         let path = root().join("examples/programs").join(program);
         let free = Scenario::of(&path).run();
         let ticks = free.number("samples") as usize;
         let mut starved = 0.0;
         for tick in (20..ticks).step_by(step) {
-            let done = Scenario::of(&path).commands(&format!("{tick},stall-rough,100\n")).run();
+            let done = Scenario::of(&path)
+                .commands(&format!("{tick},stall-rough,100\n"))
+                .run();
             done.assert_within_limits();
             assert_eq!(done.number("blocks"), free.number("blocks"));
             starved += done.number("starvations");
         }
-        assert!(starved > 0.0, "{program}: no stall was long enough to matter");
+        assert!(
+            starved > 0.0,
+            "{program}: no stall was long enough to matter"
+        );
     }
 }
 
@@ -35,15 +44,22 @@ fn a_short_stall_is_not_noticed() {
 
 #[test]
 fn blocks_of_a_thousandth_do_not_starve() {
-    let lines: Vec<String> = (1..4000).map(|i| format!("G1 X{:.4}", f64::from(i) * 0.001)).collect();
+    let lines: Vec<String> = (1..4000)
+        .map(|i| format!("G1 X{:.4}", f64::from(i) * 0.001))
+        .collect();
     let done = Scenario::text(&format!("G21 G90 G64\nF15000\n{}\nM2\n", lines.join("\n"))).run();
     done.assert_within_limits();
     assert_eq!(done.number("starvations"), 0.0);
 }
 
 /// The built-in planners, and whether they keep every limit.
-const PLANNERS: [(&str, bool); 5] =
-    [("look-ahead", true), ("block-overlap", true), ("smooth", true), ("nurbs", true), ("after-interpolation", false)];
+const PLANNERS: [(&str, bool); 5] = [
+    ("look-ahead", true),
+    ("block-overlap", true),
+    ("smooth", true),
+    ("nurbs", true),
+    ("after-interpolation", false),
+];
 
 /// A run-up as long as the machine needs to its feed, and then a bend that costs no speed, in blocks that take a fraction
 /// of a fine period each: a ring of a fixed size holds next to no program time of them.
@@ -51,7 +67,11 @@ fn tiny_chords(drawn: &Drawn, random: &mut Random) -> String {
     let chord_mm = drawn.feed_mm_per_s * drawn.fine_s / log_between(random, 3.0, 100.0);
     let blocks = (200.0 / chord_mm).min(8000.0) as u32;
     let radius_mm = drawn.feed_mm_per_s.powi(2) / (0.2 * drawn.acceleration_mm_per_s2);
-    let mut text = format!("G21 G90 G64 P{:.4}\nF{}\n", log_between(random, 1e-3, 0.1), drawn.feed_mm_per_s * 60.0);
+    let mut text = format!(
+        "G21 G90 G64 P{:.4}\nF{}\n",
+        log_between(random, 1e-3, 0.1),
+        drawn.feed_mm_per_s * 60.0
+    );
     writeln!(text, "G0 X-240\nG1 X{}", drawn.run_up_mm - 240.0).unwrap();
     for block in 1..=blocks {
         let angle = f64::from(block) * chord_mm / radius_mm;
@@ -79,11 +99,22 @@ struct Drawn {
 impl Drawn {
     fn new(random: &mut Random) -> Self {
         let fine_s = [125e-6, 250e-6, 370e-6, 1e-3, 1.3e-3, 2e-3][random.below(6) as usize];
-        let (feed_mm_per_s, run_up_mm) = (log_between(random, 10.0, 500.0), log_between(random, 10.0, 150.0));
+        let (feed_mm_per_s, run_up_mm) = (
+            log_between(random, 10.0, 500.0),
+            log_between(random, 10.0, 150.0),
+        );
         let acceleration_mm_per_s2 = feed_mm_per_s.powi(2) / (1.5 * run_up_mm);
-        let jerk_mm_per_s3 = acceleration_mm_per_s2.powi(2) / feed_mm_per_s * log_between(random, 1.0, 100.0);
+        let jerk_mm_per_s3 =
+            acceleration_mm_per_s2.powi(2) / feed_mm_per_s * log_between(random, 1.0, 100.0);
         let rough_periods = 1 + random.below(25);
-        Self { fine_s, rough_periods, feed_mm_per_s, run_up_mm, acceleration_mm_per_s2, jerk_mm_per_s3 }
+        Self {
+            fine_s,
+            rough_periods,
+            feed_mm_per_s,
+            run_up_mm,
+            acceleration_mm_per_s2,
+            jerk_mm_per_s3,
+        }
     }
 
     fn settings(&self, planner: &str) -> Vec<(String, String)> {
@@ -91,8 +122,14 @@ impl Drawn {
             ("planner.plugin".to_string(), planner.to_string()),
             ("guard.mode".to_string(), "count".to_string()),
             ("motion.jerk".to_string(), "report".to_string()),
-            ("loops.fine_period_ms".to_string(), format!("{}", self.fine_s * 1e3)),
-            ("loops.rough_period_ms".to_string(), format!("{}", self.fine_s * 1e3 * self.rough_periods as f64)),
+            (
+                "loops.fine_period_ms".to_string(),
+                format!("{}", self.fine_s * 1e3),
+            ),
+            (
+                "loops.rough_period_ms".to_string(),
+                format!("{}", self.fine_s * 1e3 * self.rough_periods as f64),
+            ),
         ];
         for axis in ["x", "y", "z"] {
             for (key, value) in [
@@ -110,19 +147,28 @@ impl Drawn {
 
 #[test]
 fn no_planner_starves_on_any_machine_where_the_rough_loop_is_never_late() {
-    for_each_seed("no_planner_starves_on_any_machine_where_the_rough_loop_is_never_late", 6, |seed| {
-        let wrong: Vec<String> = PLANNERS.into_iter().filter_map(|planner| starved(seed, planner).err()).collect();
-        wrong.is_empty().then_some(()).ok_or(wrong.join("\n"))
-    });
+    for_each_seed(
+        "no_planner_starves_on_any_machine_where_the_rough_loop_is_never_late",
+        6,
+        |seed| {
+            let wrong: Vec<String> = PLANNERS
+                .into_iter()
+                .filter_map(|planner| starved(seed, planner).err())
+                .collect();
+            wrong.is_empty().then_some(()).ok_or(wrong.join("\n"))
+        },
+    );
 }
 
 fn starved(seed: u64, (planner, keeps_limits): (&str, bool)) -> Result<(), String> {
     let mut random = Random::new(seed);
     let drawn = Drawn::new(&mut random);
     let settings = drawn.settings(planner);
-    let bench =
-        Bench::text(&tiny_chords(&drawn, &mut random)).on(&root().join("examples/machines/mill-3axis-smooth.toml"));
-    let ran = bench.try_run(&settings).map_err(|e| format!("{planner}: {e}"))?;
+    let bench = Bench::text(&tiny_chords(&drawn, &mut random))
+        .on(&root().join("examples/machines/mill-3axis-smooth.toml"));
+    let ran = bench
+        .try_run(&settings)
+        .map_err(|e| format!("{planner}: {e}"))?;
     let summary = &ran.outcome.summary;
     println!(
         "seed {seed} {planner}: {:.3} s, {} of {} samples limited by the queue, {} starvations",
@@ -131,9 +177,16 @@ fn starved(seed: u64, (planner, keeps_limits): (&str, bool)) -> Result<(), Strin
     if let Some(fault) = &summary.fault {
         return Err(format!("{planner} {settings:?}: {fault}"));
     }
-    let limits = if keeps_limits { summary.governed_samples } else { 0 };
+    let limits = if keeps_limits {
+        summary.governed_samples
+    } else {
+        0
+    };
     if summary.starvations + limits > 0 {
-        return Err(format!("{planner} {settings:?}: {} starvations, {limits} governed", summary.starvations));
+        return Err(format!(
+            "{planner} {settings:?}: {} starvations, {limits} governed",
+            summary.starvations
+        ));
     }
     Ok(())
 }

@@ -5,9 +5,16 @@ use std::process::{Command, Output};
 
 fn state(folder: &Path, command: &str, more: &[&str]) -> Output {
     let mut tandem = Command::new(env!("CARGO_BIN_EXE_tandem"));
-    let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
-    tandem.args(["state", command, "--machine"]).arg(machine).args(more);
-    tandem.current_dir(folder).env_remove("STATE_DIRECTORY").env("XDG_STATE_HOME", folder.join("kept"));
+    let machine =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    tandem
+        .args(["state", command, "--machine"])
+        .arg(machine)
+        .args(more);
+    tandem
+        .current_dir(folder)
+        .env_remove("STATE_DIRECTORY")
+        .env("XDG_STATE_HOME", folder.join("kept"));
     tandem.output().unwrap()
 }
 
@@ -19,17 +26,32 @@ fn text(bytes: &[u8]) -> String {
 fn a_shops_files_come_in_and_go_out() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    std::fs::write(folder.join("shop.var"), "500 2.5\n5220 2\n5221 10\n5224 3\n5241 1.5\n").unwrap();
+    std::fs::write(
+        folder.join("shop.var"),
+        "500 2.5\n5220 2\n5221 10\n5224 3\n5241 1.5\n",
+    )
+    .unwrap();
     std::fs::write(folder.join("tool.tbl"), "T3 P1 Z+20.5 D6 ;end mill\n").unwrap();
     let nothing = state(folder, "show", &[]);
     assert_eq!(nothing.status.code(), Some(1));
-    assert!(text(&nothing.stderr).contains("there is no such file"), "{}", text(&nothing.stderr));
+    assert!(
+        text(&nothing.stderr).contains("there is no such file"),
+        "{}",
+        text(&nothing.stderr)
+    );
 
-    let import = state(folder, "import", &["--var", "shop.var", "--tools", "tool.tbl", "--unit", "inch"]);
+    let import = state(
+        folder,
+        "import",
+        &["--var", "shop.var", "--tools", "tool.tbl", "--unit", "inch"],
+    );
     let said = text(&import.stderr);
     assert_eq!(import.status.code(), Some(0), "{said}");
     let warning = "shop.var:4: warning: #5224 = 3 was not taken over: the machine has no axis A";
-    assert!(said.contains(warning) && said.contains("1 tools, 1 parameters, 1 values not taken over"), "{said}");
+    assert!(
+        said.contains(warning) && said.contains("1 tools, 1 parameters, 1 values not taken over"),
+        "{said}"
+    );
 
     let shown = text(&state(folder, "show", &[]).stdout);
     for line in [
@@ -38,14 +60,29 @@ fn a_shops_files_come_in_and_go_out() {
         "#500 = 2.5",
         "T3  x_mm 0.0000  y_mm 0.0000  z_mm 520.7000  diameter_mm 152.4000  end mill",
     ] {
-        assert!(shown.lines().any(|shown| shown == line), "no line {line:?} in\n{shown}");
+        assert!(
+            shown.lines().any(|shown| shown == line),
+            "no line {line:?} in\n{shown}"
+        );
     }
 
-    let export = state(folder, "export", &["--var", "out.var", "--tools", "out.tbl", "--unit", "inch"]);
+    let export = state(
+        folder,
+        "export",
+        &["--var", "out.var", "--tools", "out.tbl", "--unit", "inch"],
+    );
     assert_eq!(export.status.code(), Some(0), "{}", text(&export.stderr));
     let variables = std::fs::read_to_string(folder.join("out.var")).unwrap();
-    for line in ["500\t2.500000000", "5220\t2.000000000", "5221\t10.000000000", "5241\t1.500000000"] {
-        assert!(variables.lines().any(|written| written == line), "no line {line:?} in\n{variables}");
+    for line in [
+        "500\t2.500000000",
+        "5220\t2.000000000",
+        "5221\t10.000000000",
+        "5241\t1.500000000",
+    ] {
+        assert!(
+            variables.lines().any(|written| written == line),
+            "no line {line:?} in\n{variables}"
+        );
     }
     let tools = std::fs::read_to_string(folder.join("out.tbl")).unwrap();
     assert_eq!(tools, "T3 P1 Z20.500000000 D6.000000000 ;end mill\n");
@@ -57,10 +94,18 @@ fn what_cannot_be_read_changes_nothing() {
     let folder = folder.path();
     std::fs::write(folder.join("good.var"), "500 1\n").unwrap();
     std::fs::write(folder.join("bad.var"), "500 2\n501 two\n").unwrap();
-    assert_eq!(state(folder, "import", &["--var", "good.var"]).status.code(), Some(0));
+    assert_eq!(
+        state(folder, "import", &["--var", "good.var"])
+            .status
+            .code(),
+        Some(0)
+    );
     let refused = state(folder, "import", &["--var", "bad.var"]);
     assert_eq!(refused.status.code(), Some(1));
-    assert_eq!(text(&refused.stderr), "bad.var:2: error: \"two\" is no number\n");
+    assert_eq!(
+        text(&refused.stderr),
+        "bad.var:2: error: \"two\" is no number\n"
+    );
     let shown = text(&state(folder, "show", &[]).stdout);
     assert!(shown.contains("#500 = 1\n"), "{shown}");
     // One of the two files must be named.
@@ -70,7 +115,10 @@ fn what_cannot_be_read_changes_nothing() {
 #[test]
 fn shells_and_man_know_every_command() {
     let print = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_tandem")).args(arguments).output().unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
+            .args(arguments)
+            .output()
+            .unwrap();
         assert!(output.status.success(), "{arguments:?}");
         text(&output.stdout)
     };
@@ -90,12 +138,21 @@ fn shells_and_man_know_every_command() {
     assert!(man.contains(".TH tandem 1"), "{man}");
     for shell in ["bash", "zsh", "fish"] {
         let completions = print(&["completions", shell]);
-        assert!(completions.contains("--machine") || completions.contains("-l machine"), "{shell}");
+        assert!(
+            completions.contains("--machine") || completions.contains("-l machine"),
+            "{shell}"
+        );
         for command in &commands {
-            assert!(completions.contains(command), "{shell} does not complete {command}");
+            assert!(
+                completions.contains(command),
+                "{shell} does not complete {command}"
+            );
         }
     }
     for command in &commands {
-        assert!(man.contains(&format!("TANDEM {}", command.to_uppercase())), "the page lacks {command}");
+        assert!(
+            man.contains(&format!("TANDEM {}", command.to_uppercase())),
+            "the page lacks {command}"
+        );
     }
 }

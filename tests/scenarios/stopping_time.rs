@@ -11,7 +11,10 @@ const ACCELERATION: [f64; 3] = [1000.0; 3];
 
 /// Periods from the hold to the standstill: the first sample of the hold to the first that does not move.
 fn stopping_periods(ran: &Ran, tick: usize) -> usize {
-    ran.samples[tick..].iter().position(|sample| sample.feed_mm_per_s == 0.0).unwrap()
+    ran.samples[tick..]
+        .iter()
+        .position(|sample| sample.feed_mm_per_s == 0.0)
+        .unwrap()
 }
 
 /// The program time of each sample of an undisturbed run, s.
@@ -38,11 +41,21 @@ fn worst(name: &str, text: &str, step: usize, most: f64) -> f64 {
     for tick in (1..free.samples.len() - 1).step_by(step) {
         let ran = bench.run(&format!("{tick},hold\n{},resume", tick + 500));
         ran.expect_clean().unwrap();
-        let (taken, best) = (stopping_periods(&ran, tick) as f64, optimal.time_s(times_s[tick - 1]) / PERIOD_S);
-        assert!(taken <= most * best + 3.0, "{name}, hold at {tick}: {taken} periods, {best} would do");
+        let (taken, best) = (
+            stopping_periods(&ran, tick) as f64,
+            optimal.time_s(times_s[tick - 1]) / PERIOD_S,
+        );
+        assert!(
+            taken <= most * best + 3.0,
+            "{name}, hold at {tick}: {taken} periods, {best} would do"
+        );
         if best >= LONG_PERIODS {
             runs += 1;
-            worst = if taken / best > worst.0 { (taken / best, tick) } else { worst };
+            worst = if taken / best > worst.0 {
+                (taken / best, tick)
+            } else {
+                worst
+            };
         }
     }
     assert!(runs > 20, "{runs} stops of {LONG_PERIODS} periods or more");
@@ -67,7 +80,12 @@ fn spiral() -> String {
     for turn in 0..5 {
         let radius = 2.0 + 1.5 * f64::from(turn);
         let high = low + 2.0 * radius;
-        writeln!(text, "G1 X12\nG3 X12 Y{high} Z{:.2} I0 J{radius}", 0.3 * f64::from(turn)).unwrap();
+        writeln!(
+            text,
+            "G1 X12\nG3 X12 Y{high} Z{:.2} I0 J{radius}",
+            0.3 * f64::from(turn)
+        )
+        .unwrap();
         low = high - 2.0 * radius - 1.5;
         writeln!(text, "G1 X0\nG3 X0 Y{low} I0 J{}", (low - high) / 2.0).unwrap();
     }
@@ -80,7 +98,13 @@ fn chords() -> String {
     for step in 0..700 {
         let angle = f64::from(step) * 0.018;
         let size = 0.5 + 0.5 * f64::from(step) / 700.0;
-        writeln!(text, "G1 X{:.4} Y{:.4}", 30.0 * size * angle.cos(), 12.5 * size * angle.sin()).unwrap();
+        writeln!(
+            text,
+            "G1 X{:.4} Y{:.4}",
+            30.0 * size * angle.cos(),
+            12.5 * size * angle.sin()
+        )
+        .unwrap();
     }
     text + "M2\n"
 }
@@ -90,7 +114,11 @@ fn corners() -> String {
     let mut text = String::from("G21 G90 G17 G64\nF6000\n");
     let (mut x, mut y, mut angle) = (0.0f64, 0.0f64, 0.0f64);
     for step in 0..260 {
-        angle += if step % 11 == 10 { 0.9 } else { 0.03 * f64::from(step % 5 - 2) };
+        angle += if step % 11 == 10 {
+            0.9
+        } else {
+            0.03 * f64::from(step % 5 - 2)
+        };
         (x, y) = (x + 4.0 * angle.cos(), y + 4.0 * angle.sin());
         writeln!(text, "G1 X{x:.4} Y{y:.4}").unwrap();
     }
@@ -105,19 +133,32 @@ fn on_a_line_a_hold_takes_v_over_a_within_a_period() {
         let tick = (speed_mm_per_s as usize).max(50) + 200;
         let ran = bench.run(&format!("{tick},hold\n{},resume", tick + 500));
         assert!((ran.samples[tick - 1].feed_mm_per_s - speed_mm_per_s).abs() < 1e-9);
-        let (taken, ideal) = (stopping_periods(&ran, tick) as f64, speed_mm_per_s / 1000.0 / PERIOD_S);
-        assert!((taken - ideal).abs() <= 1.0, "{feed_mm_per_min} mm/min: {taken} periods instead of {ideal}");
+        let (taken, ideal) = (
+            stopping_periods(&ran, tick) as f64,
+            speed_mm_per_s / 1000.0 / PERIOD_S,
+        );
+        assert!(
+            (taken - ideal).abs() <= 1.0,
+            "{feed_mm_per_min} mm/min: {taken} periods instead of {ideal}"
+        );
         // The search finds the same without a governor.
         let plan = Plan::new(&ran.segments);
         let optimal = OptimalStop::of(&plan, &ACCELERATION, PERIOD_S);
         let found = optimal.time_s(plan.end_s() / 2.0) / PERIOD_S;
-        assert!((found - ideal).abs() <= 0.01 * ideal, "{feed_mm_per_min} mm/min: found {found} for {ideal}");
+        assert!(
+            (found - ideal).abs() <= 0.01 * ideal,
+            "{feed_mm_per_min} mm/min: found {found} for {ideal}"
+        );
     }
 }
 
 #[test]
 fn on_curves_a_hold_takes_little_more_than_the_optimum() {
-    for (name, text, step) in [("circle", circle(), 7), ("spiral", spiral(), 7), ("corners", corners(), 37)] {
+    for (name, text, step) in [
+        ("circle", circle(), 7),
+        ("spiral", spiral(), 7),
+        ("corners", corners(), 37),
+    ] {
         assert!(worst(name, &text, step, 1.1) <= 1.1);
     }
 }
@@ -134,7 +175,8 @@ fn in_short_chords_a_hold_takes_longer() {
 fn the_search_does_not_depend_on_its_grid() {
     let bench = Bench::text(&circle());
     let plan = Plan::new(&bench.run("").segments);
-    let [coarse, fine] = [PERIOD_S, PERIOD_S / 3.0].map(|step_s| OptimalStop::of(&plan, &ACCELERATION, step_s));
+    let [coarse, fine] =
+        [PERIOD_S, PERIOD_S / 3.0].map(|step_s| OptimalStop::of(&plan, &ACCELERATION, step_s));
     for tenth in 1..10 {
         let at_s = plan.end_s() * f64::from(tenth) / 10.0;
         let (a, b) = (coarse.time_s(at_s), fine.time_s(at_s));

@@ -21,25 +21,47 @@ fn the_fine_thread_only_sleeps() {
         .arg(root().join("examples/programs/square.ngc"))
         .arg("--machine")
         .arg(mill())
-        .args(["--clock", "wall", "--set", "loops.max_missed_periods=1000000", "--set", "loops.max_missed_share=1"])
+        .args([
+            "--clock",
+            "wall",
+            "--set",
+            "loops.max_missed_periods=1000000",
+            "--set",
+            "loops.max_missed_share=1",
+        ])
         .stdin(Stdio::null())
         .output();
     let Ok(output) = strace else {
         println!("skipped: there is no strace here");
         return;
     };
-    let logs =
-        std::fs::read_dir(folder.path()).unwrap().map(|entry| std::fs::read_to_string(entry.unwrap().path()).unwrap());
+    let logs = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| std::fs::read_to_string(entry.unwrap().path()).unwrap());
     let Some(fine) = logs.into_iter().find(|calls| sleeps(calls) > 100) else {
-        assert!(!output.status.success(), "no thread slept with absolute deadlines");
-        println!("skipped: strace may not trace here: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            !output.status.success(),
+            "no thread slept with absolute deadlines"
+        );
+        println!(
+            "skipped: strace may not trace here: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         return;
     };
     let lines: Vec<&str> = fine.lines().collect();
     let first = lines.iter().position(|line| is_sleep(line)).unwrap();
     let last = lines.iter().rposition(|line| is_sleep(line)).unwrap();
-    let others: Vec<_> = lines[first..=last].iter().filter(|line| !is_sleep(line)).collect();
-    assert!(others.is_empty(), "{} other calls: {:?}", others.len(), &others[..others.len().min(10)]);
+    let others: Vec<_> = lines[first..=last]
+        .iter()
+        .filter(|line| !is_sleep(line))
+        .collect();
+    assert!(
+        others.is_empty(),
+        "{} other calls: {:?}",
+        others.len(),
+        &others[..others.len().min(10)]
+    );
 }
 
 fn is_sleep(line: &str) -> bool {

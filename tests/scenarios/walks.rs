@@ -22,16 +22,25 @@ struct Worst {
 fn worst(lanes: &[Lane], period_s: f64, samples: &[Sample]) -> [Worst; 3] {
     let mut found = [Worst::default(); 3];
     for (number, lane) in lanes.iter().enumerate() {
-        let at = |sample: &Sample| (0..4).map(|axis| lane.parts[axis] * sample.command[axis]).sum::<f64>();
+        let at = |sample: &Sample| {
+            (0..4)
+                .map(|axis| lane.parts[axis] * sample.command[axis])
+                .sum::<f64>()
+        };
         for (order, found) in found.iter_mut().enumerate() {
             for n in 0..samples.len() {
                 let back = |by: usize| at(&samples[n.saturating_sub(by)]);
                 let (difference, limit) = difference(order, back, lane, period_s);
-                let rounding = f64::from(8 << order) * f64::EPSILON * at(&samples[n]).abs().max(1.0)
-                    / [period_s, period_s.powi(2), period_s.powi(3)][order];
+                let rounding =
+                    f64::from(8 << order) * f64::EPSILON * at(&samples[n]).abs().max(1.0)
+                        / [period_s, period_s.powi(2), period_s.powi(3)][order];
                 let share = (difference.abs() - rounding) / limit;
                 if share > found.share {
-                    *found = Worst { share, tick: samples[n].tick, lane: number };
+                    *found = Worst {
+                        share,
+                        tick: samples[n].tick,
+                        lane: number,
+                    };
                 }
             }
         }
@@ -42,8 +51,14 @@ fn worst(lanes: &[Lane], period_s: f64, samples: &[Sample]) -> [Worst; 3] {
 fn difference(order: usize, back: impl Fn(usize) -> f64, lane: &Lane, period_s: f64) -> (f64, f64) {
     match order {
         0 => ((back(0) - back(1)) / period_s, lane.velocity),
-        1 => ((back(0) - 2.0 * back(1) + back(2)) / period_s.powi(2), lane.acceleration),
-        _ => ((back(0) - 3.0 * back(1) + 3.0 * back(2) - back(3)) / period_s.powi(3), lane.jerk),
+        1 => (
+            (back(0) - 2.0 * back(1) + back(2)) / period_s.powi(2),
+            lane.acceleration,
+        ),
+        _ => (
+            (back(0) - 3.0 * back(1) + 3.0 * back(2) - back(3)) / period_s.powi(3),
+            lane.jerk,
+        ),
     }
 }
 
@@ -75,10 +90,16 @@ fn within(lanes: &[Lane], ran: &Ran, worst: &[Worst; 3]) -> Result<(), String> {
     if let Some(fault) = &ran.outcome.summary.fault {
         return Err(fault.clone());
     }
-    for ((what, most), found) in [("velocity", EXACT), ("acceleration", EXACT), ("jerk", 1.01)].into_iter().zip(worst) {
+    for ((what, most), found) in [("velocity", EXACT), ("acceleration", EXACT), ("jerk", 1.01)]
+        .into_iter()
+        .zip(worst)
+    {
         if found.share > most {
             let (lane, tick) = (&lanes[found.lane].name, found.tick);
-            return Err(format!("{what} of {lane} {:.4} of its limit at tick {tick}", found.share));
+            return Err(format!(
+                "{what} of {lane} {:.4} of its limit at tick {tick}",
+                found.share
+            ));
         }
     }
     Ok(())
@@ -92,7 +113,8 @@ fn walks_keep_every_limit(planner: &str, test: &str, count: u64) {
     let (mut ran_count, mut refused, mut planners, mut relaxed) = (0, 0, 0, 0);
     for_each_seed(test, count, |seed| {
         let draw = Draw::new(planner, seed);
-        let kept = std::env::var("TANDEM_KEEP").map(|folder| Path::new(&folder).join(format!("{planner}-{seed}")));
+        let kept = std::env::var("TANDEM_KEEP")
+            .map(|folder| Path::new(&folder).join(format!("{planner}-{seed}")));
         let temporary = tempfile::tempdir().unwrap();
         let folder = kept.unwrap_or_else(|_| temporary.path().to_owned());
         std::fs::create_dir_all(&folder).unwrap();
@@ -107,13 +129,20 @@ fn walks_keep_every_limit(planner: &str, test: &str, count: u64) {
                 return Ok(());
             }
         }
-        let Became::Ran(walked) = driven(&draw, &folder, &draw.commands)? else { return Err("refused".into()) };
+        let Became::Ran(walked) = driven(&draw, &folder, &draw.commands)? else {
+            return Err("refused".into());
+        };
         ran_count += 1;
         relaxed += walked.0.outcome.summary.jerk_relaxed_samples;
         within(&draw.lanes, &walked.0, &walked.1)
     });
-    println!("{test}: {ran_count} walked, {refused} refused, {planners} beyond a limit undisturbed, {relaxed} relaxed");
-    assert!(std::env::var("TANDEM_SEED").is_ok() || 2 * ran_count > count, "too few runs say anything");
+    println!(
+        "{test}: {ran_count} walked, {refused} refused, {planners} beyond a limit undisturbed, {relaxed} relaxed"
+    );
+    assert!(
+        std::env::var("TANDEM_SEED").is_ok() || 2 * ran_count > count,
+        "too few runs say anything"
+    );
 }
 
 #[test]
@@ -131,7 +160,10 @@ fn walks_on_nurbs_keep_every_limit() {
 fn the_rate_of_program_time_comes_to_the_end_of_its_range_without_a_step() {
     let folder = root().join("tests/fixtures/walks/wrapped-arc");
     let commands = std::fs::read_to_string(folder.join("commands.csv")).unwrap();
-    let ran = Bench::of(&folder.join("program.ngc")).on(&folder.join("machine.toml")).try_commands(&commands).unwrap();
+    let ran = Bench::of(&folder.join("program.ngc"))
+        .on(&folder.join("machine.toml"))
+        .try_commands(&commands)
+        .unwrap();
     let lane = |name: &str, parts, velocity, acceleration, jerk| Lane {
         name: name.into(),
         parts,

@@ -41,7 +41,11 @@ impl Limits {
         let acceleration = logarithmic(random, 3.0, 3e4);
         let jerk = acceleration / logarithmic(random, 5e-4, 0.5);
         let speed = acceleration * logarithmic(random, 5e-3, 1.0);
-        Self { feed_per_min: 60.0 * speed.clamp(1.0, 2000.0), acceleration, jerk }
+        Self {
+            feed_per_min: 60.0 * speed.clamp(1.0, 2000.0),
+            acceleration,
+            jerk,
+        }
     }
 
     fn keys(&self, unit: &str) -> String {
@@ -56,13 +60,22 @@ impl Limits {
         let name = name.to_string();
         let [velocity, acceleration, jerk] =
             [self.feed_per_min / 60.0, self.acceleration, self.jerk].map(|l| l * scale);
-        Lane { name, parts, velocity, acceleration, jerk }
+        Lane {
+            name,
+            parts,
+            velocity,
+            acceleration,
+            jerk,
+        }
     }
 }
 
 const RAD: f64 = std::f64::consts::PI / 180.0;
-const AXES: [(&str, [f64; 4]); 3] =
-    [("x", [1.0, 0.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0, 0.0]), ("z", [0.0, 0.0, 1.0, 0.0])];
+const AXES: [(&str, [f64; 4]); 3] = [
+    ("x", [1.0, 0.0, 0.0, 0.0]),
+    ("y", [0.0, 1.0, 0.0, 0.0]),
+    ("z", [0.0, 0.0, 1.0, 0.0]),
+];
 
 impl Draw {
     pub fn new(planner: &str, seed: u64) -> Self {
@@ -80,18 +93,38 @@ impl Draw {
         let mut lanes = vec![];
         for (name, parts) in AXES {
             let limits = Limits::draw(random);
-            writeln!(machine, "[axes.{name}]\ntravel_mm = [-1000, 1000]\n{}", limits.keys("mm")).unwrap();
+            writeln!(
+                machine,
+                "[axes.{name}]\ntravel_mm = [-1000, 1000]\n{}",
+                limits.keys("mm")
+            )
+            .unwrap();
             lanes.push(limits.lane(name, parts, 1.0));
         }
         let kind = random.below(6);
         joints(random, kind, &mut machine, &mut lanes);
-        writeln!(machine, "[planner]\nplugin = \"{planner}\"\n[driver]\nplugin = \"sim\"").unwrap();
+        writeln!(
+            machine,
+            "[planner]\nplugin = \"{planner}\"\n[driver]\nplugin = \"sim\""
+        )
+        .unwrap();
         let period_s = fine_ms * 1e-3;
         let mut program = Program::new(random, &lanes, kind == 3, planner.contains("nurbs"));
         let nominal_s = program.write(12_000.0 * period_s);
         let text = program.text + "M2\n";
-        let commands = commands(random, (nominal_s / period_s).min(15_000.0), period_s, ratio);
-        Self { machine, program: text, commands, lanes, period_s }
+        let commands = commands(
+            random,
+            (nominal_s / period_s).min(15_000.0),
+            period_s,
+            ratio,
+        );
+        Self {
+            machine,
+            program: text,
+            commands,
+            lanes,
+            period_s,
+        }
     }
 }
 
@@ -103,8 +136,12 @@ fn joints(random: &mut Random, kind: u64, machine: &mut String, lanes: &mut Vec<
         2 => gantry(random, machine, lanes),
         3 => {
             let limits = Limits::draw(random);
-            writeln!(machine, "[axes.a]\nkind = \"rotary\"\ntravel_deg = [-360000, 360000]\n{}", limits.keys("deg"))
-                .unwrap();
+            writeln!(
+                machine,
+                "[axes.a]\nkind = \"rotary\"\ntravel_deg = [-360000, 360000]\n{}",
+                limits.keys("deg")
+            )
+            .unwrap();
             lanes.push(limits.lane("a", [0.0, 0.0, 0.0, 1.0], RAD));
         }
         _ => {}
@@ -115,7 +152,12 @@ fn corexy(random: &mut Random, machine: &mut String, lanes: &mut Vec<Lane>) {
     machine.push_str("[kinematics]\nplugin = \"corexy\"\n");
     for (name, parts) in [("a", [1.0, 1.0, 0.0, 0.0]), ("b", [1.0, -1.0, 0.0, 0.0])] {
         let limits = Limits::draw(random);
-        writeln!(machine, "[joints.{name}]\ntravel_mm = [-2000, 2000]\n{}", limits.keys("mm")).unwrap();
+        writeln!(
+            machine,
+            "[joints.{name}]\ntravel_mm = [-2000, 2000]\n{}",
+            limits.keys("mm")
+        )
+        .unwrap();
         lanes.push(limits.lane(name, parts, 1.0));
     }
     machine.push_str("[joints.z]\naxis = \"z\"\n");
@@ -143,7 +185,11 @@ fn gantry(random: &mut Random, machine: &mut String, lanes: &mut Vec<Lane>) {
     )
     .unwrap();
     let acceleration = acceleration.min(lanes[1].acceleration);
-    lanes.push(Lane { name: "y2".into(), acceleration, ..lanes[1].clone() });
+    lanes.push(Lane {
+        name: "y2".into(),
+        acceleration,
+        ..lanes[1].clone()
+    });
 }
 
 /// A walk of the override every 10 ms, holds, resumes, stalls and single lines; everything is let go in the end.
@@ -158,7 +204,10 @@ fn commands(random: &mut Random, ticks: f64, period_s: f64, most_ratio: f64) -> 
         for n in 0..last / step {
             ratio = (ratio + random.between(-reach, reach)).clamp(0.0, most_ratio);
             if form != 3 || random.below(20) == 0 {
-                lines.push((n * step + random.below(step.max(1)), format!("feed-override,{ratio:.4}")));
+                lines.push((
+                    n * step + random.below(step.max(1)),
+                    format!("feed-override,{ratio:.4}"),
+                ));
             }
         }
     }
@@ -170,20 +219,33 @@ fn commands(random: &mut Random, ticks: f64, period_s: f64, most_ratio: f64) -> 
         }
     }
     for _ in 0..[0, 0, 3][random.below(3) as usize] {
-        lines.push((random.below(last), format!("stall-rough,{}", 1 + random.below(40))));
-        lines.push((random.below(last), format!("rapid-override,{:.3}", random.between(0.0, 1.0))));
+        lines.push((
+            random.below(last),
+            format!("stall-rough,{}", 1 + random.below(40)),
+        ));
+        lines.push((
+            random.below(last),
+            format!("rapid-override,{:.3}", random.between(0.0, 1.0)),
+        ));
     }
     if random.below(6) == 0 {
         lines.push((random.below(last), "single-block,1".into()));
         lines.extend((0..last / 40).map(|n| (40 * n, "resume".into())));
     }
     let end = last + last / 4;
-    for line in ["single-block,0", "feed-override,1", "rapid-override,1", "resume"] {
+    for line in [
+        "single-block,0",
+        "feed-override,1",
+        "rapid-override,1",
+        "resume",
+    ] {
         lines.push((end, line.into()));
     }
     lines.push((end + 1, "resume".into()));
     lines.sort_by_key(|(tick, _)| *tick);
-    lines.iter().fold(String::new(), |text, (tick, line)| text + &format!("{tick},{line}\n"))
+    lines.iter().fold(String::new(), |text, (tick, line)| {
+        text + &format!("{tick},{line}\n")
+    })
 }
 
 /// A program in the making.
@@ -204,7 +266,12 @@ impl<'a> Program<'a> {
     fn new(random: &'a mut Random, lanes: &[Lane], rotary: bool, curves: bool) -> Self {
         let linear = lanes.iter().filter(|lane| lane.parts[3] == 0.0);
         let slowest = linear.fold([f64::INFINITY; 3], |least, lane| {
-            let part = lane.parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+            let part = lane
+                .parts
+                .iter()
+                .map(|part| part * part)
+                .sum::<f64>()
+                .sqrt();
             let limits = [lane.velocity, lane.acceleration, lane.jerk];
             std::array::from_fn(|order| least[order].min(limits[order] / part))
         });
@@ -253,8 +320,12 @@ impl<'a> Program<'a> {
         let before = self.at;
         match self.random.below(14) {
             0 => self.feed(),
-            1 => writeln!(self.text, "{}", ["G61", "G64", "G64 P0.02", "G64 P0.5"][self.random.below(4) as usize])
-                .unwrap(),
+            1 => writeln!(
+                self.text,
+                "{}",
+                ["G61", "G64", "G64 P0.02", "G64 P0.5"][self.random.below(4) as usize]
+            )
+            .unwrap(),
             2 => writeln!(self.text, "G4 P{:.4}", self.random.between(0.0, 0.02)).unwrap(),
             3 => self.line("G0"),
             4 | 5 => self.arc(),
@@ -266,7 +337,10 @@ impl<'a> Program<'a> {
             }
             _ => self.line("G1"),
         }
-        let length_mm = (0..3).map(|axis| (self.at[axis] - before[axis]).powi(2)).sum::<f64>().sqrt();
+        let length_mm = (0..3)
+            .map(|axis| (self.at[axis] - before[axis]).powi(2))
+            .sum::<f64>()
+            .sqrt();
         let [speed, acceleration, jerk] = self.slowest;
         let turned_s = self.rotary.as_ref().map_or(0.0, |a| {
             let angle = (self.at[3] - before[3]).abs() * RAD;
@@ -288,7 +362,12 @@ impl<'a> Program<'a> {
                 self.move_to(axis, step);
             }
         }
-        write!(self.text, "{word} X{} Y{} Z{}", self.at[0], self.at[1], self.at[2]).unwrap();
+        write!(
+            self.text,
+            "{word} X{} Y{} Z{}",
+            self.at[0], self.at[1], self.at[2]
+        )
+        .unwrap();
         if let Some(a) = self.rotary.clone()
             && self.random.below(2) == 0
         {
@@ -301,7 +380,11 @@ impl<'a> Program<'a> {
 
     fn move_to(&mut self, axis: usize, step: f64) {
         let to = self.at[axis] + step;
-        self.at[axis] = Self::rounded(if to.abs() > 400.0 { self.at[axis] - step } else { to });
+        self.at[axis] = Self::rounded(if to.abs() > 400.0 {
+            self.at[axis] - step
+        } else {
+            to
+        });
     }
 
     fn chord(&mut self) {
@@ -313,7 +396,11 @@ impl<'a> Program<'a> {
 
     fn arc(&mut self) {
         let (i, j) = (self.step(), self.step());
-        let word = if self.random.below(2) == 0 { "G2" } else { "G3" };
+        let word = if self.random.below(2) == 0 {
+            "G2"
+        } else {
+            "G3"
+        };
         if self.random.below(3) == 0 {
             writeln!(self.text, "{word} I{i:.5} J{j:.5}").unwrap();
             return;
@@ -321,8 +408,16 @@ impl<'a> Program<'a> {
         // Half around a centre: the end is as far from it as the start.
         let (i, j) = (Self::rounded(i), Self::rounded(j));
         let from = self.at;
-        (self.at[0], self.at[1]) = (Self::rounded(from[0] + 2.0 * i), Self::rounded(from[1] + 2.0 * j));
-        writeln!(self.text, "{word} X{} Y{} I{i} J{j}", self.at[0], self.at[1]).unwrap();
+        (self.at[0], self.at[1]) = (
+            Self::rounded(from[0] + 2.0 * i),
+            Self::rounded(from[1] + 2.0 * j),
+        );
+        writeln!(
+            self.text,
+            "{word} X{} Y{} I{i} J{j}",
+            self.at[0], self.at[1]
+        )
+        .unwrap();
     }
 
     fn bezier(&mut self) {
@@ -330,6 +425,11 @@ impl<'a> Program<'a> {
         let (x, y) = (self.step(), self.step());
         self.move_to(0, x);
         self.move_to(1, y);
-        writeln!(self.text, "G5 X{} Y{} I{i:.5} J{j:.5} P{p:.5} Q{q:.5}", self.at[0], self.at[1]).unwrap();
+        writeln!(
+            self.text,
+            "G5 X{} Y{} I{i:.5} J{j:.5} P{p:.5} Q{q:.5}",
+            self.at[0], self.at[1]
+        )
+        .unwrap();
     }
 }

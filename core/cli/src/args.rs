@@ -119,7 +119,10 @@ pub struct Session {
 }
 
 #[derive(Group)]
-#[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub struct Run {
     /// The part program; - reads it from standard input
     pub program: PathBuf,

@@ -15,13 +15,25 @@ use crate::args::{Sdo, Which};
 pub fn bus(command: &args::Bus) -> Result<u8, Box<dyn Error>> {
     match command {
         args::Bus::Scan { which } => scan(which),
-        args::Bus::Sdo(Sdo::Read { device, object, which }) => read(which, *device, object),
-        args::Bus::Sdo(Sdo::Write { device, object, bits, value, which }) => {
-            write(which, *device, object, *bits, value)
-        }
+        args::Bus::Sdo(Sdo::Read {
+            device,
+            object,
+            which,
+        }) => read(which, *device, object),
+        args::Bus::Sdo(Sdo::Write {
+            device,
+            object,
+            bits,
+            value,
+            which,
+        }) => write(which, *device, object, *bits, value),
         args::Bus::State { which } => state(which),
         args::Bus::Watch { machine, seconds } => watch_bus(machine, None, *seconds),
-        args::Bus::Pcap { file, machine, seconds } => watch_bus(machine, Some(file), *seconds),
+        args::Bus::Pcap {
+            file,
+            machine,
+            seconds,
+        } => watch_bus(machine, Some(file), *seconds),
     }
 }
 
@@ -29,48 +41,86 @@ pub fn bus(command: &args::Bus) -> Result<u8, Box<dyn Error>> {
 fn options_of(path: &Path) -> Result<(Options, f64), Box<dyn Error>> {
     let machine = Machine::read(path, &[])?;
     let drivers = machine.drivers.iter().map(|driver| &driver.choice);
-    let choice = drivers.into_iter().find(|choice| choice.plugin == tandem_ethercat::PLUGIN.name());
-    let choice = choice.ok_or_else(|| format!("{}: no driver of this machine is ethercat", path.display()))?;
-    let options = Options::read(&choice.options).map_err(|error| format!("{}: {error}", path.display()))?;
+    let choice = drivers
+        .into_iter()
+        .find(|choice| choice.plugin == tandem_ethercat::PLUGIN.name());
+    let choice = choice
+        .ok_or_else(|| format!("{}: no driver of this machine is ethercat", path.display()))?;
+    let options =
+        Options::read(&choice.options).map_err(|error| format!("{}: {error}", path.display()))?;
     Ok((options, machine.fine_period_s))
 }
 
 fn survey(which: &Which) -> Result<Survey, Box<dyn Error>> {
     if let Some(path) = &which.machine {
         let (options, fine_period_s) = options_of(path)?;
-        return Ok(Survey::of(&options, &context_of(&options, fine_period_s, false))?);
+        return Ok(Survey::of(
+            &options,
+            &context_of(&options, fine_period_s, false),
+        )?);
     }
     if let Some(path) = &which.emulated {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        return Ok(Survey::open("", Some(&text)).map_err(|error| format!("{}: {error}", path.display()))?);
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        return Ok(Survey::open("", Some(&text))
+            .map_err(|error| format!("{}: {error}", path.display()))?);
     }
-    Ok(Survey::open(which.interface.as_deref().unwrap_or_default(), None)?)
+    Ok(Survey::open(
+        which.interface.as_deref().unwrap_or_default(),
+        None,
+    )?)
 }
 
 fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
     let found = survey(which)?.scan()?;
     let mut out = std::io::stdout();
     for (place, device) in found.iter().enumerate() {
-        let Found { identity, clock, maps, modes } = device;
+        let Found {
+            identity,
+            clock,
+            maps,
+            modes,
+        } = device;
         let clock = if *clock { ", clock" } else { "" };
-        let alias = if identity.alias == 0 { String::new() } else { format!(", alias {}", identity.alias) };
+        let alias = if identity.alias == 0 {
+            String::new()
+        } else {
+            format!(", alias {}", identity.alias)
+        };
         writeln!(
             out,
             "# {place}: {}, {:#06x}:{:#06x}, revision {:#x}{alias}{clock}",
             identity.name, identity.vendor, identity.product, identity.revision
         )?;
-        for (map, title) in maps.iter().zip(["to it", "from it"]).filter(|(map, _)| !map.is_empty()) {
+        for (map, title) in maps
+            .iter()
+            .zip(["to it", "from it"])
+            .filter(|(map, _)| !map.is_empty())
+        {
             writeln!(out, "#    {title}: {}", map.join(", "))?;
         }
         if !modes.is_empty() {
             writeln!(out, "#    modes: {}", modes.join(", "))?;
         }
     }
-    for (place, Found { identity, modes, .. }) in found.iter().enumerate() {
-        let place =
-            if identity.alias == 0 { format!("position = {place}") } else { format!("alias = {}", identity.alias) };
+    for (
+        place,
+        Found {
+            identity, modes, ..
+        },
+    ) in found.iter().enumerate()
+    {
+        let place = if identity.alias == 0 {
+            format!("position = {place}")
+        } else {
+            format!("alias = {}", identity.alias)
+        };
         writeln!(out, "\n[[drivers.bus.options.devices]]\n{place}")?;
-        writeln!(out, "product = \"{:#06x}:{:#06x}\"", identity.vendor, identity.product)?;
+        writeln!(
+            out,
+            "product = \"{:#06x}:{:#06x}\"",
+            identity.vendor, identity.product
+        )?;
         if modes.contains(&"csp") {
             writeln!(
                 out,
@@ -82,9 +132,15 @@ fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
 }
 
 fn read(which: &Which, device: usize, text: &str) -> Result<u8, Box<dyn Error>> {
-    let (index, sub) = object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
+    let (index, sub) =
+        object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
     let Value { number, bits } = survey(which)?.read(device, index, sub)?;
-    let signed = i64::from(number) - if number >> (bits - 1) & 1 == 1 { 1 << bits } else { 0 };
+    let signed = i64::from(number)
+        - if number >> (bits - 1) & 1 == 1 {
+            1 << bits
+        } else {
+            0
+        };
     let digits = usize::from(bits / 4);
     writeln!(
         std::io::stdout(),
@@ -93,20 +149,35 @@ fn read(which: &Which, device: usize, text: &str) -> Result<u8, Box<dyn Error>> 
     Ok(0)
 }
 
-fn write(which: &Which, device: usize, text: &str, bits: u8, value: &str) -> Result<u8, Box<dyn Error>> {
-    let (index, sub) = object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
+fn write(
+    which: &Which,
+    device: usize,
+    text: &str,
+    bits: u8,
+    value: &str,
+) -> Result<u8, Box<dyn Error>> {
+    let (index, sub) =
+        object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
     let signed: Option<i64> = value.parse().ok().or_else(|| number(value).map(i64::from));
-    let fits = signed.filter(|signed| matches!(bits, 8 | 16 | 32) && (-(1 << (bits - 1))..1 << bits).contains(signed));
-    let signed = fits.ok_or_else(|| format!("{value} is no number of {bits} bits; bits are 8, 16 or 32"))?;
+    let fits = signed.filter(|signed| {
+        matches!(bits, 8 | 16 | 32) && (-(1 << (bits - 1))..1 << bits).contains(signed)
+    });
+    let signed =
+        fits.ok_or_else(|| format!("{value} is no number of {bits} bits; bits are 8, 16 or 32"))?;
     let number = (signed & ((1 << bits) - 1)) as u32;
     survey(which)?.write(device, index, sub, Value { number, bits })?;
-    writeln!(std::io::stdout(), "{index:04X}:{sub:02X} = 0x{number:x}, read back")?;
+    writeln!(
+        std::io::stdout(),
+        "{index:04X}:{sub:02X} = 0x{number:x}, read back"
+    )?;
     Ok(0)
 }
 
 fn state(which: &Which) -> Result<u8, Box<dyn Error>> {
     for state in survey(which)?.states()? {
-        let error = state.error.map_or(String::new(), |(code, words)| format!(", {code:04X}: {words}"));
+        let error = state.error.map_or(String::new(), |(code, words)| {
+            format!(", {code:04X}: {words}")
+        });
         writeln!(std::io::stdout(), "{}: {}{error}", state.place, state.state)?;
     }
     Ok(0)
@@ -116,17 +187,31 @@ fn watch_bus(path: &Path, record: Option<&Path>, seconds: f64) -> Result<u8, Box
     let (options, fine_period_s) = options_of(path)?;
     let mut shown: Vec<Watched> = vec![];
     let mut last = None;
-    watch(&options, fine_period_s, record, seconds, |devices, counters, phase_ns| {
-        for device in devices.iter().filter(|device| !shown.contains(device)) {
-            let status = device.status.as_ref().map_or(String::new(), |status| format!(", {status}"));
-            let lost = device.lost.as_ref().map_or(String::new(), |lost| format!(", lost: {lost}"));
-            say!("{}: {}{status}{lost}", device.called, device.state);
-        }
-        shown = devices.to_vec();
-        last = Some((*counters, phase_ns));
-    })?;
+    watch(
+        &options,
+        fine_period_s,
+        record,
+        seconds,
+        |devices, counters, phase_ns| {
+            for device in devices.iter().filter(|device| !shown.contains(device)) {
+                let status = device
+                    .status
+                    .as_ref()
+                    .map_or(String::new(), |status| format!(", {status}"));
+                let lost = device
+                    .lost
+                    .as_ref()
+                    .map_or(String::new(), |lost| format!(", lost: {lost}"));
+                say!("{}: {}{status}{lost}", device.called, device.state);
+            }
+            shown = devices.to_vec();
+            last = Some((*counters, phase_ns));
+        },
+    )?;
     if let Some((counters, phase_ns)) = last {
-        let phase = phase_ns.map_or(String::new(), |ns| format!(", phase {:.1} µs", ns as f64 / 1000.0));
+        let phase = phase_ns.map_or(String::new(), |ns| {
+            format!(", phase {:.1} µs", ns as f64 / 1000.0)
+        });
         let (exchanges, lost) = (counters.exchanges, counters.lost);
         let (short, strays) = (counters.short, counters.strays);
         writeln!(

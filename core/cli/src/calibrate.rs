@@ -71,13 +71,19 @@ fn program(path: &Path, machine: &Machine) -> Result<u8, Box<dyn Error>> {
 
 fn left_out(experiment: &Experiment) {
     if !experiment.left_out.is_empty() {
-        say!("{} polygons do not fit into the travel and are left out", experiment.left_out.len());
+        say!(
+            "{} polygons do not fit into the travel and are left out",
+            experiment.left_out.len()
+        );
     }
 }
 
 fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box<dyn Error>> {
     if let Some(path) = &options.from {
-        return Ok(Measured { timed: measurements::read(path)?, ..Measured::default() });
+        return Ok(Measured {
+            timed: measurements::read(path)?,
+            ..Measured::default()
+        });
     }
     let experiment = Experiment::new(machine, BLOCKS_MEASURED)?;
     left_out(&experiment);
@@ -101,11 +107,23 @@ fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {
         percent(evidence.block_time_spread),
         percent(evidence.feed_spread)
     );
-    let _ = writeln!(text, "{:12} {:>10} {:>9} {:>9}  constants", "form", "R2", "rms, %", "worst, %");
+    let _ = writeln!(
+        text,
+        "{:12} {:>10} {:>9} {:>9}  constants",
+        "form", "R2", "rms, %", "worst, %"
+    );
     for fit in fits {
-        let worst = fit.residuals.iter().fold(0.0, |most, r| f64::max(most, r.abs()));
+        let worst = fit
+            .residuals
+            .iter()
+            .fold(0.0, |most, r| f64::max(most, r.abs()));
         let (name, r2, rms) = (fit.choice.name(), fit.feeds.r2, percent(fit.rms));
-        let _ = writeln!(text, "{name:12} {r2:10.6} {rms:9.3} {:9.3}  {}", percent(worst), fit.constants());
+        let _ = writeln!(
+            text,
+            "{name:12} {r2:10.6} {rms:9.3} {:9.3}  {}",
+            percent(worst),
+            fit.constants()
+        );
     }
     text
 }
@@ -115,7 +133,9 @@ fn kind(evidence: &Evidence, fits: &[Fitted]) -> &'static str {
     if evidence.is_constant_time() {
         return "an overlap control: a short block takes the same time whatever its length";
     }
-    let look_ahead = fits.iter().any(|fit| matches!(fit.choice, Choice::LookAhead(..)) && fit.is_good());
+    let look_ahead = fits
+        .iter()
+        .any(|fit| matches!(fit.choice, Choice::LookAhead(..)) && fit.is_good());
     if look_ahead {
         "a look-ahead control: the feed at a corner depends on the turn, not on the length of the block"
     } else {
@@ -124,7 +144,12 @@ fn kind(evidence: &Evidence, fits: &[Fitted]) -> &'static str {
 }
 
 /// The model to be written; why there is none.
-fn chosen(form: Option<Form>, measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> Result<Fitted, String> {
+fn chosen(
+    form: Option<Form>,
+    measured: &Measured,
+    evidence: &Evidence,
+    fits: &[Fitted],
+) -> Result<Fitted, String> {
     let kind = kind(evidence, fits);
     print(&format!("this is {kind}\n"));
     if form == Some(Form::Regression) {
@@ -135,7 +160,11 @@ fn chosen(form: Option<Form>, measured: &Measured, evidence: &Evidence, fits: &[
         (Some(Form::LookAhead), choice) => matches!(choice, Choice::LookAhead(..)),
         _ => true,
     };
-    let best = fits.iter().filter(of_form).min_by(|a, b| a.rms.total_cmp(&b.rms)).ok_or("there is nothing to fit")?;
+    let best = fits
+        .iter()
+        .filter(of_form)
+        .min_by(|a, b| a.rms.total_cmp(&b.rms))
+        .ok_or("there is nothing to fit")?;
     if best.is_good() {
         return Ok(best.clone());
     }
@@ -149,19 +178,40 @@ fn chosen(form: Option<Form>, measured: &Measured, evidence: &Evidence, fits: &[
     ))
 }
 
-fn regression(measured: &Measured, evidence: &Evidence, fits: &[Fitted], kind: &str) -> Result<Fitted, String> {
-    let block_time_s = fits.iter().filter(|fit| fit.is_good()).find_map(|fit| match &fit.choice {
-        Choice::Overlap(constants) => Some(constants.time_constant_s),
-        _ => None,
-    });
-    let LinearFit { coefficients, short, long } = linear(&measured.timed, &measured.corners, block_time_s)?;
-    print(&format!("equation (9): R2 {:.6}, rms {:.2}, worst {:.2} mm/min\n", short.r2, short.rms, short.max));
+fn regression(
+    measured: &Measured,
+    evidence: &Evidence,
+    fits: &[Fitted],
+    kind: &str,
+) -> Result<Fitted, String> {
+    let block_time_s = fits
+        .iter()
+        .filter(|fit| fit.is_good())
+        .find_map(|fit| match &fit.choice {
+            Choice::Overlap(constants) => Some(constants.time_constant_s),
+            _ => None,
+        });
+    let LinearFit {
+        coefficients,
+        short,
+        long,
+    } = linear(&measured.timed, &measured.corners, block_time_s)?;
+    print(&format!(
+        "equation (9): R2 {:.6}, rms {:.2}, worst {:.2} mm/min\n",
+        short.r2, short.rms, short.max
+    ));
     if let Some(long) = long {
-        print(&format!("equation (11): R2 {:.6}, rms {:.2}, worst {:.2} mm/min\n", long.r2, long.rms, long.max));
+        print(&format!(
+            "equation (11): R2 {:.6}, rms {:.2}, worst {:.2} mm/min\n",
+            long.r2, long.rms, long.max
+        ));
     } else {
         print("equation (11): no corners were measured; the published coefficients stay\n");
     }
-    if short.r2 < LEAST_R2 || long.is_some_and(|long| long.r2 < LEAST_R2) || !evidence.is_constant_time() {
+    if short.r2 < LEAST_R2
+        || long.is_some_and(|long| long.r2 < LEAST_R2)
+        || !evidence.is_constant_time()
+    {
         return Err(format!(
             "the linear regression does not describe this machine: equation (9) explains R2 = {:.3} of the minimum feeds, \
              where {LEAST_R2} is asked for. It holds where a short block takes the same time whatever its length; here that \
@@ -170,7 +220,10 @@ fn regression(measured: &Measured, evidence: &Evidence, fits: &[Fitted], kind: &
             100.0 * evidence.block_time_spread
         ));
     }
-    Ok(Fitted::new(Choice::Regression(coefficients), &measured.timed))
+    Ok(Fitted::new(
+        Choice::Regression(coefficients),
+        &measured.timed,
+    ))
 }
 
 /// Residuals of the times in %, a row for each number of corners, a column for each side.
@@ -181,14 +234,19 @@ fn residuals(fitted: &Fitted, timed: &[Timed]) -> String {
     sides.dedup();
     corners.sort_unstable();
     corners.dedup();
-    let mut text = format!("residuals of {}, % of the time\n  n \\ side, mm", fitted.choice.name());
+    let mut text = format!(
+        "residuals of {}, % of the time\n  n \\ side, mm",
+        fitted.choice.name()
+    );
     for side in &sides {
         let _ = write!(text, " {side:8}");
     }
     for n in corners {
         let _ = write!(text, "\n{n:13}");
         for side in &sides {
-            let at = timed.iter().position(|t| t.polygon.corners == n && t.polygon.side_mm == *side);
+            let at = timed
+                .iter()
+                .position(|t| t.polygon.corners == n && t.polygon.side_mm == *side);
             let _ = match at.map(|index| 100.0 * fitted.residuals[index]) {
                 Some(percent) => write!(text, " {percent:8.3}"),
                 None => write!(text, " {:>8}", "-"),
@@ -198,15 +256,32 @@ fn residuals(fitted: &Fitted, timed: &[Timed]) -> String {
     text + "\n"
 }
 
-fn write(options: &args::Calibrate, machine: &Machine, fitted: &Fitted) -> Result<(), Box<dyn Error>> {
-    let Some(path) = &options.out else { return Ok(()) };
-    let source = options.from.as_ref().map_or_else(|| machine.name.clone(), |from| from.display().to_string());
+fn write(
+    options: &args::Calibrate,
+    machine: &Machine,
+    fitted: &Fitted,
+) -> Result<(), Box<dyn Error>> {
+    let Some(path) = &options.out else {
+        return Ok(());
+    };
+    let source = options
+        .from
+        .as_ref()
+        .map_or_else(|| machine.name.clone(), |from| from.display().to_string());
     let (r2, rms) = (fitted.feeds.r2, 100.0 * fitted.rms);
-    let calibrated = format!("{source}: {} polygons, R2 {r2:.6}, rms {rms:.3} %", fitted.residuals.len());
+    let calibrated = format!(
+        "{source}: {} polygons, R2 {r2:.6}, rms {rms:.3} %",
+        fitted.residuals.len()
+    );
     let text = model_file::write(&fitted.choice, &calibrated).ok_or("this model has no file")?;
     let mut out = Output::create(path)?;
     out.write_all(text.as_bytes())?;
     out.finish()?;
-    print(&format!("model: {} ({}, {})\n", path.display(), fitted.choice.name(), fitted.constants()));
+    print(&format!(
+        "model: {} ({}, {})\n",
+        path.display(),
+        fitted.choice.name(),
+        fitted.constants()
+    ));
     Ok(())
 }

@@ -18,12 +18,19 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
     // A machine that is to be homed first is run with --home: there is no other run to ask about.
     let homes = options.home || machine.require_homing && !machine.homing.is_empty();
     let home = homes.then_some(HOMING);
-    let switches = Switches { block_delete: options.machine.block_delete, home, ..Switches::default() };
+    let switches = Switches {
+        block_delete: options.machine.block_delete,
+        home,
+        ..Switches::default()
+    };
     let report = check_program(machine, &built_in::registry()?, program, switches)?;
     if report.is_ok() {
         program::print_warnings(&report);
         let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
-        let _ = writeln!(std::io::stdout(), "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors");
+        let _ = writeln!(
+            std::io::stdout(),
+            "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors"
+        );
         if report.open_lines > 0 {
             let open = report.open_lines;
             let _ = writeln!(

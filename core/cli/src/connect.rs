@@ -17,9 +17,17 @@ struct Connection {
 
 impl Connection {
     fn open(path: &Path) -> Result<Self, String> {
-        let at = |why: String| format!("{}: {why}; tandem serve says where its socket is", path.display());
+        let at = |why: String| {
+            format!(
+                "{}: {why}; tandem serve says where its socket is",
+                path.display()
+            )
+        };
         let stream = UnixStream::connect(path).map_err(|e| at(e.to_string()))?;
-        let mut this = Self { reader: BufReader::new(stream), last_id: 0 };
+        let mut this = Self {
+            reader: BufReader::new(stream),
+            last_id: 0,
+        };
         let greeting = this.hear()?;
         match greeting["tandem"]["protocol"].as_u64() {
             Some(2) => Ok(this),
@@ -31,7 +39,8 @@ impl Connection {
         let mut line = String::new();
         match self.reader.read_line(&mut line) {
             Ok(0) => Err("the controller has closed the connection".to_string()),
-            Ok(_) => serde_json::from_str(&line).map_err(|e| format!("the controller says what is no JSON: {e}")),
+            Ok(_) => serde_json::from_str(&line)
+                .map_err(|e| format!("the controller says what is no JSON: {e}")),
             Err(error) => Err(format!("the controller: {error}")),
         }
     }
@@ -47,13 +56,20 @@ impl Connection {
         with.insert("id".to_string(), json!(self.last_id));
         with.insert("request".to_string(), json!(request));
         let line = format!("{}\n", Value::Object(with));
-        self.reader.get_mut().write_all(line.as_bytes()).map_err(|e| format!("the controller: {e}"))?;
+        self.reader
+            .get_mut()
+            .write_all(line.as_bytes())
+            .map_err(|e| format!("the controller: {e}"))?;
         loop {
             let told = self.hear()?;
             if told["id"].as_u64() != Some(self.last_id) || told.get("event").is_some() {
                 event(&told);
             } else if let Some(error) = told.get("error") {
-                return Err(format!("{}: {}", request, error["why"].as_str().unwrap_or_default()));
+                return Err(format!(
+                    "{}: {}",
+                    request,
+                    error["why"].as_str().unwrap_or_default()
+                ));
             } else {
                 return Ok(told["ok"].clone());
             }
@@ -77,7 +93,11 @@ pub fn status(options: &args::Status) -> Result<u8, Box<dyn Error>> {
         if told["event"] == "end" {
             return Ok(0);
         }
-        let line = if told["event"] == "status" { shown(&told["status"]) } else { continue };
+        let line = if told["event"] == "status" {
+            shown(&told["status"])
+        } else {
+            continue;
+        };
         if line != last {
             say_out(&line);
             last = line;
@@ -90,13 +110,23 @@ pub fn ask(options: &args::Ask) -> Result<u8, Box<dyn Error>> {
     let mut connection = Connection::open(&options.connect)?;
     let mut with = Map::new();
     for (key, text) in &options.with {
-        with.insert(key.clone(), serde_json::from_str(text).unwrap_or_else(|_| json!(text)));
+        with.insert(
+            key.clone(),
+            serde_json::from_str(text).unwrap_or_else(|_| json!(text)),
+        );
     }
-    if !["status", "history", "list", "hold", "emergency-stop"].contains(&options.request.as_str()) {
-        connection.ask("lease", Map::from_iter([("how".to_string(), json!("take"))]), &mut |_| ())?;
+    if !["status", "history", "list", "hold", "emergency-stop"].contains(&options.request.as_str())
+    {
+        connection.ask(
+            "lease",
+            Map::from_iter([("how".to_string(), json!("take"))]),
+            &mut |_| (),
+        )?;
     }
     let mut early = vec![];
-    let answer = connection.ask(&options.request, with, &mut |event| early.push(event.clone()));
+    let answer = connection.ask(&options.request, with, &mut |event| {
+        early.push(event.clone())
+    });
     let ok = match answer {
         Ok(ok) => ok,
         Err(why) => {
@@ -113,7 +143,11 @@ pub fn ask(options: &args::Ask) -> Result<u8, Box<dyn Error>> {
         let told = events.next().map_or_else(|| connection.hear(), Ok)?;
         if told["event"] == "job" {
             say_out(&told["job"].to_string());
-            return Ok(if told["job"]["outcome"] == "done" { 0 } else { FAULT });
+            return Ok(if told["job"]["outcome"] == "done" {
+                0
+            } else {
+                FAULT
+            });
         }
         if told["event"] == "end" {
             return Ok(FAULT);
@@ -133,7 +167,11 @@ fn shown(status: &Value) -> String {
     };
     let text = |key: &str| status[key].as_str().unwrap_or_default().to_string();
     let number = |key: &str| status[key].as_f64().unwrap_or_default();
-    let fault = if status["fault"].is_string() { format!("  fault: {}", text("fault")) } else { String::new() };
+    let fault = if status["fault"].is_string() {
+        format!("  fault: {}", text("fault"))
+    } else {
+        String::new()
+    };
     format!(
         "{}  machine {}  {} {}  F{:.0} S{:.0} T{:.0}  line {:.0}{fault}",
         text("state"),

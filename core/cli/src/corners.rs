@@ -30,7 +30,12 @@ impl Corners {
             return;
         }
         let time_constant_ms = report.time_constant_s * 1e3;
-        self.list.push(Corner { block: block.index, vertex: block.start, time_constant_ms, error_um: f64::INFINITY });
+        self.list.push(Corner {
+            block: block.index,
+            vertex: block.start,
+            time_constant_ms,
+            error_um: f64::INFINITY,
+        });
     }
 
     /// A sample was sent. Blocks are planned before their samples come.
@@ -39,11 +44,17 @@ impl Corners {
             self.at += 1;
         }
         let last = self.last.replace(sample.command).unwrap_or(sample.command);
-        let Some(corner) = self.list.get_mut(self.at).filter(|corner| corner.block == sample.block) else {
+        let Some(corner) = self
+            .list
+            .get_mut(self.at)
+            .filter(|corner| corner.block == sample.block)
+        else {
             self.places.push(u32::MAX);
             return;
         };
-        corner.error_um = corner.error_um.min(1e3 * distance_mm(&corner.vertex, &last, &sample.command));
+        corner.error_um = corner
+            .error_um
+            .min(1e3 * distance_mm(&corner.vertex, &last, &sample.command));
         self.places.push(self.at as u32);
     }
 
@@ -55,21 +66,36 @@ impl Corners {
         let curve = |name: &str, unit: &str, of: fn(&Corner) -> f64| Signal {
             name: name.to_string(),
             unit: unit.to_string(),
-            values: self.places.iter().map(|place| self.list.get(*place as usize).map_or(f64::NAN, of)).collect(),
+            values: self
+                .places
+                .iter()
+                .map(|place| self.list.get(*place as usize).map_or(f64::NAN, of))
+                .collect(),
         };
         vec![
-            curve("time constant where the block ends", "ms", |corner| corner.time_constant_ms),
-            curve("error of the corner where the block starts", "µm", |corner| corner.error_um),
+            curve("time constant where the block ends", "ms", |corner| {
+                corner.time_constant_ms
+            }),
+            curve(
+                "error of the corner where the block starts",
+                "µm",
+                |corner| corner.error_um,
+            ),
         ]
     }
 }
 
 /// Distance of `point` from the chord between two samples, mm.
 fn distance_mm(point: &AxisVector, from: &AxisVector, to: &AxisVector) -> f64 {
-    let dot = |a: &AxisVector, b: &AxisVector| -> f64 { a.0.iter().zip(&b.0).map(|(x, y)| x * y).sum() };
+    let dot =
+        |a: &AxisVector, b: &AxisVector| -> f64 { a.0.iter().zip(&b.0).map(|(x, y)| x * y).sum() };
     let (chord, reach) = (*to - *from, *point - *from);
     let square = dot(&chord, &chord);
-    let along = if square > 0.0 { (dot(&reach, &chord) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let along = if square > 0.0 {
+        (dot(&reach, &chord) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let off = reach - chord * along;
     dot(&off, &off).sqrt()
 }
@@ -81,9 +107,18 @@ mod tests {
     #[test]
     fn distance_is_to_the_chord_and_its_ends() {
         let at = |x: f64, y: f64| AxisVector::from_slice(&[x, y]);
-        assert_eq!(distance_mm(&at(1.0, 2.0), &at(0.0, 0.0), &at(3.0, 0.0)), 2.0);
-        assert_eq!(distance_mm(&at(-3.0, 4.0), &at(0.0, 0.0), &at(3.0, 0.0)), 5.0);
-        assert_eq!(distance_mm(&at(0.0, 4.0), &at(0.0, 0.0), &at(0.0, 0.0)), 4.0);
+        assert_eq!(
+            distance_mm(&at(1.0, 2.0), &at(0.0, 0.0), &at(3.0, 0.0)),
+            2.0
+        );
+        assert_eq!(
+            distance_mm(&at(-3.0, 4.0), &at(0.0, 0.0), &at(3.0, 0.0)),
+            5.0
+        );
+        assert_eq!(
+            distance_mm(&at(0.0, 4.0), &at(0.0, 0.0), &at(0.0, 0.0)),
+            4.0
+        );
     }
 
     #[test]

@@ -29,13 +29,24 @@ pub fn man() -> io::Result<u8> {
     Ok(0)
 }
 
-fn of_subcommands(command: &clap::Command, path: &mut String, text: &mut Vec<u8>) -> io::Result<()> {
-    for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
+fn of_subcommands(
+    command: &clap::Command,
+    path: &mut String,
+    text: &mut Vec<u8>,
+) -> io::Result<()> {
+    for sub in command
+        .get_subcommands()
+        .filter(|sub| sub.get_name() != "help")
+    {
         let parent = path.len();
         path.push(' ');
         path.push_str(sub.get_name());
         writeln!(text, ".SH \"{}\"", path.to_uppercase())?;
-        writeln!(text, "{}", sub.get_about().map(ToString::to_string).unwrap_or_default())?;
+        writeln!(
+            text,
+            "{}",
+            sub.get_about().map(ToString::to_string).unwrap_or_default()
+        )?;
         let man = Man::new(sub.clone());
         // A page of its own would begin with its title; here it is a part of one.
         for part in [Man::render_synopsis_section, Man::render_options_section] {

@@ -33,9 +33,15 @@ pub fn arrange() {
         operator::tell(&format!("fault: {words}"));
         let left = "the process ends here, so that the drives' own watchdog stops what still moves";
         say!("{left}; what was recorded until now is kept");
-        let last = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let last = LAST_WORDS
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         let summary = last.as_ref().map(LastWords::in_the_making);
-        for path in flush_outputs().into_iter().filter(|path| Some(path) != summary.as_ref()) {
+        for path in flush_outputs()
+            .into_iter()
+            .filter(|path| Some(path) != summary.as_ref())
+        {
             say!("incomplete: {}", path.display());
         }
         if let Some(last) = last {
@@ -47,7 +53,13 @@ pub fn arrange() {
 }
 
 /// A run begins: where its summary goes that is written without it.
-pub fn summarise_in(path: Option<&PathBuf>, program: &str, machine: &Machine, clock: &'static str, run: &Run) {
+pub fn summarise_in(
+    path: Option<&PathBuf>,
+    program: &str,
+    machine: &Machine,
+    clock: &'static str,
+    run: &Run,
+) {
     let last = path.map(|path| LastWords {
         path: path.clone(),
         program: program.to_string(),

@@ -21,19 +21,43 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
         let axis = machine.axes.index(letter.to_ascii_uppercase());
         machine.homing.retain(|homing| Some(homing.axis) == axis);
         if machine.homing.is_empty() {
-            return Err(format!("the machine has no [homing.{}]", letter.to_ascii_lowercase()).into());
+            return Err(format!(
+                "the machine has no [homing.{}]",
+                letter.to_ascii_lowercase()
+            )
+            .into());
         }
     }
     let registry = built_in::registry()?;
     let clock = clock::of(options.clock, &machine, &registry);
-    let switches = Switches { reset: options.reset, clock: Some(clock), ..Switches::default() };
+    let switches = Switches {
+        reset: options.reset,
+        clock: Some(clock),
+        ..Switches::default()
+    };
     let run = Run::home(machine.clone(), &registry, HOMING, switches)?;
-    let trace = options.trace.as_ref().map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
-    let report = options.report.as_ref().map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
+    let trace = options
+        .trace
+        .as_ref()
+        .map(|path| TraceSink::create(path, &machine, "(homing)", &run, false));
+    let report = options
+        .report
+        .as_ref()
+        .map(|_| Collector::new(&machine, "homing", &[], run.allows_steps()));
     let (corrections, broken) = (Corrections::new(&machine), Broken::default());
-    let mut observer = Observer { corrections, trace: trace.transpose()?, report, broken };
+    let mut observer = Observer {
+        corrections,
+        trace: trace.transpose()?,
+        report,
+        broken,
+    };
     let outcome = run.drive(clock, &[], &mut observer)?;
-    let Observer { trace, report, mut broken, .. } = observer;
+    let Observer {
+        trace,
+        report,
+        mut broken,
+        ..
+    } = observer;
     broken.note(trace.map_or(Ok(()), TraceSink::finish));
     if let (Some(report), Some(path)) = (report, &options.report) {
         broken.note(report.write(path, &outcome.summary));
@@ -43,7 +67,8 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
         say!("fault: {failure}");
     }
     tell_warnings(&outcome.summary);
-    let failed = outcome.summary.fault.is_some() || outcome.summary.stopped.is_some() || broken.is_any();
+    let failed =
+        outcome.summary.fault.is_some() || outcome.summary.stopped.is_some() || broken.is_any();
     Ok(if failed { FAULT } else { 0 })
 }
 
@@ -87,19 +112,38 @@ impl Corrections {
     pub fn new(machine: &Machine) -> Self {
         let axis = |axis: usize| {
             let rotary = machine.axes.is_rotary(axis);
-            let (scale, unit) = if rotary { (1f64.to_radians(), "deg") } else { (1.0, "mm") };
-            (machine.axes.letter(axis).to_ascii_lowercase(), machine.home[axis], scale, unit)
+            let (scale, unit) = if rotary {
+                (1f64.to_radians(), "deg")
+            } else {
+                (1.0, "mm")
+            };
+            (
+                machine.axes.letter(axis).to_ascii_lowercase(),
+                machine.home[axis],
+                scale,
+                unit,
+            )
         };
-        Self { axes: (0..machine.axes.count()).map(axis).collect() }
+        Self {
+            axes: (0..machine.axes.count()).map(axis).collect(),
+        }
     }
 
     pub fn event(&self, event: &Event) {
-        let Some((letter, home, scale, unit)) = self.axes.get(event.index.unsigned_abs() as usize) else { return };
+        let Some((letter, home, scale, unit)) = self.axes.get(event.index.unsigned_abs() as usize)
+        else {
+            return;
+        };
         match event.kind {
             EventKind::Correct => {
-                say!("homing {letter}: the switch is found; the axis stood {:+.6} {unit} off", event.value / scale);
+                say!(
+                    "homing {letter}: the switch is found; the axis stood {:+.6} {unit} off",
+                    event.value / scale
+                );
             }
-            EventKind::HomeByDrive => say!("homing {letter}: by its drive, within {} s", event.value),
+            EventKind::HomeByDrive => {
+                say!("homing {letter}: by its drive, within {} s", event.value)
+            }
             EventKind::Homed => say!("homing {letter}: goes home, to {:.6} {unit}", home / scale),
             _ => {}
         }

@@ -58,7 +58,12 @@ struct Record {
 impl RunObserver for Record {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
         let i = self.index;
-        self.rows.push((sample.line, sample.feedback[i], sample.speed[i], sample.current_a[i]));
+        self.rows.push((
+            sample.line,
+            sample.feedback[i],
+            sample.speed[i],
+            sample.current_a[i],
+        ));
     }
 }
 
@@ -71,9 +76,13 @@ pub fn identify(options: &args::Identify) -> Result<u8, Box<dyn Error>> {
     let (text, purposes) = program(&machine, &motor)?;
     let rows = drive(machine.clone(), &text, options, motor.index)?;
     let points = air_runs(&rows, &purposes, &motor);
-    let fit = stribeck(&points, true).ok_or("too few air runs fit into travel and feed of the axis")?;
+    let fit =
+        stribeck(&points, true).ok_or("too few air runs fit into travel and feed of the axis")?;
     let inertia = inertia(&rows, &purposes, &motor, &fit, machine.fine_period_s)?;
-    let path = options.out.clone().unwrap_or_else(|| beside(&options.machine, motor.letter));
+    let path = options
+        .out
+        .clone()
+        .unwrap_or_else(|| beside(&options.machine, motor.letter));
     // A reader that has gone away is no reason to fail.
     let _ = std::io::stdout().write_all(shown(&motor, &points, &fit, &inertia).as_bytes());
     if let Err(cause) = write(&path, &file(&motor, &fit, &inertia, &machine)) {
@@ -81,20 +90,27 @@ pub fn identify(options: &args::Identify) -> Result<u8, Box<dyn Error>> {
         say!("error: {cause}");
         return Ok(FAULT);
     }
-    let _ = writeln!(std::io::stdout(), "written: {}; include it in the machine file", path.display());
+    let _ = writeln!(
+        std::io::stdout(),
+        "written: {}; include it in the machine file",
+        path.display()
+    );
     Ok(0)
 }
 
 fn write(path: &Path, text: &str) -> Result<(), String> {
     let mut out = Output::create(path)?;
-    out.write_all(text.as_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+    out.write_all(text.as_bytes())
+        .map_err(|e| format!("{}: {e}", path.display()))?;
     out.finish()
 }
 
 impl Motor {
     fn of(machine: &Machine, letter: char) -> Result<Self, String> {
-        let index =
-            machine.axes.index(letter.to_ascii_uppercase()).ok_or(format!("the machine has no axis {letter}"))?;
+        let index = machine
+            .axes
+            .index(letter.to_ascii_uppercase())
+            .ok_or(format!("the machine has no axis {letter}"))?;
         if machine.axes.is_rotary(index) || !joints_are_axes(machine) {
             return Err(format!(
                 "axis {letter}: only linear axes are identified, on machines where each axis has one motor of its own"
@@ -102,36 +118,71 @@ impl Motor {
         }
         let letter = letter.to_ascii_lowercase();
         let table = format!("feed_strategy.options.axes.{letter}");
-        let options = machine.feed_strategy.as_ref().map_or("", |strategy| &strategy.options);
-        let options: toml::Table = options.parse().map_err(|e| format!("feed_strategy.options: {e}"))?;
-        let axis = options.get("axes").and_then(|axes| axes.get(letter.to_string()));
+        let options = machine
+            .feed_strategy
+            .as_ref()
+            .map_or("", |strategy| &strategy.options);
+        let options: toml::Table = options
+            .parse()
+            .map_err(|e| format!("feed_strategy.options: {e}"))?;
+        let axis = options
+            .get("axes")
+            .and_then(|axes| axes.get(letter.to_string()));
         let number = |key: &str| {
             let value = axis.and_then(|axis| axis.get(key));
-            let number = value.and_then(|v| v.as_float().or_else(|| v.as_integer().map(|v| v as f64)));
-            let missing = format!("{}: {table}.{key}: missing, and an identification needs it", machine.place(&table));
+            let number =
+                value.and_then(|v| v.as_float().or_else(|| v.as_integer().map(|v| v as f64)));
+            let missing = format!(
+                "{}: {table}.{key}: missing, and an identification needs it",
+                machine.place(&table)
+            );
             number.filter(|value| *value > 0.0).ok_or(missing)
         };
         let turns = TAU / number("lead_mm")?;
-        Ok(Self { letter, index, turns, torque_constant_nm_per_a: number("torque_constant_nm_per_a")? })
+        Ok(Self {
+            letter,
+            index,
+            turns,
+            torque_constant_nm_per_a: number("torque_constant_nm_per_a")?,
+        })
     }
 }
 
 /// Whether current i is that of axis i: no kinematics, and no axis with two motors.
 fn joints_are_axes(machine: &Machine) -> bool {
-    let motors = |axis: usize| machine.joints.iter().filter(|joint| joint.axis == Some(axis)).count();
-    machine.kinematics.plugin == "identity" && (0..machine.axes.count()).all(|axis| motors(axis) <= 1)
+    let motors = |axis: usize| {
+        machine
+            .joints
+            .iter()
+            .filter(|joint| joint.axis == Some(axis))
+            .count()
+    };
+    machine.kinematics.plugin == "identity"
+        && (0..machine.axes.count()).all(|axis| motors(axis) <= 1)
 }
 
 /// The experiment, and what each of its lines is for.
 fn program(machine: &Machine, motor: &Motor) -> Result<(String, Vec<Purpose>), String> {
     let limits = &machine.limits.axes()[motor.index];
-    let (middle, room) = (f64::midpoint(limits.min_mm, limits.max_mm), 0.9 * (limits.max_mm - limits.min_mm));
+    let (middle, room) = (
+        f64::midpoint(limits.min_mm, limits.max_mm),
+        0.9 * (limits.max_mm - limits.min_mm),
+    );
     if !(middle.is_finite() && room > 0.0) {
-        return Err(format!("axis {}: it states no travel to move in", motor.letter));
+        return Err(format!(
+            "axis {}: it states no travel to move in",
+            motor.letter
+        ));
     }
-    let (mut text, mut purposes) = ("G21 G90 G94 G61\n".to_string(), vec![Purpose::Positioning; 2]);
+    let (mut text, mut purposes) = (
+        "G21 G90 G94 G61\n".to_string(),
+        vec![Purpose::Positioning; 2],
+    );
     let mut line = |place_mm: f64, mm_per_s: Option<f64>, purpose: Purpose| {
-        let (letter, feed) = (motor.letter.to_ascii_uppercase(), mm_per_s.map(|v| v * 60.0));
+        let (letter, feed) = (
+            motor.letter.to_ascii_uppercase(),
+            mm_per_s.map(|v| v * 60.0),
+        );
         let _ = match feed {
             Some(feed) => writeln!(text, "G1 {letter}{place_mm:.6} F{feed:.6}"),
             None => writeln!(text, "G0 {letter}{place_mm:.6}"),
@@ -145,19 +196,45 @@ fn program(machine: &Machine, motor: &Motor) -> Result<(String, Vec<Purpose>), S
             continue;
         }
         line(middle - length / 2.0, None, Purpose::Positioning);
-        line(middle + length / 2.0, Some(mm_per_s), Purpose::AirRun(speed));
-        line(middle - length / 2.0, Some(mm_per_s), Purpose::AirRun(-speed));
+        line(
+            middle + length / 2.0,
+            Some(mm_per_s),
+            Purpose::AirRun(speed),
+        );
+        line(
+            middle - length / 2.0,
+            Some(mm_per_s),
+            Purpose::AirRun(-speed),
+        );
     }
-    let (mm_per_s, length) = stroke(limits.feed_mm_per_s, limits.acceleration_mm_per_s2, room, motor);
+    let (mm_per_s, length) = stroke(
+        limits.feed_mm_per_s,
+        limits.acceleration_mm_per_s2,
+        room,
+        motor,
+    );
     for stroke in 0..STROKE.2 {
         let side = if stroke % 2 == 0 { 0.5 } else { -0.5 };
-        line(middle + side * length, Some(mm_per_s), if stroke == 0 { Purpose::Positioning } else { Purpose::Stroke });
+        line(
+            middle + side * length,
+            Some(mm_per_s),
+            if stroke == 0 {
+                Purpose::Positioning
+            } else {
+                Purpose::Stroke
+            },
+        );
     }
     Ok((text + "M2\n", purposes))
 }
 
 /// Speed, mm/s, and length, mm, of the strokes.
-fn stroke(feed_mm_per_s: f64, acceleration_mm_per_s2: f64, room_mm: f64, motor: &Motor) -> (f64, f64) {
+fn stroke(
+    feed_mm_per_s: f64,
+    acceleration_mm_per_s2: f64,
+    room_mm: f64,
+    motor: &Motor,
+) -> (f64, f64) {
     let length = |v: f64| v * v / acceleration_mm_per_s2 + v * STROKE.1;
     let mut mm_per_s = (STROKE.0 / motor.turns).min(0.95 * feed_mm_per_s);
     while length(mm_per_s) > room_mm {
@@ -166,12 +243,28 @@ fn stroke(feed_mm_per_s: f64, acceleration_mm_per_s2: f64, room_mm: f64, motor: 
     (mm_per_s, length(mm_per_s))
 }
 
-fn drive(machine: Machine, text: &str, options: &args::Identify, index: usize) -> Result<Vec<Row>, Box<dyn Error>> {
+fn drive(
+    machine: Machine,
+    text: &str,
+    options: &args::Identify,
+    index: usize,
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let program = Program::spool("identify", text.as_bytes())?;
     let registry = built_in::registry()?;
     let clock = clock::of(options.clock, &machine, &registry);
-    let run = Run::prepare(machine, &registry, program, Switches { clock: Some(clock), ..Switches::default() })?;
-    let mut record = Record { index, rows: vec![] };
+    let run = Run::prepare(
+        machine,
+        &registry,
+        program,
+        Switches {
+            clock: Some(clock),
+            ..Switches::default()
+        },
+    )?;
+    let mut record = Record {
+        index,
+        rows: vec![],
+    };
     let summary = run.drive(clock, &[], &mut record)?.summary;
     tell_warnings(&summary);
     match summary.fault.or(summary.stopped) {
@@ -181,19 +274,31 @@ fn drive(machine: Machine, text: &str, options: &args::Identify, index: usize) -
 }
 
 fn purpose_of(purposes: &[Purpose], line: u32) -> Purpose {
-    purposes.get(line as usize).copied().unwrap_or(Purpose::Positioning)
+    purposes
+        .get(line as usize)
+        .copied()
+        .unwrap_or(Purpose::Positioning)
 }
 
 /// The mean torque of each air run while its speed is steady.
 fn air_runs(rows: &[Row], purposes: &[Purpose], motor: &Motor) -> Vec<Point> {
     let mean = |(line, purpose): (usize, &Purpose)| {
-        let Purpose::AirRun(speed_rad_per_s) = *purpose else { return None };
-        let of_line: Vec<f64> = rows.iter().filter(|row| row.0 as usize == line).map(|row| row.3).collect();
+        let Purpose::AirRun(speed_rad_per_s) = *purpose else {
+            return None;
+        };
+        let of_line: Vec<f64> = rows
+            .iter()
+            .filter(|row| row.0 as usize == line)
+            .map(|row| row.3)
+            .collect();
         let at = |share: f64| (share * of_line.len() as f64) as usize;
         let steady = &of_line[at(STEADY.0)..at(STEADY.1)];
         let current_a = steady.iter().sum::<f64>() / steady.len() as f64;
         let torque_nm = motor.torque_constant_nm_per_a * current_a;
-        torque_nm.is_finite().then_some(Point { speed_rad_per_s, torque_nm })
+        torque_nm.is_finite().then_some(Point {
+            speed_rad_per_s,
+            torque_nm,
+        })
     };
     purposes.iter().enumerate().filter_map(mean).collect()
 }
@@ -206,14 +311,32 @@ struct Inertia {
 }
 
 /// Least squares over the strokes, the friction taken out.
-fn inertia(rows: &[Row], purposes: &[Purpose], motor: &Motor, fit: &Fit, period_s: f64) -> Result<Inertia, String> {
-    let strokes: Vec<_> = rows.iter().filter(|row| purpose_of(purposes, row.0) == Purpose::Stroke).collect();
-    let fastest = strokes.iter().map(|row| (row.2 * motor.turns).abs()).fold(0.0, f64::max);
-    let mut differences = Differences::new(SPAN, period_s, (NEAR_REVERSAL.0 * fastest).min(NEAR_REVERSAL.1));
+fn inertia(
+    rows: &[Row],
+    purposes: &[Purpose],
+    motor: &Motor,
+    fit: &Fit,
+    period_s: f64,
+) -> Result<Inertia, String> {
+    let strokes: Vec<_> = rows
+        .iter()
+        .filter(|row| purpose_of(purposes, row.0) == Purpose::Stroke)
+        .collect();
+    let fastest = strokes
+        .iter()
+        .map(|row| (row.2 * motor.turns).abs())
+        .fold(0.0, f64::max);
+    let mut differences = Differences::new(
+        SPAN,
+        period_s,
+        (NEAR_REVERSAL.0 * fastest).min(NEAR_REVERSAL.1),
+    );
     let (mut rls, mut samples, mut last) = (Rls::new(0.0, 1.0, 1.0), 0, None);
     for (_, place, _, current_a) in strokes {
         let angle = place * motor.turns;
-        let speed = last.replace(angle).map_or(0.0, |last| (angle - last) / period_s);
+        let speed = last
+            .replace(angle)
+            .map_or(0.0, |last| (angle - last) / period_s);
         let free_nm = motor.torque_constant_nm_per_a * current_a - fit.model.torque_nm(speed);
         if let Some((acceleration, torque_nm)) = differences.push(angle, free_nm) {
             rls.update(acceleration, torque_nm);
@@ -224,9 +347,15 @@ fn inertia(rows: &[Row], purposes: &[Purpose], motor: &Motor, fit: &Fit, period_
     let doubt = 1.96 * rls.deviation() * (2.0 * SPAN as f64).sqrt();
     let kg_m2 = rls.value();
     if samples < 10 * SPAN || kg_m2 <= 0.0 || kg_m2.is_nan() {
-        return Err(format!("the strokes gave {samples} samples away from reversals: no inertia can be found"));
+        return Err(format!(
+            "the strokes gave {samples} samples away from reversals: no inertia can be found"
+        ));
     }
-    Ok(Inertia { kg_m2, doubt_percent: 100.0 * doubt / kg_m2, samples })
+    Ok(Inertia {
+        kg_m2,
+        doubt_percent: 100.0 * doubt / kg_m2,
+        samples,
+    })
 }
 
 fn beside(machine: &Path, letter: char) -> PathBuf {
@@ -261,15 +390,39 @@ fn file(motor: &Motor, fit: &Fit, inertia: &Inertia, machine: &Machine) -> Strin
 }
 
 fn shown(motor: &Motor, points: &[Point], fit: &Fit, inertia: &Inertia) -> String {
-    let mut text = format!("axis {}\n  speed, rad/s   torque, N·m    model, N·m\n", motor.letter);
-    for Point { speed_rad_per_s, torque_nm } in points {
+    let mut text = format!(
+        "axis {}\n  speed, rad/s   torque, N·m    model, N·m\n",
+        motor.letter
+    );
+    for Point {
+        speed_rad_per_s,
+        torque_nm,
+    } in points
+    {
         let model_nm = fit.model.torque_nm(*speed_rad_per_s);
-        let _ = writeln!(text, "{speed_rad_per_s:14.2} {torque_nm:13.5} {model_nm:13.5}");
+        let _ = writeln!(
+            text,
+            "{speed_rad_per_s:14.2} {torque_nm:13.5} {model_nm:13.5}"
+        );
     }
     let (model, d) = (&fit.model, &fit.deviations);
-    let _ = writeln!(text, "Coulomb   {:.5} ± {:.5} N·m", model.coulomb_nm, 1.96 * d[0]);
-    let _ = writeln!(text, "viscous   {:.3e} ± {:.1e} N·m·s/rad", model.viscous_nm_s_per_rad, 1.96 * d[1]);
-    let _ = writeln!(text, "Stribeck  {:.5} N·m at {:.3} rad/s", model.stribeck_nm, model.stribeck_speed_rad_per_s);
+    let _ = writeln!(
+        text,
+        "Coulomb   {:.5} ± {:.5} N·m",
+        model.coulomb_nm,
+        1.96 * d[0]
+    );
+    let _ = writeln!(
+        text,
+        "viscous   {:.3e} ± {:.1e} N·m·s/rad",
+        model.viscous_nm_s_per_rad,
+        1.96 * d[1]
+    );
+    let _ = writeln!(
+        text,
+        "Stribeck  {:.5} N·m at {:.3} rad/s",
+        model.stribeck_nm, model.stribeck_speed_rad_per_s
+    );
     let _ = writeln!(
         text,
         "constant  {:.5} ± {:.5} N·m, residual {:.5} N·m rms",
@@ -278,6 +431,9 @@ fn shown(motor: &Motor, points: &[Point], fit: &Fit, inertia: &Inertia) -> Strin
         fit.rms_nm
     );
     let (kg_m2, percent, samples) = (inertia.kg_m2, inertia.doubt_percent, inertia.samples);
-    let _ = writeln!(text, "inertia   {kg_m2:.4e} kg·m² ± {percent:.2} %, from {samples} samples");
+    let _ = writeln!(
+        text,
+        "inertia   {kg_m2:.4e} kg·m² ± {percent:.2} %, from {samples} samples"
+    );
     text
 }

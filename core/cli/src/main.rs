@@ -1,6 +1,9 @@
 //! The `tandem` command: the only crate that prints.
 
-#![allow(clippy::doc_markdown, reason = "LinuxCNC and EtherCAT are names, not code")]
+#![allow(
+    clippy::doc_markdown,
+    reason = "LinuxCNC and EtherCAT are names, not code"
+)]
 
 /// A line to standard error. A reader that has gone away is no reason to fail.
 macro_rules! say {

@@ -7,7 +7,11 @@ use tandem_gcode::{CheckReport, Program, ProgramError};
 
 /// Opens `path`; `-` is standard input.
 pub fn open(path: &Path) -> Result<Program, ProgramError> {
-    if path.as_os_str() == "-" { Program::spool("standard input", io::stdin().lock()) } else { Program::open(path) }
+    if path.as_os_str() == "-" {
+        Program::spool("standard input", io::stdin().lock())
+    } else {
+        Program::open(path)
+    }
 }
 
 /// Prints what is worth to be known of a program that is driven all the same.

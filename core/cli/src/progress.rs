@@ -60,7 +60,11 @@ impl Progress {
 
     /// Share of the program's path that is driven, 0 to 1.
     pub fn share(&self) -> f64 {
-        if self.length_mm > 0.0 { (self.driven_mm / self.length_mm).clamp(0.0, 1.0) } else { 1.0 }
+        if self.length_mm > 0.0 {
+            (self.driven_mm / self.length_mm).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
     }
 
     /// How long the rest of the path takes, s, at the pace of the `elapsed_s` so far, holds left out.
@@ -90,7 +94,10 @@ fn state(sample: &Sample) -> String {
     let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / PI;
     match sample.cause {
         StopCause::Spindle => {
-            let (turns, told) = (rpm(sample.spindle_rad_per_s), rpm(sample.switched.spindle_rad_per_s));
+            let (turns, told) = (
+                rpm(sample.spindle_rad_per_s),
+                rpm(sample.switched.spindle_rad_per_s),
+            );
             format!("waits for the spindle: {turns:.0} of {told:.0} rpm")
         }
         _ => sample.state.name().to_string(),
@@ -106,10 +113,22 @@ mod tests {
     fn a_hold_does_not_count_as_time_that_the_path_takes() {
         let mut progress = Progress::new(100.0, 0.01);
         for tick in 0..6000 {
-            let (state, feed_mm_per_s) =
-                if tick < 500 { (MachineState::Running, 10.0) } else { (MachineState::Holding, 0.0) };
-            progress.sample(&Sample { tick, state, feed_mm_per_s, ..Sample::default() });
+            let (state, feed_mm_per_s) = if tick < 500 {
+                (MachineState::Running, 10.0)
+            } else {
+                (MachineState::Holding, 0.0)
+            };
+            progress.sample(&Sample {
+                tick,
+                state,
+                feed_mm_per_s,
+                ..Sample::default()
+            });
         }
-        assert!((progress.left_s(60.0) - 5.0).abs() < 1e-9, "{}", progress.left_s(60.0));
+        assert!(
+            (progress.left_s(60.0) - 5.0).abs() < 1e-9,
+            "{}",
+            progress.left_s(60.0)
+        );
     }
 }

@@ -26,13 +26,19 @@ impl Collector {
     /// Nothing collected yet.
     pub fn new(machine: &Machine, program: &str, signals: &[&str], steps_allowed: bool) -> Self {
         let count = machine.axes.count();
-        let samples = Samples { command: vec![vec![]; count], feedback: vec![vec![]; count], ..Samples::default() };
+        let samples = Samples {
+            command: vec![vec![]; count],
+            feedback: vec![vec![]; count],
+            ..Samples::default()
+        };
         let report = Report {
             title: format!("{program} on {}", machine.name),
             program: program.to_string(),
             machine: machine.name.clone(),
             planner: machine.planner.plugin.clone(),
-            axes: (0..count).map(|i| axis(machine, i, steps_allowed)).collect(),
+            axes: (0..count)
+                .map(|i| axis(machine, i, steps_allowed))
+                .collect(),
             fine_period_s: machine.fine_period_s,
             samples,
             signals: signals.iter().map(|name| signal(name)).collect(),
@@ -61,12 +67,20 @@ impl Collector {
     /// Adds a sample.
     pub fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         let samples = &mut self.report.samples;
-        samples.t_s.push(sample.tick as f64 * self.report.fine_period_s);
+        samples
+            .t_s
+            .push(sample.tick as f64 * self.report.fine_period_s);
         samples.line.push(sample.line);
         samples.feed_mm_s.push(sample.feed_mm_per_s);
         samples.sigma.push(sample.sigma);
         let programmed = sample.programmed_feed_mm_per_s;
-        samples.programmed_feed_mm_s.push(if programmed.is_finite() { programmed } else { f64::NAN });
+        samples
+            .programmed_feed_mm_s
+            .push(if programmed.is_finite() {
+                programmed
+            } else {
+                f64::NAN
+            });
         self.deviation_mm.push(deviation_mm);
         self.corners.sample(sample);
         self.curves.sample(sample);
@@ -92,10 +106,15 @@ impl Collector {
         self.report.signals.extend(curves);
         self.report.samples.chord_share = chord_share;
         let (most_mm, each_mm) = self.tolerances.of_run_mm();
-        (self.report.path_tolerance_mm, self.report.samples.tolerance_mm) = (Some(most_mm), each_mm);
+        (
+            self.report.path_tolerance_mm,
+            self.report.samples.tolerance_mm,
+        ) = (Some(most_mm), each_mm);
         let lost = |cause: String| RecordError::lost("report", path, cause);
         let mut out = Output::create(path).map_err(lost)?;
-        self.report.write(&mut out).map_err(|e| lost(e.to_string()))?;
+        self.report
+            .write(&mut out)
+            .map_err(|e| lost(e.to_string()))?;
         out.close().map_err(|e| lost(e.to_string()))?;
         out.finish().map_err(lost)
     }
@@ -103,15 +122,32 @@ impl Collector {
 
 /// A curve called after a signal; its unit stands at the end of the name.
 fn signal(name: &str) -> Signal {
-    let units =
-        [("_mm_per_min", "mm/min"), ("_mm_per_s", "mm/s"), ("_nm", "N·m"), ("_mm", "mm"), ("_n", "N"), ("_a", "A")];
-    let unit = units.iter().find(|(suffix, _)| name.ends_with(suffix)).map_or("", |(_, unit)| unit);
-    Signal { name: name.to_string(), unit: unit.to_string(), ..Signal::default() }
+    let units = [
+        ("_mm_per_min", "mm/min"),
+        ("_mm_per_s", "mm/s"),
+        ("_nm", "N·m"),
+        ("_mm", "mm"),
+        ("_n", "N"),
+        ("_a", "A"),
+    ];
+    let unit = units
+        .iter()
+        .find(|(suffix, _)| name.ends_with(suffix))
+        .map_or("", |(_, unit)| unit);
+    Signal {
+        name: name.to_string(),
+        unit: unit.to_string(),
+        ..Signal::default()
+    }
 }
 
 fn push(columns: &mut [Vec<f64>], position: &AxisVector, axes: &Axes) {
     for (axis, column) in columns.iter_mut().enumerate() {
-        column.push(if axes.is_rotary(axis) { position[axis].to_degrees() } else { position[axis] });
+        column.push(if axes.is_rotary(axis) {
+            position[axis].to_degrees()
+        } else {
+            position[axis]
+        });
     }
 }
 
@@ -125,7 +161,11 @@ fn axis(machine: &Machine, index: usize, steps_allowed: bool) -> Axis {
         max_velocity: shown(limits.feed_mm_per_s.max(limits.rapid_mm_per_s)),
         max_acceleration: shown(limits.acceleration_mm_per_s2),
         max_jerk: Some(shown(limits.jerk_mm_per_s3)).filter(|j| j.is_finite()),
-        speed_difference: if steps_allowed { shown(limits.speed_difference_mm_per_s) } else { 0.0 },
+        speed_difference: if steps_allowed {
+            shown(limits.speed_difference_mm_per_s)
+        } else {
+            0.0
+        },
     }
 }
 
@@ -134,22 +174,47 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
     let mut facts = vec![
         fact("time", format!("{:.3} s", summary.motion_time_s)),
         fact("nominal time", format!("{:.3} s", summary.nominal_time_s)),
-        fact("path", format!("{:.3} mm in {} blocks", summary.length_mm, summary.blocks)),
+        fact(
+            "path",
+            format!("{:.3} mm in {} blocks", summary.length_mm, summary.blocks),
+        ),
         fact("clock", summary.clock.clone()),
-        fact("samples", format!("{} at {} ms", summary.samples, summary.fine_period_s * 1e3)),
-        fact("largest distance from the path", format!("{:.3} µm", summary.max_path_deviation_mm * 1e3)),
+        fact(
+            "samples",
+            format!("{} at {} ms", summary.samples, summary.fine_period_s * 1e3),
+        ),
+        fact(
+            "largest distance from the path",
+            format!("{:.3} µm", summary.max_path_deviation_mm * 1e3),
+        ),
         fact(
             "samples beyond a limit sent, guard stops",
             format!("{}, {}", summary.limit_violations, summary.guard_stops),
         ),
         fact("largest share of a limit, beyond it", worst(summary)),
-        fact("governed samples, starvations", format!("{}, {}", summary.governed_samples, summary.starvations)),
+        fact(
+            "governed samples, starvations",
+            format!("{}, {}", summary.governed_samples, summary.starvations),
+        ),
     ];
     facts.extend(summary.timing().map(|timing| fact("fine loop", timing)));
-    facts.extend(summary.warnings().into_iter().map(|warning| fact("warning", warning)));
-    facts.extend(summary.record_errors.iter().map(|error| fact("not complete", error.to_string())));
+    facts.extend(
+        summary
+            .warnings()
+            .into_iter()
+            .map(|warning| fact("warning", warning)),
+    );
+    facts.extend(
+        summary
+            .record_errors
+            .iter()
+            .map(|error| fact("not complete", error.to_string())),
+    );
     if let (Some(ratio), Some(reference_time_s)) = (summary.time_ratio, summary.reference_time_s) {
-        facts.insert(1, fact("T/T_ref", format!("{ratio:.4} of {reference_time_s} s")));
+        facts.insert(
+            1,
+            fact("T/T_ref", format!("{ratio:.4} of {reference_time_s} s")),
+        );
     }
     let total_s: f64 = summary.limited_by_s.values().sum();
     let percent = |(by, time_s): (&String, &f64)| format!("{by} {:.1} %", 100.0 * time_s / total_s);
@@ -157,36 +222,60 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         let each: Vec<_> = summary.limited_by_s.iter().map(percent).collect();
         facts.push(fact("what the time of the motion went to", each.join(", ")));
     }
-    facts.push(fact("planning a rough period, µs: periods", planning(summary)));
-    facts.extend(summary.fault.iter().map(|fault| fact("fault", fault.clone())));
+    facts.push(fact(
+        "planning a rough period, µs: periods",
+        planning(summary),
+    ));
+    facts.extend(
+        summary
+            .fault
+            .iter()
+            .map(|fault| fact("fault", fault.clone())),
+    );
     facts
 }
 
 /// The worst sample beyond a limit, whatever its excuse.
 fn worst(summary: &Summary) -> String {
-    summary.worst_beyond().map_or("none".to_string(), |(what, of, within)| {
-        let within = if of.share <= within { "within" } else { "beyond" };
-        format!(
-            "{what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
-            of.share * 100.0,
-            of.tick,
-            of.line,
-            of.state
-        )
-    })
+    summary
+        .worst_beyond()
+        .map_or("none".to_string(), |(what, of, within)| {
+            let within = if of.share <= within {
+                "within"
+            } else {
+                "beyond"
+            };
+            format!(
+                "{what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
+                of.share * 100.0,
+                of.tick,
+                of.line,
+                of.state
+            )
+        })
 }
 
 /// The histogram of planning times, by doublings; short ones together.
 fn planning(summary: &Summary) -> String {
     const SHORT_US: f64 = 100.0;
     let rows = &summary.planning_us.histogram;
-    let first = rows.iter().position(|row| row.from_us >= SHORT_US).unwrap_or(rows.len());
+    let first = rows
+        .iter()
+        .position(|row| row.from_us >= SHORT_US)
+        .unwrap_or(rows.len());
     let words = |rows: &[PlanningRow]| {
         let below_us = rows.iter().map(|row| row.below_us).fold(0.0, f64::max);
         let periods: u64 = rows.iter().map(|row| row.periods).sum();
         (periods > 0).then(|| format!("below {below_us:.0}: {periods}"))
     };
     let (short, long) = rows.split_at(first);
-    let rows: Vec<_> = std::iter::once(short).chain(long.chunks(2)).filter_map(words).collect();
-    format!("{}; at most {:.0}", rows.join(", "), summary.planning_us.max)
+    let rows: Vec<_> = std::iter::once(short)
+        .chain(long.chunks(2))
+        .filter_map(words)
+        .collect();
+    format!(
+        "{}; at most {:.0}",
+        rows.join(", "),
+        summary.planning_us.max
+    )
 }

@@ -4,7 +4,9 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use tandem_host::{Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer, Switches, Timed, parse_commands};
+use tandem_host::{
+    Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer, Switches, Timed, parse_commands,
+};
 use tandem_machine::Machine;
 use tandem_recorder::{BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, Stop, Summary};
 use tandem_rings::{Rest, Sample};
@@ -36,10 +38,17 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         other => other?,
     };
     program::print_warnings(&run.checked);
-    let commands = options.commands.as_ref().map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
+    let commands = options
+        .commands
+        .as_ref()
+        .map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run, clock)?;
-    let clock_name = if clock == Clock::Wall { "wall" } else { "virtual" };
+    let clock_name = if clock == Clock::Wall {
+        "wall"
+    } else {
+        "virtual"
+    };
     hang::summarise_in(options.summary.as_ref(), &name, &machine, clock_name, &run);
     let mut outcome = run.drive(clock, &commands, &mut sinks)?;
     if let Some(reference_time_s) = options.reference_time_s {
@@ -74,13 +83,20 @@ fn switches(options: &args::Run, clock: Clock) -> Switches {
 fn distinct_files(options: &args::Run) -> Result<(), String> {
     let mut taken = vec![resolved(&options.machine.file.path)];
     // Standard input and standard output are both called -.
-    taken.extend(Some(&options.program).filter(|path| path.as_os_str() != "-").map(|path| resolved(path)));
+    taken.extend(
+        Some(&options.program)
+            .filter(|path| path.as_os_str() != "-")
+            .map(|path| resolved(path)),
+    );
     taken.extend(options.commands.iter().map(|path| resolved(path)));
     for (_, path) in written(options) {
         let file = resolved(path);
         let regular = path.as_os_str() == "-" || !file.exists() || file.is_file();
         if regular && taken.contains(&file) {
-            return Err(format!("{}: the run reads this file, or writes it already", path.display()));
+            return Err(format!(
+                "{}: the run reads this file, or writes it already",
+                path.display()
+            ));
         }
         taken.push(file);
     }
@@ -90,10 +106,16 @@ fn distinct_files(options: &args::Run) -> Result<(), String> {
 /// Where a path leads, also where its last part does not exist yet.
 fn resolved(path: &Path) -> PathBuf {
     let in_folder = || {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         Some(folder.canonicalize().ok()?.join(path.file_name()?))
     };
-    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
+    path.canonicalize()
+        .ok()
+        .or_else(in_folder)
+        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Reads a command file; lines that are empty or begin with # are left out.
@@ -105,7 +127,11 @@ fn commands(path: &Path, clock: Clock, machine: &Machine) -> Result<Vec<Timed>, 
         );
     }
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    parse_commands(&path.display().to_string(), &text, machine.motion.max_feed_ratio)
+    parse_commands(
+        &path.display().to_string(),
+        &text,
+        machine.motion.max_feed_ratio,
+    )
 }
 
 /// Everything that a run is written to.
@@ -129,20 +155,43 @@ struct Sinks {
 const SUMMARY_ROOM_BYTES: u64 = 16 * 1024;
 
 impl Sinks {
-    fn create(options: &args::Run, machine: &Machine, name: &str, run: &Run, clock: Clock) -> Result<Self, String> {
+    fn create(
+        options: &args::Run,
+        machine: &Machine,
+        name: &str,
+        run: &Run,
+        clock: Clock,
+    ) -> Result<Self, String> {
         let signals = run.signals();
         let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
-        let trace = options.trace.as_ref().map(|path| TraceSink::create(path, machine, name, run, options.dry));
-        let blocks = options.blocks.as_ref().map(|path| BlocksCsv::create(path, machine));
-        let events = options.events.as_ref().map(|path| EventsCsv::create(path, machine.fine_period_s));
-        let report = options.report.as_ref().map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
+        let trace = options
+            .trace
+            .as_ref()
+            .map(|path| TraceSink::create(path, machine, name, run, options.dry));
+        let blocks = options
+            .blocks
+            .as_ref()
+            .map(|path| BlocksCsv::create(path, machine));
+        let events = options
+            .events
+            .as_ref()
+            .map(|path| EventsCsv::create(path, machine.fine_period_s));
+        let report = options
+            .report
+            .as_ref()
+            .map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
         let keys = keys_at_hand(clock);
-        let presence = Presence { real_time: clock == Clock::Wall, pause: options.pause, keys };
+        let presence = Presence {
+            real_time: clock == Clock::Wall,
+            pause: options.pause,
+            keys,
+        };
         if keys {
             Keyboard::explain();
         }
         Ok(Self {
-            without_time_constants: (!run.uses_time_constants()).then(|| machine.planner.plugin.clone()),
+            without_time_constants: (!run.uses_time_constants())
+                .then(|| machine.planner.plugin.clone()),
             switches: switches(options, clock),
             operator: Operator::begin(&options.operator, machine, run, presence)?,
             homed: Corrections::new(machine),
@@ -163,7 +212,10 @@ impl Sinks {
         broken.note(self.trace.map_or(Ok(()), TraceSink::finish));
         broken.note(self.blocks.map_or(Ok(()), BlocksCsv::finish));
         let completed = summary.fault.is_none() && summary.stopped.is_none();
-        broken.note(self.events.map_or(Ok(()), |events| events.finish(left, completed)));
+        broken.note(
+            self.events
+                .map_or(Ok(()), |events| events.finish(left, completed)),
+        );
         summary.record_errors = broken.errors().to_vec();
         if let (Some(report), Some(path)) = (self.report, &options.report) {
             broken.note(report.write(path, summary));
@@ -202,10 +254,15 @@ impl RunObserver for Sinks {
         if let Some(events) = &mut self.events {
             events.event(event);
         }
-        let Some(word) = stop_word(event.kind) else { return };
+        let Some(word) = stop_word(event.kind) else {
+            return;
+        };
         let (line, switches) = (event.line, &self.switches);
-        let waits =
-            if event.kind == EventKind::OptionalStop { switches.optional_stop } else { switches.pause_at_stops };
+        let waits = if event.kind == EventKind::OptionalStop {
+            switches.optional_stop
+        } else {
+            switches.pause_at_stops
+        };
         if switches.dry_run {
             say!("line {line}: {word}: a dry run, it goes on");
         } else if !waits {
@@ -295,16 +352,24 @@ fn write_summary(mut out: Output, summary: &mut Summary) -> Result<(), String> {
         if summary.stops.is_empty() {
             return Err(error.to_string());
         }
-        tell(&format!("error: summary: {error}; it is written without its list of {} stops", summary.stops.len()));
+        tell(&format!(
+            "error: summary: {error}; it is written without its list of {} stops",
+            summary.stops.len()
+        ));
         summary.stops.clear();
-        out.begin_again().and_then(|()| write(&mut out, summary)).map_err(|e| e.to_string())?;
+        out.begin_again()
+            .and_then(|()| write(&mut out, summary))
+            .map_err(|e| e.to_string())?;
     }
     out.finish()
 }
 
 fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
     // A reader that has gone away (a closed pipe) is no reason to fail: the run is done. Standard output may carry a file.
-    let _ = if written(options).iter().any(|(_, path)| path.as_os_str() == "-") {
+    let _ = if written(options)
+        .iter()
+        .any(|(_, path)| path.as_os_str() == "-")
+    {
         print_outcome(&mut io::stderr().lock(), options, &outcome.summary)
     } else {
         print_outcome(&mut io::stdout().lock(), options, &outcome.summary)
@@ -323,11 +388,20 @@ fn conclude(options: &args::Run, outcome: &Outcome) -> u8 {
 
 /// The stop that took longest to come to rest.
 fn longest(stops: &[Stop]) -> Option<&Stop> {
-    stops.iter().max_by(|a, b| a.time_s.total_cmp(&b.time_s).then(b.tick.cmp(&a.tick)))
+    stops
+        .iter()
+        .max_by(|a, b| a.time_s.total_cmp(&b.time_s).then(b.tick.cmp(&a.tick)))
 }
 
 fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> io::Result<()> {
-    let Stop { tick, line, cause, time_s, distance_mm, .. } = stop;
+    let Stop {
+        tick,
+        line,
+        cause,
+        time_s,
+        distance_mm,
+        ..
+    } = stop;
     let reaction = match stop.reaction_periods {
         Some(1) => "slower from the first sample".to_string(),
         Some(periods) => format!("slower from sample {periods}"),
@@ -341,15 +415,32 @@ fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> io::Resul
 }
 
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> io::Result<()> {
-    let Summary { program, blocks, length_mm, motion_time_s, nominal_time_s, planner, machine, .. } = summary;
+    let Summary {
+        program,
+        blocks,
+        length_mm,
+        motion_time_s,
+        nominal_time_s,
+        planner,
+        machine,
+        ..
+    } = summary;
     let dry = if summary.dry_run { "dry run of " } else { "" };
-    let ratio = summary.time_ratio.map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
+    let ratio = summary
+        .time_ratio
+        .map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
     writeln!(
         out,
         "{dry}{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s{ratio}) \
          with {planner} on {machine}"
     )?;
-    let Summary { limit_violations, guard_stops, governed_samples, starvations, .. } = summary;
+    let Summary {
+        limit_violations,
+        guard_stops,
+        governed_samples,
+        starvations,
+        ..
+    } = summary;
     let deviation_um = summary.max_path_deviation_mm * 1e3;
     writeln!(
         out,
@@ -360,7 +451,11 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
         writeln!(out, "{timing}")?;
     }
     if let Some((what, of, within)) = summary.worst_beyond() {
-        let within = if of.share <= within { "within" } else { "beyond" };
+        let within = if of.share <= within {
+            "within"
+        } else {
+            "beyond"
+        };
         writeln!(
             out,
             "largest share of a limit: {what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
@@ -374,7 +469,12 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
         print_stop(out, summary, stop)?;
     }
     for (what, path) in written(options) {
-        match summary.record_errors.iter().find(|error| error.what == what).map(|error| &error.kept_as) {
+        match summary
+            .record_errors
+            .iter()
+            .find(|error| error.what == what)
+            .map(|error| &error.kept_as)
+        {
             None => writeln!(out, "{what}: {}", path.display())?,
             Some(Some(part)) => writeln!(out, "{what}: {part}, not complete")?,
             Some(None) => writeln!(out, "{what}: not complete")?,
@@ -392,5 +492,8 @@ fn written(options: &args::Run) -> Vec<(&'static str, &Path)> {
         ("summary", &options.summary),
         ("report", &options.report),
     ];
-    files.into_iter().filter_map(|(what, path)| Some((what, path.as_deref()?))).collect()
+    files
+        .into_iter()
+        .filter_map(|(what, path)| Some((what, path.as_deref()?)))
+        .collect()
 }

@@ -26,16 +26,27 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     let script = match &options.requests {
         Some(path) => script(path)?,
         None if replays => {
-            return Err("--clock virtual goes with --requests F: nobody else can say anything there".into());
+            return Err(
+                "--clock virtual goes with --requests F: nobody else can say anything there".into(),
+            );
         }
         None => vec![],
     };
-    let listen = if replays { Listen::default() } else { doors(options, &machine)? };
+    let listen = if replays {
+        Listen::default()
+    } else {
+        doors(options, &machine)?
+    };
     let store = store(options, &machine, replays)?;
-    let lasting = store.as_ref().map(|store| store.load().to_program(&machine.home));
+    let lasting = store
+        .as_ref()
+        .map(|store| store.load().to_program(&machine.home));
     let kept_in = store.as_ref().map(|store| store.path().to_owned());
     let keeper: Box<dyn Keeper> = match store {
-        Some(store) => Box::new(InStore { recorder: store.recorder(), store }),
+        Some(store) => Box::new(InStore {
+            recorder: store.recorder(),
+            store,
+        }),
         None => Box::new(NoKeeper),
     };
     let simulated = !moves_metal(&machine, &registry);
@@ -52,13 +63,23 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     let controller = Controller::open(&machine, &registry, asked, keeper)?;
     end_by_signals(controller.ender())?;
     if !replays {
-        explain(&machine, &listen, controller.address(), kept_in.as_deref(), enabled);
+        explain(
+            &machine,
+            &listen,
+            controller.address(),
+            kept_in.as_deref(),
+            enabled,
+        );
         notify("READY=1");
     }
     let mut out = io::stdout().lock();
     controller.run(&mut |line| {
         // A reader that has gone away is no reason to fail.
-        let _ = if replays { writeln!(out, "{line}") } else { writeln!(io::stderr(), "{line}") };
+        let _ = if replays {
+            writeln!(out, "{line}")
+        } else {
+            writeln!(io::stderr(), "{line}")
+        };
     })?;
     notify("STOPPING=1");
     Ok(0)
@@ -72,12 +93,16 @@ struct InStore {
 
 impl Keeper for InStore {
     fn commit(&self, lasting: &Lasting) -> Result<(), String> {
-        self.store.commit(vec![Change::Program(Arc::new(lasting.clone()))]).map_err(|e| e.to_string())
+        self.store
+            .commit(vec![Change::Program(Arc::new(lasting.clone()))])
+            .map_err(|e| e.to_string())
     }
 
     fn record(&self, lasting: &Lasting) {
         // Who asks for the state is told of the trouble; the machine goes on.
-        let recorded = self.recorder.record(Change::Program(Arc::new(lasting.clone())));
+        let recorded = self
+            .recorder
+            .record(Change::Program(Arc::new(lasting.clone())));
         if let Err(error) = recorded {
             say!("{error}");
         }
@@ -85,13 +110,20 @@ impl Keeper for InStore {
 }
 
 /// The state file: the one that is named, else that of the machine; a replay keeps nothing unless it is told to.
-fn store(options: &args::Serve, machine: &Machine, replays: bool) -> Result<Option<Store>, Box<dyn Error>> {
+fn store(
+    options: &args::Serve,
+    machine: &Machine,
+    replays: bool,
+) -> Result<Option<Store>, Box<dyn Error>> {
     let path = match &options.state {
         Some(path) => path.clone(),
         None if replays || options.no_state => return Ok(None),
         None => default_path(&machine.name)?,
     };
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+    if let Some(folder) = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+    {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
     let store = Store::open(&path, Owner::of(machine))?;
@@ -105,26 +137,45 @@ fn store(options: &args::Serve, machine: &Machine, replays: bool) -> Result<Opti
 
 /// Where the unix socket of a machine lies, where nobody names one.
 pub fn default_socket(machine: &str) -> PathBuf {
-    let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
     let name: String = machine.chars().map(plain).take(40).collect();
-    let folder = ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"].iter().find_map(|name| {
-        let folder = std::env::var_os(name).map(PathBuf::from)?;
-        folder.is_absolute().then_some(folder)
-    });
-    folder.unwrap_or_else(|| PathBuf::from("/tmp")).join(format!("tandem-{name}.socket"))
+    let folder = ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"]
+        .iter()
+        .find_map(|name| {
+            let folder = std::env::var_os(name).map(PathBuf::from)?;
+            folder.is_absolute().then_some(folder)
+        });
+    folder
+        .unwrap_or_else(|| PathBuf::from("/tmp"))
+        .join(format!("tandem-{name}.socket"))
 }
 
 fn doors(options: &args::Serve, machine: &Machine) -> Result<Listen, Box<dyn Error>> {
     let operator = &options.operator;
-    let unix = operator.listen.clone().unwrap_or_else(|| default_socket(&machine.name));
-    Ok(Listen { unix: Some(unix), tcp: operator.listen_tcp, token_file: operator.token_file.clone() })
+    let unix = operator
+        .listen
+        .clone()
+        .unwrap_or_else(|| default_socket(&machine.name));
+    Ok(Listen {
+        unix: Some(unix),
+        tcp: operator.listen_tcp,
+        token_file: operator.token_file.clone(),
+    })
 }
 
 /// Lines of clients by fine periods; those that are empty or begin with # are left out.
 fn script(path: &Path) -> Result<Vec<ScriptLine>, Box<dyn Error>> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let mut lines: Vec<ScriptLine> = vec![];
-    for (number, line) in (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
+    for (number, line) in (1..)
+        .zip(text.lines())
+        .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
     {
         let at = |why: String| format!("{}:{number}: {why}", path.display());
         let line = ScriptLine::parse(line).map_err(at)?;
@@ -144,8 +195,14 @@ fn explain(
     state: Option<&Path>,
     enabled: bool,
 ) {
-    let socket = listen.unix.as_ref().map_or_else(String::new, |path| path.display().to_string());
-    say!("{}: the controller stays until Ctrl-C or SIGTERM", machine.name);
+    let socket = listen
+        .unix
+        .as_ref()
+        .map_or_else(String::new, |path| path.display().to_string());
+    say!(
+        "{}: the controller stays until Ctrl-C or SIGTERM",
+        machine.name
+    );
     say!("  socket  {socket}");
     if let Some(address) = address {
         say!("  tcp     {address}");
@@ -176,7 +233,10 @@ fn end_by_signals(end: impl Fn() + Send + 'static) -> Result<(), String> {
 
 /// Tells systemd, where it has started this process (sd_notify: one datagram).
 fn notify(state: &str) {
-    let Some(path) = std::env::var_os("NOTIFY_SOCKET") else { return };
+    let Some(path) = std::env::var_os("NOTIFY_SOCKET") else {
+        return;
+    };
     // Nobody listens where it fails, and the machine does not depend on it.
-    let _ = UnixDatagram::unbound().and_then(|socket| socket.send_to(state.as_bytes(), Path::new(&path)));
+    let _ = UnixDatagram::unbound()
+        .and_then(|socket| socket.send_to(state.as_bytes(), Path::new(&path)));
 }

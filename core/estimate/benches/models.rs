@@ -52,11 +52,21 @@ fn simulate(name: &str) {
     let mut registry = Registry::default();
     registry.register(tandem_look_ahead::PLUGIN).unwrap();
     registry.register(tandem_sim::PLUGIN).unwrap();
-    let (machine, text) = (mill(), std::fs::read(examples().join(format!("programs/{name}.ngc"))).unwrap());
+    let (machine, text) = (
+        mill(),
+        std::fs::read(examples().join(format!("programs/{name}.ngc"))).unwrap(),
+    );
     let once = |_| {
         let program = Program::spool("bench", text.as_slice()).unwrap();
         let started = Instant::now();
-        let estimate = estimate(&machine, &registry, program, Switches::default(), &Choice::Simulate).unwrap();
+        let estimate = estimate(
+            &machine,
+            &registry,
+            program,
+            Switches::default(),
+            &Choice::Simulate,
+        )
+        .unwrap();
         estimate.estimated_s / started.elapsed().as_secs_f64()
     };
     let best = (0..20).map(once).fold(0.0, f64::max);

@@ -52,7 +52,10 @@ impl Choice {
                 rapid_acceleration_mm_per_s2: None,
             })),
             "regression" => Ok(Self::Regression(Coefficients::default())),
-            _ => Err(format!("no model is called {name}: there are {}; a file ends in .toml", NAMES.join(", "))),
+            _ => Err(format!(
+                "no model is called {name}: there are {}; a file ends in .toml",
+                NAMES.join(", ")
+            )),
         }
     }
 
@@ -82,7 +85,11 @@ fn rule_of(machine: &Machine) -> Rule {
     let options: PlannerOptions = toml::from_str(&machine.planner.options).unwrap_or_default();
     let axes = &machine.limits.axes;
     if options.junction.as_deref() == Some("tangent") {
-        let steps = machine.limits.axes().iter().map(|axis| axis.speed_difference_mm_per_s);
+        let steps = machine
+            .limits
+            .axes()
+            .iter()
+            .map(|axis| axis.speed_difference_mm_per_s);
         let speed_difference_mm_per_s = steps.fold(f64::INFINITY, f64::min);
         return Rule::Tangent {
             acceleration_mm_per_s2: None,
@@ -91,7 +98,11 @@ fn rule_of(machine: &Machine) -> Rule {
         };
     }
     Rule::Axis {
-        acceleration_mm_per_s2: std::array::from_fn::<_, MAX_AXES, _>(|i| MARGIN * axes[i].acceleration_mm_per_s2),
-        speed_difference_mm_per_s: std::array::from_fn(|i| MARGIN * axes[i].speed_difference_mm_per_s),
+        acceleration_mm_per_s2: std::array::from_fn::<_, MAX_AXES, _>(|i| {
+            MARGIN * axes[i].acceleration_mm_per_s2
+        }),
+        speed_difference_mm_per_s: std::array::from_fn(|i| {
+            MARGIN * axes[i].speed_difference_mm_per_s
+        }),
     }
 }

@@ -49,10 +49,24 @@ impl Fitted {
     pub fn new(choice: Choice, timed: &[Timed]) -> Self {
         let times = times_s(&choice, timed);
         let feed = |t: &Timed, time_s: f64| t.mean_feed_mm_per_s() * t.time_s / time_s;
-        let pairs: Vec<_> = timed.iter().zip(&times).map(|(t, s)| (feed(t, *s), t.mean_feed_mm_per_s())).collect();
-        let residuals: Vec<_> = timed.iter().zip(&times).map(|(t, s)| s / t.time_s - 1.0).collect();
-        let rms = (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len().max(1) as f64).sqrt();
-        Self { choice, feeds: Goodness::of(&pairs), residuals, rms }
+        let pairs: Vec<_> = timed
+            .iter()
+            .zip(&times)
+            .map(|(t, s)| (feed(t, *s), t.mean_feed_mm_per_s()))
+            .collect();
+        let residuals: Vec<_> = timed
+            .iter()
+            .zip(&times)
+            .map(|(t, s)| s / t.time_s - 1.0)
+            .collect();
+        let rms =
+            (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len().max(1) as f64).sqrt();
+        Self {
+            choice,
+            feeds: Goodness::of(&pairs),
+            residuals,
+            rms,
+        }
     }
 
     /// Whether it describes the machine.
@@ -65,7 +79,14 @@ impl Fitted {
         match &self.choice {
             Choice::Simulate => String::new(),
             Choice::Overlap(c) => format!("time constant {:.3} ms", c.time_constant_s * 1e3),
-            Choice::LookAhead(Rule::Tangent { acceleration_mm_per_s2, period_s, speed_difference_mm_per_s }, _) => {
+            Choice::LookAhead(
+                Rule::Tangent {
+                    acceleration_mm_per_s2,
+                    period_s,
+                    speed_difference_mm_per_s,
+                },
+                _,
+            ) => {
                 let a = acceleration_mm_per_s2.unwrap_or(f64::INFINITY);
                 format!(
                     "junction max({:.3}/(1 - cos θ), {:.3}) mm/min, acceleration {a:.2} mm/s²",
@@ -73,7 +94,13 @@ impl Fitted {
                     speed_difference_mm_per_s * MM_PER_MIN
                 )
             }
-            Choice::LookAhead(Rule::Axis { acceleration_mm_per_s2, speed_difference_mm_per_s }, _) => format!(
+            Choice::LookAhead(
+                Rule::Axis {
+                    acceleration_mm_per_s2,
+                    speed_difference_mm_per_s,
+                },
+                _,
+            ) => format!(
                 "per axis speed difference {:.3} mm/min, acceleration {:.2} mm/s²",
                 speed_difference_mm_per_s[0] * MM_PER_MIN,
                 acceleration_mm_per_s2[0]
@@ -87,7 +114,14 @@ impl Fitted {
 }
 
 fn times_s(choice: &Choice, timed: &[Timed]) -> Vec<f64> {
-    timed.iter().map(|t| choice.model().map_or(f64::NAN, |mut model| t.under(model.as_mut()))).collect()
+    timed
+        .iter()
+        .map(|t| {
+            choice
+                .model()
+                .map_or(f64::NAN, |mut model| t.under(model.as_mut()))
+        })
+        .collect()
 }
 
 /// What the measurements say by themselves.
@@ -106,12 +140,21 @@ impl Evidence {
         let spread = |of: &dyn Fn(&Timed) -> f64| {
             let mut by_corners: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
             for t in timed.iter().filter(|t| t.polygon.side_mm <= 1.0) {
-                let [least, most] = by_corners.entry(t.polygon.corners).or_insert([f64::INFINITY, 0.0]);
+                let [least, most] = by_corners
+                    .entry(t.polygon.corners)
+                    .or_insert([f64::INFINITY, 0.0]);
                 (*least, *most) = (least.min(of(t)), most.max(of(t)));
             }
-            by_corners.values().map(|[least, most]| most / least - 1.0).sum::<f64>() / by_corners.len().max(1) as f64
+            by_corners
+                .values()
+                .map(|[least, most]| most / least - 1.0)
+                .sum::<f64>()
+                / by_corners.len().max(1) as f64
         };
-        Self { block_time_spread: spread(&Timed::block_s), feed_spread: spread(&Timed::mean_feed_mm_per_s) }
+        Self {
+            block_time_spread: spread(&Timed::block_s),
+            feed_spread: spread(&Timed::mean_feed_mm_per_s),
+        }
     }
 
     /// Whether short blocks take the same time whatever their length.
@@ -125,7 +168,11 @@ pub fn fit_all(timed: &[Timed], tick_s: Option<f64>) -> Vec<Fitted> {
     let plain = Fitted::new(overlap(timed, None), timed);
     // The polygons hardly tell ticks from none; programs with long blocks do.
     let ticks = tick_s.map(|tick_s| Fitted::new(overlap(timed, Some(tick_s)), timed));
-    let mut all = vec![ticks.filter(|ticks| ticks.rms <= plain.rms + TICK_RMS).unwrap_or(plain)];
+    let mut all = vec![
+        ticks
+            .filter(|ticks| ticks.rms <= plain.rms + TICK_RMS)
+            .unwrap_or(plain),
+    ];
     all.push(Fitted::new(tangent(timed), timed));
     all.push(Fitted::new(by_axes(timed), timed));
     all
@@ -139,22 +186,44 @@ fn start<const N: usize>(
 ) -> [f64; N] {
     let starts = [50.0, 200.0, 800.0, 3200.0].map(|a| {
         let parameters = from(a);
-        (ratios(&with(&parameters), timed).iter().map(|r| r * r).sum::<f64>(), parameters)
+        (
+            ratios(&with(&parameters), timed)
+                .iter()
+                .map(|r| r * r)
+                .sum::<f64>(),
+            parameters,
+        )
     });
-    starts.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b)).expect("there is a start").1
+    starts
+        .into_iter()
+        .min_by(|(a, _), (b, _)| a.total_cmp(b))
+        .expect("there is a start")
+        .1
 }
 
 /// Logarithms of the ratios of times: a residual that means the same for long and for short times.
 fn ratios(choice: &Choice, timed: &[Timed]) -> Vec<f64> {
-    times_s(choice, timed).iter().zip(timed).map(|(s, t)| (s / t.time_s).ln()).collect()
+    times_s(choice, timed)
+        .iter()
+        .zip(timed)
+        .map(|(s, t)| (s / t.time_s).ln())
+        .collect()
 }
 
 fn overlap(timed: &[Timed], tick_s: Option<f64>) -> Choice {
     let with = |time_constant_s: f64, tick_s| {
         let rapid_acceleration_mm_per_s2 = None;
-        Choice::Overlap(Constants { time_constant_s, obeys_program: false, tick_s, rapid_acceleration_mm_per_s2 })
+        Choice::Overlap(Constants {
+            time_constant_s,
+            obeys_program: false,
+            tick_s,
+            rapid_acceleration_mm_per_s2,
+        })
     };
-    let least = timed.iter().map(Timed::block_s).fold(f64::INFINITY, f64::min);
+    let least = timed
+        .iter()
+        .map(Timed::block_s)
+        .fold(f64::INFINITY, f64::min);
     let [time_constant_s] = positive_parameters([least], |[s]| ratios(&with(*s, None), timed));
     let whole_s = tick_s.map(|tick_s| (time_constant_s / tick_s).round().max(1.0) * tick_s);
     with(whole_s.unwrap_or(time_constant_s), tick_s)
@@ -162,19 +231,34 @@ fn overlap(timed: &[Timed], tick_s: Option<f64>) -> Choice {
 
 fn tangent(timed: &[Timed]) -> Choice {
     let with = |[a, period_s, v]: &[f64; 3]| {
-        let rule =
-            Rule::Tangent { acceleration_mm_per_s2: Some(*a), period_s: *period_s, speed_difference_mm_per_s: *v };
+        let rule = Rule::Tangent {
+            acceleration_mm_per_s2: Some(*a),
+            period_s: *period_s,
+            speed_difference_mm_per_s: *v,
+        };
         Choice::LookAhead(rule, None)
     };
-    with(&positive_parameters(start(timed, |a| [a, 1e-3, 2.0], with), |p| ratios(&with(p), timed)))
+    with(&positive_parameters(
+        start(timed, |a| [a, 1e-3, 2.0], with),
+        |p| ratios(&with(p), timed),
+    ))
 }
 
 fn by_axes(timed: &[Timed]) -> Choice {
     let with = |[a, v]: &[f64; 2]| {
         let (acceleration_mm_per_s2, speed_difference_mm_per_s) = ([*a; MAX_AXES], [*v; MAX_AXES]);
-        Choice::LookAhead(Rule::Axis { acceleration_mm_per_s2, speed_difference_mm_per_s }, None)
+        Choice::LookAhead(
+            Rule::Axis {
+                acceleration_mm_per_s2,
+                speed_difference_mm_per_s,
+            },
+            None,
+        )
     };
-    with(&positive_parameters(start(timed, |a| [a, 2.0], with), |p| ratios(&with(p), timed)))
+    with(&positive_parameters(
+        start(timed, |a| [a, 2.0], with),
+        |p| ratios(&with(p), timed),
+    ))
 }
 
 /// The linear regression (9) with the minimum feeds of (7) and (8), and (11) where corners were measured.
@@ -192,31 +276,64 @@ pub struct LinearFit {
 ///
 /// # Errors
 /// Too few measurements.
-pub fn linear(timed: &[Timed], corners: &[Corner], block_time_s: Option<f64>) -> Result<LinearFit, String> {
-    let mut coefficients = Coefficients { rapid_acceleration_mm_per_s2: None, ..Coefficients::default() };
+pub fn linear(
+    timed: &[Timed],
+    corners: &[Corner],
+    block_time_s: Option<f64>,
+) -> Result<LinearFit, String> {
+    let mut coefficients = Coefficients {
+        rapid_acceleration_mm_per_s2: None,
+        ..Coefficients::default()
+    };
     let a = coefficients.acceleration_mm_per_s2;
-    let short = |t: &&Timed| block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.feed_mm_per_s);
+    let short =
+        |t: &&Timed| block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.feed_mm_per_s);
     let (rows, feeds): (Vec<_>, Vec<_>) = timed
         .iter()
         .filter(short)
-        .map(|t| ([1.0, t.polygon.side_mm / 2.0, t.polygon.turn_rad()], t.minimum_feed_mm_per_s(a) * MM_PER_MIN))
+        .map(|t| {
+            (
+                [1.0, t.polygon.side_mm / 2.0, t.polygon.turn_rad()],
+                t.minimum_feed_mm_per_s(a) * MM_PER_MIN,
+            )
+        })
         .unzip();
     coefficients.short = least_squares(&rows, &feeds).map_err(|e| format!("equation (9): {e}"))?;
     if let Some(block_time_s) = block_time_s {
-        (coefficients.switch, coefficients.ramp_s) = (Switch::Moving(block_time_s), Some(block_time_s));
+        (coefficients.switch, coefficients.ramp_s) =
+            (Switch::Moving(block_time_s), Some(block_time_s));
     }
-    let pair = |(row, feed): (&[f64; 3], &f64)| (coefficients.short_mm_per_min(row[1], row[2]), *feed);
+    let pair =
+        |(row, feed): (&[f64; 3], &f64)| (coefficients.short_mm_per_min(row[1], row[2]), *feed);
     let short = Goodness::of(&rows.iter().zip(&feeds).map(pair).collect::<Vec<_>>());
-    let long = (!corners.is_empty()).then(|| long_form(&mut coefficients, corners)).transpose()?;
-    Ok(LinearFit { coefficients, short, long })
+    let long = (!corners.is_empty())
+        .then(|| long_form(&mut coefficients, corners))
+        .transpose()?;
+    Ok(LinearFit {
+        coefficients,
+        short,
+        long,
+    })
 }
 
 fn long_form(coefficients: &mut Coefficients, corners: &[Corner]) -> Result<Goodness, String> {
     coefficients.long = CORRECTED_LONG;
-    let rows: Vec<_> = corners.iter().map(|c| long_terms(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN)).collect();
-    let feeds: Vec<_> = corners.iter().map(|c| c.least_mm_per_s * MM_PER_MIN).collect();
+    let rows: Vec<_> = corners
+        .iter()
+        .map(|c| long_terms(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN))
+        .collect();
+    let feeds: Vec<_> = corners
+        .iter()
+        .map(|c| c.least_mm_per_s * MM_PER_MIN)
+        .collect();
     coefficients.long = least_squares(&rows, &feeds).map_err(|e| format!("equation (11): {e}"))?;
-    let pair =
-        |(c, feed): (&Corner, &f64)| (coefficients.long_mm_per_min(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN), *feed);
-    Ok(Goodness::of(&corners.iter().zip(&feeds).map(pair).collect::<Vec<_>>()))
+    let pair = |(c, feed): (&Corner, &f64)| {
+        (
+            coefficients.long_mm_per_min(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN),
+            *feed,
+        )
+    };
+    Ok(Goodness::of(
+        &corners.iter().zip(&feeds).map(pair).collect::<Vec<_>>(),
+    ))
 }

@@ -75,7 +75,12 @@ impl Element {
     /// A straight block of feed motion in the plane of the first two axes, turned by `angle_rad` from the first.
     pub fn line(length_mm: f64, angle_rad: f64, feed_mm_per_s: f64) -> Self {
         let direction = AxisVector::from_slice(&[angle_rad.cos(), angle_rad.sin()]);
-        let mut block = Block { kind: BlockKind::Line, length_mm, feed_mm_per_s, ..Block::at(AxisVector::ZERO) };
+        let mut block = Block {
+            kind: BlockKind::Line,
+            length_mm,
+            feed_mm_per_s,
+            ..Block::at(AxisVector::ZERO)
+        };
         block.end = direction * length_mm;
         let mut element = Self::new(&block, None, &unlimited());
         (element.directions, element.most) = ([direction; 2], direction.map(f64::abs));
@@ -91,21 +96,40 @@ impl Element {
             if let [first, second, ..] = points {
                 let [before, last] = points.last_chunk().copied().unwrap_or([*first, *second]);
                 self.directions = [unit(*second - *first), unit(last - before)];
-                self.most =
-                    AxisVector(std::array::from_fn(|i| self.directions[0][i].abs().max(self.directions[1][i].abs())));
+                self.most = AxisVector(std::array::from_fn(|i| {
+                    self.directions[0][i].abs().max(self.directions[1][i].abs())
+                }));
             }
         }
     }
 
     fn feeds(&mut self, block: &Block, limits: &Limits) {
         let along = limits.along(&self.most);
-        let moving = limits.axes().iter().enumerate().filter(|(axis, _)| self.most[*axis] > 0.0);
-        self.acceleration_mm_per_s2 = moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
+        let moving = limits
+            .axes()
+            .iter()
+            .enumerate()
+            .filter(|(axis, _)| self.most[*axis] > 0.0);
+        self.acceleration_mm_per_s2 = moving
+            .map(|(_, a)| a.acceleration_mm_per_s2)
+            .fold(f64::INFINITY, f64::min);
         let rapid = block.kind == BlockKind::Rapid;
         self.kind = if rapid { Kind::Rapid } else { Kind::Cut };
-        let programmed = if rapid { along.rapid_mm_per_s } else { block.feed_mm_per_s };
-        self.feed_mm_per_s = if rapid { programmed } else { block.command_feed_mm_per_s().min(along.feed_mm_per_s) };
-        self.nominal_s = if self.length_mm > 0.0 { self.length_mm / programmed } else { 0.0 };
+        let programmed = if rapid {
+            along.rapid_mm_per_s
+        } else {
+            block.feed_mm_per_s
+        };
+        self.feed_mm_per_s = if rapid {
+            programmed
+        } else {
+            block.command_feed_mm_per_s().min(along.feed_mm_per_s)
+        };
+        self.nominal_s = if self.length_mm > 0.0 {
+            self.length_mm / programmed
+        } else {
+            0.0
+        };
     }
 
     /// Whether the machine rests between this block and `next`.
@@ -126,7 +150,11 @@ fn norm(vector: AxisVector) -> f64 {
 
 fn unit(vector: AxisVector) -> AxisVector {
     let length = norm(vector);
-    if length > 0.0 { vector * (1.0 / length) } else { vector }
+    if length > 0.0 {
+        vector * (1.0 / length)
+    } else {
+        vector
+    }
 }
 
 /// Limits that nothing meets.
@@ -159,8 +187,14 @@ mod tests {
 
     #[test]
     fn a_dwell_is_its_duration() {
-        let block = Block { dwell_s: 1.5, ..Block::at(AxisVector::ZERO) };
+        let block = Block {
+            dwell_s: 1.5,
+            ..Block::at(AxisVector::ZERO)
+        };
         let element = Element::new(&block, None, &unlimited());
-        assert_eq!((element.kind, element.nominal_s, element.length_mm), (Kind::Dwell, 1.5, 0.0));
+        assert_eq!(
+            (element.kind, element.nominal_s, element.length_mm),
+            (Kind::Dwell, 1.5, 0.0)
+        );
     }
 }

@@ -93,19 +93,33 @@ fn simulate(
     switches: Switches,
 ) -> Result<Estimate, EstimateError> {
     let name = program.name().to_string();
-    let switches = Switches { clock: Some(Clock::Virtual), ..switches };
+    let switches = Switches {
+        clock: Some(Clock::Virtual),
+        ..switches
+    };
     let run = Run::prepare(machine.clone(), registry, program, switches)?;
-    let mut watch = Watch { limits: machine.limits, tally: Tally::default(), missed: 0 };
+    let mut watch = Watch {
+        limits: machine.limits,
+        tally: Tally::default(),
+        missed: 0,
+    };
     let summary = run.drive(Clock::Virtual, &[], &mut watch)?.summary;
     if let Some(cause) = summary.fault.or(summary.stopped) {
-        return Err(EstimateError::Stopped { program: name, cause });
+        return Err(EstimateError::Stopped {
+            program: name,
+            cause,
+        });
     }
     Ok(Estimate {
         program: name,
         model: "simulate",
         estimated_s: summary.motion_time_s,
         tally: watch.tally,
-        assumed_edges: if switches.assumes_edges { watch.missed } else { 0 },
+        assumed_edges: if switches.assumes_edges {
+            watch.missed
+        } else {
+            0
+        },
     })
 }
 
@@ -125,7 +139,11 @@ impl RunObserver for Watch {
         let element = Element::new(block, curve, &self.limits);
         let cut = !matches!(block.kind, BlockKind::Dwell | BlockKind::Rapid);
         let case = cut.then(|| case_of(&element, report));
-        let spent = Spent { time_s: report.time_s, reached_mm_per_s: report.peak_feed_mm_per_s, case };
+        let spent = Spent {
+            time_s: report.time_s,
+            reached_mm_per_s: report.peak_feed_mm_per_s,
+            case,
+        };
         self.tally.add(&element, &spent);
     }
 }

@@ -12,9 +12,13 @@ use crate::diagnose::Corner;
 use crate::polygon::{CORNERS, FEED_MM_PER_MIN, Polygon, SIDES_MM, Timed};
 
 /// Turns of the V paths, degrees.
-const TURNS_DEG: [f64; 11] = [0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 90.0];
+const TURNS_DEG: [f64; 11] = [
+    0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 90.0,
+];
 /// Their feeds, mm/min.
-const FEEDS_MM_PER_MIN: [f64; 10] = [200.0, 400.0, 600.0, 800.0, 1200.0, 1600.0, 2000.0, 2400.0, 2800.0, 3200.0];
+const FEEDS_MM_PER_MIN: [f64; 10] = [
+    200.0, 400.0, 600.0, 800.0, 1200.0, 1600.0, 2000.0, 2400.0, 2800.0, 3200.0,
+];
 /// How long a leg of a V takes at its feed, s: enough to reach it, and to see it.
 const LEG_S: f64 = 0.5;
 /// What a leg is longer than that, mm.
@@ -65,7 +69,12 @@ impl Experiment {
     /// # Errors
     /// The machine has no such plane, or no room in it.
     pub fn new(machine: &Machine, blocks: u32) -> Result<Self, String> {
-        let axis = |letter| machine.axes.index(letter).ok_or_else(|| format!("the experiment needs an axis {letter}"));
+        let axis = |letter| {
+            machine
+                .axes
+                .index(letter)
+                .ok_or_else(|| format!("the experiment needs an axis {letter}"))
+        };
         let axes = [axis('X')?, axis('Y')?];
         let limits = axes.map(|axis| machine.limits.axes()[axis]);
         let middle = |i: usize| f64::midpoint(limits[i].min_mm, limits[i].max_mm);
@@ -73,19 +82,31 @@ impl Experiment {
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         let room_mm = half(0).min(half(1));
         let feed = FEED_MM_PER_MIN / MM_PER_MIN;
-        let all = CORNERS.iter().flat_map(|corners| SIDES_MM.map(|side_mm| (*corners, side_mm)));
-        let all = all.map(|(corners, side_mm)| Polygon { corners, side_mm, rounds: blocks.div_ceil(corners) });
-        let (polygons, left_out) = all.partition::<Vec<_>, _>(|polygon| polygon.radius_mm() <= room_mm);
+        let all = CORNERS
+            .iter()
+            .flat_map(|corners| SIDES_MM.map(|side_mm| (*corners, side_mm)));
+        let all = all.map(|(corners, side_mm)| Polygon {
+            corners,
+            side_mm,
+            rounds: blocks.div_ceil(corners),
+        });
+        let (polygons, left_out) =
+            all.partition::<Vec<_>, _>(|polygon| polygon.radius_mm() <= room_mm);
         let this = Self {
             polygons,
             left_out,
-            feed_mm_per_s: limits.iter().fold(feed, |feed, axis| feed.min(axis.feed_mm_per_s)),
+            feed_mm_per_s: limits
+                .iter()
+                .fold(feed, |feed, axis| feed.min(axis.feed_mm_per_s)),
             vees: vees().filter(|vee| vee.leg_mm <= room_mm).collect(),
             center_mm: [finite(middle(0)), finite(middle(1))],
             axes,
         };
         if this.polygons.len() < 6 {
-            return Err(format!("the travel leaves room for {} of the polygons only", this.polygons.len()));
+            return Err(format!(
+                "the travel leaves room for {} of the polygons only",
+                this.polygons.len()
+            ));
         }
         Ok(this)
     }
@@ -102,8 +123,15 @@ impl Experiment {
         let mut all = vec![];
         for polygon in &self.polygons {
             if stops {
-                let Polygon { corners, side_mm, rounds } = polygon;
-                let _ = writeln!(text, "(note the seconds from here: n {corners} side {side_mm} repetitions {rounds})");
+                let Polygon {
+                    corners,
+                    side_mm,
+                    rounds,
+                } = polygon;
+                let _ = writeln!(
+                    text,
+                    "(note the seconds from here: n {corners} side {side_mm} repetitions {rounds})"
+                );
                 text += "M0\n";
                 lines.last += 2;
             }
@@ -124,37 +152,69 @@ impl Experiment {
         let _ = writeln!(text, "G0 X{:.6} Y{:.6}", start[0], start[1]);
         let _ = writeln!(text, "G4 P0.1");
         let _ = writeln!(text, "F{:.3}", self.feed_mm_per_s * MM_PER_MIN);
-        for point in points.iter().cycle().skip(1).take(polygon.blocks() as usize) {
+        for point in points
+            .iter()
+            .cycle()
+            .skip(1)
+            .take(polygon.blocks() as usize)
+        {
             let _ = writeln!(text, "G1 X{:.6} Y{:.6}", point[0], point[1]);
         }
-        Lines { first: before + 4, last: before + 3 + polygon.blocks() }
+        Lines {
+            first: before + 4,
+            last: before + 3 + polygon.blocks(),
+        }
     }
 
     fn vee(&self, vee: &Vee, before: u32, text: &mut String) -> Lines {
         let [x, y] = self.center_mm;
-        let end = [x + vee.leg_mm * vee.turn_rad.cos(), y + vee.leg_mm * vee.turn_rad.sin()];
+        let end = [
+            x + vee.leg_mm * vee.turn_rad.cos(),
+            y + vee.leg_mm * vee.turn_rad.sin(),
+        ];
         let _ = writeln!(text, "G0 X{:.6} Y{y:.6}", x - vee.leg_mm);
         let _ = writeln!(text, "G4 P0.1");
-        let _ = writeln!(text, "G1 X{x:.6} Y{y:.6} F{:.3}", vee.feed_mm_per_s * MM_PER_MIN);
+        let _ = writeln!(
+            text,
+            "G1 X{x:.6} Y{y:.6} F{:.3}",
+            vee.feed_mm_per_s * MM_PER_MIN
+        );
         let _ = writeln!(text, "G1 X{:.6} Y{:.6}", end[0], end[1]);
-        Lines { first: before + 3, last: before + 4 }
+        Lines {
+            first: before + 3,
+            last: before + 4,
+        }
     }
 
     /// Runs the experiment on the machine's driver.
     ///
     /// # Errors
     /// The machine refuses, or the run does not come to its end.
-    pub fn run(&self, machine: &Machine, registry: &Registry, clock: Clock) -> Result<Measured, String> {
+    pub fn run(
+        &self,
+        machine: &Machine,
+        registry: &Registry,
+        clock: Clock,
+    ) -> Result<Measured, String> {
         let (text, lines) = self.write(false);
-        let program = Program::spool("the experiment", text.as_bytes()).map_err(|e| e.to_string())?;
-        let run =
-            Run::prepare(machine.clone(), registry, program, Switches { clock: Some(clock), ..Switches::default() })
-                .map_err(|e| match e {
-                    HostError::Check(report) => {
-                        report.diagnostics.first().map_or_else(String::new, ToString::to_string)
-                    }
-                    other => other.to_string(),
-                })?;
+        let program =
+            Program::spool("the experiment", text.as_bytes()).map_err(|e| e.to_string())?;
+        let run = Run::prepare(
+            machine.clone(),
+            registry,
+            program,
+            Switches {
+                clock: Some(clock),
+                ..Switches::default()
+            },
+        )
+        .map_err(|e| match e {
+            HostError::Check(report) => report
+                .diagnostics
+                .first()
+                .map_or_else(String::new, ToString::to_string),
+            other => other.to_string(),
+        })?;
         let mut watch = Watch {
             experiment: self,
             lines: &lines,
@@ -164,7 +224,10 @@ impl Experiment {
             now: 0,
             last: None,
         };
-        let summary = run.drive(clock, &[], &mut watch).map_err(|e| e.to_string())?.summary;
+        let summary = run
+            .drive(clock, &[], &mut watch)
+            .map_err(|e| e.to_string())?
+            .summary;
         if let Some(cause) = summary.fault.or(summary.stopped) {
             return Err(format!("the experiment ended early: {cause}"));
         }
@@ -173,8 +236,14 @@ impl Experiment {
 }
 
 fn vees() -> impl Iterator<Item = Vee> {
-    let all = TURNS_DEG.iter().flat_map(|turn| FEEDS_MM_PER_MIN.map(|feed| (turn.to_radians(), feed / MM_PER_MIN)));
-    all.map(|(turn_rad, feed_mm_per_s)| Vee { turn_rad, feed_mm_per_s, leg_mm: LEG_MM + LEG_S * feed_mm_per_s })
+    let all = TURNS_DEG
+        .iter()
+        .flat_map(|turn| FEEDS_MM_PER_MIN.map(|feed| (turn.to_radians(), feed / MM_PER_MIN)));
+    all.map(|(turn_rad, feed_mm_per_s)| Vee {
+        turn_rad,
+        feed_mm_per_s,
+        leg_mm: LEG_MM + LEG_S * feed_mm_per_s,
+    })
 }
 
 /// Takes times and feeds from the samples that were sent.
@@ -194,13 +263,23 @@ impl RunObserver for Watch<'_> {
         while self.now < self.lines.len() && sample.line > self.lines[self.now].last {
             self.now += 1;
         }
-        let Some(lines) = self.lines.get(self.now).filter(|lines| sample.line >= lines.first) else { return };
+        let Some(lines) = self
+            .lines
+            .get(self.now)
+            .filter(|lines| sample.line >= lines.first)
+        else {
+            return;
+        };
         self.samples[self.now] += u64::from(sample.line <= lines.last);
         if let (Some(vee), Some(last)) = (self.vee(), last) {
-            let [x, y] = self.experiment.axes.map(|axis| sample.command[axis] - last[axis]);
+            let [x, y] = self
+                .experiment
+                .axes
+                .map(|axis| sample.command[axis] - last[axis]);
             let near = |position: &AxisVector| {
                 let [x, y] = self.experiment.axes.map(|axis| position[axis]);
-                (x - self.experiment.center_mm[0]).hypot(y - self.experiment.center_mm[1]) < vee.leg_mm / 2.0
+                (x - self.experiment.center_mm[0]).hypot(y - self.experiment.center_mm[1])
+                    < vee.leg_mm / 2.0
             };
             if near(&last) && near(&sample.command) {
                 self.least[self.now] = self.least[self.now].min(x.hypot(y) / self.period_s);
@@ -211,20 +290,40 @@ impl RunObserver for Watch<'_> {
 
 impl Watch<'_> {
     fn vee(&self) -> Option<&Vee> {
-        self.experiment.vees.get(self.now.checked_sub(self.experiment.polygons.len())?)
+        self.experiment
+            .vees
+            .get(self.now.checked_sub(self.experiment.polygons.len())?)
     }
 
     fn measured(self) -> Measured {
-        let Experiment { polygons, vees, feed_mm_per_s, .. } = self.experiment;
-        let times = self.samples.iter().map(|samples| *samples as f64 * self.period_s);
+        let Experiment {
+            polygons,
+            vees,
+            feed_mm_per_s,
+            ..
+        } = self.experiment;
+        let times = self
+            .samples
+            .iter()
+            .map(|samples| *samples as f64 * self.period_s);
         let timed = polygons.iter().zip(times);
-        let timed = timed.map(|(polygon, time_s)| Timed { polygon: *polygon, feed_mm_per_s: *feed_mm_per_s, time_s });
-        let corners = vees.iter().zip(&self.least[polygons.len()..]).filter(|(_, least)| least.is_finite());
+        let timed = timed.map(|(polygon, time_s)| Timed {
+            polygon: *polygon,
+            feed_mm_per_s: *feed_mm_per_s,
+            time_s,
+        });
+        let corners = vees
+            .iter()
+            .zip(&self.least[polygons.len()..])
+            .filter(|(_, least)| least.is_finite());
         let corner = |(vee, least): (&Vee, &f64)| Corner {
             turn_rad: vee.turn_rad,
             feed_mm_per_s: vee.feed_mm_per_s,
             least_mm_per_s: *least,
         };
-        Measured { timed: timed.collect(), corners: corners.map(corner).collect() }
+        Measured {
+            timed: timed.collect(),
+            corners: corners.map(corner).collect(),
+        }
     }
 }

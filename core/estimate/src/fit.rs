@@ -18,11 +18,28 @@ impl Goodness {
     pub fn of(pairs: &[(f64, f64)]) -> Self {
         let count = pairs.len().max(1) as f64;
         let mean = pairs.iter().map(|(_, measured)| measured).sum::<f64>() / count;
-        let left: f64 = pairs.iter().map(|(fitted, measured)| (fitted - measured).powi(2)).sum();
-        let all: f64 = pairs.iter().map(|(_, measured)| (measured - mean).powi(2)).sum();
-        let max = pairs.iter().map(|(fitted, measured)| (fitted - measured).abs()).fold(0.0, f64::max);
-        let r2 = if all > 0.0 { 1.0 - left / all } else { f64::from(left == 0.0) };
-        Self { r2, rms: (left / count).sqrt(), max }
+        let left: f64 = pairs
+            .iter()
+            .map(|(fitted, measured)| (fitted - measured).powi(2))
+            .sum();
+        let all: f64 = pairs
+            .iter()
+            .map(|(_, measured)| (measured - mean).powi(2))
+            .sum();
+        let max = pairs
+            .iter()
+            .map(|(fitted, measured)| (fitted - measured).abs())
+            .fold(0.0, f64::max);
+        let r2 = if all > 0.0 {
+            1.0 - left / all
+        } else {
+            f64::from(left == 0.0)
+        };
+        Self {
+            r2,
+            rms: (left / count).sqrt(),
+            max,
+        }
     }
 }
 
@@ -31,26 +48,42 @@ impl Goodness {
 ///
 /// # Errors
 /// Fewer rows than terms, or terms that depend on each other.
-pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Result<[f64; N], String> {
+pub fn least_squares<const N: usize>(
+    rows: &[[f64; N]],
+    values: &[f64],
+) -> Result<[f64; N], String> {
     if rows.len() < N {
-        return Err(format!("{} measurements cannot tell {N} coefficients apart", rows.len()));
+        return Err(format!(
+            "{} measurements cannot tell {N} coefficients apart",
+            rows.len()
+        ));
     }
     let mut matrix = DMatrix::from_fn(rows.len(), N, |row, column| rows[row][column]);
-    let scales: Vec<f64> = matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
+    let scales: Vec<f64> = matrix
+        .column_iter()
+        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+        .collect();
     for (mut column, scale) in matrix.column_iter_mut().zip(&scales) {
         column /= *scale;
     }
     let svd = matrix.svd(true, true);
     if svd.singular_values.min() < 1e-12 * svd.singular_values.max() {
-        return Err("the measurements do not tell all coefficients apart: vary sides and turns".to_string());
+        return Err(
+            "the measurements do not tell all coefficients apart: vary sides and turns".to_string(),
+        );
     }
-    let solved = svd.solve(&DVector::from_column_slice(values), 0.0).map_err(str::to_string)?;
+    let solved = svd
+        .solve(&DVector::from_column_slice(values), 0.0)
+        .map_err(str::to_string)?;
     Ok(std::array::from_fn(|index| solved[index] / scales[index]))
 }
 
 /// Parameters that minimise the sum of the squares of `residuals`, by damped Gauss-Newton steps in the logarithms of the
 /// parameters (which are positive), from `start`. A bounded number of steps.
-pub fn positive_parameters<const N: usize>(start: [f64; N], residuals: impl Fn(&[f64; N]) -> Vec<f64>) -> [f64; N] {
+pub fn positive_parameters<const N: usize>(
+    start: [f64; N],
+    residuals: impl Fn(&[f64; N]) -> Vec<f64>,
+) -> [f64; N] {
     const STEPS: usize = 60;
     /// Share by which a step has to lower the sum of the squares.
     const WORTH: f64 = 1e-6;
@@ -66,13 +99,20 @@ pub fn positive_parameters<const N: usize>(start: [f64; N], residuals: impl Fn(&
             let mut moved = logs;
             moved[index] += PROBE;
             let there = residuals(&exp(&moved));
-            jacobian.set_column(index, &DVector::from_fn(here.len(), |row, _| (there[row] - here[row]) / PROBE));
+            jacobian.set_column(
+                index,
+                &DVector::from_fn(here.len(), |row, _| (there[row] - here[row]) / PROBE),
+            );
         }
         let gradient = jacobian.transpose() * DVector::from_column_slice(&here);
         let normal = jacobian.transpose() * &jacobian;
-        let damped = &normal + DMatrix::from_diagonal(&normal.diagonal().map(|d| damping * d + 1e-12));
-        let Some(step) = damped.lu().solve(&gradient) else { break };
-        let next: [f64; N] = std::array::from_fn(|index| logs[index] - step[index].clamp(-1.0, 1.0));
+        let damped =
+            &normal + DMatrix::from_diagonal(&normal.diagonal().map(|d| damping * d + 1e-12));
+        let Some(step) = damped.lu().solve(&gradient) else {
+            break;
+        };
+        let next: [f64; N] =
+            std::array::from_fn(|index| logs[index] - step[index].clamp(-1.0, 1.0));
         let there = residuals(&exp(&next));
         let (before, after) = (square(&here), square(&there));
         if after < before {
@@ -105,7 +145,10 @@ mod tests {
     #[test]
     fn positive_parameters_are_found_from_far_away() {
         let [a, b] = positive_parameters([1.0, 1.0], |[a, b]| {
-            (1..20).map(f64::from).map(|x| (a * (-x / b).exp() - 50.0 * (-x / 7.0).exp()) / 50.0).collect()
+            (1..20)
+                .map(f64::from)
+                .map(|x| (a * (-x / b).exp() - 50.0 * (-x / 7.0).exp()) / 50.0)
+                .collect()
         });
         assert!((a - 50.0).abs() < 1e-6 && (b - 7.0).abs() < 1e-6, "{a} {b}");
     }

@@ -19,21 +19,44 @@ pub struct Driven {
 
 /// Drives `length` with at most `feed` from `start` to `end` with the acceleration `a`, in any consistent units.
 pub fn drive(length: f64, feed: f64, start: f64, end: f64, a: f64) -> Driven {
-    let (up, down) = (start * start + 2.0 * a * length, start * start - 2.0 * a * length);
+    let (up, down) = (
+        start * start + 2.0 * a * length,
+        start * start - 2.0 * a * length,
+    );
     if end * end > up {
         let peak = up.sqrt();
-        return Driven { case: Case::SpeedsUp, time: (peak - start) / a, peak, end: peak };
+        return Driven {
+            case: Case::SpeedsUp,
+            time: (peak - start) / a,
+            peak,
+            end: peak,
+        };
     }
     if end * end < down {
         let last = down.sqrt();
-        return Driven { case: Case::SlowsDown, time: (start - last) / a, peak: start, end: last };
+        return Driven {
+            case: Case::SlowsDown,
+            time: (start - last) / a,
+            peak: start,
+            end: last,
+        };
     }
     let highest = a * length + f64::midpoint(start * start, end * end);
     if highest >= feed * feed {
         let ramps = (2.0 * feed * feed - start * start - end * end) / (2.0 * a);
         let time = (2.0 * feed - start - end) / a + (length - ramps) / feed;
-        return Driven { case: Case::ReachesFeed, time, peak: feed, end };
+        return Driven {
+            case: Case::ReachesFeed,
+            time,
+            peak: feed,
+            end,
+        };
     }
     let peak = highest.sqrt();
-    Driven { case: Case::Peak, time: (2.0 * peak - start - end) / a, peak, end }
+    Driven {
+        case: Case::Peak,
+        time: (2.0 * peak - start - end) / a,
+        peak,
+        end,
+    }
 }

@@ -25,8 +25,15 @@ pub struct Histogram {
 impl Histogram {
     /// Adds a block.
     pub fn add(&mut self, length_mm: f64, feed_mm_per_s: f64, time_s: f64) {
-        let bin = |value: f64| (value.max(1e-12).log10() * PER_DECADE).floor().clamp(-FAR, FAR) as i32;
-        let field = self.fields.entry((bin(length_mm), bin(feed_mm_per_s * 60.0))).or_default();
+        let bin = |value: f64| {
+            (value.max(1e-12).log10() * PER_DECADE)
+                .floor()
+                .clamp(-FAR, FAR) as i32
+        };
+        let field = self
+            .fields
+            .entry((bin(length_mm), bin(feed_mm_per_s * 60.0)))
+            .or_default();
         field.blocks += 1;
         field.time_s += time_s;
     }
@@ -34,6 +41,8 @@ impl Histogram {
     /// Fields with blocks: lengths in mm and feeds in mm/min, both from and below.
     pub fn fields(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], &Field)> {
         let edges = |bin: i32| [bin, bin + 1].map(|edge| 10f64.powf(f64::from(edge) / PER_DECADE));
-        self.fields.iter().map(move |((length, feed), field)| (edges(*length), edges(*feed), field))
+        self.fields
+            .iter()
+            .map(move |((length, feed), field)| (edges(*length), edges(*feed), field))
     }
 }

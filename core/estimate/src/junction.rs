@@ -82,13 +82,25 @@ impl Rows {
 
     /// Path acceleration left at the square `w` of the speed, mm/s².
     pub fn acceleration_mm_per_s2(&self, w: f64) -> f64 {
-        let left = |r: &Row| if r.h > 0.0 { (r.a - w * r.k) / r.h } else { f64::INFINITY };
+        let left = |r: &Row| {
+            if r.h > 0.0 {
+                (r.a - w * r.k) / r.h
+            } else {
+                f64::INFINITY
+            }
+        };
         self.each().iter().map(left).fold(f64::INFINITY, f64::min)
     }
 
     /// Square of the highest speed at which turning takes no more than its share.
     pub fn turning_cap(&self) -> f64 {
-        let cap = |r: &Row| if r.k > 0.0 { TURNING_SHARE * r.a / r.k } else { f64::INFINITY };
+        let cap = |r: &Row| {
+            if r.k > 0.0 {
+                TURNING_SHARE * r.a / r.k
+            } else {
+                f64::INFINITY
+            }
+        };
         self.each().iter().map(cap).fold(f64::INFINITY, f64::min)
     }
 }
@@ -99,23 +111,44 @@ impl Rule {
         let step = after.directions[0] - before.directions[1];
         let capped = before.feed_mm_per_s.min(after.feed_mm_per_s);
         let feed = match self {
-            Self::Tangent { period_s, speed_difference_mm_per_s, .. } => {
-                let acceleration = self.path_acceleration(before).min(self.path_acceleration(after));
+            Self::Tangent {
+                period_s,
+                speed_difference_mm_per_s,
+                ..
+            } => {
+                let acceleration = self
+                    .path_acceleration(before)
+                    .min(self.path_acceleration(after));
                 let drop = 2.0 * (before.turn_rad(after) / 2.0).sin().powi(2);
-                let tangent = if drop < STRAIGHT * STRAIGHT { f64::INFINITY } else { acceleration * period_s / drop };
+                let tangent = if drop < STRAIGHT * STRAIGHT {
+                    f64::INFINITY
+                } else {
+                    acceleration * period_s / drop
+                };
                 tangent.max(*speed_difference_mm_per_s)
             }
-            Self::Axis { speed_difference_mm_per_s, .. } => {
+            Self::Axis {
+                speed_difference_mm_per_s,
+                ..
+            } => {
                 let axes = speed_difference_mm_per_s.iter().zip(step.0.map(f64::abs));
-                axes.filter(|(_, step)| *step > STRAIGHT).map(|(v, step)| v / step).fold(f64::INFINITY, f64::min)
+                axes.filter(|(_, step)| *step > STRAIGHT)
+                    .map(|(v, step)| v / step)
+                    .fold(f64::INFINITY, f64::min)
             }
         };
-        Junction { feed_mm_per_s: feed.min(capped), half_step: step * 0.5 }
+        Junction {
+            feed_mm_per_s: feed.min(capped),
+            half_step: step * 0.5,
+        }
     }
 
     fn path_acceleration(&self, element: &Element) -> f64 {
         match self {
-            Self::Tangent { acceleration_mm_per_s2: Some(a), .. } => *a,
+            Self::Tangent {
+                acceleration_mm_per_s2: Some(a),
+                ..
+            } => *a,
             _ => element.acceleration_mm_per_s2,
         }
     }
@@ -123,14 +156,30 @@ impl Rule {
     /// The limits inside `element` between the junctions at its ends.
     pub fn rows(&self, element: &Element, ends: [&Junction; 2]) -> Rows {
         let mut rows = Rows::default();
-        let Self::Axis { acceleration_mm_per_s2, .. } = self else {
-            rows.push(Row { h: 1.0, k: 0.0, a: self.path_acceleration(element) });
+        let Self::Axis {
+            acceleration_mm_per_s2,
+            ..
+        } = self
+        else {
+            rows.push(Row {
+                h: 1.0,
+                k: 0.0,
+                a: self.path_acceleration(element),
+            });
             return rows;
         };
         for (axis, a) in acceleration_mm_per_s2.iter().enumerate() {
-            let plain = Row { h: element.most[axis], k: element.bend[axis], a: *a };
+            let plain = Row {
+                h: element.most[axis],
+                k: element.bend[axis],
+                a: *a,
+            };
             let halves = ends.map(|end| end.half_step[axis]);
-            let row = if halves == [0.0; 2] { plain } else { cost(plain, element, ends, halves) };
+            let row = if halves == [0.0; 2] {
+                plain
+            } else {
+                cost(plain, element, ends, halves)
+            };
             if row.h > 0.0 || row.k > 0.0 {
                 rows.push(row);
             }
@@ -146,11 +195,27 @@ fn cost(row: Row, element: &Element, ends: [&Junction; 2], halves: [f64; 2]) -> 
     let [start, end] = ends.map(|end| end.feed_mm_per_s);
     let [before, after] = halves;
     let taken = element.feed_mm_per_s * (start * before.abs() + end * after.abs()) * per_mm;
-    let constant = Row { a: row.a - taken, ..row };
-    let square = Row { h: row.h + before.abs().max(after.abs()), k: row.k + (before + after).abs() * per_mm, a: row.a };
+    let constant = Row {
+        a: row.a - taken,
+        ..row
+    };
+    let square = Row {
+        h: row.h + before.abs().max(after.abs()),
+        k: row.k + (before + after).abs() * per_mm,
+        a: row.a,
+    };
     let slow = start.min(end).powi(2);
-    let reach = |r: &Row| (r.h * slow + 2.0 * element.length_mm * r.a, r.h + 2.0 * element.length_mm * r.k);
+    let reach = |r: &Row| {
+        (
+            r.h * slow + 2.0 * element.length_mm * r.a,
+            r.h + 2.0 * element.length_mm * r.k,
+        )
+    };
     let ((n, d), (other_n, other_d)) = (reach(&constant), reach(&square));
     let as_far = n >= element.feed_mm_per_s.powi(2) * d || n * other_d >= other_n * d;
-    if constant.a >= (1.0 - CONSTANT_SHARE) * row.a && as_far { constant } else { square }
+    if constant.a >= (1.0 - CONSTANT_SHARE) * row.a && as_far {
+        constant
+    } else {
+        square
+    }
 }

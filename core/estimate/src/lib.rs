@@ -36,5 +36,7 @@ pub use junction::{Junction, Rows, Rule};
 pub use look_ahead::LookAhead;
 pub use model::{Case, Model, Sink, Spent, total_s};
 pub use overlap::{Constants, Overlap};
-pub use regression::{CORRECTED_LONG, Coefficients, PRINTED_CUBE, PRINTED_SHORT, Regression, Switch, long_terms};
+pub use regression::{
+    CORRECTED_LONG, Coefficients, PRINTED_CUBE, PRINTED_SHORT, Regression, Switch, long_terms,
+};
 pub use tally::{Part, Tally};

@@ -32,13 +32,23 @@ pub struct LookAhead {
 impl LookAhead {
     /// A model at rest. Rapids take the machine's acceleration where none is given.
     pub fn new(rule: Rule, rapid_acceleration_mm_per_s2: Option<f64>) -> Self {
-        Self { rule, rapid_acceleration_mm_per_s2, window: VecDeque::new() }
+        Self {
+            rule,
+            rapid_acceleration_mm_per_s2,
+            window: VecDeque::new(),
+        }
     }
 
     fn close(&mut self, end: &Junction) {
-        let Some(last) = self.window.back_mut() else { return };
+        let Some(last) = self.window.back_mut() else {
+            return;
+        };
         last.rows = self.rule.rows(&last.element, [&last.start, end]);
-        last.own = last.element.feed_mm_per_s.powi(2).min(last.rows.turning_cap());
+        last.own = last
+            .element
+            .feed_mm_per_s
+            .powi(2)
+            .min(last.rows.turning_cap());
     }
 
     /// Speeds of all that is in the window, to rest at its end; the speed at its start stays.
@@ -62,7 +72,9 @@ impl LookAhead {
     fn emit(&mut self, count: usize, out: &mut Sink<'_>) {
         self.plan();
         for _ in 0..count {
-            let Some(slot) = self.window.pop_front() else { return };
+            let Some(slot) = self.window.pop_front() else {
+                return;
+            };
             let end = self.window.front().map_or(0.0, |next| next.square);
             out(&slot.element, &drive(&slot, end));
         }
@@ -72,11 +84,23 @@ impl LookAhead {
 /// The time of a block between the squares of the speeds at its ends.
 fn drive(slot: &Slot, end: f64) -> Spent {
     let (length_mm, start) = (slot.element.length_mm, slot.square);
-    let top = slot.own.min(slot.rows.peak(f64::midpoint(start, end), length_mm)).max(start).max(end);
+    let top = slot
+        .own
+        .min(slot.rows.peak(f64::midpoint(start, end), length_mm))
+        .max(start)
+        .max(end);
     let a = slot.rows.acceleration_mm_per_s2(top);
     let [first, peak, last] = [start, top, end].map(f64::sqrt);
-    let cruise_mm = if top > start.min(end) { length_mm - (2.0 * top - start - end) / (2.0 * a) } else { length_mm };
-    let ramps_s = if top > start.min(end) { (2.0 * peak - first - last) / a } else { 0.0 };
+    let cruise_mm = if top > start.min(end) {
+        length_mm - (2.0 * top - start - end) / (2.0 * a)
+    } else {
+        length_mm
+    };
+    let ramps_s = if top > start.min(end) {
+        (2.0 * peak - first - last) / a
+    } else {
+        0.0
+    };
     let case = if peak >= slot.element.feed_mm_per_s * (1.0 - 1e-9) {
         Case::ReachesFeed
     } else if top > start && top > end {
@@ -86,12 +110,19 @@ fn drive(slot: &Slot, end: f64) -> Spent {
     } else {
         Case::SlowsDown
     };
-    Spent { time_s: ramps_s + cruise_mm.max(0.0) / peak, reached_mm_per_s: peak, case: Some(case) }
+    Spent {
+        time_s: ramps_s + cruise_mm.max(0.0) / peak,
+        reached_mm_per_s: peak,
+        case: Some(case),
+    }
 }
 
 impl Model for LookAhead {
     fn block(&mut self, element: &Element, out: &mut Sink<'_>) {
-        let rests = self.window.back().is_some_and(|last| last.element.rests_before(element));
+        let rests = self
+            .window
+            .back()
+            .is_some_and(|last| last.element.rests_before(element));
         if rests || element.starts_at_rest {
             self.finish(out);
         }
@@ -102,9 +133,17 @@ impl Model for LookAhead {
             return out(element, &Spent::NOTHING);
         }
         debug_assert_eq!(element.kind, Kind::Cut);
-        let start = self.window.back().map_or_else(Junction::default, |last| self.rule.join(&last.element, element));
+        let start = self.window.back().map_or_else(Junction::default, |last| {
+            self.rule.join(&last.element, element)
+        });
         self.close(&start);
-        self.window.push_back(Slot { element: *element, start, rows: Rows::default(), own: 0.0, square: 0.0 });
+        self.window.push_back(Slot {
+            element: *element,
+            start,
+            rows: Rows::default(),
+            own: 0.0,
+            square: 0.0,
+        });
         if self.window.len() > WINDOW {
             // The last block's end is not known yet: it is planned as a rest, like the end of any buffer.
             self.close(&Junction::default());

@@ -32,15 +32,25 @@ pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
 /// # Errors
 /// What is no measurement, with file, line and cause.
 pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(bytes);
-    let headers = reader.headers().map_err(|e| format!("{name}: {e}"))?.clone();
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(bytes);
+    let headers = reader
+        .headers()
+        .map_err(|e| format!("{name}: {e}"))?
+        .clone();
     let mut all = vec![];
     for record in reader.records() {
         let record = record.map_err(|e| format!("{name}: {e}"))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let row: Row =
-            record.deserialize(Some(&headers)).map_err(|e| format!("{name}:{line}: {}", cause(&e, &headers)))?;
-        all.push(row.timed().map_err(|cause| format!("{name}:{line}: {cause}"))?);
+        let row: Row = record
+            .deserialize(Some(&headers))
+            .map_err(|e| format!("{name}:{line}: {}", cause(&e, &headers)))?;
+        all.push(
+            row.timed()
+                .map_err(|cause| format!("{name}:{line}: {cause}"))?,
+        );
     }
     if all.len() < 6 {
         return Err(format!(
@@ -53,7 +63,9 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
 
 /// What is wrong with a row, by the name of its column.
 fn cause(error: &csv::Error, headers: &csv::StringRecord) -> String {
-    let csv::ErrorKind::Deserialize { err, .. } = error.kind() else { return error.to_string() };
+    let csv::ErrorKind::Deserialize { err, .. } = error.kind() else {
+        return error.to_string();
+    };
     match err.field().and_then(|field| headers.get(field as usize)) {
         Some(column) => format!("{column}: {}", err.kind()),
         None => err.to_string(),
@@ -63,20 +75,38 @@ fn cause(error: &csv::Error, headers: &csv::StringRecord) -> String {
 impl Row {
     fn timed(&self) -> Result<Timed, String> {
         let feed_mm_per_min = self.feed_mm_per_min.unwrap_or(FEED_MM_PER_MIN);
-        let positive = [("side_mm", self.side_mm), ("seconds", self.seconds), ("feed_mm_per_min", feed_mm_per_min)];
+        let positive = [
+            ("side_mm", self.side_mm),
+            ("seconds", self.seconds),
+            ("feed_mm_per_min", feed_mm_per_min),
+        ];
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(format!("{name}: {value} is not above zero"));
             }
         }
         if self.n < 3 || self.repetitions == 0 {
-            return Err("n: a polygon has 3 corners at least, and is gone round once at least".to_string());
+            return Err(
+                "n: a polygon has 3 corners at least, and is gone round once at least".to_string(),
+            );
         }
-        if self.n.checked_mul(self.repetitions).is_none_or(|blocks| blocks > 10_000_000) {
+        if self
+            .n
+            .checked_mul(self.repetitions)
+            .is_none_or(|blocks| blocks > 10_000_000)
+        {
             return Err("repetitions: more blocks than anybody times".to_string());
         }
-        let polygon = Polygon { corners: self.n, side_mm: self.side_mm, rounds: self.repetitions };
-        Ok(Timed { polygon, feed_mm_per_s: feed_mm_per_min / 60.0, time_s: self.seconds })
+        let polygon = Polygon {
+            corners: self.n,
+            side_mm: self.side_mm,
+            rounds: self.repetitions,
+        };
+        Ok(Timed {
+            polygon,
+            feed_mm_per_s: feed_mm_per_min / 60.0,
+            time_s: self.seconds,
+        })
     }
 }
 
@@ -88,9 +118,18 @@ mod tests {
     fn a_slip_is_named_by_line_and_column() {
         let file = tempfile::NamedTempFile::new().unwrap();
         for (text, expected) in [
-            ("n,side_mm,repetitions,seconds\n3,0.1,10,1\n4,wide,1,1\n", ":3: side_mm: invalid float literal"),
-            ("n,side,repetitions,seconds\n3,0.1,10,1\n", ":2: unknown field `side`, expected one of `n`, `side_mm`"),
-            ("n,side_mm,repetitions,seconds\n3,-1,10,1\n", ":2: side_mm: -1 is not above zero"),
+            (
+                "n,side_mm,repetitions,seconds\n3,0.1,10,1\n4,wide,1,1\n",
+                ":3: side_mm: invalid float literal",
+            ),
+            (
+                "n,side,repetitions,seconds\n3,0.1,10,1\n",
+                ":2: unknown field `side`, expected one of `n`, `side_mm`",
+            ),
+            (
+                "n,side_mm,repetitions,seconds\n3,-1,10,1\n",
+                ":2: side_mm: -1 is not above zero",
+            ),
         ] {
             std::fs::write(file.path(), text).unwrap();
             let found = read(file.path()).unwrap_err();

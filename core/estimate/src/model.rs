@@ -28,7 +28,11 @@ pub struct Spent {
 
 impl Spent {
     /// No time: a path without length.
-    pub const NOTHING: Self = Self { time_s: 0.0, reached_mm_per_s: 0.0, case: None };
+    pub const NOTHING: Self = Self {
+        time_s: 0.0,
+        reached_mm_per_s: 0.0,
+        case: None,
+    };
 }
 
 /// Takes the time of each block, in the order of the program.
@@ -44,7 +48,11 @@ pub trait Model: Send {
 }
 
 /// Time of a straight way from rest to rest, s.
-pub(crate) fn rest_to_rest_s(length_mm: f64, feed_mm_per_s: f64, acceleration_mm_per_s2: f64) -> f64 {
+pub(crate) fn rest_to_rest_s(
+    length_mm: f64,
+    feed_mm_per_s: f64,
+    acceleration_mm_per_s2: f64,
+) -> f64 {
     if length_mm <= 0.0 {
         return 0.0;
     }
@@ -57,14 +65,21 @@ pub(crate) fn rest_to_rest_s(length_mm: f64, feed_mm_per_s: f64, acceleration_mm
 }
 
 /// What a rapid or a dwell takes; none for feed motion.
-pub(crate) fn without_feed(element: &Element, rapid_acceleration_mm_per_s2: Option<f64>) -> Option<Spent> {
+pub(crate) fn without_feed(
+    element: &Element,
+    rapid_acceleration_mm_per_s2: Option<f64>,
+) -> Option<Spent> {
     let acceleration = rapid_acceleration_mm_per_s2.unwrap_or(element.acceleration_mm_per_s2);
     let time_s = match element.kind {
         Kind::Cut => return None,
         Kind::Dwell => element.nominal_s,
         Kind::Rapid => rest_to_rest_s(element.length_mm, element.feed_mm_per_s, acceleration),
     };
-    Some(Spent { time_s, reached_mm_per_s: 0.0, case: None })
+    Some(Spent {
+        time_s,
+        reached_mm_per_s: 0.0,
+        case: None,
+    })
 }
 
 /// Total time of `elements` under `model`, s.

@@ -97,31 +97,56 @@ impl Source<'_> {
             |span| {
                 let before = &self.text[..span.start.min(self.text.len())];
                 let line = before.matches('\n').count() + 1;
-                let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
+                let column = before
+                    .rsplit('\n')
+                    .next()
+                    .unwrap_or_default()
+                    .chars()
+                    .count()
+                    + 1;
                 format!("{}:{line}:{column}", self.name)
             },
         );
-        ModelFileError { place, cause: cause.into() }
+        ModelFileError {
+            place,
+            cause: cause.into(),
+        }
     }
 
     fn finite(&self, key: &str, value: &Spanned<f64>) -> Result<f64, ModelFileError> {
         let number = *value.get_ref();
         number.is_finite().then_some(number).ok_or_else(|| {
-            self.refuse(Some(value.span()), format!("{key}: {number} is not a number to calculate with"))
+            self.refuse(
+                Some(value.span()),
+                format!("{key}: {number} is not a number to calculate with"),
+            )
         })
     }
 
     fn positive(&self, key: &str, value: &Spanned<f64>) -> Result<f64, ModelFileError> {
         let number = self.finite(key, value)?;
-        let refusal = || self.refuse(Some(value.span()), format!("{key}: {number} is not above zero"));
+        let refusal = || {
+            self.refuse(
+                Some(value.span()),
+                format!("{key}: {number} is not above zero"),
+            )
+        };
         (number > 0.0).then_some(number).ok_or_else(refusal)
     }
 
-    fn optional(&self, key: &str, value: Option<&Spanned<f64>>) -> Result<Option<f64>, ModelFileError> {
+    fn optional(
+        &self,
+        key: &str,
+        value: Option<&Spanned<f64>>,
+    ) -> Result<Option<f64>, ModelFileError> {
         value.map(|value| self.positive(key, value)).transpose()
     }
 
-    fn all<const N: usize>(&self, key: &str, values: &[Spanned<f64>; N]) -> Result<[f64; N], ModelFileError> {
+    fn all<const N: usize>(
+        &self,
+        key: &str,
+        values: &[Spanned<f64>; N],
+    ) -> Result<[f64; N], ModelFileError> {
         let mut all = [0.0; N];
         for (to, from) in all.iter_mut().zip(values) {
             *to = self.finite(key, from)?;
@@ -136,8 +161,10 @@ impl Source<'_> {
 /// What cannot be read or is not a model, with file, line and key.
 pub fn read(path: &Path) -> Result<Choice, ModelFileError> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| ModelFileError { place: name.clone(), cause: error.to_string() })?;
+    let text = std::fs::read_to_string(path).map_err(|error| ModelFileError {
+        place: name.clone(),
+        cause: error.to_string(),
+    })?;
     parse(&name, &text)
 }
 
@@ -146,36 +173,69 @@ pub fn read(path: &Path) -> Result<Choice, ModelFileError> {
 /// # Errors
 /// What is not a model, with file, line and key.
 pub fn parse(name: &str, text: &str) -> Result<Choice, ModelFileError> {
-    let source = Source { name: name.to_string(), text };
-    let file: File = toml::from_str(text).map_err(|error| source.refuse(error.span(), one_line(error.message())))?;
+    let source = Source {
+        name: name.to_string(),
+        text,
+    };
+    let file: File = toml::from_str(text)
+        .map_err(|error| source.refuse(error.span(), one_line(error.message())))?;
     if *file.format.get_ref() != FORMAT {
-        let cause = format!("format: this is format {}, and only format {FORMAT} is known", file.format.get_ref());
+        let cause = format!(
+            "format: this is format {}, and only format {FORMAT} is known",
+            file.format.get_ref()
+        );
         return Err(source.refuse(Some(file.format.span()), cause));
     }
-    let rapid = source.optional("rapid_acceleration_mm_per_s2", file.rapid_acceleration_mm_per_s2.as_ref())?;
+    let rapid = source.optional(
+        "rapid_acceleration_mm_per_s2",
+        file.rapid_acceleration_mm_per_s2.as_ref(),
+    )?;
     let kind = *file.model.get_ref();
     let tables = [
-        ("regression", Kind::Regression, file.regression.as_ref().map(Spanned::span)),
-        ("overlap", Kind::Overlap, file.overlap.as_ref().map(Spanned::span)),
-        ("look-ahead", Kind::LookAhead, file.look_ahead.as_ref().map(Spanned::span)),
+        (
+            "regression",
+            Kind::Regression,
+            file.regression.as_ref().map(Spanned::span),
+        ),
+        (
+            "overlap",
+            Kind::Overlap,
+            file.overlap.as_ref().map(Spanned::span),
+        ),
+        (
+            "look-ahead",
+            Kind::LookAhead,
+            file.look_ahead.as_ref().map(Spanned::span),
+        ),
     ];
     for (key, of, span) in tables {
         if let Some(span) = span.filter(|_| of != kind) {
             return Err(source.refuse(Some(span), format!("{key}: model names another form")));
         }
     }
-    let missing = || source.refuse(Some(file.model.span()), "model: the table of this name is missing");
+    let missing = || {
+        source.refuse(
+            Some(file.model.span()),
+            "model: the table of this name is missing",
+        )
+    };
     match kind {
         Kind::Regression => {
             let table = file.regression.as_ref().ok_or_else(missing)?;
             regression(&source, table.get_ref(), rapid).map(Choice::Regression)
         }
-        Kind::Overlap => {
-            overlap(&source, file.overlap.as_ref().ok_or_else(missing)?.get_ref(), rapid).map(Choice::Overlap)
-        }
+        Kind::Overlap => overlap(
+            &source,
+            file.overlap.as_ref().ok_or_else(missing)?.get_ref(),
+            rapid,
+        )
+        .map(Choice::Overlap),
         Kind::LookAhead => {
             let table = file.look_ahead.as_ref().ok_or_else(missing)?;
-            Ok(Choice::LookAhead(look_ahead(&source, table.get_ref())?, rapid))
+            Ok(Choice::LookAhead(
+                look_ahead(&source, table.get_ref())?,
+                rapid,
+            ))
         }
     }
 }
@@ -201,27 +261,45 @@ fn regression(
         short: source.all("regression.short_mm_per_min", &table.short_mm_per_min)?,
         long: source.all("regression.long_mm_per_min", &table.long_mm_per_min)?,
         switch,
-        acceleration_mm_per_s2: source.positive("regression.acceleration_mm_per_s2", &table.acceleration_mm_per_s2)?,
-        ramp_s: source.optional("regression.ramp_ms", table.ramp_ms.as_ref())?.map(|ms| ms / 1e3),
+        acceleration_mm_per_s2: source.positive(
+            "regression.acceleration_mm_per_s2",
+            &table.acceleration_mm_per_s2,
+        )?,
+        ramp_s: source
+            .optional("regression.ramp_ms", table.ramp_ms.as_ref())?
+            .map(|ms| ms / 1e3),
         rapid_acceleration_mm_per_s2: rapid,
     })
 }
 
-fn overlap(source: &Source<'_>, table: &OverlapTable, rapid: Option<f64>) -> Result<Constants, ModelFileError> {
+fn overlap(
+    source: &Source<'_>,
+    table: &OverlapTable,
+    rapid: Option<f64>,
+) -> Result<Constants, ModelFileError> {
     Ok(Constants {
-        time_constant_s: source.positive("overlap.time_constant_ms", &table.time_constant_ms)? / 1e3,
+        time_constant_s: source.positive("overlap.time_constant_ms", &table.time_constant_ms)?
+            / 1e3,
         obeys_program: table.obeys_program,
-        tick_s: source.optional("overlap.tick_ms", table.tick_ms.as_ref())?.map(|ms| ms / 1e3),
+        tick_s: source
+            .optional("overlap.tick_ms", table.tick_ms.as_ref())?
+            .map(|ms| ms / 1e3),
         rapid_acceleration_mm_per_s2: rapid,
     })
 }
 
 fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, ModelFileError> {
     let key = |name: &str| format!("look-ahead.{name}");
-    let a = source.positive(&key("acceleration_mm_per_s2"), &table.acceleration_mm_per_s2)?;
+    let a = source.positive(
+        &key("acceleration_mm_per_s2"),
+        &table.acceleration_mm_per_s2,
+    )?;
     let name = key("allowable_speed_difference_mm_per_min");
     let v = source.positive(&name, &table.allowable_speed_difference_mm_per_min)? / MM_PER_MIN;
-    let tangent = source.optional(&key("tangent_feed_mm_per_min"), table.tangent_feed_mm_per_min.as_ref())?;
+    let tangent = source.optional(
+        &key("tangent_feed_mm_per_min"),
+        table.tangent_feed_mm_per_min.as_ref(),
+    )?;
     match (*table.junction.get_ref(), tangent) {
         (JunctionKind::Tangent, Some(feed)) => Ok(Rule::Tangent {
             acceleration_mm_per_s2: Some(a),
@@ -242,13 +320,21 @@ fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, Model
 pub fn write(choice: &Choice, calibrated: &str) -> Option<String> {
     let (kind, rapid, table) = match choice {
         Choice::Simulate => return None,
-        Choice::Regression(c) => ("regression", c.rapid_acceleration_mm_per_s2, regression_text(c)),
+        Choice::Regression(c) => (
+            "regression",
+            c.rapid_acceleration_mm_per_s2,
+            regression_text(c),
+        ),
         Choice::Overlap(c) => ("overlap", c.rapid_acceleration_mm_per_s2, overlap_text(c)),
         Choice::LookAhead(rule, rapid) => ("look-ahead", *rapid, look_ahead_text(rule)),
     };
     let calibrated = toml::Value::String(calibrated.to_string());
-    let rapid = rapid.map(|a| format!("rapid_acceleration_mm_per_s2 = {a:?}\n")).unwrap_or_default();
-    Some(format!("format = {FORMAT}\ncalibrated = {calibrated}\nmodel = \"{kind}\"\n{rapid}\n[{kind}]\n{table}"))
+    let rapid = rapid
+        .map(|a| format!("rapid_acceleration_mm_per_s2 = {a:?}\n"))
+        .unwrap_or_default();
+    Some(format!(
+        "format = {FORMAT}\ncalibrated = {calibrated}\nmodel = \"{kind}\"\n{rapid}\n[{kind}]\n{table}"
+    ))
 }
 
 fn regression_text(c: &Coefficients) -> String {
@@ -256,7 +342,10 @@ fn regression_text(c: &Coefficients) -> String {
         Switch::Fixed(mm) => format!("fixed_switch_mm = {mm:?}"),
         Switch::Moving(s) => format!("block_time_ms = {:?}", s * 1e3),
     };
-    let ramp = c.ramp_s.map(|s| format!("ramp_ms = {:?}\n", s * 1e3)).unwrap_or_default();
+    let ramp = c
+        .ramp_s
+        .map(|s| format!("ramp_ms = {:?}\n", s * 1e3))
+        .unwrap_or_default();
     format!(
         "acceleration_mm_per_s2 = {:?}\nshort_mm_per_min = {:?}\nlong_mm_per_min = {:?}\n{switch}\n{ramp}",
         c.acceleration_mm_per_s2, c.short, c.long
@@ -264,17 +353,39 @@ fn regression_text(c: &Coefficients) -> String {
 }
 
 fn overlap_text(c: &Constants) -> String {
-    let tick = c.tick_s.map(|s| format!("tick_ms = {:?}\n", s * 1e3)).unwrap_or_default();
-    format!("time_constant_ms = {:?}\nobeys_program = {}\n{tick}", c.time_constant_s * 1e3, c.obeys_program)
+    let tick = c
+        .tick_s
+        .map(|s| format!("tick_ms = {:?}\n", s * 1e3))
+        .unwrap_or_default();
+    format!(
+        "time_constant_ms = {:?}\nobeys_program = {}\n{tick}",
+        c.time_constant_s * 1e3,
+        c.obeys_program
+    )
 }
 
 fn look_ahead_text(rule: &Rule) -> String {
     let (junction, a, v, tangent) = match rule {
-        Rule::Tangent { acceleration_mm_per_s2, period_s, speed_difference_mm_per_s: v } => {
+        Rule::Tangent {
+            acceleration_mm_per_s2,
+            period_s,
+            speed_difference_mm_per_s: v,
+        } => {
             let a = acceleration_mm_per_s2.unwrap_or(f64::INFINITY);
-            ("tangent", a, *v, format!("tangent_feed_mm_per_min = {:?}\n", a * period_s * MM_PER_MIN))
+            (
+                "tangent",
+                a,
+                *v,
+                format!(
+                    "tangent_feed_mm_per_min = {:?}\n",
+                    a * period_s * MM_PER_MIN
+                ),
+            )
         }
-        Rule::Axis { acceleration_mm_per_s2: a, speed_difference_mm_per_s: v } => ("axis", a[0], v[0], String::new()),
+        Rule::Axis {
+            acceleration_mm_per_s2: a,
+            speed_difference_mm_per_s: v,
+        } => ("axis", a[0], v[0], String::new()),
     };
     format!(
         "junction = \"{junction}\"\nacceleration_mm_per_s2 = {a:?}\n\
@@ -289,14 +400,21 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again() {
-        let axis = Rule::Axis { acceleration_mm_per_s2: [900.0; MAX_AXES], speed_difference_mm_per_s: [2.0; MAX_AXES] };
+        let axis = Rule::Axis {
+            acceleration_mm_per_s2: [900.0; MAX_AXES],
+            speed_difference_mm_per_s: [2.0; MAX_AXES],
+        };
         let constants = Constants {
             time_constant_s: 0.03,
             obeys_program: true,
             tick_s: Some(0.001),
             rapid_acceleration_mm_per_s2: None,
         };
-        let moving = Coefficients { switch: Switch::Moving(0.03), ramp_s: Some(0.03), ..Coefficients::default() };
+        let moving = Coefficients {
+            switch: Switch::Moving(0.03),
+            ramp_s: Some(0.03),
+            ..Coefficients::default()
+        };
         let all = [
             Choice::LookAhead(axis, Some(5000.0)),
             Choice::Overlap(constants),
@@ -318,14 +436,26 @@ mod tests {
                 .starts_with("m.toml:4:20: overlap.time_constant_ms: -3 is not above zero")
         );
         let unknown = said(&format!("{head}[overlap]\ntime_constant_s = 3.0\n"));
-        assert!(unknown.starts_with("m.toml:4:1: unknown field `time_constant_s`"), "{unknown}");
+        assert!(
+            unknown.starts_with("m.toml:4:1: unknown field `time_constant_s`"),
+            "{unknown}"
+        );
         assert!(said(head).starts_with("m.toml:2:9: model: the table of this name is missing"));
-        assert!(said("format = 2\nmodel = \"overlap\"\n").starts_with("m.toml:1:10: format: this is format 2"));
-        assert!(said("format = 1\nmodel = \"look\"\n").starts_with("m.toml:2:9: unknown variant `look`"));
+        assert!(
+            said("format = 2\nmodel = \"overlap\"\n")
+                .starts_with("m.toml:1:10: format: this is format 2")
+        );
+        assert!(
+            said("format = 1\nmodel = \"look\"\n")
+                .starts_with("m.toml:2:9: unknown variant `look`")
+        );
         let other = said(&format!(
             "{head}[look-ahead]\njunction = \"axis\"\nacceleration_mm_per_s2 = 1.0\n\
             allowable_speed_difference_mm_per_min = 1.0\n"
         ));
-        assert!(other.contains("look-ahead: model names another form"), "{other}");
+        assert!(
+            other.contains("look-ahead: model names another form"),
+            "{other}"
+        );
     }
 }

@@ -34,14 +34,23 @@ const ROUNDING: f64 = 1e-9;
 impl Overlap {
     /// A model at rest.
     pub fn new(constants: Constants) -> Self {
-        Self { constants, up_s: constants.time_constant_s, waiting: None }
+        Self {
+            constants,
+            up_s: constants.time_constant_s,
+            waiting: None,
+        }
     }
 
     fn down_s(&self, element: &Element) -> f64 {
         let asked_s = element.time_constant_s;
-        let constant_s =
-            if self.constants.obeys_program && asked_s.is_finite() { asked_s } else { self.constants.time_constant_s };
-        self.constants.tick_s.map_or(constant_s, |tick_s| (constant_s / tick_s).round().max(1.0) * tick_s)
+        let constant_s = if self.constants.obeys_program && asked_s.is_finite() {
+            asked_s
+        } else {
+            self.constants.time_constant_s
+        };
+        self.constants.tick_s.map_or(constant_s, |tick_s| {
+            (constant_s / tick_s).round().max(1.0) * tick_s
+        })
     }
 
     /// From the start of the block to the start of the next, s: where the ramps differ, the difference of their halves
@@ -57,7 +66,9 @@ impl Overlap {
 
     fn emit(&mut self, element: &Element, rests_after: bool, out: &mut Sink<'_>) {
         let rapid = self.constants.rapid_acceleration_mm_per_s2;
-        if let Some(spent) = without_feed(element, rapid).filter(|_| element.kind == Kind::Dwell || rapid.is_some()) {
+        if let Some(spent) =
+            without_feed(element, rapid).filter(|_| element.kind == Kind::Dwell || rapid.is_some())
+        {
             return out(element, &spent);
         }
         if element.length_mm <= 0.0 {
@@ -72,7 +83,14 @@ impl Overlap {
         let time_s = until_next_s + if rests_after { down_s } else { 0.0 };
         self.up_s = down_s;
         let case = (element.kind == Kind::Cut).then_some(case);
-        out(element, &Spent { time_s, reached_mm_per_s: slowed.min(element.feed_mm_per_s), case });
+        out(
+            element,
+            &Spent {
+                time_s,
+                reached_mm_per_s: slowed.min(element.feed_mm_per_s),
+                case,
+            },
+        );
     }
 }
 

@@ -53,7 +53,10 @@ impl Polygon {
         let (turn, radius) = (self.turn_rad(), self.radius_mm());
         (0..self.corners).map(move |k| {
             let angle = f64::from(k) * turn - std::f64::consts::FRAC_PI_2 - turn / 2.0;
-            [center_mm[0] + radius * angle.cos(), center_mm[1] + radius * angle.sin()]
+            [
+                center_mm[0] + radius * angle.cos(),
+                center_mm[1] + radius * angle.sin(),
+            ]
         })
     }
 
@@ -65,8 +68,9 @@ impl Polygon {
     /// Its blocks.
     pub fn elements(&self, feed_mm_per_s: f64) -> impl Iterator<Item = Element> {
         let (turn, side_mm) = (self.turn_rad(), self.side_mm);
-        let round: Vec<_> =
-            (0..self.corners).map(|k| Element::line(side_mm, f64::from(k) * turn, feed_mm_per_s)).collect();
+        let round: Vec<_> = (0..self.corners)
+            .map(|k| Element::line(side_mm, f64::from(k) * turn, feed_mm_per_s))
+            .collect();
         let count = self.blocks() as usize;
         round.into_iter().cycle().take(count)
     }
@@ -93,16 +97,28 @@ impl Timed {
     /// What `model` says it takes, s. Where there are many rounds, those in the middle are taken to be alike.
     pub fn under(&self, model: &mut dyn Model) -> f64 {
         let corners = self.polygon.corners as usize;
-        let rounds = self.polygon.rounds.min(ENOUGH_BLOCKS.div_ceil(self.polygon.corners));
-        let shorter = Polygon { rounds, ..self.polygon };
+        let rounds = self
+            .polygon
+            .rounds
+            .min(ENOUGH_BLOCKS.div_ceil(self.polygon.corners));
+        let shorter = Polygon {
+            rounds,
+            ..self.polygon
+        };
         let from = rounds as usize / 2 * corners;
         let (mut total_s, mut round_s, mut number) = (0.0, 0.0, 0);
         let mut add = |_: &Element, spent: &Spent| {
             total_s += spent.time_s;
-            round_s += if (from..from + corners).contains(&number) { spent.time_s } else { 0.0 };
+            round_s += if (from..from + corners).contains(&number) {
+                spent.time_s
+            } else {
+                0.0
+            };
             number += 1;
         };
-        shorter.elements(self.feed_mm_per_s).for_each(|element| model.block(&element, &mut add));
+        shorter
+            .elements(self.feed_mm_per_s)
+            .for_each(|element| model.block(&element, &mut add));
         model.finish(&mut add);
         total_s + f64::from(self.polygon.rounds - rounds) * round_s
     }

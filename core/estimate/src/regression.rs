@@ -111,7 +111,9 @@ impl Coefficients {
     fn is_short(&self, element: &Element) -> bool {
         let switch_mm = match self.switch {
             Switch::Fixed(half_mm) => half_mm,
-            Switch::Moving(block_time_s) => (element.feed_mm_per_s * block_time_s / 2.0).max(FIXED_SWITCH_MM),
+            Switch::Moving(block_time_s) => {
+                (element.feed_mm_per_s * block_time_s / 2.0).max(FIXED_SWITCH_MM)
+            }
         };
         element.length_mm / 2.0 <= switch_mm
     }
@@ -133,7 +135,9 @@ impl Coefficients {
 
     fn acceleration(&self, element: &Element) -> f64 {
         let ramps_s = self.ramp_s.filter(|_| !self.is_short(element));
-        ramps_s.map_or(self.acceleration_mm_per_s2, |ramp_s| element.feed_mm_per_s / ramp_s)
+        ramps_s.map_or(self.acceleration_mm_per_s2, |ramp_s| {
+            element.feed_mm_per_s / ramp_s
+        })
     }
 }
 
@@ -148,7 +152,11 @@ pub struct Regression {
 impl Regression {
     /// A model at rest.
     pub fn new(coefficients: Coefficients) -> Self {
-        Self { coefficients, waiting: None, start_mm_per_s: 0.0 }
+        Self {
+            coefficients,
+            waiting: None,
+            start_mm_per_s: 0.0,
+        }
     }
 
     fn emit(&mut self, element: &Element, end_mm_per_s: f64, out: &mut Sink<'_>) {
@@ -158,9 +166,22 @@ impl Regression {
         }
         let start = self.start_mm_per_s.min(element.feed_mm_per_s);
         let a = coefficients.acceleration(element);
-        let driven = drive(element.length_mm, element.feed_mm_per_s, start, end_mm_per_s, a);
+        let driven = drive(
+            element.length_mm,
+            element.feed_mm_per_s,
+            start,
+            end_mm_per_s,
+            a,
+        );
         self.start_mm_per_s = driven.end;
-        out(element, &Spent { time_s: driven.time, reached_mm_per_s: driven.peak, case: Some(driven.case) });
+        out(
+            element,
+            &Spent {
+                time_s: driven.time,
+                reached_mm_per_s: driven.peak,
+                case: Some(driven.case),
+            },
+        );
     }
 }
 

@@ -90,14 +90,18 @@ impl Tally {
             Kind::Cut => {
                 self.cutting.add(element, spent);
                 self.programmed(element.length_mm / element.nominal_s * 60.0);
-                self.histogram.add(element.length_mm, spent.reached_mm_per_s, spent.time_s);
+                self.histogram
+                    .add(element.length_mm, spent.reached_mm_per_s, spent.time_s);
             }
         }
         self.length_mm += element.length_mm;
         if let Some(case) = spent.case {
             self.cases[case as usize - 1] += 1;
         }
-        self.tools.entry(element.tool).or_default().add(element, spent);
+        self.tools
+            .entry(element.tool)
+            .or_default()
+            .add(element, spent);
         self.range(element.line).add(element, spent);
     }
 
@@ -118,7 +122,11 @@ impl Tally {
 
     /// Ranges of lines, first and last, with what they take; those without any block are left out.
     pub fn lines(&self) -> impl Iterator<Item = (u32, u32, &Part)> {
-        let ranges = self.ranges.iter().enumerate().filter(|(_, part)| part.blocks > 0);
+        let ranges = self
+            .ranges
+            .iter()
+            .enumerate()
+            .filter(|(_, part)| part.blocks > 0);
         ranges.map(|(index, part)| {
             let first = index as u32 * self.lines_per_range + 1;
             (first, first + (self.lines_per_range - 1), part)
@@ -138,7 +146,8 @@ impl Tally {
             self.ranges = halves.collect();
         }
         let index = index(self.lines_per_range);
-        self.ranges.resize(self.ranges.len().max(index + 1), Part::default());
+        self.ranges
+            .resize(self.ranges.len().max(index + 1), Part::default());
         &mut self.ranges[index]
     }
 }
@@ -151,8 +160,18 @@ mod tests {
     fn ranges_of_lines_stay_few_and_lose_nothing() {
         let mut tally = Tally::default();
         for line in [1, 2, 31, 33, 500, 70_001, 4_000_000_000] {
-            let element = Element { line, ..Element::line(1.0, 0.0, 10.0) };
-            tally.add(&element, &Spent { time_s: f64::from(line), reached_mm_per_s: 10.0, case: None });
+            let element = Element {
+                line,
+                ..Element::line(1.0, 0.0, 10.0)
+            };
+            tally.add(
+                &element,
+                &Spent {
+                    time_s: f64::from(line),
+                    reached_mm_per_s: 10.0,
+                    case: None,
+                },
+            );
         }
         let total: f64 = tally.lines().map(|(_, _, part)| part.time_s).sum();
         assert_eq!(total, tally.all.time_s);

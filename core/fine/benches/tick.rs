@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits,
-    PluginError, Segment, SegmentFlags, Setpoint,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback,
+    JointState, Limits, PluginError, Segment, SegmentFlags, Setpoint,
 };
 
 const TICKS: usize = 1000;
@@ -30,9 +30,17 @@ impl Driver for Echo {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::default())
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
-        let enabled = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+        let enabled = if setpoint.enable == 0 {
+            JointState::Disabled
+        } else {
+            JointState::Enabled
+        };
         feedback.state = [enabled; 8];
         Ok(())
     }
@@ -57,7 +65,10 @@ impl Bench {
     }
 
     fn of_order(order: u32, duration_s: f64, turn_rad: f64) -> Self {
-        let (mut rough, end, host) = bridge(Sizes { segments: 2048, samples: 64 });
+        let (mut rough, end, host) = bridge(Sizes {
+            segments: 2048,
+            samples: 64,
+        });
         let mut at = AxisVector::ZERO;
         for number in 0..((TICKS + 16) as f64 * 1e-3 / duration_s).ceil() as u32 {
             let queued = segment(&mut at, f64::from(number), duration_s, turn_rad);
@@ -65,7 +76,11 @@ impl Bench {
         }
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
-        let mut this = Self { fine: FineLoop::new(&config(order), end, Box::new(Echo), None), host, _rough: rough };
+        let mut this = Self {
+            fine: FineLoop::new(&config(order), end, Box::new(Echo), None),
+            host,
+            _rough: rough,
+        };
         this.fine.reset();
         while this.fine.counters().samples == 0 {
             this.run(1);
@@ -108,7 +123,10 @@ fn segment(at: &mut AxisVector, number: f64, duration_s: f64, turn_rad: f64) -> 
         segment.coefficients[axis][1] = FEED_MM_PER_S * direction[axis];
     }
     *at += direction * (FEED_MM_PER_S * duration_s);
-    Queued::Segment { start_s: number * duration_s, segment }
+    Queued::Segment {
+        start_s: number * duration_s,
+        segment,
+    }
 }
 
 fn config(order: u32) -> FineConfig {
@@ -125,13 +143,20 @@ fn config(order: u32) -> FineConfig {
         // The queue starts at speed: the guard is to look at it, not to stop it.
         speed_difference_mm_per_s: [1000.0; 8],
         order,
-        guard: if order == 3 { GuardMode::Count } else { GuardMode::Stop },
+        guard: if order == 3 {
+            GuardMode::Count
+        } else {
+            GuardMode::Stop
+        },
         ..FineConfig::new(1e-3, Limits::new(&[axis; 3]).unwrap())
     }
 }
 
 fn bench(bencher: divan::Bencher, state: MachineState, make: impl Fn() -> Bench) {
-    bencher.counter(ItemsCount::new(TICKS)).with_inputs(make).bench_local_refs(|bench| bench.measure(state));
+    bencher
+        .counter(ItemsCount::new(TICKS))
+        .with_inputs(make)
+        .bench_local_refs(|bench| bench.measure(state));
 }
 
 /// Segments of a rough period each, as long lines give them.
@@ -159,7 +184,9 @@ fn hold(bencher: divan::Bencher) {
 /// Segments of a fine period each on a straight line with a jerk limit.
 #[divan::bench]
 fn jerk_limited(bencher: divan::Bencher) {
-    bench(bencher, MachineState::Running, || Bench::of_order(3, 1e-3, 0.0));
+    bench(bencher, MachineState::Running, || {
+        Bench::of_order(3, 1e-3, 0.0)
+    });
 }
 
 /// The same, at half the feed.

@@ -41,7 +41,10 @@ pub struct MissedLimits {
 impl Default for MissedLimits {
     /// Two in a row, and 1 % of a second.
     fn default() -> Self {
-        Self { in_a_row: 2, share: 0.01 }
+        Self {
+            in_a_row: 2,
+            share: 0.01,
+        }
     }
 }
 

@@ -31,8 +31,15 @@ pub struct Pace {
 impl Pace {
     /// How far it is to `other`, mm: on the path, or straight on, whichever is more.
     pub fn way_to_mm(&self, other: &Self) -> f64 {
-        let squares = self.linear_mm.iter().zip(&other.linear_mm).map(|(a, b)| (b - a) * (b - a));
-        squares.sum::<f64>().sqrt().max(other.path_mm - self.path_mm)
+        let squares = self
+            .linear_mm
+            .iter()
+            .zip(&other.linear_mm)
+            .map(|(a, b)| (b - a) * (b - a));
+        squares
+            .sum::<f64>()
+            .sqrt()
+            .max(other.path_mm - self.path_mm)
     }
 }
 
@@ -52,7 +59,11 @@ impl Motion {
     fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
         for axis in 0..axes {
             let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], local_s);
-            (self.velocity[axis], self.acceleration[axis], self.jerk[axis]) = (velocity, acceleration, jerk);
+            (
+                self.velocity[axis],
+                self.acceleration[axis],
+                self.jerk[axis],
+            ) = (velocity, acceleration, jerk);
         }
     }
 }
@@ -72,13 +83,28 @@ pub struct Place<'a> {
 
 impl<'a> Course<'a> {
     /// `segment` moves, `queued` follows; `axes` axes are looked at, those of the mask `linear` are linear ones.
-    pub fn new(segment: &'a Segment, queued: [&'a [Queued]; 2], (axes, linear): (usize, u32)) -> Self {
-        Self { segment, queued, axes, linear }
+    pub fn new(
+        segment: &'a Segment,
+        queued: [&'a [Queued]; 2],
+        (axes, linear): (usize, u32),
+    ) -> Self {
+        Self {
+            segment,
+            queued,
+            axes,
+            linear,
+        }
     }
 
     /// The place at local time `local_s` of the segment that moves.
     pub fn begin(&self, local_s: f64) -> Place<'a> {
-        Place { course: *self, segment: Some(self.segment), passed: 0, local_s, known: true }
+        Place {
+            course: *self,
+            segment: Some(self.segment),
+            passed: 0,
+            local_s,
+            known: true,
+        }
     }
 
     fn entry(&self, n: usize) -> Option<&'a Queued> {
@@ -112,7 +138,11 @@ impl<'a> Place<'a> {
         for axis in (0..self.course.axes).filter(|axis| self.course.linear >> axis & 1 == 1) {
             squares += motion.velocity[axis] * motion.velocity[axis];
         }
-        Some(if squares > speed * speed { f64::sqrt(squares) } else { speed })
+        Some(if squares > speed * speed {
+            f64::sqrt(squares)
+        } else {
+            speed
+        })
     }
 
     /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
@@ -122,13 +152,22 @@ impl<'a> Place<'a> {
     pub fn pace(&self) -> Option<Pace> {
         let segment = self.segment?;
         let [speed, rise, _] = derivatives(&segment.path, self.local_s);
-        let mut pace = Pace { path_mm: segment.path_mm(self.local_s), linear_mm: [0.0; MAX_AXES], speed, rise };
+        let mut pace = Pace {
+            path_mm: segment.path_mm(self.local_s),
+            linear_mm: [0.0; MAX_AXES],
+            speed,
+            rise,
+        };
         let (mut squares, mut product) = (0.0, 0.0);
         let position = segment.position(self.local_s);
         for axis in (0..self.course.axes).filter(|axis| self.course.linear >> axis & 1 == 1) {
-            let [velocity, acceleration, _] = derivatives(&segment.coefficients[axis], self.local_s);
+            let [velocity, acceleration, _] =
+                derivatives(&segment.coefficients[axis], self.local_s);
             pace.linear_mm[axis] = position[axis];
-            (squares, product) = (squares + velocity * velocity, product + velocity * acceleration);
+            (squares, product) = (
+                squares + velocity * velocity,
+                product + velocity * acceleration,
+            );
         }
         if squares > speed * speed {
             (pace.speed, pace.rise) = (squares.sqrt(), product / squares.sqrt());
@@ -138,7 +177,9 @@ impl<'a> Place<'a> {
 
     /// Programmed feed here, mm/s; infinite in a rapid, and where nothing moves.
     pub fn feed_mm_per_s(&self) -> f64 {
-        self.segment.filter(|it| !it.flags.contains(SegmentFlags::RAPID)).map_or(f64::INFINITY, |it| it.feed_mm_per_s)
+        self.segment
+            .filter(|it| !it.flags.contains(SegmentFlags::RAPID))
+            .map_or(f64::INFINITY, |it| it.feed_mm_per_s)
     }
 
     /// Moves on by `time_s`, over the ends of segments.
@@ -157,12 +198,16 @@ impl<'a> Place<'a> {
 
     /// How much of `most_s` lies in the segment here, s; all of it where nothing moves.
     pub fn stretch_s(&self, most_s: f64) -> f64 {
-        self.segment.map_or(most_s, |segment| (segment.duration_s - self.local_s).clamp(0.0, most_s))
+        self.segment.map_or(most_s, |segment| {
+            (segment.duration_s - self.local_s).clamp(0.0, most_s)
+        })
     }
 
     /// Moves on to the end of the segment, and by no more than `most_s`; gives what is left of it.
     pub fn advance(&mut self, most_s: f64) -> f64 {
-        let Some(segment) = self.segment else { return 0.0 };
+        let Some(segment) = self.segment else {
+            return 0.0;
+        };
         let left_s = segment.duration_s - self.local_s;
         self.local_s += left_s.min(most_s);
         (most_s - left_s).max(0.0)
@@ -175,7 +220,9 @@ impl<'a> Place<'a> {
         self.segment = None;
         while !rests && self.segment.is_none() {
             match self.course.entry(self.passed) {
-                Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => rests = ends(segment),
+                Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => {
+                    rests = ends(segment)
+                }
                 Some(Queued::Segment { segment, .. }) => self.segment = Some(segment),
                 Some(Queued::Event(_)) => {}
                 None => (rests, self.known) = (true, false),

@@ -110,8 +110,11 @@ impl Cursor {
     /// Rests at `position` from here on, in the next epoch: older entries no longer count.
     pub fn part(&mut self, position: &AxisVector) {
         let mut rest = Segment::rest(position, 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) =
-            (self.segment.block, self.segment.line, self.segment.feed_mm_per_s);
+        (rest.block, rest.line, rest.feed_mm_per_s) = (
+            self.segment.block,
+            self.segment.line,
+            self.segment.feed_mm_per_s,
+        );
         rest.path[0] = self.path_mm;
         (self.start_s, self.local_s, self.owed_s) = (self.program_time_s(), 0.0, 0.0);
         self.segment = rest;
@@ -123,13 +126,19 @@ impl Cursor {
     /// Behind every move: where the place is on the path.
     fn look_at_path(&mut self) {
         self.path_mm = self.segment.path_mm(self.local_s);
-        self.path_speed_mm_per_s = if self.resting { 0.0 } else { self.segment.path_speed_mm_per_s(self.local_s) };
+        self.path_speed_mm_per_s = if self.resting {
+            0.0
+        } else {
+            self.segment.path_speed_mm_per_s(self.local_s)
+        };
     }
 
     /// Drops entries of older epochs from the front of the queue, a bounded number; whether one that counts is in front.
     pub fn drop_older(&mut self) -> bool {
         for _ in 0..DROPS {
-            let Ok(queued) = self.entries.peek() else { return false };
+            let Ok(queued) = self.entries.peek() else {
+                return false;
+            };
             let epoch = match queued {
                 Queued::Event(event) => event.epoch,
                 Queued::Segment { segment, .. } => segment.epoch,
@@ -165,13 +174,17 @@ impl Cursor {
             }
         }
         let waiting = self.entries.slots().min(Points::SEGMENTS);
-        let Ok(chunk) = self.entries.read_chunk(waiting) else { return };
+        let Ok(chunk) = self.entries.read_chunk(waiting) else {
+            return;
+        };
         let (first, second) = chunk.as_slices();
         for queued in first.iter().chain(second) {
             if left_s <= 0.0 || points.is_full() {
                 break;
             }
-            let Queued::Segment { segment, .. } = queued else { continue };
+            let Queued::Segment { segment, .. } = queued else {
+                continue;
+            };
             points.add(segment, 0.0, segment.duration_s.min(left_s));
             left_s -= segment.duration_s;
             if ends(segment) {
@@ -198,13 +211,24 @@ impl Cursor {
         }
         let waiting = self.entries.slots().min(Points::SEGMENTS);
         let mut last = Ahead::at(&self.segment, self.segment.duration_s);
-        let mut most = if self.resting { 0.0 } else { self.segment.feed_mm_per_s };
-        let Ok(chunk) = self.entries.read_chunk(waiting) else { return last };
+        let mut most = if self.resting {
+            0.0
+        } else {
+            self.segment.feed_mm_per_s
+        };
+        let Ok(chunk) = self.entries.read_chunk(waiting) else {
+            return last;
+        };
         let (first, second) = chunk.as_slices();
         for queued in first.iter().chain(second) {
-            let Queued::Segment { segment, .. } = queued else { continue };
+            let Queued::Segment { segment, .. } = queued else {
+                continue;
+            };
             most = segment.feed_mm_per_s.max(most);
-            last = Ahead { most_feed_mm_per_s: most, ..Ahead::at(segment, left_s.min(segment.duration_s)) };
+            last = Ahead {
+                most_feed_mm_per_s: most,
+                ..Ahead::at(segment, left_s.min(segment.duration_s))
+            };
             if left_s < segment.duration_s || ends(segment) {
                 return last;
             }
@@ -218,7 +242,11 @@ impl Cursor {
     pub fn advance(&mut self, delta_s: f64, meet: impl FnMut(&Queued) -> bool) -> Reached {
         if delta_s == 0.0 {
             self.recent.pass(None);
-            return if self.resting { Reached::Rest } else { Reached::Inside };
+            return if self.resting {
+                Reached::Rest
+            } else {
+                Reached::Inside
+            };
         }
         let reached = self.go(delta_s, meet);
         self.recent.pass(self.crossed.as_ref());
@@ -252,7 +280,11 @@ impl Cursor {
                 (left_s, self.owed_s) = (over_s.max(0.0), over_s.min(0.0));
             }
             if !self.next(&mut meet) {
-                return if self.resting { Reached::Rest } else { Reached::Wall };
+                return if self.resting {
+                    Reached::Rest
+                } else {
+                    Reached::Wall
+                };
             }
         }
     }
@@ -262,7 +294,9 @@ impl Cursor {
         let (mut found, mut stay) = (false, false);
         while !found && !stay {
             // Looked at in its slot: a segment is large, and is copied once.
-            let Ok(queued) = self.entries.peek() else { break };
+            let Ok(queued) = self.entries.peek() else {
+                break;
+            };
             match queued {
                 Queued::Event(it) if it.epoch >= self.epoch => stay = meet(queued) && self.resting,
                 Queued::Segment { start_s, segment } if segment.epoch >= self.epoch => {
@@ -272,7 +306,9 @@ impl Cursor {
                     self.epoch = segment.epoch;
                     (self.start_s, self.local_s) = (*start_s, 0.0);
                     if segment.flags.contains(SegmentFlags::STEPS) && !self.resting {
-                        self.crossed.get_or_insert_default().join(&Steps::between(&self.segment, segment));
+                        self.crossed
+                            .get_or_insert_default()
+                            .join(&Steps::between(&self.segment, segment));
                     }
                     self.segment.clone_from(segment);
                     self.resting = false;
@@ -342,7 +378,11 @@ mod tests {
             let piece_s = left_s.min(rough_s);
             left_s -= piece_s;
             let mut segment = Segment::rest(&AxisVector::ZERO, piece_s);
-            segment.flags = if left_s > 0.0 { SegmentFlags::DWELL } else { SegmentFlags::ENDS_AT_REST };
+            segment.flags = if left_s > 0.0 {
+                SegmentFlags::DWELL
+            } else {
+                SegmentFlags::ENDS_AT_REST
+            };
             input.push(Queued::Segment { start_s, segment }).unwrap();
             start_s += piece_s;
         }
@@ -363,7 +403,11 @@ mod tests {
         let mut points = Points::new(&[axis; MAX_AXES], 1);
         (1..=most).find(|_| {
             cursor.scan(rate * period_s, &mut points);
-            let covered_s = if cursor.is_resting() { f64::MAX } else { points.covered_s };
+            let covered_s = if cursor.is_resting() {
+                f64::MAX
+            } else {
+                points.covered_s
+            };
             cursor.advance((rate * period_s).min(covered_s), |_| false);
             cursor.is_resting() && cursor.is_last()
         })
@@ -371,15 +415,32 @@ mod tests {
 
     #[test]
     fn a_dwell_takes_its_periods_whatever_the_pair_of_periods_and_the_rate_are() {
-        for fine_ms in [0.125, 0.2, 0.25, 0.3, 0.37, 0.4, 0.5, 0.625, 0.75, 1.0, 1.25, 1.3, 2.0] {
+        for fine_ms in [
+            0.125, 0.2, 0.25, 0.3, 0.37, 0.4, 0.5, 0.625, 0.75, 1.0, 1.25, 1.3, 2.0,
+        ] {
             for ratio in 1..=21 {
                 let (period_s, rough_s) = (fine_ms / 1000.0, fine_ms * f64::from(ratio) / 1000.0);
-                for (dwell_s, rate) in [(0.05, 1.0), (0.1, 1.0), (0.05, 0.3), (0.013, 0.01), (40.0 * period_s, 1.0)] {
+                for (dwell_s, rate) in [
+                    (0.05, 1.0),
+                    (0.1, 1.0),
+                    (0.05, 0.3),
+                    (0.013, 0.01),
+                    (40.0 * period_s, 1.0),
+                ] {
                     let exact = dwell_s / (rate * period_s);
-                    let took = periods(&mut dwell(dwell_s, rough_s, 0.3), period_s, rate, 2 * exact as u64 + 10);
+                    let took = periods(
+                        &mut dwell(dwell_s, rough_s, 0.3),
+                        period_s,
+                        rate,
+                        2 * exact as u64 + 10,
+                    );
                     // What the pieces' own rounding leaves is no period of its own.
                     let expected = (exact - 1e-6).ceil() as u64;
-                    assert_eq!(took, Some(expected), "{fine_ms} ms, {ratio} of them, {dwell_s} s at {rate}");
+                    assert_eq!(
+                        took,
+                        Some(expected),
+                        "{fine_ms} ms, {ratio} of them, {dwell_s} s at {rate}"
+                    );
                 }
             }
         }
@@ -391,10 +452,20 @@ mod tests {
         let (mut input, output) = RingBuffer::new(8);
         let mut segment = Segment::rest(&AxisVector::ZERO, 0.01);
         segment.flags = SegmentFlags::DWELL;
-        input.push(Queued::Segment { start_s: 0.0, segment }).unwrap();
+        input
+            .push(Queued::Segment {
+                start_s: 0.0,
+                segment,
+            })
+            .unwrap();
         let mut cursor = Cursor::new(output, &AxisVector::ZERO);
         assert_eq!(cursor.advance(0.02, |_| false), Reached::Wall);
-        input.push(Queued::Segment { start_s: 0.01, segment: Segment::rest(&AxisVector::ZERO, 0.0) }).unwrap();
+        input
+            .push(Queued::Segment {
+                start_s: 0.01,
+                segment: Segment::rest(&AxisVector::ZERO, 0.0),
+            })
+            .unwrap();
         assert_eq!(periods(&mut cursor, 0.001, 1.0, 3), Some(1));
     }
 
@@ -406,6 +477,10 @@ mod tests {
         for _ in 0..1_000_000 {
             cursor.advance(1e-11, |_| false);
         }
-        assert!((cursor.program_time_s() - 9e5 - 1e-5).abs() < 1e-9, "{}", cursor.program_time_s() - 9e5);
+        assert!(
+            (cursor.program_time_s() - 9e5 - 1e-5).abs() < 1e-9,
+            "{}",
+            cursor.program_time_s() - 9e5
+        );
     }
 }

@@ -28,13 +28,29 @@ impl EdgeWatch {
     /// nearer to the edge than the feedback, and shows an edge that is over before the period is; a joint that it did not catch
     /// is found in `measured`, where the joints were in the periods up to this one, a period of `period_s` after the other. What
     /// is old is no edge. Fine loop.
-    pub fn find(&self, stop_on: &StopOn, feedback: &Feedback, measured: &History, period_s: f64) -> Option<AxisVector> {
-        let fits = |latch: &Latch| latch.input == stop_on.input && latch.edge == stop_on.edge as u32;
-        let latch = feedback.latches.iter().find(|latch| fits(latch) && !self.latches.contains(latch));
+    pub fn find(
+        &self,
+        stop_on: &StopOn,
+        feedback: &Feedback,
+        measured: &History,
+        period_s: f64,
+    ) -> Option<AxisVector> {
+        let fits =
+            |latch: &Latch| latch.input == stop_on.input && latch.edge == stop_on.edge as u32;
+        let latch = feedback
+            .latches
+            .iter()
+            .find(|latch| fits(latch) && !self.latches.contains(latch));
         if let Some(latch) = latch {
             let then = measured.before(latch.before_s / period_s);
             let caught = |joint: usize| latch.joints >> joint & 1 == 1;
-            return Some(AxisVector(std::array::from_fn(|i| if caught(i) { latch.position[i] } else { then[i] })));
+            return Some(AxisVector(std::array::from_fn(|i| {
+                if caught(i) {
+                    latch.position[i]
+                } else {
+                    then[i]
+                }
+            })));
         }
         let is_new = feedback.input_age_periods[stop_on.input.min(63) as usize] == 0;
         (is_new && has_level(stop_on, feedback.inputs)).then_some(feedback.position)
@@ -50,7 +66,10 @@ impl EdgeWatch {
 pub fn arm_for(stop_on: &StopOn) -> Arm {
     match stop_on.edge {
         Edge::None => Arm::default(),
-        edge => Arm { input: stop_on.input, edge: edge as u32 },
+        edge => Arm {
+            input: stop_on.input,
+            edge: edge as u32,
+        },
     }
 }
 
@@ -69,12 +88,23 @@ mod tests {
 
     fn probing(edge: Edge) -> Segment {
         let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
-        (segment.block, segment.stop_on) = (7, StopOn { input: 3, edge, miss_is_fault: 0 });
+        (segment.block, segment.stop_on) = (
+            7,
+            StopOn {
+                input: 3,
+                edge,
+                miss_is_fault: 0,
+            },
+        );
         segment
     }
 
     fn feedback(inputs: u64) -> Feedback {
-        Feedback { inputs, position: AxisVector([5.0; 8]), ..Feedback::default() }
+        Feedback {
+            inputs,
+            position: AxisVector([5.0; 8]),
+            ..Feedback::default()
+        }
     }
 
     /// What is found where the joints have gone 1 mm a period up to 5 mm.
@@ -89,7 +119,13 @@ mod tests {
     #[test]
     fn a_joint_that_was_not_caught_is_found_between_its_samples() {
         let mut at_edge = feedback(0);
-        at_edge.latches[0] = Latch { input: 3, edge: 1, joints: 2, before_s: 0.00125, position: AxisVector([9.0; 8]) };
+        at_edge.latches[0] = Latch {
+            input: 3,
+            edge: 1,
+            joints: 2,
+            before_s: 0.00125,
+            position: AxisVector([9.0; 8]),
+        };
         let found = find(&EdgeWatch::default(), &probing(Edge::Rising), &at_edge).unwrap();
         assert_eq!((found[0], found[1], found[2]), (3.75, 9.0, 3.75));
     }
@@ -98,7 +134,10 @@ mod tests {
     fn an_old_input_is_no_edge() {
         let mut old = feedback(8);
         old.input_age_periods[3] = 1;
-        assert_eq!(find(&EdgeWatch::default(), &probing(Edge::Rising), &old), None);
+        assert_eq!(
+            find(&EdgeWatch::default(), &probing(Edge::Rising), &old),
+            None
+        );
         assert!(find(&EdgeWatch::default(), &probing(Edge::Rising), &feedback(8)).is_some());
     }
 
@@ -107,11 +146,17 @@ mod tests {
         for (edge, there, away) in [(Edge::Rising, 8, 0), (Edge::Falling, 0, 8)] {
             let mut watch = EdgeWatch::default();
             assert!(watch.begin(&probing(edge), &feedback(there)));
-            assert!(!watch.begin(&probing(edge), &feedback(there)), "it moves already");
+            assert!(
+                !watch.begin(&probing(edge), &feedback(there)),
+                "it moves already"
+            );
             watch.end();
             assert!(!watch.begin(&probing(edge), &feedback(away)));
             assert_eq!(find(&watch, &probing(edge), &feedback(away)), None);
-            assert_eq!(find(&watch, &probing(edge), &feedback(there)), Some(AxisVector([5.0; 8])));
+            assert_eq!(
+                find(&watch, &probing(edge), &feedback(there)),
+                Some(AxisVector([5.0; 8]))
+            );
         }
         assert!(!EdgeWatch::default().begin(&probing(Edge::None), &feedback(u64::MAX)));
     }
@@ -121,14 +166,35 @@ mod tests {
         let segment = probing(Edge::Rising);
         let with = |input, edge, at: f64| {
             let mut feedback = feedback(0);
-            feedback.latches[2] = Latch { input, edge, joints: 255, position: AxisVector([at; 8]), ..Latch::default() };
+            feedback.latches[2] = Latch {
+                input,
+                edge,
+                joints: 255,
+                position: AxisVector([at; 8]),
+                ..Latch::default()
+            };
             feedback
         };
         let mut watch = EdgeWatch::default();
         watch.begin(&segment, &with(3, 1, 1.0));
-        assert_eq!(find(&watch, &segment, &with(3, 1, 1.0)), None, "of an older edge");
-        assert_eq!(find(&watch, &segment, &with(3, 2, 4.0)), None, "of the other edge");
-        assert_eq!(find(&watch, &segment, &with(2, 1, 4.0)), None, "of another input");
-        assert_eq!(find(&watch, &segment, &with(3, 1, 4.0)), Some(AxisVector([4.0; 8])));
+        assert_eq!(
+            find(&watch, &segment, &with(3, 1, 1.0)),
+            None,
+            "of an older edge"
+        );
+        assert_eq!(
+            find(&watch, &segment, &with(3, 2, 4.0)),
+            None,
+            "of the other edge"
+        );
+        assert_eq!(
+            find(&watch, &segment, &with(2, 1, 4.0)),
+            None,
+            "of another input"
+        );
+        assert_eq!(
+            find(&watch, &segment, &with(3, 1, 4.0)),
+            Some(AxisVector([4.0; 8]))
+        );
     }
 }

@@ -165,7 +165,11 @@ impl Governor {
     /// The highest rate at which the plan itself keeps the limits: 1 unless the planner is defective.
     pub fn plan_limit(points: &Points) -> f64 {
         let excess = points.speed_ratio.max(points.acceleration_ratio.sqrt());
-        if excess <= 1.0 + TOLERANCE { 1.0 } else { 1.0 / excess }
+        if excess <= 1.0 + TOLERANCE {
+            1.0
+        } else {
+            1.0 / excess
+        }
     }
 
     /// The rate at the end of this period, as near to `target` as the limits let it come.
@@ -205,13 +209,20 @@ impl Governor {
 ///
 /// With σ going from σ₀ to σ₀ + d·t the axis accelerates by `σ²·q″ + d·t/T·q′`: at the start of the time linear in t, at its
 /// end quadratic. Where it is within the limit at both ends, it is so in between.
-fn reach(sigma: f64, (velocity_per_s, acceleration): (f64, f64), limit: f64, direction: f64) -> f64 {
+fn reach(
+    sigma: f64,
+    (velocity_per_s, acceleration): (f64, f64),
+    limit: f64,
+    direction: f64,
+) -> f64 {
     let planned = sigma * sigma * acceleration;
     let most = (MARGIN * limit).max(planned.abs());
     let turned = direction * velocity_per_s;
     let slope = turned + 2.0 * direction * sigma * acceleration;
-    let up = crossing(most - planned, turned, 0.0).min(crossing(most - planned, slope, acceleration));
-    let down = crossing(most + planned, -turned, 0.0).min(crossing(most + planned, -slope, -acceleration));
+    let up =
+        crossing(most - planned, turned, 0.0).min(crossing(most - planned, slope, acceleration));
+    let down =
+        crossing(most + planned, -turned, 0.0).min(crossing(most + planned, -slope, -acceleration));
     up.min(down)
 }
 
@@ -256,7 +267,10 @@ mod tests {
             points.add(&segment, 0.0, 0.001);
             // 1000 mm/s² take 1 mm/s of 50 in a period.
             let sigma = Governor::new(&limits, 3, 0.001).choose(0.0, &points);
-            assert!((sigma - (1.0 - MARGIN / 50.0)).abs() < 1e-9, "axis {moving}: {sigma}");
+            assert!(
+                (sigma - (1.0 - MARGIN / 50.0)).abs() < 1e-9,
+                "axis {moving}: {sigma}"
+            );
         }
     }
 

@@ -54,8 +54,11 @@ struct Behind {
 }
 
 impl Behind {
-    const REST: Self =
-        Self { velocity: AxisVector::ZERO, acceleration: AxisVector::ZERO, buckets: [[0.0; MAX_AXES]; 2] };
+    const REST: Self = Self {
+        velocity: AxisVector::ZERO,
+        acceleration: AxisVector::ZERO,
+        buckets: [[0.0; MAX_AXES]; 2],
+    };
 }
 
 /// What was found of a sample.
@@ -76,11 +79,19 @@ impl Guard {
                 min_mm: limits.min_mm,
                 max_mm: limits.max_mm,
                 leak_mm_per_s: limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * config.period_s,
-                fastest_mm_per_s: limits.feed_mm_per_s.max(limits.rapid_mm_per_s) * (1.0 + TOLERANCE),
+                fastest_mm_per_s: limits.feed_mm_per_s.max(limits.rapid_mm_per_s)
+                    * (1.0 + TOLERANCE),
                 allowed_mm_per_s: config.speed_difference_mm_per_s[axis] * (1.0 + TOLERANCE),
             }
         });
-        Self { config: *config, lanes, position: config.position, behind: [Behind::REST; 2], sent: 0, relaxed: 0 }
+        Self {
+            config: *config,
+            lanes,
+            position: config.position,
+            behind: [Behind::REST; 2],
+            sent: 0,
+            relaxed: 0,
+        }
     }
 
     /// The last position sent.
@@ -110,12 +121,18 @@ impl Guard {
 
     /// Stands still at `position` from here on, wherever that is.
     pub fn place(&mut self, position: &AxisVector) {
-        *self = Self::new(&FineConfig { position: *position, ..self.config });
+        *self = Self::new(&FineConfig {
+            position: *position,
+            ..self.config
+        });
     }
 
     /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
     pub fn check(&mut self, next: &AxisVector, unhomed: u32) -> Checked {
-        let mut checked = Checked { relaxed: false, breach: None };
+        let mut checked = Checked {
+            relaxed: false,
+            breach: None,
+        };
         for axis in 0..self.config.lane_count() {
             let travels = unhomed >> axis & 1 == 0;
             let breach = self.check_axis(axis, next[axis], travels, &mut checked.relaxed);
@@ -134,10 +151,20 @@ impl Guard {
     }
 
     #[inline]
-    fn check_axis(&mut self, axis: usize, next: f64, travels: bool, relaxed: &mut bool) -> Option<FaultKind> {
+    fn check_axis(
+        &mut self,
+        axis: usize,
+        next: f64,
+        travels: bool,
+        relaxed: &mut bool,
+    ) -> Option<FaultKind> {
         let (lane, period_s, at) = (&self.lanes[axis], self.config.period_s, self.position[axis]);
         let [first, second] = &mut self.behind;
-        let (last, now) = if self.sent == 0 { (first, second) } else { (second, first) };
+        let (last, now) = if self.sent == 0 {
+            (first, second)
+        } else {
+            (second, first)
+        };
         // Each velocity is a difference of two positions that are known to half a unit in the last place.
         let rounding = rounding(next, period_s);
         let velocity = (next - at) / period_s;
@@ -157,43 +184,95 @@ impl Guard {
         {
             return Some(breach);
         }
-        if self.config.order >= 3 { self.check_jerk(axis, change / period_s, rounding, relaxed) } else { None }
+        if self.config.order >= 3 {
+            self.check_jerk(axis, change / period_s, rounding, relaxed)
+        } else {
+            None
+        }
     }
     /// The limit that `next` breaks, where it does.
     #[cold]
     #[inline(never)]
-    fn breach_of(&self, axis: usize, next: f64, travels: bool, velocity: f64, change: f64) -> Option<FaultKind> {
-        let (limits, lane, period_s) = (&self.config.limits.axes[axis], &self.lanes[axis], self.config.period_s);
+    fn breach_of(
+        &self,
+        axis: usize,
+        next: f64,
+        travels: bool,
+        velocity: f64,
+        change: f64,
+    ) -> Option<FaultKind> {
+        let (limits, lane, period_s) = (
+            &self.config.limits.axes[axis],
+            &self.lanes[axis],
+            self.config.period_s,
+        );
         let rounding = rounding(next, period_s);
-        let breach = |breach, value, limit| Some(FaultKind::Guard { breach, axis, value, limit });
+        let breach = |breach, value, limit| {
+            Some(FaultKind::Guard {
+                breach,
+                axis,
+                value,
+                limit,
+            })
+        };
         if !next.is_finite() {
             return breach(Breach::NotFinite, next, 0.0);
         }
         // Who stands outside of the travel may go inward only.
-        let (lowest, highest) = (lane.min_mm.min(self.position[axis]), lane.max_mm.max(self.position[axis]));
+        let (lowest, highest) = (
+            lane.min_mm.min(self.position[axis]),
+            lane.max_mm.max(self.position[axis]),
+        );
         let forgiven = FITTED_MM + rounding;
         if travels && (next < lowest - forgiven || next > highest + forgiven) {
-            let nearest = if next < lowest { lane.min_mm } else { lane.max_mm };
+            let nearest = if next < lowest {
+                lane.min_mm
+            } else {
+                lane.max_mm
+            };
             return breach(Breach::Position, next, nearest);
         }
         if velocity.abs() > lane.fastest_mm_per_s + rounding {
-            return breach(Breach::Velocity, velocity, limits.feed_mm_per_s.max(limits.rapid_mm_per_s));
+            return breach(
+                Breach::Velocity,
+                velocity,
+                limits.feed_mm_per_s.max(limits.rapid_mm_per_s),
+            );
         }
         let buckets = &self.behind[1 - self.sent].buckets;
         if larger(buckets[0][axis], buckets[1][axis]) > lane.allowed_mm_per_s + rounding {
-            return breach(Breach::Acceleration, change / period_s, limits.acceleration_mm_per_s2);
+            return breach(
+                Breach::Acceleration,
+                change / period_s,
+                limits.acceleration_mm_per_s2,
+            );
         }
         None
     }
 
     /// Jerk, where the planner keeps it.
-    fn check_jerk(&mut self, axis: usize, acceleration: f64, rounding: f64, relaxed: &mut bool) -> Option<FaultKind> {
-        let (limit, period_s) = (self.config.limits.axes[axis].jerk_mm_per_s3, self.config.period_s);
+    fn check_jerk(
+        &mut self,
+        axis: usize,
+        acceleration: f64,
+        rounding: f64,
+        relaxed: &mut bool,
+    ) -> Option<FaultKind> {
+        let (limit, period_s) = (
+            self.config.limits.axes[axis].jerk_mm_per_s3,
+            self.config.period_s,
+        );
         self.behind[1 - self.sent].acceleration[axis] = acceleration;
         let value = (acceleration - self.behind[self.sent].acceleration[axis]) / period_s;
-        let beyond = value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
+        let beyond =
+            value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
         *relaxed |= beyond && self.relaxed > 0;
-        (beyond && self.relaxed == 0).then_some(FaultKind::Guard { breach: Breach::Jerk, axis, value, limit })
+        (beyond && self.relaxed == 0).then_some(FaultKind::Guard {
+            breach: Breach::Jerk,
+            axis,
+            value,
+            limit,
+        })
     }
 }
 
@@ -255,9 +334,15 @@ mod tests {
                 assert!(breach(axis, &[sign * 3.003]).is_some(), "axis {axis}");
                 // The difference is there once in a window, however it is spread.
                 assert_eq!(breach(axis, &[sign * 3.0, sign * 4.0, sign * 5.0]), None);
-                assert!(breach(axis, &[sign * 3.0, sign * 4.0, sign * 5.003]).is_some(), "axis {axis}");
+                assert!(
+                    breach(axis, &[sign * 3.0, sign * 4.0, sign * 5.003]).is_some(),
+                    "axis {axis}"
+                );
                 // It leaks away by what is not used.
-                assert_eq!(breach(axis, &[sign * 3.0, sign * 3.0, sign * 3.0, sign * 6.0]), None);
+                assert_eq!(
+                    breach(axis, &[sign * 3.0, sign * 3.0, sign * 3.0, sign * 6.0]),
+                    None
+                );
             }
         }
     }
@@ -267,17 +352,41 @@ mod tests {
         let mut up: Vec<f64> = (1..=100).map(f64::from).collect();
         assert_eq!(breach(1, &up), None);
         up.push(100.001);
-        assert!(matches!(breach(1, &up), Some(FaultKind::Guard { breach: Breach::Velocity, axis: 1, .. })));
+        assert!(matches!(
+            breach(1, &up),
+            Some(FaultKind::Guard {
+                breach: Breach::Velocity,
+                axis: 1,
+                ..
+            })
+        ));
         let mut guard = guard();
         guard.position[2] = 500.0;
         let mut at = guard.position;
-        assert!(guard.check(&at, 0).breach.is_none(), "the end of the travel is travel");
+        assert!(
+            guard.check(&at, 0).breach.is_none(),
+            "the end of the travel is travel"
+        );
         at[2] += FITTED_MM;
-        assert!(guard.check(&at, 0).breach.is_none(), "so closely an arc is fitted");
+        assert!(
+            guard.check(&at, 0).breach.is_none(),
+            "so closely an arc is fitted"
+        );
         at[2] += FITTED_MM;
         let found = guard.check(&at, 0).breach;
-        assert!(matches!(found, Some(FaultKind::Guard { breach: Breach::Position, axis: 2, limit: 500.0, .. })));
-        assert!(guard.check(&at, 0b100).breach.is_none(), "an axis that is not homed has no travel yet");
+        assert!(matches!(
+            found,
+            Some(FaultKind::Guard {
+                breach: Breach::Position,
+                axis: 2,
+                limit: 500.0,
+                ..
+            })
+        ));
+        assert!(
+            guard.check(&at, 0b100).breach.is_none(),
+            "an axis that is not homed has no travel yet"
+        );
     }
 
     #[test]
@@ -289,13 +398,24 @@ mod tests {
             let wild = at + AxisVector([f64::from(period - 20) * 0.01; MAX_AXES]);
             refused += u32::from(tempted.check(&wild, 0).breach.is_some());
             // Up to 8 mm/s and down again, the steps now and then as large as the buckets are full.
-            at[0] += 0.001 * f64::from(if period < 20 { period / 3 } else { (40 - period) / 2 });
+            at[0] += 0.001
+                * f64::from(if period < 20 {
+                    period / 3
+                } else {
+                    (40 - period) / 2
+                });
             let (expected, found) = (plain.check(&at, 0), tempted.check(&at, 0));
             assert_eq!(expected.breach, found.breach, "{period}");
             plain.sent(&at);
             tempted.sent(&at);
-            assert_eq!((plain.velocity(), plain.acceleration()), (tempted.velocity(), tempted.acceleration()));
-            assert_eq!(plain.behind[plain.sent].buckets, tempted.behind[tempted.sent].buckets);
+            assert_eq!(
+                (plain.velocity(), plain.acceleration()),
+                (tempted.velocity(), tempted.acceleration())
+            );
+            assert_eq!(
+                plain.behind[plain.sent].buckets,
+                tempted.behind[tempted.sent].buckets
+            );
         }
         assert!(refused > 30, "{refused}");
     }

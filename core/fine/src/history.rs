@@ -16,7 +16,10 @@ pub struct History {
 impl History {
     /// Always there. Any loop; does not allocate.
     pub fn new(position: &AxisVector) -> Self {
-        Self { kept: [*position; KEPT], next: 0 }
+        Self {
+            kept: [*position; KEPT],
+            next: 0,
+        }
     }
 
     /// Another period. Fine loop.
@@ -41,7 +44,11 @@ impl History {
 
     /// The place `periods` before the last one, between what was pushed; at most as long ago as is kept. Fine loop.
     pub fn before(&self, periods: f64) -> AxisVector {
-        let back = if periods.is_nan() { 0.0 } else { periods.clamp(0.0, f64::from(MAX_DELAY_PERIODS)) };
+        let back = if periods.is_nan() {
+            0.0
+        } else {
+            periods.clamp(0.0, f64::from(MAX_DELAY_PERIODS))
+        };
         let (newer, share) = (back as u32, back.fract());
         let (from, to) = (*self.at(newer), *self.at(newer + 1));
         from + (to - from) * share
@@ -63,7 +70,11 @@ mod tests {
         }
         assert_eq!(history.before(2.25)[0], 36.75);
         assert_eq!(history.before(1e9)[0], 39.0 - f64::from(MAX_DELAY_PERIODS));
-        assert_eq!(history.before(f64::NAN)[0], 39.0, "what is no number is no time ago");
+        assert_eq!(
+            history.before(f64::NAN)[0],
+            39.0,
+            "what is no number is no time ago"
+        );
         assert_eq!(History::new(&AxisVector([3.0; 8])).before(7.5)[0], 3.0);
     }
 }

@@ -15,7 +15,11 @@ pub fn to_rest(x: f64, rate: f64, gentle: f64, most: f64, period_s: f64) -> f64 
     let ahead = period_s * rate;
     let y = x + ahead;
     let far = (step * (step + 8.0 * y.abs())).sqrt();
-    let off = if y.abs() < step { ahead + y } else { ahead + y.signum() * (far - step) / 2.0 };
+    let off = if y.abs() < step {
+        ahead + y
+    } else {
+        ahead + y.signum() * (far - step) / 2.0
+    };
     (-off / (period_s * period_s)).clamp(-most, most)
 }
 
@@ -23,11 +27,19 @@ pub fn to_rest(x: f64, rate: f64, gentle: f64, most: f64, period_s: f64) -> f64 
 /// more already, and the change of that within `±jerk`.
 pub fn stop_s(rate: f64, change: f64, most: f64, jerk: f64) -> f64 {
     // Seen so that the rate is to be brought down after the change has come to nothing.
-    let down = if rate + change * change.abs() / (2.0 * jerk) < 0.0 { -1.0 } else { 1.0 };
+    let down = if rate + change * change.abs() / (2.0 * jerk) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     let (rate, change) = (down * rate, down * change);
     let peak = (jerk * rate + change * change / 2.0).max(0.0).sqrt();
     let held = peak.min(most.max(-change));
-    let left = if peak > held { (rate + change * change / (2.0 * jerk) - held * held / jerk) / held } else { 0.0 };
+    let left = if peak > held {
+        (rate + change * change / (2.0 * jerk) - held * held / jerk) / held
+    } else {
+        0.0
+    };
     (change + 2.0 * held) / jerk + left
 }
 
@@ -67,9 +79,14 @@ impl Along {
         let slope = end_mm_per_s - step / 2.0;
         let root = (slope * slope + 2.0 * step * way).sqrt();
         // In each case the form that does not cancel.
-        let periods = if slope > 0.0 { 2.0 * way / (slope + root) } else { (root - slope) / step };
+        let periods = if slope > 0.0 {
+            2.0 * way / (slope + root)
+        } else {
+            (root - slope) / step
+        };
         let periods = periods.floor().max(1.0);
-        let above = (way / periods - end_mm_per_s + step * (periods - 1.0) / 2.0).min(periods * step);
+        let above =
+            (way / periods - end_mm_per_s + step * (periods - 1.0) / 2.0).min(periods * step);
         end_mm_per_s + above.max(0.0)
     }
 
@@ -90,7 +107,9 @@ impl Along {
             // What is already under way is more than enough.
             return way_mm + drop.max(0.0) * v / braking.max(f64::MIN_POSITIVE);
         }
-        let peak = (j * drop + braking * braking / 2.0).sqrt().min(a.max(braking));
+        let peak = (j * drop + braking * braking / 2.0)
+            .sqrt()
+            .min(a.max(braking));
         let rise_s = (peak - braking) / j;
         let fall_s = peak / j;
         let held_s = ((drop - (peak * peak - braking * braking / 2.0) / j) / peak).max(0.0);
@@ -108,7 +127,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn along(speed_mm_per_s: f64, most_mm_per_s2: f64) -> Along {
-        Along { speed_mm_per_s, acceleration_mm_per_s2: 0.0, most_mm_per_s2, jerk_mm_per_s3: f64::INFINITY }
+        Along {
+            speed_mm_per_s,
+            acceleration_mm_per_s2: 0.0,
+            most_mm_per_s2,
+            jerk_mm_per_s3: f64::INFINITY,
+        }
     }
 
     proptest! {
@@ -148,6 +172,9 @@ mod tests {
     #[test]
     fn what_leaves_nothing_to_brake_with_asks_for_the_end_speed_and_what_does_not_move_for_none() {
         assert_eq!(along(5.0, 0.0).speed_towards(1.0, 2.0, 1e-3), 2.0);
-        assert_eq!(along(0.0, f64::INFINITY).speed_towards(1.0, 2.0, 1e-3), f64::INFINITY);
+        assert_eq!(
+            along(0.0, f64::INFINITY).speed_towards(1.0, 2.0, 1e-3),
+            f64::INFINITY
+        );
     }
 }

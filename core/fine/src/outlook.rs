@@ -73,7 +73,8 @@ impl Outlook {
     /// Forgets all points.
     pub fn clear(&mut self) {
         self.count = 0;
-        (self.path_jerk_mm_per_s3, self.rate_change_per_s2) = (f64::INFINITY, self.most_change_per_s2);
+        (self.path_jerk_mm_per_s3, self.rate_change_per_s2) =
+            (f64::INFINITY, self.most_change_per_s2);
         self.share = 0.97;
     }
 
@@ -89,7 +90,10 @@ impl Outlook {
 
     /// Adds both ends of a stretch of `segment` in the coming period.
     pub fn stretch(&mut self, segment: &Segment, from_s: f64, duration_s: f64, offset_s: f64) {
-        for (t, offset) in [(from_s, offset_s), (from_s + duration_s, offset_s + duration_s)] {
+        for (t, offset) in [
+            (from_s, offset_s),
+            (from_s + duration_s, offset_s + duration_s),
+        ] {
             self.point(segment, t, offset);
         }
     }
@@ -101,13 +105,22 @@ impl Outlook {
         let mut per_speed = f64::INFINITY;
         for axis in 0..self.axes {
             let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], t_s);
-            (point.velocity[axis], point.acceleration[axis], point.jerk[axis]) = (velocity, acceleration, jerk);
+            (
+                point.velocity[axis],
+                point.acceleration[axis],
+                point.jerk[axis],
+            ) = (velocity, acceleration, jerk);
             per_speed = per_speed.min(self.jerk[axis] / velocity.abs());
-            let steady = acceleration.abs() < STEADY * self.acceleration[axis] && jerk.abs() < STEADY * self.jerk[axis];
+            let steady = acceleration.abs() < STEADY * self.acceleration[axis]
+                && jerk.abs() < STEADY * self.jerk[axis];
             self.share = if steady { self.share } else { SHARE };
         }
         let [speed, ..] = derivatives(&segment.path, t_s);
-        point.path_jerk_mm_per_s3 = if speed > 0.0 { speed * per_speed } else { f64::INFINITY };
+        point.path_jerk_mm_per_s3 = if speed > 0.0 {
+            speed * per_speed
+        } else {
+            f64::INFINITY
+        };
         if speed > 0.0 {
             self.path_jerk_mm_per_s3 = self.path_jerk_mm_per_s3.min(speed * per_speed);
             self.rate_change_per_s2 = self.rate_change_per_s2.min(per_speed);
@@ -121,7 +134,9 @@ impl Outlook {
     pub fn path_jerk_to_rest(&self, sigma: f64, speed: f64, acceleration: f64) -> f64 {
         let mut least = f64::INFINITY;
         for point in self.iter() {
-            if least.is_finite() && point.offset_s > sigma * stop_s(speed, acceleration, f64::INFINITY, least) {
+            if least.is_finite()
+                && point.offset_s > sigma * stop_s(speed, acceleration, f64::INFINITY, least)
+            {
                 break;
             }
             least = least.min(point.path_jerk_mm_per_s3);

@@ -62,14 +62,17 @@ impl Outputs {
     pub fn apply(&mut self, event: &Event, waits: Waits) {
         let on = event.value != 0.0;
         match event.kind {
-            EventKind::Spindle | EventKind::Mist | EventKind::Flood | EventKind::DigitalOutput if self.dry_run => {}
+            EventKind::Spindle | EventKind::Mist | EventKind::Flood | EventKind::DigitalOutput
+                if self.dry_run => {}
             EventKind::Spindle => {
                 self.spindle_rad_per_s = event.value;
                 self.by = SwitchedBy::Program;
             }
             EventKind::Mist => self.switch_by(event, MIST),
             EventKind::Flood => self.switch_by(event, FLOOD),
-            EventKind::DigitalOutput => self.switch_by(event, event.index.clamp(0, 63).unsigned_abs()),
+            EventKind::DigitalOutput => {
+                self.switch_by(event, event.index.clamp(0, 63).unsigned_abs())
+            }
             EventKind::FeedOverride => self.override_permitted = on,
             EventKind::AdaptiveFeed => self.adaptive_permitted = on,
             EventKind::ProgramStop | EventKind::ToolChange => self.stop_requested |= waits.program,
@@ -81,7 +84,10 @@ impl Outputs {
             }
             // Where drives home axes, joints are axes.
             EventKind::HomeByDrive => {
-                self.hand_over = Some(((event.index.unsigned_abs() as usize).min(MAX_AXES - 1), event.value));
+                self.hand_over = Some((
+                    (event.index.unsigned_abs() as usize).min(MAX_AXES - 1),
+                    event.value,
+                ));
             }
             EventKind::Homed => self.unhomed &= !(1 << event.index.clamp(0, 31)),
             // The first two no drive has: programs for drives that move something are refused them.
@@ -117,7 +123,11 @@ impl Outputs {
     }
 
     fn switch(&mut self, output: u32, on: bool) {
-        self.bits = if on { self.bits | 1 << output } else { self.bits & !(1 << output) };
+        self.bits = if on {
+            self.bits | 1 << output
+        } else {
+            self.bits & !(1 << output)
+        };
     }
 }
 
@@ -127,23 +137,46 @@ mod tests {
 
     #[test]
     fn an_abort_leaves_user_outputs_and_nothing_else() {
-        let waits = Waits { program: true, optional: true };
+        let waits = Waits {
+            program: true,
+            optional: true,
+        };
         let mut outputs = Outputs::new(false, 0);
-        for (kind, index) in [(EventKind::Spindle, 0), (EventKind::Mist, 0), (EventKind::Flood, 0)] {
+        for (kind, index) in [
+            (EventKind::Spindle, 0),
+            (EventKind::Mist, 0),
+            (EventKind::Flood, 0),
+        ] {
             outputs.apply(&Event::new(kind, 1, 0, index, 30.0), waits);
         }
         outputs.apply(&Event::new(EventKind::DigitalOutput, 1, 0, 7, 1.0), waits);
         outputs.apply(&Event::new(EventKind::ProgramStop, 1, 0, 0, 0.0), waits);
         outputs.abort();
-        assert_eq!((outputs.bits, outputs.spindle_rad_per_s, outputs.stop_requested), (1 << 7, 0.0, false));
+        assert_eq!(
+            (
+                outputs.bits,
+                outputs.spindle_rad_per_s,
+                outputs.stop_requested
+            ),
+            (1 << 7, 0.0, false)
+        );
     }
 
     #[test]
     fn homing_corrects_an_axis_and_counts_down_to_none() {
         let mut outputs = Outputs::new(true, 0b101);
-        outputs.apply(&Event::new(EventKind::Correct, 0, 0, 2, -3.5), Waits::default());
-        assert_eq!(outputs.correction.map(|by| (by[0], by[2])), Some((0.0, -3.5)));
-        outputs.apply(&Event::new(EventKind::Homed, 0, 0, 2, 0.0), Waits::default());
+        outputs.apply(
+            &Event::new(EventKind::Correct, 0, 0, 2, -3.5),
+            Waits::default(),
+        );
+        assert_eq!(
+            outputs.correction.map(|by| (by[0], by[2])),
+            Some((0.0, -3.5))
+        );
+        outputs.apply(
+            &Event::new(EventKind::Homed, 0, 0, 2, 0.0),
+            Waits::default(),
+        );
         assert_eq!(outputs.unhomed, 0b001);
         outputs.abort();
         assert_eq!((outputs.correction, outputs.unhomed), (None, 0b001));
@@ -152,26 +185,65 @@ mod tests {
     #[test]
     fn a_dry_run_switches_nothing() {
         let mut outputs = Outputs::new(true, 0);
-        for kind in [EventKind::Spindle, EventKind::Mist, EventKind::Flood, EventKind::DigitalOutput] {
+        for kind in [
+            EventKind::Spindle,
+            EventKind::Mist,
+            EventKind::Flood,
+            EventKind::DigitalOutput,
+        ] {
             outputs.apply(&Event::new(kind, 1, 0, 7, 30.0), Waits::default());
         }
-        outputs.apply(&Event::new(EventKind::FeedOverride, 1, 0, 0, 0.0), Waits::default());
-        assert_eq!((outputs.bits, outputs.spindle_rad_per_s, outputs.override_permitted), (0, 0.0, false));
+        outputs.apply(
+            &Event::new(EventKind::FeedOverride, 1, 0, 0, 0.0),
+            Waits::default(),
+        );
+        assert_eq!(
+            (
+                outputs.bits,
+                outputs.spindle_rad_per_s,
+                outputs.override_permitted
+            ),
+            (0, 0.0, false)
+        );
     }
 
     #[test]
     fn each_stop_waits_where_it_is_to() {
         for (kind, waits) in [
-            (EventKind::ProgramStop, Waits { program: true, optional: false }),
-            (EventKind::ToolChange, Waits { program: true, optional: false }),
-            (EventKind::OptionalStop, Waits { program: false, optional: true }),
+            (
+                EventKind::ProgramStop,
+                Waits {
+                    program: true,
+                    optional: false,
+                },
+            ),
+            (
+                EventKind::ToolChange,
+                Waits {
+                    program: true,
+                    optional: false,
+                },
+            ),
+            (
+                EventKind::OptionalStop,
+                Waits {
+                    program: false,
+                    optional: true,
+                },
+            ),
         ] {
             let stops = |waits| {
                 let mut outputs = Outputs::new(false, 0);
                 outputs.apply(&Event::new(kind, 1, 0, 0, 0.0), waits);
                 outputs.stop_requested
             };
-            assert!(stops(waits) && !stops(Waits { program: !waits.program, optional: !waits.optional }));
+            assert!(
+                stops(waits)
+                    && !stops(Waits {
+                        program: !waits.program,
+                        optional: !waits.optional
+                    })
+            );
         }
     }
 }

@@ -41,7 +41,10 @@ impl Points {
             list,
             count: 0,
             per_acceleration: limits.map(|l| 1.0 / l.acceleration_mm_per_s2),
-            per_speed: [limits.map(|l| 1.0 / l.feed_mm_per_s), limits.map(|l| 1.0 / l.rapid_mm_per_s)],
+            per_speed: [
+                limits.map(|l| 1.0 / l.feed_mm_per_s),
+                limits.map(|l| 1.0 / l.rapid_mm_per_s),
+            ],
             axes,
             speed_ratio: 0.0,
             acceleration_ratio: 0.0,
@@ -83,14 +86,18 @@ impl Points {
         let point = &mut self.list[self.count];
         let (mut speed_ratio, mut acceleration_ratio) = (self.speed_ratio, self.acceleration_ratio);
         for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
-            let velocity = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
+            let velocity =
+                c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
             let acceleration = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
             let takeback = segment.step_acceleration[axis];
             let smooth = acceleration + takeback;
             point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
             point.acceleration[axis] = smooth;
             speed_ratio = larger(speed_ratio, velocity.abs() * per_speed[axis]);
-            acceleration_ratio = larger(acceleration_ratio, smooth.abs() * self.per_acceleration[axis]);
+            acceleration_ratio = larger(
+                acceleration_ratio,
+                smooth.abs() * self.per_acceleration[axis],
+            );
         }
         (self.speed_ratio, self.acceleration_ratio) = (speed_ratio, acceleration_ratio);
         self.count += 1;

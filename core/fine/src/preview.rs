@@ -26,7 +26,11 @@ impl Mark {
     /// faster, lies inside a period in which the governor cannot yet take that back: its rise is left out, up to the half.
     pub fn speed_to_meet_mm_per_s(&self, ratio: f64, period_s: f64) -> f64 {
         let asked = ratio * self.feed_mm_per_s;
-        let sigma = if self.speed_mm_per_s > asked { asked / self.speed_mm_per_s } else { 1.0 };
+        let sigma = if self.speed_mm_per_s > asked {
+            asked / self.speed_mm_per_s
+        } else {
+            1.0
+        };
         let rise = sigma * sigma * self.acceleration_mm_per_s2.max(0.0) * period_s;
         (asked - rise).max(asked / 2.0)
     }
@@ -52,14 +56,21 @@ pub struct Preview {
 impl Preview {
     /// Nothing seen. Allocates.
     pub fn new() -> Self {
-        Self { next: 0, feed_mm_per_s: 0.0, marks: vec![Mark::default(); MARKS].into_boxed_slice(), first: 0, count: 0 }
+        Self {
+            next: 0,
+            feed_mm_per_s: 0.0,
+            marks: vec![Mark::default(); MARKS].into_boxed_slice(),
+            first: 0,
+            count: 0,
+        }
     }
 
     /// Looks further ahead, up to program time `until_s`; forgets what has been passed.
     pub fn extend(&mut self, cursor: &mut Cursor, until_s: f64) {
         let here_mm = cursor.path_mm();
         if self.next < cursor.next_number() {
-            (self.next, self.feed_mm_per_s) = (cursor.next_number(), cursor.segment().feed_mm_per_s);
+            (self.next, self.feed_mm_per_s) =
+                (cursor.next_number(), cursor.segment().feed_mm_per_s);
         }
         while self.count > 0 && self.marks[self.first].path_mm <= here_mm {
             self.first = (self.first + 1) % MARKS;
@@ -109,7 +120,8 @@ impl Preview {
             let last = &mut self.marks[(self.first + self.count - 1) % MARKS];
             last.feed_mm_per_s = last.feed_mm_per_s.min(mark.feed_mm_per_s);
             last.speed_mm_per_s = last.speed_mm_per_s.min(mark.speed_mm_per_s);
-            last.acceleration_mm_per_s2 = last.acceleration_mm_per_s2.max(mark.acceleration_mm_per_s2);
+            last.acceleration_mm_per_s2 =
+                last.acceleration_mm_per_s2.max(mark.acceleration_mm_per_s2);
         }
     }
 }
@@ -135,7 +147,8 @@ impl LineEnd {
 
     /// Whether the end chosen lies behind the machine, which did not come to rest there.
     pub fn is_passed(&self, cursor: &Cursor) -> bool {
-        self.chosen_mm.is_some_and(|end_mm| end_mm < cursor.path_mm())
+        self.chosen_mm
+            .is_some_and(|end_mm| end_mm < cursor.path_mm())
     }
 
     /// The nearest end of a line at which the plan goes on and the machine can stop when it needs `way_mm` for it.
@@ -150,9 +163,14 @@ impl LineEnd {
             let nearest_mm = here_mm + way_mm;
             let (line, rests, chosen) = (&mut self.line, &mut self.rests, &mut self.chosen_mm);
             self.next = cursor.walk(self.next, ENTRIES, |queued| {
-                let Queued::Segment { segment, .. } = queued else { return true };
+                let Queued::Segment { segment, .. } = queued else {
+                    return true;
+                };
                 let ended = segment.line != *line && !*rests && segment.path[0] >= nearest_mm;
-                (*line, *rests) = (segment.line, segment.flags.contains(SegmentFlags::ENDS_AT_REST));
+                (*line, *rests) = (
+                    segment.line,
+                    segment.flags.contains(SegmentFlags::ENDS_AT_REST),
+                );
                 *chosen = ended.then_some(segment.path[0]);
                 !ended
             });

@@ -36,10 +36,20 @@ impl Ramp {
             velocity: *sent.velocity(),
             acceleration: *sent.acceleration(),
             most: config.limits.axes.map(|l| l.acceleration_mm_per_s2),
-            jerk: config.limits.axes.map(|l| if smooth { l.jerk_mm_per_s3 } else { f64::INFINITY }),
+            jerk: config.limits.axes.map(|l| {
+                if smooth {
+                    l.jerk_mm_per_s3
+                } else {
+                    f64::INFINITY
+                }
+            }),
             period_s: config.period_s,
             together: None,
-            axes: if matches!(config.joints, Joints::Curved { .. }) { config.axis_count() } else { MAX_AXES },
+            axes: if matches!(config.joints, Joints::Curved { .. }) {
+                config.axis_count()
+            } else {
+                MAX_AXES
+            },
         };
         if matches!(config.joints, Joints::Sums(_)) {
             ramp.together = Some(Together::new(&ramp, config.lane_count()));
@@ -77,13 +87,23 @@ impl Ramp {
     fn slow_smoothly(&mut self, axis: usize) {
         let (period_s, limit, most) = (self.period_s, self.jerk[axis], self.most[axis]);
         let (velocity, acceleration) = (self.velocity[axis], self.acceleration[axis]);
-        let jerk = to_rest(velocity - period_s * acceleration, acceleration, SHARE * limit, limit, period_s);
+        let jerk = to_rest(
+            velocity - period_s * acceleration,
+            acceleration,
+            SHARE * limit,
+            limit,
+            period_s,
+        );
         let kept = acceleration.abs().max(most);
         let next = (acceleration + period_s * jerk).clamp(-kept, kept);
         let step = limit * period_s;
-        let arrives = (velocity + period_s * next).abs() < 1e-3 * step * period_s && next.abs() < step;
-        (self.velocity[axis], self.acceleration[axis]) =
-            if arrives { (0.0, 0.0) } else { (velocity + period_s * next, next) };
+        let arrives =
+            (velocity + period_s * next).abs() < 1e-3 * step * period_s && next.abs() < step;
+        (self.velocity[axis], self.acceleration[axis]) = if arrives {
+            (0.0, 0.0)
+        } else {
+            (velocity + period_s * next, next)
+        };
     }
 }
 
@@ -115,10 +135,22 @@ impl Together {
         // The falling law has its greatest slope 1.5 in the middle, its greatest bend 6 at the ends.
         let fall_s = longest(&|i| {
             let v = steady[i].abs();
-            if smooth { (1.5 * v / ramp.most[i]).max((6.0 * v / ramp.jerk[i]).sqrt()) } else { v / ramp.most[i] }
+            if smooth {
+                (1.5 * v / ramp.most[i]).max((6.0 * v / ramp.jerk[i]).sqrt())
+            } else {
+                v / ramp.most[i]
+            }
         });
         let fall = (fall_s / period_s).ceil().max(1.0);
-        Self { velocity, acceleration, steady, runs_out, periods: [out, fall], smooth, passed: 0.0 }
+        Self {
+            velocity,
+            acceleration,
+            steady,
+            runs_out,
+            periods: [out, fall],
+            smooth,
+            passed: 0.0,
+        }
     }
 
     /// The velocity in the next period.
@@ -126,13 +158,19 @@ impl Together {
         self.passed += 1.0;
         let [out, fall] = self.periods;
         if self.passed <= out {
-            return self.velocity + self.acceleration * (gained(self.passed, self.runs_out) * period_s);
+            return self.velocity
+                + self.acceleration * (gained(self.passed, self.runs_out) * period_s);
         }
         let share = ((self.passed - out) / fall).min(1.0);
         if share >= 1.0 {
             return AxisVector::ZERO;
         }
-        self.steady * if self.smooth { 1.0 - share * share * (3.0 - 2.0 * share) } else { 1.0 - share }
+        self.steady
+            * if self.smooth {
+                1.0 - share * share * (3.0 - 2.0 * share)
+            } else {
+                1.0 - share
+            }
     }
 }
 
@@ -140,7 +178,11 @@ impl Together {
 /// `1/runs_out` after the other: never more than the plan would gain, so that no speed gets beyond what was planned.
 fn gained(periods: f64, runs_out: f64) -> f64 {
     let periods = periods.min(runs_out.floor());
-    if periods > 0.0 { periods - periods * (periods + 1.0) / (2.0 * runs_out) } else { 0.0 }
+    if periods > 0.0 {
+        periods - periods * (periods + 1.0) / (2.0 * runs_out)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -58,7 +58,12 @@ impl Tripped {
     /// The lowest of `those` that is tripped, and whether it is by its age. Fine loop.
     pub fn first(&self, those: u64) -> Option<(u32, bool)> {
         let tripped = self.all & those;
-        (tripped != 0).then(|| (tripped.trailing_zeros(), self.old >> tripped.trailing_zeros() & 1 == 1))
+        (tripped != 0).then(|| {
+            (
+                tripped.trailing_zeros(),
+                self.old >> tripped.trailing_zeros() & 1 == 1,
+            )
+        })
     }
 }
 
@@ -69,7 +74,12 @@ impl Roles {
     }
 
     fn all(&self) -> u64 {
-        self.emergency_stop | self.drives_ready | self.door | self.feed_hold | self.limit | self.awaited
+        self.emergency_stop
+            | self.drives_ready
+            | self.door
+            | self.feed_hold
+            | self.limit
+            | self.awaited
     }
 
     /// What of them is tripped by `feedback`. Fine loop; as many steps as there are inputs with a role.
@@ -81,7 +91,10 @@ impl Roles {
             old |= u64::from(feedback.input_age_periods[at] > self.max_age_periods[at]) << input;
             left &= left - 1;
         }
-        Tripped { all: ((feedback.inputs ^ self.normally_closed) & all) | old, old }
+        Tripped {
+            all: ((feedback.inputs ^ self.normally_closed) & all) | old,
+            old,
+        }
     }
 }
 
@@ -91,18 +104,44 @@ mod tests {
 
     #[test]
     fn a_level_trips_by_its_kind_and_an_age_trips_either_kind() {
-        let mut roles = Roles { door: 1 << 3, limit: 1 << 63, normally_closed: 1 << 3, ..Roles::default() };
+        let mut roles = Roles {
+            door: 1 << 3,
+            limit: 1 << 63,
+            normally_closed: 1 << 3,
+            ..Roles::default()
+        };
         roles.max_age_periods[3] = 2;
-        let mut feedback = Feedback { inputs: 1 << 3 | 1 << 5, ..Feedback::default() };
+        let mut feedback = Feedback {
+            inputs: 1 << 3 | 1 << 5,
+            ..Feedback::default()
+        };
         assert_eq!(roles.judge(&feedback), Tripped::default());
         feedback.inputs = 1 << 63;
-        assert_eq!(roles.judge(&feedback), Tripped { all: 1 << 3 | 1 << 63, old: 0 });
+        assert_eq!(
+            roles.judge(&feedback),
+            Tripped {
+                all: 1 << 3 | 1 << 63,
+                old: 0
+            }
+        );
         feedback.inputs = 1 << 3;
-        (feedback.input_age_periods[3], feedback.input_age_periods[63]) = (2, 1);
-        assert_eq!(roles.judge(&feedback), Tripped { all: 1 << 63, old: 1 << 63 });
+        (
+            feedback.input_age_periods[3],
+            feedback.input_age_periods[63],
+        ) = (2, 1);
+        assert_eq!(
+            roles.judge(&feedback),
+            Tripped {
+                all: 1 << 63,
+                old: 1 << 63
+            }
+        );
         feedback.input_age_periods[3] = u16::MAX;
         let tripped = roles.judge(&feedback);
-        assert_eq!((tripped.first(roles.door), tripped.first(roles.limit)), (Some((3, true)), Some((63, true))));
+        assert_eq!(
+            (tripped.first(roles.door), tripped.first(roles.limit)),
+            (Some((3, true)), Some((63, true)))
+        );
         assert_eq!(tripped.first(roles.feed_hold), None);
         feedback.input_age_periods[5] = u16::MAX;
         assert_eq!(roles.judge(&feedback).all >> 5 & 1, 0, "it has no role");

@@ -1,6 +1,8 @@
 //! The state of the machine as a table; the states are those that `PLCopen` and `CiA 402` know.
 
-use tandem_rings::MachineState::{self, Disabled, Fault, Holding, Running, Standstill, Starved, Stopping};
+use tandem_rings::MachineState::{
+    self, Disabled, Fault, Holding, Running, Standstill, Starved, Stopping,
+};
 
 /// What drives the state, once a fine period or on command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,14 +71,27 @@ mod tests {
 
     #[test]
     fn rows_stand_in_the_order_of_the_states() {
-        assert!(states().enumerate().all(|(index, state)| state as usize == index));
-        assert!(INPUT.iter().enumerate().all(|(index, input)| *input as usize == index));
+        assert!(
+            states()
+                .enumerate()
+                .all(|(index, state)| state as usize == index)
+        );
+        assert!(
+            INPUT
+                .iter()
+                .enumerate()
+                .all(|(index, input)| *input as usize == index)
+        );
     }
 
     #[test]
     fn a_fault_is_left_by_reset_alone_and_into_disabled() {
         for input in INPUT {
-            let expected = if input == Input::Reset { Disabled } else { Fault };
+            let expected = if input == Input::Reset {
+                Disabled
+            } else {
+                Fault
+            };
             assert_eq!(next(Fault, input), expected);
         }
     }
@@ -84,8 +99,14 @@ mod tests {
     #[test]
     fn motion_begins_from_a_machine_that_stands_with_its_drives_on() {
         for state in states() {
-            for input in INPUT.into_iter().filter(|_| [Disabled, Fault, Stopping].contains(&state)) {
-                assert!(![Running, Holding, Starved].contains(&next(state, input)), "{state:?} {input:?}");
+            for input in INPUT
+                .into_iter()
+                .filter(|_| [Disabled, Fault, Stopping].contains(&state))
+            {
+                assert!(
+                    ![Running, Holding, Starved].contains(&next(state, input)),
+                    "{state:?} {input:?}"
+                );
             }
         }
         assert_eq!(next(Disabled, Input::DrivesOn), Standstill);
@@ -96,7 +117,10 @@ mod tests {
     fn every_state_trips() {
         for state in states() {
             let moving = [Standstill, Running, Holding, Starved, Stopping].contains(&state);
-            assert_eq!(next(state, Input::Trip), if moving { Stopping } else { Fault });
+            assert_eq!(
+                next(state, Input::Trip),
+                if moving { Stopping } else { Fault }
+            );
             assert_eq!(next(state, Input::Stopped), Fault);
         }
     }
@@ -115,7 +139,10 @@ mod tests {
     fn reset_changes_nothing_but_a_fault_and_drives_that_stay_on_change_nothing() {
         for state in states().filter(|s| *s != Fault) {
             assert_eq!(next(state, Input::Reset), state);
-            assert_eq!(next(state, Input::DrivesOn), if state == Disabled { Standstill } else { state });
+            assert_eq!(
+                next(state, Input::DrivesOn),
+                if state == Disabled { Standstill } else { state }
+            );
         }
     }
 

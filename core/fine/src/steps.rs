@@ -22,13 +22,22 @@ impl Steps {
     pub fn between(before: &Segment, behind: &Segment) -> Self {
         let velocity = behind.velocity(0.0) - before.velocity(before.duration_s);
         let acceleration = behind.acceleration(0.0) - before.acceleration(before.duration_s);
-        Self { velocity: velocity.0.map(f64::abs), acceleration: acceleration.0.map(f64::abs) }
+        Self {
+            velocity: velocity.0.map(f64::abs),
+            acceleration: acceleration.0.map(f64::abs),
+        }
     }
 
     /// From the end of `before` to a rest there.
     pub fn to_rest(before: &Segment) -> Self {
-        let (velocity, acceleration) = (before.velocity(before.duration_s), before.acceleration(before.duration_s));
-        Self { velocity: velocity.0.map(f64::abs), acceleration: acceleration.0.map(f64::abs) }
+        let (velocity, acceleration) = (
+            before.velocity(before.duration_s),
+            before.acceleration(before.duration_s),
+        );
+        Self {
+            velocity: velocity.0.map(f64::abs),
+            acceleration: acceleration.0.map(f64::abs),
+        }
     }
 
     /// Both, as if they came together.
@@ -46,7 +55,8 @@ impl Steps {
 
     /// Jerk of `axis` that samples show for them at the rate `sigma`, mm/s³.
     pub fn jerk_mm_per_s3(&self, axis: usize, sigma: f64, period_s: f64) -> f64 {
-        sigma * (self.velocity[axis] / period_s + WORST * sigma * self.acceleration[axis]) / period_s
+        sigma * (self.velocity[axis] / period_s + WORST * sigma * self.acceleration[axis])
+            / period_s
     }
 }
 

@@ -23,8 +23,8 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
 use tandem_rings::{
-    Controls, Depth, FineEnd, MachineState, OperatorInputs, Ratio, Rest, Sample, Status, StopCause, StrategyRequest,
-    Switched, SwitchedBy,
+    Controls, Depth, FineEnd, MachineState, OperatorInputs, Ratio, Rest, Sample, Status, StopCause,
+    StrategyRequest, Switched, SwitchedBy,
 };
 use tandem_sdk::{Arm, AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
 
@@ -183,7 +183,11 @@ impl FineLoop {
         kinematics: Option<Box<dyn Kinematics>>,
     ) -> Self {
         let (limits, lanes) = (&config.limits.axes, config.lane_count());
-        let judges_following = config.max_following_error_mm.0.iter().any(|most| *most < f64::INFINITY);
+        let judges_following = config
+            .max_following_error_mm
+            .0
+            .iter()
+            .any(|most| *most < f64::INFINITY);
         Self {
             config: *config,
             driver,
@@ -228,7 +232,10 @@ impl FineLoop {
             tick: 0,
             attach: Attach::new(config),
             setpoint: Setpoint::default(),
-            feedback: Feedback { position: config.attached.position, ..Feedback::default() },
+            feedback: Feedback {
+                position: config.attached.position,
+                ..Feedback::default()
+            },
             sent: judges_following.then(|| History::new(&config.attached.position)),
             measured: History::new(&config.attached.position),
             arm: Arm::default(),
@@ -257,7 +264,8 @@ impl FineLoop {
         let all_hold = self.exchange(&position);
         self.state = state::next(state::next(self.state, self.drives(all_hold)), input);
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
-        let recorded = (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
+        let recorded =
+            (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
         if started && recorded && !ended && !self.outputs.ended {
             let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
@@ -280,7 +288,11 @@ impl FineLoop {
             self.attach = Attach::again(self.feedback.position);
             (self.fault, self.plugin_error, self.lead) = (None, None, Lead::Axes);
             self.release = Release::default();
-            self.governor = Governor::new(&self.config.limits.axes, self.config.lane_count(), self.config.period_s);
+            self.governor = Governor::new(
+                &self.config.limits.axes,
+                self.config.lane_count(),
+                self.config.period_s,
+            );
             self.progress = Progress::new(&self.config);
             self.forget_roles();
             self.phase = Phase::Waiting;
@@ -340,7 +352,8 @@ impl FineLoop {
     fn next_position(&mut self) -> (AxisVector, Input) {
         if self.given.emergency_stop {
             // Also where another fault is being ramped out: it may be why somebody presses it.
-            self.outputs.switch_off(self.config.kept_outputs, SwitchedBy::EmergencyStop);
+            self.outputs
+                .switch_off(self.config.kept_outputs, SwitchedBy::EmergencyStop);
             self.fail(FaultKind::EmergencyStop);
         }
         match &mut self.phase {
@@ -356,7 +369,10 @@ impl FineLoop {
                 let (mut position, over) = (ramp.next(), ramp.is_over());
                 self.add_joints(&mut position);
                 let over = over && self.joints_rest();
-                (self.ramp_out(position, over), if over { Input::Stopped } else { Input::Trip })
+                (
+                    self.ramp_out(position, over),
+                    if over { Input::Stopped } else { Input::Trip },
+                )
             }
             Phase::Faulted => {
                 self.cause = StopCause::Fault;
@@ -380,8 +396,8 @@ impl FineLoop {
         if self.given.abort || self.is_jog_let_go() {
             return self.part(Stop::abort());
         }
-        let of_this_epoch =
-            self.cursor.epoch() == 0 || (self.depth.is_of(self.cursor.epoch()) && self.cursor.drop_older());
+        let of_this_epoch = self.cursor.epoch() == 0
+            || (self.depth.is_of(self.cursor.epoch()) && self.cursor.drop_older());
         if of_this_epoch && self.depth.may_start(self.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
@@ -393,7 +409,8 @@ impl FineLoop {
         self.guard.sent(&position);
         if over {
             if self.outputs.by != SwitchedBy::EmergencyStop {
-                self.outputs.switch_off(self.config.kept_outputs, SwitchedBy::Fault);
+                self.outputs
+                    .switch_off(self.config.kept_outputs, SwitchedBy::Fault);
             }
             self.driver.quick_stop();
             self.phase = Phase::Faulted;
@@ -408,7 +425,11 @@ impl FineLoop {
         }
         self.end_hand_over();
         self.arm = Arm::default();
-        self.fault = Some(Fault { kind, tick: self.tick, line: self.cursor.segment().line });
+        self.fault = Some(Fault {
+            kind,
+            tick: self.tick,
+            line: self.cursor.segment().line,
+        });
         self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
     }
 }

@@ -12,13 +12,20 @@ use common::{Bench, PERIOD_S};
 use counting_allocator::{HeapUse, heap_use_of};
 use tandem_fine::{FaultKind, GuardMode};
 use tandem_rings::{MachineState, Ratio};
-use tandem_sdk::{Axes, AxisVector, EventKind, Kinematics, KinematicsContext, NoOptions, local_plugin};
+use tandem_sdk::{
+    Axes, AxisVector, EventKind, Kinematics, KinematicsContext, NoOptions, local_plugin,
+};
 
 /// Runs `periods` fine periods; none may allocate or free.
 fn tick(bench: &mut Bench, periods: u32) {
     for _ in 0..periods {
         let used = heap_use_of(|| bench.fine.tick());
-        assert_eq!(used, HeapUse::default(), "the heap was used in state {:?}", bench.state());
+        assert_eq!(
+            used,
+            HeapUse::default(),
+            "the heap was used in state {:?}",
+            bench.state()
+        );
     }
 }
 
@@ -30,13 +37,23 @@ fn tick_until(bench: &mut Bench, state: MachineState) {
         }
         tick(bench, 1);
     }
-    panic!("{state:?} is not reached: {:?}, {:?}", bench.state(), bench.fine.fault());
+    panic!(
+        "{state:?} is not reached: {:?}, {:?}",
+        bench.state(),
+        bench.fine.fault()
+    );
 }
 
 #[test]
 fn the_counter_counts() {
     let used = heap_use_of(|| drop(std::hint::black_box(Box::new(1))));
-    assert_eq!(used, HeapUse { allocations: 1, frees: 1 });
+    assert_eq!(
+        used,
+        HeapUse {
+            allocations: 1,
+            frees: 1
+        }
+    );
 }
 
 #[test]
@@ -61,7 +78,14 @@ fn a_program_with_events_hold_and_overrides() {
     bench.host.controls.feed_override.store(0.4);
     tick(&mut bench, 200);
     bench.host.controls.feed_override.store(1.0);
-    bench.host.ratios.push(Ratio { tick: 0, ratio: 0.7 }).unwrap();
+    bench
+        .host
+        .ratios
+        .push(Ratio {
+            tick: 0,
+            ratio: 0.7,
+        })
+        .unwrap();
     for _ in 0..10_000 {
         tick(&mut bench, 1);
         if bench.fine.is_over() {
@@ -69,7 +93,10 @@ fn a_program_with_events_hold_and_overrides() {
         }
     }
     assert!(bench.fine.is_over());
-    assert_eq!((bench.fine.fault(), bench.fine.counters().late_ratios), (None, 1));
+    assert_eq!(
+        (bench.fine.fault(), bench.fine.counters().late_ratios),
+        (None, 1)
+    );
 }
 
 #[test]
@@ -79,12 +106,19 @@ fn starvation_and_going_on() {
     bench.cruise(0.5);
     tick_until(&mut bench, MachineState::Starved);
     tick(&mut bench, 300);
-    assert_eq!(bench.host.status.feed_mm_per_s.load(), 0.0, "it waits on the path");
+    assert_eq!(
+        bench.host.status.feed_mm_per_s.load(),
+        0.0,
+        "it waits on the path"
+    );
     bench.cruise(0.3);
     bench.brake();
     tick_until(&mut bench, MachineState::Running);
     tick_until(&mut bench, MachineState::Standstill);
-    assert_eq!((bench.fine.fault(), bench.fine.counters().starvations), (None, 1));
+    assert_eq!(
+        (bench.fine.fault(), bench.fine.counters().starvations),
+        (None, 1)
+    );
 }
 
 #[test]
@@ -99,7 +133,11 @@ fn an_abort_and_the_next_epoch() {
     bench.host.controls.abort.store(true, Relaxed);
     tick_until(&mut bench, MachineState::Standstill);
     tick(&mut bench, 300);
-    assert_eq!(bench.host.status.feed_mm_per_s.load(), 0.0, "what is queued is of the old epoch");
+    assert_eq!(
+        bench.host.status.feed_mm_per_s.load(),
+        0.0,
+        "what is queued is of the old epoch"
+    );
     bench.go_on();
     bench.accelerate();
     bench.brake();
@@ -141,9 +179,15 @@ fn the_guard_stops_or_counts() {
         bench.brake();
         tick_until(&mut bench, MachineState::Running);
         tick(&mut bench, (1.0 / PERIOD_S) as u32);
-        let guard = matches!(bench.fine.fault().map(|f| f.kind), Some(FaultKind::Guard { .. }));
+        let guard = matches!(
+            bench.fine.fault().map(|f| f.kind),
+            Some(FaultKind::Guard { .. })
+        );
         assert_eq!(guard, mode == GuardMode::Stop);
-        assert_eq!(bench.fine.counters().limit_violations > 0, mode == GuardMode::Count);
+        assert_eq!(
+            bench.fine.counters().limit_violations > 0,
+            mode == GuardMode::Count
+        );
     }
 }
 
@@ -157,7 +201,11 @@ impl Kinematics for Bent {
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
         let mut joints = *axes;
         let fails = self.calls.fetch_add(1, Relaxed) >= self.fails_at;
-        joints[0] = if fails { f64::NAN } else { axes[0] + axes[0] * axes[0] / 1000.0 };
+        joints[0] = if fails {
+            f64::NAN
+        } else {
+            axes[0] + axes[0] * axes[0] / 1000.0
+        };
         joints
     }
 
@@ -174,7 +222,8 @@ fn kinematics_that_are_asked_and_kinematics_that_fail() {
     let plugin = local_plugin!(kinematics "bent" = |_: &NoOptions, _: &KinematicsContext| {
         Ok(Bent { calls: AtomicU32::new(0), fails_at: 200 })
     });
-    let context = KinematicsContext::new(Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap());
+    let context =
+        KinematicsContext::new(Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap());
     let mut bench = Bench::with_curved(plugin.kinematics("", &context).unwrap());
     bench.accelerate();
     bench.cruise(1.0);
@@ -182,5 +231,8 @@ fn kinematics_that_are_asked_and_kinematics_that_fail() {
     tick(&mut bench, 150);
     assert!(bench.host.status.feed_mm_per_s.load() > 10.0, "it moves");
     tick_until(&mut bench, MachineState::Fault);
-    assert!(matches!(bench.fine.fault().unwrap().kind, FaultKind::Kinematics { joint: 0 }));
+    assert!(matches!(
+        bench.fine.fault().unwrap().kind,
+        FaultKind::Kinematics { joint: 0 }
+    ));
 }

@@ -52,11 +52,28 @@ fn the_joint_keeps_its_limit_and_the_place_where_it_rests_is_known() {
     bench.host.controls.emergency_stop.store(true, Relaxed);
     let samples = until_fault(&mut bench);
     assert!(bench.fine.joints_went_alone());
-    let joints: Vec<f64> = samples.iter().map(|sample| Bent.to_joints(&sample.feedback)[0]).collect();
-    let speeds: Vec<f64> = joints.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_S).collect();
-    let most = speeds.windows(2).fold(0.0, |most: f64, pair| most.max((pair[1] - pair[0]).abs() / PERIOD_S));
+    let joints: Vec<f64> = samples
+        .iter()
+        .map(|sample| Bent.to_joints(&sample.feedback)[0])
+        .collect();
+    let speeds: Vec<f64> = joints
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / PERIOD_S)
+        .collect();
+    let most = speeds.windows(2).fold(0.0, |most: f64, pair| {
+        most.max((pair[1] - pair[0]).abs() / PERIOD_S)
+    });
     assert!((990.0..1000.01).contains(&most), "{most} mm/s² of 1000");
     let (last, sent) = (samples.last().unwrap(), bench.fine.sent());
-    assert!((last.feedback[0] - sent[0]).abs() < 1e-9, "{} mm, said to be {}", last.feedback[0], sent[0]);
-    assert!((last.command[0] - sent[0]).abs() > 1e-3, "the axis was to be at {} mm", last.command[0]);
+    assert!(
+        (last.feedback[0] - sent[0]).abs() < 1e-9,
+        "{} mm, said to be {}",
+        last.feedback[0],
+        sent[0]
+    );
+    assert!(
+        (last.command[0] - sent[0]).abs() > 1e-3,
+        "the axis was to be at {} mm",
+        last.command[0]
+    );
 }

@@ -29,7 +29,10 @@ fn the_feed_is_kept_where_the_plan_turns_from_getting_faster_to_braking_within_a
             }
         }
         assert_eq!(bench.fine.fault(), None, "peak {peak}");
-        assert!(fastest < FEED_MM_PER_S * MOST + ROUNDING_MM_PER_S, "peak {peak}: {fastest}");
+        assert!(
+            fastest < FEED_MM_PER_S * MOST + ROUNDING_MM_PER_S,
+            "peak {peak}: {fastest}"
+        );
         assert!(fastest > 0.97 * FEED_MM_PER_S, "peak {peak}: {fastest}");
     }
 }
@@ -40,7 +43,12 @@ fn the_feed_is_kept_where_the_plan_uses_all_the_jerk_to_go_beyond_it() {
     for feed in [0.04, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 80.0] {
         for ratio in [1.02, 1.1, 1.3, 1.6, 2.0] {
             let planned = ratio * feed;
-            let pieces = profile(0.6 * planned, planned, 0.999 * LIMITS.acceleration, 0.999 * LIMITS.jerk);
+            let pieces = profile(
+                0.6 * planned,
+                planned,
+                0.999 * LIMITS.acceleration,
+                0.999 * LIMITS.jerk,
+            );
             let plan = Plan::new(pieces, planned, |s| [0.8 * s, 0.6 * s]);
             let machine = Machine::planned_at(&plan, ratio);
             let done = machine.run_to_end();
@@ -48,7 +56,10 @@ fn the_feed_is_kept_where_the_plan_uses_all_the_jerk_to_go_beyond_it() {
             done.assert_kept(&what);
             assert_eq!(done.relaxed, 0, "{what}");
             let fastest = done.speeds().into_iter().fold(0.0, f64::max);
-            assert!(fastest < feed * MOST + ROUNDING_MM_PER_S, "{what}: {fastest}");
+            assert!(
+                fastest < feed * MOST + ROUNDING_MM_PER_S,
+                "{what}: {fastest}"
+            );
             assert!(fastest > 0.999 * feed, "{what}: {fastest}");
         }
     }
@@ -60,15 +71,26 @@ fn the_feed_is_kept_on_a_circle_that_leaves_little_to_slow_down_with() {
     for (radius_mm, planned, share) in [(20.0, 60.0, 0.5), (3.0, 25.0, 0.6), (0.5, 10.0, 0.5)] {
         for ratio in [1.05, 1.3, 2.0] {
             let length_mm = 1.5 * std::f64::consts::TAU * radius_mm;
-            let pieces = profile(length_mm, planned, share * LIMITS.acceleration, share * LIMITS.jerk);
+            let pieces = profile(
+                length_mm,
+                planned,
+                share * LIMITS.acceleration,
+                share * LIMITS.jerk,
+            );
             let plan = Plan::new(pieces, planned, move |s| {
-                [radius_mm * (s / radius_mm).cos() - radius_mm, radius_mm * (s / radius_mm).sin()]
+                [
+                    radius_mm * (s / radius_mm).cos() - radius_mm,
+                    radius_mm * (s / radius_mm).sin(),
+                ]
             });
             let done = Machine::planned_at(&plan, ratio).run_to_end();
             let what = format!("radius {radius_mm}, planned at {ratio}");
             done.assert_kept(&what);
             let fastest = done.speeds().into_iter().fold(0.0, f64::max);
-            assert!(fastest < planned / ratio * MOST + ROUNDING_MM_PER_S, "{what}: {fastest}");
+            assert!(
+                fastest < planned / ratio * MOST + ROUNDING_MM_PER_S,
+                "{what}: {fastest}"
+            );
         }
     }
 }

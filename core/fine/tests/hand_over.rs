@@ -17,7 +17,8 @@ const HOMED: usize = 1;
 
 /// A machine somewhere, whose second joint is to be homed by its drive.
 fn unhomed(random: &mut Random) -> Bench {
-    let position = AxisVector::from_slice(&[random.between(-500.0, 500.0), random.between(-500.0, 500.0)]);
+    let position =
+        AxisVector::from_slice(&[random.between(-500.0, 500.0), random.between(-500.0, 500.0)]);
     let script = Script {
         position,
         homing_takes: 1 + random.below(200),
@@ -26,28 +27,52 @@ fn unhomed(random: &mut Random) -> Bench {
         was_homed: if random.below(2) == 1 { 1 << HOMED } else { 0 },
         ..Script::new(JOINTS)
     };
-    let attached = Attached { delay_periods: [2; MAX_AXES], ..Attached::default() };
-    let config =
-        FineConfig { unhomed: 1 << HOMED, record_drives: true, enable_periods: 100, attached, ..config(JOINTS) };
+    let attached = Attached {
+        delay_periods: [2; MAX_AXES],
+        ..Attached::default()
+    };
+    let config = FineConfig {
+        unhomed: 1 << HOMED,
+        record_drives: true,
+        enable_periods: 100,
+        attached,
+        ..config(JOINTS)
+    };
     let mut bench = Bench::new(&config, script);
-    assert_eq!(bench.rest(20).map(|rest| rest.cause), Some(RestCause::Attached));
+    assert_eq!(
+        bench.rest(20).map(|rest| rest.cause),
+        Some(RestCause::Attached)
+    );
     bench
 }
 
 fn hand_over(bench: &mut Bench, within_s: f64) {
-    bench.queue_event(EventKind::HomeByDrive, (HOMED as u32).cast_signed(), within_s);
+    bench.queue_event(
+        EventKind::HomeByDrive,
+        (HOMED as u32).cast_signed(),
+        within_s,
+    );
 }
 
 /// No setpoint but that of the joint in its drive's hands ever jumped, and its first one behind is where it is.
 fn assert_bumpless(bench: &Bench) {
     let script = bench.script();
     let told: Vec<_> = script.told.iter().map(|(told, _)| *told).collect();
-    for pair in told.windows(2).filter(|pair| pair[1].enable != 0 && pair[0].enable != 0) {
+    for pair in told
+        .windows(2)
+        .filter(|pair| pair[1].enable != 0 && pair[0].enable != 0)
+    {
         assert_eq!(pair[0].position[0], pair[1].position[0]);
         if pair[0].homing == 0 && pair[1].homing == 0 {
-            assert!((pair[0].position[HOMED] - pair[1].position[HOMED]).abs() <= 0.1, "{pair:?}");
+            assert!(
+                (pair[0].position[HOMED] - pair[1].position[HOMED]).abs() <= 0.1,
+                "{pair:?}"
+            );
         }
-        assert_eq!((pair[1].velocity, pair[1].acceleration), (AxisVector::ZERO, AxisVector::ZERO));
+        assert_eq!(
+            (pair[1].velocity, pair[1].acceleration),
+            (AxisVector::ZERO, AxisVector::ZERO)
+        );
     }
 }
 
@@ -57,16 +82,32 @@ fn a_joint_is_adopted_where_its_drive_says_that_it_is() {
         let mut random = Random::new(seed);
         let mut bench = unhomed(&mut random);
         hand_over(&mut bench, 10.0);
-        let rest = bench.rest(300).unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
+        let rest = bench
+            .rest(300)
+            .unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
         let homed_at_mm = bench.script().homed_at_mm;
-        assert_eq!((rest.cause, rest.position[HOMED]), (RestCause::Corrected, homed_at_mm), "seed {seed}");
+        assert_eq!(
+            (rest.cause, rest.position[HOMED]),
+            (RestCause::Corrected, homed_at_mm),
+            "seed {seed}"
+        );
         bench.ticks(20);
         assert_eq!(bench.fault(), None, "seed {seed}");
         let script = bench.script();
-        assert_eq!((script.last().homing, script.position[HOMED]), (0, homed_at_mm));
-        let handed_over = script.told.iter().filter(|(told, _)| told.homing != 0).count() as u64;
+        assert_eq!(
+            (script.last().homing, script.position[HOMED]),
+            (0, homed_at_mm)
+        );
+        let handed_over = script
+            .told
+            .iter()
+            .filter(|(told, _)| told.homing != 0)
+            .count() as u64;
         let takes = script.homing_takes + script.homing_lag;
-        assert!((takes..=takes + 2).contains(&handed_over), "seed {seed}: {handed_over}");
+        assert!(
+            (takes..=takes + 2).contains(&handed_over),
+            "seed {seed}: {handed_over}"
+        );
         drop(script);
         assert_bumpless(&bench);
     }
@@ -81,7 +122,10 @@ fn it_is_followed_again_from_there() {
     bench.ticks(260);
     // Feedback that answers at once where two periods were told: what is behind by them is 0.1 mm at 50 mm/s.
     let fault = bench.fault();
-    assert!(matches!(fault, Some(FaultKind::Following { joint: HOMED, .. })), "it is followed again: {fault:?}");
+    assert!(
+        matches!(fault, Some(FaultKind::Following { joint: HOMED, .. })),
+        "it is followed again: {fault:?}"
+    );
 }
 
 #[test]
@@ -92,7 +136,12 @@ fn a_drive_that_finds_nothing_or_fails_is_a_fault_with_its_code() {
     assert_eq!(bench.rest(250), None);
     assert_eq!(bench.fault(), None);
     bench.ticks(200);
-    let kind = FaultKind::NotHomed { joint: HOMED, state: JointState::Homing, code: 0, within_s: 0.3 };
+    let kind = FaultKind::NotHomed {
+        joint: HOMED,
+        state: JointState::Homing,
+        code: 0,
+        within_s: 0.3,
+    };
     assert_eq!(bench.fault(), Some(kind));
     let last = bench.told();
     assert_eq!((last.homing, last.enable), (0, 0));
@@ -103,7 +152,13 @@ fn a_drive_that_finds_nothing_or_fails_is_a_fault_with_its_code() {
         drop(script);
         hand_over(&mut bench, 10.0);
         bench.ticks(200);
-        assert_eq!(bench.fault(), Some(FaultKind::Drive { joint: HOMED, code: HOMING_CODE }));
+        assert_eq!(
+            bench.fault(),
+            Some(FaultKind::Drive {
+                joint: HOMED,
+                code: HOMING_CODE
+            })
+        );
         assert_bumpless(&bench);
         assert_eq!(bench.state(), MachineState::Fault);
     }
@@ -127,11 +182,18 @@ fn an_abort_and_an_emergency_stop_take_the_joint_back_where_it_is() {
             bench.ticks(20);
             assert_eq!(bench.fault(), Some(FaultKind::Soft));
         } else {
-            let stop = if seed % 2 == 0 { &controls.abort } else { &controls.jog.let_go };
+            let stop = if seed % 2 == 0 {
+                &controls.abort
+            } else {
+                &controls.jog.let_go
+            };
             stop.store(true, Relaxed);
             let rest = bench.rest(20).expect("a rest");
             let at_mm = bench.script().position[HOMED];
-            assert_eq!((rest.cause, rest.position[HOMED], bench.fault()), (RestCause::Abort, at_mm, None));
+            assert_eq!(
+                (rest.cause, rest.position[HOMED], bench.fault()),
+                (RestCause::Abort, at_mm, None)
+            );
         }
         bench.ticks(10);
         assert_eq!(bench.told().homing, 0);
@@ -168,7 +230,10 @@ fn what_the_host_has_called_the_axis_before_is_forgotten() {
     let before_mm = bench.position[HOMED];
     bench.queue_event(EventKind::Correct, (HOMED as u32).cast_signed(), 3.0);
     let corrected = bench.rest(20).expect("it is called otherwise");
-    assert_eq!((corrected.cause, corrected.position[HOMED]), (RestCause::Corrected, before_mm + 3.0));
+    assert_eq!(
+        (corrected.cause, corrected.position[HOMED]),
+        (RestCause::Corrected, before_mm + 3.0)
+    );
     hand_over(&mut bench, 10.0);
     let homed_at_mm = bench.script().homed_at_mm;
     assert_eq!(bench.rest(300).expect("homed").position[HOMED], homed_at_mm);
@@ -193,12 +258,26 @@ fn a_joint_is_taken_back_by_nothing_that_is_old() {
         }
         bench.script().late = late;
         // Until the drive is through with it, and for some time more.
-        assert_eq!(bench.rest(250), None, "seed {seed}: nothing new was heard of the joint");
+        assert_eq!(
+            bench.rest(250),
+            None,
+            "seed {seed}: nothing new was heard of the joint"
+        );
         bench.script().late = 0;
-        let rest = bench.rest(20).unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
+        let rest = bench
+            .rest(20)
+            .unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
         let at_mm = bench.script().position[HOMED];
-        let cause = if aborts { RestCause::Abort } else { RestCause::Corrected };
-        assert_eq!((rest.cause, rest.position[HOMED], bench.fault()), (cause, at_mm, None), "seed {seed}");
+        let cause = if aborts {
+            RestCause::Abort
+        } else {
+            RestCause::Corrected
+        };
+        assert_eq!(
+            (rest.cause, rest.position[HOMED], bench.fault()),
+            (cause, at_mm, None),
+            "seed {seed}"
+        );
     }
 }
 
@@ -222,8 +301,14 @@ fn an_old_frame_does_not_make_an_older_homing_a_new_one() {
         let mut script = bench.script();
         (script.was_homed, script.late) = (1 << HOMED, 0);
         drop(script);
-        let rest = bench.rest(400).unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
+        let rest = bench
+            .rest(400)
+            .unwrap_or_else(|| panic!("seed {seed}: {:?}", bench.fault()));
         let homed_at_mm = bench.script().homed_at_mm;
-        assert_eq!((rest.cause, rest.position[HOMED]), (RestCause::Corrected, homed_at_mm), "seed {seed}");
+        assert_eq!(
+            (rest.cause, rest.position[HOMED]),
+            (RestCause::Corrected, homed_at_mm),
+            "seed {seed}"
+        );
     }
 }

@@ -9,14 +9,29 @@ use smooth::{LIMITS, Machine, PERIOD_S, Plan, profile};
 
 /// A straight line in X and Y with limits used to 0.99.
 fn line() -> Plan {
-    let pieces = profile(120.0, 80.0, 0.99 * LIMITS.acceleration / 0.8, 0.99 * LIMITS.jerk / 0.8);
+    let pieces = profile(
+        120.0,
+        80.0,
+        0.99 * LIMITS.acceleration / 0.8,
+        0.99 * LIMITS.jerk / 0.8,
+    );
     Plan::new(pieces, 80.0, |s| [0.8 * s, 0.6 * s])
 }
 
 /// One and a half turns on a circle, with `share` of the limits along the path.
 fn circle(radius_mm: f64, feed: f64, share: f64) -> Plan {
-    let pieces = profile(1.5 * TAU * radius_mm, feed, share * LIMITS.acceleration, share * LIMITS.jerk);
-    Plan::new(pieces, feed, move |s| [radius_mm * (s / radius_mm).cos() - radius_mm, radius_mm * (s / radius_mm).sin()])
+    let pieces = profile(
+        1.5 * TAU * radius_mm,
+        feed,
+        share * LIMITS.acceleration,
+        share * LIMITS.jerk,
+    );
+    Plan::new(pieces, feed, move |s| {
+        [
+            radius_mm * (s / radius_mm).cos() - radius_mm,
+            radius_mm * (s / radius_mm).sin(),
+        ]
+    })
 }
 
 /// A line in X that uses the limits to 0.999, as planners aim at.
@@ -36,7 +51,11 @@ fn a_hold_at_every_tick_of_a_plan_at_the_limits_keeps_them() {
 }
 
 fn plans() -> [(&'static str, Plan); 3] {
-    [("line", line()), ("large circle", circle(20.0, 60.0, 0.5)), ("small circle", circle(3.0, 25.0, 0.6))]
+    [
+        ("line", line()),
+        ("large circle", circle(20.0, 60.0, 0.5)),
+        ("small circle", circle(3.0, 25.0, 0.6)),
+    ]
 }
 
 #[test]
@@ -59,7 +78,10 @@ fn a_hold_on_a_line_at_constant_speed_takes_the_shortest_time() {
     let shortest_s = 80.0 / a + a / j;
     println!("{stop_s:.3} s, shortest {shortest_s:.4} s");
     // The last sample moves, the next one shows that it rests.
-    assert!(stop_s < 1.02 * shortest_s + 2.0 * PERIOD_S, "{stop_s} {shortest_s}");
+    assert!(
+        stop_s < 1.02 * shortest_s + 2.0 * PERIOD_S,
+        "{stop_s} {shortest_s}"
+    );
 }
 
 /// A hold at `tick`, a rest, and on to the end.

@@ -38,11 +38,18 @@ fn cause(bench: &Bench) -> Option<FaultKind> {
 }
 
 const fn in_a_row(missed: u64) -> FaultKind {
-    FaultKind::MissedPeriods { missed, most: IN_A_ROW, of_last: None }
+    FaultKind::MissedPeriods {
+        missed,
+        most: IN_A_ROW,
+        of_last: None,
+    }
 }
 
-const OF_LAST: Option<FaultKind> =
-    Some(FaultKind::MissedPeriods { missed: OF_A_SECOND + 1, most: OF_A_SECOND, of_last: Some(1000) });
+const OF_LAST: Option<FaultKind> = Some(FaultKind::MissedPeriods {
+    missed: OF_A_SECOND + 1,
+    most: OF_A_SECOND,
+    of_last: Some(1000),
+});
 
 #[test]
 fn in_motion_one_more_in_a_row_than_allowed_is_a_fault() {
@@ -56,7 +63,13 @@ fn in_motion_one_more_in_a_row_than_allowed_is_a_fault() {
         let mut bench = cruising();
         bench.fine.missed(missed, missed);
         assert_eq!(cause(&bench), fault);
-        assert_eq!((bench.fine.counters().missed_periods, bench.fine.counters().missed_in_motion), (missed, missed));
+        assert_eq!(
+            (
+                bench.fine.counters().missed_periods,
+                bench.fine.counters().missed_in_motion
+            ),
+            (missed, missed)
+        );
     }
 }
 
@@ -91,7 +104,14 @@ fn at_rest_they_are_counted_and_nothing_else() {
             tick(bench, 1);
         }
         let counted = bench.fine.counters();
-        assert_eq!((cause(bench), counted.missed_periods, counted.missed_in_motion), (None, 5000, 0));
+        assert_eq!(
+            (
+                cause(bench),
+                counted.missed_periods,
+                counted.missed_in_motion
+            ),
+            (None, 5000, 0)
+        );
     }
 }
 
@@ -108,7 +128,10 @@ fn a_row_that_began_at_rest_counts_from_where_the_machine_moves() {
     bench.fine.missed(50, 50);
     tick(&mut bench, 1);
     bench.fine.missed(2, 52);
-    assert_eq!((cause(&bench), bench.fine.counters().missed_in_motion), (None, 2));
+    assert_eq!(
+        (cause(&bench), bench.fine.counters().missed_in_motion),
+        (None, 2)
+    );
 }
 
 #[test]
@@ -119,7 +142,10 @@ fn as_many_in_a_second_as_allowed_are_none_too_many_however_long_it_goes_on() {
         bench.fine.missed(1, 1);
         tick(&mut bench, 99);
     }
-    assert_eq!((cause(&bench), bench.fine.counters().missed_in_motion), (None, 400));
+    assert_eq!(
+        (cause(&bench), bench.fine.counters().missed_in_motion),
+        (None, 400)
+    );
     tick(&mut bench, 1000);
     for _ in 0..OF_A_SECOND {
         bench.fine.missed(1, 1);
@@ -144,7 +170,11 @@ fn the_window_is_a_second_to_a_period() {
         tick(&mut bench, between - 19);
         assert_eq!(cause(&bench), None);
         bench.fine.missed(1, 1);
-        assert_eq!(cause(&bench), fault, "{between} periods from the first to the last");
+        assert_eq!(
+            cause(&bench),
+            fault,
+            "{between} periods from the first to the last"
+        );
     }
 }
 

@@ -35,17 +35,32 @@ fn moving() -> Bench {
 #[test]
 fn what_is_slow_held_or_stopped_by_an_override_is_no_loss_of_progress() {
     let mut bench = moving();
-    for (hold, feed_override) in [(false, 1e-4), (true, 1.0), (false, 0.0), (false, 1e-6), (false, 0.3), (true, 0.2)] {
+    for (hold, feed_override) in [
+        (false, 1e-4),
+        (true, 1.0),
+        (false, 0.0),
+        (false, 1e-6),
+        (false, 0.3),
+        (true, 0.2),
+    ] {
         bench.host.controls.hold.store(hold, Relaxed);
         bench.host.controls.feed_override.store(feed_override);
         tick(&mut bench, LONG);
-        assert_eq!(bench.fine.fault(), None, "hold {hold}, override {feed_override}");
+        assert_eq!(
+            bench.fine.fault(),
+            None,
+            "hold {hold}, override {feed_override}"
+        );
     }
     bench.host.controls.hold.store(false, Relaxed);
     bench.host.controls.feed_override.store(1.0);
     bench.event(EventKind::ProgramEnd, 0, 0.0);
     tick(&mut bench, 5000);
-    assert!(bench.fine.is_over() && bench.fine.fault().is_none(), "{:?}", bench.fine.fault());
+    assert!(
+        bench.fine.is_over() && bench.fine.fault().is_none(),
+        "{:?}",
+        bench.fine.fault()
+    );
 }
 
 #[test]
@@ -67,8 +82,17 @@ fn program_time_that_does_not_pass_though_nothing_stops_it_is_a_fault_by_its_nam
     tick(&mut bench, 150);
     assert_eq!(bench.fine.fault(), None);
     tick(&mut bench, LONG);
-    let Some(FaultKind::NoProgress { periods, grown_s, asked }) = bench.fine.fault().map(|fault| fault.kind) else {
+    let Some(FaultKind::NoProgress {
+        periods,
+        grown_s,
+        asked,
+    }) = bench.fine.fault().map(|fault| fault.kind)
+    else {
         panic!("{:?}", bench.fine.fault())
     };
-    assert_eq!((periods, grown_s, asked), (433, 0.0, 1.0), "the window of 4·V/A and 32 periods");
+    assert_eq!(
+        (periods, grown_s, asked),
+        (433, 0.0, 1.0),
+        "the window of 4·V/A and 32 periods"
+    );
 }

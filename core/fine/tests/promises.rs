@@ -35,9 +35,15 @@ fn a_ramp_ends_in_one_quick_stop_of_the_drives_and_not_before() {
     bench.host.controls.emergency_stop.store(true, Relaxed);
     // 20 mm/s at 1000 mm/s²: 20 periods.
     tick(&mut bench, 19);
-    assert_eq!((bench.state(), bench.quick_stops()), (MachineState::Stopping, 0));
+    assert_eq!(
+        (bench.state(), bench.quick_stops()),
+        (MachineState::Stopping, 0)
+    );
     tick(&mut bench, 30);
-    assert_eq!((bench.state(), bench.quick_stops()), (MachineState::Fault, 1));
+    assert_eq!(
+        (bench.state(), bench.quick_stops()),
+        (MachineState::Fault, 1)
+    );
 }
 
 #[test]
@@ -47,9 +53,22 @@ fn feedback_that_is_no_number_while_ramping_goes_no_further_and_changes_no_cause
     tick(&mut bench, 5);
     bench.spoil_feedback();
     let samples = tick(&mut bench, 10);
-    assert!(samples.len() == 10 && samples.iter().all(|sample| sample.feedback.0.iter().all(|v| v.is_finite())));
-    assert!(samples.iter().all(|sample| sample.feedback == samples[0].feedback), "the last number there was");
-    assert_eq!(bench.fine.fault().map(|fault| fault.kind), Some(FaultKind::EmergencyStop));
+    assert!(
+        samples.len() == 10
+            && samples
+                .iter()
+                .all(|sample| sample.feedback.0.iter().all(|v| v.is_finite()))
+    );
+    assert!(
+        samples
+            .iter()
+            .all(|sample| sample.feedback == samples[0].feedback),
+        "the last number there was"
+    );
+    assert_eq!(
+        bench.fine.fault().map(|fault| fault.kind),
+        Some(FaultKind::EmergencyStop)
+    );
 }
 
 #[test]
@@ -57,7 +76,10 @@ fn feedback_that_is_no_number_faults_a_machine_that_moves() {
     let mut bench = cruising();
     bench.spoil_feedback();
     tick(&mut bench, 1);
-    assert_eq!(bench.fine.fault().map(|fault| fault.kind), Some(FaultKind::Feedback { joint: Some(0) }));
+    assert_eq!(
+        bench.fine.fault().map(|fault| fault.kind),
+        Some(FaultKind::Feedback { joint: Some(0) })
+    );
 }
 
 #[test]
@@ -70,9 +92,15 @@ fn a_jog_is_let_go_in_the_period_in_which_its_keep_alive_is_late() {
         tick(&mut bench, 1);
         // The beat is seen in this period; `most` periods later nobody has said anything.
         tick(&mut bench, most as u32 - 1);
-        assert!(!bench.host.controls.jog.let_go.load(Relaxed), "{most} periods");
+        assert!(
+            !bench.host.controls.jog.let_go.load(Relaxed),
+            "{most} periods"
+        );
         tick(&mut bench, 1);
-        assert!(bench.host.controls.jog.let_go.load(Relaxed), "{most} periods");
+        assert!(
+            bench.host.controls.jog.let_go.load(Relaxed),
+            "{most} periods"
+        );
     }
 }
 

@@ -10,7 +10,9 @@ use demanding::{ACCELERATION_MM_PER_S2, Bench, FAULT_CODE, FEED_MM_PER_S, Script
 use tandem_fine::{FaultKind, FineConfig, Joints};
 use tandem_rig::Random;
 use tandem_rings::{MachineState, RestCause};
-use tandem_sdk::{Arm, Attached, AxisVector, Edge, EventKind, Kinematics, Limits, MAX_AXES, Setpoint, StopOn};
+use tandem_sdk::{
+    Arm, Attached, AxisVector, Edge, EventKind, Kinematics, Limits, MAX_AXES, Setpoint, StopOn,
+};
 
 /// Rounds on each machine.
 const ROUNDS: u64 = 105;
@@ -31,8 +33,15 @@ enum Phase {
     RampingOut,
 }
 
-const PHASES: [Phase; 7] =
-    [Phase::Enabling, Phase::Moving, Phase::Holding, Phase::Homing, Phase::Probing, Phase::Jogging, Phase::RampingOut];
+const PHASES: [Phase; 7] = [
+    Phase::Enabling,
+    Phase::Moving,
+    Phase::Holding,
+    Phase::Homing,
+    Phase::Probing,
+    Phase::Jogging,
+    Phase::RampingOut,
+];
 
 /// How the joints hang on the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,28 +97,54 @@ impl Machine {
     fn drawn(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let map = [Map::Axes, Map::Turned, Map::Bent][seed as usize % 3];
-        let joints =
-            (if map == Map::Axes { 1 } else { 2 }) + random.below(if map == Map::Bent { 3 } else { 5 }) as usize;
+        let joints = (if map == Map::Axes { 1 } else { 2 })
+            + random.below(if map == Map::Bent { 3 } else { 5 }) as usize;
         let behind = random.below(6) as usize;
         let period_s = [0.0005, 0.001, 0.002, 0.004][random.below(4) as usize];
-        let mut script =
-            Script { behind, homing_takes: u64::MAX, position: somewhere(&mut random, joints), ..Script::new(joints) };
+        let mut script = Script {
+            behind,
+            homing_takes: u64::MAX,
+            position: somewhere(&mut random, joints),
+            ..Script::new(joints)
+        };
         // What the drives say of their states is as late as what they say of their places.
         script.enable_after = std::array::from_fn(|_| 2 + behind as u64 + random.below(30));
         script.reset_takes = random.below(12);
         script.brake_for = std::array::from_fn(|_| random.below(20));
-        let attached = Attached { delay_periods: [behind as u32; MAX_AXES], ..Attached::default() };
-        let plain = FineConfig { period_s, attached, ..config(joints) };
+        let attached = Attached {
+            delay_periods: [behind as u32; MAX_AXES],
+            ..Attached::default()
+        };
+        let plain = FineConfig {
+            period_s,
+            attached,
+            ..config(joints)
+        };
         let (config, kinematics): (_, Option<Box<dyn Kinematics>>) = match map {
             Map::Axes => (plain, None),
             Map::Turned => (plain, Some(Box::new(Turned))),
             Map::Bent => {
-                let limits = Limits::new(&[plain.limits.axes()[0]; MAX_AXES][..2 * joints]).unwrap();
-                (FineConfig { limits, joints: Joints::Curved { axes: joints }, ..plain }, Some(Box::new(Bent)))
+                let limits =
+                    Limits::new(&[plain.limits.axes()[0]; MAX_AXES][..2 * joints]).unwrap();
+                (
+                    FineConfig {
+                        limits,
+                        joints: Joints::Curved { axes: joints },
+                        ..plain
+                    },
+                    Some(Box::new(Bent)),
+                )
             }
         };
         let bench = Bench::with(&config, script, kinematics);
-        Self { bench, random, joints, period_s, map, round: String::new() }
+        Self {
+            bench,
+            random,
+            joints,
+            period_s,
+            map,
+            round: String::new(),
+        }
     }
 
     /// Where the drives have the axes, mm.
@@ -124,15 +159,25 @@ impl Machine {
 
     /// All joints hold, where they stand.
     fn attach(&mut self) {
-        let rest = self.bench.rest(200).unwrap_or_else(|| panic!("{}: {:?}", self.round, self.bench.fault()));
+        let rest = self
+            .bench
+            .rest(200)
+            .unwrap_or_else(|| panic!("{}: {:?}", self.round, self.bench.fault()));
         let off = rest.position - self.axes();
         assert_eq!(rest.cause, RestCause::Attached, "{}", self.round);
-        assert!((0..self.joints).all(|axis| off[axis].abs() < ROUNDING_MM), "{}: {off:?}", self.round);
+        assert!(
+            (0..self.joints).all(|axis| off[axis].abs() < ROUNDING_MM),
+            "{}: {off:?}",
+            self.round
+        );
     }
 
     /// Queues a move of any axis with at least so long a cruise; the axis, and how far it goes.
     fn queue(&mut self, cruise_s: f64, stop_on: StopOn) -> (usize, f64) {
-        let (axis, ramp_s) = (self.random.below(self.joints as u64) as usize, self.random.between(0.03, 0.15));
+        let (axis, ramp_s) = (
+            self.random.below(self.joints as u64) as usize,
+            self.random.between(0.03, 0.15),
+        );
         self.bench.queue(axis, ramp_s, cruise_s, stop_on);
         (axis, 500.0 * ramp_s * (ramp_s + cruise_s))
     }
@@ -147,8 +192,17 @@ impl Machine {
         let (axis, by_mm) = self.queue(0.0, StopOn::default());
         self.ticks_s(0.4);
         let gone = self.axes() - from;
-        assert_eq!((self.bench.fault(), self.bench.state()), (None, MachineState::Standstill), "{}", self.round);
-        assert!((gone[axis] - by_mm).abs() < ROUNDING_MM, "{}: {gone:?} of {by_mm}", self.round);
+        assert_eq!(
+            (self.bench.fault(), self.bench.state()),
+            (None, MachineState::Standstill),
+            "{}",
+            self.round
+        );
+        assert!(
+            (gone[axis] - by_mm).abs() < ROUNDING_MM,
+            "{}: {gone:?} of {by_mm}",
+            self.round
+        );
     }
 
     /// Brings the machine to where it does that, some time into it.
@@ -175,9 +229,24 @@ impl Machine {
                 assert_eq!(self.bench.told().homing, 1 << joint, "{}", self.round);
             }
             Phase::Probing => {
-                self.queue(1.0, StopOn { input: PROBE, edge: Edge::Rising, miss_is_fault: 0 });
+                self.queue(
+                    1.0,
+                    StopOn {
+                        input: PROBE,
+                        edge: Edge::Rising,
+                        miss_is_fault: 0,
+                    },
+                );
                 self.ticks_s(some_s);
-                assert_eq!(self.bench.told().arm, Arm { input: PROBE, edge: 1 }, "{}", self.round);
+                assert_eq!(
+                    self.bench.told().arm,
+                    Arm {
+                        input: PROBE,
+                        edge: 1
+                    },
+                    "{}",
+                    self.round
+                );
             }
             Phase::Jogging => {
                 controls.jog.most_periods.store(20, Relaxed);
@@ -206,12 +275,29 @@ impl Machine {
         let first = if phase == Phase::RampingOut {
             FaultKind::EmergencyStop
         } else {
-            FaultKind::Drive { joint, code: FAULT_CODE }
+            FaultKind::Drive {
+                joint,
+                code: FAULT_CODE,
+            }
         };
-        assert_eq!(self.bench.fault(), Some(first), "{}: in that period", self.round);
+        assert_eq!(
+            self.bench.fault(),
+            Some(first),
+            "{}: in that period",
+            self.round
+        );
         self.ticks_s(0.4);
-        assert_eq!((self.bench.fault(), self.bench.state()), (Some(first), MachineState::Fault), "{}", self.round);
-        assert!(self.bench.fine.is_over(), "{}: the drives have let go", self.round);
+        assert_eq!(
+            (self.bench.fault(), self.bench.state()),
+            (Some(first), MachineState::Fault),
+            "{}",
+            self.round
+        );
+        assert!(
+            self.bench.fine.is_over(),
+            "{}: the drives have let go",
+            self.round
+        );
         let script = self.bench.script();
         let last = script.last();
         assert_eq!(
@@ -227,11 +313,19 @@ impl Machine {
     /// From one setpoint to the next no joint breaks a limit.
     fn assert_ramps(&self, told: &[Setpoint], phase: Phase) {
         let most = |limit: f64| limit * (1.0 + 1e-6) + 1e-6;
-        for told in told.iter().filter(|_| phase != Phase::Enabling && phase != Phase::Homing) {
+        for told in told
+            .iter()
+            .filter(|_| phase != Phase::Enabling && phase != Phase::Homing)
+        {
             for joint in 0..self.joints {
-                let (speed, acceleration) = (told.velocity[joint].abs(), told.acceleration[joint].abs());
+                let (speed, acceleration) =
+                    (told.velocity[joint].abs(), told.acceleration[joint].abs());
                 assert!(speed <= most(FEED_MM_PER_S), "{}: {told:?}", self.round);
-                assert!(acceleration <= most(ACCELERATION_MM_PER_S2), "{}: {told:?}", self.round);
+                assert!(
+                    acceleration <= most(ACCELERATION_MM_PER_S2),
+                    "{}: {told:?}",
+                    self.round
+                );
             }
         }
     }
@@ -240,7 +334,11 @@ impl Machine {
     fn reset(&mut self) {
         let position = somewhere(&mut self.random, self.joints);
         let controls = &self.bench.host.controls;
-        for flag in [&controls.hold, &controls.emergency_stop, &controls.jog.let_go] {
+        for flag in [
+            &controls.hold,
+            &controls.emergency_stop,
+            &controls.jog.let_go,
+        ] {
             flag.store(false, Relaxed);
         }
         controls.jog.most_periods.store(0, Relaxed);
@@ -260,7 +358,11 @@ impl Machine {
             let script = self.bench.script();
             // Until the drives are reset their fault is what the reset is for.
             let reset = if round > 0 { script.reset_takes + 1 } else { 0 };
-            let first = script.enable_after[..self.joints].iter().min().copied().unwrap_or(1);
+            let first = script.enable_after[..self.joints]
+                .iter()
+                .min()
+                .copied()
+                .unwrap_or(1);
             drop(script);
             self.bench.ticks(reset + 1 + self.random.below(first));
             assert!(self.bench.fine.is_attaching(), "{}", self.round);
@@ -270,16 +372,33 @@ impl Machine {
             self.work();
             self.begin(phase);
         }
-        let told: Vec<_> = self.bench.script().told.iter().map(|(told, _)| told.reset).collect();
+        let told: Vec<_> = self
+            .bench
+            .script()
+            .told
+            .iter()
+            .map(|(told, _)| told.reset)
+            .collect();
         let reset = u32::from(round > 0);
-        assert_eq!((told[0], told.iter().sum::<u32>()), (reset, reset), "{}: for one period", self.round);
+        assert_eq!(
+            (told[0], told.iter().sum::<u32>()),
+            (reset, reset),
+            "{}: for one period",
+            self.round
+        );
         self.fault(phase, joint);
         self.reset();
     }
 }
 
 fn somewhere(random: &mut Random, joints: usize) -> AxisVector {
-    AxisVector(std::array::from_fn(|i| if i < joints { random.between(-700.0, 700.0) } else { 0.0 }))
+    AxisVector(std::array::from_fn(|i| {
+        if i < joints {
+            random.between(-700.0, 700.0)
+        } else {
+            0.0
+        }
+    }))
 }
 
 #[test]
@@ -294,8 +413,9 @@ fn each_joint_faults_in_each_phase_and_the_machine_runs_again_a_hundred_times() 
             };
             let joint = round as usize / PHASES.len() % machine.joints;
             let (joints, map, period_s) = (machine.joints, machine.map, machine.period_s);
-            machine.round =
-                format!("seed {seed}, {joints} joints, {map:?}, {period_s} s, round {round}, joint {joint}, {phase:?}");
+            machine.round = format!(
+                "seed {seed}, {joints} joints, {map:?}, {period_s} s, round {round}, joint {joint}, {phase:?}"
+            );
             machine.round(round, phase, joint);
         }
     }

@@ -102,8 +102,13 @@ fn doing(doing: Doing, later: u32) -> (Bench, Sample) {
         Doing::Standstill => 2500,
         _ => 0,
     };
-    let samples = tick(&mut bench, there + 1 + if on_the_way { later % 15 } else { later });
-    let last = *samples.last().expect("a machine that has started gives samples");
+    let samples = tick(
+        &mut bench,
+        there + 1 + if on_the_way { later % 15 } else { later },
+    );
+    let last = *samples
+        .last()
+        .expect("a machine that has started gives samples");
     let state = match doing {
         Doing::Running | Doing::Dwelling | Doing::Probing => MachineState::Running,
         Doing::StoppingForHold | Doing::Held => MachineState::Holding,
@@ -134,27 +139,54 @@ fn sent(switched: &Switched) -> (u64, f64) {
 /// What must be sent in each sample behind `before`, once that has happened.
 fn judge(state: Doing, what: Happens, before: &Sample, samples: &[Sample]) {
     let all_on = (1 | KEPT | 1 << 61 | 1 << MIST | 1 << FLOOD, 100.0);
-    let on = if state == Doing::Aborted { (1 | KEPT | 1 << 61, 0.0) } else { all_on };
+    let on = if state == Doing::Aborted {
+        (1 | KEPT | 1 << 61, 0.0)
+    } else {
+        all_on
+    };
     assert_eq!(sent(&before.switched), on, "{state:?}");
-    let resting = matches!(state, Doing::Held | Doing::Dwelling | Doing::Aborted | Doing::Standstill);
+    let resting = matches!(
+        state,
+        Doing::Held | Doing::Dwelling | Doing::Aborted | Doing::Standstill
+    );
     if what == Happens::PeriodsAreMissed && resting {
-        assert!(samples.iter().all(|sample| sent(&sample.switched) == on), "{state:?}: nothing moved");
+        assert!(
+            samples.iter().all(|sample| sent(&sample.switched) == on),
+            "{state:?}: nothing moved"
+        );
         return;
     }
     let off = if what == Happens::EmergencyStop {
         0
     } else {
-        samples.iter().position(|sample| sample.state == MachineState::Fault).expect("a fault, and rest")
+        samples
+            .iter()
+            .position(|sample| sample.state == MachineState::Fault)
+            .expect("a fault, and rest")
     };
-    let by = if what == Happens::EmergencyStop { SwitchedBy::EmergencyStop } else { SwitchedBy::Fault };
+    let by = if what == Happens::EmergencyStop {
+        SwitchedBy::EmergencyStop
+    } else {
+        SwitchedBy::Fault
+    };
     for (number, sample) in samples.iter().enumerate() {
-        let (expected, said) = (if number < off { on } else { (KEPT, 0.0) }, format!("{state:?}, {what:?}, {number}"));
+        let (expected, said) = (
+            if number < off { on } else { (KEPT, 0.0) },
+            format!("{state:?}, {what:?}, {number}"),
+        );
         assert_eq!(sent(&sample.switched), expected, "{said}");
-        assert!(number < off || sample.switched.by == by, "{said}: {:?}", sample.switched.by);
+        assert!(
+            number < off || sample.switched.by == by,
+            "{said}: {:?}",
+            sample.switched.by
+        );
     }
     if what != Happens::EmergencyStop {
         let last = if off == 0 { before } else { &samples[off - 1] };
-        assert_eq!(samples[off].command, last.command, "{state:?}, {what:?}: at rest and no sooner");
+        assert_eq!(
+            samples[off].command, last.command,
+            "{state:?}, {what:?}: at rest and no sooner"
+        );
     }
 }
 
@@ -197,6 +229,11 @@ fn what_the_last_period_of_a_program_switches_is_left() {
     bench.event(EventKind::ProgramEnd, 0, 0.0);
     let samples = tick(&mut bench, 400);
     assert!(bench.fine.is_over());
-    assert_eq!(samples.last().map(|sample| sample.switched.spindle_rad_per_s), Some(100.0));
+    assert_eq!(
+        samples
+            .last()
+            .map(|sample| sample.switched.spindle_rad_per_s),
+        Some(100.0)
+    );
     assert_eq!(bench.fine.left().switched.spindle_rad_per_s, 0.0);
 }

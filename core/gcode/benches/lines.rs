@@ -11,7 +11,8 @@ use tandem_sdk::Axes;
 const LINES: u32 = 100_000;
 
 fn config() -> Config {
-    let mut config = Config::new(Axes::new(&[('X', false), ('Y', false), ('Z', false)]).expect("three axes"));
+    let mut config =
+        Config::new(Axes::new(&[('X', false), ('Y', false), ('Z', false)]).expect("three axes"));
     config.travel_mm[0] = (-250.0, 250.0);
     config.travel_mm[1] = (-250.0, 250.0);
     config
@@ -42,7 +43,9 @@ fn interpret(text: &str, items: &mut Vec<Item>) -> usize {
     let mut count = 0;
     for (number, line) in (1..).zip(text.lines()) {
         items.clear();
-        interpreter.line(number, line.as_bytes(), items).expect("a good line");
+        interpreter
+            .line(number, line.as_bytes(), items)
+            .expect("a good line");
         count += items.len();
     }
     count
@@ -50,7 +53,11 @@ fn interpret(text: &str, items: &mut Vec<Item>) -> usize {
 
 #[divan::bench(args = ["raster", "arcs"])]
 fn line(bencher: divan::Bencher, program: &str) {
-    let text = if program == "raster" { raster() } else { arcs() };
+    let text = if program == "raster" {
+        raster()
+    } else {
+        arcs()
+    };
     let mut items = Vec::with_capacity(16);
     bencher
         .counter(ItemsCount::new(LINES))
@@ -63,7 +70,11 @@ fn both_passes(bencher: divan::Bencher) {
     let text = raster();
     bencher.counter(ItemsCount::new(LINES)).bench_local(|| {
         let mut program = Program::spool("raster.ngc", text.as_bytes()).expect("a temporary file");
-        assert!(check(&mut program, &config(), &mut |_, _| Ok(())).expect("readable").is_ok());
+        assert!(
+            check(&mut program, &config(), &mut |_, _| Ok(()))
+                .expect("readable")
+                .is_ok()
+        );
         let mut stream = Stream::new(program, &config()).expect("checked");
         let mut items = Vec::with_capacity(16);
         while stream.next_items(&mut items).expect("unchanged") {
@@ -80,5 +91,8 @@ fn main() {
     let start = Instant::now();
     let blocks = interpret(&text, &mut items);
     let seconds = start.elapsed().as_secs_f64();
-    println!("{:.2} million lines a second ({blocks} blocks)", f64::from(LINES) / seconds / 1e6);
+    println!(
+        "{:.2} million lines a second ({blocks} blocks)",
+        f64::from(LINES) / seconds / 1e6
+    );
 }

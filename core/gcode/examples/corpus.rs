@@ -41,15 +41,25 @@ fn main() {
     files.sort();
     let judge = judge();
     if judge.is_none() {
-        println!("rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none: nothing is compared");
+        println!(
+            "rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none: nothing is compared"
+        );
     }
     let folder = std::env::temp_dir().join(format!("tandem-corpus-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
     let mut ranking = BTreeMap::<(Verdict, String), Vec<&Path>>::new();
     for file in &files {
         let (verdict, why) = judged(file, judge.as_deref(), &folder);
-        println!("{}: {}{}{why}", file.display(), verdict.name(), if why.is_empty() { "" } else { ": " });
-        ranking.entry((verdict, reason(&why))).or_default().push(file);
+        println!(
+            "{}: {}{}{why}",
+            file.display(),
+            verdict.name(),
+            if why.is_empty() { "" } else { ": " }
+        );
+        ranking
+            .entry((verdict, reason(&why)))
+            .or_default()
+            .push(file);
     }
     let _ = std::fs::remove_dir_all(&folder);
     print(&ranking, files.len());
@@ -61,8 +71,13 @@ fn walk(place: &Path, files: &mut Vec<PathBuf>) {
         return;
     }
     if let Ok(entries) = std::fs::read_dir(place) {
-        entries.flatten().for_each(|entry| walk(&entry.path(), files));
-    } else if place.extension().is_some_and(|ending| ENDINGS.iter().any(|e| ending.eq_ignore_ascii_case(e))) {
+        entries
+            .flatten()
+            .for_each(|entry| walk(&entry.path(), files));
+    } else if place
+        .extension()
+        .is_some_and(|ending| ENDINGS.iter().any(|e| ending.eq_ignore_ascii_case(e)))
+    {
         files.push(place.to_path_buf());
     }
 }
@@ -97,18 +112,29 @@ impl Verdict {
 }
 
 fn machine(file: &Path) -> Config {
-    let axes = "XYZABCUV".chars().map(|letter| (letter, "ABC".contains(letter))).collect::<Vec<_>>();
+    let axes = "XYZABCUV"
+        .chars()
+        .map(|letter| (letter, "ABC".contains(letter)))
+        .collect::<Vec<_>>();
     let mut config = Config::new(Axes::new(&axes).expect("eight axes"));
-    config.probe = Some(ProbeInput { input: 0, inverted: false });
+    config.probe = Some(ProbeInput {
+        input: 0,
+        inverted: false,
+    });
     config.zero_length_without_table = true;
-    config.subroutine_path.extend(file.parent().map(Path::to_path_buf));
+    config
+        .subroutine_path
+        .extend(file.parent().map(Path::to_path_buf));
     config
 }
 
 fn judged(file: &Path, judge: Option<&Path>, folder: &Path) -> (Verdict, String) {
     let mine = ours(file, &machine(file));
     let Some(judge) = judge else {
-        return mine.map_or_else(|why| (Verdict::RefusedHere, why), |_| (Verdict::Taken, String::new()));
+        return mine.map_or_else(
+            |why| (Verdict::RefusedHere, why),
+            |_| (Verdict::Taken, String::new()),
+        );
     };
     let tools: Vec<_> = (1..=TOOLS).map(|number| (number, 0.0, 0.0)).collect();
     let theirs = canon::judged(judge, file, folder, &Tables::of_tools(&tools)).map(moving);
@@ -117,16 +143,19 @@ fn judged(file: &Path, judge: Option<&Path>, folder: &Path) -> (Verdict, String)
         (Err(why), Ok(_)) => (Verdict::RefusedHere, why),
         (Ok(_), Err(why)) if why == canon::NEVER_ENDS => (Verdict::Taken, why),
         (Ok(_), Err(why)) => (Verdict::RefusedThere, why),
-        (Ok(mine), Ok(theirs)) => {
-            parting(&mine, &theirs).map_or_else(|| (Verdict::Same, String::new()), |why| (Verdict::Differs, why))
-        }
+        (Ok(mine), Ok(theirs)) => parting(&mine, &theirs).map_or_else(
+            || (Verdict::Same, String::new()),
+            |why| (Verdict::Differs, why),
+        ),
     }
 }
 
 /// A message without its place and its numbers, so that equal reasons are counted as one.
 fn reason(why: &str) -> String {
     let why = why.lines().next().unwrap_or_default();
-    let why = why.split_once("error: ").map_or(why, |(_, message)| message);
+    let why = why
+        .split_once("error: ")
+        .map_or(why, |(_, message)| message);
     if why.starts_with("move ") {
         return "other moves".to_owned();
     }
@@ -138,8 +167,17 @@ fn print(ranking: &BTreeMap<(Verdict, String), Vec<&Path>>, count: usize) {
     rows.sort_by_key(|((verdict, _), files)| (*verdict, std::cmp::Reverse(files.len())));
     println!();
     for ((verdict, reason), files) in &rows {
-        println!("{:5}  {}: {reason} ({})", files.len(), verdict.name(), files[0].display());
+        println!(
+            "{:5}  {}: {reason} ({})",
+            files.len(),
+            verdict.name(),
+            files[0].display()
+        );
     }
-    let taken: usize = rows.iter().filter(|((verdict, _), _)| verdict.is_taken()).map(|(_, files)| files.len()).sum();
+    let taken: usize = rows
+        .iter()
+        .filter(|((verdict, _), _)| verdict.is_taken())
+        .map(|(_, files)| files.len())
+        .sum();
     println!("\n{taken} of {count} files taken");
 }

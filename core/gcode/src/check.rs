@@ -92,7 +92,9 @@ pub fn check(
         Err(ProgramError::Text(diagnostic)) => pass.report.add(diagnostic),
         Err(other) => return Err(other),
     }
-    pass.report.warnings.extend(pass.execution.interpreter.note());
+    pass.report
+        .warnings
+        .extend(pass.execution.interpreter.note());
     Ok(pass.report)
 }
 
@@ -106,7 +108,12 @@ struct FirstPass<'a> {
 impl<'a> FirstPass<'a> {
     fn new(program: &mut Program, config: &Config, per_block: &'a mut PerBlock<'a>) -> Self {
         let execution = Execution::new(program, config, Pass::First);
-        Self { execution, per_block, items: Vec::new(), report: CheckReport::default() }
+        Self {
+            execution,
+            per_block,
+            items: Vec::new(),
+            report: CheckReport::default(),
+        }
     }
 
     fn run(&mut self, program: &mut Program) -> Result<(), ProgramError> {
@@ -140,7 +147,9 @@ impl<'a> FirstPass<'a> {
     /// lets a program that begins with `%` end at the second one, whatever follows; a `%` that closes what none opened
     /// may only be the last text of the file.
     fn look_behind_percent(&mut self, program: &mut Program) -> Result<(), ProgramError> {
-        let Some((percent, opened)) = self.execution.interpreter.ended_by_percent() else { return Ok(()) };
+        let Some((percent, opened)) = self.execution.interpreter.ended_by_percent() else {
+            return Ok(());
+        };
         loop {
             let next = self.execution.lines().next(program);
             let lines = self.execution.lines();
@@ -150,7 +159,9 @@ impl<'a> FirstPass<'a> {
                     let number = lines.number;
                     let text = lines.text(&range).to_vec();
                     let text = &text[..];
-                    let Some(at) = self.execution.interpreter.first_text(text) else { continue };
+                    let Some(at) = self.execution.interpreter.first_text(text) else {
+                        continue;
+                    };
                     let message = if opened {
                         format!(
                             "this and all that follows is not driven: the % of line {percent} has ended the program"
@@ -168,7 +179,10 @@ impl<'a> FirstPass<'a> {
                 Err(other) => return Err(other),
             };
             if opened {
-                self.report.warnings.push(Diagnostic { severity: Severity::Warning, ..found });
+                self.report.warnings.push(Diagnostic {
+                    severity: Severity::Warning,
+                    ..found
+                });
             } else {
                 self.report.add(found);
             }
@@ -201,7 +215,12 @@ impl<'a> FirstPass<'a> {
                     // A curve takes more lines than the one that is read.
                     let text = if curve.is_some() { b"" } else { text };
                     let curve = curve.as_deref().map(NurbsData::curve);
-                    judge_block(&mut self.report, &mut self.per_block, (block, curve), (&program.name, text));
+                    judge_block(
+                        &mut self.report,
+                        &mut self.per_block,
+                        (block, curve),
+                        (&program.name, text),
+                    );
                 }
                 Item::Wait(_) => waits = true,
                 Item::Event(_) | Item::Command(_) | Item::End => {}
@@ -223,6 +242,12 @@ fn judge_block(
     report.blocks += 1;
     report.length_mm += block.length_mm;
     if let Err(why) = per_block(block, curve) {
-        report.add(Diagnostic::whole_line(place.0, block.line, place.1, "block-refused", why));
+        report.add(Diagnostic::whole_line(
+            place.0,
+            block.line,
+            place.1,
+            "block-refused",
+            why,
+        ));
     }
 }

@@ -41,18 +41,27 @@ pub struct Lines {
 impl Lines {
     /// All of them.
     pub fn all() -> Self {
-        Self { mask: u64::MAX, shown: String::new() }
+        Self {
+            mask: u64::MAX,
+            shown: String::new(),
+        }
     }
 
     /// None of them.
     pub fn none() -> Self {
-        Self { mask: 0, shown: String::new() }
+        Self {
+            mask: 0,
+            shown: String::new(),
+        }
     }
 
     /// Why line `number` cannot be used, where nobody has it; `what` it is, as in "output".
     pub(crate) fn refusal(&self, what: &str, number: u32) -> Option<String> {
-        let there =
-            if self.shown.is_empty() { "there is none".to_owned() } else { format!("there are {}", self.shown) };
+        let there = if self.shown.is_empty() {
+            "there is none".to_owned()
+        } else {
+            format!("there are {}", self.shown)
+        };
         (self.mask >> number & 1 == 0).then(|| format!("no driver has {what} {number}; {there}"))
     }
 }

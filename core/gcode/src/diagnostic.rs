@@ -51,13 +51,27 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// An error that concerns `line` of `file` as a whole.
-    pub fn whole_line(file: &Arc<str>, line: u32, text: &[u8], code: &'static str, message: String) -> Self {
-        Self::new(file, line, text, Fault::new(Span::new(0, text.len()), code, message))
+    pub fn whole_line(
+        file: &Arc<str>,
+        line: u32,
+        text: &[u8],
+        code: &'static str,
+        message: String,
+    ) -> Self {
+        Self::new(
+            file,
+            line,
+            text,
+            Fault::new(Span::new(0, text.len()), code, message),
+        )
     }
 
     /// The error in `line`, or in the line before it that `fault` names.
     pub(crate) fn new(file: &Arc<str>, line: u32, text: &[u8], fault: Fault) -> Self {
-        let (line, text) = fault.line.as_ref().map_or((line, text), |before| (before.number, &before.text));
+        let (line, text) = fault
+            .line
+            .as_ref()
+            .map_or((line, text), |before| (before.number, &before.text));
         let start = text.len().min(fault.span.start as usize);
         let end = text.len().min(fault.span.end as usize).max(start);
         let column = 1 + characters(&text[..start]);
@@ -116,14 +130,25 @@ fn escape(bytes: &[u8], to: &mut String) {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: {}: {}", self.file, self.line, self.column, self.severity, self.message)?;
+        write!(
+            f,
+            "{}:{}:{}: {}: {}",
+            self.file, self.line, self.column, self.severity, self.message
+        )?;
         if self.excerpt.is_empty() {
             return Ok(());
         }
         writeln!(f, "\n  {}", self.excerpt)?;
-        let room = (CONTEXT as u32).min((self.excerpt.chars().count() as u32).saturating_sub(self.caret)).max(1);
+        let room = (CONTEXT as u32)
+            .min((self.excerpt.chars().count() as u32).saturating_sub(self.caret))
+            .max(1);
         let width = (self.end_column - self.column).clamp(1, room);
-        write!(f, "  {}{}", " ".repeat(self.caret as usize), "^".repeat(width as usize))
+        write!(
+            f,
+            "  {}{}",
+            " ".repeat(self.caret as usize),
+            "^".repeat(width as usize)
+        )
     }
 }
 
@@ -140,16 +165,28 @@ mod tests {
 
     #[test]
     fn the_caret_points_at_the_text() {
-        assert_eq!(shown(b"G1 X1 Q2", 6, 8), "part.ngc:7:7: error: no good\n  G1 X1 Q2\n        ^^");
+        assert_eq!(
+            shown(b"G1 X1 Q2", 6, 8),
+            "part.ngc:7:7: error: no good\n  G1 X1 Q2\n        ^^"
+        );
         assert_eq!(shown(b"", 0, 0), "part.ngc:7:1: error: no good");
     }
 
     #[test]
     fn columns_count_characters_and_control_bytes_are_escaped() {
-        assert_eq!(shown("(ä)\u{7}".as_bytes(), 4, 5), "part.ngc:7:4: error: no good\n  (ä)\\u{7}\n     ^");
-        assert_eq!(shown(b"(\xff)Q", 3, 4), "part.ngc:7:4: error: no good\n  (\\xff)Q\n        ^");
+        assert_eq!(
+            shown("(ä)\u{7}".as_bytes(), 4, 5),
+            "part.ngc:7:4: error: no good\n  (ä)\\u{7}\n     ^"
+        );
+        assert_eq!(
+            shown(b"(\xff)Q", 3, 4),
+            "part.ngc:7:4: error: no good\n  (\\xff)Q\n        ^"
+        );
         let hidden = shown("(\u{202e}'\u{9b}\\)".as_bytes(), 0, 1);
-        assert_eq!(hidden, "part.ngc:7:1: error: no good\n  (\\u{202e}'\\u{9b}\\)\n  ^");
+        assert_eq!(
+            hidden,
+            "part.ngc:7:1: error: no good\n  (\\u{202e}'\\u{9b}\\)\n  ^"
+        );
     }
 
     #[test]
@@ -158,7 +195,10 @@ mod tests {
         let shown = shown(&text, 2000, 4000);
         let lines: Vec<_> = shown.lines().collect();
         assert_eq!(lines[1].chars().count(), 2 + 122);
-        assert!(lines[1].starts_with("  …1") && lines[1].ends_with("1…"), "{shown}");
+        assert!(
+            lines[1].starts_with("  …1") && lines[1].ends_with("1…"),
+            "{shown}"
+        );
         assert_eq!(lines[2].find('^'), Some(2 + 61));
     }
 }

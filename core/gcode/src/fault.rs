@@ -9,7 +9,10 @@ pub(crate) struct Span {
 
 impl Span {
     pub fn new(start: usize, end: usize) -> Self {
-        Self { start: start as u32, end: end as u32 }
+        Self {
+            start: start as u32,
+            end: end as u32,
+        }
     }
 }
 
@@ -32,7 +35,12 @@ pub(crate) struct SourceLine {
 
 impl Fault {
     pub fn new(span: Span, code: &'static str, message: impl Into<String>) -> Self {
-        Self { span, code, message: message.into(), line: None }
+        Self {
+            span,
+            code,
+            message: message.into(),
+            line: None,
+        }
     }
 }
 
@@ -43,7 +51,11 @@ pub(crate) type Checked<T> = Result<T, Fault>;
 pub(crate) fn show(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    if text == "-0" {
+        "0".into()
+    } else {
+        text.into()
+    }
 }
 
 #[cfg(test)]

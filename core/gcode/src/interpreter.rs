@@ -39,7 +39,11 @@ impl Phase {
     /// The phase behind a line with text on it.
     #[inline]
     fn after_text(self) -> Self {
-        if self == Self::Fresh { Self::Running } else { self }
+        if self == Self::Fresh {
+            Self::Running
+        } else {
+            self
+        }
     }
 }
 
@@ -129,7 +133,10 @@ impl Interpreter {
         let line = self.state.tools.assumed_zero?;
         let message = "the machine has no tool table: the length of every tool is taken as zero";
         let note = Diagnostic::whole_line(&self.file, line, b"", "tool-length", message.into());
-        Some(Diagnostic { severity: Severity::Warning, ..note })
+        Some(Diagnostic {
+            severity: Severity::Warning,
+            ..note
+        })
     }
 
     /// A subroutine begins.
@@ -174,7 +181,11 @@ impl Interpreter {
         }
         let start = scanner.at();
         // A comment that is not closed is no comment.
-        let at = if scanner.skip_ignorable().is_ok() { scanner.at() } else { start };
+        let at = if scanner.skip_ignorable().is_ok() {
+            scanner.at()
+        } else {
+            start
+        };
         (at < line.len()).then_some(at)
     }
 
@@ -238,7 +249,12 @@ impl Interpreter {
     /// # Errors
     /// The first error of the line; `out` is then as before. The interpreter can go on with the next line (to find
     /// more errors), at the programmed end of this one where that is known.
-    pub fn line(&mut self, number: u32, text: &[u8], out: &mut Vec<Item>) -> Result<(), Diagnostic> {
+    pub fn line(
+        &mut self,
+        number: u32,
+        text: &[u8],
+        out: &mut Vec<Item>,
+    ) -> Result<(), Diagnostic> {
         if self.state.ended {
             return Ok(());
         }
@@ -267,12 +283,19 @@ impl Interpreter {
         if self.phase == Phase::Opened {
             self.state.ended = true;
             let why = "the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
-            return Err(Diagnostic::whole_line(&self.file, last_line, b"", "truncated", why.into()));
+            return Err(Diagnostic::whole_line(
+                &self.file,
+                last_line,
+                b"",
+                "truncated",
+                why.into(),
+            ));
         }
         let open = self.state.curves.end();
         let beside = compensation::off(&mut self.execution(out));
         stop::end(&mut self.execution(out));
-        open.and(beside).map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
+        open.and(beside)
+            .map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
     }
 
     /// The current line with the state that it changes.
@@ -293,7 +316,9 @@ impl Interpreter {
         if text.len() > MAX_LINE_BYTES {
             return Err(too_long(text.len()));
         }
-        let Some(from) = self.lead(text, out)? else { return Ok(()) };
+        let Some(from) = self.lead(text, out)? else {
+            return Ok(());
+        };
         self.words.clear();
         self.state.path.begin_line();
         self.reads_assumed.set(false);
@@ -318,7 +343,9 @@ impl Interpreter {
     fn curve_line(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
         let done = parsed.and_then(|()| self.assign()).and_then(|()| {
             self.orders.clear();
-            self.words.polar.map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
+            self.words
+                .polar
+                .map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
             curve::curve_line(&mut self.execution(out))
         });
         if done.is_err() {
@@ -330,12 +357,17 @@ impl Interpreter {
     /// Executes any other line, if it could be read; otherwise takes over what can be.
     #[inline]
     fn obey(&mut self, parsed: Checked<()>, out: &mut Vec<Item>) -> Checked<()> {
-        let sorted = self.orders.sort(&self.words, self.state.motion, &self.letters);
+        let sorted = self
+            .orders
+            .sort(&self.words, self.state.motion, &self.letters);
         let complete = parsed.is_ok();
-        let done = parsed.and(sorted).and_then(|()| self.assign()).and_then(|()| {
-            self.refuse_late_number()?;
-            self.execution(out).execute()
-        });
+        let done = parsed
+            .and(sorted)
+            .and_then(|()| self.assign())
+            .and_then(|()| {
+                self.refuse_late_number()?;
+                self.execution(out).execute()
+            });
         if done.is_err() {
             // What the line would have assigned exists, so that no later line complains of that.
             let _ = self.assign();
@@ -378,7 +410,11 @@ impl Interpreter {
         scanner.advance(1);
         scanner.skip_ignorable()?;
         if !scanner.at_end() {
-            return Err(Fault::new(scanner.since(start), "percent", "% stands on a line of its own"));
+            return Err(Fault::new(
+                scanner.since(start),
+                "percent",
+                "% stands on a line of its own",
+            ));
         }
         if self.phase == Phase::Fresh {
             self.phase = Phase::Opened;
@@ -397,9 +433,16 @@ impl Interpreter {
         let assumed = self.reads_assumed.get();
         for assignment in &self.words.assignments {
             match &assignment.target {
-                Target::Numbered(number) => self.parameters.set_numbered(*number, assignment.value, assumed),
+                Target::Numbered(number) => {
+                    self.parameters
+                        .set_numbered(*number, assignment.value, assumed)
+                }
                 Target::Named(range) => {
-                    if !self.parameters.set_named(&self.words.names[range.clone()], assignment.value, assumed) {
+                    if !self.parameters.set_named(
+                        &self.words.names[range.clone()],
+                        assignment.value,
+                        assumed,
+                    ) {
                         return Err(Fault::new(
                             assignment.span,
                             "parameter-name",
@@ -415,6 +458,8 @@ impl Interpreter {
 
 #[cold]
 fn too_long(length: usize) -> Fault {
-    let message = format!("the line has {length} bytes, {MAX_LINE_BYTES} are allowed: this is hardly a part program");
+    let message = format!(
+        "the line has {length} bytes, {MAX_LINE_BYTES} are allowed: this is hardly a part program"
+    );
     Fault::new(Span::new(0, 1), "line-long", message)
 }

@@ -6,7 +6,10 @@ use tandem_sdk::{AxisVector, Block, Edge, Event, NurbsData};
 
 /// One element of the stream, in program order.
 #[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant, reason = "blocks are by far the most frequent item; boxing them would allocate")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "blocks are by far the most frequent item; boxing them would allocate"
+)]
 pub enum Item {
     /// A path element, or rest. Behind a probe, whose [`Block::stop_on`] names an edge, nothing is read before
     /// [`crate::Stream::provide_probe`]; what else stands in its line may follow it. A NURBS has the data of its curve beside it.

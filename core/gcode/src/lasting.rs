@@ -118,7 +118,9 @@ impl Ledger {
 
 impl Inner {
     fn take_next(&mut self) {
-        let Some((_, moment)) = self.waiting.pop_front() else { return };
+        let Some((_, moment)) = self.waiting.pop_front() else {
+            return;
+        };
         match &mut self.reached {
             Some(reached) => {
                 reached.written.extend(moment.written);
@@ -144,7 +146,9 @@ impl Interpreter {
     pub fn set_lasting(&mut self, lasting: &Lasting) {
         self.state.coordinates.hear(lasting);
         self.parameters.set_lasting(&lasting.parameters);
-        self.state.tools.set_table(&lasting.tools, lasting.tool_in_spindle);
+        self.state
+            .tools
+            .set_table(&lasting.tools, lasting.tool_in_spindle);
     }
 
     /// From here on what lines write is kept, to be told by [`Interpreter::moment_since`].
@@ -156,12 +160,20 @@ impl Interpreter {
     /// something has changed.
     pub fn moment_since(&mut self, before: &mut Option<Moment>) -> Option<Moment> {
         let written = self.parameters.take_log();
-        let same = before.as_ref().is_some_and(|before| before.state.is_as(&self.state));
+        let same = before
+            .as_ref()
+            .is_some_and(|before| before.state.is_as(&self.state));
         if same && written.is_empty() {
             return None;
         }
-        let moment = Moment { state: Box::new(self.state.clone()), written };
-        *before = Some(Moment { state: moment.state.clone(), written: vec![] });
+        let moment = Moment {
+            state: Box::new(self.state.clone()),
+            written,
+        };
+        *before = Some(Moment {
+            state: moment.state.clone(),
+            written: vec![],
+        });
         Some(moment)
     }
 
@@ -212,7 +224,13 @@ impl Interpreter {
     pub fn modal_words(&self) -> Vec<String> {
         let (modes, coordinates) = (&self.state.modes, &self.state.coordinates);
         let either = |on: bool, yes: &str, no: &str| if on { yes } else { no }.to_string();
-        let mut words: Vec<String> = self.state.motion.code().map(str::to_string).into_iter().collect();
+        let mut words: Vec<String> = self
+            .state
+            .motion
+            .code()
+            .map(str::to_string)
+            .into_iter()
+            .collect();
         words.push(modes.plane.code().to_string());
         words.push(either(modes.unit_mm == 1.0, "G21", "G20"));
         words.push(either(modes.absolute, "G90", "G91"));
@@ -223,7 +241,11 @@ impl Interpreter {
         words.push(self.state.compensation.word().to_string());
         words.push(system_code(coordinates.active()));
         words.push(either(modes.exact_stop, "G61", "G64"));
-        words.push(either(*coordinates.tool() == AxisVector::ZERO, "G49", "G43"));
+        words.push(either(
+            *coordinates.tool() == AxisVector::ZERO,
+            "G49",
+            "G43",
+        ));
         words.push(match self.state.spindle.direction {
             0 => "M5".to_string(),
             direction => either(direction > 0, "M3", "M4"),
@@ -249,7 +271,11 @@ impl Interpreter {
 
 /// A work coordinate system as programs call it: `G54` for 0, `G59.3` for 8.
 pub fn system_code(index: usize) -> String {
-    if index < 6 { format!("G{}", 54 + index) } else { format!("G59.{}", index - 5) }
+    if index < 6 {
+        format!("G{}", 54 + index)
+    } else {
+        format!("G59.{}", index - 5)
+    }
 }
 
 #[cfg(test)]
@@ -260,7 +286,9 @@ mod tests {
     fn interpreter(config: &crate::Config, lines: &[&str]) -> Interpreter {
         let mut interpreter = Interpreter::new(config.clone());
         for (number, line) in (1..).zip(lines) {
-            interpreter.line(number, line.as_bytes(), &mut vec![]).unwrap();
+            interpreter
+                .line(number, line.as_bytes(), &mut vec![])
+                .unwrap();
         }
         interpreter
     }
@@ -279,13 +307,21 @@ mod tests {
         let first = interpreter(&mill(), &lines);
         let lasting = first.lasting();
         assert_eq!((lasting.active_system, lasting.tool_in_spindle), (1, 2));
-        assert_eq!(lasting.parameters, BTreeMap::from([(100, 7.0), (4999, -2.5)]), "#5 dies with its program");
+        assert_eq!(
+            lasting.parameters,
+            BTreeMap::from([(100, 7.0), (4999, -2.5)]),
+            "#5 dies with its program"
+        );
         let mut config = mill();
         config.lasting = Some(Arc::new(lasting.clone()));
         let second = Interpreter::new(config);
         assert_eq!(second.lasting(), lasting);
         let place = AxisVector::from_slice(&[1.0, 2.0, 3.0]);
-        assert_eq!(second.to_program(&place), first.to_program(&place), "the rotation in force too");
+        assert_eq!(
+            second.to_program(&place),
+            first.to_program(&place),
+            "the rotation in force too"
+        );
     }
 
     #[test]
@@ -294,7 +330,14 @@ mod tests {
         let mut ahead = standing.clone();
         ahead.keep_moments();
         let mut last = None;
-        for (number, line) in (1..).zip(["G1 X1 F60", "G91 #100=1", "X1", "#100=2 G10 L2 P1 X9", "T2", "X1"]) {
+        for (number, line) in (1..).zip([
+            "G1 X1 F60",
+            "G91 #100=1",
+            "X1",
+            "#100=2 G10 L2 P1 X9",
+            "T2",
+            "X1",
+        ]) {
             let before = ahead.next_block();
             ahead.line(number, line.as_bytes(), &mut vec![]).unwrap();
             if let Some(moment) = ahead.moment_since(&mut last) {
@@ -305,8 +348,16 @@ mod tests {
         ledger.forget();
         standing.take_up(ledger.take().unwrap());
         assert_eq!(standing.lasting().parameters, BTreeMap::from([(100, 1.0)]));
-        assert_eq!(standing.lasting().origins[0], AxisVector::ZERO, "the path did not come to line 4");
-        assert!(standing.modal_words().contains(&"G91".to_string()), "{:?}", standing.modal_words());
+        assert_eq!(
+            standing.lasting().origins[0],
+            AxisVector::ZERO,
+            "the path did not come to line 4"
+        );
+        assert!(
+            standing.modal_words().contains(&"G91".to_string()),
+            "{:?}",
+            standing.modal_words()
+        );
         assert!(standing.modal_words().contains(&"G1".to_string()));
         standing.reset_modes();
         assert!(standing.modal_words().contains(&"G90".to_string()));

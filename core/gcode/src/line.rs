@@ -20,8 +20,10 @@ const TRAVEL_ROUNDING: f64 = 1e-9;
 /// Groups that take effect before F, and those between T and S. The units and the feed mode of a line hold for all its
 /// words, unlike in LinuxCNC: `G20 F10` is 10 inches a minute.
 const BEFORE_FEED: u32 = Group::Units.bit() | Group::FeedMode.bit() | Group::LatheDiameter.bit();
-const BEFORE_SPEED: u32 =
-    Group::ModalState.bit() | Group::InputOutput.bit() | Group::ToolChange.bit() | Group::SpindleMode.bit();
+const BEFORE_SPEED: u32 = Group::ModalState.bit()
+    | Group::InputOutput.bit()
+    | Group::ToolChange.bit()
+    | Group::SpindleMode.bit();
 const BEFORE_MOTION: u32 = (Group::Motion.bit() - 1) & !(BEFORE_FEED | BEFORE_SPEED);
 /// Modes that later lines are read with.
 const MODES: u32 = Group::Plane.bit()
@@ -46,7 +48,11 @@ impl Line<'_> {
     /// Obeys the words in LinuxCNC's order.
     #[inline]
     pub fn execute(&mut self) -> Checked<()> {
-        if self.state.compensation.is_on() && self.orders.get(Group::CutterRadius).is_none_or(|word| word.tenths != 400)
+        if self.state.compensation.is_on()
+            && self
+                .orders
+                .get(Group::CutterRadius)
+                .is_none_or(|word| word.tenths != 400)
         {
             compensation::refuse_company(self)?;
         }
@@ -108,7 +114,10 @@ impl Line<'_> {
     #[cold]
     pub fn recover(&mut self, complete: bool) {
         // Errors of what follows have been reported already, or do not matter now.
-        let _ = self.act(BEFORE_FEED).and_then(|()| modes::feed(self)).and_then(|()| self.act(MODES));
+        let _ = self
+            .act(BEFORE_FEED)
+            .and_then(|()| modes::feed(self))
+            .and_then(|()| self.act(MODES));
         self.set_motion();
         self.state.compensation.spoil();
         if matches!(self.orders.motion, Some(MotionMode::Refused)) {
@@ -148,14 +157,19 @@ impl Line<'_> {
     pub fn named_axes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (0..self.letters.count()).filter_map(|axis| {
             let value = self.words.get(self.letters.letter(axis))?;
-            Some((axis, value * self.state.modes.word_scale(self.letters, axis)))
+            Some((
+                axis,
+                value * self.state.modes.word_scale(self.letters, axis),
+            ))
         })
     }
 
     /// Whether G53 stands in the line: its axis words are machine coordinates.
     #[inline]
     pub fn in_machine_coordinates(&self) -> bool {
-        self.orders.get(Group::NonModal).is_some_and(|word| word.tenths == 530)
+        self.orders
+            .get(Group::NonModal)
+            .is_some_and(|word| word.tenths == 530)
     }
 
     /// Takes the axis words into the programmed position.
@@ -167,7 +181,9 @@ impl Line<'_> {
             return self.advance_in_plane(absolute);
         }
         for axis in 0..self.letters.count() {
-            let Some(value) = self.words.get(self.letters.letter(axis)) else { continue };
+            let Some(value) = self.words.get(self.letters.letter(axis)) else {
+                continue;
+            };
             let value = value * self.state.modes.word_scale(self.letters, axis);
             let base = match (machine, absolute) {
                 (true, _) => 0.0,
@@ -188,7 +204,11 @@ impl Line<'_> {
     fn advance_in_plane(&mut self, absolute: bool) {
         let mut program = self.state.coordinates.to_program(&self.state.path.position);
         for (axis, value) in self.named_axes() {
-            program[axis] = if absolute { value } else { program[axis] + value };
+            program[axis] = if absolute {
+                value
+            } else {
+                program[axis] + value
+            };
         }
         if let (Some(polar), Some([x, y])) = (self.words.polar, self.state.coordinates.plane()) {
             let unit_mm = self.state.modes.unit_mm;
@@ -198,7 +218,11 @@ impl Line<'_> {
         self.state.path.position = self.state.coordinates.to_machine(&program);
         let plane = mask("XY");
         let named = self.words.named();
-        let moved = if named & plane == 0 { named } else { named | plane };
+        let moved = if named & plane == 0 {
+            named
+        } else {
+            named | plane
+        };
         if absolute && named & plane == plane {
             self.state.path.uncertain &= !self.letters.axes_of(named);
         }
@@ -228,7 +252,8 @@ impl Line<'_> {
 
     #[inline]
     pub fn moves_linear(&self, displacement: &AxisVector) -> bool {
-        (0..self.letters.count()).any(|axis| displacement[axis] != 0.0 && !self.letters.is_rotary(axis))
+        (0..self.letters.count())
+            .any(|axis| displacement[axis] != 0.0 && !self.letters.is_rotary(axis))
     }
 
     /// The feed of a path of `length_mm`, mm/s or rad/s.
@@ -244,8 +269,16 @@ impl Line<'_> {
                 _ => Err(self.no_inverse_time()),
             };
         }
-        let feed = if linear { feed.linear_mm_per_s } else { feed.rotary_rad_per_s };
-        if feed > 0.0 { Ok(feed) } else { Err(self.no_feed()) }
+        let feed = if linear {
+            feed.linear_mm_per_s
+        } else {
+            feed.rotary_rad_per_s
+        };
+        if feed > 0.0 {
+            Ok(feed)
+        } else {
+            Err(self.no_feed())
+        }
     }
 
     /// G95: the feed at the speed that the spindle is commanded.
@@ -253,25 +286,37 @@ impl Line<'_> {
     fn feed_a_revolution(&self) -> Checked<f64> {
         let speed_rad_per_s = self.state.spindle.speed_rad_per_s;
         if speed_rad_per_s <= 0.0 {
-            return Err(
-                self.motion_fault("feed-missing", "G95 is a feed a revolution, and the spindle has no speed (S)")
-            );
+            return Err(self.motion_fault(
+                "feed-missing",
+                "G95 is a feed a revolution, and the spindle has no speed (S)",
+            ));
         }
-        let feed = self.state.modes.feed.mm_per_revolution * speed_rad_per_s / std::f64::consts::TAU;
-        if feed > 0.0 { Ok(feed) } else { Err(self.no_feed()) }
+        let feed =
+            self.state.modes.feed.mm_per_revolution * speed_rad_per_s / std::f64::consts::TAU;
+        if feed > 0.0 {
+            Ok(feed)
+        } else {
+            Err(self.no_feed())
+        }
     }
 
     /// The motion word whose path this line makes, where it is no straight line and no arc.
     fn special_motion(&self) -> Option<&'static crate::words::Word> {
         match self.orders.motion {
-            Some(MotionMode::Word(word)) if !matches!(word.shape(), Some(Shape::Straight | Shape::Arc)) => Some(word),
+            Some(MotionMode::Word(word))
+                if !matches!(word.shape(), Some(Shape::Straight | Shape::Arc)) =>
+            {
+                Some(word)
+            }
             _ => None,
         }
     }
 
     #[cold]
     fn no_inverse_time(&self) -> Fault {
-        let curve = self.special_motion().is_some_and(|word| word.shape() == Some(Shape::Curve));
+        let curve = self
+            .special_motion()
+            .is_some_and(|word| word.shape() == Some(Shape::Curve));
         let why = if curve {
             "with G93 every curve needs its F, in its first line"
         } else {
@@ -282,14 +327,25 @@ impl Line<'_> {
 
     #[cold]
     fn no_feed(&self) -> Fault {
-        let why = if self.words.has(b'F') { "the feed is zero" } else { "the feed is missing: no F has been set" };
-        let who = self.special_motion().map_or("G1, G2 and G3 need".into(), |word| format!("{} needs", word.code));
+        let why = if self.words.has(b'F') {
+            "the feed is zero"
+        } else {
+            "the feed is missing: no F has been set"
+        };
+        let who = self
+            .special_motion()
+            .map_or("G1, G2 and G3 need".into(), |word| {
+                format!("{} needs", word.code)
+            });
         self.motion_fault("feed-missing", format!("{why}; {who} one"))
     }
 
     /// Appends a block.
     #[inline]
-    #[allow(clippy::large_types_passed_by_value, reason = "built in place: a reference would copy once more")]
+    #[allow(
+        clippy::large_types_passed_by_value,
+        reason = "built in place: a reference would copy once more"
+    )]
     pub fn push(&mut self, block: Block) {
         if self.state.compensation.holds() {
             return self.state.compensation.hold(Item::Block(block, None));
@@ -309,7 +365,13 @@ impl Line<'_> {
     /// Appends an event before the next block.
     pub fn event(&mut self, kind: EventKind, index: u32, value: f64) {
         let (line, before_block) = (self.state.line, self.state.path.next_index);
-        let event = Item::Event(Event::new(kind, line, before_block, index.cast_signed(), value));
+        let event = Item::Event(Event::new(
+            kind,
+            line,
+            before_block,
+            index.cast_signed(),
+            value,
+        ));
         if self.state.compensation.holds() {
             return self.state.compensation.hold(event);
         }
@@ -325,7 +387,11 @@ impl Line<'_> {
 
     /// Rest for `dwell_s`.
     pub fn dwell(&mut self, dwell_s: f64) {
-        let block = Block { kind: BlockKind::Dwell, dwell_s, ..self.state.blank_block() };
+        let block = Block {
+            kind: BlockKind::Dwell,
+            dwell_s,
+            ..self.state.blank_block()
+        };
         self.push(block);
         self.state.path.at_rest = true;
     }
@@ -334,10 +400,19 @@ impl Line<'_> {
     #[inline]
     pub fn check_travel(&self, axis: usize, low: f64, high: f64) -> Checked<()> {
         let (min, max) = self.config.travel_mm[axis];
-        if low >= min - TRAVEL_ROUNDING && high <= max + TRAVEL_ROUNDING || self.state.path.uncertain >> axis & 1 != 0 {
+        if low >= min - TRAVEL_ROUNDING && high <= max + TRAVEL_ROUNDING
+            || self.state.path.uncertain >> axis & 1 != 0
+        {
             return Ok(());
         }
-        Err(self.beyond_travel(axis, if high > max + TRAVEL_ROUNDING { high } else { low }))
+        Err(self.beyond_travel(
+            axis,
+            if high > max + TRAVEL_ROUNDING {
+                high
+            } else {
+                low
+            },
+        ))
     }
 
     #[cold]
@@ -349,8 +424,10 @@ impl Line<'_> {
         let name = letter as char;
         let (min, max) = self.config.travel_mm[axis];
         let travel = format!("{} to {} {unit}", shown(min), shown(max));
-        let mut message =
-            format!("{name} would reach {} {unit}, beyond its travel of {travel} (machine coordinates", shown(value));
+        let mut message = format!(
+            "{name} would reach {} {unit}, beyond its travel of {travel} (machine coordinates",
+            shown(value)
+        );
         let offset = self.state.coordinates.total()[axis];
         if offset != 0.0 {
             let _ = write!(message, "; the offset in force is {} {unit}", shown(offset));
@@ -377,7 +454,11 @@ impl Line<'_> {
     /// Motions other than G0 and G1 do not go with G53.
     pub fn refuse_machine_coordinates(&self) -> Checked<()> {
         if self.in_machine_coordinates() {
-            return Err(self.orders.fault(Group::NonModal, "conflict", "G53 goes with G0 and G1 only"));
+            return Err(self.orders.fault(
+                Group::NonModal,
+                "conflict",
+                "G53 goes with G0 and G1 only",
+            ));
         }
         Ok(())
     }

@@ -39,7 +39,13 @@ impl Stream {
             return Err(ProgramError::Unchecked(Arc::clone(&program.name)));
         }
         let execution = Execution::new(&mut program, config, Pass::Second);
-        Ok(Self { program, execution, waiting: None, ledger: None, told: None })
+        Ok(Self {
+            program,
+            execution,
+            waiting: None,
+            ledger: None,
+            told: None,
+        })
     }
 
     /// Tells `ledger` what every line changes, with the block at which the path reaches it. Before the first item.
@@ -65,8 +71,12 @@ impl Stream {
     /// or an answer has not been provided.
     pub fn next_items(&mut self, out: &mut Vec<Item>) -> Result<bool, ProgramError> {
         match self.waiting {
-            Some(Waiting::Input) => return Err(ProgramError::WaitsForInput(Arc::clone(&self.program.name))),
-            Some(Waiting::Probe) => return Err(ProgramError::WaitsForProbe(Arc::clone(&self.program.name))),
+            Some(Waiting::Input) => {
+                return Err(ProgramError::WaitsForInput(Arc::clone(&self.program.name)));
+            }
+            Some(Waiting::Probe) => {
+                return Err(ProgramError::WaitsForProbe(Arc::clone(&self.program.name)));
+            }
             None => {}
         }
         let before = out.len();

@@ -9,12 +9,15 @@ use tandem_sdk::Axes;
 
 #[test]
 fn a_steady_state_allocates_nothing() {
-    let line =
-        "N5 G1 X[#1 + 0.5] Y0.25 F1000 S500 M8 (along)\n#1=[#1 + 0.001] #<depth>=[#1 * 2]\nG2 X0 Y0 R40\nG4 P0.1\n";
+    let line = "N5 G1 X[#1 + 0.5] Y0.25 F1000 S500 M8 (along)\n#1=[#1 + 0.001] #<depth>=[#1 * 2]\nG2 X0 Y0 R40\nG4 P0.1\n";
     let text = "M3 S500 TA 20\n".to_owned() + &line.repeat(10_000);
     let config = Config::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
     let mut program = Program::spool("steady.ngc", text.as_bytes()).unwrap();
-    assert!(check(&mut program, &config, &mut |_, _| Ok(())).unwrap().is_ok());
+    assert!(
+        check(&mut program, &config, &mut |_, _| Ok(()))
+            .unwrap()
+            .is_ok()
+    );
     let mut stream = Stream::new(program, &config).unwrap();
     let mut items = Vec::with_capacity(100);
     for _ in 0..100 {

@@ -10,8 +10,14 @@ use tandem_sdk::{Block, NurbsData};
 
 fn curves(program: &str) -> Vec<(Block, Arc<NurbsData>)> {
     let all = run(program).into_iter();
-    all.filter_map(|item| if let Item::Block(block, curve) = item { curve.map(|curve| (block, curve)) } else { None })
-        .collect()
+    all.filter_map(|item| {
+        if let Item::Block(block, curve) = item {
+            curve.map(|curve| (block, curve))
+        } else {
+            None
+        }
+    })
+    .collect()
 }
 
 fn assert_messages(program: &str, expected: &[&str]) {
@@ -20,7 +26,9 @@ fn assert_messages(program: &str, expected: &[&str]) {
 
 #[test]
 fn linuxcnc_curve() {
-    let items = shown(&run("F60\nG0 X1\nG5.2 P2 L3\nX0 Y1 P1\n(in between)\nX2 Y2\nN7 X2 Y0 P3\nG5.3\nG1 X3"));
+    let items = shown(&run(
+        "F60\nG0 X1\nG5.2 P2 L3\nX0 Y1 P1\n(in between)\nX2 Y2\nN7 X2 Y0 P3\nG5.3\nG1 X3",
+    ));
     assert_eq!(
         items[1],
         "3: Nurbs 1 to 2 0 0 0 length 3.867 feed 1 degree 2 points 1 0 0, 0 1 0, 2 2 0, 2 0 0 weights 2 1 1 3 \
@@ -33,7 +41,10 @@ fn linuxcnc_curve() {
 fn linuxcnc_curve_with_a_point_in_its_first_line() {
     let made = curves("F60\nG91 G5.2 X1 Y1 P3 L4\nX1\nX1 Y-1\nG5.3");
     let data = &made[0].1;
-    assert_eq!((data.degree, data.weights.as_slice()), (3, &[1.0, 3.0, 1.0, 1.0][..]));
+    assert_eq!(
+        (data.degree, data.weights.as_slice()),
+        (3, &[1.0, 3.0, 1.0, 1.0][..])
+    );
     assert_eq!(data.control_points[3].0[..2], [3.0, 0.0]);
     // Nothing is left of the curve's mode.
     assert!(messages("F60\nG5.2 X1 Y1\nX2\nG5.3\nX5")[0].contains("no motion mode"));
@@ -41,7 +52,9 @@ fn linuxcnc_curve_with_a_point_in_its_first_line() {
 
 #[test]
 fn fanuc_curve() {
-    let items = shown(&run("F60\nG06.2 P3 K0 X0 Y0 R1\nK0 X0 Y5\nK0. X5 Y5 R2\nK1 X9 Y5\nK3\nN9 K3\nK3\nG01 X10"));
+    let items = shown(&run(
+        "F60\nG06.2 P3 K0 X0 Y0 R1\nK0 X0 Y5\nK0. X5 Y5 R2\nK1 X9 Y5\nK3\nN9 K3\nK3\nG01 X10",
+    ));
     assert_eq!(
         items[0],
         "2: Nurbs 0 to 9 5 0 0 length 12.65 feed 1 degree 2 points 0 0 0, 0 5 0, 5 5 0, 9 5 0 weights 1 1 2 1 \
@@ -49,15 +62,30 @@ fn fanuc_curve() {
     );
     assert!(items[1].starts_with("9: Line 1 to 10 5"), "{}", items[1]);
     // Without a point in its first line the curve begins where the machine stands; without P it is cubic.
-    assert_eq!(curves("F60\nG1 X1\nG6.2 K0\nK0 X2\nK0 X2 Y1\nK0 Y2\nK1\nK1\nK1\nK1")[0].1.degree, 3);
+    assert_eq!(
+        curves("F60\nG1 X1\nG6.2 K0\nK0 X2\nK0 X2 Y1\nK0 Y2\nK1\nK1\nK1\nK1")[0]
+            .1
+            .degree,
+        3
+    );
 }
 
 #[test]
 fn bezier_curves() {
     let made = curves("F60\nG5 X3 Y0 I1 J1 P-1 Q1\nX6 P-1 Q-1\nG5.1 X8 I1");
-    let points = |n: usize| made[n].1.control_points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>();
+    let points = |n: usize| {
+        made[n]
+            .1
+            .control_points
+            .iter()
+            .map(|p| [p[0], p[1]])
+            .collect::<Vec<_>>()
+    };
     assert_eq!(points(0), [[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 0.0]]);
-    assert_eq!(points(1), [[3.0, 0.0], [4.0, -1.0], [5.0, -1.0], [6.0, 0.0]]);
+    assert_eq!(
+        points(1),
+        [[3.0, 0.0], [4.0, -1.0], [5.0, -1.0], [6.0, 0.0]]
+    );
     assert_eq!(points(2), [[6.0, 0.0], [7.0, 0.0], [8.0, 0.0]]);
     let inches = curves("G20 F60\nG5.1 X2 I1");
     assert!((inches[0].0.length_mm - 50.8).abs() < 1e-9 && inches[0].0.feed_mm_per_s == 25.4);
@@ -74,7 +102,13 @@ fn inverse_time() {
 fn blocks_go_on_behind_a_curve() {
     let (items, errors) = run_on(mill(), "F60\nG1 X1\nG5.2 L2\nX2\nG5.3\nG1 X5\nX7");
     assert!(errors.is_empty());
-    assert_eq!(only_blocks(&items).iter().map(|b| b.index).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    assert_eq!(
+        only_blocks(&items)
+            .iter()
+            .map(|b| b.index)
+            .collect::<Vec<_>>(),
+        [0, 1, 2, 3]
+    );
 }
 
 #[test]
@@ -95,11 +129,19 @@ fn faulty_knots_and_weights_are_named() {
         "F60\nG6.2 P3 K0\nK0 X1 R0\nK0 X2\nK2\nK2\nK2",
         &["3:7 [nurbs] the weight R must be greater than zero"],
     );
-    assert_messages("F60\nG5.2 P-1\nX2\nG5.3", &["2:6 [nurbs] the weight P must be greater than zero"]);
-    assert_messages("F60\nG6.2 P7 K0", &["2:6 [word-range] P must be a whole number from 2 to 6"]);
+    assert_messages(
+        "F60\nG5.2 P-1\nX2\nG5.3",
+        &["2:6 [nurbs] the weight P must be greater than zero"],
+    );
+    assert_messages(
+        "F60\nG6.2 P7 K0",
+        &["2:6 [word-range] P must be a whole number from 2 to 6"],
+    );
     assert_messages(
         "F60\nG6.2 P2 X1 K0\nX2 K0\nK1\nK1",
-        &["2:9 [nurbs] the first control point is not where the machine stands (1 off): the curve begins there"],
+        &[
+            "2:9 [nurbs] the first control point is not where the machine stands (1 off): the curve begins there",
+        ],
     );
 }
 
@@ -112,7 +154,10 @@ fn what_is_missing_is_named() {
            control point 1 are missing",
         ],
     );
-    assert_messages("F60\nG6.2 P3 K0\nX1\nK0 X2\nK2\nK2\nK2", &["3:1 [nurbs] K, the knot of this line, is missing"]);
+    assert_messages(
+        "F60\nG6.2 P3 K0\nX1\nK0 X2\nK2\nK2\nK2",
+        &["3:1 [nurbs] K, the knot of this line, is missing"],
+    );
     assert_messages(
         "F60\nG5.2 L4\nX1\nX2\nG5.3\nG1 X9",
         &[
@@ -121,15 +166,34 @@ fn what_is_missing_is_named() {
     );
     assert_messages(
         "F60\nG5.2\nX1\nX2\nG1 X9",
-        &["5:1 [nurbs] the curve that line 2 opens is not complete: G5.3, which ends it, is missing before this line"],
+        &[
+            "5:1 [nurbs] the curve that line 2 opens is not complete: G5.3, which ends it, is missing before this line",
+        ],
     );
-    for stray in ["F60\nG1 X1\nG5.3\nG1 X2", "F60\nG5.2 L2\nX2\nG5.3 (over)\n\nG5.3"] {
+    for stray in [
+        "F60\nG1 X1\nG5.3\nG1 X2",
+        "F60\nG5.2 L2\nX2\nG5.3 (over)\n\nG5.3",
+    ] {
         let line = stray.lines().count() - usize::from(stray.starts_with("F60\nG1"));
-        assert_messages(stray, &[&format!("{line}:1 [nurbs] G5.3 ends a curve, and none is open: G5.2 opens one")]);
+        assert_messages(
+            stray,
+            &[&format!(
+                "{line}:1 [nurbs] G5.3 ends a curve, and none is open: G5.2 opens one"
+            )],
+        );
     }
-    assert_messages("F60\nG5.2\nX1", &["3:1 [nurbs] the program ends within the curve that line 2 opens"]);
-    assert_messages("F60\nG5.2\nX1 S300\nX2\nG5.3", &["3:4 [unused-word] S has no place in this line of a curve"]);
-    assert_messages("F60\nG5.2\nX1 B3\nX2\nG5.3", &["3:4 [axis] this machine has no axis B; it has X Y Z A"]);
+    assert_messages(
+        "F60\nG5.2\nX1",
+        &["3:1 [nurbs] the program ends within the curve that line 2 opens"],
+    );
+    assert_messages(
+        "F60\nG5.2\nX1 S300\nX2\nG5.3",
+        &["3:4 [unused-word] S has no place in this line of a curve"],
+    );
+    assert_messages(
+        "F60\nG5.2\nX1 B3\nX2\nG5.3",
+        &["3:4 [axis] this machine has no axis B; it has X Y Z A"],
+    );
     assert_messages(
         "F60\nG6.2 P3 K0\nK0 X1 R1e-3\nK0 X2\nK1\nK1\nK1",
         &["3:9 [unused-word] E has no place in this line of a curve; numbers have no exponent"],
@@ -146,17 +210,25 @@ fn what_is_missing_is_named() {
         "F60\nG5.2\nX1\nX2\nG5.3 M8\nG1 X9",
         &["5:6 [nurbs] G5.3 ends a curve: no other G or M word stands in its line"],
     );
-    assert_messages("F60 G5 X1 I1 J1", &["1:5 [nurbs] G5 needs P and Q, the third control point from the end"]);
+    assert_messages(
+        "F60 G5 X1 I1 J1",
+        &["1:5 [nurbs] G5 needs P and Q, the third control point from the end"],
+    );
     assert_messages(
         "F60 G5 X1 P1 Q1",
         &[
             "1:5 [nurbs] G5 needs I and J, the second control point from the start: only a G5 behind another may lack them",
         ],
     );
-    assert_messages("F60 G18 G5.1 X1 I1", &["1:9 [nurbs] G5 and G5.1 need the plane XY (G17)"]);
+    assert_messages(
+        "F60 G18 G5.1 X1 I1",
+        &["1:9 [nurbs] G5 and G5.1 need the plane XY (G17)"],
+    );
     assert_messages(
         "F60\nG5.2\nX0\nX0\nG5.3",
-        &["5:1 [nurbs] the curve that line 2 opens: all control points coincide: the curve has no length"],
+        &[
+            "5:1 [nurbs] the curve that line 2 opens: all control points coincide: the curve has no length",
+        ],
     );
 }
 
@@ -165,13 +237,17 @@ fn what_is_missing_is_named() {
 fn what_is_wrong_with_the_whole_points_at_the_word() {
     assert_messages(
         "F60\nG6.2 P3 K0\nK0 X1 R1000 (heavy)\nN9 K0 (R) x[1+1] R.0001\nK1 X3\nK2\nK2\nK2\nG1 X9",
-        &["4:18 [nurbs] the curve that line 2 opens: the largest weight is 1.0e7 times the smallest: at most 1e6 is \
-           evaluated to its digits"],
+        &[
+            "4:18 [nurbs] the curve that line 2 opens: the largest weight is 1.0e7 times the smallest: at most 1e6 is \
+           evaluated to its digits",
+        ],
     );
     assert_messages(
         "F60\nG5.2\nX1 P1000\nX2\nX3 Y1 P0.000001\nX4\nG5.3",
-        &["5:7 [nurbs] the curve that line 2 opens: the largest weight is 1.0e9 times the smallest: at most 1e6 is \
-           evaluated to its digits"],
+        &[
+            "5:7 [nurbs] the curve that line 2 opens: the largest weight is 1.0e9 times the smallest: at most 1e6 is \
+           evaluated to its digits",
+        ],
     );
     assert_messages(
         "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nX3 K0.00000000001\nK1\nK1\nK1",
@@ -187,7 +263,10 @@ fn what_is_wrong_with_the_whole_points_at_the_word() {
         ],
     );
     let excerpt = run_on(mill(), "F60\nG5.2\nX1 P1000\nX2 P0.0001\nX3\nG5.3").1[0].to_string();
-    assert!(excerpt.ends_with("\n  X2 P0.0001\n     ^^^^^^^"), "{excerpt}");
+    assert!(
+        excerpt.ends_with("\n  X2 P0.0001\n     ^^^^^^^"),
+        "{excerpt}"
+    );
 }
 
 /// Knots that stand too often: the curve would not pass its ends, or falls apart.
@@ -199,11 +278,19 @@ fn knots_that_stand_too_often() {
              curve would not reach its control point there"
         )
     };
-    assert_messages("F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK0 X3\nK1\nK1\nK1\nG1 X9", &[&end(5, "0", 4)]);
-    assert_messages("F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1 X3\nK1\nK1\nK1\nG1 X9", &[&end(6, "1", 4)]);
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK0 X3\nK1\nK1\nK1\nG1 X9",
+        &[&end(5, "0", 4)],
+    );
+    assert_messages(
+        "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1 X3\nK1\nK1\nK1\nG1 X9",
+        &[&end(6, "1", 4)],
+    );
     assert_messages(
         "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK1 X3\nK1 X4\nK1 X5\nK2\nK2\nK2",
-        &["7:1 [nurbs] knot 1 stands 3 times inside a curve of degree 2: the curve breaks in two there"],
+        &[
+            "7:1 [nurbs] knot 1 stands 3 times inside a curve of degree 2: the curve breaks in two there",
+        ],
     );
     assert_messages(
         "F60\nG6.2 P3 K0\nK0 X1\nK0 X2\nK0\nK0\nK0",
@@ -216,11 +303,19 @@ fn knots_that_stand_too_often() {
 fn travel() {
     assert!(messages("F60\nG5.2\nX240 Y100\nX0 Y251\nX-240 Y100\nG5.3").is_empty());
     let refused = messages("F60\nG5.2\nX240 Y100\nX0 Y600\nX-240 Y100\nG5.3");
-    assert!(refused[0].starts_with("4:4 [travel] Y would reach 433.3333 mm"), "{refused:?}");
-    assert!(refused[0].ends_with("(machine coordinates); this control point draws the curve there"), "{refused:?}");
+    assert!(
+        refused[0].starts_with("4:4 [travel] Y would reach 433.3333 mm"),
+        "{refused:?}"
+    );
+    assert!(
+        refused[0].ends_with("(machine coordinates); this control point draws the curve there"),
+        "{refused:?}"
+    );
     // Weights that rise a hundredfold: the curve goes out and back in a small part of its parameter.
-    let uneven =
-        "F60\nG6.2 P5 K0\nK0 X1200 R100\nK0 X-1200 R10000\nK0 X0 Y30 R1000000\nK0 X10 R1000000\nK1\nK1\nK1\nK1\nK1";
+    let uneven = "F60\nG6.2 P5 K0\nK0 X1200 R100\nK0 X-1200 R10000\nK0 X0 Y30 R1000000\nK0 X10 R1000000\nK1\nK1\nK1\nK1\nK1";
     let refused = messages(uneven);
-    assert!(refused[0].starts_with("3:4 [travel] X would reach 32"), "{refused:?}");
+    assert!(
+        refused[0].starts_with("3:4 [travel] X would reach 32"),
+        "{refused:?}"
+    );
 }

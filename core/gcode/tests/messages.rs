@@ -60,8 +60,7 @@ truncated-comment.ngc:3:1: error: the comment is not closed: ) is missing
   ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
 ";
     assert_eq!(checked("truncated-comment.ngc") + "\n", expected);
-    let expected =
-        "truncated-percent.ngc:3:1: error: the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
+    let expected = "truncated-percent.ngc:3:1: error: the program is truncated: % opened it, and neither %, M2 nor M30 ends it";
     assert_eq!(checked("truncated-percent.ngc"), expected);
 }
 
@@ -123,11 +122,15 @@ unknown-word.ngc:5:4: error: nothing in this line takes the word E (M66, M67, M6
     assert_eq!(checked("unknown-word.ngc") + "\n", expected);
     assert_messages(
         "G0 X1e-5",
-        &["1:6 [unused-word] nothing in this line takes the word E (M66, M67, M68 would); numbers have no exponent"],
+        &[
+            "1:6 [unused-word] nothing in this line takes the word E (M66, M67, M68 would); numbers have no exponent",
+        ],
     );
     assert_messages(
         "G0 D3",
-        &["1:4 [unused-word] nothing in this line takes the word D (G41, G41.1, G42, G42.1, G96 would)"],
+        &[
+            "1:4 [unused-word] nothing in this line takes the word D (G41, G41.1, G42, G42.1, G96 would)",
+        ],
     );
 }
 
@@ -141,78 +144,212 @@ refused.ngc:2:1: error: G33 (synchronous motion): motion synchronous with the sp
 ";
     assert!(all.starts_with(first), "{all}");
     for (line, word) in [(3, "G33.1"), (4, "G76"), (5, "G51"), (6, "G16"), (7, "G87")] {
-        assert!(all.contains(&format!("refused.ngc:{line}:1: error: {word} (")), "{word}: {all}");
+        assert!(
+            all.contains(&format!("refused.ngc:{line}:1: error: {word} (")),
+            "{word}: {all}"
+        );
     }
-    for (line, word) in [(11, "M29"), (12, "G65"), (13, "G70"), (14, "G68"), (15, "M60"), (16, "M102"), (17, "G44")] {
-        assert!(all.contains(&format!("refused.ngc:{line}:1: error: {word}")), "{word}: {all}");
+    for (line, word) in [
+        (11, "M29"),
+        (12, "G65"),
+        (13, "G70"),
+        (14, "G68"),
+        (15, "M60"),
+        (16, "M102"),
+        (17, "G44"),
+    ] {
+        assert!(
+            all.contains(&format!("refused.ngc:{line}:1: error: {word}")),
+            "{word}: {all}"
+        );
     }
-    assert!(!all.contains("ngc:8:"), "the points of a refused cycle are not blamed again: {all}");
+    assert!(
+        !all.contains("ngc:8:"),
+        "the points of a refused cycle are not blamed again: {all}"
+    );
 }
 
 #[test]
 fn the_reader_says_where_and_what() {
     for (program, expected) in [
-        ("G0 X", "1:4 [value-missing] X has no value: a number, [expression], #parameter or function must follow"),
-        ("G0 XY1", "1:4 [value-missing] X has no value: a number, [expression], #parameter or function must follow"),
-        ("G0 X1 2", "1:7 [unexpected] a number without a letter before it"),
-        ("G0 X1.2.3", "1:8 [number] a number has one decimal point only"),
+        (
+            "G0 X",
+            "1:4 [value-missing] X has no value: a number, [expression], #parameter or function must follow",
+        ),
+        (
+            "G0 XY1",
+            "1:4 [value-missing] X has no value: a number, [expression], #parameter or function must follow",
+        ),
+        (
+            "G0 X1 2",
+            "1:7 [unexpected] a number without a letter before it",
+        ),
+        (
+            "G0 X1.2.3",
+            "1:8 [number] a number has one decimal point only",
+        ),
         ("G0 X1 X2", "1:7 [word-twice] X stands in this line twice"),
-        ("G0 X[1+2", "1:5 [bracket] the [ is not closed: ] is missing"),
+        (
+            "G0 X[1+2",
+            "1:5 [bracket] the [ is not closed: ] is missing",
+        ),
         ("G0 X[1 2]", "1:8 [bracket] an operator or ] is missing"),
         ("G0 XSIN30", "1:8 [bracket] [ is missing"),
         (
             "G0 XFOO[1]",
             "1:5 [function] no function is called FOO; there are ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT TAN",
         ),
-        ("G0 XSQRT[-1]", "1:5 [arithmetic] SQRT needs a number that is not negative"),
-        ("G0 X[EXP[1000]]", "1:6 [arithmetic] the result is too large to be a number"),
-        ("G0 X#<never>", "1:5 [parameter-unset] parameter #<never> has never been set"),
-        ("G0 X#5603", "1:5 [parameter-number] there is no parameter #5603: the numbers go from 1 to 5602"),
+        (
+            "G0 XSQRT[-1]",
+            "1:5 [arithmetic] SQRT needs a number that is not negative",
+        ),
+        (
+            "G0 X[EXP[1000]]",
+            "1:6 [arithmetic] the result is too large to be a number",
+        ),
+        (
+            "G0 X#<never>",
+            "1:5 [parameter-unset] parameter #<never> has never been set",
+        ),
+        (
+            "G0 X#5603",
+            "1:5 [parameter-number] there is no parameter #5603: the numbers go from 1 to 5602",
+        ),
         (
             "#5220=3",
             "1:1 [read-only] parameter #5220 cannot be assigned: it holds the number of the coordinate system: use G54 to G59.3",
         ),
-        ("#<_metric>=3", "1:1 [read-only] this parameter cannot be assigned: the interpreter keeps it itself"),
-        ("#1 G0", "1:1 [assignment] a parameter stands here for a word; an assignment needs ="),
-        ("G0 X99999999999", "1:4 [word-range] X is too large a number"),
-        ("G0 (a (b c)", "1:4 [comment] the comment is not closed: it holds more ( than )"),
-        ("G0 X1 )", "1:7 [unexpected] a comment ends here that has not begun"),
-        ("G0 X1 / Y1", "1:7 [unexpected] / (block delete) stands at the start of a line only"),
+        (
+            "#<_metric>=3",
+            "1:1 [read-only] this parameter cannot be assigned: the interpreter keeps it itself",
+        ),
+        (
+            "#1 G0",
+            "1:1 [assignment] a parameter stands here for a word; an assignment needs =",
+        ),
+        (
+            "G0 X99999999999",
+            "1:4 [word-range] X is too large a number",
+        ),
+        (
+            "G0 (a (b c)",
+            "1:4 [comment] the comment is not closed: it holds more ( than )",
+        ),
+        (
+            "G0 X1 )",
+            "1:7 [unexpected] a comment ends here that has not begun",
+        ),
+        (
+            "G0 X1 / Y1",
+            "1:7 [unexpected] / (block delete) stands at the start of a line only",
+        ),
         ("% G0", "1:1 [percent] % stands on a line of its own"),
-        ("G0 X1 é", "1:7 [unexpected] only comments may hold characters outside ASCII"),
-        ("X1", "1:1 [motion-missing] no motion mode is in force: G0, G1, G2 or G3 is missing"),
-        ("G0 G1 X1", "1:4 [conflict] G1 and G0 exclude each other in a line (group: motion)"),
-        ("G90 G91", "1:5 [conflict] G91 and G90 exclude each other in a line (group: distance mode)"),
-        ("M3 M4", "1:4 [conflict] M4 and M3 exclude each other in a line (group: spindle)"),
-        ("M8 M9", "1:4 [conflict] M9 and M7 or M8 exclude each other in a line"),
-        ("G1 G92 X1", "1:1 [conflict] the axis words belong to G92, not to a motion: split the line"),
-        ("G4 P1 M62", "1:4 [ambiguous] M62 takes P, but so does another word of this line: split it"),
+        (
+            "G0 X1 é",
+            "1:7 [unexpected] only comments may hold characters outside ASCII",
+        ),
+        (
+            "X1",
+            "1:1 [motion-missing] no motion mode is in force: G0, G1, G2 or G3 is missing",
+        ),
+        (
+            "G0 G1 X1",
+            "1:4 [conflict] G1 and G0 exclude each other in a line (group: motion)",
+        ),
+        (
+            "G90 G91",
+            "1:5 [conflict] G91 and G90 exclude each other in a line (group: distance mode)",
+        ),
+        (
+            "M3 M4",
+            "1:4 [conflict] M4 and M3 exclude each other in a line (group: spindle)",
+        ),
+        (
+            "M8 M9",
+            "1:4 [conflict] M9 and M7 or M8 exclude each other in a line",
+        ),
+        (
+            "G1 G92 X1",
+            "1:1 [conflict] the axis words belong to G92, not to a motion: split the line",
+        ),
+        (
+            "G4 P1 M62",
+            "1:4 [ambiguous] M62 takes P, but so does another word of this line: split it",
+        ),
         ("G92", "1:1 [axis-missing] G92 needs at least one axis word"),
-        ("G10 P1", "1:1 [word-missing] G10 needs L: 1, 2, 10, 11 or 20"),
+        (
+            "G10 P1",
+            "1:1 [word-missing] G10 needs L: 1, 2, 10, 11 or 20",
+        ),
         ("G4", "1:1 [word-missing] G4 needs P, the dwell in seconds"),
         ("G4 P-1", "1:4 [word-range] P must not be negative"),
-        ("TA0", "1:1 [time-constant] TA (time constant, ms) must be greater than zero"),
-        ("G1 TA-5", "1:4 [time-constant] TA (time constant, ms) must be greater than zero"),
-        ("TA", "1:1 [value-missing] TA has no value: a number, [expression], #parameter or function must follow"),
+        (
+            "TA0",
+            "1:1 [time-constant] TA (time constant, ms) must be greater than zero",
+        ),
+        (
+            "G1 TA-5",
+            "1:4 [time-constant] TA (time constant, ms) must be greater than zero",
+        ),
+        (
+            "TA",
+            "1:1 [value-missing] TA has no value: a number, [expression], #parameter or function must follow",
+        ),
         ("T9", "1:1 [tool] the tool table has no tool 9"),
         ("G43 H9", "1:1 [tool] the tool table has no tool 9"),
-        ("M66 P1 L3", "1:1 [input] M66 needs Q, the longest wait in seconds, greater than zero"),
+        (
+            "M66 P1 L3",
+            "1:1 [input] M66 needs Q, the longest wait in seconds, greater than zero",
+        ),
         ("F-1", "1:1 [word-range] F must not be negative"),
-        ("F0\nG1 X1 F0", "2:1 [feed-missing] the feed is zero; G1, G2 and G3 need one"),
-        ("G93 F2\nG1 X1", "2:1 [feed-missing] with G93 every line with G1, G2 or G3 needs its F"),
-        ("F60 G2 X1", "1:5 [arc-centre] the arc has no centre (I J) and no radius (R)"),
-        ("F60 G2 X1 K1", "1:11 [arc-centre] K is no centre in this plane: I and J are (G17, G18, G19 choose)"),
-        ("F60 G2 X1 I1 R1", "1:14 [arc-centre] an arc has either R or I J K, not both"),
-        ("F60 G2 X9 R4", "1:11 [arc-radius] the radius 4 mm is too small: the ends of the arc are 9 mm apart"),
-        ("F60 G2 R4", "1:8 [arc-ends] an arc by radius (R) cannot end where it starts: a full circle needs I J K"),
+        (
+            "F0\nG1 X1 F0",
+            "2:1 [feed-missing] the feed is zero; G1, G2 and G3 need one",
+        ),
+        (
+            "G93 F2\nG1 X1",
+            "2:1 [feed-missing] with G93 every line with G1, G2 or G3 needs its F",
+        ),
+        (
+            "F60 G2 X1",
+            "1:5 [arc-centre] the arc has no centre (I J) and no radius (R)",
+        ),
+        (
+            "F60 G2 X1 K1",
+            "1:11 [arc-centre] K is no centre in this plane: I and J are (G17, G18, G19 choose)",
+        ),
+        (
+            "F60 G2 X1 I1 R1",
+            "1:14 [arc-centre] an arc has either R or I J K, not both",
+        ),
+        (
+            "F60 G2 X9 R4",
+            "1:11 [arc-radius] the radius 4 mm is too small: the ends of the arc are 9 mm apart",
+        ),
+        (
+            "F60 G2 R4",
+            "1:8 [arc-ends] an arc by radius (R) cannot end where it starts: a full circle needs I J K",
+        ),
         (
             "F60 G2 X1 I0 J0",
             "1:11 [arc-radius] the arc does not fit: its radius is 0.0000 mm at the start and 1.0000 mm at the end",
         ),
-        ("F60 G90.1 G2 X1 I0", "1:11 [arc-centre] with G90.1 an arc needs both coordinates of its centre"),
-        ("G91 G53 G0 X1", "1:5 [conflict] G53 does not go with G91: machine coordinates are absolute"),
-        ("F60 G53 G2 X1 R1", "1:5 [conflict] G53 goes with G0 and G1 only"),
-        ("G0 X1\nO5", "2:1 [o-word] an O-word stands in a line of its own of a program; manual input has none"),
+        (
+            "F60 G90.1 G2 X1 I0",
+            "1:11 [arc-centre] with G90.1 an arc needs both coordinates of its centre",
+        ),
+        (
+            "G91 G53 G0 X1",
+            "1:5 [conflict] G53 does not go with G91: machine coordinates are absolute",
+        ),
+        (
+            "F60 G53 G2 X1 R1",
+            "1:5 [conflict] G53 goes with G0 and G1 only",
+        ),
+        (
+            "G0 X1\nO5",
+            "2:1 [o-word] an O-word stands in a line of its own of a program; manual input has none",
+        ),
     ] {
         assert_messages(program, &[expected]);
     }
@@ -243,5 +380,8 @@ fn one_error_does_not_cause_others() {
             "1:12 [unused-word] nothing in this line takes the word Q (G5, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
         ],
     );
-    assert_messages("#<a>=[1/0]\nG0 X#<a>", &["1:7 [arithmetic] division by zero"]);
+    assert_messages(
+        "#<a>=[1/0]\nG0 X#<a>",
+        &["1:7 [arithmetic] division by zero"],
+    );
 }

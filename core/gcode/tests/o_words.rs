@@ -22,7 +22,10 @@ fn items_on(config: &Config, text: &str) -> Vec<Item> {
     while stream.next_items(&mut items).unwrap() {
         if let Some(Item::Block(block, _)) = items.last().filter(|item| item.is_probe()) {
             let touched = (block.start + block.end) * 0.5;
-            stream.provide_probe(&ProbeResult { touched: Some(touched), rest: touched });
+            stream.provide_probe(&ProbeResult {
+                touched: Some(touched),
+                rest: touched,
+            });
         }
         stream.provide_input(1.0);
     }
@@ -32,12 +35,20 @@ fn items_on(config: &Config, text: &str) -> Vec<Item> {
 /// Where the blocks end in X, and their lines.
 fn path(text: &str) -> String {
     let blocks = only_blocks(&items_on(&mill(), text));
-    blocks.iter().map(|b| format!("{}:{}", b.line, short(b.end[0]))).collect::<Vec<_>>().join(" ")
+    blocks
+        .iter()
+        .map(|b| format!("{}:{}", b.line, short(b.end[0])))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn errors_on(config: &Config, text: &str) -> Vec<String> {
     let (_, report) = checked(text, config);
-    report.diagnostics.iter().map(|d| format!("{}:{} [{}] {}", d.line, d.column, d.code, d.message)).collect()
+    report
+        .diagnostics
+        .iter()
+        .map(|d| format!("{}:{} [{}] {}", d.line, d.column, d.code, d.message))
+        .collect()
 }
 
 fn errors(text: &str) -> Vec<String> {
@@ -61,9 +72,18 @@ fn branches_take_the_first_that_is_true() {
 
 #[test]
 fn loops_repeat_break_and_continue() {
-    assert_eq!(path("o1 while [#1 LT 3]\n#1=[#1+1]\nG0 X#1\no1 endwhile"), "3:1 3:2 3:3");
-    assert_eq!(path("o1 do\n#1=[#1+1]\nG0 X#1\no1 while [#1 LT 3]\nG0 X9"), "3:1 3:2 3:3 5:9");
-    assert_eq!(path("o1 repeat [2.6]\nG91 G0 X1\no1 endrepeat"), "2:1 2:2 2:3");
+    assert_eq!(
+        path("o1 while [#1 LT 3]\n#1=[#1+1]\nG0 X#1\no1 endwhile"),
+        "3:1 3:2 3:3"
+    );
+    assert_eq!(
+        path("o1 do\n#1=[#1+1]\nG0 X#1\no1 while [#1 LT 3]\nG0 X9"),
+        "3:1 3:2 3:3 5:9"
+    );
+    assert_eq!(
+        path("o1 repeat [2.6]\nG91 G0 X1\no1 endrepeat"),
+        "2:1 2:2 2:3"
+    );
     assert_eq!(
         path("o1 repeat [2.5]\nG91 G0 X1\no1 endrepeat"),
         "2:1 2:2",
@@ -71,7 +91,9 @@ fn loops_repeat_break_and_continue() {
     );
     assert_eq!(path("o1 repeat [0]\nG0 X1\no1 endrepeat\nG0 X2"), "4:2");
     let left = |how: &str| {
-        path(&format!("o1 repeat [4]\n#1=[#1+1]\no2 if [#1 EQ 2]\no1 {how}\no2 endif\nG0 X#1\no1 endrepeat\nG0 X9"))
+        path(&format!(
+            "o1 repeat [4]\n#1=[#1+1]\no2 if [#1 EQ 2]\no1 {how}\no2 endif\nG0 X#1\no1 endrepeat\nG0 X9"
+        ))
     };
     assert_eq!(left("break"), "6:1 8:9");
     assert_eq!(left("continue"), "6:1 6:3 6:4 8:9");
@@ -86,13 +108,18 @@ fn a_subroutine_has_parameters_of_its_own_and_returns_a_value() {
     let text = "o<double it> sub\n#<local>=[#1 * 2]\n#31=[#31+1]\nG0 X#<local>\no<doubleit> return [#<local>]\nG0 X99\n\
                 o<doubleit> endsub\n#1=7\no<DOUBLEIT> call [5]\nG0 X[#<_value> + #1 + #31]\nG0 X[EXISTS[#<local>] + #2]";
     assert_eq!(path(text), "4:10 10:18 11:0");
-    assert_eq!(path("o1 sub\nG0 X[#1 + 10 * #2]\no1 endsub\n#2=5\no1 call [3]\nG0 X#<_value_returned>"), "2:3 6:0");
-    let recursive =
-        "o1 sub\no2 if [#1 GT 0]\nG0 X#1\no1 call [#1 - 1]\no2 endif\no1 endsub\no1 call [3]\nG0 X#<_call_level>";
+    assert_eq!(
+        path("o1 sub\nG0 X[#1 + 10 * #2]\no1 endsub\n#2=5\no1 call [3]\nG0 X#<_value_returned>"),
+        "2:3 6:0"
+    );
+    let recursive = "o1 sub\no2 if [#1 GT 0]\nG0 X#1\no1 call [#1 - 1]\no2 endif\no1 endsub\no1 call [3]\nG0 X#<_call_level>";
     assert_eq!(path(recursive), "3:3 3:2 3:1 8:0");
     assert_eq!(path("o5 sub\nG0 X5\no5 endsub\no[#1 + 5] call"), "2:5");
     // Modes last beyond a subroutine, and one may stand behind the end of the program.
-    assert_eq!(path("G0 X5\no1 call\nX1\nM2\no1 sub\nG91\no1 endsub"), "1:5 3:6 4:6");
+    assert_eq!(
+        path("G0 X5\no1 call\nX1\nM2\no1 sub\nG91\no1 endsub"),
+        "1:5 3:6 4:6"
+    );
 }
 
 #[test]
@@ -109,18 +136,33 @@ fn a_subroutine_is_looked_up_in_the_folders() {
     let text = "\n\no<drill> call [3]\nG0 X1";
     let all = errors_on(&config, text);
     assert!(
-        all[0].starts_with("3:1 [o-word] there is no subroutine with this label in this file, and the machine"),
+        all[0].starts_with(
+            "3:1 [o-word] there is no subroutine with this label in this file, and the machine"
+        ),
         "{all:?}"
     );
     config.subroutine_path = vec![PathBuf::from("/no/such"), folder.clone()];
     let blocks = only_blocks(&items_on(&config, text));
-    let shown: Vec<_> = blocks.iter().map(|b| format!("{}:{}", b.line, short(b.end[0]))).collect();
-    assert_eq!(shown, ["3:3", "3:7", "4:1"], "blocks of a file of its own bear the line of the call");
-    assert!(errors_on(&config, "o<none> call")[0].contains("no file none.ngc lies in /no/such or "));
+    let shown: Vec<_> = blocks
+        .iter()
+        .map(|b| format!("{}:{}", b.line, short(b.end[0])))
+        .collect();
+    assert_eq!(
+        shown,
+        ["3:3", "3:7", "4:1"],
+        "blocks of a file of its own bear the line of the call"
+    );
+    assert!(
+        errors_on(&config, "o<none> call")[0].contains("no file none.ngc lies in /no/such or ")
+    );
     // The second pass reads what the first one read.
     let (program, report) = checked(text, &config);
     assert!(report.is_ok());
-    std::fs::write(folder.join("drill.ngc"), "o<drill> sub\nG0 X2\no<drill> endsub\n").unwrap();
+    std::fs::write(
+        folder.join("drill.ngc"),
+        "o<drill> sub\nG0 X2\no<drill> endsub\n",
+    )
+    .unwrap();
     let mut stream = Stream::new(program, &config).unwrap();
     let error = loop {
         match stream.next_items(&mut Vec::new()) {
@@ -137,16 +179,27 @@ fn errors_name_the_callers() {
     let text = "o1 sub\nG0 X[1/#1]\no1 endsub\no<outer> sub\no1 call [#1]\no<outer> endsub\n\no<outer> call [0]";
     assert_eq!(
         errors(text),
-        ["2:6 [arithmetic] division by zero; in o1, called from line 5; in o<outer>, called from line 8"]
+        [
+            "2:6 [arithmetic] division by zero; in o1, called from line 5; in o<outer>, called from line 8"
+        ]
     );
 }
 
 #[test]
 fn what_does_not_belong_together_is_named() {
     for (text, message) in [
-        ("o1 endif", "1:1 [o-word] o1 endif: it closes nothing: no block is open"),
-        ("o1 if [1]\no2 endif\no1 endif", "2:1 [o-word] o2 endif: it closes nothing here: open is o1 if of line 1"),
-        ("G0 X1\no1 while [1]", "2:1 [o-word] o1 while: it is opened and never closed"),
+        (
+            "o1 endif",
+            "1:1 [o-word] o1 endif: it closes nothing: no block is open",
+        ),
+        (
+            "o1 if [1]\no2 endif\no1 endif",
+            "2:1 [o-word] o2 endif: it closes nothing here: open is o1 if of line 1",
+        ),
+        (
+            "G0 X1\no1 while [1]",
+            "2:1 [o-word] o1 while: it is opened and never closed",
+        ),
         (
             "o1 repeat [1]\no2 break\no1 endrepeat",
             "2:1 [o-word] o2 break: it stands in no while or do or repeat with this label",
@@ -159,17 +212,36 @@ fn what_does_not_belong_together_is_named() {
             "o1 if [0]\no1 else\no1 elseif [1]\no1 endif",
             "3:1 [o-word] o1 elseif: nothing but endif may follow else, o1 else of line 2",
         ),
-        ("o1 jump", "1:4 [o-word] what the O-word does is missing here: one of sub, endsub,"),
-        ("o1 if\no1 endif", "1:1 [value-missing] if needs a value in brackets"),
-        ("o1 if [1] G0 X1\no1 endif", "1:11 [o-word] only values in brackets may follow here"),
-        ("o1 repeat [1/0]\no1 endrepeat\nG0 Q1", "1:12 [arithmetic] division by zero"),
+        (
+            "o1 jump",
+            "1:4 [o-word] what the O-word does is missing here: one of sub, endsub,",
+        ),
+        (
+            "o1 if\no1 endif",
+            "1:1 [value-missing] if needs a value in brackets",
+        ),
+        (
+            "o1 if [1] G0 X1\no1 endif",
+            "1:11 [o-word] only values in brackets may follow here",
+        ),
+        (
+            "o1 repeat [1/0]\no1 endrepeat\nG0 Q1",
+            "1:12 [arithmetic] division by zero",
+        ),
     ] {
         let all = errors(text);
-        assert!(all.first().is_some_and(|first| first.starts_with(message)), "{text}: {all:?}");
+        assert!(
+            all.first().is_some_and(|first| first.starts_with(message)),
+            "{text}: {all:?}"
+        );
     }
     // What is never executed is not looked at, as in LinuxCNC.
     assert!(errors("G0 X1\no1 sub\no2 return\no1 endsub\nM2\no3 endif").is_empty());
-    assert_eq!(errors("o1 repeat [1/0]\no1 endrepeat\nG0 Q1").len(), 2, "what follows is checked");
+    assert_eq!(
+        errors("o1 repeat [1/0]\no1 endrepeat\nG0 Q1").len(),
+        2,
+        "what follows is checked"
+    );
 }
 
 #[test]
@@ -177,10 +249,19 @@ fn a_program_without_end_is_named() {
     let mut config = mill();
     config.max_steps = 1000;
     let endless = errors_on(&config, "G0 X1\no7 while [1]\nG0 X2\no7 endwhile");
-    assert!(endless[0].contains("o7 while of line 2 goes on after 1000 lines ([program] max_steps)"), "{endless:?}");
+    assert!(
+        endless[0].contains("o7 while of line 2 goes on after 1000 lines ([program] max_steps)"),
+        "{endless:?}"
+    );
     let recursive = errors("o1 sub\no1 call\no1 endsub\no1 call");
-    assert!(recursive[0].contains("calls lie 100 deep within each other"), "{recursive:?}");
-    assert!(recursive[0].contains("called from line 2; and 95 callers before"), "{recursive:?}");
+    assert!(
+        recursive[0].contains("calls lie 100 deep within each other"),
+        "{recursive:?}"
+    );
+    assert!(
+        recursive[0].contains("called from line 2; and 95 callers before"),
+        "{recursive:?}"
+    );
     // One mistake in a loop is one message.
     let (_, report) = checked("o1 repeat [50]\nG41\no1 endrepeat", &config);
     assert_eq!((report.diagnostics.len(), report.unlisted), (1, 0));
@@ -188,11 +269,15 @@ fn a_program_without_end_is_named() {
 
 #[test]
 fn the_first_pass_ends_where_only_the_machine_knows() {
-    let text = "F60\nG38.3 Z-5\nG0 Z1\no1 if [#5063 LT -2]\nG0 X1\no1 else\nG0 X2\no1 endif\nG0 X3\nM2";
+    let text =
+        "F60\nG38.3 Z-5\nG0 Z1\no1 if [#5063 LT -2]\nG0 X1\no1 else\nG0 X2\no1 endif\nG0 X3\nM2";
     let (_, report) = checked(text, &mill());
     assert_eq!((report.seen_to, report.is_ok()), (Some(4), true));
     let warning = report.warnings[0].to_string();
-    assert!(warning.starts_with("t.ngc:4:1: warning: from here on the program depends on what a probe"), "{warning}");
+    assert!(
+        warning.starts_with("t.ngc:4:1: warning: from here on the program depends on what a probe"),
+        "{warning}"
+    );
     assert!(path(text).ends_with("5:1 9:3 10:3"), "{}", path(text));
     // What a value that is assumed decides lies further on.
     let (_, report) = checked(
@@ -215,15 +300,18 @@ fn a_loop_across_chunks_reads_the_same_text() {
 
 #[test]
 fn a_subroutine_leaves_the_modes_as_m73_found_them() {
-    let program =
-        "o1 sub\nM73\nG91 G20\nG0 X1\no1 endsub\no2 sub\nM70\nG91\no2 endsub\nG0 X5\no1 call\nX1\no2 call\nX1";
+    let program = "o1 sub\nM73\nG91 G20\nG0 X1\no1 endsub\no2 sub\nM70\nG91\no2 endsub\nG0 X5\no1 call\nX1\no2 call\nX1";
     assert_eq!(path(program), "10:5 4:30.4 12:1 14:2");
     let inner = "o1 sub\nM72\no1 endsub\nM70\no1 call";
-    assert!(errors_on(&mill(), inner)[0].starts_with("2:1 [modal-state]"), "each call has its own");
+    assert!(
+        errors_on(&mill(), inner)[0].starts_with("2:1 [modal-state]"),
+        "each call has its own"
+    );
 }
 
 #[test]
 fn a_return_needs_no_label_of_its_own() {
-    let program = "o1 sub\no2 if [#1]\no2 return [7]\no2 endif\nG0 X1\no1 endsub\no1 call [1]\nG0 X#<_value>";
+    let program =
+        "o1 sub\no2 if [#1]\no2 return [7]\no2 endif\nG0 X1\no1 endsub\no1 call [1]\nG0 X#<_value>";
     assert_eq!(path(program), "8:7");
 }

@@ -42,8 +42,17 @@ fn tree() -> impl Strategy<Value = Tree> {
         let call = prop::sample::select(vec!["ABS", "SIN", "COS", "FIX", "FUP", "ROUND", "SQRT"]);
         prop_oneof![
             (call, inner.clone()).prop_map(|(name, tree)| Tree::Call(name, tree.into())),
-            (prop::sample::select(OPERATORS.to_vec()), inner.clone(), inner)
-                .prop_map(|((name, strength), a, b)| Tree::Pair(name, strength, a.into(), b.into())),
+            (
+                prop::sample::select(OPERATORS.to_vec()),
+                inner.clone(),
+                inner
+            )
+                .prop_map(|((name, strength), a, b)| Tree::Pair(
+                    name,
+                    strength,
+                    a.into(),
+                    b.into()
+                )),
         ]
     })
 }
@@ -143,8 +152,18 @@ fn line() -> impl Strategy<Value = Vec<u8>> {
 fn o_line() -> impl Strategy<Value = Vec<u8>> {
     let keywords = "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue";
     let keyword = prop::sample::select(keywords.split(' ').collect::<Vec<_>>());
-    let value = prop::sample::select(vec!["", " [#1 LT 3]", " [1]", " [0]", " [#31]", " [2] [3]", " [1/0]", " x"]);
-    (1..4, keyword, value).prop_map(|(label, keyword, value)| format!("o{label} {keyword}{value}").into_bytes())
+    let value = prop::sample::select(vec![
+        "",
+        " [#1 LT 3]",
+        " [1]",
+        " [0]",
+        " [#31]",
+        " [2] [3]",
+        " [1/0]",
+        " x",
+    ]);
+    (1..4, keyword, value)
+        .prop_map(|(label, keyword, value)| format!("o{label} {keyword}{value}").into_bytes())
 }
 
 /// Counts, and moves a little.
@@ -155,7 +174,10 @@ fn step() -> impl Strategy<Value = Vec<u8>> {
 fn point(block: &Block, share: f64) -> [f64; 2] {
     let angle = block.arc.start_angle_rad + share * block.arc.sweep_rad;
     let [a, b] = block.arc.center_mm;
-    [a + block.arc.radius_mm * angle.cos(), b + block.arc.radius_mm * angle.sin()]
+    [
+        a + block.arc.radius_mm * angle.cos(),
+        b + block.arc.radius_mm * angle.sin(),
+    ]
 }
 
 /// What the planner may rely on.
@@ -163,18 +185,28 @@ fn assert_sound(blocks: &[Block], gaps: bool) {
     for (n, block) in blocks.iter().enumerate() {
         assert_eq!(block.index, n as u64);
         assert!(block.start.is_finite() && block.end.is_finite() && block.length_mm.is_finite());
-        assert_eq!(block.length_mm > 0.0, block.kind != BlockKind::Dwell, "{block:?}");
+        assert_eq!(
+            block.length_mm > 0.0,
+            block.kind != BlockKind::Dwell,
+            "{block:?}"
+        );
         assert!(block.feed_mm_per_s > 0.0 && block.dwell_s >= 0.0);
         assert!(block.time_constant_s.is_nan() || block.time_constant_s > 0.0);
         assert!(block.path_tolerance_mm.is_nan() || block.path_tolerance_mm >= 0.0);
         assert!(gaps || n == 0 || blocks[n - 1].end == block.start);
         if block.kind == BlockKind::Arc {
             let [a, b] = block.arc.plane.map(|axis| axis as usize);
-            let scale =
-                1e-9 * (1.0 + block.arc.radius_mm + block.arc.center_mm[0].abs() + block.arc.center_mm[1].abs());
+            let scale = 1e-9
+                * (1.0
+                    + block.arc.radius_mm
+                    + block.arc.center_mm[0].abs()
+                    + block.arc.center_mm[1].abs());
             for (share, end) in [(0.0, block.start), (1.0, block.end)] {
                 let [x, y] = point(block, share);
-                assert!((x - end[a]).hypot(y - end[b]) < scale * (1.0 + block.arc.sweep_rad.abs()), "{block:?}");
+                assert!(
+                    (x - end[a]).hypot(y - end[b]) < scale * (1.0 + block.arc.sweep_rad.abs()),
+                    "{block:?}"
+                );
             }
         }
     }

@@ -10,11 +10,18 @@ use tandem_gcode::{Item, docs};
 fn the_fixture_holds_every_word_that_works() {
     let text = std::fs::read_to_string(programs().join("every-word.ngc")).unwrap();
     run(&text);
-    let words: Vec<_> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '.').collect();
+    let words: Vec<_> = text
+        .split(|c: char| !c.is_ascii_alphanumeric() && c != '.')
+        .collect();
     for row in docs().lines().filter(|row| row.ends_with("| works |")) {
         let word = row.split_whitespace().nth(1).unwrap();
-        let alone = |w: &&str| **w == *word || matches!(w.strip_prefix(word), Some(rest) if rest.starts_with('X'));
-        assert!(words.iter().any(alone) || matches!(word, "M2" | "M3" | "M6"), "{word} is missing");
+        let alone = |w: &&str| {
+            **w == *word || matches!(w.strip_prefix(word), Some(rest) if rest.starts_with('X'))
+        };
+        assert!(
+            words.iter().any(alone) || matches!(word, "M2" | "M3" | "M6"),
+            "{word} is missing"
+        );
     }
 }
 
@@ -30,7 +37,11 @@ fn blocks_are_numbered_and_joined() {
     }
     assert_eq!(all[9].line, 22);
     assert_eq!(
-        (all[9].tool, short(all[9].spindle_rad_per_s), short(all[9].offset[2])),
+        (
+            all[9].tool,
+            short(all[9].spindle_rad_per_s),
+            short(all[9].offset[2])
+        ),
         (2, "837.758".into(), "25".into())
     );
 }
@@ -88,16 +99,38 @@ fn what_needs_rest_gets_it_and_the_rest_does_not() {
 
 #[test]
 fn parameters_take_effect_after_their_line() {
-    assert_eq!(ends("#1=5\n#1=7 G0 X#1\nX#1"), [["5", "0", "0"], ["7", "0", "0"]]);
-    assert_eq!(ends("#<Long Name>=3 #<_global>=4\nG0 X#<longname> Y#<_GLOBAL>"), [["3", "4", "0"]]);
+    assert_eq!(
+        ends("#1=5\n#1=7 G0 X#1\nX#1"),
+        [["5", "0", "0"], ["7", "0", "0"]]
+    );
+    assert_eq!(
+        ends("#<Long Name>=3 #<_global>=4\nG0 X#<longname> Y#<_GLOBAL>"),
+        [["3", "4", "0"]]
+    );
     assert_eq!(ends("#2=3 #3=2\nG0 X##3 Y#[1+1] Z-#2"), [["3", "3", "-3"]]);
-    assert_eq!(ends("G10 L2 P2 X5\nG55 G0 X1\nG0 Y#5420 Z#5241\nX#5220")[1..], [["6", "1", "5"], ["7", "1", "5"]]);
-    assert_eq!(ends("G0 X3\n#1=#<_x>\nG0 Y[#1 + #<_line>]")[1], ["3", "6", "0"]);
+    assert_eq!(
+        ends("G10 L2 P2 X5\nG55 G0 X1\nG0 Y#5420 Z#5241\nX#5220")[1..],
+        [["6", "1", "5"], ["7", "1", "5"]]
+    );
+    assert_eq!(
+        ends("G0 X3\n#1=#<_x>\nG0 Y[#1 + #<_line>]")[1],
+        ["3", "6", "0"]
+    );
     // Where the touched position and more were kept can be assigned before it is.
-    assert_eq!(ends("#5061=4 #5070=2\nG0 X#5061 Y#5070 Z[EXISTS[#99999]]"), [["4", "2", "0"]]);
-    let named = "G0 X#<_abs_x> Y[#<_plane> - #<_motion_mode> / 10] Z[#<_absolute> + #<_spindle_on>]";
-    assert_eq!(ends(&format!("G54 G92 X-7\nS1 M3 G18\n{named}"))[0], ["7", "100", "2"]);
-    assert_eq!(ends("G0 X[EXISTS[#<no>] + 1]\n#<no>=1\nY[EXISTS[#<no>]]"), [["1", "0", "0"], ["1", "1", "0"]]);
+    assert_eq!(
+        ends("#5061=4 #5070=2\nG0 X#5061 Y#5070 Z[EXISTS[#99999]]"),
+        [["4", "2", "0"]]
+    );
+    let named =
+        "G0 X#<_abs_x> Y[#<_plane> - #<_motion_mode> / 10] Z[#<_absolute> + #<_spindle_on>]";
+    assert_eq!(
+        ends(&format!("G54 G92 X-7\nS1 M3 G18\n{named}"))[0],
+        ["7", "100", "2"]
+    );
+    assert_eq!(
+        ends("G0 X[EXISTS[#<no>] + 1]\n#<no>=1\nY[EXISTS[#<no>]]"),
+        [["1", "0", "0"], ["1", "1", "0"]]
+    );
 }
 
 #[test]
@@ -120,7 +153,11 @@ fn precedence_is_that_of_linuxcnc() {
         ("-[3]+-ABS[-4]", -7.0),
     ] {
         let block = last(&format!("G0 X[{expression}] Y200"));
-        assert!((block.end[0] - value).abs() < 1e-12, "[{expression}] = {}", block.end[0]);
+        assert!(
+            (block.end[0] - value).abs() < 1e-12,
+            "[{expression}] = {}",
+            block.end[0]
+        );
     }
 }
 
@@ -128,8 +165,7 @@ fn precedence_is_that_of_linuxcnc() {
 fn lines_may_be_skipped_empty_or_commented() {
     let mut config = mill();
     config.block_delete = true;
-    let program =
-        "  /G0 X1\n\n  \t\n(only a comment, z = sin(x/7))\n; another\nN5\nG0 (here) X2 (there) ; end\n%\nG0 X3";
+    let program = "  /G0 X1\n\n  \t\n(only a comment, z = sin(x/7))\n; another\nN5\nG0 (here) X2 (there) ; end\n%\nG0 X3";
     let (items, errors) = run_on(config, program);
     assert!(errors.is_empty());
     assert_eq!(only_blocks(&items).len(), 1);

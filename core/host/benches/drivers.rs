@@ -6,8 +6,8 @@ use divan::{Bencher, black_box};
 use tandem_host::{Registry, attached_driver};
 use tandem_machine::Machine;
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES, NoOptions,
-    PluginError, Setpoint, local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, MAX_AXES,
+    NoOptions, PluginError, Setpoint, local_plugin,
 };
 
 const CALLS: u32 = 1000;
@@ -32,12 +32,20 @@ impl Driver for Counts {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(AxisVector::ZERO))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         for joint in 0..self.1.min(MAX_AXES) {
             self.0[joint] = (setpoint.position[joint] * COUNTS_PER_MM) as i32;
             feedback.position[joint] = f64::from(self.0[joint]) / COUNTS_PER_MM;
             feedback.speed[joint] = setpoint.velocity[joint];
-            feedback.state[joint] = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+            feedback.state[joint] = if setpoint.enable == 0 {
+                JointState::Disabled
+            } else {
+                JointState::Enabled
+            };
         }
         Ok(())
     }
@@ -58,9 +66,17 @@ fn exchanges(bencher: Bencher, drivers: &str) {
     std::fs::write(&path, text + drivers).unwrap();
     let machine = Machine::read(&path, &[]).unwrap();
     let mut registry = Registry::default();
-    registry.register(local_plugin!(driver "counts" = |_: &NoOptions| Ok(Counts::default()))).unwrap();
+    registry
+        .register(local_plugin!(driver "counts" = |_: &NoOptions| Ok(Counts::default())))
+        .unwrap();
     let (mut driver, _) = attached_driver(&machine, &registry).unwrap();
-    let (mut setpoint, mut feedback) = (Setpoint { enable: 1, ..Setpoint::default() }, Feedback::default());
+    let (mut setpoint, mut feedback) = (
+        Setpoint {
+            enable: 1,
+            ..Setpoint::default()
+        },
+        Feedback::default(),
+    );
     bencher.counter(ItemsCount::new(CALLS)).bench_local(|| {
         for tick in 0..CALLS {
             setpoint.tick = u64::from(tick);

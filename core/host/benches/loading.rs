@@ -24,10 +24,15 @@ fn load(bencher: Bencher) {
     let mut copies = 0;
     let copy = || {
         copies += 1;
-        let path = folder.path().join(format!("copy{copies}")).join(library.file_name().unwrap());
+        let path = folder
+            .path()
+            .join(format!("copy{copies}"))
+            .join(library.file_name().unwrap());
         std::fs::create_dir(path.parent().unwrap()).unwrap();
         std::fs::copy(&library, &path).unwrap();
         path
     };
-    bencher.with_inputs(copy).bench_local_values(|path| tandem_host::load_plugins(&path).unwrap());
+    bencher
+        .with_inputs(copy)
+        .bench_local_values(|path| tandem_host::load_plugins(&path).unwrap());
 }

@@ -58,8 +58,13 @@ impl Example {
 
     fn run(&self) -> Summary {
         let program = Program::spool("bench", self.text.as_slice()).unwrap();
-        let run =
-            Run::prepare(self.machine.clone(), &self.registry, program, tandem_host::Switches::default()).unwrap();
+        let run = Run::prepare(
+            self.machine.clone(),
+            &self.registry,
+            program,
+            tandem_host::Switches::default(),
+        )
+        .unwrap();
         let outcome = run.drive(Clock::Virtual, &[], &mut ()).unwrap();
         assert!(outcome.fault.is_none() && outcome.summary.starvations == 0);
         outcome.summary
@@ -85,5 +90,7 @@ fn run_block_overlap(bencher: divan::Bencher, name: &str) {
 fn drive(bencher: divan::Bencher, planner: &str, name: &str) {
     let example = Example::new(planner, name);
     let samples = example.run().samples;
-    bencher.counter(ItemsCount::new(samples)).bench_local(|| example.run());
+    bencher
+        .counter(ItemsCount::new(samples))
+        .bench_local(|| example.run());
 }

@@ -34,5 +34,8 @@ pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostEr
         Place::Override(path) if path == key => Place::Override(path).to_string(),
         place => format!("{place}: {key}"),
     };
-    HostError::Setup { place, cause: cause.into() }
+    HostError::Setup {
+        place,
+        cause: cause.into(),
+    }
 }

@@ -16,7 +16,11 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 fn hang() -> PluginError {
     let said = SAID.0.lock().unwrap();
-    drop(SAID.1.wait_timeout_while(said, PATIENCE, |said| said.is_none()).unwrap());
+    drop(
+        SAID.1
+            .wait_timeout_while(said, PATIENCE, |said| said.is_none())
+            .unwrap(),
+    );
     PluginError::fixed("it has come back")
 }
 
@@ -29,8 +33,13 @@ fn kinematics(_: &NoOptions, _: &KinematicsContext) -> Result<Identity, PluginEr
 }
 
 fn machine(name: &str, section: &str) -> Machine {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines").join(name);
-    let set = [(format!("{section}.plugin"), "waits"), ("loops.soft_hang_after_s".to_string(), "0.1")];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../examples/machines")
+        .join(name);
+    let set = [
+        (format!("{section}.plugin"), "waits"),
+        ("loops.soft_hang_after_s".to_string(), "0.1"),
+    ];
     Machine::read(&path, &set.map(|(key, value)| (key, value.to_string()))).unwrap()
 }
 
@@ -41,12 +50,19 @@ fn a_constructor_that_does_not_come_back_is_told_where_drives_and_planner_are_as
         SAID.1.notify_all();
     });
     let mut registry = Registry::default();
-    registry.register(local_plugin!(driver "waits" = drives)).unwrap();
-    registry.register(local_plugin!(kinematics "waits" = kinematics)).unwrap();
+    registry
+        .register(local_plugin!(driver "waits" = drives))
+        .unwrap();
+    registry
+        .register(local_plugin!(kinematics "waits" = kinematics))
+        .unwrap();
     registry.register(tandem_look_ahead::PLUGIN).unwrap();
     let said = || SAID.0.lock().unwrap().take();
 
-    assert!(!moves_metal(&machine("mill-3axis.toml", "driver"), &registry), "it cannot be made");
+    assert!(
+        !moves_metal(&machine("mill-3axis.toml", "driver"), &registry),
+        "it cannot be made"
+    );
     let words = "waits: its constructor does not come back: no answer for 0.1 s";
     assert_eq!(said(), Some(format!("driver {words}")));
 

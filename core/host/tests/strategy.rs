@@ -8,7 +8,9 @@ use tandem_host::{Clock, Registry, Run, RunObserver, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_recorder::Summary;
 use tandem_rings::Sample;
-use tandem_sdk::{Answer, FeedStrategy, MAX_SIGNALS, PluginError, RawOptions, Request, StrategyContext, Window};
+use tandem_sdk::{
+    Answer, FeedStrategy, MAX_SIGNALS, PluginError, RawOptions, Request, StrategyContext, Window,
+};
 
 /// Rough period in whose samples the strategy finds what it acts on, and the tick in which that acts.
 const PERIOD: u64 = 20;
@@ -22,13 +24,19 @@ impl FeedStrategy for Once {
         let request = match (window.period == PERIOD, self.0.as_str()) {
             (true, "hold") => Request::Hold,
             // For as long as its cause lasts.
-            _ if self.0 == "long hold" && (PERIOD..PERIOD + 40).contains(&window.period) => Request::Hold,
+            _ if self.0 == "long hold" && (PERIOD..PERIOD + 40).contains(&window.period) => {
+                Request::Hold
+            }
             _ if self.0 == "long hold" && window.period == PERIOD + 60 => Request::Hold,
             (true, "fault") => Request::Fault(7),
             (true, "defect") => return Err(PluginError::fixed("it has lost its way")),
             _ => Request::None,
         };
-        Ok(Answer { ratio: 1.0, request, signals: [0.0; MAX_SIGNALS] })
+        Ok(Answer {
+            ratio: 1.0,
+            request,
+            signals: [0.0; MAX_SIGNALS],
+        })
     }
 }
 
@@ -49,7 +57,11 @@ impl FeedStrategy for Loaded {
         let mut signals = [0.0; MAX_SIGNALS];
         (signals[0], signals[1]) = (3.0, if window.period < 60 { 3.0 } else { 6.0 });
         let ratio = if window.period < 120 { 0.8 } else { 0.2 };
-        Ok(Answer { ratio, request: Request::None, signals })
+        Ok(Answer {
+            ratio,
+            request: Request::None,
+            signals,
+        })
     }
 }
 
@@ -88,7 +100,8 @@ fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
         ("loops.max_missed_share", "1".to_string()),
     ];
     let settings = settings.map(|(key, value)| (key.to_string(), value));
-    let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let mill =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let machine = Machine::read(&mill, &settings).unwrap();
     let program = Program::spool("line", &b"G21 G90\nF5000\nG1 X60\nM2\n"[..]).unwrap();
     let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
@@ -98,8 +111,15 @@ fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
         "long hold" => vec!["560,resume", "700,resume"],
         _ => vec![],
     };
-    let commands: Vec<_> = commands.into_iter().map(|line| Timed::parse(line).unwrap()).collect();
-    let commands = if clock == Clock::Virtual { commands } else { vec![] };
+    let commands: Vec<_> = commands
+        .into_iter()
+        .map(|line| Timed::parse(line).unwrap())
+        .collect();
+    let commands = if clock == Clock::Virtual {
+        commands
+    } else {
+        vec![]
+    };
     let outcome = run.drive(clock, &commands, &mut samples).unwrap();
     (outcome.summary, samples)
 }
@@ -107,10 +127,19 @@ fn driven(asks: &str, clock: Clock) -> (Summary, Samples) {
 #[test]
 fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
     let (summary, samples) = driven("hold", Clock::Virtual);
-    assert_eq!((summary.fault, summary.late_ratios, summary.stop_count), (None, 0, 1));
+    assert_eq!(
+        (summary.fault, summary.late_ratios, summary.stop_count),
+        (None, 0, 1)
+    );
     let stop = &summary.stops[0];
-    assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "hold", Some(1)));
-    assert_eq!(samples.1, [format!("{TICK},hold"), "400,resume".to_string()]);
+    assert_eq!(
+        (stop.tick, stop.cause, stop.reaction_periods),
+        (TICK, "hold", Some(1))
+    );
+    assert_eq!(
+        samples.1,
+        [format!("{TICK},hold"), "400,resume".to_string()]
+    );
     assert_eq!(summary.end_position_mm["x"], 60.0);
 }
 
@@ -119,7 +148,8 @@ fn a_hold_acts_in_its_tick_and_is_resumed_like_any() {
 fn a_hold_that_is_asked_for_in_every_period_is_told_once() {
     let (summary, samples) = driven("long hold", Clock::Virtual);
     assert_eq!(summary.fault, None);
-    let line = |tick: u64| format!("line 3: the feed strategy once asks for a hold, at tick {tick}");
+    let line =
+        |tick: u64| format!("line 3: the feed strategy once asks for a hold, at tick {tick}");
     assert_eq!(samples.2, [line(TICK), line(TICK + 60 * 8)]);
 }
 
@@ -131,34 +161,70 @@ fn the_lesser_of_strategy_and_script_acts_times_the_override() {
         registry.register(plugin).unwrap();
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let script = root.join("scripts/policies/load-feed.wasm").display().to_string();
-    let settings = [("feed_strategy.plugin", "loaded".to_string()), ("policy.script", script)];
+    let script = root
+        .join("scripts/policies/load-feed.wasm")
+        .display()
+        .to_string();
+    let settings = [
+        ("feed_strategy.plugin", "loaded".to_string()),
+        ("policy.script", script),
+    ];
     let settings = settings.map(|(key, value)| (key.to_string(), value));
-    let machine = Machine::read(&root.join("examples/machines/mill-3axis.toml"), &settings).unwrap();
+    let machine =
+        Machine::read(&root.join("examples/machines/mill-3axis.toml"), &settings).unwrap();
     let program = Program::spool("line", &b"G21 G90\nF1200\nG1 X14\nM2\n"[..]).unwrap();
     let run = Run::prepare(machine, &registry, program, Switches::default()).unwrap();
     let mut samples = Samples::default();
     let commands = [Timed::parse("1300,feed-override,0.5").unwrap()];
-    let summary = run.drive(Clock::Virtual, &commands, &mut samples).unwrap().summary;
+    let summary = run
+        .drive(Clock::Virtual, &commands, &mut samples)
+        .unwrap()
+        .summary;
     let feed_mm_per_s = |tick: usize| samples.0[tick].feed_mm_per_s;
     // 20 mm/s are programmed. The script asks for 1, and from period 60 on, where torque is twice the reference, for 0.3.
-    for (tick, expected) in [(440, 0.8 * 20.0), (920, 0.3 * 20.0), (1250, 0.2 * 20.0), (1500, 0.5 * 0.2 * 20.0)] {
-        assert!((feed_mm_per_s(tick) - expected).abs() < 1e-9, "tick {tick}: {} mm/s", feed_mm_per_s(tick));
+    for (tick, expected) in [
+        (440, 0.8 * 20.0),
+        (920, 0.3 * 20.0),
+        (1250, 0.2 * 20.0),
+        (1500, 0.5 * 0.2 * 20.0),
+    ] {
+        assert!(
+            (feed_mm_per_s(tick) - expected).abs() < 1e-9,
+            "tick {tick}: {} mm/s",
+            feed_mm_per_s(tick)
+        );
     }
     let policy = summary.policy.unwrap();
-    assert_eq!((summary.fault, summary.late_ratios, policy.traps), (None, 0, 0));
-    assert!(policy.ratios_changed > 100 && policy.periods > policy.ratios_changed, "{policy:?}");
+    assert_eq!(
+        (summary.fault, summary.late_ratios, policy.traps),
+        (None, 0, 0)
+    );
+    assert!(
+        policy.ratios_changed > 100 && policy.periods > policy.ratios_changed,
+        "{policy:?}"
+    );
 }
 
 #[test]
 fn a_fault_and_a_defect_stop_on_the_path_in_their_tick() {
-    for (asks, words) in
-        [("fault", "feed strategy once: fault 7"), ("defect", "feed strategy once: it has lost its way")]
-    {
+    for (asks, words) in [
+        ("fault", "feed strategy once: fault 7"),
+        ("defect", "feed strategy once: it has lost its way"),
+    ] {
         let (summary, samples) = driven(asks, Clock::Virtual);
-        assert!(summary.fault.as_ref().is_some_and(|fault| fault.starts_with(words)), "{:?}", summary.fault);
+        assert!(
+            summary
+                .fault
+                .as_ref()
+                .is_some_and(|fault| fault.starts_with(words)),
+            "{:?}",
+            summary.fault
+        );
         let stop = &summary.stops[0];
-        assert_eq!((stop.tick, stop.cause, stop.reaction_periods), (TICK, "soft fault", Some(1)));
+        assert_eq!(
+            (stop.tick, stop.cause, stop.reaction_periods),
+            (TICK, "soft fault", Some(1))
+        );
         let last = samples.0.last().unwrap().command;
         assert!(last[1] == 0.0 && last[0] > 0.0 && last[0] < 60.0);
     }
@@ -173,6 +239,12 @@ fn both_clocks_send_the_same_samples_up_to_the_fault() {
         println!("not compared: this computer was late {disturbed} times");
         return;
     }
-    let commands = |samples: &Samples| samples.0.iter().map(|s| (s.tick, s.command)).collect::<Vec<_>>();
+    let commands = |samples: &Samples| {
+        samples
+            .0
+            .iter()
+            .map(|s| (s.tick, s.command))
+            .collect::<Vec<_>>()
+    };
     assert!(commands(&samples) == commands(&expected));
 }

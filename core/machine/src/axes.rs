@@ -47,17 +47,24 @@ impl AxisSet {
             section.refuse_whole("missing: a machine has at least one axis");
         }
         if names.len() > MAX_AXES {
-            section.refuse_whole(format!("a machine has at most {MAX_AXES} axes, not {}", names.len()));
+            section.refuse_whole(format!(
+                "a machine has at most {MAX_AXES} axes, not {}",
+                names.len()
+            ));
         }
         // All axes are read before any failure counts, so that all problems are told.
-        let all: Vec<_> = names.iter().map(|name| axis(&section, name, motion)).collect();
+        let all: Vec<_> = names
+            .iter()
+            .map(|name| axis(&section, name, motion))
+            .collect();
         Self::from_axes(&all.into_iter().collect::<Option<Vec<_>>>()?)
     }
 
     fn from_axes(all: &[Axis]) -> Option<Self> {
         let letters: Vec<_> = all.iter().map(|a| (a.letter, a.rotary)).collect();
         let limits: Vec<_> = all.iter().map(|a| a.limits).collect();
-        let vector = |of: fn(&Axis) -> f64| AxisVector::from_slice(&all.iter().map(of).collect::<Vec<_>>());
+        let vector =
+            |of: fn(&Axis) -> f64| AxisVector::from_slice(&all.iter().map(of).collect::<Vec<_>>());
         Some(Self {
             axes: Axes::new(&letters).ok()?,
             limits: Limits::new(&limits).ok()?,
@@ -75,17 +82,39 @@ fn axis(axes: &Section<'_>, name: &str, motion: &Motion) -> Option<Axis> {
     let letter = letter(&section, name);
     let kinds = [("linear", false), ("rotary", true)];
     // Where the kind is wrong, nobody knows which units are right.
-    let rotary = if section.has("kind") { section.choice("kind", &kinds)? } else { false };
+    let rotary = if section.has("kind") {
+        section.choice("kind", &kinds)?
+    } else {
+        false
+    };
     refuse_other_kind(&section, rotary);
     let units = Units::of(rotary);
     let limits = limits(&section, units, None, difference(rotary, motion))?;
-    let stated = if section.has(units.following) { section.positive(units.following) } else { Some(f64::INFINITY) };
+    let stated = if section.has(units.following) {
+        section.positive(units.following)
+    } else {
+        Some(f64::INFINITY)
+    };
     let following = stated.map(|most| most * units.scale);
-    let unhomed = if section.has(units.unhomed) { unhomed(&section, units, &limits) } else { Some(f64::NAN) };
-    let skew = if section.has(units.skew) { section.positive(units.skew) } else { Some(MAX_SKEW) };
+    let unhomed = if section.has(units.unhomed) {
+        unhomed(&section, units, &limits)
+    } else {
+        Some(f64::NAN)
+    };
+    let skew = if section.has(units.skew) {
+        section.positive(units.skew)
+    } else {
+        Some(MAX_SKEW)
+    };
     let skew = skew.map(|most| most * units.scale);
     let start = position(&section, units.start, units, &limits, 0.0);
-    let home = position(&section, units.home, units, &limits, start.unwrap_or(limits.min_mm));
+    let home = position(
+        &section,
+        units.home,
+        units,
+        &limits,
+        start.unwrap_or(limits.min_mm),
+    );
     Some(Axis {
         letter: letter?,
         rotary,
@@ -104,7 +133,10 @@ fn unhomed(section: &Section<'_>, units: &Units, limits: &AxisLimits) -> Option<
     if stated * per_minute > limits.feed_mm_per_s * (1.0 + 1e-12) {
         section.refuse(
             units.unhomed,
-            format!("is more than the axis's highest feed, {}", limits.feed_mm_per_s / per_minute),
+            format!(
+                "is more than the axis's highest feed, {}",
+                limits.feed_mm_per_s / per_minute
+            ),
         );
         return None;
     }
@@ -114,7 +146,9 @@ fn unhomed(section: &Section<'_>, units: &Units, limits: &AxisLimits) -> Option<
 /// The letter of an axis, upper case.
 fn letter(section: &Section<'_>, name: &str) -> Option<char> {
     let mut letters = name.chars();
-    let letter = letters.next().filter(|c| letters.next().is_none() && LETTERS.contains(*c));
+    let letter = letters
+        .next()
+        .filter(|c| letters.next().is_none() && LETTERS.contains(*c));
     if letter.is_none() {
         let lower = name.to_lowercase();
         let meant = if lower.len() == 1 && LETTERS.contains(&lower) {
@@ -122,7 +156,9 @@ fn letter(section: &Section<'_>, name: &str) -> Option<char> {
         } else {
             String::new()
         };
-        section.refuse_whole(format!("an axis is called x, y, z, a, b, c, u, v or w{meant}"));
+        section.refuse_whole(format!(
+            "an axis is called x, y, z, a, b, c, u, v or w{meant}"
+        ));
     }
     letter.map(|c| c.to_ascii_uppercase())
 }

@@ -20,14 +20,22 @@ pub struct Convert<'a> {
 impl<'a> Convert<'a> {
     /// For the text numbered `source`, at the dotted path where its values belong.
     pub fn new(source: usize, problems: &'a Problems, path: Vec<String>) -> Self {
-        Self { source, problems, path, depth: 0 }
+        Self {
+            source,
+            problems,
+            path,
+            depth: 0,
+        }
     }
 
     /// A table.
     pub fn table(&mut self, table: &DeTable<'_>) -> Table {
         let mut nodes = Table::with_capacity(table.len());
         for (key, value) in table {
-            let origin = Origin { source: self.source, offset: key.span().start };
+            let origin = Origin {
+                source: self.source,
+                offset: key.span().start,
+            };
             self.path.push(key.get_ref().to_string());
             let value = self.value(value.get_ref(), origin);
             self.path.pop();
@@ -65,8 +73,14 @@ impl<'a> Convert<'a> {
     fn elements(&mut self, value: &DeValue<'_>) -> Vec<Node> {
         let array = value.as_array().into_iter().flatten();
         let nodes = array.map(|element| {
-            let origin = Origin { source: self.source, offset: element.span().start };
-            Node { origin, value: self.value(element.get_ref(), origin) }
+            let origin = Origin {
+                source: self.source,
+                offset: element.span().start,
+            };
+            Node {
+                origin,
+                value: self.value(element.get_ref(), origin),
+            }
         });
         nodes.collect()
     }
@@ -75,7 +89,13 @@ impl<'a> Convert<'a> {
         if let Ok(value) = i64::from_str_radix(number.as_str(), number.radix()) {
             return Value::Integer(value);
         }
-        self.report(origin, format!("the integer {} has more than 64 bits", shorten(number.as_str())));
+        self.report(
+            origin,
+            format!(
+                "the integer {} has more than 64 bits",
+                shorten(number.as_str())
+            ),
+        );
         Value::Wrong
     }
 
@@ -83,7 +103,10 @@ impl<'a> Convert<'a> {
         let text = number.as_str();
         let value = text.parse().unwrap_or(f64::NAN);
         if f64::is_infinite(value) && !text.contains("inf") {
-            self.report(origin, format!("the number {} is out of range", shorten(text)));
+            self.report(
+                origin,
+                format!("the number {} is out of range", shorten(text)),
+            );
             return Value::Wrong;
         }
         Value::Float(value)

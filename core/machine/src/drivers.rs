@@ -46,7 +46,9 @@ pub struct Owned {
 impl DriverChoice {
     /// The dotted path of its table.
     pub fn section(&self) -> String {
-        self.name.as_ref().map_or_else(|| "driver".to_owned(), |name| format!("drivers.{name}"))
+        self.name
+            .as_ref()
+            .map_or_else(|| "driver".to_owned(), |name| format!("drivers.{name}"))
     }
 
     /// What people call it: its plugin, behind its name where it has one.
@@ -61,14 +63,22 @@ impl DriverChoice {
     fn read_one(section: &Section<'_>) -> Option<Self> {
         let stand_in = stand_in(section);
         let choice = PluginChoice::read(section)?;
-        Some(Self { name: None, choice, stand_in, owns: None, inputs_at_rest: 0 })
+        Some(Self {
+            name: None,
+            choice,
+            stand_in,
+            owns: None,
+            inputs_at_rest: 0,
+        })
     }
 
     /// Reads `[drivers.<name>]`; `None` where it is wrong, which is reported.
     fn read_named(section: &Section<'_>, name: &str) -> Option<Self> {
         let numbers = |key, last| numbers(section, key, last);
         let owns = Owned {
-            joints: list(section, "joints", "names of joints", |node| node.text().map(str::to_owned)),
+            joints: list(section, "joints", "names of joints", |node| {
+                node.text().map(str::to_owned)
+            }),
             inputs: numbers("inputs", LAST_INPUT),
             outputs: numbers("outputs", LAST_INPUT),
             analog: numbers("analog", MAX_ANALOG as u32 - 1),
@@ -76,14 +86,24 @@ impl DriverChoice {
         };
         let stand_in = stand_in(section);
         let choice = PluginChoice::read(section)?;
-        Some(Self { name: Some(name.to_owned()), choice, stand_in, owns: Some(owns), inputs_at_rest: 0 })
+        Some(Self {
+            name: Some(name.to_owned()),
+            choice,
+            stand_in,
+            owns: Some(owns),
+            inputs_at_rest: 0,
+        })
     }
 }
 
 /// Reads `stand_in` of a driver's table; `None` where there is none, or where it is wrong, which is reported.
 fn stand_in(section: &Section<'_>) -> Option<PluginChoice> {
     let stand_in = section.section("stand_in");
-    if stand_in.exists() { PluginChoice::read(&stand_in) } else { None }
+    if stand_in.exists() {
+        PluginChoice::read(&stand_in)
+    } else {
+        None
+    }
 }
 
 /// Reads `[driver]`, or else all of `[drivers.*]`. What is wrong is reported; there is one driver at least in any case.
@@ -91,12 +111,20 @@ pub(crate) fn read(root: &Section<'_>) -> Vec<DriverChoice> {
     let (one, several) = (root.section("driver"), root.section("drivers"));
     let nothing = || {
         let choice = PluginChoice::named("");
-        DriverChoice { name: None, choice, stand_in: None, owns: None, inputs_at_rest: 0 }
+        DriverChoice {
+            name: None,
+            choice,
+            stand_in: None,
+            owns: None,
+            inputs_at_rest: 0,
+        }
     };
     if !root.has("drivers") {
         return vec![DriverChoice::read_one(&one).unwrap_or_else(nothing)];
     }
-    let named = several.keys().filter_map(|name| DriverChoice::read_named(&several.section(name), name));
+    let named = several
+        .keys()
+        .filter_map(|name| DriverChoice::read_named(&several.section(name), name));
     let mut all: Vec<_> = named.collect();
     if root.has("driver") {
         several
@@ -131,12 +159,22 @@ impl Wanted<'_> {
             return;
         }
         let all = self.root.section("drivers");
-        let names: Vec<_> = drivers.iter().filter_map(|driver| driver.name.as_deref()).collect();
+        let names: Vec<_> = drivers
+            .iter()
+            .filter_map(|driver| driver.name.as_deref())
+            .collect();
         let names = names.join(", ");
         let known: Vec<_> = self.joints.iter().map(|(name, _)| name.as_str()).collect();
         let joints = owners(&all, "joints", |node| node.text().map(str::to_owned));
-        for (joint, owner) in joints.iter().filter(|(joint, _)| !known.contains(&joint.as_str())) {
-            let cause = format!("no joint is called \"{}\"; the machine has {}", shorten(joint), known.join(", "));
+        for (joint, owner) in joints
+            .iter()
+            .filter(|(joint, _)| !known.contains(&joint.as_str()))
+        {
+            let cause = format!(
+                "no joint is called \"{}\"; the machine has {}",
+                shorten(joint),
+                known.join(", ")
+            );
             owner.refuse(cause);
         }
         let whole = |node: &Node| node.whole();
@@ -144,7 +182,14 @@ impl Wanted<'_> {
         let inputs = self.inputs.iter().map(|(n, table)| (*n, table.as_str()));
         let outputs = self.outputs.iter().map(|(n, table)| (*n, table.as_str()));
         let analog = self.analog.iter().map(|(n, table)| (*n, table.as_str()));
-        self.unowned("joint", &joints, self.joints.iter().map(|(name, table)| (name.clone(), table.as_str())), &names);
+        self.unowned(
+            "joint",
+            &joints,
+            self.joints
+                .iter()
+                .map(|(name, table)| (name.clone(), table.as_str())),
+            &names,
+        );
         self.unowned("input", &of("inputs"), inputs, &names);
         self.unowned("output", &of("outputs"), outputs, &names);
         self.unowned("analog input", &of("analog"), analog, &names);
@@ -160,18 +205,25 @@ impl Wanted<'_> {
         names: &str,
     ) {
         for (one, table) in wanted.filter(|(one, _)| !owned.contains_key(one)) {
-            let words = format!("no driver has {what} {one}: it is in no list of [drivers.*], which are {names}");
+            let words = format!(
+                "no driver has {what} {one}: it is in no list of [drivers.*], which are {names}"
+            );
             self.root.refuse_dotted(table, words);
         }
     }
 
     fn check_spindle(&self, all: &Section<'_>, drivers: &[DriverChoice], names: &str) {
-        let spindle = |driver: &&DriverChoice| driver.owns.as_ref().is_some_and(|owns| owns.spindle);
-        let mut owners = drivers.iter().filter(spindle).filter_map(|driver| driver.name.as_deref());
+        let spindle =
+            |driver: &&DriverChoice| driver.owns.as_ref().is_some_and(|owns| owns.spindle);
+        let mut owners = drivers
+            .iter()
+            .filter(spindle)
+            .filter_map(|driver| driver.name.as_deref());
         let Some(first) = owners.next() else {
             if self.root.has("spindle") {
-                let words =
-                    format!("no driver has the spindle: none of [drivers.*], which are {names}, says spindle = true");
+                let words = format!(
+                    "no driver has the spindle: none of [drivers.*], which are {names}, says spindle = true"
+                );
                 self.root.refuse("spindle", words);
             }
             return;
@@ -212,10 +264,23 @@ fn owners<'a, T: Ord + std::fmt::Display>(
             match owned.get(&one) {
                 Some(first) => {
                     let (place, first) = (section.place_of(first.node), first.driver);
-                    let words = format!("{} is that of drivers.{first} already ({place})", shorten(&one.to_string()));
+                    let words = format!(
+                        "{} is that of drivers.{first} already ({place})",
+                        shorten(&one.to_string())
+                    );
                     section.refuse_node(key, node, words);
                 }
-                None => _ = owned.insert(one, Owner { section: section.clone(), driver, key, node }),
+                None => {
+                    _ = owned.insert(
+                        one,
+                        Owner {
+                            section: section.clone(),
+                            driver,
+                            key,
+                            node,
+                        },
+                    )
+                }
             }
         }
     }
@@ -224,17 +289,34 @@ fn owners<'a, T: Ord + std::fmt::Display>(
 
 /// The names of the joints that drives move, each with its table: those that the file states, and an axis without one is its own
 /// joint, but for machines whose kinematics say what the joints are.
-pub(crate) fn joint_names(axes: &[String], joints: &[Joint], identity: bool) -> Vec<(String, String)> {
-    let stated = joints.iter().map(|joint| (joint.name.clone(), format!("joints.{}", joint.name)));
+pub(crate) fn joint_names(
+    axes: &[String],
+    joints: &[Joint],
+    identity: bool,
+) -> Vec<(String, String)> {
+    let stated = joints
+        .iter()
+        .map(|joint| (joint.name.clone(), format!("joints.{}", joint.name)));
     let lone = |axis: &usize| identity && !joints.iter().any(|joint| joint.axis == Some(*axis));
-    let alone = (0..axes.len()).filter(lone).map(|axis| (axes[axis].clone(), format!("axes.{}", axes[axis])));
+    let alone = (0..axes.len())
+        .filter(lone)
+        .map(|axis| (axes[axis].clone(), format!("axes.{}", axes[axis])));
     stated.chain(alone).collect()
 }
 
 /// The list `key`, each entry read by `read`; none where one of them is wrong, which is reported.
-fn list<T>(section: &Section<'_>, key: &str, what: &str, read: impl Fn(&Node) -> Option<T>) -> Vec<T> {
-    let Some(node) = section.right(key) else { return vec![] };
-    let read: Option<Vec<T>> = node.array().and_then(|nodes| nodes.iter().map(read).collect());
+fn list<T>(
+    section: &Section<'_>,
+    key: &str,
+    what: &str,
+    read: impl Fn(&Node) -> Option<T>,
+) -> Vec<T> {
+    let Some(node) = section.right(key) else {
+        return vec![];
+    };
+    let read: Option<Vec<T>> = node
+        .array()
+        .and_then(|nodes| nodes.iter().map(read).collect());
     read.unwrap_or_else(|| {
         section.refuse(key, format!("must be an array of {what}"));
         vec![]

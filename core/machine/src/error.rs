@@ -47,7 +47,11 @@ pub struct Problem {
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let said = matches!(&self.place, Place::Override(key) if *key == self.key);
-        let key = if said || self.key.is_empty() { String::new() } else { format!("{}: ", self.key) };
+        let key = if said || self.key.is_empty() {
+            String::new()
+        } else {
+            format!("{}: ", self.key)
+        };
         f.write_str(&one_line(&format!("{}: {key}{}", self.place, self.what)))
     }
 }

@@ -109,7 +109,10 @@ const ROTARY: Keys = Keys {
 /// Reads `[homing.*]`, in the order in which the axes home; what is wrong is reported and left out.
 pub(crate) fn read(root: &Section<'_>, axes: &AxisSet) -> Vec<AxisHoming> {
     let section = root.section("homing");
-    let mut all: Vec<_> = section.keys().filter_map(|name| axis(&section.section(name), name, axes)).collect();
+    let mut all: Vec<_> = section
+        .keys()
+        .filter_map(|name| axis(&section.section(name), name, axes))
+        .collect();
     all.sort_by_key(|homing| (homing.sequence, homing.axis));
     all
 }
@@ -117,15 +120,25 @@ pub(crate) fn read(root: &Section<'_>, axes: &AxisSet) -> Vec<AxisHoming> {
 fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> {
     let Some(axis) = index(&set.axes, name) else {
         let have = letters(&set.axes);
-        section.refuse_whole(format!("no axis is called \"{}\"; the machine has {have}", shorten(name)));
+        section.refuse_whole(format!(
+            "no axis is called \"{}\"; the machine has {have}",
+            shorten(name)
+        ));
         return None;
     };
     let rotary = set.axes.is_rotary(axis);
-    let (keys, other) = if rotary { (ROTARY, LINEAR) } else { (LINEAR, ROTARY) };
+    let (keys, other) = if rotary {
+        (ROTARY, LINEAR)
+    } else {
+        (LINEAR, ROTARY)
+    };
     refuse_other_unit(section, &keys, &other, rotary);
     let max_torque_percent = section.positive("max_torque_percent").filter(|percent| {
         if *percent > MOST_TORQUE_PERCENT {
-            section.refuse("max_torque_percent", format!("must be at most {MOST_TORQUE_PERCENT}, not {percent}"));
+            section.refuse(
+                "max_torque_percent",
+                format!("must be at most {MOST_TORQUE_PERCENT}, not {percent}"),
+            );
         }
         *percent <= MOST_TORQUE_PERCENT
     });
@@ -139,24 +152,44 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
     let inverted = section.truth("invert").unwrap_or(false);
     let sequence = section.whole("sequence", 0, u32::MAX);
     let input = section.required("input", |section, key| section.whole(key, 0, LAST_INPUT));
-    let search = section.required(keys.search, Section::number).filter(|search| {
-        if *search == 0.0 {
-            section.refuse(keys.search, "must not be 0: its sign is the direction of the search");
-        }
-        *search != 0.0
-    });
+    let search = section
+        .required(keys.search, Section::number)
+        .filter(|search| {
+            if *search == 0.0 {
+                section.refuse(
+                    keys.search,
+                    "must not be 0: its sign is the direction of the search",
+                );
+            }
+            *search != 0.0
+        });
     let latch = section.required(keys.latch, Section::positive);
     let back_off = section.required(keys.back_off, Section::positive);
     let switch = section.required(keys.switch, Section::number);
-    let (per_minute, most) = (keys.scale / 60.0, set.limits.axes().get(axis)?.feed_mm_per_s);
+    let (per_minute, most) = (
+        keys.scale / 60.0,
+        set.limits.axes().get(axis)?.feed_mm_per_s,
+    );
     for (key, feed) in [(keys.search, search), (keys.latch, latch)] {
         if feed.is_some_and(|feed| feed.abs() * per_minute > most * (1.0 + 1e-12)) {
-            section.refuse(key, format!("is more than the axis's highest feed, {}", most / per_minute));
+            section.refuse(
+                key,
+                format!(
+                    "is more than the axis's highest feed, {}",
+                    most / per_minute
+                ),
+            );
         }
     }
     let slowest = set.unhomed_feed[axis] / per_minute;
     if search.is_some_and(|feed| feed.abs() > slowest * (1.0 + 1e-12)) {
-        section.refuse(keys.search, format!("is more than {} of axes.{name}, {slowest}", Units::of(rotary).unhomed));
+        section.refuse(
+            keys.search,
+            format!(
+                "is more than {} of axes.{name}, {slowest}",
+                Units::of(rotary).unhomed
+            ),
+        );
     }
     let by = HomingBy::Switch(SwitchHoming {
         input: input?,
@@ -166,13 +199,30 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
         back_off_mm: back_off? * keys.scale,
         switch_mm: switch? * keys.scale,
     });
-    Some(AxisHoming { axis, sequence: sequence.unwrap_or(0), max_torque_percent, by })
+    Some(AxisHoming {
+        axis,
+        sequence: sequence.unwrap_or(0),
+        max_torque_percent,
+        by,
+    })
 }
 
 /// An axis that its drive homes: the keys of a switch say nothing then.
-fn by_drive(section: &Section<'_>, axis: usize, max_torque_percent: Option<f64>, keys: &Keys) -> Option<AxisHoming> {
+fn by_drive(
+    section: &Section<'_>,
+    axis: usize,
+    max_torque_percent: Option<f64>,
+    keys: &Keys,
+) -> Option<AxisHoming> {
     let method = section.whole("drive_method", 1, LAST_METHOD)?.cast_signed();
-    for key in ["input", "invert", keys.search, keys.latch, keys.back_off, keys.switch] {
+    for key in [
+        "input",
+        "invert",
+        keys.search,
+        keys.latch,
+        keys.back_off,
+        keys.switch,
+    ] {
         if section.has(key) {
             section.refuse(
                 key,
@@ -182,7 +232,12 @@ fn by_drive(section: &Section<'_>, axis: usize, max_torque_percent: Option<f64>,
     }
     let sequence = section.whole("sequence", 0, u32::MAX).unwrap_or(0);
     let within_s = section.positive("drive_within_s").unwrap_or(DRIVE_WITHIN_S);
-    Some(AxisHoming { axis, sequence, max_torque_percent, by: HomingBy::Drive(DriveHoming { method, within_s }) })
+    Some(AxisHoming {
+        axis,
+        sequence,
+        max_torque_percent,
+        by: HomingBy::Drive(DriveHoming { method, within_s }),
+    })
 }
 
 fn refuse_other_unit(section: &Section<'_>, keys: &Keys, other: &Keys, rotary: bool) {
@@ -193,7 +248,11 @@ fn refuse_other_unit(section: &Section<'_>, keys: &Keys, other: &Keys, rotary: b
         (other.switch, keys.switch),
     ];
     for (wrong, right) in pairs.into_iter().filter(|(wrong, _)| section.has(wrong)) {
-        let kind = if rotary { "rotary axis is in degrees" } else { "linear axis is in mm" };
+        let kind = if rotary {
+            "rotary axis is in degrees"
+        } else {
+            "linear axis is in mm"
+        };
         section.suggest(right);
         section.refuse(wrong, format!("a {kind}; did you mean `{right}`?"));
     }

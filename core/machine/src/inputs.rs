@@ -44,7 +44,10 @@ const ROLES: [(&str, Role); 7] = [
 impl Role {
     /// The word of the file.
     pub fn name(self) -> &'static str {
-        ROLES.iter().find(|(_, role)| *role == self).map_or("", |(word, _)| word)
+        ROLES
+            .iter()
+            .find(|(_, role)| *role == self)
+            .map_or("", |(word, _)| word)
     }
 }
 
@@ -69,16 +72,31 @@ pub(crate) fn read(root: &Section<'_>) -> Vec<Input> {
     let mut all: Vec<Input> = vec![];
     for name in section.keys() {
         let table = section.section(name);
-        let Some(input) = one(&table, name) else { continue };
-        let (number, same) = (input.input, all.iter().find(|other| other.input == input.input));
-        match same.filter(|other| other.role == input.role || other.normally_closed != input.normally_closed) {
+        let Some(input) = one(&table, name) else {
+            continue;
+        };
+        let (number, same) = (
+            input.input,
+            all.iter().find(|other| other.input == input.input),
+        );
+        match same.filter(|other| {
+            other.role == input.role || other.normally_closed != input.normally_closed
+        }) {
             Some(other) if other.role != input.role => {
                 let closed = other.normally_closed;
-                table.refuse("normally_closed", format!("input {number} is inputs.{} too, with {closed}", other.name));
+                table.refuse(
+                    "normally_closed",
+                    format!("input {number} is inputs.{} too, with {closed}", other.name),
+                );
             }
             Some(other) => {
-                let role = input.role.map_or(String::new(), |role| format!(", with the role {}", role.name()));
-                table.refuse("input", format!("input {number} is inputs.{} already{role}", other.name));
+                let role = input.role.map_or(String::new(), |role| {
+                    format!(", with the role {}", role.name())
+                });
+                table.refuse(
+                    "input",
+                    format!("input {number} is inputs.{} already{role}", other.name),
+                );
             }
             None => all.push(input),
         }
@@ -88,33 +106,58 @@ pub(crate) fn read(root: &Section<'_>) -> Vec<Input> {
 
 fn one(table: &Section<'_>, name: &str) -> Option<Input> {
     // Everything is read before the first failure ends it, so that all problems are told.
-    let role = table.choice("role", &ROLES.map(|(word, role)| (word, Some(role)))).flatten();
+    let role = table
+        .choice("role", &ROLES.map(|(word, role)| (word, Some(role))))
+        .flatten();
     let normally_closed = table.truth("normally_closed").unwrap_or(true);
     let max_age_ms = table.at_least("max_age_ms", 0.0).unwrap_or(MAX_AGE_MS);
     if max_age_ms > MOST_AGE_MS {
-        table.refuse("max_age_ms", format!("must be at most {MOST_AGE_MS}, not {max_age_ms}"));
+        table.refuse(
+            "max_age_ms",
+            format!("must be at most {MOST_AGE_MS}, not {max_age_ms}"),
+        );
     }
     let input = table.required("input", |table, key| table.whole(key, 0, LAST_INPUT))?;
-    Some(Input { name: name.to_owned(), input, role, normally_closed, max_age_s: max_age_ms / 1e3 })
+    Some(Input {
+        name: name.to_owned(),
+        input,
+        role,
+        normally_closed,
+        max_age_s: max_age_ms / 1e3,
+    })
 }
 
 /// Reports inputs called home switch or probe that nobody homes or probes by, or that are read the other way round there.
-pub(crate) fn check(root: &Section<'_>, inputs: &[Input], homing: &[AxisHoming], probe: Option<&Probe>) {
+pub(crate) fn check(
+    root: &Section<'_>,
+    inputs: &[Input],
+    homing: &[AxisHoming],
+    probe: Option<&Probe>,
+) {
     let section = root.section("inputs");
     for input in inputs {
         let table = section.section(&input.name);
         let homes = || {
             let mut switches = homing.iter().filter_map(AxisHoming::switch);
-            switches.find(|switch| switch.input == input.input).map(|switch| switch.inverted)
+            switches
+                .find(|switch| switch.input == input.input)
+                .map(|switch| switch.inverted)
         };
-        let probes = || probe.filter(|probe| probe.input == input.input).map(|probe| probe.inverted);
+        let probes = || {
+            probe
+                .filter(|probe| probe.input == input.input)
+                .map(|probe| probe.inverted)
+        };
         let (used, by) = match input.role {
             Some(Role::Home) => (homes(), "[homing.*]"),
             Some(Role::Probe) => (probes(), "[probe]"),
             _ => continue,
         };
         match used {
-            None => table.refuse("role", format!("no {by} has input {}: nobody would look at it", input.input)),
+            None => table.refuse(
+                "role",
+                format!("no {by} has input {}: nobody would look at it", input.input),
+            ),
             Some(inverted) if inverted != input.normally_closed => {
                 let (own, other) = (input.normally_closed, inverted);
                 table.refuse(

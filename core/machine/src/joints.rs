@@ -31,13 +31,22 @@ pub(crate) fn read(root: &Section<'_>, axes: &AxisSet, motion: &Motion) -> Vec<J
     let section = root.section("joints");
     let count = section.keys().count();
     if count > MAX_AXES {
-        section.refuse_whole(format!("a machine has at most {MAX_AXES} joints, not {count}"));
+        section.refuse_whole(format!(
+            "a machine has at most {MAX_AXES} joints, not {count}"
+        ));
     }
-    section.keys().filter_map(|name| joint(&section.section(name), name, axes, motion)).collect()
+    section
+        .keys()
+        .filter_map(|name| joint(&section.section(name), name, axes, motion))
+        .collect()
 }
 
 fn joint(section: &Section<'_>, name: &str, set: &AxisSet, motion: &Motion) -> Option<Joint> {
-    if section.has("axis") { joint_of_axis(section, name, set) } else { joint_of_its_own(section, name, motion) }
+    if section.has("axis") {
+        joint_of_axis(section, name, set)
+    } else {
+        joint_of_its_own(section, name, motion)
+    }
 }
 
 /// A joint that moves one axis, and takes from it what it does not state.
@@ -46,13 +55,20 @@ fn joint_of_axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<Joi
     let Some(axis) = index(&set.axes, letter) else {
         section.refuse(
             "axis",
-            format!("no axis is called \"{}\"; the machine has {}", shorten(letter), letters(&set.axes)),
+            format!(
+                "no axis is called \"{}\"; the machine has {}",
+                shorten(letter),
+                letters(&set.axes)
+            ),
         );
         return None;
     };
     let rotary = set.axes.is_rotary(axis);
     if section.has("kind") {
-        section.refuse("kind", "a joint is of the kind of its axis; a joint of its own states no axis");
+        section.refuse(
+            "kind",
+            "a joint is of the kind of its axis; a joint of its own states no axis",
+        );
     }
     refuse_other_kind(section, rotary);
     let units = Units::of(rotary);
@@ -60,24 +76,50 @@ fn joint_of_axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<Joi
     let limits = limits(section, units, Some(base), base.speed_difference_mm_per_s)?;
     let following = following(section, units, set.max_following_error[axis])?;
     let home = position(section, units.home, units, &limits, set.home[axis])?;
-    Some(Joint { name: name.to_owned(), axis: Some(axis), rotary, limits, max_following_error_mm: following, home })
+    Some(Joint {
+        name: name.to_owned(),
+        axis: Some(axis),
+        rotary,
+        limits,
+        max_following_error_mm: following,
+        home,
+    })
 }
 
 /// A joint that is no axis by itself: the kinematics say what moves it.
 fn joint_of_its_own(section: &Section<'_>, name: &str, motion: &Motion) -> Option<Joint> {
     let kinds = [("linear", false), ("rotary", true)];
-    let rotary = if section.has("kind") { section.choice("kind", &kinds)? } else { false };
+    let rotary = if section.has("kind") {
+        section.choice("kind", &kinds)?
+    } else {
+        false
+    };
     refuse_other_kind(section, rotary);
     let units = Units::of(rotary);
     let limits = limits_without_end(section, units, difference(rotary, motion))?;
     let following = following(section, units, f64::INFINITY)?;
-    let home = position(section, units.home, units, &limits, 0.0f64.clamp(limits.min_mm, limits.max_mm))?;
-    Some(Joint { name: name.to_owned(), axis: None, rotary, limits, max_following_error_mm: following, home })
+    let home = position(
+        section,
+        units.home,
+        units,
+        &limits,
+        0.0f64.clamp(limits.min_mm, limits.max_mm),
+    )?;
+    Some(Joint {
+        name: name.to_owned(),
+        axis: None,
+        rotary,
+        limits,
+        max_following_error_mm: following,
+        home,
+    })
 }
 
 fn following(section: &Section<'_>, units: &Units, default: f64) -> Option<f64> {
     if section.has(units.following) {
-        section.positive(units.following).map(|most| most * units.scale)
+        section
+            .positive(units.following)
+            .map(|most| most * units.scale)
     } else {
         Some(default)
     }
@@ -86,7 +128,9 @@ fn following(section: &Section<'_>, units: &Units, default: f64) -> Option<f64> 
 /// The index of the axis that a file calls `name`, in lower case.
 pub(crate) fn index(axes: &Axes, name: &str) -> Option<usize> {
     let mut letters = name.chars();
-    let letter = letters.next().filter(|c| c.is_ascii_lowercase() && letters.next().is_none())?;
+    let letter = letters
+        .next()
+        .filter(|c| c.is_ascii_lowercase() && letters.next().is_none())?;
     axes.index(letter.to_ascii_uppercase())
 }
 

@@ -13,8 +13,18 @@ pub struct Key {
     pub meaning: &'static str,
 }
 
-const fn key(path: &'static str, unit: &'static str, default: &'static str, meaning: &'static str) -> Key {
-    Key { path, unit, default, meaning }
+const fn key(
+    path: &'static str,
+    unit: &'static str,
+    default: &'static str,
+    meaning: &'static str,
+) -> Key {
+    Key {
+        path,
+        unit,
+        default,
+        meaning,
+    }
 }
 
 #[rustfmt::skip]
@@ -168,11 +178,20 @@ pub fn tool_keys() -> &'static [Key] {
 
 /// The reference of both files as Markdown tables.
 pub fn markdown() -> String {
-    format!("## machine.toml\n\n{}\n## Tool table\n\n{}", table(MACHINE), table(TOOLS))
+    format!(
+        "## machine.toml\n\n{}\n## Tool table\n\n{}",
+        table(MACHINE),
+        table(TOOLS)
+    )
 }
 
 fn table(keys: &[Key]) -> String {
-    let row = |k: &Key| format!("| `{}` | {} | {} | {} |\n", k.path, k.unit, k.default, k.meaning);
+    let row = |k: &Key| {
+        format!(
+            "| `{}` | {} | {} | {} |\n",
+            k.path, k.unit, k.default, k.meaning
+        )
+    };
     let rows: String = keys.iter().map(row).collect();
     format!("| key | unit | default | meaning |\n|---|---|---|---|\n{rows}")
 }

@@ -8,17 +8,46 @@ use crate::units::Units;
 
 /// The allowable speed difference of an axis, mm/s or rad/s.
 pub fn difference(rotary: bool, motion: &Motion) -> f64 {
-    if rotary { motion.speed_difference_rad_per_s } else { motion.speed_difference_mm_per_s }
+    if rotary {
+        motion.speed_difference_rad_per_s
+    } else {
+        motion.speed_difference_mm_per_s
+    }
 }
 
 /// The limits of an axis, or those of a joint where `base`, its axis, gives what it does not state.
-pub fn limits(section: &Section<'_>, units: &Units, base: Option<&AxisLimits>, difference: f64) -> Option<AxisLimits> {
-    read(&Reader { section, base, endless: false }, units, difference)
+pub fn limits(
+    section: &Section<'_>,
+    units: &Units,
+    base: Option<&AxisLimits>,
+    difference: f64,
+) -> Option<AxisLimits> {
+    read(
+        &Reader {
+            section,
+            base,
+            endless: false,
+        },
+        units,
+        difference,
+    )
 }
 
 /// The limits of a joint that belongs to no axis: without `travel` it has no end.
-pub fn limits_without_end(section: &Section<'_>, units: &Units, difference: f64) -> Option<AxisLimits> {
-    read(&Reader { section, base: None, endless: true }, units, difference)
+pub fn limits_without_end(
+    section: &Section<'_>,
+    units: &Units,
+    difference: f64,
+) -> Option<AxisLimits> {
+    read(
+        &Reader {
+            section,
+            base: None,
+            endless: true,
+        },
+        units,
+        difference,
+    )
 }
 
 fn read(read: &Reader<'_>, units: &Units, difference: f64) -> Option<AxisLimits> {
@@ -64,22 +93,49 @@ impl Reader<'_> {
         if let Some(base) = self.base.filter(|_| !self.section.has(key)) {
             return Some(of(base));
         }
-        self.section.required(key, Section::positive).map(|value| value * factor)
+        self.section
+            .required(key, Section::positive)
+            .map(|value| value * factor)
     }
 
-    fn optional(&self, key: &str, factor: f64, of: fn(&AxisLimits) -> f64, default: Option<f64>) -> Option<f64> {
-        if self.section.has(key) { self.value(key, factor, of) } else { self.base.map(of).or(default) }
+    fn optional(
+        &self,
+        key: &str,
+        factor: f64,
+        of: fn(&AxisLimits) -> f64,
+        default: Option<f64>,
+    ) -> Option<f64> {
+        if self.section.has(key) {
+            self.value(key, factor, of)
+        } else {
+            self.base.map(of).or(default)
+        }
     }
 }
 
 /// A position within the travel of an axis or joint, mm or rad.
-pub fn position(section: &Section<'_>, key: &str, units: &Units, limits: &AxisLimits, default: f64) -> Option<f64> {
-    let value = if section.has(key) { section.number(key)? * units.scale } else { default };
+pub fn position(
+    section: &Section<'_>,
+    key: &str,
+    units: &Units,
+    limits: &AxisLimits,
+    default: f64,
+) -> Option<f64> {
+    let value = if section.has(key) {
+        section.number(key)? * units.scale
+    } else {
+        default
+    };
     if (limits.min_mm..=limits.max_mm).contains(&value) {
         return Some(value);
     }
-    let [value, low, high] = [value, limits.min_mm, limits.max_mm].map(|v| as_written(v / units.scale));
-    let which = if section.has(key) { format!("{value} is") } else { format!("missing, and its default, {value}, is") };
+    let [value, low, high] =
+        [value, limits.min_mm, limits.max_mm].map(|v| as_written(v / units.scale));
+    let which = if section.has(key) {
+        format!("{value} is")
+    } else {
+        format!("missing, and its default, {value}, is")
+    };
     section.refuse(key, format!("{which} outside the travel, {low} to {high}"));
     None
 }

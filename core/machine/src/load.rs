@@ -31,7 +31,11 @@ pub struct Loader<'a> {
 impl<'a> Loader<'a> {
     /// A loader that notes what is wrong in `problems`.
     pub fn new(problems: &'a Problems) -> Self {
-        Self { problems, open: Vec::new(), files: 0 }
+        Self {
+            problems,
+            open: Vec::new(),
+            files: 0,
+        }
     }
 
     /// The table of `path` with everything that it includes. `from` is where the name was written, if it was.
@@ -40,7 +44,10 @@ impl<'a> Loader<'a> {
         self.check_format(&own.table, own.source, from.is_none())?;
         let mut table = Table::new();
         self.open.push((own.canonical, path.to_owned()));
-        let included = own.table.get("include").map(|node| self.includes(node, path, &mut table));
+        let included = own
+            .table
+            .get("include")
+            .map(|node| self.includes(node, path, &mut table));
         self.open.pop();
         included.unwrap_or(Some(()))?;
         let mut above = own.table;
@@ -59,15 +66,32 @@ impl<'a> Loader<'a> {
 
     fn includes(&mut self, list: &Node, path: &Path, table: &mut Table) -> Option<()> {
         let Some(files) = list.array() else {
-            self.problems.report(list.origin, "include", format!("must be an array of files, not {}", list.kind()));
+            self.problems.report(
+                list.origin,
+                "include",
+                format!("must be an array of files, not {}", list.kind()),
+            );
             return None;
         };
         for file in files {
             let Some(name) = file.text() else {
-                self.problems.report(file.origin, "include", format!("must name files, not {}", file.kind()));
+                self.problems.report(
+                    file.origin,
+                    "include",
+                    format!("must name files, not {}", file.kind()),
+                );
                 return None;
             };
-            merge(table, self.machine(&beside(path, name), Some(Named { origin: file.origin, key: "include" }))?);
+            merge(
+                table,
+                self.machine(
+                    &beside(path, name),
+                    Some(Named {
+                        origin: file.origin,
+                        key: "include",
+                    }),
+                )?,
+            );
         }
         Some(())
     }
@@ -78,20 +102,40 @@ impl<'a> Loader<'a> {
         self.files += 1;
         let bytes = match read(path) {
             Ok(bytes) if self.files <= MOST_FILES => bytes,
-            Ok(_) => return self.refuse(path, from, &format!("the machine is made of more than {MOST_FILES} files")),
+            Ok(_) => {
+                return self.refuse(
+                    path,
+                    from,
+                    &format!("the machine is made of more than {MOST_FILES} files"),
+                );
+            }
             Err(error) => return self.refuse(path, from, &format!("cannot be read: {error}")),
         };
-        self.parse(path, bytes).map(|(source, table)| Loaded { source, table, canonical })
+        self.parse(path, bytes).map(|(source, table)| Loaded {
+            source,
+            table,
+            canonical,
+        })
     }
 
     fn parse(&self, path: &Path, bytes: Vec<u8>) -> Option<(usize, Table)> {
         let (source, text) = self.decode(path, bytes)?;
         match DeTable::parse(&text) {
-            Ok(table) => Some((source, Convert::new(source, self.problems, Vec::new()).table(table.get_ref()))),
+            Ok(table) => Some((
+                source,
+                Convert::new(source, self.problems, Vec::new()).table(table.get_ref()),
+            )),
             Err(error) => {
                 let span = error.span().unwrap_or_default();
                 let what = syntax(error.message(), text.get(span.clone()).unwrap_or_default());
-                self.problems.report(Origin { source, offset: span.start }, "", what);
+                self.problems.report(
+                    Origin {
+                        source,
+                        offset: span.start,
+                    },
+                    "",
+                    what,
+                );
                 None
             }
         }
@@ -102,8 +146,11 @@ impl<'a> Loader<'a> {
             Ok(text) => Some((self.problems.add_file(path, text.clone()), text)),
             Err(error) => {
                 let offset = error.utf8_error().valid_up_to();
-                let source = self.problems.add_file(path, String::from_utf8_lossy(error.as_bytes()).into_owned());
-                self.problems.report(Origin { source, offset }, "", "not UTF-8 text");
+                let source = self
+                    .problems
+                    .add_file(path, String::from_utf8_lossy(error.as_bytes()).into_owned());
+                self.problems
+                    .report(Origin { source, offset }, "", "not UTF-8 text");
                 None
             }
         }
@@ -113,7 +160,11 @@ impl<'a> Loader<'a> {
         let Some(node) = table.get("format") else {
             if required {
                 let origin = Origin { source, offset: 0 };
-                self.problems.report(origin, "format", format!("missing; this version reads format = {FORMAT}"));
+                self.problems.report(
+                    origin,
+                    "format",
+                    format!("missing; this version reads format = {FORMAT}"),
+                );
             }
             return (!required).then_some(());
         };
@@ -131,14 +182,22 @@ impl<'a> Loader<'a> {
         let Some(start) = self.open.iter().position(|(open, _)| open == canonical) else {
             return Some(());
         };
-        let mut names: Vec<_> = self.open[start..].iter().map(|(_, name)| name.display().to_string()).collect();
+        let mut names: Vec<_> = self.open[start..]
+            .iter()
+            .map(|(_, name)| name.display().to_string())
+            .collect();
         names.push(path.display().to_string());
-        self.refuse(path, from, &format!("includes itself: {}", names.join(" → ")))
+        self.refuse(
+            path,
+            from,
+            &format!("includes itself: {}", names.join(" → ")),
+        )
     }
 
     fn refuse<T>(&self, path: &Path, from: Option<Named>, what: &str) -> Option<T> {
         if let Some(Named { origin, key }) = from {
-            self.problems.report(origin, key, format!("{}: {what}", path.display()));
+            self.problems
+                .report(origin, key, format!("{}: {what}", path.display()));
         } else {
             let source = self.problems.add_unreadable(path);
             self.problems.report(Origin { source, offset: 0 }, "", what);
@@ -162,9 +221,13 @@ struct Loaded {
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LONGEST_FILE + 1).read_to_end(&mut bytes)?;
+    File::open(path)?
+        .take(LONGEST_FILE + 1)
+        .read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LONGEST_FILE {
-        return Err(io::Error::other(format!("longer than {LONGEST_FILE} bytes")));
+        return Err(io::Error::other(format!(
+            "longer than {LONGEST_FILE} bytes"
+        )));
     }
     Ok(bytes)
 }

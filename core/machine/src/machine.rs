@@ -16,7 +16,9 @@ use crate::motion::{FineThread, Loops, Motion};
 use crate::node::plain;
 use crate::outputs::{self, Output};
 use crate::overrides;
-use crate::parts::{GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle, analog_names, text};
+use crate::parts::{
+    GuardMode, Operator, PluginChoice, Policy, RecordErrorMode, Spindle, analog_names, text,
+};
 use crate::places::Places;
 use crate::probe::Probe;
 use crate::problems::{Origin, Problems};
@@ -131,19 +133,32 @@ impl Machine {
         let moving = moving.map(|axes| Moving::read(&section, axes, &tables.motion, &problems));
         // Tables that are wrong themselves say nothing of each other.
         if let Some(moving) = moving.as_ref().filter(|_| problems.is_empty()) {
-            inputs::check(&section, &tables.inputs, &moving.homing, tables.probe.as_ref());
+            inputs::check(
+                &section,
+                &tables.inputs,
+                &moving.homing,
+                tables.probe.as_ref(),
+            );
         }
         if let Some(moving) = moving.as_ref().filter(|_| !section.has("driver")) {
             tables.wanted(&section, moving).check(&tables.drivers);
         }
         let effective = text(&section, "format", &root);
         let moving = problems.verdict(moving)?;
-        Ok(tables.into_machine(path, moving, effective, Places::new(problems.into_sources(), &root)))
+        Ok(tables.into_machine(
+            path,
+            moving,
+            effective,
+            Places::new(problems.into_sources(), &root),
+        ))
     }
 
     /// The outputs that a fault and an emergency stop leave as they are, a bit each.
     pub fn kept_outputs(&self) -> u64 {
-        self.outputs.iter().filter(|output| output.kept).fold(0, |bits, output| bits | 1 << output.output)
+        self.outputs
+            .iter()
+            .filter(|output| output.kept)
+            .fold(0, |bits, output| bits | 1 << output.output)
     }
 
     /// The configuration in force as TOML text: includes and overrides applied, files named absolutely. Reading it as
@@ -187,12 +202,19 @@ impl Moving {
     /// Highest feeds of axes that do not know where they are. Who states a search feed has said how fast that axis may look for
     /// its place blindly; without one it is a tenth of the highest, at which a hand is quicker than the axis.
     fn unhomed_feed(&self) -> AxisVector {
-        let switch = |axis: usize| self.homing.iter().find(|homing| homing.axis == axis).and_then(AxisHoming::switch);
+        let switch = |axis: usize| {
+            self.homing
+                .iter()
+                .find(|homing| homing.axis == axis)
+                .and_then(AxisHoming::switch)
+        };
         let search = |axis: usize| switch(axis).map(|switch| switch.search_mm_per_s.abs());
-        AxisVector(std::array::from_fn(|axis| match self.axes.limits.axes().get(axis) {
-            Some(_) if self.axes.unhomed_feed[axis].is_finite() => self.axes.unhomed_feed[axis],
-            Some(limits) => search(axis).unwrap_or(UNHOMED_SHARE * limits.feed_mm_per_s),
-            None => 0.0,
+        AxisVector(std::array::from_fn(|axis| {
+            match self.axes.limits.axes().get(axis) {
+                Some(_) if self.axes.unhomed_feed[axis].is_finite() => self.axes.unhomed_feed[axis],
+                Some(limits) => search(axis).unwrap_or(UNHOMED_SHARE * limits.feed_mm_per_s),
+                None => 0.0,
+            }
         }))
     }
 }
@@ -226,11 +248,16 @@ struct Tables {
 impl Tables {
     fn read(root: &Section<'_>) -> Self {
         let optional = |key: &str| Some(root.section(key)).filter(Section::exists);
-        let required = |key: &str| PluginChoice::read(&root.section(key)).unwrap_or_else(|| PluginChoice::named(""));
+        let required = |key: &str| {
+            PluginChoice::read(&root.section(key)).unwrap_or_else(|| PluginChoice::named(""))
+        };
         let kinematics = optional("kinematics").and_then(|s| PluginChoice::read(&s));
         Self {
             name: root.section("machine").text("name").map(str::to_owned),
-            require_homing: root.section("machine").truth("require_homing").unwrap_or(false),
+            require_homing: root
+                .section("machine")
+                .truth("require_homing")
+                .unwrap_or(false),
             loops: Loops::read(&root.section("loops")),
             motion: Motion::read(&root.section("motion")),
             kinematics: kinematics.unwrap_or_else(|| PluginChoice::named("identity")),
@@ -253,18 +280,42 @@ impl Tables {
 
     /// What the drivers together must have.
     fn wanted<'a>(&self, root: &'a Section<'a>, moving: &Moving) -> Wanted<'a> {
-        let letter = |axis| moving.axes.axes.letter(axis).to_ascii_lowercase().to_string();
+        let letter = |axis| {
+            moving
+                .axes
+                .axes
+                .letter(axis)
+                .to_ascii_lowercase()
+                .to_string()
+        };
         let axes: Vec<_> = (0..moving.axes.axes.count()).map(letter).collect();
-        let homing = moving
-            .homing
+        let homing = moving.homing.iter().filter_map(|homing| {
+            homing
+                .switch()
+                .map(|switch| (switch.input, format!("homing.{}", axes[homing.axis])))
+        });
+        let probe = self
+            .probe
             .iter()
-            .filter_map(|homing| homing.switch().map(|switch| (switch.input, format!("homing.{}", axes[homing.axis]))));
-        let probe = self.probe.iter().map(|probe| (probe.input, "probe".to_owned()));
-        let named = self.inputs.iter().map(|input| (input.input, format!("inputs.{}", input.name)));
-        let outputs = self.outputs.iter().map(|output| (output.output, format!("outputs.{}", output.name)));
-        let analog = self.analog.iter().map(|analog| (analog.input, format!("analog.{}", analog.name)));
+            .map(|probe| (probe.input, "probe".to_owned()));
+        let named = self
+            .inputs
+            .iter()
+            .map(|input| (input.input, format!("inputs.{}", input.name)));
+        let outputs = self
+            .outputs
+            .iter()
+            .map(|output| (output.output, format!("outputs.{}", output.name)));
+        let analog = self
+            .analog
+            .iter()
+            .map(|analog| (analog.input, format!("analog.{}", analog.name)));
         Wanted {
-            joints: drivers::joint_names(&axes, &moving.joints, self.kinematics.plugin == "identity"),
+            joints: drivers::joint_names(
+                &axes,
+                &moving.joints,
+                self.kinematics.plugin == "identity",
+            ),
             inputs: homing.chain(probe).chain(named).collect(),
             outputs: outputs.collect(),
             analog: analog.collect(),
@@ -272,10 +323,29 @@ impl Tables {
         }
     }
 
-    fn into_machine(self, path: &Path, moving: Moving, effective: String, places: Places) -> Machine {
-        let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    fn into_machine(
+        self,
+        path: &Path,
+        moving: Moving,
+        effective: String,
+        places: Places,
+    ) -> Machine {
+        let stem = || {
+            path.file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        };
         let unhomed_max_feed_mm_per_s = moving.unhomed_feed();
-        let AxisSet { axes, limits, max_following_error, max_skew, start, home, .. } = moving.axes;
+        let AxisSet {
+            axes,
+            limits,
+            max_following_error,
+            max_skew,
+            start,
+            home,
+            ..
+        } = moving.axes;
         Machine {
             name: self.name.unwrap_or_else(stem),
             path: path.to_owned(),

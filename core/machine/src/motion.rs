@@ -37,15 +37,22 @@ pub struct Motion {
 impl Motion {
     /// Reads `[motion]`.
     pub(crate) fn read(motion: &Section<'_>) -> Self {
-        let linear = motion.at_least("allowable_speed_difference_mm_per_min", 0.0).unwrap_or(0.0);
-        let rotary = motion.at_least("allowable_speed_difference_deg_per_min", 0.0).unwrap_or(linear);
+        let linear = motion
+            .at_least("allowable_speed_difference_mm_per_min", 0.0)
+            .unwrap_or(0.0);
+        let rotary = motion
+            .at_least("allowable_speed_difference_deg_per_min", 0.0)
+            .unwrap_or(linear);
         let modes = [("limit", JerkMode::Limit), ("report", JerkMode::Report)];
         let time_constant_s = motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0;
         let time_constant_range_s = time_constant_range(motion);
         let (least_s, most_s) = time_constant_range_s.unwrap_or((0.0, LONGEST_S));
         if !(least_s..=most_s).contains(&time_constant_s) {
             let (least, most) = (least_s * 1000.0, most_s * 1000.0);
-            motion.refuse("time_constant_ms", format!("must be {least} to {most}, the time constants of this machine"));
+            motion.refuse(
+                "time_constant_ms",
+                format!("must be {least} to {most}, the time constants of this machine"),
+            );
         }
         Self {
             speed_difference_mm_per_s: linear / 60.0,
@@ -84,7 +91,10 @@ pub struct FineThread {
 impl Default for FineThread {
     /// The last core; above the usual interrupt threads (50), below the kernel's own.
     fn default() -> Self {
-        Self { core: None, priority: 80 }
+        Self {
+            core: None,
+            priority: 80,
+        }
     }
 }
 
@@ -121,20 +131,37 @@ const MAX_MISSED_SHARE: f64 = 0.01;
 impl Loops {
     /// Reads `[loops]`.
     pub fn read(loops: &Section<'_>) -> Self {
-        let period = |key, default| if loops.has(key) { loops.positive(key) } else { Some(default) };
-        let (rough, fine) = (period("rough_period_ms", 8.0), period("fine_period_ms", 1.0));
-        let count = rough.zip(fine).and_then(|(rough, fine)| fine_periods(loops, rough, fine));
+        let period = |key, default| {
+            if loops.has(key) {
+                loops.positive(key)
+            } else {
+                Some(default)
+            }
+        };
+        let (rough, fine) = (
+            period("rough_period_ms", 8.0),
+            period("fine_period_ms", 1.0),
+        );
+        let count = rough
+            .zip(fine)
+            .and_then(|(rough, fine)| fine_periods(loops, rough, fine));
         let fine_thread = FineThread {
             core: loops.whole("fine_core", 0, LAST_CORE),
-            priority: loops.whole("fine_priority", 1, 99).unwrap_or(FineThread::default().priority),
+            priority: loops
+                .whole("fine_priority", 1, 99)
+                .unwrap_or(FineThread::default().priority),
         };
         let fine_period_s = fine.unwrap_or(1.0) / 1000.0;
         let at_least_s = FINE_HANG_AFTER_S.max(FINE_HANG_AFTER_PERIODS * fine_period_s);
         Self {
             rough_period_s: rough.unwrap_or(8.0) / 1000.0,
             fine_period_s,
-            fine_hang_after_s: loops.at_least("fine_hang_after_ms", 10.0).map_or(at_least_s, |ms| ms / 1000.0),
-            soft_hang_after_s: loops.at_least("soft_hang_after_s", 0.1).unwrap_or(SOFT_HANG_AFTER_S),
+            fine_hang_after_s: loops
+                .at_least("fine_hang_after_ms", 10.0)
+                .map_or(at_least_s, |ms| ms / 1000.0),
+            soft_hang_after_s: loops
+                .at_least("soft_hang_after_s", 0.1)
+                .unwrap_or(SOFT_HANG_AFTER_S),
             fine_periods_per_rough: count.unwrap_or(1),
             max_missed_periods: loops.whole("max_missed_periods", 0, u32::MAX).unwrap_or(2),
             max_missed_share: share(loops, "max_missed_share").unwrap_or(MAX_MISSED_SHARE),
@@ -155,7 +182,11 @@ fn share(loops: &Section<'_>, key: &str) -> Option<f64> {
 
 fn fine_periods(loops: &Section<'_>, rough: f64, fine: f64) -> Option<u32> {
     let count = (rough / fine).round();
-    let key = if loops.has("rough_period_ms") { "rough_period_ms" } else { "fine_period_ms" };
+    let key = if loops.has("rough_period_ms") {
+        "rough_period_ms"
+    } else {
+        "fine_period_ms"
+    };
     if count < 1.0 || (rough / fine - count).abs() > 1e-9 * count {
         loops.refuse(
             key,
@@ -164,7 +195,9 @@ fn fine_periods(loops: &Section<'_>, rough: f64, fine: f64) -> Option<u32> {
         return None;
     }
     if count > MOST_FINE_PERIODS {
-        let most = format!("the rough period, {rough} ms, is more than {MOST_FINE_PERIODS} fine periods of {fine} ms");
+        let most = format!(
+            "the rough period, {rough} ms, is more than {MOST_FINE_PERIODS} fine periods of {fine} ms"
+        );
         loops.refuse(key, most);
         return None;
     }

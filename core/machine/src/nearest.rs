@@ -38,8 +38,13 @@ impl Nearest {
 
 /// The name among `known` that `name` was probably meant to be; none where no one is near.
 pub fn meant<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
-    let nearest = known.iter().map(|known| (distance(name, known), *known)).min_by_key(|(edits, _)| *edits);
-    nearest.filter(|(edits, _)| is_close(name, *edits)).map(|(_, known)| known)
+    let nearest = known
+        .iter()
+        .map(|known| (distance(name, known), *known))
+        .min_by_key(|(edits, _)| *edits);
+    nearest
+        .filter(|(edits, _)| is_close(name, *edits))
+        .map(|(_, known)| known)
 }
 
 /// Whether a name so many edits away was probably meant: a third of its letters may be wrong, two always.
@@ -57,7 +62,8 @@ pub fn nearest(keys: &[Key], path: &[&str], rotary: bool) -> Option<Nearest> {
     let (name, table) = path.split_last()?;
     let name: String = name.chars().take(LONGEST).collect();
     let usable = keys.iter().filter(|key| fits(key.path, path, rotary));
-    let candidates = usable.flat_map(|key| prefixes(key.path).map(|prefix| candidate(prefix, &name, table)));
+    let candidates =
+        usable.flat_map(|key| prefixes(key.path).map(|prefix| candidate(prefix, &name, table)));
     candidates.min_by_key(|c| c.cost).map(|c| c.nearest)
 }
 
@@ -69,7 +75,10 @@ fn fits(pattern: &str, path: &[&str], rotary: bool) -> bool {
 
 /// The path of a key and of every table around it that has a fixed name.
 fn prefixes(pattern: &str) -> impl Iterator<Item = &str> {
-    let ends = pattern.match_indices('.').map(|(i, _)| i).chain([pattern.len()]);
+    let ends = pattern
+        .match_indices('.')
+        .map(|(i, _)| i)
+        .chain([pattern.len()]);
     let named = |p: &&str| is_open(p) || !p.rsplit('.').next().is_some_and(is_placeholder);
     ends.map(|end| &pattern[..end]).filter(named)
 }
@@ -83,11 +92,26 @@ fn candidate(pattern: &str, name: &str, table: &[&str]) -> Candidate {
         let beside = parents.len() == table.len() + 1 && !table.is_empty() && agree(pattern, table);
         let cost = if beside { PLUGINS_OWN } else { usize::MAX };
         let path = written(parents, name, table);
-        return Candidate { cost, nearest: Nearest { path, same_table, close: true } };
+        return Candidate {
+            cost,
+            nearest: Nearest {
+                path,
+                same_table,
+                close: true,
+            },
+        };
     }
     let edits = distance(name, last);
-    let cost = if same_table { edits } else { edits + OTHER_TABLE };
-    let nearest = Nearest { path: written(parents, last, table), same_table, close: is_close(name, edits) };
+    let cost = if same_table {
+        edits
+    } else {
+        edits + OTHER_TABLE
+    };
+    let nearest = Nearest {
+        path: written(parents, last, table),
+        same_table,
+        close: is_close(name, edits),
+    };
     Candidate { cost, nearest }
 }
 
@@ -96,7 +120,11 @@ fn written(parents: &[&str], last: &str, table: &[&str]) -> String {
     let pattern = parents.join(".");
     let part = |(index, part): (usize, &&str)| {
         let same = index < table.len() && agree(&pattern, &table[..=index]);
-        if same { dotted(&table[index..=index]) } else { (*part).to_owned() }
+        if same {
+            dotted(&table[index..=index])
+        } else {
+            (*part).to_owned()
+        }
     };
     let mut path: Vec<_> = parents.iter().enumerate().map(part).collect();
     path.push(dotted(&[last]));

@@ -44,22 +44,38 @@ impl Node {
 
     /// The table, where it is one.
     pub fn table(&self) -> Option<&Table> {
-        if let Value::Table(table) = &self.value { Some(table) } else { None }
+        if let Value::Table(table) = &self.value {
+            Some(table)
+        } else {
+            None
+        }
     }
 
     /// The text, where it is one.
     pub fn text(&self) -> Option<&str> {
-        if let Value::Text(text) = &self.value { Some(text) } else { None }
+        if let Value::Text(text) = &self.value {
+            Some(text)
+        } else {
+            None
+        }
     }
 
     /// The number, where it is a whole one that is not negative.
     pub fn whole(&self) -> Option<u32> {
-        if let Value::Integer(number) = self.value { u32::try_from(number).ok() } else { None }
+        if let Value::Integer(number) = self.value {
+            u32::try_from(number).ok()
+        } else {
+            None
+        }
     }
 
     /// The elements, where it is an array.
     pub fn array(&self) -> Option<&[Node]> {
-        if let Value::Array(array) = &self.value { Some(array) } else { None }
+        if let Value::Array(array) = &self.value {
+            Some(array)
+        } else {
+            None
+        }
     }
 
     fn plain(&self) -> toml::Value {
@@ -78,18 +94,35 @@ impl Node {
 
 /// The table without the places.
 pub fn plain(table: &Table) -> toml::Table {
-    table.iter().map(|(key, node)| (key.clone(), node.plain())).collect()
+    table
+        .iter()
+        .map(|(key, node)| (key.clone(), node.plain()))
+        .collect()
 }
 
 /// Lays `over` over `base`: tables are joined, anything else is replaced where it stands.
 pub fn merge(base: &mut Table, over: Table) {
     for (key, node) in over {
         match (base.get_mut(&key), node.value) {
-            (Some(Node { origin, value: Value::Table(below) }), Value::Table(above)) => {
+            (
+                Some(Node {
+                    origin,
+                    value: Value::Table(below),
+                }),
+                Value::Table(above),
+            ) => {
                 *origin = node.origin;
                 merge(below, above);
             }
-            (_, value) => _ = base.insert(key, Node { origin: node.origin, value }),
+            (_, value) => {
+                _ = base.insert(
+                    key,
+                    Node {
+                        origin: node.origin,
+                        value,
+                    },
+                )
+            }
         }
     }
 }

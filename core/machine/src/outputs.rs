@@ -22,11 +22,23 @@ pub(crate) fn read(root: &Section<'_>) -> Vec<Output> {
     let mut all: Vec<Output> = vec![];
     for name in section.keys() {
         let table = section.section(name);
-        let kept = table.choice("on_fault", &[("off", false), ("keep", true)]).unwrap_or(false);
-        let Some(output) = table.required("output", |table, key| table.whole(key, 0, LAST_OUTPUT)) else { continue };
+        let kept = table
+            .choice("on_fault", &[("off", false), ("keep", true)])
+            .unwrap_or(false);
+        let Some(output) = table.required("output", |table, key| table.whole(key, 0, LAST_OUTPUT))
+        else {
+            continue;
+        };
         match all.iter().find(|other| other.output == output) {
-            Some(other) => table.refuse("output", format!("output {output} is outputs.{} already", other.name)),
-            None => all.push(Output { name: name.to_owned(), output, kept }),
+            Some(other) => table.refuse(
+                "output",
+                format!("output {output} is outputs.{} already", other.name),
+            ),
+            None => all.push(Output {
+                name: name.to_owned(),
+                output,
+                kept,
+            }),
         }
     }
     all

@@ -10,7 +10,10 @@ use crate::problems::{Origin, Problems};
 ///
 /// A key that exists keeps its place, so that the order of the axes stays that of the file.
 pub fn apply(root: &mut Table, key: &str, value: &str, problems: &Problems) {
-    let origin = Origin { source: problems.add_override(key), offset: 0 };
+    let origin = Origin {
+        source: problems.add_override(key),
+        offset: 0,
+    };
     let path: Vec<&str> = key.split('.').map(str::trim).collect();
     if let Some(what) = refusal(&path) {
         problems.report(origin, key, what);
@@ -38,12 +41,17 @@ fn read(path: &[&str], text: &str, origin: Origin, problems: &Problems) -> Value
 }
 
 fn put(table: &mut Table, path: &[&str], node: Node) {
-    let Some((name, rest)) = path.split_first() else { return };
+    let Some((name, rest)) = path.split_first() else {
+        return;
+    };
     if rest.is_empty() {
         table.insert((*name).to_owned(), node);
         return;
     }
-    let empty = || Node { origin: node.origin, value: Value::Table(Table::new()) };
+    let empty = || Node {
+        origin: node.origin,
+        value: Value::Table(Table::new()),
+    };
     let inner = table.entry(*name).or_insert_with(empty);
     if inner.table().is_none() {
         *inner = empty();

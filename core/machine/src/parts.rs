@@ -25,29 +25,52 @@ impl PluginChoice {
     /// The plugin called `name`, without options.
     pub fn named(name: &str) -> Self {
         let library = is_library(name).then(|| PathBuf::from(name));
-        Self { plugin: name.to_owned(), library, options: String::new() }
+        Self {
+            plugin: name.to_owned(),
+            library,
+            options: String::new(),
+        }
     }
 
     /// Reads a table with `plugin` and `options`; `None` where it is wrong, which is reported.
     pub(crate) fn read(section: &Section<'_>) -> Option<Self> {
         let choice = section.required("plugin", Section::text).map(Self::named)?;
-        let options = section.section("options").table().map(|table| text(section, "options", table));
-        Some(Self { options: options.unwrap_or_default(), ..choice })
+        let options = section
+            .section("options")
+            .table()
+            .map(|table| text(section, "options", table));
+        Some(Self {
+            options: options.unwrap_or_default(),
+            ..choice
+        })
     }
 }
 
 /// Reads the names of analog inputs; none where they are wrong, which is reported.
 pub(crate) fn analog_names(driver: &Section<'_>) -> Vec<String> {
-    let Some(node) = driver.right("analog") else { return vec![] };
-    let names: Option<Vec<&str>> = node.array().and_then(|names| names.iter().map(Node::text).collect());
+    let Some(node) = driver.right("analog") else {
+        return vec![];
+    };
+    let names: Option<Vec<&str>> = node
+        .array()
+        .and_then(|names| names.iter().map(Node::text).collect());
     let Some(names) = names.filter(|names| names.len() <= MAX_ANALOG) else {
-        driver.refuse("analog", format!("must be an array of at most {MAX_ANALOG} names"));
+        driver.refuse(
+            "analog",
+            format!("must be an array of at most {MAX_ANALOG} names"),
+        );
         return vec![];
     };
     let twice = |name: &&&str| names.iter().filter(|other| other == name).count() > 1;
-    let wrong = names.iter().find(|name| !is_name(name)).or_else(|| names.iter().find(twice));
+    let wrong = names
+        .iter()
+        .find(|name| !is_name(name))
+        .or_else(|| names.iter().find(twice));
     if let Some(wrong) = wrong {
-        driver.refuse("analog", format!("{wrong:?}: a name is lower case with underscores, and stands once"));
+        driver.refuse(
+            "analog",
+            format!("{wrong:?}: a name is lower case with underscores, and stands once"),
+        );
         return vec![];
     }
     names.into_iter().map(str::to_owned).collect()
@@ -74,7 +97,9 @@ pub enum GuardMode {
 impl GuardMode {
     /// Reads `[guard]`.
     pub(crate) fn read(guard: &Section<'_>) -> Self {
-        guard.choice("mode", &[("stop", Self::Stop), ("count", Self::Count)]).unwrap_or_default()
+        guard
+            .choice("mode", &[("stop", Self::Stop), ("count", Self::Count)])
+            .unwrap_or_default()
     }
 }
 
@@ -91,7 +116,12 @@ pub enum RecordErrorMode {
 impl RecordErrorMode {
     /// Reads `[recorder]`.
     pub(crate) fn read(recorder: &Section<'_>) -> Self {
-        recorder.choice("on_error", &[("continue", Self::Continue), ("hold", Self::Hold)]).unwrap_or_default()
+        recorder
+            .choice(
+                "on_error",
+                &[("continue", Self::Continue), ("hold", Self::Hold)],
+            )
+            .unwrap_or_default()
     }
 }
 
@@ -122,21 +152,35 @@ impl Policy {
     /// Reads `[policy]`; `None` where it is wrong, which is reported.
     pub(crate) fn read(policy: &Section<'_>) -> Option<Self> {
         let script = policy.required("script", Section::text)?.into();
-        let parameters = policy.section("parameters").table().map(plain).unwrap_or_default();
-        let time_constant_ms =
-            policy.range("time_constant_ms").filter(|range| above_zero(policy, "time_constant_ms", range));
-        let tolerance_mm =
-            policy.range("path_tolerance_mm").filter(|range| above_zero(policy, "path_tolerance_mm", range));
+        let parameters = policy
+            .section("parameters")
+            .table()
+            .map(plain)
+            .unwrap_or_default();
+        let time_constant_ms = policy
+            .range("time_constant_ms")
+            .filter(|range| above_zero(policy, "time_constant_ms", range));
+        let tolerance_mm = policy
+            .range("path_tolerance_mm")
+            .filter(|range| above_zero(policy, "path_tolerance_mm", range));
         let ratio = policy.positive("lowest_feed_ratio").unwrap_or(0.05);
         if ratio > 1.0 {
-            policy.refuse("lowest_feed_ratio", format!("must be at most 1, not {ratio}"));
+            policy.refuse(
+                "lowest_feed_ratio",
+                format!("must be at most 1, not {ratio}"),
+            );
         }
         Some(Self {
             script,
-            fuel_per_call: policy.whole("fuel_per_call", 100, 1_000_000_000).unwrap_or(20_000),
-            fuel_per_block: policy.whole("fuel_per_block", 0, 10_000_000).unwrap_or(1_000),
+            fuel_per_call: policy
+                .whole("fuel_per_call", 100, 1_000_000_000)
+                .unwrap_or(20_000),
+            fuel_per_block: policy
+                .whole("fuel_per_block", 0, 10_000_000)
+                .unwrap_or(1_000),
             memory_pages: policy.whole("memory_pages", 1, 1024).unwrap_or(32),
-            time_constant_s: time_constant_ms.map_or((0.001, 1.0), |(low, high)| (low / 1e3, high / 1e3)),
+            time_constant_s: time_constant_ms
+                .map_or((0.001, 1.0), |(low, high)| (low / 1e3, high / 1e3)),
             path_tolerance_mm: tolerance_mm,
             lowest_feed_ratio: ratio,
             ratio_change_per_s: policy.positive("ratio_change_per_s").unwrap_or(10.0),
@@ -169,8 +213,13 @@ impl Operator {
     /// Reads `[operator]`.
     pub(crate) fn read(operator: &Section<'_>) -> Self {
         Self {
-            dry_run_feed_mm_per_s: operator.positive("dry_run_feed_mm_per_min").map(|feed| feed / 60.0),
-            jog_keep_alive_s: operator.positive("jog_keep_alive_ms").unwrap_or(JOG_KEEP_ALIVE_MS) / 1e3,
+            dry_run_feed_mm_per_s: operator
+                .positive("dry_run_feed_mm_per_min")
+                .map(|feed| feed / 60.0),
+            jog_keep_alive_s: operator
+                .positive("jog_keep_alive_ms")
+                .unwrap_or(JOG_KEEP_ALIVE_MS)
+                / 1e3,
         }
     }
 }
@@ -196,14 +245,25 @@ const AT_SPEED_RANGE_S: [f64; 2] = [0.1, 600.0];
 impl Spindle {
     /// Reads `[spindle]`.
     pub(crate) fn read(spindle: &Section<'_>) -> Self {
-        let (min, max) = (spindle.at_least("min_rpm", 0.0).unwrap_or(0.0), spindle.positive("max_rpm"));
+        let (min, max) = (
+            spindle.at_least("min_rpm", 0.0).unwrap_or(0.0),
+            spindle.positive("max_rpm"),
+        );
         if let Some(max) = max.filter(|max| *max < min) {
-            spindle.refuse("min_rpm", format!("the lowest speed, {min}, is above the highest, {max}"));
+            spindle.refuse(
+                "min_rpm",
+                format!("the lowest speed, {min}, is above the highest, {max}"),
+            );
         }
-        let within_s = spindle.positive("at_speed_within_s").unwrap_or(AT_SPEED_WITHIN_S);
+        let within_s = spindle
+            .positive("at_speed_within_s")
+            .unwrap_or(AT_SPEED_WITHIN_S);
         let [least, most] = AT_SPEED_RANGE_S;
         if !(least..=most).contains(&within_s) {
-            spindle.refuse("at_speed_within_s", format!("must be from {least} to {most}, not {within_s}"));
+            spindle.refuse(
+                "at_speed_within_s",
+                format!("must be from {least} to {most}, not {within_s}"),
+            );
         }
         let rad_per_s = |rpm: f64| rpm * 2.0 * PI / 60.0;
         Self {

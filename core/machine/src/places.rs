@@ -16,14 +16,21 @@ pub struct Places {
 impl Places {
     /// The places of all keys of `root`.
     pub fn new(sources: Vec<Source>, root: &Table) -> Self {
-        let mut this = Self { sources, origins: BTreeMap::new() };
+        let mut this = Self {
+            sources,
+            origins: BTreeMap::new(),
+        };
         this.add("", root);
         this
     }
 
     fn add(&mut self, path: &str, table: &Table) {
         for (key, node) in table {
-            let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            let path = if path.is_empty() {
+                key.clone()
+            } else {
+                format!("{path}.{key}")
+            };
             self.add_node(path, node);
         }
     }
@@ -46,7 +53,9 @@ impl Places {
 
     /// Where `key` was written, else the table around it, else the beginning of the machine's file.
     pub fn of(&self, key: &str) -> Place {
-        let parents = std::iter::successors(Some(key), |key| key.rsplit_once('.').map(|(parent, _)| parent));
+        let parents = std::iter::successors(Some(key), |key| {
+            key.rsplit_once('.').map(|(parent, _)| parent)
+        });
         let origin = parents.into_iter().find_map(|key| self.origins.get(key));
         place(&self.sources, origin.copied().unwrap_or_default())
     }

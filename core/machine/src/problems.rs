@@ -41,7 +41,10 @@ pub struct Problems {
 impl Problems {
     /// Keeps the text of a file, for line numbers.
     pub fn add_file(&self, path: &Path, text: String) -> usize {
-        self.add(Source::File { path: path.to_owned(), text })
+        self.add(Source::File {
+            path: path.to_owned(),
+            text,
+        })
     }
 
     /// A file of which there is no text.
@@ -63,7 +66,11 @@ impl Problems {
     /// Notes that `key`, written at `origin`, is wrong.
     pub fn report(&self, origin: Origin, key: &str, what: impl Into<String>) {
         if !self.is_full() {
-            self.found.borrow_mut().push(Found { origin, key: key.to_owned(), what: what.into() });
+            self.found.borrow_mut().push(Found {
+                origin,
+                key: key.to_owned(),
+                what: what.into(),
+            });
         }
     }
 
@@ -112,11 +119,17 @@ impl Problems {
                 ..last
             }));
         }
-        value.filter(|_| problems.is_empty()).ok_or(MachineError { problems })
+        value
+            .filter(|_| problems.is_empty())
+            .ok_or(MachineError { problems })
     }
 
     fn problem(&self, found: Found) -> Problem {
-        Problem { place: self.place(found.origin), key: found.key, what: found.what }
+        Problem {
+            place: self.place(found.origin),
+            key: found.key,
+            what: found.what,
+        }
     }
 }
 
@@ -125,7 +138,11 @@ pub fn place(sources: &[Source], origin: Origin) -> Place {
     match sources.get(origin.source) {
         Some(Source::File { path, text }) => {
             let (line, column) = position(text, origin.offset);
-            Place::File { path: path.clone(), line, column }
+            Place::File {
+                path: path.clone(),
+                line,
+                column,
+            }
         }
         Some(Source::Unreadable(path)) => Place::Whole(path.clone()),
         Some(Source::Override(key)) => Place::Override(key.clone()),
@@ -139,7 +156,11 @@ fn position(text: &str, offset: usize) -> (usize, usize) {
     let line = before.matches('\n').count() + 1;
     let start = before.rfind('\n').map_or(0, |i| i + 1);
     // A byte order mark is not a column that an editor shows.
-    let column = before[start..].trim_start_matches('\u{feff}').chars().count() + 1;
+    let column = before[start..]
+        .trim_start_matches('\u{feff}')
+        .chars()
+        .count()
+        + 1;
     (line, column)
 }
 
@@ -152,6 +173,10 @@ mod tests {
         assert_eq!(position("", 0), (1, 1));
         assert_eq!(position("a = 1\nµ = é!", 13), (2, 6));
         assert_eq!(position("\u{feff}a = 1", 7), (1, 5));
-        assert_eq!(position("é", 1), (1, 2), "an offset inside a character does not panic");
+        assert_eq!(
+            position("é", 1),
+            (1, 2),
+            "an offset inside a character does not panic"
+        );
     }
 }

@@ -21,7 +21,9 @@ fn command(commands: &Section<'_>, key: &str) -> Option<(u32, PathBuf)> {
         commands.refuse(key, "the commands of a machine are M100 to M199");
         return None;
     };
-    commands.text(key).map(|program| (number, PathBuf::from(program)))
+    commands
+        .text(key)
+        .map(|program| (number, PathBuf::from(program)))
 }
 
 /// What part programs may use.
@@ -41,9 +43,16 @@ impl ProgramRules {
     pub(crate) fn read(program: &Section<'_>, commands: &Section<'_>) -> Self {
         Self {
             subroutine_path: program.text("subroutine_path").map(PathBuf::from),
-            max_steps: program.whole("max_steps", 1, u32::MAX).unwrap_or(DEFAULT_MAX_STEPS),
-            user_commands: commands.keys().filter_map(|key| command(commands, key)).collect(),
-            user_command_time_limit_s: commands.positive("time_limit_s").unwrap_or(DEFAULT_TIME_LIMIT_S),
+            max_steps: program
+                .whole("max_steps", 1, u32::MAX)
+                .unwrap_or(DEFAULT_MAX_STEPS),
+            user_commands: commands
+                .keys()
+                .filter_map(|key| command(commands, key))
+                .collect(),
+            user_command_time_limit_s: commands
+                .positive("time_limit_s")
+                .unwrap_or(DEFAULT_TIME_LIMIT_S),
         }
     }
 }

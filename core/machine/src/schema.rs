@@ -35,7 +35,10 @@ pub fn is_open(pattern: &str) -> bool {
 
 /// Whether a path begins like a key's path, over the shorter of the two.
 pub fn agree(pattern: &str, path: &[&str]) -> bool {
-    pattern.split('.').zip(path).all(|(pattern, part)| is_placeholder(pattern) || pattern == *part)
+    pattern
+        .split('.')
+        .zip(path)
+        .all(|(pattern, part)| is_placeholder(pattern) || pattern == *part)
 }
 
 /// What `path` is among `keys`.
@@ -74,7 +77,11 @@ fn must_be_table(path: &[&str], node: &Node, problems: &Problems) {
     if matches!(node.value, Value::Wrong) {
         return;
     }
-    problems.report(node.origin, &dotted(path), format!("must be a table, not {}", node.kind()));
+    problems.report(
+        node.origin,
+        &dotted(path),
+        format!("must be a table, not {}", node.kind()),
+    );
 }
 
 fn unknown(keys: &[Key], path: &[&str], node: &Node, rotary: bool, problems: &Problems) {
@@ -83,8 +90,16 @@ fn unknown(keys: &[Key], path: &[&str], node: &Node, rotary: bool, problems: &Pr
         // A name in the same table is told alone, as it would be written there; an override is always a whole path.
         let whole = matches!(problems.place(node.origin), Place::Override(_));
         let name = if whole { &found.path } else { found.name() };
-        let verb = if found.close { "did you mean" } else { "the nearest known key is" };
+        let verb = if found.close {
+            "did you mean"
+        } else {
+            "the nearest known key is"
+        };
         format!("; {verb} `{name}`{}", if found.close { "?" } else { "" })
     });
-    problems.report(node.origin, &dotted(path), format!("unknown key{}", hint.unwrap_or_default()));
+    problems.report(
+        node.origin,
+        &dotted(path),
+        format!("unknown key{}", hint.unwrap_or_default()),
+    );
 }

@@ -20,8 +20,19 @@ pub struct Section<'a> {
 
 impl<'a> Section<'a> {
     /// The root, or a table at `path` that is written at `origin`.
-    pub fn new(path: Vec<String>, origin: Origin, table: &'a Table, problems: &'a Problems) -> Self {
-        Self { path, origin, table: Some(table), broken: false, problems }
+    pub fn new(
+        path: Vec<String>,
+        origin: Origin,
+        table: &'a Table,
+        problems: &'a Problems,
+    ) -> Self {
+        Self {
+            path,
+            origin,
+            table: Some(table),
+            broken: false,
+            problems,
+        }
     }
 
     /// The table `key` inside this one.
@@ -32,7 +43,13 @@ impl<'a> Section<'a> {
         let origin = node.map_or(self.origin, |n| n.origin);
         let table = node.and_then(Node::table);
         let broken = self.broken || (node.is_some() && table.is_none());
-        Self { path, origin, table, broken, problems: self.problems }
+        Self {
+            path,
+            origin,
+            table,
+            broken,
+            problems: self.problems,
+        }
     }
 
     /// Whether the file has something other than a table where this one should be.
@@ -47,7 +64,9 @@ impl<'a> Section<'a> {
 
     /// The keys, in the order of the file.
     pub fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
-        self.table.into_iter().flat_map(|table| table.keys().map(String::as_str))
+        self.table
+            .into_iter()
+            .flat_map(|table| table.keys().map(String::as_str))
     }
 
     /// The table itself.
@@ -62,7 +81,8 @@ impl<'a> Section<'a> {
 
     /// The value of `key` where it was not reported already.
     pub fn right(&self, key: &str) -> Option<&'a Node> {
-        self.node(key).filter(|node| !matches!(node.value, Value::Wrong))
+        self.node(key)
+            .filter(|node| !matches!(node.value, Value::Wrong))
     }
 
     /// Whether `key` is stated.
@@ -83,12 +103,15 @@ impl<'a> Section<'a> {
 
     /// Notes that the table at a dotted path inside this one is wrong; told at this one where there is none.
     pub fn refuse_dotted(&self, path: &str, what: impl Into<String>) {
-        path.split('.').fold(self.clone(), |section, key| section.section(key)).refuse_whole(what);
+        path.split('.')
+            .fold(self.clone(), |section, key| section.section(key))
+            .refuse_whole(what);
     }
 
     /// Where `key` is written, else this table.
     pub fn place(&self, key: &str) -> Place {
-        self.problems.place(self.node(key).map_or(self.origin, |node| node.origin))
+        self.problems
+            .place(self.node(key).map_or(self.origin, |node| node.origin))
     }
 
     /// Where `node` is written.

@@ -5,7 +5,11 @@ const LONGEST: usize = 64;
 
 /// The beginning of `text`, without line breaks or control characters.
 pub fn shorten(text: &str) -> String {
-    let mut short: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    let mut short: String = text
+        .chars()
+        .take(LONGEST)
+        .flat_map(char::escape_debug)
+        .collect();
     if text.chars().nth(LONGEST).is_some() {
         short.push('…');
     }
@@ -14,7 +18,13 @@ pub fn shorten(text: &str) -> String {
 
 /// `text` on one line: names of files and values of the command line may hold anything.
 pub fn one_line(text: &str) -> String {
-    let shown = |c: char| if c.is_control() { c.escape_debug().to_string() } else { c.to_string() };
+    let shown = |c: char| {
+        if c.is_control() {
+            c.escape_debug().to_string()
+        } else {
+            c.to_string()
+        }
+    };
     text.chars().map(shown).collect()
 }
 
@@ -26,7 +36,11 @@ pub fn dotted<S: AsRef<str>>(path: &[S]) -> String {
 
 fn quoted(part: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !part.is_empty() && part.chars().all(bare) { shorten(part) } else { format!("\"{}\"", shorten(part)) }
+    if !part.is_empty() && part.chars().all(bare) {
+        shorten(part)
+    } else {
+        format!("\"{}\"", shorten(part))
+    }
 }
 
 #[cfg(test)]

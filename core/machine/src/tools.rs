@@ -50,12 +50,22 @@ impl ToolTable {
     pub(crate) fn read(tools: &Section<'_>, axes: &Axes, problems: &Problems) -> Option<Self> {
         let zero = tools.choice("without_table", &[("zero", true)]);
         if zero.is_some() && !tools.has("table") {
-            return Some(Self { zero_without_table: true, ..Self::default() });
+            return Some(Self {
+                zero_without_table: true,
+                ..Self::default()
+            });
         }
         let path = tools.required("table", Section::text).map(PathBuf::from)?;
-        let from = Named { origin: tools.node("table")?.origin, key: "tools.table" };
+        let from = Named {
+            origin: tools.node("table")?.origin,
+            key: "tools.table",
+        };
         let tools = read_file(&path, from, axes, problems)?;
-        Some(Self { path: Some(path), tools, zero_without_table: false })
+        Some(Self {
+            path: Some(path),
+            tools,
+            zero_without_table: false,
+        })
     }
 }
 
@@ -63,19 +73,32 @@ fn read_file(path: &Path, from: Named, axes: &Axes, problems: &Problems) -> Opti
     let mut root = Loader::new(problems).tools(path, from)?;
     let list = root.remove("tool");
     check(tool_keys(), &mut Vec::new(), &root, problems);
-    let Some(list) = list else { return Some(Vec::new()) };
+    let Some(list) = list else {
+        return Some(Vec::new());
+    };
     let Some(nodes) = list.array() else {
         problems.report(list.origin, "tool", "every tool is written as [[tool]]");
         return None;
     };
     let mut numbers = BTreeSet::new();
-    let tools = nodes.iter().filter_map(|node| entry(node, axes, &mut numbers, problems));
+    let tools = nodes
+        .iter()
+        .filter_map(|node| entry(node, axes, &mut numbers, problems));
     Some(tools.collect())
 }
 
-fn entry(node: &Node, axes: &Axes, numbers: &mut BTreeSet<u32>, problems: &Problems) -> Option<Tool> {
+fn entry(
+    node: &Node,
+    axes: &Axes,
+    numbers: &mut BTreeSet<u32>,
+    problems: &Problems,
+) -> Option<Tool> {
     let Some(table) = node.table() else {
-        problems.report(node.origin, "tool", format!("must be a table, not {}", node.kind()));
+        problems.report(
+            node.origin,
+            "tool",
+            format!("must be a table, not {}", node.kind()),
+        );
         return None;
     };
     let tool = tool(node.origin, table, axes, problems)?;
@@ -107,17 +130,28 @@ fn tool(origin: Origin, table: &Table, axes: &Axes, problems: &Problems) -> Opti
 fn offsets(tool: &Section<'_>, key: &str, rotary: bool, axes: &Axes, offset: &mut AxisVector) {
     let section = tool.section(key);
     for name in section.keys() {
-        let Some(value) = section.number(name) else { continue };
+        let Some(value) = section.number(name) else {
+            continue;
+        };
         match index(axes, name) {
             Some(axis) if axes.is_rotary(axis) == rotary => {
                 offset[axis] = if rotary { value.to_radians() } else { value };
             }
-            Some(_) if rotary => section.refuse(name, "a linear axis is in mm; did you mean `offset_mm`?"),
-            Some(_) => section.refuse(name, "a rotary axis is in degrees; did you mean `offset_deg`?"),
+            Some(_) if rotary => {
+                section.refuse(name, "a linear axis is in mm; did you mean `offset_mm`?")
+            }
+            Some(_) => section.refuse(
+                name,
+                "a rotary axis is in degrees; did you mean `offset_deg`?",
+            ),
             None => {
                 section.refuse(
                     name,
-                    format!("no axis is called \"{}\"; the machine has {}", shorten(name), letters(axes)),
+                    format!(
+                        "no axis is called \"{}\"; the machine has {}",
+                        shorten(name),
+                        letters(axes)
+                    ),
                 );
             }
         }
@@ -126,12 +160,20 @@ fn offsets(tool: &Section<'_>, key: &str, rotary: bool, axes: &Axes, offset: &mu
 
 /// The length is another name of the offset along z.
 fn length(tool: &Section<'_>, axes: &Axes, offset: &mut AxisVector) {
-    let Some(length) = tool.number("length_mm") else { return };
+    let Some(length) = tool.number("length_mm") else {
+        return;
+    };
     match axes.index('Z').filter(|z| !axes.is_rotary(*z)) {
         Some(_) if tool.section("offset_mm").has("z") => {
-            tool.refuse("length_mm", "the offset along z is stated twice: offset_mm.z is the same");
+            tool.refuse(
+                "length_mm",
+                "the offset along z is stated twice: offset_mm.z is the same",
+            );
         }
         Some(z) => offset[z] = length,
-        None => tool.refuse("length_mm", "the machine has no linear axis z; did you mean `offset_mm`?"),
+        None => tool.refuse(
+            "length_mm",
+            "the machine has no linear axis z; did you mean `offset_mm`?",
+        ),
     }
 }

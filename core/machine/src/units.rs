@@ -71,11 +71,22 @@ impl Units {
 
 /// Refuses the keys of the other kind of axis in the table of an axis or joint.
 pub fn refuse_other_kind(section: &Section<'_>, rotary: bool) {
-    let pairs = Units::of(!rotary).names().into_iter().zip(Units::of(rotary).names());
+    let pairs = Units::of(!rotary)
+        .names()
+        .into_iter()
+        .zip(Units::of(rotary).names());
     for (wrong, right) in pairs.filter(|(wrong, _)| section.has(wrong)) {
-        let kind = if rotary { "rotary axis is in degrees" } else { "linear axis is in mm" };
+        let kind = if rotary {
+            "rotary axis is in degrees"
+        } else {
+            "linear axis is in mm"
+        };
         let unsure = !rotary && !section.has("kind") && !section.has("axis");
-        let end = if unsure { ", or is `kind = \"rotary\"` missing?" } else { "?" };
+        let end = if unsure {
+            ", or is `kind = \"rotary\"` missing?"
+        } else {
+            "?"
+        };
         section.suggest(right);
         section.refuse(wrong, format!("a {kind}; did you mean `{right}`{end}"));
     }

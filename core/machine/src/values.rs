@@ -25,8 +25,14 @@ impl<'a> Section<'a> {
         let text = self.text(key)?;
         let found = words.iter().find(|(word, _)| *word == text);
         if found.is_none() {
-            let all: Vec<_> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
-            self.refuse(key, format!("must be {}, not \"{}\"", all.join(" or "), shorten(text)));
+            let all: Vec<_> = words
+                .iter()
+                .map(|(word, _)| format!("\"{word}\""))
+                .collect();
+            self.refuse(
+                key,
+                format!("must be {}, not \"{}\"", all.join(" or "), shorten(text)),
+            );
         }
         found.map(|(_, meaning)| *meaning)
     }
@@ -45,7 +51,9 @@ impl<'a> Section<'a> {
                 return None;
             }
         };
-        let fits = u32::try_from(number).ok().filter(|n| (least..=most).contains(n));
+        let fits = u32::try_from(number)
+            .ok()
+            .filter(|n| (least..=most).contains(n));
         if fits.is_none() {
             self.refuse(key, format!("must be from {least} to {most}, not {number}"));
         }
@@ -82,7 +90,10 @@ impl<'a> Section<'a> {
         if number <= 0.0 {
             self.refuse(key, format!("must be above 0, not {number}"));
         } else if number < SMALLEST {
-            self.refuse(key, format!("must be at least {SMALLEST:e}, not {number:e}"));
+            self.refuse(
+                key,
+                format!("must be at least {SMALLEST:e}, not {number:e}"),
+            );
         }
         Some(number).filter(|n| *n >= SMALLEST)
     }
@@ -98,7 +109,10 @@ impl<'a> Section<'a> {
         if low < high {
             return Some((low, high));
         }
-        self.refuse(key, format!("the lowest, {low}, is not below the highest, {high}"));
+        self.refuse(
+            key,
+            format!("the lowest, {low}, is not below the highest, {high}"),
+        );
         None
     }
 

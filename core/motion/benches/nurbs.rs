@@ -22,7 +22,11 @@ fn curve() -> Nurbs {
         weights: (0..POINTS).map(|i| 1.0 + (i % 3) as f64).collect(),
         knots: (0..POINTS + 4).map(|i| i.clamp(3, POINTS) as f64).collect(),
     };
-    Nurbs::new(&data, &Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap()).unwrap()
+    Nurbs::new(
+        &data,
+        &Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap(),
+    )
+    .unwrap()
 }
 
 /// Position and three derivatives by the parameter, the span known. An item is an evaluation.
@@ -69,5 +73,7 @@ fn along_path(bencher: divan::Bencher) {
 #[divan::bench]
 fn arc_length_table(bencher: divan::Bencher) {
     let curve = curve();
-    bencher.counter(ItemsCount::new(POINTS - 3)).bench_local(|| divan::black_box(ArcLength::new(&curve)));
+    bencher
+        .counter(ItemsCount::new(POINTS - 3))
+        .bench_local(|| divan::black_box(ArcLength::new(&curve)));
 }

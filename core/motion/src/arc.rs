@@ -52,7 +52,10 @@ impl Arc {
 
     pub(crate) fn position(&self, start: &AxisVector, s_mm: f64) -> AxisVector {
         let (sin, cos) = self.angle(s_mm).sin_cos();
-        let at = [self.center_mm[0] + self.radius_mm * cos, self.center_mm[1] + self.radius_mm * sin];
+        let at = [
+            self.center_mm[0] + self.radius_mm * cos,
+            self.center_mm[1] + self.radius_mm * sin,
+        ];
         self.with_plane(*start + self.rise * s_mm, at)
     }
 
@@ -62,7 +65,10 @@ impl Arc {
 
     pub(crate) fn direction_at(&self, angle: f64) -> AxisVector {
         let (sin, cos) = angle.sin_cos();
-        let at = [-self.radius_mm * self.rad_per_mm * sin, self.radius_mm * self.rad_per_mm * cos];
+        let at = [
+            -self.radius_mm * self.rad_per_mm * sin,
+            self.radius_mm * self.rad_per_mm * cos,
+        ];
         self.with_plane(self.rise, at)
     }
 
@@ -72,7 +78,10 @@ impl Arc {
 
     pub(crate) fn curvature_at(&self, angle: f64) -> AxisVector {
         let (sin, cos) = angle.sin_cos();
-        let at = [-self.radius_mm * self.rad_per_mm.powi(2) * cos, -self.radius_mm * self.rad_per_mm.powi(2) * sin];
+        let at = [
+            -self.radius_mm * self.rad_per_mm.powi(2) * cos,
+            -self.radius_mm * self.rad_per_mm.powi(2) * sin,
+        ];
         self.with_plane(AxisVector::ZERO, at)
     }
 
@@ -80,7 +89,11 @@ impl Arc {
     pub(crate) fn third(&self, s_mm: f64) -> AxisVector {
         let direction = self.direction(s_mm);
         let squared = self.rad_per_mm * self.rad_per_mm;
-        self.with_plane(AxisVector::ZERO, self.plane.map(|axis| -squared * direction[usize::from(axis)]))
+        self.with_plane(
+            AxisVector::ZERO,
+            self.plane
+                .map(|axis| -squared * direction[usize::from(axis)]),
+        )
     }
 
     /// Per axis the largest |value| of a function whose plane components go as the sine and cosine of the angle: they
@@ -131,7 +144,9 @@ impl Arc {
         // Where in the plane the point lies, as an angle from the start in the direction of the sweep.
         let turn = ((y.atan2(x) - self.start_angle_rad) * self.sweep_rad.signum()).rem_euclid(TAU);
         let axes = self.lanes.map_or(self.rise.0.len(), JointLanes::first);
-        let per_rad = self.rise.0[..axes].iter().map(|rise| rise / self.rad_per_mm.abs());
+        let per_rad = self.rise.0[..axes]
+            .iter()
+            .map(|rise| rise / self.rad_per_mm.abs());
         let mut square = 0.0;
         let mut along = 0.0;
         for (axis, rise) in per_rad.enumerate() {
@@ -141,10 +156,18 @@ impl Arc {
         if square == 0.0 {
             // A point just before the start belongs to the start, not to the end of the turn.
             let beyond = (turn - swept).max(0.0);
-            let angle = if beyond > 0.0 && TAU - turn < beyond { 0.0 } else { turn };
+            let angle = if beyond > 0.0 && TAU - turn < beyond {
+                0.0
+            } else {
+                turn
+            };
             return angle.min(swept);
         }
-        let way = Helix { pull: self.radius_mm * x.hypot(y), square, risen: along / square };
+        let way = Helix {
+            pull: self.radius_mm * x.hypot(y),
+            square,
+            risen: along / square,
+        };
         way.nearest(turn, swept)
     }
 }
@@ -171,12 +194,19 @@ impl Helix {
     /// is the end, or lies in one of the neighbouring turns.
     fn nearest(&self, turn: f64, swept: f64) -> f64 {
         let middle = turn + ((self.risen.clamp(0.0, swept) - turn) / TAU).round() * TAU;
-        let inside = [middle - TAU, middle, middle + TAU].map(|turn| self.least_beside(turn).clamp(0.0, swept));
+        let inside = [middle - TAU, middle, middle + TAU]
+            .map(|turn| self.least_beside(turn).clamp(0.0, swept));
         let cost = |angle: f64| {
             let off = angle - self.risen;
             self.square * off * off - 2.0 * self.pull * (angle - turn).cos()
         };
-        let nearer = |best: f64, angle: f64| if cost(angle) < cost(best) { angle } else { best };
+        let nearer = |best: f64, angle: f64| {
+            if cost(angle) < cost(best) {
+                angle
+            } else {
+                best
+            }
+        };
         inside.into_iter().chain([swept]).fold(0.0, nearer)
     }
 
@@ -187,7 +217,11 @@ impl Helix {
         let way = off.abs();
         // Half of the derivative at `x` from the turn towards the rise: below zero at 0, and concave up to half a turn.
         let slope = |x: f64| self.pull * x.sin() + self.square * (x - way);
-        let steepest = if self.square < self.pull { (-self.square / self.pull).acos() } else { PI };
+        let steepest = if self.square < self.pull {
+            (-self.square / self.pull).acos()
+        } else {
+            PI
+        };
         let mut low = 0.0;
         let mut high = if way <= PI { way } else { steepest };
         if slope(high) < 0.0 {
@@ -198,7 +232,11 @@ impl Helix {
             let at = slope(x);
             *(if at < 0.0 { &mut low } else { &mut high }) = x;
             let next = x - at / (self.pull * x.cos() + self.square);
-            let next = if next > low && next < high { next } else { f64::midpoint(low, high) };
+            let next = if next > low && next < high {
+                next
+            } else {
+                f64::midpoint(low, high)
+            };
             if next == x || (next - x).abs() <= f64::EPSILON * x.abs() {
                 break;
             }
@@ -220,7 +258,11 @@ mod tests {
     }
 
     fn helix_block(radius: f64, start: f64, sweep: f64, rise: f64) -> Block {
-        let mut block = Block::at(AxisVector::from_slice(&[radius * start.cos(), radius * start.sin(), 1.0]));
+        let mut block = Block::at(AxisVector::from_slice(&[
+            radius * start.cos(),
+            radius * start.sin(),
+            1.0,
+        ]));
         let to = start + sweep;
         block.kind = BlockKind::Arc;
         block.end = AxisVector::from_slice(&[radius * to.cos(), radius * to.sin(), 1.0 + rise]);
@@ -299,10 +341,17 @@ mod tests {
         let rise = 20.0;
         let mut point = path.position(path.length_mm() / 3.0);
         let length = 2.0f64.hypot(rise);
-        for (axis, part) in [rise * at.sin(), -rise * at.cos(), 2.0].into_iter().enumerate() {
+        for (axis, part) in [rise * at.sin(), -rise * at.cos(), 2.0]
+            .into_iter()
+            .enumerate()
+        {
             point[axis] += 0.01 * part / length;
         }
-        assert!((path.distance_mm(&point) - 0.01).abs() < 1e-6, "{}", path.distance_mm(&point));
+        assert!(
+            (path.distance_mm(&point) - 0.01).abs() < 1e-6,
+            "{}",
+            path.distance_mm(&point)
+        );
     }
 
     proptest! {

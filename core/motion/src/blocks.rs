@@ -1,7 +1,8 @@
 //! What every planner writes about blocks: whether it can drive them, the segments that begin, rest and dwell, and reports.
 
 use tandem_sdk::{
-    Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, PluginError, Segment, SegmentFlags, SegmentSink,
+    Axes, AxisVector, Block, BlockKind, BlockReport, LimitedBy, PluginError, Segment, SegmentFlags,
+    SegmentSink,
 };
 
 /// The block that a segment belongs to.
@@ -15,7 +16,10 @@ pub struct BlockId {
 
 impl From<&Block> for BlockId {
     fn from(block: &Block) -> Self {
-        Self { index: block.index, line: block.line }
+        Self {
+            index: block.index,
+            line: block.line,
+        }
     }
 }
 
@@ -33,7 +37,13 @@ pub fn check(block: &Block, axes: &Axes) -> Result<(), PluginError> {
             refuse("a dwell needs a place and a duration of zero or more")
         }
         BlockKind::Dwell => Ok(()),
-        BlockKind::Arc if !block.arc.plane.iter().all(|axis| (*axis as usize) < axes.count()) => {
+        BlockKind::Arc
+            if !block
+                .arc
+                .plane
+                .iter()
+                .all(|axis| (*axis as usize) < axes.count()) =>
+        {
             refuse("an arc lies in a plane of axes that the machine lacks")
         }
         _ if !(has_ends && block.length_mm > 0.0 && block.length_mm.is_finite()) => {
@@ -47,12 +57,21 @@ pub fn check(block: &Block, axes: &Axes) -> Result<(), PluginError> {
 
 /// What limits a block that is driven at its feed: the program, or the cap that a policy laid on it.
 pub fn limited_by_feed(block: &Block) -> LimitedBy {
-    if block.feed_cap_mm_per_s < block.feed_mm_per_s { LimitedBy::Policy } else { LimitedBy::Feed }
+    if block.feed_cap_mm_per_s < block.feed_mm_per_s {
+        LimitedBy::Policy
+    } else {
+        LimitedBy::Feed
+    }
 }
 
 /// The report of block number `block`: its feeds at the start, the highest and at the end, mm/s, and its duration, s. No time
 /// constant is reported.
-pub fn report(block: u64, limited_by: LimitedBy, feeds_mm_per_s: [f64; 3], time_s: f64) -> BlockReport {
+pub fn report(
+    block: u64,
+    limited_by: LimitedBy,
+    feeds_mm_per_s: [f64; 3],
+    time_s: f64,
+) -> BlockReport {
     let [start_feed_mm_per_s, peak_feed_mm_per_s, end_feed_mm_per_s] = feeds_mm_per_s;
     BlockReport {
         limited_by,
@@ -115,7 +134,10 @@ impl BlockWriter {
         let mut dwell = self.rest(block, position, path_mm);
         dwell.order = 2;
         dwell.duration_s = duration_s;
-        dwell.flags = dwell.flags.with(SegmentFlags::DWELL).with(SegmentFlags::BLOCK_BEGINS);
+        dwell.flags = dwell
+            .flags
+            .with(SegmentFlags::DWELL)
+            .with(SegmentFlags::BLOCK_BEGINS);
         self.dwell = Some(dwell);
         sink.block(&report(block.index, LimitedBy::Feed, [0.0; 3], duration_s));
     }
@@ -176,34 +198,132 @@ mod tests {
             let mut kept = Kept::default();
             let at = AxisVector::from_slice(&[1.0, 2.0]);
             let duration_s = if parts[2] > 1e9 { 1e6 } else { 1.0 };
-            writer.begin_dwell(BlockId { index: 7, line: 9 }, &at, duration_s, 5.0, &mut kept);
-            let emitted: f64 = parts.iter().map_while(|left_s| writer.emit_dwell(*left_s, &mut kept)).sum();
-            assert!((emitted - duration_s).abs() < 1e-9 && !writer.is_dwelling(), "{parts:?}: {emitted}");
-            let count = |flag| kept.0.iter().filter(|segment| segment.flags.contains(flag)).count();
-            assert_eq!((count(SegmentFlags::BLOCK_BEGINS), count(SegmentFlags::BLOCK_ENDS)), (1, 1), "{parts:?}");
+            writer.begin_dwell(
+                BlockId { index: 7, line: 9 },
+                &at,
+                duration_s,
+                5.0,
+                &mut kept,
+            );
+            let emitted: f64 = parts
+                .iter()
+                .map_while(|left_s| writer.emit_dwell(*left_s, &mut kept))
+                .sum();
+            assert!(
+                (emitted - duration_s).abs() < 1e-9 && !writer.is_dwelling(),
+                "{parts:?}: {emitted}"
+            );
+            let count = |flag| {
+                kept.0
+                    .iter()
+                    .filter(|segment| segment.flags.contains(flag))
+                    .count()
+            };
+            assert_eq!(
+                (
+                    count(SegmentFlags::BLOCK_BEGINS),
+                    count(SegmentFlags::BLOCK_ENDS)
+                ),
+                (1, 1),
+                "{parts:?}"
+            );
             assert!(kept.0[0].flags.contains(SegmentFlags::BLOCK_BEGINS));
             assert!(
-                kept.0.iter().all(|segment| segment.flags.contains(SegmentFlags::DWELL) && segment.duration_s > 0.0)
+                kept.0
+                    .iter()
+                    .all(|segment| segment.flags.contains(SegmentFlags::DWELL)
+                        && segment.duration_s > 0.0)
             );
-            assert!(kept.0.iter().all(|segment| (segment.block, segment.line, segment.path[0]) == (7, 9, 5.0)));
-            assert_eq!((kept.1.len(), kept.1[0].block, kept.1[0].time_s), (1, 7, duration_s));
+            assert!(
+                kept.0
+                    .iter()
+                    .all(|segment| (segment.block, segment.line, segment.path[0]) == (7, 9, 5.0))
+            );
+            assert_eq!(
+                (kept.1.len(), kept.1[0].block, kept.1[0].time_s),
+                (1, 7, duration_s)
+            );
         }
     }
 
     #[test]
     fn a_block_that_lacks_something_is_refused_in_words() {
         let axes = Axes::new(&[('X', false), ('Y', false)]).unwrap();
-        let line = Block { kind: BlockKind::Line, length_mm: 1.0, feed_mm_per_s: 1.0, ..Block::at(AxisVector::ZERO) };
-        let arc = Block { kind: BlockKind::Arc, ..line };
-        let says = |block: Block| check(&block, &axes).err().map(|error| error.to_string()).unwrap_or_default();
+        let line = Block {
+            kind: BlockKind::Line,
+            length_mm: 1.0,
+            feed_mm_per_s: 1.0,
+            ..Block::at(AxisVector::ZERO)
+        };
+        let arc = Block {
+            kind: BlockKind::Arc,
+            ..line
+        };
+        let says = |block: Block| {
+            check(&block, &axes)
+                .err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
+        };
         assert_eq!(says(line), "");
-        assert!(says(Block { length_mm: 0.0, ..line }).contains("length"));
-        assert!(says(Block { end: AxisVector::ZERO * f64::NAN, ..line }).contains("ends"));
-        assert!(says(Block { feed_mm_per_s: f64::NAN, ..line }).contains("feed"));
-        assert!(says(Block { feed_cap_mm_per_s: f64::NAN, ..line }).contains("feed"));
-        assert!(says(Block { feed_cap_mm_per_s: 0.0, ..line }).contains("feed"));
-        assert!(says(Block { dwell_s: -1.0, ..Block::at(AxisVector::ZERO) }).contains("dwell"));
-        assert!(says(Block { start: AxisVector::ZERO * f64::NAN, ..Block::at(AxisVector::ZERO) }).contains("place"));
-        assert!(says(Block { arc: tandem_sdk::ArcGeometry { plane: [0, 2], ..arc.arc }, ..arc }).contains("plane"));
+        assert!(
+            says(Block {
+                length_mm: 0.0,
+                ..line
+            })
+            .contains("length")
+        );
+        assert!(
+            says(Block {
+                end: AxisVector::ZERO * f64::NAN,
+                ..line
+            })
+            .contains("ends")
+        );
+        assert!(
+            says(Block {
+                feed_mm_per_s: f64::NAN,
+                ..line
+            })
+            .contains("feed")
+        );
+        assert!(
+            says(Block {
+                feed_cap_mm_per_s: f64::NAN,
+                ..line
+            })
+            .contains("feed")
+        );
+        assert!(
+            says(Block {
+                feed_cap_mm_per_s: 0.0,
+                ..line
+            })
+            .contains("feed")
+        );
+        assert!(
+            says(Block {
+                dwell_s: -1.0,
+                ..Block::at(AxisVector::ZERO)
+            })
+            .contains("dwell")
+        );
+        assert!(
+            says(Block {
+                start: AxisVector::ZERO * f64::NAN,
+                ..Block::at(AxisVector::ZERO)
+            })
+            .contains("place")
+        );
+        assert!(
+            says(Block {
+                arc: tandem_sdk::ArcGeometry {
+                    plane: [0, 2],
+                    ..arc.arc
+                },
+                ..arc
+            })
+            .contains("plane")
+        );
     }
 }

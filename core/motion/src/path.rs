@@ -36,13 +36,23 @@ impl Path {
             BlockKind::Arc if block.length_mm > 0.0 => Shape::Arc(Arc::new(block, lanes)),
             _ => return None,
         };
-        Some(Self { start: block.start, end: block.end, length_mm: block.length_mm, shape })
+        Some(Self {
+            start: block.start,
+            end: block.end,
+            length_mm: block.length_mm,
+            shape,
+        })
     }
 
     /// A straight line; `length_mm`, above zero, is its length in the path's metric.
     pub fn line(start: &AxisVector, end: &AxisVector, length_mm: f64) -> Self {
         let shape = Shape::Line((*end - *start) * (1.0 / length_mm));
-        Self { start: *start, end: *end, length_mm, shape }
+        Self {
+            start: *start,
+            end: *end,
+            length_mm,
+            shape,
+        }
     }
 
     /// Length, mm.
@@ -147,7 +157,8 @@ impl Path {
 }
 
 fn nearest_on_line(start: &AxisVector, direction: &AxisVector, point: &AxisVector) -> f64 {
-    let dot = |a: &AxisVector, b: &AxisVector| -> f64 { a.0.iter().zip(&b.0).map(|(x, y)| x * y).sum() };
+    let dot =
+        |a: &AxisVector, b: &AxisVector| -> f64 { a.0.iter().zip(&b.0).map(|(x, y)| x * y).sum() };
     dot(&(*point - *start), direction) / dot(direction, direction)
 }
 
@@ -166,7 +177,10 @@ mod tests {
     #[test]
     fn a_line_ends_at_its_programmed_point() {
         let path = line(&[0.1, 0.2, 0.3]);
-        assert_eq!(path.position(path.length_mm()), AxisVector::from_slice(&[0.1, 0.2, 0.3]));
+        assert_eq!(
+            path.position(path.length_mm()),
+            AxisVector::from_slice(&[0.1, 0.2, 0.3])
+        );
         assert_eq!(path.max_curvature(), AxisVector::ZERO);
         let aside = AxisVector::from_slice(&[-1.0, 0.0, 0.0]);
         assert_eq!(path.distance_mm(&aside), 1.0);

@@ -46,8 +46,15 @@ impl Builder {
         // The quintic through position, velocity and acceleration at both ends of an arc of angle θ stands off by at
         // most R·θ⁶/(6!·2⁶): the Hermite remainder of a sine.
         let most = |radius_mm: f64| (46_080.0 * FIT_MM / radius_mm).powf(1.0 / 6.0);
-        let max_angle_rad = if path.is_straight() { f64::INFINITY } else { most(path.radius_mm()) };
-        Self { path_start_mm, max_angle_rad }
+        let max_angle_rad = if path.is_straight() {
+            f64::INFINITY
+        } else {
+            most(path.radius_mm())
+        };
+        Self {
+            path_start_mm,
+            max_angle_rad,
+        }
     }
 
     /// Where the block starts on the path of the run, mm.
@@ -70,7 +77,14 @@ impl Builder {
         let speed = piece.speed_mm_per_s;
         let half_acceleration = piece.acceleration_mm_per_s2 / 2.0;
         segment.duration_s = piece.duration_s;
-        segment.path = [self.path_start_mm + piece.start_mm, speed, half_acceleration, 0.0, 0.0, 0.0];
+        segment.path = [
+            self.path_start_mm + piece.start_mm,
+            speed,
+            half_acceleration,
+            0.0,
+            0.0,
+            0.0,
+        ];
         if path.is_straight() {
             parabola(path, piece, &mut segment.coefficients);
         } else {
@@ -85,7 +99,14 @@ fn parabola(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_A
     let velocity = direction * piece.speed_mm_per_s;
     let half_acceleration = direction * (piece.acceleration_mm_per_s2 / 2.0);
     for (axis, c) in coefficients.iter_mut().enumerate() {
-        *c = [at[axis], velocity[axis], half_acceleration[axis], 0.0, 0.0, 0.0];
+        *c = [
+            at[axis],
+            velocity[axis],
+            half_acceleration[axis],
+            0.0,
+            0.0,
+            0.0,
+        ];
     }
 }
 
@@ -93,7 +114,11 @@ fn quintic(path: &Path, piece: &SpeedPiece, coefficients: &mut [[f64; 6]; MAX_AX
     let start = state(path, piece, 0.0);
     let end = state(path, piece, piece.duration_s);
     for (axis, c) in coefficients.iter_mut().enumerate() {
-        *c = hermite(start.map(|v| v[axis]), end.map(|v| v[axis]), piece.duration_s);
+        *c = hermite(
+            start.map(|v| v[axis]),
+            end.map(|v| v[axis]),
+            piece.duration_s,
+        );
     }
 }
 
@@ -102,7 +127,8 @@ pub fn state(path: &Path, piece: &SpeedPiece, t_s: f64) -> [AxisVector; 3] {
     let s_mm = piece.path_mm(t_s);
     let speed = piece.speed(t_s);
     let direction = path.direction(s_mm);
-    let acceleration = direction * piece.acceleration_mm_per_s2 + path.curvature(s_mm) * (speed * speed);
+    let acceleration =
+        direction * piece.acceleration_mm_per_s2 + path.curvature(s_mm) * (speed * speed);
     [path.position(s_mm), direction * speed, acceleration]
 }
 

@@ -21,7 +21,10 @@ use crate::blocks::{BlockId, BlockWriter};
 
 /// What comes next where the machine rests.
 #[derive(Clone, Copy, Debug)]
-#[allow(clippy::large_enum_variant, reason = "it is looked at and gone; boxing it would allocate")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "it is looked at and gone; boxing it would allocate"
+)]
 pub enum Next {
     /// Nothing is known.
     Nothing,
@@ -99,7 +102,11 @@ pub struct Blocks {
 
 impl Blocks {
     fn new(position: &AxisVector) -> Self {
-        Self { writer: BlockWriter::new(3), blank: Segment::rest(position, 0.0), reported: None }
+        Self {
+            writer: BlockWriter::new(3),
+            blank: Segment::rest(position, 0.0),
+            reported: None,
+        }
     }
 
     /// Whether `block` was the last to be reported.
@@ -126,11 +133,20 @@ impl Blocks {
 
     /// The block that the present segments belong to.
     pub fn present(&self) -> BlockId {
-        BlockId { index: self.blank.block, line: self.blank.line }
+        BlockId {
+            index: self.blank.block,
+            line: self.blank.line,
+        }
     }
 
     /// Emits a rest at `position` in or at the end of a block.
-    pub fn rest(&self, block: BlockId, position: &AxisVector, path_mm: f64, sink: &mut dyn SegmentSink) {
+    pub fn rest(
+        &self,
+        block: BlockId,
+        position: &AxisVector,
+        path_mm: f64,
+        sink: &mut dyn SegmentSink,
+    ) {
         sink.segment(&self.writer.rest(block, position, path_mm));
     }
 }
@@ -154,7 +170,11 @@ pub struct Stream {
 impl Stream {
     /// At rest at `position`.
     pub fn new(position: &AxisVector) -> Self {
-        Self { blocks: Blocks::new(position), driving: None, finished: false }
+        Self {
+            blocks: Blocks::new(position),
+            driving: None,
+            finished: false,
+        }
     }
 
     /// A block was taken: more may follow.
@@ -192,10 +212,15 @@ impl Stream {
         if let Some(emitted_s) = blocks.writer.emit_dwell(left_s, sink) {
             return Ok(Some(emitted_s));
         }
-        let Some(Driving { driven_s, commit_s }) = self.driving else { return self.begin(windows, sink) };
+        let Some(Driving { driven_s, commit_s }) = self.driving else {
+            return self.begin(windows, sink);
+        };
         if driven_s < commit_s {
             let emitted = windows.emit(driven_s, commit_s, left_s, blocks, sink);
-            self.driving = Some(Driving { driven_s: emitted.until_s, commit_s });
+            self.driving = Some(Driving {
+                driven_s: emitted.until_s,
+                commit_s,
+            });
             return Ok(Some(emitted.duration_s));
         }
         if driven_s >= windows.duration_s() {
@@ -203,7 +228,10 @@ impl Stream {
             self.driving = None;
         } else {
             self.driving = Some(match windows.plan_on(driven_s, self.finished) {
-                Planned::NextWindow { commit_s } => Driving { driven_s: 0.0, commit_s },
+                Planned::NextWindow { commit_s } => Driving {
+                    driven_s: 0.0,
+                    commit_s,
+                },
                 Planned::SameWindow { commit_s } => Driving { driven_s, commit_s },
             });
         }
@@ -211,17 +239,30 @@ impl Stream {
     }
 
     /// Begins what comes next, at rest.
-    fn begin<W: Windows>(&mut self, windows: &mut W, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+    fn begin<W: Windows>(
+        &mut self,
+        windows: &mut W,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Option<f64>, PluginError> {
         match windows.next(&mut self.blocks, sink) {
             Next::Nothing => return Ok(None),
             Next::Again => {}
             Next::Dwell(block, path_mm) => {
                 self.blocks.reported = Some(block.index);
-                self.blocks.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, path_mm, sink);
+                self.blocks.writer.begin_dwell(
+                    BlockId::from(&block),
+                    &block.end,
+                    block.dwell_s,
+                    path_mm,
+                    sink,
+                );
             }
             Next::Path => {
                 let commit_s = windows.plan_from_rest(self.finished)?;
-                self.driving = Some(Driving { driven_s: 0.0, commit_s });
+                self.driving = Some(Driving {
+                    driven_s: 0.0,
+                    commit_s,
+                });
             }
         }
         Ok(Some(0.0))
@@ -248,17 +289,25 @@ mod tests {
 
         fn plan_from_rest(&mut self, finished: bool) -> Result<f64, PluginError> {
             self.seen.push(format!("from rest, finished {finished}"));
-            if self.windows == 0 { Err(PluginError::fixed("no way")) } else { Ok(1.0) }
+            if self.windows == 0 {
+                Err(PluginError::fixed("no way"))
+            } else {
+                Ok(1.0)
+            }
         }
 
         fn plan_on(&mut self, now_s: f64, _: bool) -> Planned {
             self.seen.push(format!("on from {now_s}"));
             if self.refused > 0 {
                 self.refused -= 1;
-                return Planned::SameWindow { commit_s: now_s + 0.5 };
+                return Planned::SameWindow {
+                    commit_s: now_s + 0.5,
+                };
             }
             self.windows -= 1;
-            Planned::NextWindow { commit_s: if self.windows == 0 { 2.0 } else { 1.0 } }
+            Planned::NextWindow {
+                commit_s: if self.windows == 0 { 2.0 } else { 1.0 },
+            }
         }
 
         fn duration_s(&self) -> f64 {
@@ -273,14 +322,28 @@ mod tests {
             blocks: &mut Blocks,
             sink: &mut dyn SegmentSink,
         ) -> Emitted {
-            let block = Block { kind: BlockKind::Line, index: 4, ..Block::at(AxisVector::ZERO) };
+            let block = Block {
+                kind: BlockKind::Line,
+                index: 4,
+                ..Block::at(AxisVector::ZERO)
+            };
             if !blocks.is_reported(&block) {
-                blocks.begin(&block, &crate::blocks::report(4, LimitedBy::Feed, [0.0; 3], 1.0), sink);
+                blocks.begin(
+                    &block,
+                    &crate::blocks::report(4, LimitedBy::Feed, [0.0; 3], 1.0),
+                    sink,
+                );
             }
             let until_s = commit_s.min(from_s + left_s);
-            sink.segment(&Segment { duration_s: until_s - from_s, ..blocks.blank });
+            sink.segment(&Segment {
+                duration_s: until_s - from_s,
+                ..blocks.blank
+            });
             blocks.has_begun();
-            Emitted { until_s, duration_s: until_s - from_s }
+            Emitted {
+                until_s,
+                duration_s: until_s - from_s,
+            }
         }
 
         fn rest(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
@@ -299,7 +362,9 @@ mod tests {
     impl SegmentSink for Counted {
         fn segment(&mut self, segment: &Segment) {
             self.begins += u32::from(segment.flags.contains(SegmentFlags::BLOCK_BEGINS));
-            self.rests += u32::from(segment.flags.contains(SegmentFlags::ENDS_AT_REST) && segment.duration_s == 0.0);
+            self.rests += u32::from(
+                segment.flags.contains(SegmentFlags::ENDS_AT_REST) && segment.duration_s == 0.0,
+            );
         }
 
         fn block(&mut self, _: &BlockReport) {
@@ -309,9 +374,18 @@ mod tests {
 
     #[test]
     fn windows_follow_each_other_to_a_rest_and_a_refused_one_is_driven_on() {
-        let dwell = Block { dwell_s: 0.25, index: 3, ..Block::at(AxisVector::ZERO) };
+        let dwell = Block {
+            dwell_s: 0.25,
+            index: 3,
+            ..Block::at(AxisVector::ZERO)
+        };
         let next = vec![Next::Path, Next::Again, Next::Dwell(dwell, 7.0)];
-        let mut windows = Scripted { next, windows: 2, refused: 1, seen: vec![] };
+        let mut windows = Scripted {
+            next,
+            windows: 2,
+            refused: 1,
+            seen: vec![],
+        };
         let mut stream = Stream::new(&AxisVector::ZERO);
         let mut counted = Counted::default();
         stream.finish();
@@ -322,7 +396,16 @@ mod tests {
         }
         // The dwell; one second of the first window and half a second more; one of the second; all of the last.
         assert!((sum_s - (0.25 + 1.5 + 1.0 + 2.0)).abs() < 1e-12, "{sum_s}");
-        assert_eq!(windows.seen, ["from rest, finished true", "on from 1", "on from 1.5", "on from 1", "rest"]);
+        assert_eq!(
+            windows.seen,
+            [
+                "from rest, finished true",
+                "on from 1",
+                "on from 1.5",
+                "on from 1",
+                "rest"
+            ]
+        );
         assert_eq!((counted.begins, counted.rests, counted.reports), (2, 1, 2));
         assert!(stream.is_done(true) && !stream.is_done(false));
         stream.accepted();
@@ -331,8 +414,15 @@ mod tests {
 
     #[test]
     fn where_no_motion_from_rest_is_found_the_error_is_the_planners() {
-        let mut windows = Scripted { next: vec![Next::Path], windows: 0, refused: 0, seen: vec![] };
-        let error = Stream::new(&AxisVector::ZERO).emit(&mut windows, 1.0, &mut Counted::default()).unwrap_err();
+        let mut windows = Scripted {
+            next: vec![Next::Path],
+            windows: 0,
+            refused: 0,
+            seen: vec![],
+        };
+        let error = Stream::new(&AxisVector::ZERO)
+            .emit(&mut windows, 1.0, &mut Counted::default())
+            .unwrap_err();
         assert_eq!(error.message(), "no way");
     }
 }

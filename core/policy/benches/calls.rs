@@ -9,7 +9,13 @@ use tandem_policy::abi::block as at;
 use tandem_policy::{Bounds, Budget, Engine, Facts, Instance, Period, Policy, Record};
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
-const SCRIPTS: [&str; 5] = ["nothing", "half-feed", "gentle-start", "material-feed", "corner-time-constant"];
+const SCRIPTS: [&str; 5] = [
+    "nothing",
+    "half-feed",
+    "gentle-start",
+    "material-feed",
+    "corner-time-constant",
+];
 
 fn main() {
     divan::main();
@@ -19,28 +25,55 @@ fn main() {
 fn bytes(name: &str) -> Vec<u8> {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let built = std::fs::read(format!("{root}/scripts/policies/{name}.wasm"));
-    built.unwrap_or_else(|_| std::fs::read(format!("{root}/tests/fixtures/policies/good/{name}.wat")).unwrap())
+    built.unwrap_or_else(|_| {
+        std::fs::read(format!("{root}/tests/fixtures/policies/good/{name}.wat")).unwrap()
+    })
 }
 
 fn facts() -> Facts {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
-    Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 }
+    Facts {
+        axes,
+        time_constant_s: 0.05,
+        path_tolerance_mm: 0.01,
+        rough_period_s: 0.008,
+    }
 }
 
 fn policy(name: &str) -> Policy {
     let script = Engine::new().unwrap().compile(&bytes(name)).unwrap();
-    Policy::new(script, vec![], Budget::default(), Bounds::default(), &facts()).unwrap()
+    Policy::new(
+        script,
+        vec![],
+        Budget::default(),
+        Bounds::default(),
+        &facts(),
+    )
+    .unwrap()
 }
 
 /// Lines of a spiral in chords, as CAM writes them.
 fn blocks(count: usize) -> Vec<Block> {
     let at = |index: usize| {
         let turn = index as f64 * 0.1;
-        AxisVector::from_slice(&[(10.0 + turn) * turn.cos(), (10.0 + turn) * turn.sin(), -0.01 * turn])
+        AxisVector::from_slice(&[
+            (10.0 + turn) * turn.cos(),
+            (10.0 + turn) * turn.sin(),
+            -0.01 * turn,
+        ])
     };
     let line = |index: usize| {
-        let ends = Block { end: at(index + 1), ..Block::at(at(index)) };
-        Block { kind: BlockKind::Line, feed_mm_per_s: 50.0, length_mm: 1.0, line: index as u32 + 1, ..ends }
+        let ends = Block {
+            end: at(index + 1),
+            ..Block::at(at(index))
+        };
+        Block {
+            kind: BlockKind::Line,
+            feed_mm_per_s: 50.0,
+            length_mm: 1.0,
+            line: index as u32 + 1,
+            ..ends
+        }
     };
     (0..count).map(line).collect()
 }
@@ -48,12 +81,28 @@ fn blocks(count: usize) -> Vec<Block> {
 /// A line as it crosses into a script.
 fn record(index: usize) -> Record {
     let mut record = [0; at::BYTES];
-    for (place, number) in [(at::SIZE, at::BYTES as u32), (at::LINE, index as u32 + 1), (at::KIND, 1), (at::TOOL, 1)] {
+    for (place, number) in [
+        (at::SIZE, at::BYTES as u32),
+        (at::LINE, index as u32 + 1),
+        (at::KIND, 1),
+        (at::TOOL, 1),
+    ] {
         record[place..place + 4].copy_from_slice(&number.to_le_bytes());
     }
-    let numbers = [(at::LENGTH, 1.0), (at::FEED, 50.0), (at::TURN_IN, 0.1), (at::TURN_OUT, 0.1), (at::CURVATURE, 0.0)];
-    let force = [(at::TIME_CONSTANT, 0.05), (at::TOLERANCE, 0.01), (at::FEED_CAP, f64::INFINITY)];
-    let asks = [at::ASK_TIME_CONSTANT, at::ASK_TOLERANCE, at::ASK_FEED_CAP].map(|place| (place, f64::NAN));
+    let numbers = [
+        (at::LENGTH, 1.0),
+        (at::FEED, 50.0),
+        (at::TURN_IN, 0.1),
+        (at::TURN_OUT, 0.1),
+        (at::CURVATURE, 0.0),
+    ];
+    let force = [
+        (at::TIME_CONSTANT, 0.05),
+        (at::TOLERANCE, 0.01),
+        (at::FEED_CAP, f64::INFINITY),
+    ];
+    let asks =
+        [at::ASK_TIME_CONSTANT, at::ASK_TOLERANCE, at::ASK_FEED_CAP].map(|place| (place, f64::NAN));
     for (place, number) in numbers.into_iter().chain(force).chain(asks) {
         record[place..place + 8].copy_from_slice(&f64::to_le_bytes(number));
     }
@@ -70,7 +119,9 @@ fn decide_all(policy: &mut Policy, blocks: &[Block]) {
 #[divan::bench(args = SCRIPTS, consts = [1, 64], sample_size = 256)]
 fn decide<const BLOCKS: usize>(bencher: Bencher, name: &str) {
     let (mut policy, blocks) = (policy(name), blocks(BLOCKS));
-    bencher.counter(ItemsCount::new(BLOCKS)).bench_local(|| decide_all(&mut policy, divan::black_box(&blocks)));
+    bencher
+        .counter(ItemsCount::new(BLOCKS))
+        .bench_local(|| decide_all(&mut policy, divan::black_box(&blocks)));
     assert_eq!(policy.counters().troubles(), 0);
 }
 
@@ -82,21 +133,30 @@ fn window<const BLOCKS: usize>(bencher: Bencher, name: &str) {
     let mut asks = Vec::with_capacity(64);
     bencher.counter(ItemsCount::new(BLOCKS)).bench_local(|| {
         asks.clear();
-        instance.blocks(divan::black_box(&records), &mut asks).unwrap();
+        instance
+            .blocks(divan::black_box(&records), &mut asks)
+            .unwrap();
     });
 }
 
 #[divan::bench(sample_size = 256)]
 fn period(bencher: Bencher) {
     let mut policy = policy("load-feed");
-    let means = Period { duration_s: 0.008, cutting_torque_nm: 2.0, reference_torque_nm: 2.0, ..Period::default() };
+    let means = Period {
+        duration_s: 0.008,
+        cutting_torque_nm: 2.0,
+        reference_torque_nm: 2.0,
+        ..Period::default()
+    };
     bencher.bench_local(|| policy.period(divan::black_box(&means)));
 }
 
 #[divan::bench(args = ["gentle-start", "material-feed", "corner-time-constant", "load-feed"])]
 fn compile(bencher: Bencher, name: &str) {
     let bytes = bytes(name);
-    bencher.with_inputs(|| Engine::new().unwrap()).bench_local_values(|engine| engine.compile(&bytes).unwrap());
+    bencher
+        .with_inputs(|| Engine::new().unwrap())
+        .bench_local_values(|engine| engine.compile(&bytes).unwrap());
 }
 
 #[divan::bench(args = ["gentle-start", "corner-time-constant"])]

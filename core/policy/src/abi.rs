@@ -171,10 +171,14 @@ pub(crate) fn put_f64(bytes: &mut [u8], at: usize, value: f64) {
 
 /// Reads an unsigned number at `at`; `None` beyond the end.
 pub(crate) fn get_u32(bytes: &[u8], at: usize) -> Option<u32> {
-    Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?))
+    Some(u32::from_le_bytes(
+        bytes.get(at..at.checked_add(4)?)?.try_into().ok()?,
+    ))
 }
 
 /// Reads a number at `at`; `None` beyond the end.
 pub(crate) fn get_f64(bytes: &[u8], at: usize) -> Option<f64> {
-    Some(f64::from_le_bytes(bytes.get(at..at.checked_add(8)?)?.try_into().ok()?))
+    Some(f64::from_le_bytes(
+        bytes.get(at..at.checked_add(8)?)?.try_into().ok()?,
+    ))
 }

@@ -66,8 +66,15 @@ impl Bounds {
     /// The bounds of each answer. A cap is fixed when a block is planned and a ratio when it is driven, so that neither
     /// knows the other: where a script gives both, each keeps to the root of the share that they have together.
     pub(crate) fn for_each_answer(self, gives_both: bool) -> Self {
-        let lowest = if gives_both { self.lowest_feed_ratio.sqrt() } else { self.lowest_feed_ratio };
-        Self { lowest_feed_ratio: lowest, ..self }
+        let lowest = if gives_both {
+            self.lowest_feed_ratio.sqrt()
+        } else {
+            self.lowest_feed_ratio
+        };
+        Self {
+            lowest_feed_ratio: lowest,
+            ..self
+        }
     }
 
     /// What a script gets that asks for `asks`; the second says which of the three were changed on the way.
@@ -79,12 +86,27 @@ impl Bounds {
         let slowest = self.lowest_feed_ratio * block.programmed_feed_mm_per_s;
         let moves = block.kind != BlockKind::Dwell;
         let feeds = moves && block.kind != BlockKind::Rapid;
-        let time_constant = limited(time_constant, shortest, longest, block.time_constant_s, moves);
-        let tolerance = limited(tolerance, smallest.min(largest), largest, block.path_tolerance_mm, moves);
+        let time_constant = limited(
+            time_constant,
+            shortest,
+            longest,
+            block.time_constant_s,
+            moves,
+        );
+        let tolerance = limited(
+            tolerance,
+            smallest.min(largest),
+            largest,
+            block.path_tolerance_mm,
+            moves,
+        );
         let highest = block.programmed_feed_mm_per_s.min(block.feed_cap_mm_per_s);
         let cap = limited(cap, slowest.min(highest), highest, highest, feeds);
-        let tuning =
-            Tuning { time_constant_s: time_constant.0, path_tolerance_mm: tolerance.0, feed_cap_mm_per_s: cap.0 };
+        let tuning = Tuning {
+            time_constant_s: time_constant.0,
+            path_tolerance_mm: tolerance.0,
+            feed_cap_mm_per_s: cap.0,
+        };
         (tuning, [time_constant.1, tolerance.1, cap.1])
     }
 
@@ -99,7 +121,13 @@ impl Bounds {
 }
 
 /// `asked` between `lowest` and `highest`, where it differs from what is in force; and whether it was changed.
-fn limited(asked: f64, lowest: f64, highest: f64, in_force: f64, applies: bool) -> (Option<f64>, bool) {
+fn limited(
+    asked: f64,
+    lowest: f64,
+    highest: f64,
+    in_force: f64,
+    applies: bool,
+) -> (Option<f64>, bool) {
     if asked.is_nan() {
         return (None, false);
     }
@@ -132,44 +160,95 @@ mod tests {
     #[test]
     fn requests_are_kept_within_the_machine() {
         let (tuning, changed) = Bounds::default().apply(&[1e308, 1e308, 1e308], &LINE);
-        assert_eq!(tuning, Tuning { time_constant_s: Some(1.0), ..Tuning::default() });
-        assert_eq!(changed, [true; 3], "a tolerance above the one in force, a cap above the feed");
+        assert_eq!(
+            tuning,
+            Tuning {
+                time_constant_s: Some(1.0),
+                ..Tuning::default()
+            }
+        );
+        assert_eq!(
+            changed, [true; 3],
+            "a tolerance above the one in force, a cap above the feed"
+        );
         let (tuning, changed) = Bounds::default().apply(&[-1e308; 3], &LINE);
-        let lowest = (tuning.time_constant_s, tuning.path_tolerance_mm, tuning.feed_cap_mm_per_s);
-        assert_eq!((lowest, changed), ((Some(0.001), Some(1e-4), Some(5.0)), [true; 3]));
+        let lowest = (
+            tuning.time_constant_s,
+            tuning.path_tolerance_mm,
+            tuning.feed_cap_mm_per_s,
+        );
+        assert_eq!(
+            (lowest, changed),
+            ((Some(0.001), Some(1e-4), Some(5.0)), [true; 3])
+        );
         let (tuning, changed) = Bounds::default().apply(&[0.02, 0.005, 50.0], &LINE);
-        let given = (tuning.time_constant_s, tuning.path_tolerance_mm, tuning.feed_cap_mm_per_s);
-        assert_eq!((given, changed), ((Some(0.02), Some(0.005), Some(50.0)), [false; 3]));
+        let given = (
+            tuning.time_constant_s,
+            tuning.path_tolerance_mm,
+            tuning.feed_cap_mm_per_s,
+        );
+        assert_eq!(
+            (given, changed),
+            ((Some(0.02), Some(0.005), Some(50.0)), [false; 3])
+        );
     }
 
     #[test]
     fn a_cap_never_exceeds_the_cap_in_force() {
-        let capped = InForce { feed_cap_mm_per_s: 30.0, ..LINE };
+        let capped = InForce {
+            feed_cap_mm_per_s: 30.0,
+            ..LINE
+        };
         for asked in [30.000_001, 60.0, 100.0, 1e308] {
             let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, asked], &capped);
-            assert_eq!((tuning.feed_cap_mm_per_s, changed), (None, [false, false, true]), "{asked}");
+            assert_eq!(
+                (tuning.feed_cap_mm_per_s, changed),
+                (None, [false, false, true]),
+                "{asked}"
+            );
         }
         let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, 29.0], &capped);
         assert_eq!((tuning.feed_cap_mm_per_s, changed[2]), (Some(29.0), false));
         // A cap below the floor that somebody else has set stays.
-        let slow = InForce { feed_cap_mm_per_s: 2.0, ..LINE };
+        let slow = InForce {
+            feed_cap_mm_per_s: 2.0,
+            ..LINE
+        };
         let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, 1.0], &slow);
         assert_eq!((tuning.feed_cap_mm_per_s, changed[2]), (None, true));
     }
 
     #[test]
     fn rapids_have_no_feed_and_dwells_nothing_to_tune() {
-        let rapid = InForce { kind: BlockKind::Rapid, programmed_feed_mm_per_s: f64::INFINITY, ..LINE };
+        let rapid = InForce {
+            kind: BlockKind::Rapid,
+            programmed_feed_mm_per_s: f64::INFINITY,
+            ..LINE
+        };
         let (tuning, changed) = Bounds::default().apply(&[0.02, f64::NAN, 50.0], &rapid);
-        assert_eq!((tuning.time_constant_s, tuning.feed_cap_mm_per_s), (Some(0.02), None));
+        assert_eq!(
+            (tuning.time_constant_s, tuning.feed_cap_mm_per_s),
+            (Some(0.02), None)
+        );
         assert_eq!(changed, [false, false, true]);
-        let dwell = InForce { kind: BlockKind::Dwell, ..LINE };
-        assert!(Bounds::default().apply(&[0.02, 0.005, 50.0], &dwell).0.is_empty());
+        let dwell = InForce {
+            kind: BlockKind::Dwell,
+            ..LINE
+        };
+        assert!(
+            Bounds::default()
+                .apply(&[0.02, 0.005, 50.0], &dwell)
+                .0
+                .is_empty()
+        );
     }
 
     #[test]
     fn ratios_change_no_faster_than_stated() {
-        let bounds = Bounds { ratio_change_per_s: 2.0, ..Bounds::default() };
+        let bounds = Bounds {
+            ratio_change_per_s: 2.0,
+            ..Bounds::default()
+        };
         assert_eq!(bounds.ratio(0.0, 1.0, 0.01), (0.98, true));
         assert_eq!(bounds.ratio(1e308, 0.5, 0.01), (0.52, true));
         assert_eq!(Bounds::default().ratio(0.0, 1.0, 0.01), (0.05, true));

@@ -19,14 +19,19 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { fuel_per_call: 20_000, fuel_per_block: 1_000, memory_pages: 32 }
+        Self {
+            fuel_per_call: 20_000,
+            fuel_per_block: 1_000,
+            memory_pages: 32,
+        }
     }
 }
 
 impl Budget {
     /// Fuel for a window of `blocks`.
     pub fn window(&self, blocks: usize) -> u64 {
-        self.fuel_per_call.saturating_add(self.fuel_per_block.saturating_mul(blocks as u64))
+        self.fuel_per_call
+            .saturating_add(self.fuel_per_block.saturating_mul(blocks as u64))
     }
 
     /// Fuel to start a module and to ask it for its layout: fifty calls.

@@ -46,7 +46,11 @@ pub struct Counters {
 impl Counters {
     /// Calls that went wrong.
     pub fn troubles(&self) -> u64 {
-        self.out_of_fuel + self.memory_refusals + self.stack_overflows + self.traps + self.not_finite
+        self.out_of_fuel
+            + self.memory_refusals
+            + self.stack_overflows
+            + self.traps
+            + self.not_finite
     }
 
     pub(crate) fn count(&mut self, trouble: &Trouble) {

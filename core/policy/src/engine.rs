@@ -32,9 +32,13 @@ impl Engine {
     /// # Errors
     /// This computer's processor is not known to the compiler.
     pub fn new() -> Result<Self, Refusal> {
-        let engine = wasmtime::Engine::new(&config()).map_err(|e| Refusal::NotAModule(format!("{e:#}")))?;
+        let engine =
+            wasmtime::Engine::new(&config()).map_err(|e| Refusal::NotAModule(format!("{e:#}")))?;
         warm_up(&engine);
-        Ok(Self { engine, compiled: Arc::default() })
+        Ok(Self {
+            engine,
+            compiled: Arc::default(),
+        })
     }
 
     /// Compiles `bytes`, a module or the text of one (WAT), and checks its exports. The same bytes are compiled once.
@@ -44,7 +48,10 @@ impl Engine {
     /// What is wrong with the module.
     pub fn compile(&self, bytes: &[u8]) -> Result<Script, Refusal> {
         if bytes.len() > MOST_BYTES {
-            return Err(Refusal::TooLarge { bytes: bytes.len(), most: MOST_BYTES });
+            return Err(Refusal::TooLarge {
+                bytes: bytes.len(),
+                most: MOST_BYTES,
+            });
         }
         let mut hasher = DefaultHasher::new();
         bytes.hash(&mut hasher);
@@ -53,12 +60,17 @@ impl Engine {
         if let Some(found) = kept.iter().find(|c| c.hash == hash && c.bytes == bytes) {
             return Ok(found.script.clone());
         }
-        let module = Module::new(&self.engine, bytes).map_err(|e| Refusal::NotAModule(one_line(&format!("{e:#}"))))?;
+        let module = Module::new(&self.engine, bytes)
+            .map_err(|e| Refusal::NotAModule(one_line(&format!("{e:#}"))))?;
         let script = Script::new(module)?;
         if kept.len() == KEPT {
             kept.remove(0);
         }
-        kept.push(Compiled { hash, bytes: bytes.to_vec(), script: script.clone() });
+        kept.push(Compiled {
+            hash,
+            bytes: bytes.to_vec(),
+            script: script.clone(),
+        });
         Ok(script)
     }
 }
@@ -84,7 +96,9 @@ fn config() -> Config {
 
 /// The first trap of a process takes a third of a millisecond: have it now.
 fn warm_up(engine: &wasmtime::Engine) {
-    let Ok(module) = Module::new(engine, r#"(module (func (export "trap") unreachable))"#) else { return };
+    let Ok(module) = Module::new(engine, r#"(module (func (export "trap") unreachable))"#) else {
+        return;
+    };
     let mut store = Store::new(engine, ());
     let _ = store.set_fuel(1000);
     if let Ok(instance) = wasmtime::Instance::new(&mut store, &module, &[])
@@ -97,5 +111,10 @@ fn warm_up(engine: &wasmtime::Engine) {
 /// Text of the engine on one line, shortened.
 fn one_line(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
-    words.join(" ").chars().filter(|c| !c.is_control()).take(300).collect()
+    words
+        .join(" ")
+        .chars()
+        .filter(|c| !c.is_control())
+        .take(300)
+        .collect()
 }

@@ -30,7 +30,11 @@ impl Instance {
     ///
     /// # Errors
     /// It does not start within its budget, its layout is wrong, or the parameters do not fit.
-    pub fn new(script: &Script, budget: &Budget, stated: &[(String, f64)]) -> Result<Self, Refusal> {
+    pub fn new(
+        script: &Script,
+        budget: &Budget,
+        stated: &[(String, f64)],
+    ) -> Result<Self, Refusal> {
         let mut store = Store::new(script.module.engine(), Limits::new(budget));
         store.limiter(|limits| limits);
         let fuel = budget.start();
@@ -38,8 +42,12 @@ impl Instance {
         let made = wasmtime::Instance::new(&mut store, &script.module, &[]);
         let instance = made.map_err(|e| Refusal::Start(trouble(&mut store, &e, fuel)))?;
         let missing = || Refusal::Exports(vec!["an export has gone".to_string()]);
-        let memory = instance.get_memory(&mut store, abi::MEMORY_EXPORT).ok_or_else(missing)?;
-        let locate = instance.get_typed_func::<(), u32>(&mut store, abi::LAYOUT_EXPORT).map_err(|_| missing())?;
+        let memory = instance
+            .get_memory(&mut store, abi::MEMORY_EXPORT)
+            .ok_or_else(missing)?;
+        let locate = instance
+            .get_typed_func::<(), u32>(&mut store, abi::LAYOUT_EXPORT)
+            .map_err(|_| missing())?;
         let located = locate.call(&mut store, ());
         let address = located.map_err(|e| Refusal::Start(trouble(&mut store, &e, fuel)))?;
         let layout = Layout::read(memory.data(&store), address)?;
@@ -51,7 +59,9 @@ impl Instance {
             blocks: instance.get_typed_func(&mut store, abi::BLOCKS_EXPORT).ok(),
             period: instance.get_typed_func(&mut store, abi::PERIOD_EXPORT).ok(),
             save: instance.get_typed_func(&mut store, abi::SAVE_EXPORT).ok(),
-            restore: instance.get_typed_func(&mut store, abi::RESTORE_EXPORT).ok(),
+            restore: instance
+                .get_typed_func(&mut store, abi::RESTORE_EXPORT)
+                .ok(),
             store,
             memory,
             layout,
@@ -75,7 +85,9 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script. An infinite number in an answer is an error too.
     pub fn blocks(&mut self, records: &[Record], asks: &mut Vec<Asks>) -> Result<(), Trouble> {
-        let Some(function) = &self.blocks else { return Ok(()) };
+        let Some(function) = &self.blocks else {
+            return Ok(());
+        };
         let (window, stride) = (self.layout.window, self.layout.block_bytes);
         let memory = self.memory.data_mut(&mut self.store);
         if stride == abi::block::BYTES {
@@ -86,15 +98,25 @@ impl Instance {
             }
         }
         let fuel = self.budget.window(records.len());
-        let answer = call(&mut self.store, function, (window as u32, records.len() as u32), fuel);
+        let answer = call(
+            &mut self.store,
+            function,
+            (window as u32, records.len() as u32),
+            fuel,
+        );
         self.fuel_used = fuel_used(&self.store, fuel);
         answer?;
-        let answered = self.memory.data(&self.store)[window..].chunks_exact(stride).take(records.len());
+        let answered = self.memory.data(&self.store)[window..]
+            .chunks_exact(stride)
+            .take(records.len());
         asks.extend(answered.map(read_asks));
-        asks.iter().flatten().position(|ask| ask.is_infinite()).map_or(Ok(()), |at| {
-            const NAMES: [&str; 3] = ["a time constant", "a path tolerance", "a feed cap"];
-            Err(not_finite(NAMES[at % 3], asks[at / 3][at % 3]))
-        })
+        asks.iter()
+            .flatten()
+            .position(|ask| ask.is_infinite())
+            .map_or(Ok(()), |at| {
+                const NAMES: [&str; 3] = ["a time constant", "a path tolerance", "a feed cap"];
+                Err(not_finite(NAMES[at % 3], asks[at / 3][at % 3]))
+            })
     }
 
     /// Hands over the means of a rough period, as [`abi::period`] lays them out; gives the ratio, NaN for none. Does not
@@ -103,13 +125,19 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn period(&mut self, record: &[u8]) -> Result<f64, Trouble> {
-        let Some(function) = &self.period else { return Ok(f64::NAN) };
+        let Some(function) = &self.period else {
+            return Ok(f64::NAN);
+        };
         let (place, fuel) = (self.layout.period, self.budget.fuel_per_call);
         self.memory.data_mut(&mut self.store)[place..][..record.len()].copy_from_slice(record);
         let answer = call(&mut self.store, function, place as u32, fuel);
         self.fuel_used = fuel_used(&self.store, fuel);
         let ratio = answer?;
-        if ratio.is_infinite() { Err(not_finite("a ratio", ratio)) } else { Ok(ratio) }
+        if ratio.is_infinite() {
+            Err(not_finite("a ratio", ratio))
+        } else {
+            Ok(ratio)
+        }
     }
 
     /// What must survive a reload. Allocates.
@@ -117,10 +145,15 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn save(&mut self) -> Result<Vec<u8>, Trouble> {
-        let Some(function) = &self.save else { return Ok(vec![]) };
+        let Some(function) = &self.save else {
+            return Ok(vec![]);
+        };
         let bytes = call(&mut self.store, function, (), self.budget.fuel_per_call)? as usize;
         if bytes > self.layout.state_bytes {
-            return Err(Trouble::Trap(format!("save gave {bytes} bytes, the buffer has {}", self.layout.state_bytes)));
+            return Err(Trouble::Trap(format!(
+                "save gave {bytes} bytes, the buffer has {}",
+                self.layout.state_bytes
+            )));
         }
         let start = self.layout.state;
         Ok(self.memory.data(&self.store)[start..start + bytes].to_vec())
@@ -131,13 +164,20 @@ impl Instance {
     /// # Errors
     /// What went wrong in the script.
     pub fn restore(&mut self, state: &[u8]) -> Result<(), Trouble> {
-        let Some(function) = &self.restore else { return Ok(()) };
+        let Some(function) = &self.restore else {
+            return Ok(());
+        };
         if state.is_empty() || state.len() > self.layout.state_bytes {
             return Ok(());
         }
         let start = self.layout.state;
         self.memory.data_mut(&mut self.store)[start..start + state.len()].copy_from_slice(state);
-        call(&mut self.store, function, state.len() as u32, self.budget.fuel_per_call)
+        call(
+            &mut self.store,
+            function,
+            state.len() as u32,
+            self.budget.fuel_per_call,
+        )
     }
 }
 
@@ -149,7 +189,9 @@ fn call<P: WasmParams, R: WasmResults>(
     fuel: u64,
 ) -> Result<R, Trouble> {
     let _ = store.set_fuel(fuel);
-    function.call(&mut *store, arguments).map_err(|e| trouble(store, &e, fuel))
+    function
+        .call(&mut *store, arguments)
+        .map_err(|e| trouble(store, &e, fuel))
 }
 
 /// What a call with `fuel` has used.
@@ -161,11 +203,16 @@ fn fuel_used(store: &Store<Limits>, fuel: u64) -> u64 {
 fn read_asks(record: &[u8]) -> Asks {
     let at = abi::block::ASK_TIME_CONSTANT;
     let asks: &[u8; 24] = record[at..].first_chunk().unwrap_or(&[0xff; 24]);
-    std::array::from_fn(|index| f64::from_le_bytes(std::array::from_fn(|byte| asks[8 * index + byte])))
+    std::array::from_fn(|index| {
+        f64::from_le_bytes(std::array::from_fn(|byte| asks[8 * index + byte]))
+    })
 }
 
 fn not_finite(what: &'static str, value: f64) -> Trouble {
-    Trouble::NotFinite { what, value: value.to_string() }
+    Trouble::NotFinite {
+        what,
+        value: value.to_string(),
+    }
 }
 
 fn trouble(store: &mut Store<Limits>, error: &wasmtime::Error, fuel: u64) -> Trouble {
@@ -175,7 +222,18 @@ fn trouble(store: &mut Store<Limits>, error: &wasmtime::Error, fuel: u64) -> Tro
     match error.downcast_ref::<Trap>() {
         Some(Trap::OutOfFuel) => Trouble::Fuel(fuel),
         Some(Trap::StackOverflow) => Trouble::Stack,
-        Some(other) => Trouble::Trap(other.to_string().trim_start_matches("wasm trap: ").to_string()),
-        None => Trouble::Trap(format!("{error:#}").chars().filter(|c| !c.is_control()).take(200).collect()),
+        Some(other) => Trouble::Trap(
+            other
+                .to_string()
+                .trim_start_matches("wasm trap: ")
+                .to_string(),
+        ),
+        None => Trouble::Trap(
+            format!("{error:#}")
+                .chars()
+                .filter(|c| !c.is_control())
+                .take(200)
+                .collect(),
+        ),
     }
 }

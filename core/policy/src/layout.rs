@@ -36,25 +36,42 @@ impl Layout {
     /// Reads the layout at `address` of `memory`.
     pub fn read(memory: &[u8], address: u32) -> Result<Self, Refusal> {
         let at = |field: usize| -> Result<u32, Refusal> {
-            get_u32(memory, address as usize + field).ok_or_else(|| wrong("it lies outside of the memory"))
+            get_u32(memory, address as usize + field)
+                .ok_or_else(|| wrong("it lies outside of the memory"))
         };
         let size = at(abi::layout::SIZE)?;
         if (size as usize) < abi::layout::BYTES {
-            return Err(wrong(format!("its size is {size} bytes, version 1 has {}", abi::layout::BYTES)));
+            return Err(wrong(format!(
+                "its size is {size} bytes, version 1 has {}",
+                abi::layout::BYTES
+            )));
         }
         let block_bytes = stride(at(abi::layout::BLOCK_BYTES)?, abi::block::BYTES, "a block")?;
-        let period_bytes = stride(at(abi::layout::PERIOD_BYTES)?, abi::period::BYTES, "the period")?;
+        let period_bytes = stride(
+            at(abi::layout::PERIOD_BYTES)?,
+            abi::period::BYTES,
+            "the period",
+        )?;
         if (at(abi::layout::WINDOW_BLOCKS)? as usize) < abi::WINDOW_BLOCKS {
-            return Err(wrong(format!("the window holds fewer than {} blocks", abi::WINDOW_BLOCKS)));
+            return Err(wrong(format!(
+                "the window holds fewer than {} blocks",
+                abi::WINDOW_BLOCKS
+            )));
         }
         let state_bytes = at(abi::layout::STATE_BYTES)?;
         if state_bytes > MOST_STATE {
-            return Err(wrong(format!("the state has {state_bytes} bytes, {MOST_STATE} are allowed")));
+            return Err(wrong(format!(
+                "the state has {state_bytes} bytes, {MOST_STATE} are allowed"
+            )));
         }
         let place = |address: u32, bytes: usize, what| region(memory, address, bytes, what);
         let table = Table::read(memory, &at)?;
         Ok(Self {
-            window: place(at(abi::layout::WINDOW)?, block_bytes * abi::WINDOW_BLOCKS, "the window")?,
+            window: place(
+                at(abi::layout::WINDOW)?,
+                block_bytes * abi::WINDOW_BLOCKS,
+                "the window",
+            )?,
             block_bytes,
             period: place(at(abi::layout::PERIOD)?, period_bytes, "the period")?,
             state: place(at(abi::layout::STATE)?, state_bytes as usize, "the state")?,
@@ -80,23 +97,50 @@ impl Table {
     fn read(memory: &[u8], at: &impl Fn(usize) -> Result<u32, Refusal>) -> Result<Self, Refusal> {
         let count = at(abi::layout::PARAMETER_COUNT)?;
         if count == 0 {
-            return Ok(Self { address: 0, stride: 0, parameters: vec![] });
+            return Ok(Self {
+                address: 0,
+                stride: 0,
+                parameters: vec![],
+            });
         }
         if count > MOST_PARAMETERS {
-            return Err(wrong(format!("{count} parameters, {MOST_PARAMETERS} are allowed")));
+            return Err(wrong(format!(
+                "{count} parameters, {MOST_PARAMETERS} are allowed"
+            )));
         }
-        let stride = stride(at(abi::layout::PARAMETER_BYTES)?, abi::parameter::BYTES, "a parameter")?;
+        let stride = stride(
+            at(abi::layout::PARAMETER_BYTES)?,
+            abi::parameter::BYTES,
+            "a parameter",
+        )?;
         let address = at(abi::layout::PARAMETERS)?;
-        let start = region(memory, address, stride * count as usize, "the table of parameters")?;
+        let start = region(
+            memory,
+            address,
+            stride * count as usize,
+            "the table of parameters",
+        )?;
         let utf16 = at(abi::layout::TEXT)? == 1;
         let each = |index: usize| parameter(memory, start + index * stride, utf16);
-        let parameters = (0..count as usize).map(each).collect::<Result<Vec<_>, _>>()?;
+        let parameters = (0..count as usize)
+            .map(each)
+            .collect::<Result<Vec<_>, _>>()?;
         for (index, parameter) in parameters.iter().enumerate() {
-            if parameters[..index].iter().any(|other| other.name == parameter.name) {
-                return Err(wrong(format!("two parameters are called {:?}", parameter.name)));
+            if parameters[..index]
+                .iter()
+                .any(|other| other.name == parameter.name)
+            {
+                return Err(wrong(format!(
+                    "two parameters are called {:?}",
+                    parameter.name
+                )));
             }
         }
-        Ok(Self { address: start, stride, parameters })
+        Ok(Self {
+            address: start,
+            stride,
+            parameters,
+        })
     }
 }
 
@@ -110,43 +154,76 @@ fn parameter(memory: &[u8], at: usize, utf16: bool) -> Result<Parameter, Refusal
     };
     let name = text(abi::parameter::NAME, abi::parameter::NAME_BYTES)?;
     let description = text(abi::parameter::TEXT, abi::parameter::TEXT_BYTES)?;
-    let (lowest, highest) = (number(abi::parameter::LOWEST)?, number(abi::parameter::HIGHEST)?);
+    let (lowest, highest) = (
+        number(abi::parameter::LOWEST)?,
+        number(abi::parameter::HIGHEST)?,
+    );
     let default = number(abi::parameter::DEFAULT)?;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
-        return Err(wrong(format!("{name:?} is no name of a parameter: letters, digits and _ only")));
+        return Err(wrong(format!(
+            "{name:?} is no name of a parameter: letters, digits and _ only"
+        )));
     }
     if !(lowest.is_finite() && highest.is_finite() && lowest <= default && default <= highest) {
-        return Err(wrong(format!("parameter {name}: its default {default} is not within {lowest} to {highest}")));
+        return Err(wrong(format!(
+            "parameter {name}: its default {default} is not within {lowest} to {highest}"
+        )));
     }
-    Ok(Parameter { name, description, lowest, highest, default })
+    Ok(Parameter {
+        name,
+        description,
+        lowest,
+        highest,
+        default,
+    })
 }
 
 fn read_text(memory: &[u8], address: u32, bytes: u32, utf16: bool) -> Result<String, Refusal> {
     if bytes > MOST_TEXT {
-        return Err(wrong(format!("a text of {bytes} bytes, {MOST_TEXT} are allowed")));
+        return Err(wrong(format!(
+            "a text of {bytes} bytes, {MOST_TEXT} are allowed"
+        )));
     }
     let start = region(memory, address, bytes as usize, "a text")?;
     let raw = &memory[start..start + bytes as usize];
     let read = if utf16 {
-        let units: Vec<u16> = raw.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+        let units: Vec<u16> = raw
+            .chunks_exact(2)
+            .map(|pair| u16::from_le_bytes([pair[0], pair[1]]))
+            .collect();
         String::from_utf16(&units).ok()
     } else {
         String::from_utf8(raw.to_vec()).ok()
     };
     let read = read.ok_or_else(|| wrong("a text is not in the encoding that the layout states"))?;
-    Ok(read.chars().map(|c| if c.is_control() { ' ' } else { c }).collect())
+    Ok(read
+        .chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect())
 }
 
 fn stride(bytes: u32, least: usize, what: &str) -> Result<usize, Refusal> {
     let fits = (least as u32..=MOST_STRIDE).contains(&bytes) && bytes.is_multiple_of(8);
-    if fits { Ok(bytes as usize) } else { Err(wrong(format!("{what} has {bytes} bytes, version 1 has {least}"))) }
+    if fits {
+        Ok(bytes as usize)
+    } else {
+        Err(wrong(format!(
+            "{what} has {bytes} bytes, version 1 has {least}"
+        )))
+    }
 }
 
 fn region(memory: &[u8], address: u32, bytes: usize, what: &str) -> Result<usize, Refusal> {
     let start = address as usize;
-    let inside = start.checked_add(bytes).is_some_and(|end| end <= memory.len());
-    if inside { Ok(start) } else { Err(wrong(format!("{what} lies outside of the memory"))) }
+    let inside = start
+        .checked_add(bytes)
+        .is_some_and(|end| end <= memory.len());
+    if inside {
+        Ok(start)
+    } else {
+        Err(wrong(format!("{what} lies outside of the memory")))
+    }
 }
 
 fn wrong(what: impl Into<String>) -> Refusal {

@@ -10,7 +10,10 @@
 //!
 //! Without the feature `scripts` nothing of the WASM engine is built, and every script is refused.
 
-#![cfg_attr(not(feature = "scripts"), allow(dead_code, reason = "what only the WASM engine calls"))]
+#![cfg_attr(
+    not(feature = "scripts"),
+    allow(dead_code, reason = "what only the WASM engine calls")
+)]
 
 pub mod abi;
 mod bounds;

@@ -18,7 +18,10 @@ pub struct Limits {
 impl Limits {
     /// Nothing used yet.
     pub fn new(budget: &Budget) -> Self {
-        Self { memory_bytes: budget.memory_bytes(), refused: None }
+        Self {
+            memory_bytes: budget.memory_bytes(),
+            refused: None,
+        }
     }
 
     fn refuse(&mut self, asked: String) -> Result<bool> {
@@ -28,19 +31,35 @@ impl Limits {
 }
 
 impl ResourceLimiter for Limits {
-    fn memory_growing(&mut self, _current: usize, desired: usize, _maximum: Option<usize>) -> Result<bool> {
+    fn memory_growing(
+        &mut self,
+        _current: usize,
+        desired: usize,
+        _maximum: Option<usize>,
+    ) -> Result<bool> {
         if desired <= self.memory_bytes {
             return Ok(true);
         }
         let pages = |bytes: usize| bytes / 65_536;
-        self.refuse(format!("{} pages of memory, {} are allowed", pages(desired), pages(self.memory_bytes)))
+        self.refuse(format!(
+            "{} pages of memory, {} are allowed",
+            pages(desired),
+            pages(self.memory_bytes)
+        ))
     }
 
-    fn table_growing(&mut self, _current: usize, desired: usize, _maximum: Option<usize>) -> Result<bool> {
+    fn table_growing(
+        &mut self,
+        _current: usize,
+        desired: usize,
+        _maximum: Option<usize>,
+    ) -> Result<bool> {
         if desired <= MOST_ELEMENTS {
             return Ok(true);
         }
-        self.refuse(format!("a table of {desired} elements, {MOST_ELEMENTS} are allowed"))
+        self.refuse(format!(
+            "a table of {desired} elements, {MOST_ELEMENTS} are allowed"
+        ))
     }
 
     fn instances(&self) -> usize {

@@ -21,7 +21,13 @@ impl Notes {
     /// No notes; rough periods of `rough_period_s`.
     pub fn new(rough_period_s: f64) -> Self {
         let periods_per_s = (1.0 / rough_period_s).round().max(1.0) as u32;
-        Self { waiting: vec![], allowed: AT_ONCE, until_next: periods_per_s, periods_per_s, left_out: 0 }
+        Self {
+            waiting: vec![],
+            allowed: AT_ONCE,
+            until_next: periods_per_s,
+            periods_per_s,
+            left_out: 0,
+        }
     }
 
     /// A rough period has passed.
@@ -56,7 +62,11 @@ impl Notes {
     /// Notes what must be said.
     pub fn always(&mut self, text: String) {
         let before = std::mem::take(&mut self.left_out);
-        self.waiting.push(if before == 0 { text } else { format!("{text} ({before} notes were left out before)") });
+        self.waiting.push(if before == 0 {
+            text
+        } else {
+            format!("{text} ({before} notes were left out before)")
+        });
     }
 
     /// What has been noted since the last look.

@@ -27,7 +27,10 @@ pub type Values = Vec<(String, f64)>;
 /// # Errors
 /// Each name that is not declared, with the nearest, and each value out of range.
 pub fn resolve(declared: &[Parameter], stated: &[(String, f64)]) -> Result<Vec<f64>, Refusal> {
-    let wrong: Vec<String> = stated.iter().filter_map(|(name, value)| complaint(declared, name, *value)).collect();
+    let wrong: Vec<String> = stated
+        .iter()
+        .filter_map(|(name, value)| complaint(declared, name, *value))
+        .collect();
     if !wrong.is_empty() {
         return Err(Refusal::Parameters(wrong));
     }
@@ -40,11 +43,17 @@ pub fn resolve(declared: &[Parameter], stated: &[(String, f64)]) -> Result<Vec<f
 
 fn complaint(declared: &[Parameter], name: &str, value: f64) -> Option<String> {
     let Some(parameter) = declared.iter().find(|p| p.name == name) else {
-        let nearest = declared.iter().min_by_key(|p| damerau_levenshtein(&p.name, name));
-        let hint = nearest.map_or("it declares none".to_string(), |p| format!("the nearest is {}", p.name));
+        let nearest = declared
+            .iter()
+            .min_by_key(|p| damerau_levenshtein(&p.name, name));
+        let hint = nearest.map_or("it declares none".to_string(), |p| {
+            format!("the nearest is {}", p.name)
+        });
         return Some(format!("it has no parameter {name:?}; {hint}"));
     };
-    let Parameter { lowest, highest, .. } = parameter;
+    let Parameter {
+        lowest, highest, ..
+    } = parameter;
     let inside = value >= *lowest && value <= *highest;
     (!inside).then(|| format!("{name} is {value}; it must be from {lowest} to {highest}"))
 }
@@ -72,10 +81,19 @@ mod tests {
 
     #[test]
     fn slips_are_refused_with_the_nearest_name_and_the_range() {
-        let stated = [("corner_eror_um".to_string(), 5.0), ("floor_mm_per_min".to_string(), 200.0)];
+        let stated = [
+            ("corner_eror_um".to_string(), 5.0),
+            ("floor_mm_per_min".to_string(), 200.0),
+        ];
         let refusal = resolve(&declared(), &stated).unwrap_err().to_string();
-        assert!(refusal.contains("no parameter \"corner_eror_um\"; the nearest is corner_error_um"), "{refusal}");
-        assert!(refusal.contains("floor_mm_per_min is 200; it must be from 1 to 100"), "{refusal}");
+        assert!(
+            refusal.contains("no parameter \"corner_eror_um\"; the nearest is corner_error_um"),
+            "{refusal}"
+        );
+        assert!(
+            refusal.contains("floor_mm_per_min is 200; it must be from 1 to 100"),
+            "{refusal}"
+        );
         assert!(resolve(&declared(), &[("floor_mm_per_min".to_string(), f64::NAN)]).is_err());
     }
 }

@@ -40,7 +40,13 @@ impl Policy {
     ///
     /// # Errors
     /// It does not start, its layout is wrong, or the parameters do not fit.
-    pub fn new(script: Script, values: Values, budget: Budget, bounds: Bounds, facts: &Facts) -> Result<Self, Refusal> {
+    pub fn new(
+        script: Script,
+        values: Values,
+        budget: Budget,
+        bounds: Bounds,
+        facts: &Facts,
+    ) -> Result<Self, Refusal> {
         let instance = Instance::new(&script, &budget, &values)?;
         let answers = (script.tunes_blocks, script.answers_periods);
         Ok(Self {
@@ -98,7 +104,9 @@ impl Policy {
     /// The planner refused a tuning: the block is driven as programmed.
     pub fn refused_by_planner(&mut self, line: u32, cause: &str) {
         self.counters.refused_by_planner += 1;
-        self.notes.note(|| format!("policy: line {line}: the planner refuses what was asked for, {cause}"));
+        self.notes.note(|| {
+            format!("policy: line {line}: the planner refuses what was asked for, {cause}")
+        });
     }
 
     /// The feed ratio after a rough period; `None` where the script asks for none.
@@ -116,7 +124,8 @@ impl Policy {
         self.counters.ratios += u64::from(ratio != 1.0);
         if ratio != self.ratio {
             let (line, old) = (period.line, self.ratio);
-            self.notes.note(|| format!("policy: line {line}: feed ratio {old:.3} -> {ratio:.3}"));
+            self.notes
+                .note(|| format!("policy: line {line}: feed ratio {old:.3} -> {ratio:.3}"));
         }
         self.ratio = ratio;
         Some(ratio)
@@ -129,8 +138,10 @@ impl Policy {
     /// The new script gives an answer that the first did not give, or does not take over the state: the old one goes on.
     pub fn swap(&mut self, script: Script, mut instance: Instance) -> Result<(), Refusal> {
         let (tunes_blocks, answers_periods) = self.answers;
-        let calls =
-            [(script.tunes_blocks, tunes_blocks, "on_blocks"), (script.answers_periods, answers_periods, "on_period")];
+        let calls = [
+            (script.tunes_blocks, tunes_blocks, "on_blocks"),
+            (script.answers_periods, answers_periods, "on_period"),
+        ];
         // Blocks that are planned already have caps down to a floor that was made for the first script alone.
         if let Some((_, _, call)) = calls.into_iter().find(|(has, had, _)| *has && !had) {
             return Err(Refusal::Exports(vec![format!(
@@ -146,14 +157,17 @@ impl Policy {
         }
         (self.script, self.instance, self.strikes) = (script, Some(instance), 0);
         self.counters.reloads += 1;
-        self.notes.always("policy: the script is loaded anew".to_string());
+        self.notes
+            .always("policy: the script is loaded anew".to_string());
         Ok(())
     }
 
     /// A new script is not taken: the one that runs goes on.
     pub fn keep(&mut self, why: &str) {
         self.counters.refused_reloads += 1;
-        self.notes.always(format!("policy: the new script is refused, the old one goes on: {why}"));
+        self.notes.always(format!(
+            "policy: the new script is refused, the old one goes on: {why}"
+        ));
     }
 
     /// The parameters of the machine file, for a new instance.
@@ -188,8 +202,10 @@ impl Policy {
 
     fn ask_window(&mut self) -> Option<()> {
         let mut instance = self.live()?;
-        (self.counters.windows, self.counters.blocks) =
-            (self.counters.windows + 1, self.counters.blocks + self.window.blocks().len() as u64);
+        (self.counters.windows, self.counters.blocks) = (
+            self.counters.windows + 1,
+            self.counters.blocks + self.window.blocks().len() as u64,
+        );
         let asked = instance.blocks(self.window.records(), &mut self.asks);
         self.counters.most_window_fuel = self.counters.most_window_fuel.max(instance.fuel_used);
         let line = self.window.blocks().first().map_or(0, |block| block.line);
@@ -216,7 +232,13 @@ impl Policy {
     }
 
     /// Keeps the instance where the call went well, else drops it.
-    fn settle<T>(&mut self, instance: Instance, answer: Result<T, Trouble>, call: &str, line: u32) -> Option<T> {
+    fn settle<T>(
+        &mut self,
+        instance: Instance,
+        answer: Result<T, Trouble>,
+        call: &str,
+        line: u32,
+    ) -> Option<T> {
         match answer {
             Ok(answer) => {
                 self.instance = Some(instance);
@@ -238,7 +260,9 @@ impl Policy {
             "the default policy takes over, the script is made anew"
         };
         let strikes = self.strikes;
-        self.notes.always(format!("policy: line {line}: {call}: {trouble}; strike {strikes} of {MAX_STRIKES}, {then}"));
+        self.notes.always(format!(
+            "policy: line {line}: {call}: {trouble}; strike {strikes} of {MAX_STRIKES}, {then}"
+        ));
     }
 }
 
@@ -251,29 +275,60 @@ fn count(counters: &mut Counters, tuning: &Tuning, limited: [bool; 3]) {
 
 /// Notes that a block makes: what it is given, or asked for in vain.
 fn told(tuning: &Tuning, limited: [bool; 3]) -> u64 {
-    let given =
-        [tuning.time_constant_s.is_some(), tuning.path_tolerance_mm.is_some(), tuning.feed_cap_mm_per_s.is_some()];
-    (0..3).map(|index| u64::from(given[index] || limited[index])).sum()
+    let given = [
+        tuning.time_constant_s.is_some(),
+        tuning.path_tolerance_mm.is_some(),
+        tuning.feed_cap_mm_per_s.is_some(),
+    ];
+    (0..3)
+        .map(|index| u64::from(given[index] || limited[index]))
+        .sum()
 }
 
 /// Notes each change of a block, in the units of the machine file.
 fn note(notes: &mut Notes, block: &InForce, asks: &Asks, tuning: &Tuning, limited: [bool; 3]) {
     let feed_mm_per_s = block.programmed_feed_mm_per_s.min(block.feed_cap_mm_per_s);
     let rows = [
-        ("time constant", "ms", 1e3, block.time_constant_s, tuning.time_constant_s),
-        ("path tolerance", "mm", 1.0, block.path_tolerance_mm, tuning.path_tolerance_mm),
-        ("feed", "mm/min", 60.0, feed_mm_per_s, tuning.feed_cap_mm_per_s),
+        (
+            "time constant",
+            "ms",
+            1e3,
+            block.time_constant_s,
+            tuning.time_constant_s,
+        ),
+        (
+            "path tolerance",
+            "mm",
+            1.0,
+            block.path_tolerance_mm,
+            tuning.path_tolerance_mm,
+        ),
+        (
+            "feed",
+            "mm/min",
+            60.0,
+            feed_mm_per_s,
+            tuning.feed_cap_mm_per_s,
+        ),
     ];
     for (index, (what, unit, scale, old, new)) in rows.into_iter().enumerate() {
         if new.is_none() && !limited[index] {
             continue;
         }
-        let (line, scaled) = (block.line, |value: f64| shown((value * scale).clamp(f64::MIN, f64::MAX)));
+        let (line, scaled) = (block.line, |value: f64| {
+            shown((value * scale).clamp(f64::MIN, f64::MAX))
+        });
         let change = || match new {
             Some(new) => format!("{} -> {} {unit}", scaled(old), scaled(new)),
             None => format!("stays {} {unit}", scaled(old)),
         };
-        let asked = || if limited[index] { format!(", {} was asked for", scaled(asks[index])) } else { String::new() };
+        let asked = || {
+            if limited[index] {
+                format!(", {} was asked for", scaled(asks[index]))
+            } else {
+                String::new()
+            }
+        };
         notes.note(|| format!("policy: line {line}: {what} {}{}", change(), asked()));
     }
 }
@@ -281,5 +336,9 @@ fn note(notes: &mut Notes, block: &InForce, asks: &Asks, tuning: &Tuning, limite
 /// A number of any size, short.
 fn shown(value: f64) -> String {
     let plain = value == 0.0 || (1e-3..1e7).contains(&value.abs());
-    if plain { format!("{}", (value * 1e4).round() / 1e4) } else { format!("{value:.3e}") }
+    if plain {
+        format!("{}", (value * 1e4).round() / 1e4)
+    } else {
+        format!("{value:.3e}")
+    }
 }

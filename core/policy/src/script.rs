@@ -25,7 +25,11 @@ impl Script {
 
     /// Checks what the module imports and exports.
     pub(crate) fn new(module: Module) -> Result<Self, Refusal> {
-        let imports: Vec<String> = module.imports().map(|i| format!("{}.{}", i.module(), i.name())).take(8).collect();
+        let imports: Vec<String> = module
+            .imports()
+            .map(|i| format!("{}.{}", i.module(), i.name()))
+            .take(8)
+            .collect();
         if !imports.is_empty() {
             return Err(Refusal::Imports(imports));
         }
@@ -34,18 +38,31 @@ impl Script {
         let mut has = |name, wanted: &Wanted| look(&module, name, wanted, &mut wrong);
         has(abi::MEMORY_EXPORT, &Wanted::Memory);
         has(abi::LAYOUT_EXPORT, &Wanted::Function(&[], &[Number::I32]));
-        let tunes_blocks = has(abi::BLOCKS_EXPORT, &Wanted::Optional(&[Number::I32, Number::I32], &[]));
-        let answers_periods = has(abi::PERIOD_EXPORT, &Wanted::Optional(&[Number::I32], &[Number::F64]));
+        let tunes_blocks = has(
+            abi::BLOCKS_EXPORT,
+            &Wanted::Optional(&[Number::I32, Number::I32], &[]),
+        );
+        let answers_periods = has(
+            abi::PERIOD_EXPORT,
+            &Wanted::Optional(&[Number::I32], &[Number::F64]),
+        );
         let saves = has(abi::SAVE_EXPORT, &Wanted::Optional(&[], &[Number::I32]));
         let restores = has(abi::RESTORE_EXPORT, &Wanted::Optional(&[Number::I32], &[]));
         if saves != restores {
             wrong.push("save and restore go together, one of them is missing".to_string());
         }
         if !tunes_blocks && !answers_periods && wrong.is_empty() {
-            wrong.push("it exports neither on_blocks (i32, i32) nor on_period (i32) -> f64".to_string());
+            wrong.push(
+                "it exports neither on_blocks (i32, i32) nor on_period (i32) -> f64".to_string(),
+            );
         }
         if wrong.is_empty() {
-            Ok(Self { module, tunes_blocks, answers_periods, keeps_state: saves })
+            Ok(Self {
+                module,
+                tunes_blocks,
+                answers_periods,
+                keeps_state: saves,
+            })
         } else {
             Err(Refusal::Exports(wrong))
         }
@@ -60,7 +77,10 @@ enum Number {
 
 impl Number {
     fn is(self, of: &ValType) -> bool {
-        matches!((self, of), (Self::I32, ValType::I32) | (Self::F64, ValType::F64))
+        matches!(
+            (self, of),
+            (Self::I32, ValType::I32) | (Self::F64, ValType::F64)
+        )
     }
 
     fn name(self) -> &'static str {
@@ -79,28 +99,50 @@ fn look(module: &Module, name: &str, wanted: &Wanted<'_>, wrong: &mut Vec<String
     match (module.get_export(name), wanted) {
         (None, Wanted::Optional(..)) => return false,
         (Some(ExternType::Memory(memory)), Wanted::Memory) if !memory.is_shared() => return true,
-        (Some(ExternType::Func(function)), Wanted::Function(takes, gives) | Wanted::Optional(takes, gives)) => {
+        (
+            Some(ExternType::Func(function)),
+            Wanted::Function(takes, gives) | Wanted::Optional(takes, gives),
+        ) => {
             let same = |numbers: &[Number], of: &mut dyn ExactSizeIterator<Item = ValType>| {
-                numbers.len() == of.len() && numbers.iter().zip(of).all(|(number, of)| number.is(&of))
+                numbers.len() == of.len()
+                    && numbers.iter().zip(of).all(|(number, of)| number.is(&of))
             };
             if same(takes, &mut function.params()) && same(gives, &mut function.results()) {
                 return true;
             }
-            wrong.push(format!("its export {name} is not {}", signature(takes, gives)));
+            wrong.push(format!(
+                "its export {name} is not {}",
+                signature(takes, gives)
+            ));
         }
         (None, Wanted::Memory) => wrong.push(format!("the memory {name} is not exported")),
         (None, Wanted::Function(takes, gives)) => {
-            wrong.push(format!("the function {name} {} is not exported", signature(takes, gives)));
+            wrong.push(format!(
+                "the function {name} {} is not exported",
+                signature(takes, gives)
+            ));
         }
-        (Some(_), Wanted::Memory) => wrong.push(format!("its export {name} is no memory of its own")),
+        (Some(_), Wanted::Memory) => {
+            wrong.push(format!("its export {name} is no memory of its own"))
+        }
         (Some(_), _) => wrong.push(format!("its export {name} is no function")),
     }
     false
 }
 
 fn signature(takes: &[Number], gives: &[Number]) -> String {
-    let names = |numbers: &[Number]| numbers.iter().map(|n| n.name()).collect::<Vec<_>>().join(", ");
-    if gives.is_empty() { format!("({})", names(takes)) } else { format!("({}) -> {}", names(takes), names(gives)) }
+    let names = |numbers: &[Number]| {
+        numbers
+            .iter()
+            .map(|n| n.name())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    if gives.is_empty() {
+        format!("({})", names(takes))
+    } else {
+        format!("({}) -> {}", names(takes), names(gives))
+    }
 }
 
 /// A module that names another version says so before anything else is looked at.
@@ -108,7 +150,9 @@ fn check_version(module: &Module) -> Result<(), Refusal> {
     if module.get_export(abi::LAYOUT_EXPORT).is_some() {
         return Ok(());
     }
-    let other = module.exports().find_map(|e| e.name().strip_prefix(abi::LAYOUT_PREFIX).map(str::to_owned));
+    let other = module
+        .exports()
+        .find_map(|e| e.name().strip_prefix(abi::LAYOUT_PREFIX).map(str::to_owned));
     match other {
         Some(version) => Err(Refusal::OtherVersion(version.chars().take(12).collect())),
         None => Ok(()),

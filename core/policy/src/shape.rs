@@ -18,15 +18,20 @@ impl LinearAxes {
     /// Those of `axes`.
     pub fn of(axes: &Axes) -> Self {
         let linear = |axis: usize| axis < axes.count() && !axes.is_rotary(axis);
-        Self(std::array::from_fn(|axis| f64::from(u8::from(linear(axis)))))
+        Self(std::array::from_fn(|axis| {
+            f64::from(u8::from(linear(axis)))
+        }))
     }
 
     /// The way `from` one point `to` another over the linear axes, of unit length; none where none of them moves.
     #[inline]
     fn unit(&self, from: &AxisVector, to: &AxisVector) -> Option<Direction> {
-        let linear: Direction = std::array::from_fn(|axis| (to.0[axis] - from.0[axis]) * self.0[axis]);
+        let linear: Direction =
+            std::array::from_fn(|axis| (to.0[axis] - from.0[axis]) * self.0[axis]);
         let inverse = 1.0 / square(&linear).sqrt();
-        inverse.is_finite().then(|| linear.map(|part| part * inverse))
+        inverse
+            .is_finite()
+            .then(|| linear.map(|part| part * inverse))
     }
 }
 
@@ -44,20 +49,32 @@ impl Shape {
         match block.kind {
             BlockKind::Rapid | BlockKind::Line => {
                 let direction = linear.unit(&block.start, &block.end);
-                Self { start: direction, end: direction, curvature_per_mm: 0.0 }
+                Self {
+                    start: direction,
+                    end: direction,
+                    curvature_per_mm: 0.0,
+                }
             }
-            BlockKind::Nurbs => curve.map_or_else(Self::none, |curve| Self::of_curve(curve, axes, linear)),
+            BlockKind::Nurbs => {
+                curve.map_or_else(Self::none, |curve| Self::of_curve(curve, axes, linear))
+            }
             BlockKind::Arc => Self::of_arc(block, linear),
             BlockKind::Dwell => Self::none(),
         }
     }
 
     fn none() -> Self {
-        Self { start: None, end: None, curvature_per_mm: 0.0 }
+        Self {
+            start: None,
+            end: None,
+            curvature_per_mm: 0.0,
+        }
     }
 
     fn of_arc(block: &Block, linear: &LinearAxes) -> Self {
-        let Some(path) = Path::new(block) else { return Self::none() };
+        let Some(path) = Path::new(block) else {
+            return Self::none();
+        };
         let direction = |s_mm: f64| linear.unit(&AxisVector::ZERO, &path.direction(s_mm));
         Self {
             start: direction(0.0),
@@ -68,15 +85,22 @@ impl Shape {
 
     /// A curve: its curvature is looked at in places of equal distance in its parameter.
     fn of_curve(curve: Curve<'_>, axes: &Axes, linear: &LinearAxes) -> Self {
-        let Ok(curve) = Nurbs::new(&curve.to_data(), axes) else { return Self::none() };
+        let Ok(curve) = Nurbs::new(&curve.to_data(), axes) else {
+            return Self::none();
+        };
         let (from, to) = curve.range();
         let direction = |u: f64| {
             let at = curve.along_path(u)?;
             linear.unit(&AxisVector::ZERO, &at.direction)
         };
         let place = |i: usize| from + (to - from) * i as f64 / CURVATURE_PLACES as f64;
-        let curvatures = (0..=CURVATURE_PLACES).filter_map(|i| curve.curvature(&curve.derivatives(place(i))));
-        Self { start: direction(from), end: direction(to), curvature_per_mm: curvatures.fold(0.0, f64::max) }
+        let curvatures =
+            (0..=CURVATURE_PLACES).filter_map(|i| curve.curvature(&curve.derivatives(place(i))));
+        Self {
+            start: direction(from),
+            end: direction(to),
+            curvature_per_mm: curvatures.fold(0.0, f64::max),
+        }
     }
 }
 
@@ -87,7 +111,9 @@ pub type HalfTurn = [f64; 2];
 /// The turn from `before` to `after`; none where there is none of either.
 #[inline]
 pub fn half_turn(before: Option<&Direction>, after: Option<&Direction>) -> HalfTurn {
-    let (Some(before), Some(after)) = (before, after) else { return [0.0, 1.0] };
+    let (Some(before), Some(after)) = (before, after) else {
+        return [0.0, 1.0];
+    };
     let difference: Direction = std::array::from_fn(|axis| after[axis] - before[axis]);
     let sum: Direction = std::array::from_fn(|axis| after[axis] + before[axis]);
     [square(&difference), square(&sum)]
@@ -100,7 +126,11 @@ const SMALL: f64 = 0.4375;
 /// without branches; the others follow.
 pub fn turns_rad(half_turns: &[HalfTurn], turns_rad: &mut Vec<f64>) {
     turns_rad.clear();
-    turns_rad.extend(half_turns.iter().map(|[sine, cosine]| 2.0 * small_arc_tangent((sine / cosine).sqrt())));
+    turns_rad.extend(
+        half_turns
+            .iter()
+            .map(|[sine, cosine]| 2.0 * small_arc_tangent((sine / cosine).sqrt())),
+    );
     for (turn_rad, [sine, cosine]) in turns_rad.iter_mut().zip(half_turns) {
         if *sine >= SMALL * SMALL * cosine {
             *turn_rad = 2.0 * (sine / cosine).sqrt().atan();
@@ -117,7 +147,8 @@ fn small_arc_tangent(x: f64) -> f64 {
         + (1.428_571_427_250_346_6e-1 - 1.111_111_040_546_235_6e-1 * z) * z2;
     let second = (9.090_887_133_436_507e-2 - 7.691_876_205_044_83e-2 * z)
         + (6.661_073_137_387_531e-2 - 5.833_570_133_790_573_5e-2 * z) * z2;
-    let third = (4.976_877_994_615_932e-2 - 3.653_157_274_421_691_6e-2 * z) + 1.628_582_011_536_578_2e-2 * z2;
+    let third = (4.976_877_994_615_932e-2 - 3.653_157_274_421_691_6e-2 * z)
+        + 1.628_582_011_536_578_2e-2 * z2;
     x - x * z * (first + z4 * (second + z4 * third))
 }
 
@@ -145,7 +176,10 @@ mod tests {
             let turn = std::f64::consts::PI * (f64::from(index) / 10_000.0).powi(4);
             let after = [turn.cos(), 0.0, turn.sin(), 0.0, 0.0, 0.0, 0.0, 0.0];
             let found = turn_rad(&before, &after);
-            assert!((found - turn).abs() <= 1e-15 + 4e-15 * turn, "{found} of {turn}");
+            assert!(
+                (found - turn).abs() <= 1e-15 + 4e-15 * turn,
+                "{found} of {turn}"
+            );
         }
         assert_eq!(half_turn(None, Some(&before)), [0.0, 1.0]);
     }
@@ -154,7 +188,10 @@ mod tests {
     fn small_arc_tangents_are_those_of_the_library() {
         for index in 0..100_000 {
             let x = f64::from(index) / 1e5 * SMALL;
-            assert!((small_arc_tangent(x) - x.atan()).abs() <= 2.3e-16 * x, "{x}");
+            assert!(
+                (small_arc_tangent(x) - x.atan()).abs() <= 2.3e-16 * x,
+                "{x}"
+            );
         }
     }
 }

@@ -56,10 +56,12 @@ impl Window {
     /// Appends a block. Its turns are known when the window is closed.
     pub fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) {
         let shape = Shape::of(block, curve, &self.facts.axes, &self.axes);
-        self.half_turns.push(half_turn(self.last.as_ref(), shape.start.as_ref()));
+        self.half_turns
+            .push(half_turn(self.last.as_ref(), shape.start.as_ref()));
         self.last = shape.end;
         let in_force = in_force(block, &self.facts);
-        self.records.push(record(block, &in_force, shape.curvature_per_mm));
+        self.records
+            .push(record(block, &in_force, shape.curvature_per_mm));
         self.blocks.push(in_force);
     }
 
@@ -91,7 +93,11 @@ fn in_force(block: &Block, facts: &Facts) -> InForce {
     InForce {
         line: block.line,
         // What an input ends has the feed that the probe or switch can take.
-        kind: if block.stop_on.edge == Edge::None { block.kind } else { BlockKind::Dwell },
+        kind: if block.stop_on.edge == Edge::None {
+            block.kind
+        } else {
+            BlockKind::Dwell
+        },
         time_constant_s: or(block.time_constant_s, facts.time_constant_s),
         path_tolerance_mm: or(block.path_tolerance_mm, facts.path_tolerance_mm),
         programmed_feed_mm_per_s: block.feed_mm_per_s,
@@ -100,8 +106,16 @@ fn in_force(block: &Block, facts: &Facts) -> InForce {
 }
 
 fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64) -> Record {
-    let starts = if block.starts_at_rest() { at::STARTS_AT_REST } else { 0 };
-    let ends = if block.ends_at_rest() { at::ENDS_AT_REST } else { 0 };
+    let starts = if block.starts_at_rest() {
+        at::STARTS_AT_REST
+    } else {
+        0
+    };
+    let ends = if block.ends_at_rest() {
+        at::ENDS_AT_REST
+    } else {
+        0
+    };
     let mut record = [0; at::BYTES];
     put_u32(&mut record, at::SIZE, at::BYTES as u32);
     put_u32(&mut record, at::LINE, block.line);
@@ -109,7 +123,11 @@ fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64) -> Record {
     put_u32(&mut record, at::TOOL, block.tool);
     put_u32(&mut record, at::FLAGS, starts | ends);
     put_f64(&mut record, at::LENGTH, block.length_mm);
-    let feed_mm_per_s = if block.kind == BlockKind::Dwell { 0.0 } else { block.command_feed_mm_per_s() };
+    let feed_mm_per_s = if block.kind == BlockKind::Dwell {
+        0.0
+    } else {
+        block.command_feed_mm_per_s()
+    };
     put_f64(&mut record, at::FEED, feed_mm_per_s);
     put_f64(&mut record, at::CURVATURE, curvature_per_mm);
     put_f64(&mut record, at::SPINDLE, block.spindle_rad_per_s);
@@ -131,12 +149,24 @@ mod tests {
 
     fn facts() -> Facts {
         let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
-        Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 }
+        Facts {
+            axes,
+            time_constant_s: 0.05,
+            path_tolerance_mm: 0.01,
+            rough_period_s: 0.008,
+        }
     }
 
     fn line(start: [f64; 2], end: [f64; 2]) -> Block {
         let (start, end) = (AxisVector::from_slice(&start), AxisVector::from_slice(&end));
-        Block { kind: BlockKind::Line, start, end, feed_mm_per_s: 50.0, length_mm: 1.0, ..Block::at(start) }
+        Block {
+            kind: BlockKind::Line,
+            start,
+            end,
+            feed_mm_per_s: 50.0,
+            length_mm: 1.0,
+            ..Block::at(start)
+        }
     }
 
     fn field(window: &Window, index: usize, field: usize) -> f64 {
@@ -149,7 +179,12 @@ mod tests {
         window.push(&line([0.0, 0.0], [1.0, 0.0]), None);
         window.push(&line([1.0, 0.0], [1.0, 1.0]), None);
         window.close(Some((&line([1.0, 1.0], [1.0, 0.0]), None)));
-        let turns = [(0, at::TURN_IN), (0, at::TURN_OUT), (1, at::TURN_IN), (1, at::TURN_OUT)];
+        let turns = [
+            (0, at::TURN_IN),
+            (0, at::TURN_OUT),
+            (1, at::TURN_IN),
+            (1, at::TURN_OUT),
+        ];
         let turns = turns.map(|(index, place)| field(&window, index, place));
         for (turn, expected) in turns.into_iter().zip([0.0, FRAC_PI_2, FRAC_PI_2, PI]) {
             assert!((turn - expected).abs() < 1e-12, "{turns:?}");
@@ -158,11 +193,19 @@ mod tests {
         window.push(&line([1.0, 1.0], [1.0, 0.0]), None);
         window.close(None);
         assert!((field(&window, 0, at::TURN_IN) - PI).abs() < 1e-12);
-        assert_eq!(field(&window, 0, at::TURN_OUT), 0.0, "a stretch ends at rest");
+        assert_eq!(
+            field(&window, 0, at::TURN_OUT),
+            0.0,
+            "a stretch ends at rest"
+        );
         window.clear();
         window.push(&line([1.0, 0.0], [0.0, 0.0]), None);
         window.close(None);
-        assert_eq!(field(&window, 0, at::TURN_IN), 0.0, "a stretch begins at rest");
+        assert_eq!(
+            field(&window, 0, at::TURN_IN),
+            0.0,
+            "a stretch begins at rest"
+        );
     }
 
     #[test]
@@ -177,7 +220,15 @@ mod tests {
             sweep_rad: PI,
         };
         let ends = line([2.0, -2.0], [2.0, 2.0]);
-        window.push(&Block { kind: BlockKind::Arc, arc, length_mm: 2.0 * PI, ..ends }, None);
+        window.push(
+            &Block {
+                kind: BlockKind::Arc,
+                arc,
+                length_mm: 2.0 * PI,
+                ..ends
+            },
+            None,
+        );
         window.close(None);
         assert!(field(&window, 1, at::TURN_IN) < 1e-9);
         assert!((field(&window, 1, at::CURVATURE) - 0.5).abs() < 1e-9);

@@ -60,7 +60,11 @@ impl Instance {
     ///
     /// # Errors
     /// None: there is no script that could be given.
-    pub fn new(script: &Script, _budget: &Budget, _stated: &[(String, f64)]) -> Result<Self, Refusal> {
+    pub fn new(
+        script: &Script,
+        _budget: &Budget,
+        _stated: &[(String, f64)],
+    ) -> Result<Self, Refusal> {
         match script.none {}
     }
 

@@ -8,17 +8,36 @@ use tandem_policy::{Bounds, Budget, Engine, Facts, Period, Policy};
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
 fn policy(name: &str) -> Policy {
-    let path = format!("{}/../../scripts/policies/{name}.wasm", env!("CARGO_MANIFEST_DIR"));
-    let script = Engine::new().unwrap().compile(&std::fs::read(path).unwrap()).unwrap();
+    let path = format!(
+        "{}/../../scripts/policies/{name}.wasm",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let script = Engine::new()
+        .unwrap()
+        .compile(&std::fs::read(path).unwrap())
+        .unwrap();
     let axes = Axes::new(&[('X', false), ('Y', false)]).unwrap();
-    let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 };
+    let facts = Facts {
+        axes,
+        time_constant_s: 0.05,
+        path_tolerance_mm: 0.01,
+        rough_period_s: 0.008,
+    };
     Policy::new(script, vec![], Budget::default(), Bounds::default(), &facts).unwrap()
 }
 
 fn line(index: u32) -> Block {
     let at = |index: u32| AxisVector::from_slice(&[f64::from(index), f64::from(index % 2)]);
-    let ends = Block { end: at(index + 1), ..Block::at(at(index)) };
-    Block { kind: BlockKind::Line, feed_mm_per_s: 50.0, length_mm: 1.4, ..ends }
+    let ends = Block {
+        end: at(index + 1),
+        ..Block::at(at(index))
+    };
+    Block {
+        kind: BlockKind::Line,
+        feed_mm_per_s: 50.0,
+        length_mm: 1.4,
+        ..ends
+    }
 }
 
 #[test]
@@ -41,5 +60,8 @@ fn windows_and_periods_allocate_nothing_once_the_notes_are_spent() {
     };
     // The first notes are made at once, later ones a second apart.
     (0..30).for_each(&mut round);
-    assert_eq!(heap_use_of(|| (30..90).for_each(&mut round)), HeapUse::default());
+    assert_eq!(
+        heap_use_of(|| (30..90).for_each(&mut round)),
+        HeapUse::default()
+    );
 }

@@ -78,28 +78,53 @@ const FULL_RATE: f64 = 1.0 - 1e-9;
 impl BlockTimes {
     /// Nothing seen. Allocates as blocks come.
     pub fn new(period_s: f64, max_feed_ratio: f64) -> Self {
-        Self { period_s, max_feed_ratio, open: VecDeque::new(), started: false }
+        Self {
+            period_s,
+            max_feed_ratio,
+            open: VecDeque::new(),
+            started: false,
+        }
     }
 
     /// A block is planned for good. Blocks come in order.
     pub fn block(&mut self, block: &Block, report: &BlockReport) {
         let dwell = block.kind == BlockKind::Dwell;
-        let goes_to = if dwell { TimeGoesTo::Dwell } else { TimeGoesTo::Limit(report.limited_by) };
-        self.open.push_back(Open { index: block.index, length_mm: block.length_mm, goes_to, time_s: 0.0 });
+        let goes_to = if dwell {
+            TimeGoesTo::Dwell
+        } else {
+            TimeGoesTo::Limit(report.limited_by)
+        };
+        self.open.push_back(Open {
+            index: block.index,
+            length_mm: block.length_mm,
+            goes_to,
+            time_s: 0.0,
+        });
     }
 
     /// A sample was sent: `part` is told what its period went to and how much of it, s, and `passed` the index and the time
     /// of each block that the machine has left behind, s.
-    pub fn sample(&mut self, sample: &Sample, mut part: impl FnMut(TimeGoesTo, f64), mut passed: impl FnMut(u64, f64)) {
+    pub fn sample(
+        &mut self,
+        sample: &Sample,
+        mut part: impl FnMut(TimeGoesTo, f64),
+        mut passed: impl FnMut(u64, f64),
+    ) {
         let mut left_s = if self.started { self.period_s } else { 0.0 };
         self.started = true;
         let asked = self.asked(sample);
         let here = self.open.partition_point(|open| open.index < sample.block);
         // Blocks that are shorter than the period have passed inside it: each takes its part of the way.
-        let behind_mm: f64 = self.open.range(1.min(here)..here).map(|open| open.length_mm).sum();
+        let behind_mm: f64 = self
+            .open
+            .range(1.min(here)..here)
+            .map(|open| open.length_mm)
+            .sum();
         let moved_mm = (sample.feed_mm_per_s * self.period_s).max(behind_mm);
         for place in 0..here {
-            let Some(mut open) = self.open.pop_front() else { break };
+            let Some(mut open) = self.open.pop_front() else {
+                break;
+            };
             if place > 0 && moved_mm > 0.0 {
                 let share_s = (self.period_s * open.length_mm / moved_mm).min(left_s);
                 left_s -= share_s;
@@ -108,7 +133,11 @@ impl BlockTimes {
             }
             passed(open.index, open.time_s);
         }
-        match self.open.front_mut().filter(|open| open.index == sample.block) {
+        match self
+            .open
+            .front_mut()
+            .filter(|open| open.index == sample.block)
+        {
             Some(open) => {
                 open.time_s += left_s;
                 part(asked.unwrap_or(open.goes_to), left_s);
@@ -119,7 +148,9 @@ impl BlockTimes {
 
     /// Nothing follows: `passed` is told of the blocks that are left, in order.
     pub fn finish(&mut self, mut passed: impl FnMut(u64, f64)) {
-        self.open.drain(..).for_each(|open| passed(open.index, open.time_s));
+        self.open
+            .drain(..)
+            .for_each(|open| passed(open.index, open.time_s));
     }
 
     /// What the period went to other than to the plan of its block.
@@ -134,9 +165,17 @@ impl BlockTimes {
             return None;
         }
         let rapid = sample.programmed_feed_mm_per_s.is_infinite();
-        let operator = if rapid { sample.given.rapid_override } else { sample.given.feed_override };
+        let operator = if rapid {
+            sample.given.rapid_override
+        } else {
+            sample.given.feed_override
+        };
         // The sample holds both together.
-        let strategy = if rapid || operator <= 0.0 { 1.0 } else { sample.ratio / operator };
+        let strategy = if rapid || operator <= 0.0 {
+            1.0
+        } else {
+            sample.ratio / operator
+        };
         if operator < 1.0 && operator <= strategy {
             Some(TimeGoesTo::Override)
         } else if strategy < 1.0 {
@@ -188,8 +227,23 @@ mod tests {
     fn blocks_shorter_than_a_period_share_it_by_their_lengths() {
         let mut times = BlockTimes::new(1e-3, 1.0);
         for index in 0..4 {
-            let block = Block { kind: BlockKind::Line, index, length_mm: 0.02, ..Block::at(AxisVector::ZERO) };
-            times.block(&block, &report(index, if index == 1 { LimitedBy::Junction } else { LimitedBy::Feed }));
+            let block = Block {
+                kind: BlockKind::Line,
+                index,
+                length_mm: 0.02,
+                ..Block::at(AxisVector::ZERO)
+            };
+            times.block(
+                &block,
+                &report(
+                    index,
+                    if index == 1 {
+                        LimitedBy::Junction
+                    } else {
+                        LimitedBy::Feed
+                    },
+                ),
+            );
         }
         let sample = |block, feed_mm_per_s| Sample {
             block,
@@ -200,13 +254,30 @@ mod tests {
         };
         let (mut by, mut blocks) = (vec![], vec![]);
         for sample in [sample(0, 0.0), sample(3, 50.0), sample(3, 30.0)] {
-            times.sample(&sample, |goes_to, s| by.push((goes_to.name(), s)), |index, s| blocks.push((index, s)));
+            times.sample(
+                &sample,
+                |goes_to, s| by.push((goes_to.name(), s)),
+                |index, s| blocks.push((index, s)),
+            );
         }
         times.finish(|index, s| blocks.push((index, s)));
-        let junction: f64 = by.iter().filter(|(name, _)| *name == "junction").map(|(_, s)| s).sum();
+        let junction: f64 = by
+            .iter()
+            .filter(|(name, _)| *name == "junction")
+            .map(|(_, s)| s)
+            .sum();
         assert!((junction - 0.4e-3).abs() < 1e-12, "0.02 of 0.05 mm: {by:?}");
-        assert!((by.iter().map(|(_, s)| s).sum::<f64>() - 2e-3).abs() < 1e-12, "{by:?}");
-        assert!((blocks.iter().map(|(_, s)| s).sum::<f64>() - 2e-3).abs() < 1e-12, "{blocks:?}");
-        assert_eq!(blocks.iter().map(|(index, _)| *index).collect::<Vec<_>>(), [0, 1, 2, 3]);
+        assert!(
+            (by.iter().map(|(_, s)| s).sum::<f64>() - 2e-3).abs() < 1e-12,
+            "{by:?}"
+        );
+        assert!(
+            (blocks.iter().map(|(_, s)| s).sum::<f64>() - 2e-3).abs() < 1e-12,
+            "{blocks:?}"
+        );
+        assert_eq!(
+            blocks.iter().map(|(index, _)| *index).collect::<Vec<_>>(),
+            [0, 1, 2, 3]
+        );
     }
 }

@@ -32,13 +32,22 @@ pub enum JointPeaks {
 impl JointPeaks {
     /// Velocity, acceleration and jerk, mm and s.
     fn linear([max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3]: [f64; 3]) -> Self {
-        Self::Linear { max_velocity_mm_s, max_acceleration_mm_s2, max_jerk_mm_s3 }
+        Self::Linear {
+            max_velocity_mm_s,
+            max_acceleration_mm_s2,
+            max_jerk_mm_s3,
+        }
     }
 
     /// Velocity, acceleration and jerk, rad and s.
     fn rotary(peaks: [f64; 3]) -> Self {
-        let [max_velocity_deg_s, max_acceleration_deg_s2, max_jerk_deg_s3] = peaks.map(f64::to_degrees);
-        Self::Rotary { max_velocity_deg_s, max_acceleration_deg_s2, max_jerk_deg_s3 }
+        let [max_velocity_deg_s, max_acceleration_deg_s2, max_jerk_deg_s3] =
+            peaks.map(f64::to_degrees);
+        Self::Rotary {
+            max_velocity_deg_s,
+            max_acceleration_deg_s2,
+            max_jerk_deg_s3,
+        }
     }
 }
 
@@ -71,13 +80,21 @@ impl JointWatch {
         period_s: f64,
     ) -> Self {
         let peaks = [AxisVector::ZERO; 3];
-        Self { joints, to_joints: Box::new(to_joints), rate: 1.0 / period_s, last: None, peaks }
+        Self {
+            joints,
+            to_joints: Box::new(to_joints),
+            rate: 1.0 / period_s,
+            last: None,
+            peaks,
+        }
     }
 
     /// A sample was sent.
     pub fn sample(&mut self, command: &AxisVector) {
         let joints = (self.to_joints)(command);
-        let [position, velocity, acceleration] = self.last.unwrap_or([joints, AxisVector::ZERO, AxisVector::ZERO]);
+        let [position, velocity, acceleration] =
+            self.last
+                .unwrap_or([joints, AxisVector::ZERO, AxisVector::ZERO]);
         let speed = (joints - position) * self.rate;
         let change = (speed - velocity) * self.rate;
         let jerk = (change - acceleration) * self.rate;
@@ -91,7 +108,14 @@ impl JointWatch {
     pub fn peaks(&self) -> BTreeMap<String, JointPeaks> {
         let each = self.joints.iter().enumerate().map(|(i, joint)| {
             let peaks = self.peaks.map(|peak| peak[i]);
-            (joint.name.clone(), if joint.rotary { JointPeaks::rotary(peaks) } else { JointPeaks::linear(peaks) })
+            (
+                joint.name.clone(),
+                if joint.rotary {
+                    JointPeaks::rotary(peaks)
+                } else {
+                    JointPeaks::linear(peaks)
+                },
+            )
         });
         each.collect()
     }

@@ -31,7 +31,11 @@ pub struct Row {
 impl Lateness {
     /// Nothing counted. Host; allocates.
     pub fn new() -> Self {
-        Self { counts: Box::new([0; BUCKETS]), count: 0, max_ns: 0 }
+        Self {
+            counts: Box::new([0; BUCKETS]),
+            count: 0,
+            max_ns: 0,
+        }
     }
 
     /// Counts one wake-up; one before its time counts as in time. Fine thread; does not allocate.
@@ -67,7 +71,9 @@ impl Lateness {
             seen += count;
             seen >= rank
         });
-        reached.map_or(self.max_ns, |found| (lowest_ns(found + 1) - 1).min(self.max_ns))
+        reached.map_or(self.max_ns, |found| {
+            (lowest_ns(found + 1) - 1).min(self.max_ns)
+        })
     }
 
     /// The counts by half doublings, from the first to the last that holds any.
@@ -77,8 +83,18 @@ impl Lateness {
             below_ns: lowest_ns((index + 1) * ROW),
             count: counts.iter().sum(),
         };
-        let mut rows: Vec<Row> = self.counts.chunks(ROW).enumerate().map(row).skip_while(|r| r.count == 0).collect();
-        rows.truncate(rows.iter().rposition(|r| r.count > 0).map_or(0, |last| last + 1));
+        let mut rows: Vec<Row> = self
+            .counts
+            .chunks(ROW)
+            .enumerate()
+            .map(row)
+            .skip_while(|r| r.count == 0)
+            .collect();
+        rows.truncate(
+            rows.iter()
+                .rposition(|r| r.count > 0)
+                .map_or(0, |last| last + 1),
+        );
         rows
     }
 }
@@ -101,7 +117,11 @@ fn bucket(ns: u64) -> usize {
 /// The smallest value of a bucket, ns.
 fn lowest_ns(bucket: usize) -> u64 {
     let bucket = bucket as u64;
-    if bucket < STEPS { bucket } else { (bucket % STEPS + STEPS) << (bucket / STEPS - 1) }
+    if bucket < STEPS {
+        bucket
+    } else {
+        (bucket % STEPS + STEPS) << (bucket / STEPS - 1)
+    }
 }
 
 #[cfg(test)]
@@ -127,12 +147,18 @@ mod tests {
         assert_eq!((lateness.count(), lateness.max_ns()), (1001, 1_000_000));
         for (share, us) in [(0.5, 500.0), (0.99, 990.0), (0.999, 999.0)] {
             let found = lateness.percentile_ns(share) as f64 / 1000.0;
-            assert!(found >= us && found <= us * (1.0 + 1.0 / STEPS as f64), "{share}: {found}");
+            assert!(
+                found >= us && found <= us * (1.0 + 1.0 / STEPS as f64),
+                "{share}: {found}"
+            );
         }
         assert_eq!(lateness.percentile_ns(1.0), 1_000_000);
         let rows = lateness.rows();
         assert_eq!(rows.iter().map(|row| row.count).sum::<u64>(), 1001);
-        assert!(rows.windows(2).all(|pair| pair[0].below_ns == pair[1].from_ns));
+        assert!(
+            rows.windows(2)
+                .all(|pair| pair[0].below_ns == pair[1].from_ns)
+        );
     }
 
     #[test]

@@ -23,10 +23,12 @@ pub use lateness::{Lateness, Row};
 pub use monitor::Monitor;
 pub use policy_summary::PolicySummary;
 pub use record::{
-    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, flush_outputs, outputs_word, rpm,
+    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, flush_outputs,
+    outputs_word, rpm,
 };
 pub use stops::{Stop, StopWatch};
 pub use summary::{
-    ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PageFaults, PlanningRow, PlanningUs, Summary,
+    ExchangeUs, FORMAT as SUMMARY_FORMAT, LatenessUs, OfLimit, OfLimits, PageFaults, PlanningRow,
+    PlanningUs, Summary,
 };
 pub use worst::Worst;

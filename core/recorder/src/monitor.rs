@@ -45,7 +45,12 @@ impl Monitor {
     /// Nothing seen yet; `leaves_path` as the planner describes itself.
     pub fn new(machine: &Machine, leaves_path: bool) -> Self {
         Self {
-            rapid_mm_per_s: machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect(),
+            rapid_mm_per_s: machine
+                .limits
+                .axes()
+                .iter()
+                .map(|a| a.rapid_mm_per_s)
+                .collect(),
             period_s: machine.fine_period_s,
             last_tick: 0,
             last: [AxisVector::ZERO; 3],
@@ -59,7 +64,11 @@ impl Monitor {
             worst: Worst::new(machine),
             position: machine.start,
             stops: StopWatch::new(machine.axes, machine.fine_period_s),
-            watch: PathWatch::new(leaves_path, machine.motion.path_tolerance_mm, &machine.start),
+            watch: PathWatch::new(
+                leaves_path,
+                machine.motion.path_tolerance_mm,
+                &machine.start,
+            ),
             axes: machine.axes,
             joints: None,
         }
@@ -90,7 +99,11 @@ impl Monitor {
     }
 
     fn rapid_time_s(&self, block: &Block) -> f64 {
-        let each = self.rapid_mm_per_s.iter().enumerate().map(|(i, v)| (block.end[i] - block.start[i]).abs() / v);
+        let each = self
+            .rapid_mm_per_s
+            .iter()
+            .enumerate()
+            .map(|(i, v)| (block.end[i] - block.start[i]).abs() / v);
         each.fold(0.0, f64::max)
     }
 

@@ -38,7 +38,11 @@ impl Watched {
         match self {
             Self::Path(path) => path.distance_mm(position),
             Self::Curve(curve, span) => {
-                let mut nearest = curve.nearest(position, span.saturating_sub(SPANS_AROUND), *span + SPANS_AROUND);
+                let mut nearest = curve.nearest(
+                    position,
+                    span.saturating_sub(SPANS_AROUND),
+                    *span + SPANS_AROUND,
+                );
                 if nearest.distance_mm > ON_PATH_MM {
                     nearest = curve.nearer(position, nearest);
                 }
@@ -78,7 +82,14 @@ pub struct PathWatch {
 impl PathWatch {
     /// Nothing seen yet, at rest at `position`; `leaves_path` as the planner describes itself, `tolerance_mm` the machine's.
     pub fn new(leaves_path: bool, tolerance_mm: f64, position: &AxisVector) -> Self {
-        Self { entries: VecDeque::new(), here: 0, leaves_path, tolerance_mm, position: *position, max_mm: 0.0 }
+        Self {
+            entries: VecDeque::new(),
+            here: 0,
+            leaves_path,
+            tolerance_mm,
+            position: *position,
+            max_mm: 0.0,
+        }
     }
 
     /// A block that will be driven.
@@ -90,16 +101,30 @@ impl PathWatch {
         // A block that states none says NaN.
         let tolerance_mm = self.tolerance_mm.max(block.path_tolerance_mm);
         if let Some(path) = path {
-            self.entries.push_back(Entry { index: block.index, length_mm: block.length_mm, tolerance_mm, path });
+            self.entries.push_back(Entry {
+                index: block.index,
+                length_mm: block.length_mm,
+                tolerance_mm,
+                path,
+            });
         }
     }
 
     /// Distance of `position`, sampled while block `block` moved, from the path, mm. Blocks far behind are forgotten.
     pub fn sample(&mut self, block: u64, position: &AxisVector) -> f64 {
         self.find(block);
-        let moved_mm = (*position - self.position).0.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let moved_mm = (*position - self.position)
+            .0
+            .iter()
+            .map(|d| d * d)
+            .sum::<f64>()
+            .sqrt();
         self.position = *position;
-        let nearest = if self.leaves_path { self.nearest_of_all(position) } else { self.nearest(position, moved_mm) };
+        let nearest = if self.leaves_path {
+            self.nearest_of_all(position)
+        } else {
+            self.nearest(position, moved_mm)
+        };
         let distance_mm = if nearest.is_finite() { nearest } else { 0.0 };
         self.max_mm = self.max_mm.max(distance_mm);
         distance_mm
@@ -107,11 +132,19 @@ impl PathWatch {
 
     /// Finds the entry of `block`, and forgets those too far behind it.
     fn find(&mut self, block: u64) {
-        let look_back = if self.leaves_path { LOOK_BACK } else { LOOK_BACK_ON_PATH };
+        let look_back = if self.leaves_path {
+            LOOK_BACK
+        } else {
+            LOOK_BACK_ON_PATH
+        };
         while self.here > 0 && self.entries[self.here - 1].index >= block {
             self.here -= 1;
         }
-        while self.entries.get(self.here).is_some_and(|entry| entry.index < block) {
+        while self
+            .entries
+            .get(self.here)
+            .is_some_and(|entry| entry.index < block)
+        {
             self.here += 1;
             if self.here > look_back {
                 self.entries.pop_front();
@@ -136,7 +169,10 @@ impl PathWatch {
     /// the sample moved and the tolerance may have cut off: blocks shorter than a period are named by the last of them.
     fn nearest(&mut self, position: &AxisVector, moved_mm: f64) -> f64 {
         let neighbours = self.here.saturating_sub(1)..self.entries.len().min(self.here + 2);
-        let tolerance_mm = self.entries.range(neighbours).fold(0.0, |most: f64, entry| most.max(entry.tolerance_mm));
+        let tolerance_mm = self
+            .entries
+            .range(neighbours)
+            .fold(0.0, |most: f64, entry| most.max(entry.tolerance_mm));
         let patience_mm = moved_mm + 2.0 * tolerance_mm;
         let on = self.here..self.entries.len().min(self.here + LOOK_BACK_ON_PATH);
         let mut nearest = f64::INFINITY;
@@ -159,7 +195,11 @@ impl PathWatch {
             }
             let entry = &mut self.entries[place];
             let distance_mm = entry.path.distance_mm(position);
-            passed_mm = if distance_mm < *nearest { 0.0 } else { passed_mm + entry.length_mm };
+            passed_mm = if distance_mm < *nearest {
+                0.0
+            } else {
+                passed_mm + entry.length_mm
+            };
             *nearest = nearest.min(distance_mm);
         }
     }

@@ -54,12 +54,24 @@ impl StopWatch {
     pub fn new(axes: Axes, period_s: f64) -> Self {
         let (stops, before) = (vec![], (1.0, 0.0));
         let cause = StopCause::None;
-        Self { axes, period_s, last: None, way: AxisVector::ZERO, cause, open: false, before, stops, count: 0 }
+        Self {
+            axes,
+            period_s,
+            last: None,
+            way: AxisVector::ZERO,
+            cause,
+            open: false,
+            before,
+            stops,
+            count: 0,
+        }
     }
 
     /// A sample was sent.
     pub fn sample(&mut self, sample: &Sample) {
-        let way = self.last.map_or(AxisVector::ZERO, |(last, _)| sample.command - last);
+        let way = self
+            .last
+            .map_or(AxisVector::ZERO, |(last, _)| sample.command - last);
         if sample.cause != self.cause {
             self.open = false;
             if sample.cause != StopCause::None {
@@ -69,7 +81,8 @@ impl StopWatch {
         if self.open {
             self.go_on(sample, self.length_mm(&way));
         }
-        (self.cause, self.way, self.last) = (sample.cause, way, Some((sample.command, sample.sigma)));
+        (self.cause, self.way, self.last) =
+            (sample.cause, way, Some((sample.command, sample.sigma)));
     }
 
     fn begin(&mut self, sample: &Sample) {
@@ -82,18 +95,29 @@ impl StopWatch {
         self.before = (self.last.map_or(1.0, |(_, sigma)| sigma), speed_mm_per_s);
         let (cause, reaction_periods) = (sample.cause.name(), None);
         let (tick, line) = (sample.tick, sample.line);
-        self.stops.push(Stop { tick, line, cause, reaction_periods, time_s: 0.0, distance_mm: 0.0, rest: false });
+        self.stops.push(Stop {
+            tick,
+            line,
+            cause,
+            reaction_periods,
+            time_s: 0.0,
+            distance_mm: 0.0,
+            rest: false,
+        });
     }
 
     fn go_on(&mut self, sample: &Sample, way_mm: f64) {
-        let Some(stop) = self.stops.last_mut() else { return };
+        let Some(stop) = self.stops.last_mut() else {
+            return;
+        };
         let (sigma, speed_mm_per_s) = self.before;
         let slower = match sample.cause {
             StopCause::Fault => way_mm / self.period_s < speed_mm_per_s,
             _ => speed_mm_per_s > 0.0 && sample.sigma < sigma,
         };
         if slower {
-            stop.reaction_periods.get_or_insert(sample.tick + 1 - stop.tick);
+            stop.reaction_periods
+                .get_or_insert(sample.tick + 1 - stop.tick);
         }
         if way_mm == 0.0 {
             (stop.rest, self.open) = (true, false);
@@ -104,7 +128,8 @@ impl StopWatch {
     }
 
     fn length_mm(&self, way: &AxisVector) -> f64 {
-        let slides = (0..self.axes.count()).any(|axis| !self.axes.is_rotary(axis) && way[axis] != 0.0);
+        let slides =
+            (0..self.axes.count()).any(|axis| !self.axes.is_rotary(axis) && way[axis] != 0.0);
         let length = self.axes.path_length(way);
         if slides { length } else { length.to_degrees() }
     }
@@ -122,7 +147,14 @@ mod tests {
             x += speed * 0.001;
             let command = AxisVector::from_slice(&[x]);
             let (tick, sigma) = (tick as u64, speed / 4.0);
-            watch.sample(&Sample { tick, command, sigma, cause: *cause, line: 3, ..Sample::default() });
+            watch.sample(&Sample {
+                tick,
+                command,
+                sigma,
+                cause: *cause,
+                line: 3,
+                ..Sample::default()
+            });
         }
         watch
     }
@@ -130,9 +162,20 @@ mod tests {
     #[test]
     fn a_hold_from_its_tick_to_the_rest() {
         let (run, hold) = (StopCause::None, StopCause::Hold);
-        let watch = watched(&[(4.0, run), (4.0, run), (3.0, hold), (1.0, hold), (0.0, hold), (0.0, hold), (4.0, run)]);
+        let watch = watched(&[
+            (4.0, run),
+            (4.0, run),
+            (3.0, hold),
+            (1.0, hold),
+            (0.0, hold),
+            (0.0, hold),
+            (4.0, run),
+        ]);
         let stop = &watch.stops[0];
-        assert_eq!((watch.count, stop.tick, stop.line, stop.cause), (1, 2, 3, "hold"));
+        assert_eq!(
+            (watch.count, stop.tick, stop.line, stop.cause),
+            (1, 2, 3, "hold")
+        );
         assert_eq!((stop.reaction_periods, stop.rest), (Some(1), true));
         assert!((stop.time_s - 0.002).abs() < 1e-12 && (stop.distance_mm - 0.004).abs() < 1e-12);
     }
@@ -140,11 +183,37 @@ mod tests {
     #[test]
     fn what_is_late_at_rest_or_resumed_is_said() {
         use StopCause::{Abort, Hold, None as Run, ProgramStop};
-        let late = watched(&[(4.0, Run), (4.0, Run), (4.0, Hold), (4.0, Hold), (2.0, Hold), (4.0, Run)]);
-        assert_eq!((late.stops[0].reaction_periods, late.stops[0].rest), (Some(3), false));
-        let rest = watched(&[(0.0, Run), (0.0, ProgramStop), (0.0, ProgramStop), (0.0, Abort), (0.0, Run)]);
-        let each: Vec<_> = rest.stops.iter().map(|s| (s.cause, s.reaction_periods, s.time_s, s.rest)).collect();
-        assert_eq!(each, [("program stop", None, 0.0, true), ("abort", None, 0.0, true)]);
+        let late = watched(&[
+            (4.0, Run),
+            (4.0, Run),
+            (4.0, Hold),
+            (4.0, Hold),
+            (2.0, Hold),
+            (4.0, Run),
+        ]);
+        assert_eq!(
+            (late.stops[0].reaction_periods, late.stops[0].rest),
+            (Some(3), false)
+        );
+        let rest = watched(&[
+            (0.0, Run),
+            (0.0, ProgramStop),
+            (0.0, ProgramStop),
+            (0.0, Abort),
+            (0.0, Run),
+        ]);
+        let each: Vec<_> = rest
+            .stops
+            .iter()
+            .map(|s| (s.cause, s.reaction_periods, s.time_s, s.rest))
+            .collect();
+        assert_eq!(
+            each,
+            [
+                ("program stop", None, 0.0, true),
+                ("abort", None, 0.0, true)
+            ]
+        );
     }
 
     #[test]

@@ -142,13 +142,22 @@ impl Summary {
         if self.missed_periods == 0 && self.overruns == 0 {
             return vec![];
         }
-        let Self { missed_periods, missed_in_motion, overruns, samples, .. } = self;
+        let Self {
+            missed_periods,
+            missed_in_motion,
+            overruns,
+            samples,
+            ..
+        } = self;
         let over = match overruns {
             0 => String::new(),
             1 => "; once the work of a period went past its end".to_string(),
             _ => format!("; {overruns} times the work of a period went past its end"),
         };
-        let cause = self.late_cause().map(|cause| format!(": {cause}")).unwrap_or_default();
+        let cause = self
+            .late_cause()
+            .map(|cause| format!(": {cause}"))
+            .unwrap_or_default();
         let beside = format!(
             "{missed_periods} fine periods went by without a sample, {missed_in_motion} of them in motion, \
              beside {samples} with one"
@@ -159,7 +168,11 @@ impl Summary {
     /// What made the fine loop late by a period or more, in words, where that is known.
     pub fn late_cause(&self) -> Option<String> {
         let period_ms = self.fine_period_s * 1e3;
-        if let Some(ExchangeUs { max, longer_than_period }) = self.exchange_us.filter(|e| e.longer_than_period > 0) {
+        if let Some(ExchangeUs {
+            max,
+            longer_than_period,
+        }) = self.exchange_us.filter(|e| e.longer_than_period > 0)
+        {
             return Some(format!(
                 "the driver's exchange took longer than the period of {period_ms} ms {longer_than_period} times, \
                  at most {:.3} ms",
@@ -168,13 +181,23 @@ impl Summary {
         }
         let late_us = self.lateness_us?.max;
         let late = late_us >= period_ms * 1e3;
-        late.then(|| format!("the computer woke the fine loop up to {:.3} ms late", late_us / 1e3))
+        late.then(|| {
+            format!(
+                "the computer woke the fine loop up to {:.3} ms late",
+                late_us / 1e3
+            )
+        })
     }
 
     /// How the periods of the fine loop were kept, in words; nothing on the virtual clock.
     pub fn timing(&self) -> Option<String> {
         let late_us = self.lateness_us?.max;
-        let Self { overruns, missed_periods, missed_in_motion, .. } = self;
+        let Self {
+            overruns,
+            missed_periods,
+            missed_in_motion,
+            ..
+        } = self;
         Some(format!(
             "overruns {overruns}, missed periods {missed_periods}, in motion {missed_in_motion}, \
              latest wake-up {late_us:.0} µs"
@@ -195,7 +218,10 @@ impl PageFaults {
     /// Those since `earlier`.
     #[must_use]
     pub fn since(self, earlier: Self) -> Self {
-        Self { major: self.major - earlier.major, minor: self.minor - earlier.minor }
+        Self {
+            major: self.major - earlier.major,
+            minor: self.minor - earlier.minor,
+        }
     }
 }
 
@@ -241,14 +267,25 @@ impl Summary {
         let jerk_counts = self.jerk == "limit";
         let each = self.worst_of_limits.iter().flat_map(|(axis, of)| {
             let jerk = jerk_counts.then_some(("jerk", of.jerk, JERK_TOLERANCE));
-            let others = [("velocity", of.velocity, TOLERANCE), ("acceleration", of.acceleration, TOLERANCE)];
+            let others = [
+                ("velocity", of.velocity, TOLERANCE),
+                ("acceleration", of.acceleration, TOLERANCE),
+            ];
             others
                 .into_iter()
                 .chain(jerk)
-                .map(move |(name, of, tolerance)| (format!("{} {name}", axis.to_uppercase()), of, 1.0 + tolerance))
+                .map(move |(name, of, tolerance)| {
+                    (
+                        format!("{} {name}", axis.to_uppercase()),
+                        of,
+                        1.0 + tolerance,
+                    )
+                })
         });
         let beyond = each.filter(|(_, of, _)| of.share > 1.0 + TOLERANCE);
-        beyond.max_by(|(_, a, within_a), (_, b, within_b)| (a.share / within_a).total_cmp(&(b.share / within_b)))
+        beyond.max_by(|(_, a, within_a), (_, b, within_b)| {
+            (a.share / within_a).total_cmp(&(b.share / within_b))
+        })
     }
 }
 
@@ -294,13 +331,24 @@ pub struct PlanningRow {
 impl From<&Lateness> for PlanningUs {
     fn from(times: &Lateness) -> Self {
         let us = |ns: u64| ns as f64 / 1e3;
-        let LatenessUs { p50, p99, p999, max } = LatenessUs::from(times);
+        let LatenessUs {
+            p50,
+            p99,
+            p999,
+            max,
+        } = LatenessUs::from(times);
         let row = |r: crate::lateness::Row| PlanningRow {
             from_us: us(r.from_ns),
             below_us: us(r.below_ns),
             periods: r.count,
         };
-        Self { p50, p99, p999, max, histogram: times.rows().into_iter().map(row).collect() }
+        Self {
+            p50,
+            p99,
+            p999,
+            max,
+            histogram: times.rows().into_iter().map(row).collect(),
+        }
     }
 }
 
@@ -308,6 +356,11 @@ impl From<&Lateness> for LatenessUs {
     fn from(lateness: &Lateness) -> Self {
         let us = |ns: u64| ns as f64 / 1e3;
         let kept_by = |share| us(lateness.percentile_ns(share));
-        Self { p50: kept_by(0.5), p99: kept_by(0.99), p999: kept_by(0.999), max: us(lateness.max_ns()) }
+        Self {
+            p50: kept_by(0.5),
+            p99: kept_by(0.99),
+            p999: kept_by(0.999),
+            max: us(lateness.max_ns()),
+        }
     }
 }

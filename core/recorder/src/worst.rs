@@ -20,9 +20,19 @@ pub struct Worst {
 impl Worst {
     /// Nothing seen.
     pub fn new(machine: &Machine) -> Self {
-        let (limits, axes, period_s) = (machine.limits.axes, machine.axes.count(), machine.fine_period_s);
+        let (limits, axes, period_s) = (
+            machine.limits.axes,
+            machine.axes.count(),
+            machine.fine_period_s,
+        );
         let (beyond, of_limits) = ([[0.0; 2]; MAX_AXES], [OfLimits::default(); MAX_AXES]);
-        Self { limits, axes, period_s, beyond, of_limits }
+        Self {
+            limits,
+            axes,
+            period_s,
+            beyond,
+            of_limits,
+        }
     }
 
     /// The planner makes use of these steps of the velocity and no others, per axis, mm/s.
@@ -58,7 +68,11 @@ impl Worst {
             let of = &mut self.of_limits[axis];
             raise(&mut of.velocity, velocity[axis].abs() / fastest, sample);
             raise(&mut of.acceleration, share, sample);
-            raise(&mut of.jerk, jerk[axis].abs() / limits.jerk_mm_per_s3, sample);
+            raise(
+                &mut of.jerk,
+                jerk[axis].abs() / limits.jerk_mm_per_s3,
+                sample,
+            );
         }
     }
 
@@ -71,6 +85,11 @@ impl Worst {
 fn raise(worst: &mut OfLimit, share: f64, sample: &Sample) {
     // Most samples are not the worst: one comparison each.
     if share > worst.share {
-        *worst = OfLimit { share, tick: sample.tick, line: sample.line, state: sample.state.name() };
+        *worst = OfLimit {
+            share,
+            tick: sample.tick,
+            line: sample.line,
+            state: sample.state.name(),
+        };
     }
 }

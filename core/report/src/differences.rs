@@ -11,7 +11,9 @@ pub(crate) fn steps_s(t_s: &[f64], period_s: f64) -> Vec<f64> {
 /// Rate of change against the sample before; NaN where that is unknown.
 pub(crate) fn rate(values: &[f64], steps_s: &[f64]) -> Vec<f64> {
     let mut steps = steps_s.iter().skip(1);
-    first_then(values, |pair| (pair[1] - pair[0]) / steps.next().copied().unwrap_or(f64::NAN))
+    first_then(values, |pair| {
+        (pair[1] - pair[0]) / steps.next().copied().unwrap_or(f64::NAN)
+    })
 }
 
 fn first_then(values: &[f64], each: impl FnMut(&[f64]) -> f64) -> Vec<f64> {

@@ -66,35 +66,55 @@ impl EstimateReport {
 
 fn program(program: &EstimatedProgram) -> String {
     let (name, figures) = (escape(&program.name), facts(&program.facts));
-    format!("<h2>{name}</h2>\n<p class=\"facts\">{figures}</p>\n{}\n", drawing(program))
+    format!(
+        "<h2>{name}</h2>\n<p class=\"facts\">{figures}</p>\n{}\n",
+        drawing(program)
+    )
 }
 
 fn drawing(program: &EstimatedProgram) -> String {
     let fields = &program.fields;
     let edges = |of: fn(&EstimatedField) -> [f64; 2]| {
         let ends = fields.iter().map(of);
-        ends.fold([f64::INFINITY, 0.0], |[low, high], [from, below]| [low.min(from), f64::max(high, below)])
+        ends.fold([f64::INFINITY, 0.0], |[low, high], [from, below]| {
+            [low.min(from), f64::max(high, below)]
+        })
     };
-    let programmed = program.programmed_mm_per_min.iter().copied().fold(0.0, f64::max);
+    let programmed = program
+        .programmed_mm_per_min
+        .iter()
+        .copied()
+        .fold(0.0, f64::max);
     let (lengths, feeds) = (edges(|f| f.length_mm), edges(|f| f.feed_mm_per_min));
     let x = Scale::new(lengths[0], lengths[1], AREA[0], AREA[1]);
     let y = Scale::new(feeds[0], feeds[1].max(programmed * 1.2), AREA[3], AREA[2]);
-    let mut text =
-        format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"block length against feed reached\">");
+    let mut text = format!(
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"block length against feed reached\">"
+    );
     grid(&x, &y, &mut text);
     cells(fields, (&x, &y), &mut text);
     for feed in &program.programmed_mm_per_min {
         let at = y.place(*feed);
-        let _ = write!(text, "<path class=\"s1\" stroke-dasharray=\"5 4\" d=\"M{} {at:.1} H{}\"/>", AREA[0], AREA[1]);
+        let _ = write!(
+            text,
+            "<path class=\"s1\" stroke-dasharray=\"5 4\" d=\"M{} {at:.1} H{}\"/>",
+            AREA[0], AREA[1]
+        );
     }
     text + "</svg>"
 }
 
 fn cells(fields: &[EstimatedField], (x, y): (&Scale, &Scale), text: &mut String) {
-    let most = fields.iter().map(|field| field.time_s).fold(f64::MIN_POSITIVE, f64::max);
+    let most = fields
+        .iter()
+        .map(|field| field.time_s)
+        .fold(f64::MIN_POSITIVE, f64::max);
     for field in fields {
         let (left, right) = (x.place(field.length_mm[0]), x.place(field.length_mm[1]));
-        let (bottom, top) = (y.place(field.feed_mm_per_min[0]), y.place(field.feed_mm_per_min[1]));
+        let (bottom, top) = (
+            y.place(field.feed_mm_per_min[0]),
+            y.place(field.feed_mm_per_min[1]),
+        );
         let _ = write!(
             text,
             "<rect class=\"s0\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill-opacity=\"{:.2}\">\
@@ -115,19 +135,42 @@ fn cells(fields: &[EstimatedField], (x, y): (&Scale, &Scale), text: &mut String)
 fn grid(x: &Scale, y: &Scale, text: &mut String) {
     for mark in x.marks() {
         let at = x.place(mark);
-        let _ = write!(text, "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>", AREA[2], AREA[3]);
+        let _ = write!(
+            text,
+            "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>",
+            AREA[2], AREA[3]
+        );
         let label = AREA[3] + 15.0;
-        let _ = write!(text, "<text x=\"{at:.1}\" y=\"{label}\" text-anchor=\"middle\">{}</text>", number(mark));
+        let _ = write!(
+            text,
+            "<text x=\"{at:.1}\" y=\"{label}\" text-anchor=\"middle\">{}</text>",
+            number(mark)
+        );
     }
     for mark in y.marks() {
         let at = y.place(mark);
-        let _ = write!(text, "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>", AREA[0], AREA[1]);
+        let _ = write!(
+            text,
+            "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>",
+            AREA[0], AREA[1]
+        );
         let (left, below) = (AREA[0] - 6.0, at + 4.0);
-        let _ = write!(text, "<text x=\"{left}\" y=\"{below:.1}\" text-anchor=\"end\">{}</text>", number(mark));
+        let _ = write!(
+            text,
+            "<text x=\"{left}\" y=\"{below:.1}\" text-anchor=\"end\">{}</text>",
+            number(mark)
+        );
     }
     let bottom = HEIGHT - 5.0;
-    let _ = write!(text, "<text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">block length, mm</text>", AREA[1]);
-    let _ = write!(text, "<text x=\"6\" y=\"{bottom}\">feed reached, mm/min</text>");
+    let _ = write!(
+        text,
+        "<text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">block length, mm</text>",
+        AREA[1]
+    );
+    let _ = write!(
+        text,
+        "<text x=\"6\" y=\"{bottom}\">feed reached, mm/min</text>"
+    );
 }
 
 #[cfg(test)]
@@ -154,10 +197,17 @@ mod tests {
             fields: vec![field(0.1, 70_000), field(3.0, 1)],
             programmed_mm_per_min: vec![2000.0],
         };
-        let html = page(&EstimateReport { programs: vec![program], ..EstimateReport::default() });
+        let html = page(&EstimateReport {
+            programs: vec![program],
+            ..EstimateReport::default()
+        });
         assert_eq!(html.matches("<rect").count(), 2);
-        for text in ["a&lt;b&gt;.ngc", "estimated <b>3 s", "70\u{202f}000 blocks", "0.1 to 0.2 mm at 500 to 800 mm/min"]
-        {
+        for text in [
+            "a&lt;b&gt;.ngc",
+            "estimated <b>3 s",
+            "70\u{202f}000 blocks",
+            "0.1 to 0.2 mm at 500 to 800 mm/min",
+        ] {
             assert!(html.contains(text), "{text} is not in {html}");
         }
         assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("<script"));
@@ -166,7 +216,13 @@ mod tests {
     #[test]
     fn a_program_without_cuts_is_a_page() {
         let empty = EstimatedProgram::default();
-        let html = page(&EstimateReport { programs: vec![empty], ..EstimateReport::default() });
-        assert!(html.contains("</svg>") && !html.contains("NaN") && !html.contains("inf"), "{html}");
+        let html = page(&EstimateReport {
+            programs: vec![empty],
+            ..EstimateReport::default()
+        });
+        assert!(
+            html.contains("</svg>") && !html.contains("NaN") && !html.contains("inf"),
+            "{html}"
+        );
     }
 }

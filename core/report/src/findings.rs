@@ -51,7 +51,9 @@ impl Findings {
         for (axis, motion) in report.axes.iter().zip(motions) {
             findings.add_axis(report, axis, motion);
         }
-        if let (Some(limit), Some(values)) = (report.path_tolerance_mm, &report.samples.deviation_mm) {
+        if let (Some(limit), Some(values)) =
+            (report.path_tolerance_mm, &report.samples.deviation_mm)
+        {
             let kind = Finding {
                 what: "path deviation".into(),
                 unit: "mm".into(),
@@ -61,7 +63,9 @@ impl Findings {
             };
             findings.off_path = findings.add(report, &kind, values, off_path, 1);
         }
-        findings.listed.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        findings
+            .listed
+            .sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
         findings
     }
 
@@ -74,9 +78,16 @@ impl Findings {
             ..Finding::default()
         };
         let velocity = kind("velocity", "s", axis.max_velocity);
-        self.limit_violations += self.add(report, &velocity, &motion.velocity, &motion.marks, VELOCITY);
+        self.limit_violations +=
+            self.add(report, &velocity, &motion.velocity, &motion.marks, VELOCITY);
         let acceleration = kind("acceleration", "s²", axis.max_acceleration);
-        self.limit_violations += self.add(report, &acceleration, &motion.acceleration, &motion.marks, ACCELERATION);
+        self.limit_violations += self.add(
+            report,
+            &acceleration,
+            &motion.acceleration,
+            &motion.marks,
+            ACCELERATION,
+        );
         if let Some(limit) = axis.max_jerk.filter(|_| report.jerk_is_judged) {
             let jerk = kind("jerk", "s³", limit);
             self.limit_violations += self.add(report, &jerk, &motion.jerk, &motion.marks, JERK);
@@ -84,13 +95,23 @@ impl Findings {
     }
 
     /// Adds the stretches in which `bit` is marked; answers the number of samples.
-    fn add(&mut self, report: &Report, kind: &Finding, values: &[f64], marks: &[u8], bit: u8) -> usize {
+    fn add(
+        &mut self,
+        report: &Report,
+        kind: &Finding,
+        values: &[f64],
+        marks: &[u8],
+        bit: u8,
+    ) -> usize {
         let mut stretches: Vec<Finding> = Vec::new();
         let (mut last, mut samples, mut unlisted) = (None, 0, 0);
         for i in (0..marks.len()).filter(|&i| marks[i] & bit != 0) {
             let continues = last.is_some_and(|last| i - last <= GAP);
             if continues && unlisted == 0 {
-                stretches.last_mut().into_iter().for_each(|stretch| stretch.extend(report.samples.t_s[i], values[i]));
+                stretches
+                    .last_mut()
+                    .into_iter()
+                    .for_each(|stretch| stretch.extend(report.samples.t_s[i], values[i]));
             } else if !continues && stretches.len() < LISTED {
                 stretches.push(kind.starting(report, i, values[i]));
             } else if !continues {
@@ -108,8 +129,20 @@ impl Findings {
 impl Finding {
     fn starting(&self, report: &Report, i: usize, value: f64) -> Self {
         let (t_s, line) = (report.samples.t_s[i], report.samples.line[i]);
-        let limit = if self.of_path { report.tolerance_at_mm(i).unwrap_or(self.limit) } else { self.limit };
-        Self { from_s: t_s, to_s: t_s, line, peak: value.abs(), samples: 1, limit, ..self.clone() }
+        let limit = if self.of_path {
+            report.tolerance_at_mm(i).unwrap_or(self.limit)
+        } else {
+            self.limit
+        };
+        Self {
+            from_s: t_s,
+            to_s: t_s,
+            line,
+            peak: value.abs(),
+            samples: 1,
+            limit,
+            ..self.clone()
+        }
     }
 
     fn extend(&mut self, t_s: f64, value: f64) {
@@ -145,13 +178,25 @@ mod tests {
         assert_eq!(findings.off_path, 4);
         assert_eq!(findings.listed.len(), 2);
         let first = &findings.listed[0];
-        assert_eq!((first.from_s, first.to_s, first.peak, first.samples, first.line), (0.001, 0.004, 0.03, 3, 7));
+        assert_eq!(
+            (
+                first.from_s,
+                first.to_s,
+                first.peak,
+                first.samples,
+                first.line
+            ),
+            (0.001, 0.004, 0.03, 3, 7)
+        );
     }
 
     #[test]
     fn what_is_not_listed_is_counted() {
         let marks: Vec<u8> = (0..10_000).map(|i| u8::from(i % 10 == 0)).collect();
         let findings = Findings::of(&report(vec![0.02; 10_000]), &[], &marks);
-        assert_eq!((findings.listed.len(), findings.unlisted, findings.off_path), (LISTED, 800, 1000));
+        assert_eq!(
+            (findings.listed.len(), findings.unlisted, findings.off_path),
+            (LISTED, 800, 1000)
+        );
     }
 }

@@ -37,17 +37,30 @@ impl AxisMotion {
         let jerk = rate(&acceleration, steps_s);
         // What the rounding of the positions alone can make of a velocity.
         let noise = 4.0 * f64::EPSILON * peak(position) / period_s;
-        let mut motion = Self { marks: vec![0; position.len()], max_step: 0.0, velocity, acceleration, jerk };
+        let mut motion = Self {
+            marks: vec![0; position.len()],
+            max_step: 0.0,
+            velocity,
+            acceleration,
+            jerk,
+        };
         motion.mark_above(VELOCITY, axis.max_velocity * (1.0 + TOLERANCE) + noise);
         motion.mark_steps(axis, steps_s, noise);
         if let Some(max) = axis.max_jerk {
-            motion.mark_above(JERK, max * (1.0 + JERK_TOLERANCE) + 4.0 * noise / (period_s * period_s));
+            motion.mark_above(
+                JERK,
+                max * (1.0 + JERK_TOLERANCE) + 4.0 * noise / (period_s * period_s),
+            );
         }
         motion
     }
 
     fn mark_above(&mut self, mark: u8, limit: f64) {
-        let values = if mark == VELOCITY { &self.velocity } else { &self.jerk };
+        let values = if mark == VELOCITY {
+            &self.velocity
+        } else {
+            &self.jerk
+        };
         for (bits, value) in self.marks.iter_mut().zip(values) {
             if value.abs() > limit {
                 *bits |= mark;
@@ -84,7 +97,13 @@ mod tests {
     const PERIOD_S: f64 = 0.001;
 
     fn axis(speed_difference: f64) -> Axis {
-        Axis { letter: 'X', max_velocity: 100.0, max_acceleration: 1000.0, speed_difference, ..Axis::default() }
+        Axis {
+            letter: 'X',
+            max_velocity: 100.0,
+            max_acceleration: 1000.0,
+            speed_difference,
+            ..Axis::default()
+        }
     }
 
     /// Marks of the motion that has the given velocities.
@@ -121,13 +140,19 @@ mod tests {
         let one = [0.0, 0.0, 2.5, 2.5, 2.5, 2.5];
         assert!(marks(&axis(2.0), &one).iter().all(|&m| m == 0));
         let row = [0.0, 0.0, 2.5, 5.0, 7.5];
-        assert_eq!(marks(&axis(2.0), &row), [0, 0, 0, ACCELERATION, ACCELERATION]);
+        assert_eq!(
+            marks(&axis(2.0), &row),
+            [0, 0, 0, ACCELERATION, ACCELERATION]
+        );
     }
 
     #[test]
     fn jerk_is_marked_where_it_has_a_limit() {
         let kick = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0];
-        let limited = Axis { max_jerk: Some(500_000.0), ..axis(0.0) };
+        let limited = Axis {
+            max_jerk: Some(500_000.0),
+            ..axis(0.0)
+        };
         assert_eq!(marks(&limited, &kick), [0, 0, 0, JERK, 0, 0]);
         assert!(marks(&axis(0.0), &kick).iter().all(|&m| m == 0));
     }

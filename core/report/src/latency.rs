@@ -58,16 +58,24 @@ impl LatencyReport {
     /// # Errors
     /// Writing fails.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        template::write_plain((&self.title, &self.facts), TEMPLATE, out, |gap| self.fill(gap))
+        template::write_plain((&self.title, &self.facts), TEMPLATE, out, |gap| {
+            self.fill(gap)
+        })
     }
 
     fn fill(&self, gap: &str) -> String {
         let of_each = |text: &dyn Fn(usize, &LatencySeries) -> String| -> String {
-            self.series.iter().enumerate().map(|(index, series)| text(index, series)).collect()
+            self.series
+                .iter()
+                .enumerate()
+                .map(|(index, series)| text(index, series))
+                .collect()
         };
         match gap {
             "notes" => joined(&self.notes, |note| format!("<p>{}</p>\n", escape(note))),
-            "legend" => of_each(&|index, series| format!("<span class=\"s{index}\">{}</span>", escape(&series.name))),
+            "legend" => of_each(&|index, series| {
+                format!("<span class=\"s{index}\">{}</span>", escape(&series.name))
+            }),
             "histogram" => svg::histogram(&self.series),
             "later" => svg::later(&self.series),
             "figures" => of_each(&figures),
@@ -83,7 +91,10 @@ fn joined<T>(items: &[T], text: impl Fn(&T) -> String) -> String {
 fn figures(index: usize, series: &LatencySeries) -> String {
     let cells = joined(&series.percentiles_us, |us| format!("<td>{}", number(*us)));
     let wake_ups = count(usize::try_from(series.count()).unwrap_or(usize::MAX));
-    format!("<tr class=\"s{index}\"><th>{}<td>{wake_ups}{cells}", escape(&series.name))
+    format!(
+        "<tr class=\"s{index}\"><th>{}<td>{wake_ups}{cells}",
+        escape(&series.name)
+    )
 }
 
 #[cfg(test)]
@@ -98,7 +109,11 @@ mod tests {
             count: *count,
         };
         let bins = counts.iter().enumerate().map(bin).collect();
-        LatencySeries { name: name.into(), bins, percentiles_us: [1.0, 2.0, 3.0, 1234.5] }
+        LatencySeries {
+            name: name.into(),
+            bins,
+            percentiles_us: [1.0, 2.0, 3.0, 1234.5],
+        }
     }
 
     fn page(report: &LatencyReport) -> String {
@@ -109,10 +124,25 @@ mod tests {
 
     #[test]
     fn the_page_holds_everything_and_fetches_nothing() {
-        let series = vec![series("tandem", &[5, 0, 1]), series("<other>", &[3, 90_000])];
+        let series = vec![
+            series("tandem", &[5, 0, 1]),
+            series("<other>", &[3, 90_000]),
+        ];
         let facts = vec![("period".into(), "1 ms".into())];
-        let html = page(&LatencyReport { title: "a & b".into(), facts, notes: vec!["no <b>".into()], series });
-        for text in ["a &amp; b", "period <b>1 ms", "no &lt;b&gt;", "&lt;other&gt;", "<td>1234", "90\u{202f}003"] {
+        let html = page(&LatencyReport {
+            title: "a & b".into(),
+            facts,
+            notes: vec!["no <b>".into()],
+            series,
+        });
+        for text in [
+            "a &amp; b",
+            "period <b>1 ms",
+            "no &lt;b&gt;",
+            "&lt;other&gt;",
+            "<td>1234",
+            "90\u{202f}003",
+        ] {
             assert!(html.contains(text), "{text} is not in {html}");
         }
         assert!(
@@ -126,10 +156,19 @@ mod tests {
 
     #[test]
     fn nothing_measured_is_a_page() {
-        let empty = LatencySeries { name: "tandem".into(), ..LatencySeries::default() };
+        let empty = LatencySeries {
+            name: "tandem".into(),
+            ..LatencySeries::default()
+        };
         for series in [vec![], vec![empty], vec![series("tandem", &[0, 0])]] {
-            let html = page(&LatencyReport { series, ..LatencyReport::default() });
-            assert!(html.contains("</svg>") && !html.contains("NaN") && !html.contains("inf"), "{html}");
+            let html = page(&LatencyReport {
+                series,
+                ..LatencyReport::default()
+            });
+            assert!(
+                html.contains("</svg>") && !html.contains("NaN") && !html.contains("inf"),
+                "{html}"
+            );
         }
     }
 }

@@ -48,7 +48,11 @@ pub enum Ended {
 impl Report {
     /// How far sample `i` may lie from the path, mm, where something was promised.
     pub(crate) fn tolerance_at_mm(&self, i: usize) -> Option<f64> {
-        let each = self.samples.tolerance_mm.as_ref().and_then(|each| each.get(i));
+        let each = self
+            .samples
+            .tolerance_mm
+            .as_ref()
+            .and_then(|each| each.get(i));
         each.copied().or(self.path_tolerance_mm)
     }
 

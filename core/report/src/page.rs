@@ -53,7 +53,11 @@ fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> i
         "style" => STYLE.into(),
         "script" => SCRIPTS.concat(),
         "about" => about(report, derived)?,
-        "columns" => return derived.columns(report).try_for_each(|column| column.write(out)),
+        "columns" => {
+            return derived
+                .columns(report)
+                .try_for_each(|column| column.write(out));
+        }
         unknown => unreachable!("the template has an unknown gap {unknown}"),
     };
     out.write_all(text.as_bytes())
@@ -89,22 +93,31 @@ struct AboutSignal<'a> {
 
 /// The JSON of [`About`], with `<` written so that it cannot end the element it stands in.
 fn about(report: &Report, derived: &Derived) -> io::Result<String> {
-    let axes = report.axes.iter().zip(&derived.centres).map(|(axis, &centre)| AboutAxis {
-        letter: axis.letter.into(),
-        unit: axis.unit.as_str(),
-        linear: axis.unit == Unit::Mm,
-        centre,
-        max_velocity: axis.max_velocity,
-        max_acceleration: axis.max_acceleration,
-        max_jerk: axis.max_jerk,
-        speed_difference: axis.speed_difference,
+    let axes = report
+        .axes
+        .iter()
+        .zip(&derived.centres)
+        .map(|(axis, &centre)| AboutAxis {
+            letter: axis.letter.into(),
+            unit: axis.unit.as_str(),
+            linear: axis.unit == Unit::Mm,
+            centre,
+            max_velocity: axis.max_velocity,
+            max_acceleration: axis.max_acceleration,
+            max_jerk: axis.max_jerk,
+            speed_difference: axis.speed_difference,
+        });
+    let signals = report.signals.iter().map(|signal| AboutSignal {
+        name: &signal.name,
+        unit: &signal.unit,
     });
-    let signals = report.signals.iter().map(|signal| AboutSignal { name: &signal.name, unit: &signal.unit });
     let about = About {
         axes: axes.collect(),
         signals: signals.collect(),
         // A line in the plot stands for one tolerance only.
-        path_tolerance_mm: report.path_tolerance_mm.filter(|_| report.samples.tolerance_mm.is_none()),
+        path_tolerance_mm: report
+            .path_tolerance_mm
+            .filter(|_| report.samples.tolerance_mm.is_none()),
         jerk_is_judged: report.jerk_is_judged,
         binding: binding::NAMES,
     };
@@ -121,9 +134,18 @@ mod tests {
             title: "<b>title</b>".into(),
             program: "a<script>alert(1)</script>.ngc".into(),
             facts: vec![("a<b".into(), "c&d".into())],
-            axes: vec![Axis { letter: 'X', max_velocity: 1.0, max_acceleration: 1.0, ..Axis::default() }],
+            axes: vec![Axis {
+                letter: 'X',
+                max_velocity: 1.0,
+                max_acceleration: 1.0,
+                ..Axis::default()
+            }],
             fine_period_s: 0.001,
-            signals: vec![Signal { name: "</script>".into(), unit: "%".into(), values: vec![0.0; n] }],
+            signals: vec![Signal {
+                name: "</script>".into(),
+                unit: "%".into(),
+                values: vec![0.0; n],
+            }],
             samples: Samples {
                 t_s: (0..n).map(|i| i as f64 * 0.001).collect(),
                 line: vec![0; n],
@@ -144,7 +166,10 @@ mod tests {
     #[test]
     fn text_is_escaped_everywhere() {
         let html = html(&report(3), MAX_SAMPLES);
-        assert!(html.contains("&lt;b&gt;title") && html.contains("a&lt;script&gt;alert(1)&lt;/script&gt;.ngc"));
+        assert!(
+            html.contains("&lt;b&gt;title")
+                && html.contains("a&lt;script&gt;alert(1)&lt;/script&gt;.ngc")
+        );
         assert!(!html.contains("<b>title") && !html.contains("<script>alert"));
         assert!(html.contains(r#""name":"\u003c/script>""#));
         assert!(html.contains("<th>a&lt;b<td>c&amp;d"));
@@ -174,7 +199,13 @@ mod tests {
         odd.samples.sigma = vec![1.0; 2];
         let error = odd.write(&mut Vec::new()).unwrap_err();
         assert_eq!(error.to_string(), "a column has 2 samples, t_s has 3");
-        let still = Report { fine_period_s: 0.0, ..report(3) };
-        assert_eq!(still.write(&mut Vec::new()).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        let still = Report {
+            fine_period_s: 0.0,
+            ..report(3)
+        };
+        assert_eq!(
+            still.write(&mut Vec::new()).unwrap_err().kind(),
+            io::ErrorKind::InvalidInput
+        );
     }
 }

@@ -9,9 +9,19 @@ use crate::text::{count, escape, number};
 
 /// The summary as rows of a table.
 pub(crate) fn facts(report: &Report, derived: &Derived) -> String {
-    let row = |(name, value): &(String, String)| format!("<tr><th>{}<td>{}", escape(name), escape(value));
-    let binds = ("what binds, of the time in motion".to_string(), derived.binding.words());
-    report.facts.iter().chain([&binds]).map(row).collect::<Vec<_>>().concat()
+    let row =
+        |(name, value): &(String, String)| format!("<tr><th>{}<td>{}", escape(name), escape(value));
+    let binds = (
+        "what binds, of the time in motion".to_string(),
+        derived.binding.words(),
+    );
+    report
+        .facts
+        .iter()
+        .chain([&binds])
+        .map(row)
+        .collect::<Vec<_>>()
+        .concat()
 }
 
 /// Per axis the peaks, as rows of a table, with the part of the limit that they use.
@@ -19,10 +29,24 @@ pub(crate) fn peaks(report: &Report, derived: &Derived) -> String {
     let mut rows = String::new();
     for (axis, motion) in report.axes.iter().zip(&derived.motions) {
         let unit = axis.unit.as_str();
-        let _ = write!(rows, "<tr><th>{}<small>{unit}</small>", escape(&axis.letter.to_string()));
+        let _ = write!(
+            rows,
+            "<tr><th>{}<small>{unit}</small>",
+            escape(&axis.letter.to_string())
+        );
         rows += &usage(peak(&motion.velocity), Some(axis.max_velocity), 1e-6, true);
-        rows += &usage(peak(&motion.acceleration), Some(axis.max_acceleration), 1e-6, axis.speed_difference == 0.0);
-        rows += &usage(peak(&motion.jerk), axis.max_jerk, 1e-2, report.jerk_is_judged);
+        rows += &usage(
+            peak(&motion.acceleration),
+            Some(axis.max_acceleration),
+            1e-6,
+            axis.speed_difference == 0.0,
+        );
+        rows += &usage(
+            peak(&motion.jerk),
+            axis.max_jerk,
+            1e-2,
+            report.jerk_is_judged,
+        );
         if steps_are_allowed(&report.axes) {
             rows += &usage(motion.max_step, Some(axis.speed_difference), 1e-6, true);
         }
@@ -32,7 +56,11 @@ pub(crate) fn peaks(report: &Report, derived: &Derived) -> String {
 
 /// The heading of [`peaks`].
 pub(crate) fn peaks_head(report: &Report) -> String {
-    let step = if steps_are_allowed(&report.axes) { "<th>step /s" } else { "" };
+    let step = if steps_are_allowed(&report.axes) {
+        "<th>step /s"
+    } else {
+        ""
+    };
     format!("<tr><th>axis<th>velocity /s<th>acceleration /s²<th>jerk /s³{step}")
 }
 
@@ -51,9 +79,17 @@ fn usage(value: f64, limit: Option<f64>, tolerance: f64, judged: bool) -> String
     let part = value / limit;
     // By the value itself: what is beyond the limit but within the tolerance is told so, and not as what keeps it.
     let (state, excess) = match part {
-        part if part > 1.0 + tolerance && judged => ("over", format!(", {:.2} % beyond", 100.0 * (part - 1.0))),
-        part if part > 1.0 + tolerance => ("above", format!(", {:.2} % beyond, not judged", 100.0 * (part - 1.0))),
-        part if part > 1.0 + ROUNDING => ("above", format!(", {:.2} % beyond, within tolerance", 100.0 * (part - 1.0))),
+        part if part > 1.0 + tolerance && judged => {
+            ("over", format!(", {:.2} % beyond", 100.0 * (part - 1.0)))
+        }
+        part if part > 1.0 + tolerance => (
+            "above",
+            format!(", {:.2} % beyond, not judged", 100.0 * (part - 1.0)),
+        ),
+        part if part > 1.0 + ROUNDING => (
+            "above",
+            format!(", {:.2} % beyond, within tolerance", 100.0 * (part - 1.0)),
+        ),
         _ => ("", String::new()),
     };
     let width = (part * 100.0).clamp(0.0, 100.0);
@@ -84,8 +120,11 @@ pub(crate) fn findings(derived: &Derived) -> String {
         );
     }
     if derived.findings.unlisted > 0 {
-        let _ =
-            write!(rows, "<tr><td colspan=\"6\">and {} more, marked in the plots", count(derived.findings.unlisted));
+        let _ = write!(
+            rows,
+            "<tr><td colspan=\"6\">and {} more, marked in the plots",
+            count(derived.findings.unlisted)
+        );
     }
     rows
 }

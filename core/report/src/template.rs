@@ -47,6 +47,8 @@ pub(crate) fn write_plain(
 
 /// Names and values in a row.
 pub(crate) fn facts(facts: &[(String, String)]) -> String {
-    let one = |(name, value): &(String, String)| format!("<span>{} <b>{}</b></span>", escape(name), escape(value));
+    let one = |(name, value): &(String, String)| {
+        format!("<span>{} <b>{}</b></span>", escape(name), escape(value))
+    };
     facts.iter().map(one).collect()
 }

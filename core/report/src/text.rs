@@ -24,7 +24,11 @@ pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs().max(1e-9).log10().floor() as i32;
     let decimals = (3 - magnitude).clamp(0, 6) as usize;
     let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
     group(if text == "-0" { "0" } else { text })
 }
 
@@ -40,7 +44,10 @@ fn group(text: &str) -> String {
     if end - start < 5 {
         return grouped;
     }
-    for place in (start + 1..end).rev().filter(|place| (end - place).is_multiple_of(3)) {
+    for place in (start + 1..end)
+        .rev()
+        .filter(|place| (end - place).is_multiple_of(3))
+    {
         grouped.insert(place, '\u{202f}');
     }
     grouped

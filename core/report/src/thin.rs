@@ -10,7 +10,13 @@ pub(crate) struct Thinning {
 impl Thinning {
     /// The thinning that leaves at most `cap` of `samples` (rounded up to whole slices).
     pub(crate) fn new(samples: usize, cap: usize) -> Self {
-        Self { slice: if samples > cap { (2 * samples).div_ceil(cap).max(3) } else { 1 } }
+        Self {
+            slice: if samples > cap {
+                (2 * samples).div_ceil(cap).max(3)
+            } else {
+                1
+            },
+        }
     }
 
     /// Samples in a slice, or `None` where nothing is thinned.
@@ -30,7 +36,10 @@ impl Thinning {
     pub(crate) fn picks<T: Copy>(self, values: &[T]) -> Vec<T> {
         match self.slice() {
             None => values.to_vec(),
-            Some(slice) => values.chunks(slice).flat_map(|part| [part[0], part[part.len() / 2]]).collect(),
+            Some(slice) => values
+                .chunks(slice)
+                .flat_map(|part| [part[0], part[part.len() / 2]])
+                .collect(),
         }
     }
 
@@ -38,7 +47,10 @@ impl Thinning {
     pub(crate) fn marks(self, marks: &[u8]) -> Vec<u8> {
         match self.slice() {
             None => marks.to_vec(),
-            Some(slice) => marks.chunks(slice).flat_map(|part| [part.iter().fold(0, |all, m| all | m); 2]).collect(),
+            Some(slice) => marks
+                .chunks(slice)
+                .flat_map(|part| [part.iter().fold(0, |all, m| all | m); 2])
+                .collect(),
         }
     }
 }

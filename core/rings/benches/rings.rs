@@ -23,7 +23,10 @@ fn sample(bencher: Bencher) {
 #[divan::bench]
 fn segment(bencher: Bencher) {
     let (mut rough, mut fine, _host) = bridge(Sizes::default());
-    let queued = Queued::Segment { start_s: 0.0, segment: Segment::rest(&AxisVector::ZERO, 0.001) };
+    let queued = Queued::Segment {
+        start_s: 0.0,
+        segment: Segment::rest(&AxisVector::ZERO, 0.001),
+    };
     bencher.bench_local(|| {
         rough.segments.push(black_box(queued)).unwrap();
         fine.segments.pop().unwrap()

@@ -13,7 +13,9 @@ mod rest;
 mod sample;
 mod switched;
 
-pub use atomics::{AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
+pub use atomics::{
+    AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period,
+};
 pub use controls::{Controls, JogControls, JointStatus, SpindleStatus, Status};
 pub use counts::Counts;
 pub use operator_inputs::OperatorInputs;
@@ -75,7 +77,10 @@ impl Sizes {
 impl Default for Sizes {
     /// 4096 segments (3 MB); 4096 samples hold 4 s of a recorder that is not looking.
     fn default() -> Self {
-        Self { segments: Self::SEGMENTS[0], samples: 4096 }
+        Self {
+            segments: Self::SEGMENTS[0],
+            samples: 4096,
+        }
     }
 }
 
@@ -151,15 +156,23 @@ pub fn bridge(sizes: Sizes) -> (RoughEnd, FineEnd, HostEnd) {
 }
 
 /// Makes the bridge between the loops of one job among several, which share `controls` and `status`. Allocates for good.
-pub fn bridge_with(sizes: Sizes, controls: Arc<Controls>, status: Arc<Status>) -> (RoughEnd, FineEnd, HostEnd) {
+pub fn bridge_with(
+    sizes: Sizes,
+    controls: Arc<Controls>,
+    status: Arc<Status>,
+) -> (RoughEnd, FineEnd, HostEnd) {
     let (segments_in, segments_out) = RingBuffer::new(sizes.segments);
     let (ratios_in, ratios_out) = RingBuffer::new(64);
     let (samples_in, samples_out) = sample_ring(sizes.samples);
     let (requests_in, requests_out) = RingBuffer::new(8);
     let (rests_in, rests_out) = RingBuffer::new(8);
     let depth = Arc::<Depth>::default();
-    let rough =
-        RoughEnd { segments: segments_in, rests: rests_out, depth: Arc::clone(&depth), status: Arc::clone(&status) };
+    let rough = RoughEnd {
+        segments: segments_in,
+        rests: rests_out,
+        depth: Arc::clone(&depth),
+        status: Arc::clone(&status),
+    };
     let fine = FineEnd {
         segments: segments_out,
         ratios: ratios_out,
@@ -170,5 +183,15 @@ pub fn bridge_with(sizes: Sizes, controls: Arc<Controls>, status: Arc<Status>) -
         status: Arc::clone(&status),
         samples: samples_in,
     };
-    (rough, fine, HostEnd { controls, status, samples: samples_out, ratios: ratios_in, requests: requests_in })
+    (
+        rough,
+        fine,
+        HostEnd {
+            controls,
+            status,
+            samples: samples_out,
+            ratios: ratios_in,
+            requests: requests_in,
+        },
+    )
 }

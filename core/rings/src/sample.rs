@@ -29,10 +29,18 @@ pub enum MachineState {
 impl MachineState {
     /// The state of a number, as [`crate::Status::state`] holds it.
     pub fn from_number(number: u32) -> Self {
-        [Self::Standstill, Self::Running, Self::Holding, Self::Starved, Self::Stopping, Self::Fault, Self::Disabled]
-            .into_iter()
-            .find(|s| *s as u32 == number)
-            .unwrap_or_default()
+        [
+            Self::Standstill,
+            Self::Running,
+            Self::Holding,
+            Self::Starved,
+            Self::Stopping,
+            Self::Fault,
+            Self::Disabled,
+        ]
+        .into_iter()
+        .find(|s| *s as u32 == number)
+        .unwrap_or_default()
     }
 
     /// The state's name as traces and people read it.

@@ -90,7 +90,8 @@ impl Braking {
 
     fn push(&mut self, stop: f64, until_s: f64) {
         let before = self.ends.back().map_or(self.passed, |(_, sum)| *sum);
-        self.ends.push_back((until_s, before + stop.min(Self::WHOLE_STOP)));
+        self.ends
+            .push_back((until_s, before + stop.min(Self::WHOLE_STOP)));
     }
 
     fn forget(&mut self, now_s: f64) {
@@ -102,13 +103,20 @@ impl Braking {
     /// The integral up to the last end that is not behind `at_s`.
     fn before(&self, at_s: f64) -> f64 {
         let count = self.ends.partition_point(|(until_s, _)| *until_s <= at_s);
-        if count == 0 { self.passed } else { self.ends[count - 1].1 }
+        if count == 0 {
+            self.passed
+        } else {
+            self.ends[count - 1].1
+        }
     }
 
     /// The integral up to the first end that is not before `at_s`.
     fn behind(&self, at_s: f64) -> f64 {
         let count = self.ends.partition_point(|(until_s, _)| *until_s < at_s);
-        self.ends.get(count).or(self.ends.back()).map_or(self.passed, |(_, sum)| *sum)
+        self.ends
+            .get(count)
+            .or(self.ends.back())
+            .map_or(self.passed, |(_, sum)| *sum)
     }
 }
 
@@ -131,7 +139,8 @@ impl QueueDepth {
             ramps: SlidingMax::default(),
             braking: Braking::default(),
             dense: SlidingMax::default(),
-            ends_s: vec![f64::NEG_INFINITY; most_entries_a_period(fine_period_s)].into_boxed_slice(),
+            ends_s: vec![f64::NEG_INFINITY; most_entries_a_period(fine_period_s)]
+                .into_boxed_slice(),
             next_end: 0,
             rough_period_s,
             fine_period_s,
@@ -159,13 +168,21 @@ impl QueueDepth {
         let at = |share: f64| segment.path_speed_mm_per_s(share * segment.duration_s);
         let speed = at(0.0).max(at(0.5)).max(at(1.0));
         self.speeds.push(speed, until_s);
-        self.decelerations.push(-segment.stop_deceleration_mm_per_s2, until_s);
+        self.decelerations
+            .push(-segment.stop_deceleration_mm_per_s2, until_s);
         let stop_s = speed / segment.stop_deceleration_mm_per_s2;
         if speed > 0.0 {
             self.stops.push(stop_s, until_s);
         }
         let rests = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
-        self.braking.push(if rests { Braking::WHOLE_STOP } else { segment.duration_s / stop_s }, until_s);
+        self.braking.push(
+            if rests {
+                Braking::WHOLE_STOP
+            } else {
+                segment.duration_s / stop_s
+            },
+            until_s,
+        );
         // Without a jerk limit both bounds are infinite.
         let ramp_s = segment.max_sigma_rate_per_s / segment.max_sigma_acceleration_per_s2;
         if ramp_s > 0.0 {
@@ -195,7 +212,9 @@ impl QueueDepth {
 
     /// Highest rate of program time at which no more entries come in a fine period than the fine loop looks at.
     pub fn rate_for_entries(&self) -> f64 {
-        self.dense.max().map_or(1.0, |negative| (-negative).max(LEAST_RATE))
+        self.dense
+            .max()
+            .map_or(1.0, |negative| (-negative).max(LEAST_RATE))
     }
 
     /// Highest rate of program time from which the machine comes to rest between `now_s` and `wall_s`, where the queue gets
@@ -205,7 +224,9 @@ impl QueueDepth {
         let late_s = (SERVED_FOR_PERIODS + 1.0) * self.rough_period_s + 3.0 * self.fine_period_s;
         let before_s = late_s + 2.0 * self.stop_ramp_s() / STOP_JERK_SHARE;
         let end = self.braking.before(wall_s);
-        let fits = |rate: f64| end - self.braking.behind(now_s + rate * before_s) >= rate * rate / (2.0 * STOP_SHARE);
+        let fits = |rate: f64| {
+            end - self.braking.behind(now_s + rate * before_s) >= rate * rate / (2.0 * STOP_SHARE)
+        };
         if fits(1.0) {
             return 1.0;
         }
@@ -219,7 +240,9 @@ impl QueueDepth {
 
     /// Smallest stop deceleration queued, mm/s²; infinite where nothing moves.
     pub fn stop_deceleration_mm_per_s2(&self) -> f64 {
-        self.decelerations.max().map_or(f64::INFINITY, |negative| -negative)
+        self.decelerations
+            .max()
+            .map_or(f64::INFINITY, |negative| -negative)
     }
 
     /// Longest stop of a segment queued from its own speed with its own deceleration, s. On its path program time slows at
@@ -237,7 +260,10 @@ impl QueueDepth {
     /// Program time that must be queued, s: the worst stop `v/a_s + a_s/J` and two rough periods. Of highest speed over least
     /// deceleration and the longest of single segments the shorter one counts.
     pub fn required_s(&self) -> f64 {
-        let worst_s = self.speeds.max().map_or(0.0, |v| v / self.stop_deceleration_mm_per_s2());
+        let worst_s = self
+            .speeds
+            .max()
+            .map_or(0.0, |v| v / self.stop_deceleration_mm_per_s2());
         let worst_s = worst_s.min(self.stop_s()) / STOP_SHARE;
         self.factor * (worst_s + self.stop_ramp_s() / STOP_JERK_SHARE) + 2.0 * self.rough_period_s
     }
@@ -280,9 +306,16 @@ mod tests {
         let mut stops = vec![];
         for piece in 0..pieces {
             let phase = f64::from(piece) * 0.05;
-            let (speed, deceleration) = (30.0 + 25.0 * phase.sin(), 100.0 * 10f64.powf((1.7 * phase).cos()));
+            let (speed, deceleration) = (
+                30.0 + 25.0 * phase.sin(),
+                100.0 * 10f64.powf((1.7 * phase).cos()),
+            );
             depth.push(
-                &Segment { duration_s: 0.002, flags: SegmentFlags::default(), ..level(speed, deceleration) },
+                &Segment {
+                    duration_s: 0.002,
+                    flags: SegmentFlags::default(),
+                    ..level(speed, deceleration)
+                },
                 f64::from(piece + 1) * 0.002,
             );
             stops.push((f64::from(piece + 1) * 0.002, deceleration / speed));
@@ -300,7 +333,9 @@ mod tests {
             let (mut sigma, mut now_s) = (rate, rate * (0.03 + 0.003));
             while sigma > 0.0 {
                 let place = stops.iter().find(|(until_s, _)| *until_s > now_s);
-                let Some((_, rate_per_s)) = place else { panic!("{pieces}: {sigma} of {rate} is left at the wall") };
+                let Some((_, rate_per_s)) = place else {
+                    panic!("{pieces}: {sigma} of {rate} is left at the wall")
+                };
                 now_s += sigma * 1e-5;
                 sigma -= STOP_SHARE * rate_per_s * 1e-5;
             }
@@ -316,7 +351,10 @@ mod tests {
         assert_eq!(depth.rate_for_entries(), 1.0);
         let most = most_entries_a_period(0.001);
         for entry in 1..=2 * most {
-            depth.push(&level(50.0, 100.0), 1.0 + entry as f64 * 0.0005 / most as f64);
+            depth.push(
+                &level(50.0, 100.0),
+                1.0 + entry as f64 * 0.0005 / most as f64,
+            );
         }
         assert!((depth.rate_for_entries() - 0.5).abs() < 1e-6);
         depth.passed(1.1);

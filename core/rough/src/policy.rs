@@ -98,8 +98,12 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
         let blocks = items.iter_mut().filter(|item| is_block(item)).take(count);
         for (index, item) in blocks.enumerate() {
             let (block, curve) = block_of(item);
-            let Some(tuned) = policy.tuned(index, block, curve) else { continue };
-            let Item::Block(facts, _) = item else { continue };
+            let Some(tuned) = policy.tuned(index, block, curve) else {
+                continue;
+            };
+            let Item::Block(facts, _) = item else {
+                continue;
+            };
             facts.time_constant_s = tuned.time_constant_s;
             facts.path_tolerance_mm = tuned.path_tolerance_mm;
             facts.feed_cap_mm_per_s = tuned.feed_cap_mm_per_s;

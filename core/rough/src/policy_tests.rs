@@ -23,11 +23,18 @@ impl BlockPolicy for Recorder {
 
     fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
         let window = std::mem::take(&mut self.window);
-        self.seen.lock().unwrap().push((window, next.map(|(block, _)| block.index)));
+        self.seen
+            .lock()
+            .unwrap()
+            .push((window, next.map(|(block, _)| block.index)));
     }
 
     fn tuned(&mut self, index: usize, block: &Block, _curve: Option<Curve<'_>>) -> Option<Block> {
-        Some(Block { feed_cap_mm_per_s: index as f64, line: 999, ..*block })
+        Some(Block {
+            feed_cap_mm_per_s: index as f64,
+            line: 999,
+            ..*block
+        })
     }
 }
 
@@ -52,17 +59,42 @@ impl Source for Script {
 }
 
 fn block(index: u64) -> Item {
-    Item::Block(Block { kind: BlockKind::Line, index, line: 1, ..Block::at(AxisVector::ZERO) }, None)
+    Item::Block(
+        Block {
+            kind: BlockKind::Line,
+            index,
+            line: 1,
+            ..Block::at(AxisVector::ZERO)
+        },
+        None,
+    )
 }
 
 fn probe(index: u64) -> Item {
-    let stop_on = StopOn { edge: Edge::Rising, ..StopOn::default() };
-    Item::Block(Block { kind: BlockKind::Line, index, stop_on, ..Block::at(AxisVector::ZERO) }, None)
+    let stop_on = StopOn {
+        edge: Edge::Rising,
+        ..StopOn::default()
+    };
+    Item::Block(
+        Block {
+            kind: BlockKind::Line,
+            index,
+            stop_on,
+            ..Block::at(AxisVector::ZERO)
+        },
+        None,
+    )
 }
 
 fn wait() -> Item {
     let (input, mode) = (Input::Digital(0), InputMode::High);
-    Item::Wait(InputWait { line: 1, before_block: 0, input, mode, timeout_s: 1.0 })
+    Item::Wait(InputWait {
+        line: 1,
+        before_block: 0,
+        input,
+        mode,
+        timeout_s: 1.0,
+    })
 }
 
 fn tuned(script: Vec<Result<Vec<Item>, String>>) -> (Tuned<Script, Recorder>, Seen) {
@@ -85,20 +117,37 @@ fn drain(source: &mut impl Source) -> (Vec<Item>, Option<String>) {
 }
 
 fn windows(seen: &Seen) -> Vec<(usize, Option<u64>)> {
-    seen.lock().unwrap().iter().map(|(window, next)| (window.len(), *next)).collect()
+    seen.lock()
+        .unwrap()
+        .iter()
+        .map(|(window, next)| (window.len(), *next))
+        .collect()
 }
 
 #[test]
 fn windows_are_full_whatever_comes_at_once() {
     for at_once in [1, 7, 64, 65, 200] {
         let all: Vec<u64> = (0..150).collect();
-        let script = all.chunks(at_once).map(|chunk| Ok(chunk.iter().map(|i| block(*i)).collect())).collect();
+        let script = all
+            .chunks(at_once)
+            .map(|chunk| Ok(chunk.iter().map(|i| block(*i)).collect()))
+            .collect();
         let (mut source, seen) = tuned(script);
         let (items, error) = drain(&mut source);
-        assert_eq!(windows(&seen), [(64, Some(64)), (64, Some(128)), (22, None)], "{at_once} at once");
-        let caps = items.iter().map(|item| block_of(item).0).map(|b| (b.index, b.feed_cap_mm_per_s, b.line));
+        assert_eq!(
+            windows(&seen),
+            [(64, Some(64)), (64, Some(128)), (22, None)],
+            "{at_once} at once"
+        );
+        let caps = items
+            .iter()
+            .map(|item| block_of(item).0)
+            .map(|b| (b.index, b.feed_cap_mm_per_s, b.line));
         let expected = all.iter().map(|i| (*i, (*i % 64) as f64, 1));
-        assert!(caps.eq(expected) && error.is_none(), "only what a policy may change has changed");
+        assert!(
+            caps.eq(expected) && error.is_none(),
+            "only what a policy may change has changed"
+        );
     }
 }
 
@@ -132,12 +181,18 @@ fn nothing_for_now_ends_a_window() {
 fn blocks_before_an_error_are_handed_out_first() {
     let (mut source, seen) = tuned(vec![Ok(vec![block(0)]), Err("line 2: no".to_string())]);
     let (items, error) = drain(&mut source);
-    assert_eq!((items.len(), error.as_deref(), windows(&seen)), (1, Some("line 2: no"), vec![(1, None)]));
+    assert_eq!(
+        (items.len(), error.as_deref(), windows(&seen)),
+        (1, Some("line 2: no"), vec![(1, None)])
+    );
 }
 
 #[test]
 fn an_abort_drops_the_blocks_of_windows_to_come() {
-    let (mut source, seen) = tuned(vec![Ok((0..100).map(block).collect()), Ok(vec![block(100)])]);
+    let (mut source, seen) = tuned(vec![
+        Ok((0..100).map(block).collect()),
+        Ok(vec![block(100)]),
+    ]);
     source.next_items(&mut vec![]).unwrap();
     let rest = Rest {
         epoch: 0,
@@ -153,5 +208,8 @@ fn an_abort_drops_the_blocks_of_windows_to_come() {
     };
     assert!(source.provide_rest(&rest));
     let (items, _) = drain(&mut source);
-    assert_eq!((items.len(), windows(&seen)), (1, vec![(64, Some(64)), (1, None)]));
+    assert_eq!(
+        (items.len(), windows(&seen)),
+        (1, vec![(64, Some(64)), (1, None)])
+    );
 }

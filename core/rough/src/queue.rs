@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, Release};
 
 use tandem_rings::{Queued, Rest, RoughEnd};
-use tandem_sdk::{Block, BlockReport, Edge, Event, NurbsData, Segment, SegmentFlags, SegmentSink, StopOn};
+use tandem_sdk::{
+    Block, BlockReport, Edge, Event, NurbsData, Segment, SegmentFlags, SegmentSink, StopOn,
+};
 
 use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
@@ -81,7 +83,8 @@ impl Queue {
         self.epoch = rest.epoch + 1;
         self.seams.restart();
         self.path_start_mm = rest.path_mm;
-        (self.emitted_s, self.queued_s, self.ends_at_rest) = (rest.program_time_s, rest.program_time_s, true);
+        (self.emitted_s, self.queued_s, self.ends_at_rest) =
+            (rest.program_time_s, rest.program_time_s, true);
         self.plan_rests = true;
         self.staged.clear();
         self.sent = 0;
@@ -98,7 +101,10 @@ impl Queue {
         while self.stops.front().is_some_and(|(index, _)| *index < block) {
             self.stops.pop_front();
         }
-        self.stops.front().filter(|(index, _)| *index == block).map_or(StopOn::default(), |(_, stop_on)| *stop_on)
+        self.stops
+            .front()
+            .filter(|(index, _)| *index == block)
+            .map_or(StopOn::default(), |(_, stop_on)| *stop_on)
     }
 
     /// Takes an event that belongs in front of a block still to come.
@@ -116,7 +122,11 @@ impl Queue {
     /// Tells `observer` of the blocks planned for good since the last look, and forgets them.
     pub fn tell_of_blocks(&mut self, observer: &mut dyn Observer) {
         for report in self.reported.drain(..) {
-            while let Some((block, curve)) = self.blocks.front().filter(|(block, _)| block.index <= report.block) {
+            while let Some((block, curve)) = self
+                .blocks
+                .front()
+                .filter(|(block, _)| block.index <= report.block)
+            {
                 if block.index == report.block {
                     observer.block(block, curve.as_deref().map(NurbsData::curve), &report);
                 }
@@ -173,8 +183,13 @@ impl Queue {
 
     /// Moves what is staged into the ring, as far as there is room.
     pub fn move_staged(&mut self) {
-        let (moved, _) = self.end.segments.push_partial_slice(&self.staged[self.sent..]);
-        let last = moved.iter().rfind(|queued| matches!(queued, Queued::Segment { .. }));
+        let (moved, _) = self
+            .end
+            .segments
+            .push_partial_slice(&self.staged[self.sent..]);
+        let last = moved
+            .iter()
+            .rfind(|queued| matches!(queued, Queued::Segment { .. }));
         if let Some(Queued::Segment { start_s, segment }) = last {
             self.queued_s = start_s + segment.duration_s;
             self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
@@ -196,15 +211,31 @@ impl Queue {
         self.depth.passed(now_s);
         let shared = &self.end.depth;
         let most_rate = self.depth.rate_for_entries();
-        let most_rate = if full { most_rate.min(self.depth.rate_for_wall(now_s, self.queued_s)) } else { most_rate };
+        let most_rate = if full {
+            most_rate.min(self.depth.rate_for_wall(now_s, self.queued_s))
+        } else {
+            most_rate
+        };
         shared.most_rate.store(most_rate);
         shared.full.store(full, Release);
-        shared.stop_deceleration_mm_per_s2.store(self.depth.stop_deceleration_mm_per_s2());
+        shared
+            .stop_deceleration_mm_per_s2
+            .store(self.depth.stop_deceleration_mm_per_s2());
         shared.stop_s.store(self.depth.stop_s());
         shared.stop_ramp_s.store(self.depth.stop_ramp_s());
-        shared.wall_s.store(if self.ends_at_rest { f64::INFINITY } else { self.queued_s });
-        shared.required_s.store(if over || full { 0.0 } else { self.depth.required_s() });
-        shared.served_for_s.store(SERVED_FOR_PERIODS * self.depth.rough_period_s());
+        shared.wall_s.store(if self.ends_at_rest {
+            f64::INFINITY
+        } else {
+            self.queued_s
+        });
+        shared.required_s.store(if over || full {
+            0.0
+        } else {
+            self.depth.required_s()
+        });
+        shared
+            .served_for_s
+            .store(SERVED_FOR_PERIODS * self.depth.rough_period_s());
         shared.served.fetch_add(1, Release);
     }
 
@@ -217,17 +248,32 @@ impl Queue {
 impl SegmentSink for Queue {
     fn segment(&mut self, segment: &Segment) {
         if !is_sound(segment) {
-            self.defect = Some("advance emits a segment with a number that is not finite, or a negative duration");
+            self.defect = Some(
+                "advance emits a segment with a number that is not finite, or a negative duration",
+            );
             return;
         }
-        while self.events.front().is_some_and(|event| event.before_block <= segment.block) {
-            let event = self.events.pop_front().unwrap_or_else(|| unreachable!("looked at above"));
+        while self
+            .events
+            .front()
+            .is_some_and(|event| event.before_block <= segment.block)
+        {
+            let event = self
+                .events
+                .pop_front()
+                .unwrap_or_else(|| unreachable!("looked at above"));
             self.stage_event(event);
         }
         let stop_on = self.stop_on(segment.block);
         // A segment is large: it is copied to its place, and marked there.
-        let staged = self.staged.push_mut(Queued::Segment { start_s: self.emitted_s, segment: *segment });
-        if let Queued::Segment { segment: marked, .. } = staged {
+        let staged = self.staged.push_mut(Queued::Segment {
+            start_s: self.emitted_s,
+            segment: *segment,
+        });
+        if let Queued::Segment {
+            segment: marked, ..
+        } = staged
+        {
             (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
             marked.path[0] += self.path_start_mm;
             if self.seams.steps_at(segment) {
@@ -241,8 +287,15 @@ impl SegmentSink for Queue {
 
     fn block(&mut self, report: &BlockReport) {
         let first = self.reported.last().map_or(0, |last| last.block + 1);
-        let place = self.blocks.front().map_or(0, |(front, _)| report.block.wrapping_sub(front.index) as usize);
-        if report.block >= first && self.blocks.get(place).is_some_and(|(block, _)| block.index == report.block) {
+        let place = self.blocks.front().map_or(0, |(front, _)| {
+            report.block.wrapping_sub(front.index) as usize
+        });
+        if report.block >= first
+            && self
+                .blocks
+                .get(place)
+                .is_some_and(|(block, _)| block.index == report.block)
+        {
             self.reported.push(*report);
         } else {
             self.defect = Some("advance emits a report of a block that it was not given");

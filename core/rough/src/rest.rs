@@ -23,7 +23,10 @@ impl RoughLoop {
                 observer.rest(&rest);
             }
             if let Some(cause) = refusal(&rest) {
-                return Err(RoughError::Stop { line: rest.line, cause });
+                return Err(RoughError::Stop {
+                    line: rest.line,
+                    cause,
+                });
             }
             self.dry = !self.source.provide_rest(&rest) || self.dry;
         }
@@ -32,7 +35,12 @@ impl RoughLoop {
 
     /// After an abort nothing counts that has been read; behind an edge what is left of the line does, at the new place.
     fn forget(&mut self, rest: &Rest) {
-        (self.finished, self.stretch_over, self.done, self.edge_awaited) = (false, false, false, false);
+        (
+            self.finished,
+            self.stretch_over,
+            self.done,
+            self.edge_awaited,
+        ) = (false, false, false, false);
         if rest.cause == RestCause::Abort {
             (self.waiting, self.waited_s) = (None, 0.0);
             self.next = self.items.len();
@@ -50,12 +58,18 @@ impl RoughLoop {
 /// Why the run cannot go on from `rest`.
 fn refusal(rest: &Rest) -> Option<String> {
     let input = rest.stop_on.input;
-    let done = if rest.stop_on.edge == Edge::Rising { "tripped" } else { "released" };
+    let done = if rest.stop_on.edge == Edge::Rising {
+        "tripped"
+    } else {
+        "released"
+    };
     match rest.cause {
-        RestCause::Already => Some(format!("input {input} was already {done} when the motion began")),
-        RestCause::Missed if rest.stop_on.miss_is_fault != 0 => {
-            Some(format!("input {input} was not {done} before the motion ended"))
-        }
+        RestCause::Already => Some(format!(
+            "input {input} was already {done} when the motion began"
+        )),
+        RestCause::Missed if rest.stop_on.miss_is_fault != 0 => Some(format!(
+            "input {input} was not {done} before the motion ended"
+        )),
         _ => None,
     }
 }

@@ -50,9 +50,14 @@ impl RoughConfig {
     /// mm/s², and jerk, mm/s³. Called for each axis. Host.
     pub fn count_steps_of(&mut self, acceleration_mm_per_s2: f64, jerk_mm_per_s3: f64) {
         let period_s = self.fine_period_s;
-        let [acceleration, jerk] = [COUNTS[0] * acceleration_mm_per_s2, COUNTS[1] * jerk_mm_per_s3];
+        let [acceleration, jerk] = [
+            COUNTS[0] * acceleration_mm_per_s2,
+            COUNTS[1] * jerk_mm_per_s3,
+        ];
         let [of_velocity, of_acceleration] = &mut self.seam_rounding;
-        *of_velocity = of_velocity.min(acceleration * period_s).min(jerk * period_s * period_s);
+        *of_velocity = of_velocity
+            .min(acceleration * period_s)
+            .min(jerk * period_s * period_s);
         *of_acceleration = of_acceleration.min(jerk * period_s);
     }
 }
@@ -136,14 +141,23 @@ pub struct RoughLoop {
 
 impl RoughLoop {
     /// A rough loop at the start of its program.
-    pub fn new(config: RoughConfig, source: Box<dyn Source + Send>, planner: Box<dyn Planner>, end: RoughEnd) -> Self {
+    pub fn new(
+        config: RoughConfig,
+        source: Box<dyn Source + Send>,
+        planner: Box<dyn Planner>,
+        end: RoughEnd,
+    ) -> Self {
         Self {
             config,
             source,
             planner,
             queue: Queue::new(
                 end,
-                QueueDepth::new(config.rough_period_s, config.fine_period_s, config.depth_factor),
+                QueueDepth::new(
+                    config.rough_period_s,
+                    config.fine_period_s,
+                    config.depth_factor,
+                ),
                 Seams::new(config.seam_rounding),
             ),
             items: Vec::new(),
@@ -182,7 +196,11 @@ impl RoughLoop {
         self.queue.tell_of_blocks(observer);
         result?;
         self.answer_wait();
-        Ok(if self.done { Progress::Done } else { Progress::Working })
+        Ok(if self.done {
+            Progress::Done
+        } else {
+            Progress::Working
+        })
     }
 
     /// Whether the program waits for an input (M66), or its source for time to pass.
@@ -199,13 +217,18 @@ impl RoughLoop {
                 return Ok(());
             }
             let before_s = self.queue.emitted_s();
-            let advanced =
-                self.planner.advance(advance_s, &mut self.queue).map_err(|e| planner_error(None, &e.to_string()))?;
+            let advanced = self
+                .planner
+                .advance(advance_s, &mut self.queue)
+                .map_err(|e| planner_error(None, &e.to_string()))?;
             if let Some(defect) = self.queue.defect() {
                 return Err(planner_error(None, defect));
             }
             if advanced.done != 0 && !self.queue.plan_rests() {
-                return Err(planner_error(None, "advance says that it is done, and the plan does not end at rest"));
+                return Err(planner_error(
+                    None,
+                    "advance says that it is done, and the plan does not end at rest",
+                ));
             }
             self.stretch_over = advanced.done != 0;
             if self.stretch_over {
@@ -216,11 +239,17 @@ impl RoughLoop {
             // What came counts, not what the planner says of it.
             let emitted_s = self.queue.emitted_s() - before_s;
             if emitted_s == 0.0 && !self.finished {
-                return Err(planner_error(Some(self.line), "it is full, and advance emits nothing"));
+                return Err(planner_error(
+                    Some(self.line),
+                    "it is full, and advance emits nothing",
+                ));
             }
             short += u32::from(emitted_s < advance_s / 2.0);
             if short > MOST_SHORT_ADVANCES {
-                return Err(planner_error(None, "advance emits a little at a time, and hardly gets on"));
+                return Err(planner_error(
+                    None,
+                    "advance emits a little at a time, and hardly gets on",
+                ));
             }
         }
         Ok(())
@@ -230,7 +259,13 @@ impl RoughLoop {
     fn stretch_is_over(&mut self) {
         self.queue.release_events();
         if !self.awaits_answer() && self.dry {
-            self.queue.event(Event::new(EventKind::ProgramEnd, self.line, self.last_block + 1, 0, 0.0));
+            self.queue.event(Event::new(
+                EventKind::ProgramEnd,
+                self.line,
+                self.last_block + 1,
+                0,
+                0.0,
+            ));
             self.queue.release_events();
             self.done = true;
         }
@@ -244,8 +279,12 @@ impl RoughLoop {
                 Item::Block(block, curve) => {
                     self.line = block.line;
                     self.last_block = block.index;
-                    let accepted = self.planner.accept(block, curve.as_deref().map(NurbsData::curve));
-                    if accepted.map_err(|e| planner_error(Some(block.line), &e.to_string()))? == Accepted::Full {
+                    let accepted = self
+                        .planner
+                        .accept(block, curve.as_deref().map(NurbsData::curve));
+                    if accepted.map_err(|e| planner_error(Some(block.line), &e.to_string()))?
+                        == Accepted::Full
+                    {
                         return Ok(());
                     }
                     self.edge_awaited = block.stop_on.edge != Edge::None;
@@ -296,7 +335,10 @@ impl RoughLoop {
             }
             self.items.clear();
             self.next = 0;
-            let more = self.source.next_items(&mut self.items).map_err(RoughError::Program)?;
+            let more = self
+                .source
+                .next_items(&mut self.items)
+                .map_err(RoughError::Program)?;
             if self.items.is_empty() {
                 self.dry = !more;
                 return Ok(false);
@@ -326,7 +368,10 @@ fn at_line(line: Option<u32>) -> String {
 }
 
 fn planner_error(line: Option<u32>, cause: &str) -> RoughError {
-    RoughError::Planner { line, cause: cause.to_string() }
+    RoughError::Planner {
+        line,
+        cause: cause.to_string(),
+    }
 }
 
 /// The answer of an input now, if what is waited for is there. Edges are taken as levels: the machine was at rest

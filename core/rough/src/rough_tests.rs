@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_gcode::Item;
 use tandem_rings::{FineEnd, HostEnd, Rest, Sizes, bridge};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, Curve, Planner, PlannerDescription, PluginError, Segment, SegmentFlags,
-    SegmentSink,
+    Accepted, Advanced, AxisVector, Block, Curve, Planner, PlannerDescription, PluginError,
+    Segment, SegmentFlags, SegmentSink,
 };
 
 use super::*;
@@ -30,14 +30,25 @@ impl Planner for Fake {
     fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         Ok(())
     }
-    fn accept(&mut self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+    fn accept(
+        &mut self,
+        _block: &Block,
+        _curve: Option<Curve<'_>>,
+    ) -> Result<Accepted, PluginError> {
         Ok(Accepted::Accepted)
     }
     fn finish(&mut self) {}
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         self.calls.fetch_add(1, Relaxed);
         let (duration_s, done) = (self.emits)(duration_s, sink);
-        Ok(Advanced { duration_s, done: u32::from(done) })
+        Ok(Advanced {
+            duration_s,
+            done: u32::from(done),
+        })
     }
     fn reset(&mut self, _position: &AxisVector) {}
 }
@@ -63,10 +74,18 @@ fn with(emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
 
 fn with_ring(sizes: Sizes, emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
     let calls = Arc::new(AtomicU64::new(0));
-    let planner = Box::new(Fake { emits, calls: Arc::clone(&calls) });
+    let planner = Box::new(Fake {
+        emits,
+        calls: Arc::clone(&calls),
+    });
     let (rough, fine, host) = bridge(sizes);
     (
-        RoughLoop::new(RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S), Box::new(Over), planner, rough),
+        RoughLoop::new(
+            RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S),
+            Box::new(Over),
+            planner,
+            rough,
+        ),
         calls,
         (fine, host),
     )
@@ -81,7 +100,10 @@ fn piece(duration_s: f64, flags: SegmentFlags, sink: &mut dyn SegmentSink) {
 #[test]
 fn a_planner_that_says_it_emitted_and_did_not_is_named_within_one_period() {
     let (mut rough, calls, _ends) = with(|duration_s, _| (duration_s, false));
-    let error = rough.step(&mut ()).expect_err("nothing was emitted").to_string();
+    let error = rough
+        .step(&mut ())
+        .expect_err("nothing was emitted")
+        .to_string();
     assert!(error.contains("hardly gets on"), "{error}");
     assert!(calls.load(Relaxed) <= u64::from(MOST_SHORT_ADVANCES) + 1);
 }
@@ -89,7 +111,10 @@ fn a_planner_that_says_it_emitted_and_did_not_is_named_within_one_period() {
 #[test]
 fn a_planner_that_is_never_done_is_named_within_one_period() {
     let (mut rough, _, _ends) = with(|_, _| (0.0, false));
-    let error = rough.step(&mut ()).expect_err("it is never done").to_string();
+    let error = rough
+        .step(&mut ())
+        .expect_err("it is never done")
+        .to_string();
     assert!(error.contains("hardly gets on"), "{error}");
 }
 
@@ -99,7 +124,10 @@ fn a_plan_that_is_done_in_motion_is_refused() {
         piece(duration_s, SegmentFlags::default(), sink);
         (duration_s, true)
     });
-    let error = rough.step(&mut ()).expect_err("it ends in motion").to_string();
+    let error = rough
+        .step(&mut ())
+        .expect_err("it ends in motion")
+        .to_string();
     assert!(error.contains("does not end at rest"), "{error}");
 }
 
@@ -115,7 +143,9 @@ fn a_rough_period_asks_for_the_depth_and_for_no_more() {
     for period in 1..100 {
         rough.step(&mut ()).unwrap();
         assert_eq!(calls.swap(0, Relaxed), 0, "nothing was driven since");
-        host.status.program_time_s.store(f64::from(period) * ROUGH_PERIOD_S);
+        host.status
+            .program_time_s
+            .store(f64::from(period) * ROUGH_PERIOD_S);
         rough.step(&mut ()).unwrap();
         assert!(calls.swap(0, Relaxed) <= 2, "one period was driven");
     }
@@ -124,7 +154,10 @@ fn a_rough_period_asks_for_the_depth_and_for_no_more() {
 #[test]
 fn a_ring_that_gets_room_is_filled_in_the_same_period_and_said_to_be_full() {
     // Eight entries hold far less than the depth asks for, and one call emits more than has room beside what is there.
-    let sizes = Sizes { segments: 8, ..Sizes::default() };
+    let sizes = Sizes {
+        segments: 8,
+        ..Sizes::default()
+    };
     let (mut rough, calls, (mut fine, host)) = with_ring(sizes, |duration_s, sink| {
         (0..5).for_each(|_| piece(duration_s / 10.0, SegmentFlags::default(), sink));
         (duration_s / 2.0, false)
@@ -133,7 +166,9 @@ fn a_ring_that_gets_room_is_filled_in_the_same_period_and_said_to_be_full() {
     assert!(fine.depth.full.load(Relaxed));
     for period in 1..20 {
         calls.store(0, Relaxed);
-        host.status.program_time_s.store(f64::from(period) * 0.5 * ROUGH_PERIOD_S);
+        host.status
+            .program_time_s
+            .store(f64::from(period) * 0.5 * ROUGH_PERIOD_S);
         (0..5).for_each(|_| assert!(fine.segments.pop().is_ok()));
         rough.step(&mut ()).unwrap();
         assert_eq!(calls.load(Relaxed), 1);

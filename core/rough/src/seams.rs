@@ -17,7 +17,10 @@ pub struct Seams {
 impl Seams {
     /// Behind a rest.
     pub fn new(rounding: [f64; 2]) -> Self {
-        Self { end: None, rounding }
+        Self {
+            end: None,
+            rounding,
+        }
     }
 
     /// Behind a rest again.
@@ -36,7 +39,9 @@ impl Seams {
         }
         let start = derivatives(segment, 0.0);
         before.is_some_and(|end| {
-            let off = |n: usize| (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > self.rounding[n]);
+            let off = |n: usize| {
+                (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > self.rounding[n])
+            };
             off(0) || off(1)
         })
     }
@@ -61,19 +66,41 @@ mod tests {
     fn steps_are_found_where_segments_meet() {
         let mut seams = Seams::new(ROUNDING);
         // At its end the velocity is 4, the acceleration 8.
-        assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "after a rest nothing steps");
-        assert!(!seams.steps_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])), "it goes on");
+        assert!(
+            !seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
+            "after a rest nothing steps"
+        );
+        assert!(
+            !seams.steps_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])),
+            "it goes on"
+        );
         let end = derivatives(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
-        assert!(seams.steps_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])), "acceleration steps");
-        let end = derivatives(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
-        assert!(seams.steps_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])), "velocity steps");
+        assert!(
+            seams.steps_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])),
+            "acceleration steps"
+        );
+        let end = derivatives(
+            &segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0]),
+            0.5,
+        )
+        .map(|v| v[1]);
+        assert!(
+            seams.steps_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])),
+            "velocity steps"
+        );
         assert!(!seams.steps_at(&Segment::rest(&AxisVector::ZERO, 0.0)));
-        assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])), "nor behind a rest");
+        assert!(
+            !seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
+            "nor behind a rest"
+        );
         // What is rounding on fast machines is a part of what a slow one may.
         for (rounding, counts) in [(ROUNDING, false), ([1e-6, 3e-4], true)] {
             let mut seams = Seams::new(rounding);
             assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])));
-            assert_eq!(seams.steps_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])), counts);
+            assert_eq!(
+                seams.steps_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])),
+                counts
+            );
         }
     }
 }

@@ -20,7 +20,11 @@ impl SlidingMax {
 
     /// Forgets what ended before `now_s`.
     pub fn forget(&mut self, now_s: f64) {
-        while self.values.front().is_some_and(|(_, until_s)| *until_s < now_s) {
+        while self
+            .values
+            .front()
+            .is_some_and(|(_, until_s)| *until_s < now_s)
+        {
             self.values.pop_front();
         }
     }

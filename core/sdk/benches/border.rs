@@ -4,8 +4,8 @@
 
 use divan::{Bencher, black_box};
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, KinematicsContext, NoOptions,
-    PluginError, Setpoint,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics,
+    KinematicsContext, NoOptions, PluginError, Setpoint,
 };
 
 fn main() {
@@ -27,7 +27,11 @@ impl Driver for Counter {
         Ok(Attached::default())
     }
     #[inline]
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.0 += setpoint.tick;
         feedback.inputs = self.0;
         Ok(())
@@ -42,12 +46,23 @@ impl Driver for Counter {
 const CALLS: u32 = 1000;
 
 fn exchange(bencher: Bencher, driver: &mut dyn Driver) {
-    let (setpoint, mut feedback) = (Setpoint { tick: 1, ..Setpoint::default() }, Feedback::default());
-    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
-        for _ in 0..CALLS {
-            let _ = black_box(black_box(&mut *driver).exchange(black_box(&setpoint), black_box(&mut feedback)));
-        }
-    });
+    let (setpoint, mut feedback) = (
+        Setpoint {
+            tick: 1,
+            ..Setpoint::default()
+        },
+        Feedback::default(),
+    );
+    bencher
+        .counter(divan::counter::ItemsCount::new(CALLS))
+        .bench_local(|| {
+            for _ in 0..CALLS {
+                let _ = black_box(
+                    black_box(&mut *driver)
+                        .exchange(black_box(&setpoint), black_box(&mut feedback)),
+                );
+            }
+        });
 }
 
 /// The static call.
@@ -55,20 +70,34 @@ struct Called<T>(T);
 
 impl Called<Counter> {
     #[inline(never)]
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.0.exchange(setpoint, feedback)
     }
 }
 
 #[divan::bench]
 fn exchange_static(bencher: Bencher) {
-    let (setpoint, mut feedback) = (Setpoint { tick: 1, ..Setpoint::default() }, Feedback::default());
+    let (setpoint, mut feedback) = (
+        Setpoint {
+            tick: 1,
+            ..Setpoint::default()
+        },
+        Feedback::default(),
+    );
     let mut driver = Called(Counter::default());
-    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
-        for _ in 0..CALLS {
-            let _ = black_box(black_box(&mut driver).exchange(black_box(&setpoint), black_box(&mut feedback)));
-        }
-    });
+    bencher
+        .counter(divan::counter::ItemsCount::new(CALLS))
+        .bench_local(|| {
+            for _ in 0..CALLS {
+                let _ = black_box(
+                    black_box(&mut driver).exchange(black_box(&setpoint), black_box(&mut feedback)),
+                );
+            }
+        });
 }
 
 #[divan::bench]
@@ -79,7 +108,8 @@ fn exchange_dyn(bencher: Bencher) {
 
 #[divan::bench]
 fn exchange_plugin(bencher: Bencher) {
-    let plugin = tandem_sdk::local_plugin!(driver "counter" = |_: &NoOptions| Ok(Counter::default()));
+    let plugin =
+        tandem_sdk::local_plugin!(driver "counter" = |_: &NoOptions| Ok(Counter::default()));
     let mut driver = plugin.driver("").unwrap_or_else(|e| panic!("{e}"));
     exchange(bencher, driver.as_mut());
 }
@@ -108,21 +138,25 @@ impl Called<Swap> {
 
 fn to_joints(bencher: Bencher, kinematics: &dyn Kinematics) {
     let axes = AxisVector::from_slice(&[1.0, 2.0, 3.0]);
-    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
-        for _ in 0..CALLS {
-            black_box(black_box(kinematics).to_joints(black_box(&axes)));
-        }
-    });
+    bencher
+        .counter(divan::counter::ItemsCount::new(CALLS))
+        .bench_local(|| {
+            for _ in 0..CALLS {
+                black_box(black_box(kinematics).to_joints(black_box(&axes)));
+            }
+        });
 }
 
 #[divan::bench]
 fn to_joints_static(bencher: Bencher) {
     let (kinematics, axes) = (Called(Swap), AxisVector::from_slice(&[1.0, 2.0, 3.0]));
-    bencher.counter(divan::counter::ItemsCount::new(CALLS)).bench_local(|| {
-        for _ in 0..CALLS {
-            black_box(black_box(&kinematics).to_joints(black_box(&axes)));
-        }
-    });
+    bencher
+        .counter(divan::counter::ItemsCount::new(CALLS))
+        .bench_local(|| {
+            for _ in 0..CALLS {
+                black_box(black_box(&kinematics).to_joints(black_box(&axes)));
+            }
+        });
 }
 
 #[divan::bench]
@@ -133,8 +167,11 @@ fn to_joints_dyn(bencher: Bencher) {
 #[divan::bench]
 fn to_joints_plugin(bencher: Bencher) {
     let plugin = tandem_sdk::local_plugin!(kinematics "swap" = |_: &NoOptions, _: &KinematicsContext| Ok(Swap));
-    let axes = tandem_sdk::Axes::new(&[('X', false), ('Y', false)]).unwrap_or_else(|e| panic!("{e}"));
-    let kinematics = plugin.kinematics("", &KinematicsContext::new(axes)).unwrap_or_else(|e| panic!("{e}"));
+    let axes =
+        tandem_sdk::Axes::new(&[('X', false), ('Y', false)]).unwrap_or_else(|e| panic!("{e}"));
+    let kinematics = plugin
+        .kinematics("", &KinematicsContext::new(axes))
+        .unwrap_or_else(|e| panic!("{e}"));
     to_joints(bencher, kinematics.as_ref());
 }
 
@@ -153,7 +190,9 @@ fn a_panic_that_is_caught() {
     let plugin = tandem_sdk::local_plugin!(kinematics "panics" = |_: &NoOptions, _: &KinematicsContext| Ok(Panics));
     std::panic::set_hook(Box::new(|_| {}));
     let axes = tandem_sdk::Axes::new(&[('X', false)]).unwrap_or_else(|e| panic!("{e}"));
-    let kinematics = plugin.kinematics("", &KinematicsContext::new(axes)).unwrap_or_else(|e| panic!("{e}"));
+    let kinematics = plugin
+        .kinematics("", &KinematicsContext::new(axes))
+        .unwrap_or_else(|e| panic!("{e}"));
     black_box(kinematics.to_joints(&AxisVector::ZERO));
     let _ = std::panic::take_hook();
 }

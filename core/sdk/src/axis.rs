@@ -113,7 +113,11 @@ pub struct Axes {
     rotary: [bool; MAX_AXES],
 }
 
-layout!(Axes { count, letters, rotary });
+layout!(Axes {
+    count,
+    letters,
+    rotary
+});
 
 impl Axes {
     /// Axes from `(letter, rotary)` pairs; letters are upper case, one of `XYZABCUVW`.
@@ -122,12 +126,21 @@ impl Axes {
     /// More than [`MAX_AXES`] axes, none, an unknown letter or a letter used twice.
     pub fn new(axes: &[(char, bool)]) -> Result<Self, String> {
         if axes.is_empty() || axes.len() > MAX_AXES {
-            return Err(format!("a machine has 1 to {MAX_AXES} axes, not {}", axes.len()));
+            return Err(format!(
+                "a machine has 1 to {MAX_AXES} axes, not {}",
+                axes.len()
+            ));
         }
-        let mut this = Self { count: axes.len() as u32, letters: [0; MAX_AXES], rotary: [false; MAX_AXES] };
+        let mut this = Self {
+            count: axes.len() as u32,
+            letters: [0; MAX_AXES],
+            rotary: [false; MAX_AXES],
+        };
         for (index, (letter, rotary)) in axes.iter().enumerate() {
             if !"XYZABCUVW".contains(*letter) {
-                return Err(format!("no axis is called {letter}: the letters are X Y Z A B C U V W"));
+                return Err(format!(
+                    "no axis is called {letter}: the letters are X Y Z A B C U V W"
+                ));
             }
             if this.index(*letter).is_some() {
                 return Err(format!("axis {letter} appears twice"));
@@ -146,7 +159,9 @@ impl Axes {
 
     /// The index of the axis called `letter` (upper case).
     pub fn index(&self, letter: char) -> Option<usize> {
-        self.letters.iter().position(|l| *l != 0 && *l as char == letter)
+        self.letters
+            .iter()
+            .position(|l| *l != 0 && *l as char == letter)
     }
 
     /// The letter of axis `index`, upper case.
@@ -164,7 +179,9 @@ impl Axes {
     /// over the rotary ones (rad).
     pub fn path_length(&self, displacement: &AxisVector) -> f64 {
         let sum = |rotary: bool| -> f64 {
-            let squares = (0..self.count()).filter(|i| self.rotary[*i] == rotary).map(|i| displacement[i].powi(2));
+            let squares = (0..self.count())
+                .filter(|i| self.rotary[*i] == rotary)
+                .map(|i| displacement[i].powi(2));
             squares.sum::<f64>().sqrt()
         };
         let linear = sum(false);
@@ -179,14 +196,24 @@ mod tests {
     #[test]
     fn path_length_counts_linear_axes_first() {
         let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
-        assert_eq!(axes.path_length(&AxisVector::from_slice(&[3.0, 4.0, 9.0])), 5.0);
-        assert_eq!(axes.path_length(&AxisVector::from_slice(&[0.0, 0.0, -9.0])), 9.0);
+        assert_eq!(
+            axes.path_length(&AxisVector::from_slice(&[3.0, 4.0, 9.0])),
+            5.0
+        );
+        assert_eq!(
+            axes.path_length(&AxisVector::from_slice(&[0.0, 0.0, -9.0])),
+            9.0
+        );
     }
 
     #[test]
     fn axes_are_checked() {
         assert!(Axes::new(&[]).is_err());
-        assert!(Axes::new(&[('X', false), ('X', false)]).unwrap_err().contains("twice"));
+        assert!(
+            Axes::new(&[('X', false), ('X', false)])
+                .unwrap_err()
+                .contains("twice")
+        );
         assert!(Axes::new(&[('Q', false)]).unwrap_err().contains('Q'));
     }
 }

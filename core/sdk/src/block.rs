@@ -20,7 +20,13 @@ pub enum BlockKind {
     Dwell = 4,
 }
 
-layout_of_enum!(BlockKind { Rapid, Line, Arc, Nurbs, Dwell });
+layout_of_enum!(BlockKind {
+    Rapid,
+    Line,
+    Arc,
+    Nurbs,
+    Dwell
+});
 
 /// How exactly the path is to be followed where this block meets the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +38,10 @@ pub enum PathMode {
     ExactStop = 1,
 }
 
-layout_of_enum!(PathMode { Continuous, ExactStop });
+layout_of_enum!(PathMode {
+    Continuous,
+    ExactStop
+});
 
 /// A circular arc or helix. The plane is spanned by two axes; the turn from the first to the second is positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,7 +59,13 @@ pub struct ArcGeometry {
     pub sweep_rad: f64,
 }
 
-layout!(ArcGeometry { plane, center_mm, radius_mm, start_angle_rad, sweep_rad });
+layout!(ArcGeometry {
+    plane,
+    center_mm,
+    radius_mm,
+    start_angle_rad,
+    sweep_rad
+});
 
 /// The curve of a [`BlockKind::Nurbs`], of degree `degree` over the machine's axes, borrowed from who hands the block over.
 #[derive(Clone, Copy, Debug)]
@@ -199,7 +214,11 @@ impl Block {
     /// The feed that may be driven: the programmed feed under the policy's cap, mm/s. A programmed feed that is not a
     /// number stays none.
     pub fn command_feed_mm_per_s(&self) -> f64 {
-        if self.feed_cap_mm_per_s < self.feed_mm_per_s { self.feed_cap_mm_per_s } else { self.feed_mm_per_s }
+        if self.feed_cap_mm_per_s < self.feed_mm_per_s {
+            self.feed_cap_mm_per_s
+        } else {
+            self.feed_mm_per_s
+        }
     }
 
     /// Whether the machine must be at rest at the end of this block for the program's sake.
@@ -219,7 +238,10 @@ mod tests {
 
     #[test]
     fn motion_that_an_input_ends_stands_between_two_rests() {
-        let mut block = Block { kind: BlockKind::Line, ..Block::at(AxisVector::ZERO) };
+        let mut block = Block {
+            kind: BlockKind::Line,
+            ..Block::at(AxisVector::ZERO)
+        };
         assert!(!block.starts_at_rest() && !block.ends_at_rest());
         block.stop_on.edge = Edge::Rising;
         assert!(block.starts_at_rest() && block.ends_at_rest());

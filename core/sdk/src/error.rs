@@ -15,28 +15,48 @@ pub struct PluginError {
     panicked: u32,
 }
 
-layout!(PluginError { message, option, panicked });
+layout!(PluginError {
+    message,
+    option,
+    panicked
+});
 
 impl PluginError {
     /// A message made up at run time. Allocates: not for the fine loop.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::fixed(""), panicked: 0 }
+        Self {
+            message: Text::owned(message.into()),
+            option: Text::fixed(""),
+            panicked: 0,
+        }
     }
 
     /// A fixed message. Does not allocate.
     pub const fn fixed(message: &'static str) -> Self {
-        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: 0 }
+        Self {
+            message: Text::fixed(message),
+            option: Text::fixed(""),
+            panicked: 0,
+        }
     }
 
     /// What is wrong with the option `key`, a dotted path below `options`: the host adds where in `machine.toml` it
     /// was written. Allocates.
     pub fn of_option(key: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { message: Text::owned(message.into()), option: Text::owned(key.into()), panicked: 0 }
+        Self {
+            message: Text::owned(message.into()),
+            option: Text::owned(key.into()),
+            panicked: 0,
+        }
     }
 
     /// The words of a plugin that has panicked.
     pub(crate) const fn of_panic(message: &'static str) -> Self {
-        Self { message: Text::fixed(message), option: Text::fixed(""), panicked: 1 }
+        Self {
+            message: Text::fixed(message),
+            option: Text::fixed(""),
+            panicked: 1,
+        }
     }
 
     /// Whether the plugin has panicked, now or before.
@@ -72,7 +92,10 @@ mod tests {
 
     #[test]
     fn a_truth_value_of_another_side_that_is_neither_is_read_as_a_number() {
-        let error = PluginError { panicked: 7, ..PluginError::fixed("words") };
+        let error = PluginError {
+            panicked: 7,
+            ..PluginError::fixed("words")
+        };
         assert!(error.is_panic() && !PluginError::fixed("words").is_panic());
     }
 }

@@ -69,6 +69,14 @@ pub struct Event {
 impl Event {
     /// An event of `kind` on `line` that takes effect before block `before_block`.
     pub fn new(kind: EventKind, line: u32, before_block: u64, index: i32, value: f64) -> Self {
-        Self { kind, line, index, value, epoch: 0, before_block, program_time_s: f64::NAN }
+        Self {
+            kind,
+            line,
+            index,
+            value,
+            epoch: 0,
+            before_block,
+            program_time_s: f64::NAN,
+        }
     }
 }

@@ -18,7 +18,11 @@ pub struct JointLanes {
     weights: [AxisVector; MAX_AXES],
 }
 
-layout!(JointLanes { first, count, weights });
+layout!(JointLanes {
+    first,
+    count,
+    weights
+});
 
 impl JointLanes {
     /// Lanes behind `axes` axes, one for each of `weights`.
@@ -33,7 +37,11 @@ impl JointLanes {
             ));
         }
         let all = std::array::from_fn(|i| weights.get(i).copied().unwrap_or(AxisVector::ZERO));
-        Ok(Self { first: axes as u32, count: count as u32, weights: all })
+        Ok(Self {
+            first: axes as u32,
+            count: count as u32,
+            weights: all,
+        })
     }
 
     /// The entry of the first lane: the number of axes.
@@ -62,16 +70,29 @@ impl JointLanes {
     /// The limits of the axes alone, narrowed until every lane keeps its own in whatever way the axes move:
     /// `Σ |weight| · limit` of the axes is at most the limit of the lane, for each of them. Travel stays as it is.
     pub(crate) fn narrowed(&self, limits: &Limits) -> Limits {
-        let mut narrow = Limits { count: self.first, ..*limits };
+        let mut narrow = Limits {
+            count: self.first,
+            ..*limits
+        };
         for (lane, weights) in self.weights().iter().enumerate() {
             let of = &limits.axes[self.first() + lane];
             let weights = &weights.0[..self.first()];
             let axes = &mut narrow.axes[..self.first()];
-            share(axes, weights, of.feed_mm_per_s, |axis| &mut axis.feed_mm_per_s);
-            share(axes, weights, of.rapid_mm_per_s, |axis| &mut axis.rapid_mm_per_s);
-            share(axes, weights, of.acceleration_mm_per_s2, |axis| &mut axis.acceleration_mm_per_s2);
-            share(axes, weights, of.jerk_mm_per_s3, |axis| &mut axis.jerk_mm_per_s3);
-            share(axes, weights, of.speed_difference_mm_per_s, |axis| &mut axis.speed_difference_mm_per_s);
+            share(axes, weights, of.feed_mm_per_s, |axis| {
+                &mut axis.feed_mm_per_s
+            });
+            share(axes, weights, of.rapid_mm_per_s, |axis| {
+                &mut axis.rapid_mm_per_s
+            });
+            share(axes, weights, of.acceleration_mm_per_s2, |axis| {
+                &mut axis.acceleration_mm_per_s2
+            });
+            share(axes, weights, of.jerk_mm_per_s3, |axis| {
+                &mut axis.jerk_mm_per_s3
+            });
+            share(axes, weights, of.speed_difference_mm_per_s, |axis| {
+                &mut axis.speed_difference_mm_per_s
+            });
         }
         narrow
     }
@@ -93,9 +114,18 @@ impl JointLanes {
 /// Makes one limit of `axes` smaller until together they ask no more of a lane than `most`: each gets an equal part of it, and
 /// those that ask for less leave the rest to the others. Parts in proportion would leave an axis next to nothing beside one
 /// that is a thousand times as quick.
-fn share(axes: &mut [AxisLimits], weights: &[f64], most: f64, limit: fn(&mut AxisLimits) -> &mut f64) {
+fn share(
+    axes: &mut [AxisLimits],
+    weights: &[f64],
+    most: f64,
+    limit: fn(&mut AxisLimits) -> &mut f64,
+) {
     let mut asked = [0.0; MAX_AXES];
-    for (axis, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+    for (axis, weight) in weights
+        .iter()
+        .enumerate()
+        .filter(|(_, weight)| **weight != 0.0)
+    {
         asked[axis] = weight.abs() * *limit(&mut axes[axis]);
     }
     if asked.iter().sum::<f64>() <= most {
@@ -109,7 +139,11 @@ fn share(axes: &mut [AxisLimits], weights: &[f64], most: f64, limit: fn(&mut Axi
             part = (most - modest) / others as f64;
         }
     }
-    for (axis, weight) in weights.iter().enumerate().filter(|(axis, _)| asked[*axis] > part) {
+    for (axis, weight) in weights
+        .iter()
+        .enumerate()
+        .filter(|(axis, _)| asked[*axis] > part)
+    {
         *limit(&mut axes[axis]) = part / weight.abs();
     }
 }
@@ -152,30 +186,72 @@ mod tests {
     #[test]
     fn axes_share_what_a_lane_has() {
         let none = f64::INFINITY;
-        let all = limits(&[[250.0, none], [125.0, none], [40.0, none], [250.0, 1000.0], [400.0, none]]);
+        let all = limits(&[
+            [250.0, none],
+            [125.0, none],
+            [40.0, none],
+            [250.0, 1000.0],
+            [400.0, none],
+        ]);
         let narrow = belts().narrowed(&all);
-        let feeds: Vec<f64> = narrow.axes().iter().map(|axis| axis.feed_mm_per_s).collect();
+        let feeds: Vec<f64> = narrow
+            .axes()
+            .iter()
+            .map(|axis| axis.feed_mm_per_s)
+            .collect();
         assert_eq!(narrow.count, 3);
-        assert_eq!(feeds, [125.0, 125.0, 40.0], "equal parts, and an axis that no lane has a part of");
-        let jerks: Vec<f64> = narrow.axes().iter().map(|axis| axis.jerk_mm_per_s3).collect();
+        assert_eq!(
+            feeds,
+            [125.0, 125.0, 40.0],
+            "equal parts, and an axis that no lane has a part of"
+        );
+        let jerks: Vec<f64> = narrow
+            .axes()
+            .iter()
+            .map(|axis| axis.jerk_mm_per_s3)
+            .collect();
         assert_eq!(jerks, [500.0, 500.0, none]);
     }
 
     #[test]
     fn a_slow_axis_keeps_what_it_has_beside_a_quick_one() {
-        let all = limits(&[[14.0, 1e3], [27_000.0, 1e5], [40.0, 1e3], [7.0, 400.0], [23_000.0, 1e5]]);
+        let all = limits(&[
+            [14.0, 1e3],
+            [27_000.0, 1e5],
+            [40.0, 1e3],
+            [7.0, 400.0],
+            [23_000.0, 1e5],
+        ]);
         let narrow = belts().narrowed(&all);
-        let most: Vec<f64> = narrow.axes().iter().map(|axis| axis.acceleration_mm_per_s2).collect();
+        let most: Vec<f64> = narrow
+            .axes()
+            .iter()
+            .map(|axis| axis.acceleration_mm_per_s2)
+            .collect();
         assert_eq!(most[..2], [3.5, 3.5]);
-        let all = limits(&[[14.0, 1e3], [27_000.0, 1e5], [40.0, 1e3], [7014.0, 400.0], [23_000.0, 1e5]]);
+        let all = limits(&[
+            [14.0, 1e3],
+            [27_000.0, 1e5],
+            [40.0, 1e3],
+            [7014.0, 400.0],
+            [23_000.0, 1e5],
+        ]);
         let narrow = belts().narrowed(&all);
-        let most: Vec<f64> = narrow.axes().iter().map(|axis| axis.acceleration_mm_per_s2).collect();
+        let most: Vec<f64> = narrow
+            .axes()
+            .iter()
+            .map(|axis| axis.acceleration_mm_per_s2)
+            .collect();
         assert_eq!(most[..2], [14.0, 7000.0]);
     }
 
     #[test]
     fn a_vector_has_no_more_entries() {
         assert!(JointLanes::new(3, &[]).is_err());
-        assert!(JointLanes::new(7, &[AxisVector::ZERO; 2]).unwrap_err().contains('8'));
+        assert!(
+            JointLanes::new(7, &[AxisVector::ZERO; 2])
+                .unwrap_err()
+                .contains('8')
+        );
     }
 }

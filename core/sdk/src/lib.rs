@@ -36,8 +36,9 @@ mod text;
 pub use axis::{Axes, AxisVector, MAX_AXES};
 pub use block::{ArcGeometry, Block, BlockKind, Curve, NurbsData, PathMode};
 pub use driver::{
-    Arm, Attached, Driver, DriverContext, DriverDescription, Feedback, JointDescription, JointState, Latch, MAX_ANALOG,
-    MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_ENABLE_S, MAX_LATCHES, Name, Setpoint,
+    Arm, Attached, Driver, DriverContext, DriverDescription, Feedback, JointDescription,
+    JointState, Latch, MAX_ANALOG, MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_ENABLE_S, MAX_LATCHES, Name,
+    Setpoint,
 };
 pub use error::PluginError;
 pub use event::{Event, EventKind};
@@ -46,12 +47,15 @@ pub use lanes::JointLanes;
 pub use limits::{AxisLimits, Limits, PathLimits};
 pub use options::{NoOptions, OptionDoc, PluginOptions, RawOptions, parse_options};
 pub use planner::{
-    Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription, SegmentSink,
+    Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription,
+    SegmentSink,
 };
 pub use plugin::{Made, Plugin, PluginKind};
 pub use segment::{Edge, Segment, SegmentFlags, StopOn};
 pub use slice::Slice;
-pub use strategy::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window};
+pub use strategy::{
+    Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window,
+};
 pub use text::Words;
 
 #[doc(hidden)]

@@ -87,9 +87,17 @@ impl Limits {
         let last = axes
             .last()
             .filter(|_| axes.len() <= MAX_AXES)
-            .ok_or_else(|| format!("limits are given for 1 to {MAX_AXES} axes, not {}", axes.len()))?;
+            .ok_or_else(|| {
+                format!(
+                    "limits are given for 1 to {MAX_AXES} axes, not {}",
+                    axes.len()
+                )
+            })?;
         let all = std::array::from_fn(|i| *axes.get(i).unwrap_or(last));
-        Ok(Self { count: axes.len() as u32, axes: all })
+        Ok(Self {
+            count: axes.len() as u32,
+            axes: all,
+        })
     }
 
     /// The limits of the axes that exist, and behind them those of the joint lanes.
@@ -102,8 +110,13 @@ impl Limits {
     /// Axes that do not move do not limit; a direction of zero gives infinite limits. Joint lanes count like axes.
     pub fn along(&self, direction: &AxisVector) -> PathLimits {
         let smallest = |of: fn(&AxisLimits) -> f64| -> f64 {
-            let each = self.axes().iter().enumerate().filter(|(i, _)| direction[*i] != 0.0);
-            each.map(|(i, axis)| of(axis) / direction[i].abs()).fold(f64::INFINITY, f64::min)
+            let each = self
+                .axes()
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| direction[*i] != 0.0);
+            each.map(|(i, axis)| of(axis) / direction[i].abs())
+                .fold(f64::INFINITY, f64::min)
         };
         PathLimits {
             feed_mm_per_s: smallest(|a| a.feed_mm_per_s),

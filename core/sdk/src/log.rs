@@ -26,7 +26,11 @@ pub enum LogLevel {
     Error = 2,
 }
 
-layout_of_enum!(LogLevel { Info, Warning, Error });
+layout_of_enum!(LogLevel {
+    Info,
+    Warning,
+    Error
+});
 
 /// One line of the log.
 #[derive(Clone, Copy)]
@@ -38,12 +42,20 @@ pub struct LogRecord {
     text: Short<LOG_TEXT>,
 }
 
-layout!(LogRecord { level, source, text });
+layout!(LogRecord {
+    level,
+    source,
+    text
+});
 
 impl LogRecord {
     /// A record; a text that is too long is cut. Any loop; does not allocate.
     pub fn new(level: LogLevel, source: &str, text: fmt::Arguments<'_>) -> Self {
-        let mut this = Self { level: level as u32, source: Short::EMPTY, text: Short::EMPTY };
+        let mut this = Self {
+            level: level as u32,
+            source: Short::EMPTY,
+            text: Short::EMPTY,
+        };
         // A text that does not fit is an error of the formatter, and marked by it.
         let _ = this.source.write_str(source);
         let _ = this.text.write_fmt(text);
@@ -82,7 +94,10 @@ impl<const N: usize> Layout for Short<N> {
 const CUT: &str = "…";
 
 impl<const N: usize> Short<N> {
-    const EMPTY: Self = Self { length: 0, bytes: [0; N] };
+    const EMPTY: Self = Self {
+        length: 0,
+        bytes: [0; N],
+    };
 
     fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..self.length as usize).unwrap_or_default();
@@ -98,7 +113,9 @@ impl<const N: usize> Short<N> {
 
 impl<const N: usize> Write for Short<N> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        let Some(room) = N.checked_sub(CUT.len() + self.length as usize) else { return Err(fmt::Error) };
+        let Some(room) = N.checked_sub(CUT.len() + self.length as usize) else {
+            return Err(fmt::Error);
+        };
         if text.len() <= room {
             self.push(text);
             return Ok(());
@@ -120,7 +137,10 @@ table! {
 impl HostTable {
     /// A table whose `log` takes a record from any thread, the fine loop's included.
     pub const fn new(log: unsafe extern "C" fn(*const LogRecord)) -> Self {
-        Self { abi_version: crate::ABI_VERSION, log }
+        Self {
+            abi_version: crate::ABI_VERSION,
+            log,
+        }
     }
 }
 
@@ -161,10 +181,22 @@ mod tests {
 
     #[test]
     fn a_long_text_is_cut_at_a_character() {
-        let record = LogRecord::new(LogLevel::Info, "driver", format_args!("{}", "é".repeat(200)));
+        let record = LogRecord::new(
+            LogLevel::Info,
+            "driver",
+            format_args!("{}", "é".repeat(200)),
+        );
         assert_eq!(record.source(), "driver");
-        assert!(record.text().len() <= LOG_TEXT && record.text().ends_with("é…"), "{}", record.text());
-        let short = LogRecord::new(LogLevel::Error, "driver", format_args!("joint {} of {}", 1, 3));
+        assert!(
+            record.text().len() <= LOG_TEXT && record.text().ends_with("é…"),
+            "{}",
+            record.text()
+        );
+        let short = LogRecord::new(
+            LogLevel::Error,
+            "driver",
+            format_args!("joint {} of {}", 1, 3),
+        );
         assert_eq!(short.text(), "joint 1 of 3");
     }
 }

@@ -72,11 +72,19 @@ impl<'de> Deserializer<'de> for Asked {
         visitor.visit_some(self)
     }
 
-    fn deserialize_unit_struct<V: Visitor<'de>>(self, _: &'static str, _: V) -> Result<V::Value, Answer> {
+    fn deserialize_unit_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: V,
+    ) -> Result<V::Value, Answer> {
         Err(Answer("nothing".to_string()))
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Answer> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Answer> {
         visitor.visit_newtype_struct(self)
     }
 
@@ -127,7 +135,10 @@ mod tests {
     #[test]
     fn a_type_says_what_it_reads() {
         assert_eq!(values::<Junction>(), "\"axis\" | \"tangent\"");
-        assert!(matches!((Junction::Axis, Junction::Tangent), (Junction::Axis, Junction::Tangent)));
+        assert!(matches!(
+            (Junction::Axis, Junction::Tangent),
+            (Junction::Axis, Junction::Tangent)
+        ));
         assert_eq!(values::<Option<f64>>(), "number");
         assert_eq!(values::<u32>(), "whole number from 0");
         assert_eq!(values::<[f64; 3]>(), "list of 3");

@@ -42,9 +42,22 @@ pub(crate) struct OptionDocs {
 impl OptionDoc {
     /// The description of `key`, whose value is `default` where none is stated. `doc` are the lines of its comment.
     pub fn new<'de, T: Serialize + Deserialize<'de>>(key: &str, doc: &[&str], default: &T) -> Self {
-        let default = toml::Value::try_from(default).map(|value| value.to_string()).unwrap_or_default();
-        let doc = doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ").trim().to_string();
-        Self { key: key.to_string(), values: values::<T>(), default, doc }
+        let default = toml::Value::try_from(default)
+            .map(|value| value.to_string())
+            .unwrap_or_default();
+        let doc = doc
+            .iter()
+            .map(|line| line.trim())
+            .collect::<Vec<_>>()
+            .join(" ")
+            .trim()
+            .to_string();
+        Self {
+            key: key.to_string(),
+            values: values::<T>(),
+            default,
+            doc,
+        }
     }
 }
 
@@ -55,7 +68,12 @@ pub struct NoOptions;
 impl PluginOptions for NoOptions {
     fn read(options: &str) -> Result<Self, PluginError> {
         let table: toml::map::Map<String, toml::Value> = parse_options(options)?;
-        let unknown = |key: &String| Err(PluginError::of_option(key, "unknown: this plugin has no options"));
+        let unknown = |key: &String| {
+            Err(PluginError::of_option(
+                key,
+                "unknown: this plugin has no options",
+            ))
+        };
         table.keys().next().map_or(Ok(Self), unknown)
     }
 
@@ -84,7 +102,10 @@ impl PluginOptions for RawOptions {
 /// What is wrong and with which key, in the TOML reader's words.
 pub fn parse_options<T: DeserializeOwned>(options: &str) -> Result<T, PluginError> {
     toml::from_str(options).map_err(|error| {
-        let key = error.span().and_then(|span| key_at(options, span.start)).unwrap_or_default();
+        let key = error
+            .span()
+            .and_then(|span| key_at(options, span.start))
+            .unwrap_or_default();
         PluginError::of_option(key, error.message())
     })
 }
@@ -100,7 +121,9 @@ fn path_in(table: &DeTable<'_>, place: usize) -> Option<String> {
     table.iter().find_map(|(key, value)| {
         let inner = path_in_value(value.get_ref(), place);
         let here = key.span().contains(&place) || value.span().contains(&place);
-        inner.or(here.then(String::new)).map(|rest| format!(".{}{rest}", key.get_ref()))
+        inner
+            .or(here.then(String::new))
+            .map(|rest| format!(".{}{rest}", key.get_ref()))
     })
 }
 
@@ -109,7 +132,9 @@ fn path_in_value(value: &DeValue<'_>, place: usize) -> Option<String> {
         DeValue::Table(table) => path_in(table, place),
         DeValue::Array(elements) => elements.iter().enumerate().find_map(|(index, element)| {
             let inner = path_in_value(element.get_ref(), place);
-            inner.or(element.span().contains(&place).then(String::new)).map(|rest| format!("[{index}]{rest}"))
+            inner
+                .or(element.span().contains(&place).then(String::new))
+                .map(|rest| format!("[{index}]{rest}"))
         }),
         _ => None,
     }
@@ -189,9 +214,20 @@ mod tests {
 
     #[test]
     fn the_wrong_key_is_named_wherever_it_stands() {
-        let wrong = |text: &str| parse_options::<Nested>(text).unwrap_err().option().map(str::to_string);
-        assert_eq!(wrong("list = [{ size_mm = 1 }, { size_um = 2 }]").as_deref(), Some("list[1].size_um"));
-        assert_eq!(wrong("[[list]]\nsize_mm = \"big\"").as_deref(), Some("list[0].size_mm"));
+        let wrong = |text: &str| {
+            parse_options::<Nested>(text)
+                .unwrap_err()
+                .option()
+                .map(str::to_string)
+        };
+        assert_eq!(
+            wrong("list = [{ size_mm = 1 }, { size_um = 2 }]").as_deref(),
+            Some("list[1].size_um")
+        );
+        assert_eq!(
+            wrong("[[list]]\nsize_mm = \"big\"").as_deref(),
+            Some("list[0].size_mm")
+        );
         assert_eq!(wrong("lists = []").as_deref(), Some("lists"));
         assert_eq!(wrong("list = ["), None);
     }
@@ -200,6 +236,9 @@ mod tests {
     fn a_plugin_without_options_refuses_any() {
         assert_eq!(NoOptions::read(""), Ok(NoOptions));
         let error = NoOptions::read("depth_mm = 3").unwrap_err();
-        assert_eq!((error.option(), error.message()), (Some("depth_mm"), "unknown: this plugin has no options"));
+        assert_eq!(
+            (error.option(), error.message()),
+            (Some("depth_mm"), "unknown: this plugin has no options")
+        );
     }
 }

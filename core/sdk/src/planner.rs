@@ -45,8 +45,14 @@ impl PlannerContext {
     /// wastes what a joint has left: half of it on a `CoreXY` machine. Host and rough loop; does not allocate.
     #[must_use]
     pub fn axis_by_axis(&self) -> Self {
-        let limits = self.joint_lanes.map_or(self.limits, |lanes| lanes.narrowed(&self.limits));
-        Self { limits, joint_lanes: None, ..*self }
+        let limits = self
+            .joint_lanes
+            .map_or(self.limits, |lanes| lanes.narrowed(&self.limits));
+        Self {
+            limits,
+            joint_lanes: None,
+            ..*self
+        }
     }
 }
 
@@ -68,7 +74,13 @@ pub struct PlannerDescription {
     pub uses_time_constants: u32,
 }
 
-layout!(PlannerDescription { order, speed_difference_mm_per_s, breaks_limits, leaves_path, uses_time_constants });
+layout!(PlannerDescription {
+    order,
+    speed_difference_mm_per_s,
+    breaks_limits,
+    leaves_path,
+    uses_time_constants
+});
 
 impl PlannerDescription {
     /// A planner that keeps velocity and acceleration limits, continuous in velocity, on the path.
@@ -216,7 +228,11 @@ pub trait Planner: Send {
     ///
     /// # Errors
     /// A defect of the planner: the machine comes to a controlled stop and names it.
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError>;
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError>;
 
     /// Forgets everything; the machine rests at `position`. Path coordinates begin at zero again.
     fn reset(&mut self, position: &AxisVector);

@@ -4,8 +4,8 @@ use crate::abi::layout::layout_of_enum;
 use crate::abi::{self, Descriptor};
 use crate::options::OptionDocs;
 use crate::{
-    Driver, FeedStrategy, Kinematics, KinematicsContext, OptionDoc, Planner, PlannerContext, PluginError,
-    StrategyContext,
+    Driver, FeedStrategy, Kinematics, KinematicsContext, OptionDoc, Planner, PlannerContext,
+    PluginError, StrategyContext,
 };
 
 /// What a constructor gives: the plugin, or why it refuses to start.
@@ -25,11 +25,21 @@ pub enum PluginKind {
     Kinematics = 4,
 }
 
-layout_of_enum!(PluginKind { Planner, FeedStrategy, Driver, Kinematics });
+layout_of_enum!(PluginKind {
+    Planner,
+    FeedStrategy,
+    Driver,
+    Kinematics
+});
 
 impl PluginKind {
     /// All kinds.
-    pub const ALL: [Self; 4] = [Self::Planner, Self::FeedStrategy, Self::Driver, Self::Kinematics];
+    pub const ALL: [Self; 4] = [
+        Self::Planner,
+        Self::FeedStrategy,
+        Self::Driver,
+        Self::Kinematics,
+    ];
 
     /// The kind's name as people read it.
     pub fn name(self) -> &'static str {
@@ -65,7 +75,9 @@ impl Plugin {
 
     /// What it makes.
     pub fn kind(&self) -> PluginKind {
-        self.0.kind().unwrap_or_else(|| unreachable!("libraries with kinds of the future are refused"))
+        self.0
+            .kind()
+            .unwrap_or_else(|| unreachable!("libraries with kinds of the future are refused"))
     }
 
     /// Its options with their meaning and defaults.
@@ -74,7 +86,8 @@ impl Plugin {
     /// It cannot describe them, in its own words.
     pub fn options(&self) -> Result<Vec<OptionDoc>, PluginError> {
         let text = self.0.options()?;
-        let docs: OptionDocs = toml::from_str(text.as_str()).map_err(|e| PluginError::new(e.message()))?;
+        let docs: OptionDocs =
+            toml::from_str(text.as_str()).map_err(|e| PluginError::new(e.message()))?;
         Ok(docs.option)
     }
 
@@ -83,15 +96,29 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn planner(&self, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-        abi::open_planner(self.table(PluginKind::Planner)?, self.name(), options, context)
+        abi::open_planner(
+            self.table(PluginKind::Planner)?,
+            self.name(),
+            options,
+            context,
+        )
     }
 
     /// Opens a feed strategy. Host.
     ///
     /// # Errors
     /// It is of another kind, or refuses.
-    pub fn feed_strategy(&self, options: &str, context: &StrategyContext) -> Made<dyn FeedStrategy> {
-        abi::open_strategy(self.table(PluginKind::FeedStrategy)?, self.name(), options, context)
+    pub fn feed_strategy(
+        &self,
+        options: &str,
+        context: &StrategyContext,
+    ) -> Made<dyn FeedStrategy> {
+        abi::open_strategy(
+            self.table(PluginKind::FeedStrategy)?,
+            self.name(),
+            options,
+            context,
+        )
     }
 
     /// Makes a driver, which is not open yet. Host.
@@ -107,11 +134,22 @@ impl Plugin {
     /// # Errors
     /// It is of another kind, or refuses.
     pub fn kinematics(&self, options: &str, context: &KinematicsContext) -> Made<dyn Kinematics> {
-        abi::open_kinematics(self.table(PluginKind::Kinematics)?, self.name(), options, context)
+        abi::open_kinematics(
+            self.table(PluginKind::Kinematics)?,
+            self.name(),
+            options,
+            context,
+        )
     }
 
     fn table<T>(self, kind: PluginKind) -> Result<&'static T, PluginError> {
-        let wrong = || PluginError::new(format!("it is a {}, not a {}", self.kind().name(), kind.name()));
+        let wrong = || {
+            PluginError::new(format!(
+                "it is a {}, not a {}",
+                self.kind().name(),
+                kind.name()
+            ))
+        };
         self.0.table(kind).ok_or_else(wrong)
     }
 }
@@ -193,6 +231,11 @@ mod tests {
     #[test]
     fn kinds_have_distinct_names() {
         let names = PluginKind::ALL.map(PluginKind::name);
-        assert!(names.iter().enumerate().all(|(i, name)| !names[..i].contains(name)));
+        assert!(
+            names
+                .iter()
+                .enumerate()
+                .all(|(i, name)| !names[..i].contains(name))
+        );
     }
 }

@@ -60,7 +60,11 @@ pub enum Edge {
     Falling = 2,
 }
 
-layout_of_enum!(Edge { None, Rising, Falling });
+layout_of_enum!(Edge {
+    None,
+    Rising,
+    Falling
+});
 
 /// What ends a motion early, and whether it is an error when nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,7 +78,11 @@ pub struct StopOn {
     pub miss_is_fault: u32,
 }
 
-layout!(StopOn { input, edge, miss_is_fault });
+layout!(StopOn {
+    input,
+    edge,
+    miss_is_fault
+});
 
 /// A piece of motion: one polynomial of degree ≤ 5 per axis over `0 ≤ t ≤ duration_s`, in the powers of t.
 ///
@@ -169,13 +177,17 @@ impl Segment {
     /// Position at local time `t_s`, mm or rad. Any loop; does not allocate.
     #[inline]
     pub fn position(&self, t_s: f64) -> AxisVector {
-        AxisVector(std::array::from_fn(|axis| polynomial(&self.coefficients[axis], t_s)))
+        AxisVector(std::array::from_fn(|axis| {
+            polynomial(&self.coefficients[axis], t_s)
+        }))
     }
 
     /// Velocity at local time `t_s`, per s of program time. Any loop; does not allocate.
     #[inline]
     pub fn velocity(&self, t_s: f64) -> AxisVector {
-        AxisVector(std::array::from_fn(|axis| polynomial_rate(&self.coefficients[axis], t_s)))
+        AxisVector(std::array::from_fn(|axis| {
+            polynomial_rate(&self.coefficients[axis], t_s)
+        }))
     }
 
     /// Acceleration at local time `t_s`, per s² of program time. Any loop; does not allocate.

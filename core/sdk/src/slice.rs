@@ -16,7 +16,10 @@ pub struct Slice<'a, T> {
 }
 
 impl<T: Layout> Layout for Slice<'_, T> {
-    const HASH: u64 = fold(fold(fold_text(START, "Slice"), size_of::<Self>() as u64), T::HASH);
+    const HASH: u64 = fold(
+        fold(fold_text(START, "Slice"), size_of::<Self>() as u64),
+        T::HASH,
+    );
 }
 
 // SAFETY: it is a shared reference to a slice, and goes where that may go.
@@ -27,7 +30,11 @@ unsafe impl<T: Sync> Sync for Slice<'_, T> {}
 impl<'a, T> Slice<'a, T> {
     /// The slice `of`. Any loop; does not allocate.
     pub const fn new(of: &'a [T]) -> Self {
-        Self { pointer: of.as_ptr(), length: of.len(), borrowed: PhantomData }
+        Self {
+            pointer: of.as_ptr(),
+            length: of.len(),
+            borrowed: PhantomData,
+        }
     }
 
     /// The slice itself, for as long as it was borrowed.

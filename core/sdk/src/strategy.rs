@@ -84,7 +84,14 @@ pub struct StrategyContext {
     pub joints_are_axes: u32,
 }
 
-layout!(StrategyContext { axis_count, axes, fine_period_s, rough_period_s, max_feed_ratio, joints_are_axes });
+layout!(StrategyContext {
+    axis_count,
+    axes,
+    fine_period_s,
+    rough_period_s,
+    max_feed_ratio,
+    joints_are_axes
+});
 
 /// One rough period.
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +107,10 @@ layout!(Window<'a> { period, samples });
 impl<'a> Window<'a> {
     /// The window of rough period `period` with all its fine samples.
     pub fn new(period: u64, samples: &'a [FineSample]) -> Self {
-        Self { period, samples: Slice::new(samples) }
+        Self {
+            period,
+            samples: Slice::new(samples),
+        }
     }
 
     /// Every fine sample of the period, in order.
@@ -137,7 +147,11 @@ pub struct Answer {
 impl Answer {
     /// An answer that asks for `ratio` and nothing else.
     pub fn of_ratio(ratio: f64) -> Self {
-        Self { ratio, request: Request::None, signals: [0.0; MAX_SIGNALS] }
+        Self {
+            ratio,
+            request: Request::None,
+            signals: [0.0; MAX_SIGNALS],
+        }
     }
 
     /// The same with the values of the named signals; what is beyond [`MAX_SIGNALS`] is left out.

@@ -15,7 +15,12 @@ pub(crate) struct Text {
     release: Option<unsafe extern "C" fn(*mut u8, usize, usize)>,
 }
 
-layout!(Text { pointer, length, capacity, release });
+layout!(Text {
+    pointer,
+    length,
+    capacity,
+    release
+});
 
 // SAFETY: the text is never changed, and any thread may free it.
 unsafe impl Send for Text {}
@@ -25,13 +30,23 @@ unsafe impl Sync for Text {}
 impl Text {
     /// A text that lives as long as the program.
     pub const fn fixed(text: &'static str) -> Self {
-        Self { pointer: text.as_ptr(), length: text.len(), capacity: 0, release: None }
+        Self {
+            pointer: text.as_ptr(),
+            length: text.len(),
+            capacity: 0,
+            release: None,
+        }
     }
 
     /// A text made up at run time.
     pub fn owned(text: String) -> Self {
         let mut text = ManuallyDrop::new(text);
-        Self { pointer: text.as_mut_ptr(), length: text.len(), capacity: text.capacity(), release: Some(release) }
+        Self {
+            pointer: text.as_mut_ptr(),
+            length: text.len(),
+            capacity: text.capacity(),
+            release: Some(release),
+        }
     }
 
     /// The text.
@@ -60,7 +75,10 @@ impl Drop for Text {
 impl Clone for Text {
     fn clone(&self) -> Self {
         match self.release {
-            None => Self { release: None, ..*self },
+            None => Self {
+                release: None,
+                ..*self
+            },
             Some(_) => Self::owned(self.as_str().to_string()),
         }
     }

@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint, local_plugin,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint,
+    local_plugin,
 };
 
 static CALLS: AtomicU32 = AtomicU32::new(0);
@@ -29,7 +30,11 @@ impl Driver for Panics {
         CALLS.fetch_add(1, Relaxed);
         Ok(Attached::default())
     }
-    fn exchange(&mut self, _setpoint: &Setpoint, _feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        _setpoint: &Setpoint,
+        _feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         CALLS.fetch_add(1, Relaxed);
         panic!("the wire is cut")
     }
@@ -47,8 +52,13 @@ fn nothing_is_called_after_a_panic() {
     let plugin = local_plugin!(driver "panics" = |_: &NoOptions| Ok(Panics));
     let mut driver = plugin.driver("").unwrap();
     driver.open(&DriverContext::new(1, 0.001)).unwrap();
-    let panicked = driver.exchange(&Setpoint::default(), &mut Feedback::default()).unwrap_err();
-    assert!(panicked.is_panic() && panicked.to_string().contains("panics panicked in exchange"), "{panicked}");
+    let panicked = driver
+        .exchange(&Setpoint::default(), &mut Feedback::default())
+        .unwrap_err();
+    assert!(
+        panicked.is_panic() && panicked.to_string().contains("panics panicked in exchange"),
+        "{panicked}"
+    );
     assert_eq!(CALLS.load(Relaxed), 2);
     let later = [
         driver.open(&DriverContext::new(1, 0.001)),

@@ -5,8 +5,9 @@ use std::panic::catch_unwind;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tandem_sdk::{
-    Accepted, Advanced, Axes, AxisLimits, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext, Limits,
-    NoOptions, Planner, PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink, local_plugin,
+    Accepted, Advanced, Axes, AxisLimits, AxisVector, Block, BlockReport, Curve, Kinematics,
+    KinematicsContext, Limits, NoOptions, Planner, PlannerContext, PlannerDescription, PluginError,
+    Segment, SegmentSink, local_plugin,
 };
 
 static TOLD: AtomicU32 = AtomicU32::new(0);
@@ -32,13 +33,24 @@ impl Planner for Emits {
     fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         Ok(())
     }
-    fn accept(&mut self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
+    fn accept(
+        &mut self,
+        _block: &Block,
+        _curve: Option<Curve<'_>>,
+    ) -> Result<Accepted, PluginError> {
         Ok(Accepted::Full)
     }
     fn finish(&mut self) {}
-    fn advance(&mut self, _duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        _duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         sink.segment(&Segment::rest(&AxisVector::ZERO, 1.0));
-        Ok(Advanced { duration_s: 1.0, done: 0 })
+        Ok(Advanced {
+            duration_s: 1.0,
+            done: 0,
+        })
     }
     fn reset(&mut self, _position: &AxisVector) {}
 }
@@ -84,11 +96,17 @@ fn panics_of_plugins_are_quiet_and_those_of_the_host_are_not() {
     tandem_sdk::abi::quiet_linked_panics();
 
     let axes = Axes::new(&[('X', false)]).unwrap();
-    let plugin = local_plugin!(kinematics "panics" = |_: &NoOptions, _: &KinematicsContext| Ok(Panics));
-    let kinematics = plugin.kinematics("", &KinematicsContext::new(axes)).unwrap();
+    let plugin =
+        local_plugin!(kinematics "panics" = |_: &NoOptions, _: &KinematicsContext| Ok(Panics));
+    let kinematics = plugin
+        .kinematics("", &KinematicsContext::new(axes))
+        .unwrap();
     assert!(kinematics.to_joints(&AxisVector::ZERO)[0].is_nan());
     let words = kinematics.health().unwrap_err().to_string();
-    assert!(words.starts_with("panics panicked in to_joints (") && words.contains("quiet.rs:"), "{words}");
+    assert!(
+        words.starts_with("panics panicked in to_joints (") && words.contains("quiet.rs:"),
+        "{words}"
+    );
     assert!(words.ends_with("no joints there"), "{words}");
     assert_eq!(TOLD.load(Relaxed), 0, "a plugin's panic is in its error");
 
@@ -97,6 +115,15 @@ fn panics_of_plugins_are_quiet_and_those_of_the_host_are_not() {
 
     let plugin = local_plugin!(planner "emits" = |_: &NoOptions, _: &PlannerContext| Ok(Emits));
     let mut planner = plugin.planner("", &context(axes)).unwrap();
-    assert!(catch_unwind(std::panic::AssertUnwindSafe(|| planner.advance(1.0, &mut Broken))).is_err());
-    assert_eq!(TOLD.load(Relaxed), 2, "the host's panic inside a plugin's call is told");
+    assert!(
+        catch_unwind(std::panic::AssertUnwindSafe(
+            || planner.advance(1.0, &mut Broken)
+        ))
+        .is_err()
+    );
+    assert_eq!(
+        TOLD.load(Relaxed),
+        2,
+        "the host's panic inside a plugin's call is told"
+    );
 }

@@ -10,7 +10,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::{Interpreter, Item, ProbeResult};
 use tandem_host::{
-    HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal, planner, with_user_commands,
+    HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal,
+    planner, with_user_commands,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
@@ -69,8 +70,22 @@ impl<'a> MdiSession<'a> {
         let mut interpreter = Interpreter::new(interpreter_config(&machine, simulated, switches));
         interpreter.set_file("input");
         let judge = planner(&machine, registry)?;
-        let manual = Manual { machine: machine.clone(), judge, interpreter, input, lines: 0, standing: 0, busy: false };
-        Ok(Self { machine, registry, switches, switched: Switched::default(), manual: Arc::new(Mutex::new(manual)) })
+        let manual = Manual {
+            machine: machine.clone(),
+            judge,
+            interpreter,
+            input,
+            lines: 0,
+            standing: 0,
+            busy: false,
+        };
+        Ok(Self {
+            machine,
+            registry,
+            switches,
+            switched: Switched::default(),
+            manual: Arc::new(Mutex::new(manual)),
+        })
     }
 
     /// Enables the machine where it stands: a run that takes lines until there are no more, or a fault ends it.
@@ -81,7 +96,13 @@ impl<'a> MdiSession<'a> {
         let lines = Box::new(Lines(Arc::clone(&self.manual)));
         let source = with_user_commands(&self.machine, self.registry, self.switches, lines);
         let name = "manual input".to_string();
-        let mut run = Run::of_source(self.machine.clone(), self.registry, name, source, self.switches)?;
+        let mut run = Run::of_source(
+            self.machine.clone(),
+            self.registry,
+            name,
+            source,
+            self.switches,
+        )?;
         run.begin_switched(&self.switched);
         Ok(run)
     }
@@ -123,11 +144,14 @@ impl Manual {
     fn interpret(&mut self, text: &str, items: &mut Vec<Item>) -> Result<(), String> {
         let mut tried = self.interpreter.clone();
         let before = items.len();
-        let judged = tried.line(self.lines, text.as_bytes(), items).map_err(|e| e.to_string()).and_then(|()| {
-            let mut blocks = items[before..].iter();
-            let place = |why: String| format!("input:{}: {why}", self.lines);
-            blocks.try_for_each(|item| self.judge(item)).map_err(place)
-        });
+        let judged = tried
+            .line(self.lines, text.as_bytes(), items)
+            .map_err(|e| e.to_string())
+            .and_then(|()| {
+                let mut blocks = items[before..].iter();
+                let place = |why: String| format!("input:{}: {why}", self.lines);
+                blocks.try_for_each(|item| self.judge(item)).map_err(place)
+            });
         if judged.is_err() {
             items.truncate(before);
             return judged;
@@ -140,8 +164,15 @@ impl Manual {
     }
 
     fn judge(&self, item: &Item) -> Result<(), String> {
-        let Item::Block(block, curve) = item else { return Ok(()) };
-        check_block(&self.machine, self.judge.as_ref(), block, curve.as_deref().map(NurbsData::curve))
+        let Item::Block(block, curve) = item else {
+            return Ok(());
+        };
+        check_block(
+            &self.machine,
+            self.judge.as_ref(),
+            block,
+            curve.as_deref().map(NurbsData::curve),
+        )
     }
 }
 
@@ -171,7 +202,12 @@ impl Source for Lines {
                 NextLine::Later => return Ok(true),
                 // What still runs is switched off, as at the end of a program.
                 NextLine::Over => {
-                    return manual.interpreter.clone().finish(items).map(|()| false).map_err(|e| e.to_string());
+                    return manual
+                        .interpreter
+                        .clone()
+                        .finish(items)
+                        .map(|()| false)
+                        .map_err(|e| e.to_string());
                 }
             };
             manual.lines += 1;
@@ -200,7 +236,10 @@ impl Source for Lines {
                 }
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
-                manual.interpreter.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+                manual.interpreter.provide_probe(&ProbeResult {
+                    touched: rest.latch,
+                    rest: rest.position,
+                });
             }
         }
         manual.standing = 0;

@@ -7,7 +7,9 @@ use serde_json::{Value, json};
 use tandem_gcode::{Lasting, Program};
 use tandem_host::{Clock, Registry, Run, Switches};
 use tandem_machine::Machine;
-use tandem_session::controller::{Controller, ControllerState, Keeper, NoKeeper, Options, ScriptLine, requests, table};
+use tandem_session::controller::{
+    Controller, ControllerState, Keeper, NoKeeper, Options, ScriptLine, requests, table,
+};
 use tandem_session::operator::Listen;
 
 fn examples() -> PathBuf {
@@ -45,7 +47,11 @@ impl Says {
         self.tick += ticks;
         let id = self.lines.len() as u64 + 1;
         (with["id"], with["request"]) = (json!(id), json!(request));
-        self.lines.push(ScriptLine { tick: self.tick, client: 1, line: with.to_string() });
+        self.lines.push(ScriptLine {
+            tick: self.tick,
+            client: 1,
+            line: with.to_string(),
+        });
         id
     }
 }
@@ -54,7 +60,12 @@ impl Says {
 struct Told(Vec<Value>);
 
 impl Told {
-    fn by(machine: &Machine, says: Says, options: impl FnOnce(&mut Options), keeper: Box<dyn Keeper>) -> Self {
+    fn by(
+        machine: &Machine,
+        says: Says,
+        options: impl FnOnce(&mut Options),
+        keeper: Box<dyn Keeper>,
+    ) -> Self {
         let registry = registry();
         let mut asked = Options {
             clock: Clock::Virtual,
@@ -68,15 +79,22 @@ impl Told {
         options(&mut asked);
         let controller = Controller::open(machine, &registry, asked, keeper).unwrap();
         let mut told = vec![];
-        controller.run(&mut |line| told.extend(serde_json::from_str(line).ok())).unwrap();
+        controller
+            .run(&mut |line| told.extend(serde_json::from_str(line).ok()))
+            .unwrap();
         Self(told)
     }
 
     /// The one answer to the request `id`.
     fn answer(&self, id: u64) -> &Value {
-        let is_answer = |told: &&Value| told["told"]["id"] == id && told["told"].get("event").is_none();
+        let is_answer =
+            |told: &&Value| told["told"]["id"] == id && told["told"].get("event").is_none();
         let answers: Vec<_> = self.0.iter().filter(is_answer).collect();
-        assert_eq!(answers.len(), 1, "every request has one answer: {id} {answers:?}");
+        assert_eq!(
+            answers.len(),
+            1,
+            "every request has one answer: {id} {answers:?}"
+        );
         &answers[0]["told"]
     }
 
@@ -87,18 +105,32 @@ impl Told {
     }
 
     fn why(&self, id: u64) -> &str {
-        self.answer(id)["error"]["why"].as_str().unwrap_or_else(|| panic!("{}", self.answer(id)))
+        self.answer(id)["error"]["why"]
+            .as_str()
+            .unwrap_or_else(|| panic!("{}", self.answer(id)))
     }
 
     fn jobs(&self) -> Vec<(String, String)> {
         let events = self.0.iter().filter(|told| told["told"]["event"] == "job");
         let word = |job: &Value, key: &str| job[key].as_str().unwrap().to_string();
-        events.map(|told| (word(&told["told"]["job"], "job"), word(&told["told"]["job"], "outcome"))).collect()
+        events
+            .map(|told| {
+                (
+                    word(&told["told"]["job"], "job"),
+                    word(&told["told"]["job"], "outcome"),
+                )
+            })
+            .collect()
     }
 
     fn states(&self) -> Vec<&str> {
-        let events = self.0.iter().filter(|told| told["told"]["event"] == "state");
-        events.map(|told| told["told"]["state"].as_str().unwrap()).collect()
+        let events = self
+            .0
+            .iter()
+            .filter(|told| told["told"]["event"] == "state");
+        events
+            .map(|told| told["told"]["state"].as_str().unwrap())
+            .collect()
     }
 }
 
@@ -117,8 +149,7 @@ impl Keeper for Kept {
     }
 }
 
-const PART: &str =
-    "G21 G90 G54 F1200\n#100 = 1\nM3 S1000\nG1 X40\nG91 #100 = 2\nG1 Y30\nG10 L2 P2 X77\nG1 X-40\nG1 Y-30\nM2\n";
+const PART: &str = "G21 G90 G54 F1200\n#100 = 1\nM3 S1000\nG1 X40\nG91 #100 = 2\nG1 Y30\nG10 L2 P2 X77\nG1 X-40\nG1 Y-30\nM2\n";
 
 #[test]
 fn a_day_at_the_machine_in_one_process() {
@@ -126,7 +157,11 @@ fn a_day_at_the_machine_in_one_process() {
     let mut says = Says::new();
     let early = says.ask(2000, "mdi", json!({ "line": "G0 X1" }));
     let home = says.ask(100, "home", json!({}));
-    let jog = says.ask(90_000, "jog", json!({ "axis": "x", "distance_mm": 5.0, "feed_mm_per_min": 3000.0 }));
+    let jog = says.ask(
+        90_000,
+        "jog",
+        json!({ "axis": "x", "distance_mm": 5.0, "feed_mm_per_min": 3000.0 }),
+    );
     let touch_off = says.ask(3000, "touch-off", json!({ "x_mm": 0.0, "y_mm": 0.0 }));
     let line = says.ask(10, "mdi", json!({ "line": "G0 X10 Y5" }));
     let load = says.ask(4000, "load", json!({ "text": PART, "name": "part.ngc" }));
@@ -149,22 +184,42 @@ fn a_day_at_the_machine_in_one_process() {
     let end = says.ask(1000, "status", json!({}));
     let told = Told::by(&machine, says, |_| (), Box::new(kept.clone()));
 
-    assert!(told.why(early).contains("\"home\" homes it"), "{}", told.why(early));
-    for id in [home, jog, touch_off, line, load, start, hold, resume, abort, again, stop, reset, back, last, disable] {
+    assert!(
+        told.why(early).contains("\"home\" homes it"),
+        "{}",
+        told.why(early)
+    );
+    for id in [
+        home, jog, touch_off, line, load, start, hold, resume, abort, again, stop, reset, back,
+        last, disable,
+    ] {
         told.ok(id);
     }
     assert_eq!(told.ok(held)["state"], "held");
     let aborted = told.ok(aborted);
-    assert_eq!((&aborted["state"], &aborted["spindle_rpm"]), (&json!("ready"), &json!(0.0)));
+    assert_eq!(
+        (&aborted["state"], &aborted["spindle_rpm"]),
+        (&json!("ready"), &json!(0.0))
+    );
     let modal = aborted["modal"].to_string();
     assert!(modal.contains("G91") && modal.contains("M5"), "{modal}");
     let at = |status: &Value, axis: &str| status["work_position"][axis].as_f64().unwrap();
-    assert!((at(aborted, "x_mm") - 40.0).abs() < 1e-9 && at(aborted, "y_mm") > 5.0 && at(aborted, "y_mm") < 35.0);
+    assert!(
+        (at(aborted, "x_mm") - 40.0).abs() < 1e-9
+            && at(aborted, "y_mm") > 5.0
+            && at(aborted, "y_mm") < 35.0
+    );
     assert_eq!(told.ok(stopped)["state"], "emergency-stop");
     assert!(told.why(refused).contains("\"reset\" takes it back"));
     let done = told.ok(done);
-    assert_eq!((done["state"].as_str(), done["not_homed"].to_string()), (Some("ready"), "[]".to_string()));
-    assert!(at(done, "x_mm").abs() < 1e-9 && at(done, "y_mm").abs() < 1e-9, "{done}");
+    assert_eq!(
+        (done["state"].as_str(), done["not_homed"].to_string()),
+        (Some("ready"), "[]".to_string())
+    );
+    assert!(
+        at(done, "x_mm").abs() < 1e-9 && at(done, "y_mm").abs() < 1e-9,
+        "{done}"
+    );
     assert_eq!(told.ok(end)["state"], "disabled");
     let jobs: Vec<_> = told.jobs();
     let expected = [
@@ -176,16 +231,37 @@ fn a_day_at_the_machine_in_one_process() {
         ("mdi", "done"),
         ("program", "done"),
     ];
-    assert_eq!(jobs, expected.map(|(job, outcome)| (job.to_string(), outcome.to_string())));
-    for state in
-        ["homing-needed", "running", "ready", "manual", "mdi", "held", "stopping", "emergency-stop", "disabled"]
-    {
-        assert!(told.states().contains(&state), "{state}: {:?}", told.states());
+    assert_eq!(
+        jobs,
+        expected.map(|(job, outcome)| (job.to_string(), outcome.to_string()))
+    );
+    for state in [
+        "homing-needed",
+        "running",
+        "ready",
+        "manual",
+        "mdi",
+        "held",
+        "stopping",
+        "emergency-stop",
+        "disabled",
+    ] {
+        assert!(
+            told.states().contains(&state),
+            "{state}: {:?}",
+            told.states()
+        );
     }
     // What the path had reached by the abort is kept, what it had not is not; the last run has come to its end.
     let kept = kept.0.lock().unwrap();
-    let parameters: Vec<_> = kept.iter().map(|lasting| lasting.parameters.get(&100).copied()).collect();
-    let after_abort = kept.iter().find(|lasting| lasting.parameters.get(&100) == Some(&2.0)).unwrap();
+    let parameters: Vec<_> = kept
+        .iter()
+        .map(|lasting| lasting.parameters.get(&100).copied())
+        .collect();
+    let after_abort = kept
+        .iter()
+        .find(|lasting| lasting.parameters.get(&100) == Some(&2.0))
+        .unwrap();
     assert_eq!(after_abort.origins[1][0], 0.0, "{parameters:?}");
     assert_eq!(kept.last().unwrap().origins[1][0], 77.0);
 }
@@ -195,7 +271,11 @@ fn lines_that_come_in_time_are_planned_through() {
     let machine = machine("mill-3axis.toml");
     let chord = |nth: usize| {
         let angle = nth as f64 / 400.0 * std::f64::consts::TAU;
-        format!("G1 X{:.4} Y{:.4} F3000", 20.0 * angle.cos() - 20.0, 20.0 * angle.sin())
+        format!(
+            "G1 X{:.4} Y{:.4} F3000",
+            20.0 * angle.cos() - 20.0,
+            20.0 * angle.sin()
+        )
     };
     let text = (1..=400).map(|nth| chord(nth) + "\n").collect::<String>();
     let run = Run::prepare(
@@ -204,22 +284,38 @@ fn lines_that_come_in_time_are_planned_through() {
         Program::spool("circle.ngc", text.as_bytes()).unwrap(),
         Switches::default(),
     );
-    let alone_s = run.unwrap().drive(Clock::Virtual, &[], &mut ()).unwrap().summary.motion_time_s;
+    let alone_s = run
+        .unwrap()
+        .drive(Clock::Virtual, &[], &mut ())
+        .unwrap()
+        .summary
+        .motion_time_s;
     // A sender that sends all at once; and one with a line in 4 ms, where a chord takes 6 ms: it is some tenths of a second ahead
     // only after a while.
     for (every_ticks, most) in [(0, 1.05), (4, 1.15)] {
         let mut says = Says::new();
         says.ask(1000, "status", json!({}));
-        let ids: Vec<_> = (1..=400).map(|nth| says.ask(every_ticks, "mdi", json!({ "line": chord(nth) }))).collect();
+        let ids: Vec<_> = (1..=400)
+            .map(|nth| says.ask(every_ticks, "mdi", json!({ "line": chord(nth) })))
+            .collect();
         says.ask(20_000, "status", json!({}));
         let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
         ids.iter().for_each(|id| _ = told.ok(*id));
         let events = told.0.iter().filter(|told| told["told"]["event"] == "job");
-        let jobs: Vec<f64> = events.map(|told| told["told"]["job"]["time_s"].as_f64().unwrap()).collect();
+        let jobs: Vec<f64> = events
+            .map(|told| told["told"]["job"]["time_s"].as_f64().unwrap())
+            .collect();
         assert_eq!(jobs.len(), 1, "one job: {jobs:?}");
         let ratio = jobs[0] / alone_s;
-        assert!(ratio <= most, "a line in {every_ticks} ms: {ratio} of the program's time");
-        let driven = told.0.iter().filter(|told| told["told"]["event"] == "driven").count();
+        assert!(
+            ratio <= most,
+            "a line in {every_ticks} ms: {ratio} of the program's time"
+        );
+        let driven = told
+            .0
+            .iter()
+            .filter(|told| told["told"]["event"] == "driven")
+            .count();
         assert_eq!(driven, 400, "each line is told when it is driven");
     }
 }
@@ -232,29 +328,56 @@ fn a_sender_that_stalls_stops_the_machine_on_the_path_and_goes_on_from_there() {
     let mut ids = vec![];
     for stall_ticks in [4, 3000, 4, 4, 2500] {
         let x = (ids.len() + 1) * 10;
-        ids.push(says.ask(stall_ticks, "mdi", json!({ "line": format!("G1 X{x} F3000") })));
+        ids.push(says.ask(
+            stall_ticks,
+            "mdi",
+            json!({ "line": format!("G1 X{x} F3000") }),
+        ));
     }
     let end = says.ask(3000, "status", json!({}));
     let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
     ids.iter().for_each(|id| _ = told.ok(*id));
     assert_eq!(told.ok(end)["position"]["x_mm"], 50.0);
-    assert!(told.jobs().iter().all(|(_, outcome)| outcome == "done") && told.jobs().len() == 3, "{:?}", told.jobs());
+    assert!(
+        told.jobs().iter().all(|(_, outcome)| outcome == "done") && told.jobs().len() == 3,
+        "{:?}",
+        told.jobs()
+    );
 }
 
 /// Every request is asked in states that the machine is really in, without what it needs: each has one answer, and none moves
 /// the machine or ends the controller.
 #[test]
 fn every_request_has_one_answer_in_real_states() {
-    for (name, enable) in [("mill-3axis.toml", false), ("mill-homing.toml", true), ("mill-3axis.toml", true)] {
+    for (name, enable) in [
+        ("mill-3axis.toml", false),
+        ("mill-homing.toml", true),
+        ("mill-3axis.toml", true),
+    ] {
         let mut says = Says::new();
         says.ask(2000, "status", json!({}));
         let moves = ["emergency-stop", "reset", "enable", "disable", "home"];
         let ids: Vec<_> = requests()
             .filter(|request| !moves.contains(request))
-            .map(|request| says.ask(10, if request == "jog-stop" { "jog" } else { request }, json!({})))
+            .map(|request| {
+                says.ask(
+                    10,
+                    if request == "jog-stop" {
+                        "jog"
+                    } else {
+                        request
+                    },
+                    json!({}),
+                )
+            })
             .collect();
         let end = says.ask(100, "status", json!({}));
-        let told = Told::by(&machine(name), says, |options| options.enable = enable, Box::new(NoKeeper));
+        let told = Told::by(
+            &machine(name),
+            says,
+            |options| options.enable = enable,
+            Box::new(NoKeeper),
+        );
         ids.iter().for_each(|id| _ = told.answer(*id));
         let state = match (name, enable) {
             (_, false) => ControllerState::Disabled,
@@ -269,5 +392,9 @@ fn every_request_has_one_answer_in_real_states() {
 fn the_page_prints_the_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/controller.md");
     let page = std::fs::read_to_string(path).unwrap();
-    assert!(page.contains(table().trim_end()), "docs/controller.md is to have:\n{}", table());
+    assert!(
+        page.contains(table().trim_end()),
+        "docs/controller.md is to have:\n{}",
+        table()
+    );
 }

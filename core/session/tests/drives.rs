@@ -5,12 +5,14 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use tandem_gcode::Program;
-use tandem_host::{Clock, Command, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed};
+use tandem_host::{
+    Clock, Command, HostError, Outcome, Registry, Run, RunObserver, Switches, Timed,
+};
 use tandem_machine::Machine;
 use tandem_rings::{Sample, StopCause};
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, NoOptions, PluginError,
-    Setpoint, local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState,
+    NoOptions, PluginError, Setpoint, local_plugin,
 };
 use tandem_session::jog::{Jog, JogController, JogInput, JogRest, JogSession, Reach};
 
@@ -46,7 +48,11 @@ struct Cell;
 
 impl Driver for Cell {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { hexadecimal_codes: 1, enable_s: 2.0, ..DriverDescription::simulated() }
+        DriverDescription {
+            hexadecimal_codes: 1,
+            enable_s: 2.0,
+            ..DriverDescription::simulated()
+        }
     }
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         HARDWARE.with_borrow_mut(|drives| {
@@ -56,14 +62,22 @@ impl Driver for Cell {
     }
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(HARDWARE.with_borrow(|drives| {
-            let mut attached = Attached { known: drives.known, homed: 0, ..Attached::at(drives.position) };
+            let mut attached = Attached {
+                known: drives.known,
+                homed: 0,
+                ..Attached::at(drives.position)
+            };
             if let Some(joint) = drives.faulty {
                 (attached.state[joint], attached.fault_code[joint]) = (JointState::Fault, 0x7210);
             }
             attached
         }))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         HARDWARE.with_borrow_mut(|drives| {
             drives.exchanges += 1;
             drives.told.push(*setpoint);
@@ -83,7 +97,11 @@ impl Driver for Cell {
                     _ => JointState::Enabled,
                 };
                 feedback.state[joint] = state;
-                feedback.fault_code[joint] = if state == JointState::Fault { 0x7210 } else { 0 };
+                feedback.fault_code[joint] = if state == JointState::Fault {
+                    0x7210
+                } else {
+                    0
+                };
                 if state == JointState::Homing {
                     drives.homing_for += 1;
                     drives.position[joint] += 0.01;
@@ -99,7 +117,11 @@ impl Driver for Cell {
             }
             feedback.homed = drives.homed;
             feedback.position = drives.position;
-            feedback.inputs = if drives.open.contains(&drives.exchanges) { 0 } else { drives.inputs };
+            feedback.inputs = if drives.open.contains(&drives.exchanges) {
+                0
+            } else {
+                drives.inputs
+            };
         });
         Ok(())
     }
@@ -114,7 +136,11 @@ impl Driver for Cell {
 
 fn set(change: impl FnOnce(&mut Hardware)) {
     HARDWARE.with_borrow_mut(|drives| {
-        *drives = Hardware { known: 7, inputs: u64::MAX, ..Hardware::default() };
+        *drives = Hardware {
+            known: 7,
+            inputs: u64::MAX,
+            ..Hardware::default()
+        };
         change(drives);
     });
 }
@@ -126,14 +152,21 @@ fn hardware() -> Hardware {
 fn registry() -> Registry {
     let mut registry = Registry::default();
     registry.register(tandem_look_ahead::PLUGIN).unwrap();
-    registry.register(local_plugin!(driver "cell" = |_: &NoOptions| Ok(Cell))).unwrap();
+    registry
+        .register(local_plugin!(driver "cell" = |_: &NoOptions| Ok(Cell)))
+        .unwrap();
     registry
 }
 
 fn machine(settings: &[(&str, &str)]) -> Machine {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let own = [("driver.plugin", "cell")];
-    let settings: Vec<_> = own.iter().chain(settings).map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect();
+    let settings: Vec<_> = own
+        .iter()
+        .chain(settings)
+        .map(|(k, v)| ((*k).to_string(), (*v).to_string()))
+        .collect();
     Machine::read(&path, &settings).unwrap()
 }
 
@@ -157,11 +190,19 @@ fn prepare(text: &str, settings: &[(&str, &str)], switches: Switches) -> Result<
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("program.ngc");
     std::fs::write(&path, text).unwrap();
-    Run::prepare(machine(settings), &registry(), Program::open(&path).unwrap(), switches)
+    Run::prepare(
+        machine(settings),
+        &registry(),
+        Program::open(&path).unwrap(),
+        switches,
+    )
 }
 
 fn refusal(text: &str, settings: &[(&str, &str)], switches: Switches) -> String {
-    prepare(text, settings, switches).err().map(|error| error.to_string()).expect("it is refused")
+    prepare(text, settings, switches)
+        .err()
+        .map(|error| error.to_string())
+        .expect("it is refused")
 }
 
 fn drive(run: Run, commands: &[Timed]) -> (Outcome, Watch) {
@@ -188,7 +229,10 @@ impl JogInput for Script {
             return jogs.end();
         }
         let asked = jogs.ask(self.jogs.remove(0));
-        self.said.lock().unwrap().push(asked.err().unwrap_or_else(|| "taken".to_string()));
+        self.said
+            .lock()
+            .unwrap()
+            .push(asked.err().unwrap_or_else(|| "taken".to_string()));
     }
     fn is_waiting(&self) -> bool {
         false
@@ -203,13 +247,24 @@ impl JogInput for Script {
 fn jog(asked: &[(f64, f64)]) -> Vec<String> {
     let by = |(distance_mm, feed): &(f64, f64)| Jog {
         axis: 0,
-        reach: Reach::By { distance_mm: *distance_mm },
+        reach: Reach::By {
+            distance_mm: *distance_mm,
+        },
         feed_mm_per_s: feed / 60.0,
     };
     let said = Arc::new(Mutex::new(vec![]));
     // The first one is asked for where the machine file has the axis: it wakes the machine up.
-    let hand = Script { jogs: asked.iter().map(by).collect(), said: Arc::clone(&said) };
-    let (registry, switches) = (registry(), Switches { unhomed: true, ..Switches::default() });
+    let hand = Script {
+        jogs: asked.iter().map(by).collect(),
+        said: Arc::clone(&said),
+    };
+    let (registry, switches) = (
+        registry(),
+        Switches {
+            unhomed: true,
+            ..Switches::default()
+        },
+    );
     let session = JogSession::new(machine(&[]), &registry, switches, Box::new(hand)).unwrap();
     let (outcome, _) = drive(session.enable().unwrap(), &[]);
     assert_eq!(outcome.summary.fault, None);
@@ -220,12 +275,31 @@ fn jog(asked: &[(f64, f64)]) -> Vec<String> {
 fn an_axis_outside_of_its_travel_is_jogged_inward_only_and_runs_no_program() {
     set(|drives| drives.position[0] = 260.0);
     let words = refusal(WORK, &[], Switches::default());
-    assert!(words.contains("where the machine starts, joint x would reach 260 mm, beyond its travel of -250 to 250"));
-    let said = jog(&[(0.5, 600.0), (-3.0, 600.0), (1.0, 600.0), (-20.0, 600.0), (-600.0, 600.0)]);
-    assert!(said.iter().any(|word| word.contains("x would reach 258 mm, beyond its travel")), "{said:?}");
-    assert!((hardware().position[0] - 237.0).abs() < 1e-9, "{:?} {said:?}", hardware().position);
+    assert!(words.contains(
+        "where the machine starts, joint x would reach 260 mm, beyond its travel of -250 to 250"
+    ));
+    let said = jog(&[
+        (0.5, 600.0),
+        (-3.0, 600.0),
+        (1.0, 600.0),
+        (-20.0, 600.0),
+        (-600.0, 600.0),
+    ]);
+    assert!(
+        said.iter()
+            .any(|word| word.contains("x would reach 258 mm, beyond its travel")),
+        "{said:?}"
+    );
+    assert!(
+        (hardware().position[0] - 237.0).abs() < 1e-9,
+        "{:?} {said:?}",
+        hardware().position
+    );
     let told = hardware().told;
-    let highest = told.iter().map(|told| told.position[0]).fold(f64::MIN, f64::max);
+    let highest = told
+        .iter()
+        .map(|told| told.position[0])
+        .fold(f64::MIN, f64::max);
     assert!(highest <= 260.0, "{highest}");
 }
 
@@ -233,10 +307,20 @@ fn an_axis_outside_of_its_travel_is_jogged_inward_only_and_runs_no_program() {
 fn an_axis_that_does_not_know_where_it_is_is_jogged_slowly_and_runs_no_program() {
     set(|drives| drives.known = 0b110);
     let words = refusal(WORK, &[], Switches::default());
-    assert!(words.contains("it is not known where x stands: home the machine first, or run with --home"), "{words}");
-    let home = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
+    assert!(
+        words
+            .contains("it is not known where x stands: home the machine first, or run with --home"),
+        "{words}"
+    );
+    let home = Switches {
+        home: Some(tandem_session::HOMING),
+        ..Switches::default()
+    };
     let words = refusal(WORK, &[("homing.y", "{drive_method = 35}")], home);
-    assert!(words.contains("it is not known where x stands, and no [homing.<axis>] table homes it"), "{words}");
+    assert!(
+        words.contains("it is not known where x stands, and no [homing.<axis>] table homes it"),
+        "{words}"
+    );
     let said = jog(&[(5.0, 1600.0), (5.0, 1500.0)]);
     let slow = "it is not known where x stands: until it is homed its feed is at most 1500 mm/min, not 1600 mm/min";
     assert_eq!(said, [slow, "taken"]);
@@ -247,16 +331,42 @@ fn an_axis_that_does_not_know_where_it_is_is_jogged_slowly_and_runs_no_program()
 fn a_drive_homes_its_axis_and_the_program_begins_there() {
     set(|drives| (drives.position[0], drives.known) = (123.0, 0b110));
     let homing = [("homing.x", "{drive_method = 35}"), ("axes.x.home_mm", "4")];
-    let (outcome, _) =
-        drive(Run::home(machine(&homing), &registry(), tandem_session::HOMING, Switches::default()).unwrap(), &[]);
-    assert_eq!((outcome.summary.fault, hardware().methods), (None, [35, 0, 0]));
-    assert!((hardware().position[0] - 4.0).abs() < 1e-9, "{:?}", hardware().position);
-    assert!(outcome.summary.max_velocity_mm_s["x"] <= 250.0 * (1.0 + 1e-6), "{:?}", outcome.summary.max_velocity_mm_s);
+    let (outcome, _) = drive(
+        Run::home(
+            machine(&homing),
+            &registry(),
+            tandem_session::HOMING,
+            Switches::default(),
+        )
+        .unwrap(),
+        &[],
+    );
+    assert_eq!(
+        (outcome.summary.fault, hardware().methods),
+        (None, [35, 0, 0])
+    );
+    assert!(
+        (hardware().position[0] - 4.0).abs() < 1e-9,
+        "{:?}",
+        hardware().position
+    );
+    assert!(
+        outcome.summary.max_velocity_mm_s["x"] <= 250.0 * (1.0 + 1e-6),
+        "{:?}",
+        outcome.summary.max_velocity_mm_s
+    );
     set(|drives| (drives.position[0], drives.known) = (-300.0, 0b110));
-    let home = Switches { home: Some(tandem_session::HOMING), ..Switches::default() };
+    let home = Switches {
+        home: Some(tandem_session::HOMING),
+        ..Switches::default()
+    };
     let (outcome, _) = drive(prepare(WORK, &homing, home).unwrap(), &[]);
     assert_eq!(outcome.summary.fault, None);
-    assert!((hardware().position[0] - 60.0).abs() < 1e-9, "{:?}", hardware().position);
+    assert!(
+        (hardware().position[0] - 60.0).abs() < 1e-9,
+        "{:?}",
+        hardware().position
+    );
     let told = hardware().told;
     assert!(told.iter().filter(|told| told.homing == 1).count() > 100);
 }
@@ -266,13 +376,31 @@ fn a_fault_that_outlives_a_run_is_reset_by_the_operator_and_only_then() {
     set(|drives| drives.faults_at = 300);
     let (outcome, _) = drive(prepare(WORK, &[], Switches::default()).unwrap(), &[]);
     let words = outcome.summary.fault.unwrap();
-    assert!(words.contains("the drive of axis Y reports fault 0x7210 (overvoltage)"), "{words}");
+    assert!(
+        words.contains("the drive of axis Y reports fault 0x7210 (overvoltage)"),
+        "{words}"
+    );
     for _ in 0..3 {
         let words = refusal(WORK, &[], Switches::default());
-        assert!(words.contains("the drive of y stands in fault 0x7210 (overvoltage); --reset clears it"), "{words}");
+        assert!(
+            words
+                .contains("the drive of y stands in fault 0x7210 (overvoltage); --reset clears it"),
+            "{words}"
+        );
     }
     assert_eq!(hardware().resets, 0);
-    let (outcome, _) = drive(prepare(WORK, &[], Switches { reset: true, ..Switches::default() }).unwrap(), &[]);
+    let (outcome, _) = drive(
+        prepare(
+            WORK,
+            &[],
+            Switches {
+                reset: true,
+                ..Switches::default()
+            },
+        )
+        .unwrap(),
+        &[],
+    );
     assert_eq!((outcome.summary.fault, hardware().resets), (None, 1));
 }
 
@@ -280,18 +408,40 @@ fn a_fault_that_outlives_a_run_is_reset_by_the_operator_and_only_then() {
 fn a_reset_in_a_session_reaches_the_drives() {
     for round in 1..=20_u64 {
         set(|drives| drives.faults_at = 20 * round);
-        let go = Jog { axis: 0, reach: Reach::By { distance_mm: 20.0 }, feed_mm_per_s: 50.0 };
+        let go = Jog {
+            axis: 0,
+            reach: Reach::By { distance_mm: 20.0 },
+            feed_mm_per_s: 50.0,
+        };
         let said = Arc::new(Mutex::new(vec![]));
-        let hand = Script { jogs: vec![go; 2], said: Arc::clone(&said) };
-        let (registry, switches) = (registry(), Switches { unhomed: true, ..Switches::default() });
-        let mut session = JogSession::new(machine(&[]), &registry, switches, Box::new(hand)).unwrap();
+        let hand = Script {
+            jogs: vec![go; 2],
+            said: Arc::clone(&said),
+        };
+        let (registry, switches) = (
+            registry(),
+            Switches {
+                unhomed: true,
+                ..Switches::default()
+            },
+        );
+        let mut session =
+            JogSession::new(machine(&[]), &registry, switches, Box::new(hand)).unwrap();
         let (outcome, _) = drive(session.enable().unwrap(), &[]);
         assert!(outcome.summary.fault.is_some(), "round {round}");
         session.stands_at(outcome.position);
-        assert!(session.enable().is_err_and(|refused| refused.to_string().contains("stands in fault 0x7210")));
+        assert!(
+            session
+                .enable()
+                .is_err_and(|refused| refused.to_string().contains("stands in fault 0x7210"))
+        );
         session.reset_drives();
         let (outcome, _) = drive(session.enable().unwrap(), &[]);
-        assert_eq!((outcome.summary.fault, hardware().resets), (None, 1), "round {round}");
+        assert_eq!(
+            (outcome.summary.fault, hardware().resets),
+            (None, 1),
+            "round {round}"
+        );
     }
 }
 
@@ -300,10 +450,19 @@ fn a_reset_in_a_session_reaches_the_drives() {
 fn commands_of_the_first_tick_act_while_the_drives_are_enabled() {
     let at_once = |command, text: &str| {
         set(|drives| drives.never_enables = true);
-        drive(prepare(text, &[], Switches::default()).unwrap(), &[Timed { tick: 0, command }]).0.summary
+        drive(
+            prepare(text, &[], Switches::default()).unwrap(),
+            &[Timed { tick: 0, command }],
+        )
+        .0
+        .summary
     };
     let stopped = at_once(Command::EmergencyStop, WORK);
-    assert!(stopped.fault.is_some_and(|words| words.contains("emergency stop")));
+    assert!(
+        stopped
+            .fault
+            .is_some_and(|words| words.contains("emergency stop"))
+    );
     assert!(hardware().told.len() <= 3 && hardware().told.iter().all(|told| told.enable == 0));
     let aborted = at_once(Command::Abort, WORK);
     assert_eq!(
@@ -313,28 +472,68 @@ fn commands_of_the_first_tick_act_while_the_drives_are_enabled() {
     assert!(hardware().told.len() <= 3 && hardware().told.iter().all(|told| told.enable == 0));
     // A hold lets them hold: they are waited for, and the machine stands then.
     let held = at_once(Command::Hold, WORK);
-    assert!(held.fault.is_some_and(|words| words.contains("is enabling")), "they never come up");
+    assert!(
+        held.fault
+            .is_some_and(|words| words.contains("is enabling")),
+        "they never come up"
+    );
     set(|_| ());
-    let hold = [Timed { tick: 0, command: Command::Hold }, Timed { tick: 700, command: Command::Abort }];
+    let hold = [
+        Timed {
+            tick: 0,
+            command: Command::Hold,
+        },
+        Timed {
+            tick: 700,
+            command: Command::Abort,
+        },
+    ];
     let (outcome, watch) = drive(prepare(WORK, &[], Switches::default()).unwrap(), &hold);
     assert_eq!(outcome.summary.fault, None);
-    let moved = hardware().told.iter().any(|told| told.velocity != AxisVector::ZERO);
-    assert!(!moved && watch.causes[1..700].iter().all(|cause| *cause == StopCause::Hold));
+    let moved = hardware()
+        .told
+        .iter()
+        .any(|told| told.velocity != AxisVector::ZERO);
+    assert!(
+        !moved
+            && watch.causes[1..700]
+                .iter()
+                .all(|cause| *cause == StopCause::Hold)
+    );
 }
 
 #[test]
 fn a_door_holds_a_program_until_it_is_closed_and_resumed() {
     let door = [("inputs.guard", "{input = 9, role = \"door\"}")];
     set(|drives| drives.open = 300..900);
-    let resume = |tick| Timed { tick, command: Command::Resume };
-    let (outcome, watch) = drive(prepare(WORK, &door, Switches::default()).unwrap(), &[resume(500), resume(1200)]);
+    let resume = |tick| Timed {
+        tick,
+        command: Command::Resume,
+    };
+    let (outcome, watch) = drive(
+        prepare(WORK, &door, Switches::default()).unwrap(),
+        &[resume(500), resume(1200)],
+    );
     assert_eq!(outcome.summary.fault, None);
     assert!((hardware().position[0] - 60.0).abs() < 1e-9);
-    let held = watch.causes.iter().filter(|cause| **cause == StopCause::Door).count();
+    let held = watch
+        .causes
+        .iter()
+        .filter(|cause| **cause == StopCause::Door)
+        .count();
     assert!((800..=1000).contains(&held), "{held}");
-    assert!(watch.notes.iter().any(|note| note == "input guard holds the machine: close it, then resume"));
+    assert!(
+        watch
+            .notes
+            .iter()
+            .any(|note| note == "input guard holds the machine: close it, then resume")
+    );
     let told = hardware().told;
-    assert!(told[310..890].iter().all(|told| told.spindle_rad_per_s == 0.0));
+    assert!(
+        told[310..890]
+            .iter()
+            .all(|told| told.spindle_rad_per_s == 0.0)
+    );
     assert!(told[250].spindle_rad_per_s > 0.0 && told[1300].spindle_rad_per_s > 0.0);
 }
 
@@ -344,6 +543,9 @@ fn an_emergency_stop_that_is_pressed_lets_nothing_hold() {
     let stop = [("inputs.button", "{input = 3, role = \"emergency-stop\"}")];
     let (outcome, _) = drive(prepare(WORK, &stop, Switches::default()).unwrap(), &[]);
     let words = outcome.summary.fault.unwrap();
-    assert!(words.starts_with("emergency stop: input button (3) is open (line"), "{words}");
+    assert!(
+        words.starts_with("emergency stop: input button (3) is open (line"),
+        "{words}"
+    );
     assert!(hardware().told.iter().all(|told| told.enable == 0));
 }

@@ -57,8 +57,15 @@ pub struct LastingState {
 impl LastingState {
     /// What a machine begins with whose file is new: its tool table; nothing else is known.
     pub fn initial(machine: &Machine) -> Self {
-        let tools = machine.tools.tools.iter().map(|tool| (tool.number, Tool::from(tool)));
-        Self { tools: tools.collect(), ..Self::default() }
+        let tools = machine
+            .tools
+            .tools
+            .iter()
+            .map(|tool| (tool.number, Tool::from(tool)));
+        Self {
+            tools: tools.collect(),
+            ..Self::default()
+        }
     }
 
     /// All of it that a part program can see; `home` is the place of G28 and G30 where none was stored. No tool length is in
@@ -73,7 +80,9 @@ impl LastingState {
             g92_stored: self.offsets.g92_stored,
             reference: self.reference.map(|stored| stored.unwrap_or(*home)),
             tool_offset: AxisVector::ZERO,
-            parameters: parameters.map(|(number, value)| (*number as u32, *value)).collect(),
+            parameters: parameters
+                .map(|(number, value)| (*number as u32, *value))
+                .collect(),
             tools: self.tools.values().map(Tool::to_program).collect(),
             tool_in_spindle: self.tool_in_spindle,
         }
@@ -81,7 +90,8 @@ impl LastingState {
 
     /// Whether a value of parameter `number` lasts: one of [`LASTING_PARAMETERS`], or one that is listed already.
     pub fn keeps(&self, number: usize) -> bool {
-        (LASTING_PARAMETERS.0..=LASTING_PARAMETERS.1).contains(&number) || self.parameters.contains_key(&number)
+        (LASTING_PARAMETERS.0..=LASTING_PARAMETERS.1).contains(&number)
+            || self.parameters.contains_key(&number)
     }
 }
 
@@ -188,8 +198,12 @@ pub enum JobKind {
 
 impl JobKind {
     /// Each, with the word that stands for it in the file.
-    pub const ALL: [(Self, &str); 4] =
-        [(Self::Program, "program"), (Self::Mdi, "mdi"), (Self::Jog, "jog"), (Self::Homing, "homing")];
+    pub const ALL: [(Self, &str); 4] = [
+        (Self::Program, "program"),
+        (Self::Mdi, "mdi"),
+        (Self::Jog, "jog"),
+        (Self::Homing, "homing"),
+    ];
 
     /// The word that stands for it.
     pub fn word(self) -> &'static str {
@@ -239,11 +253,15 @@ impl Outcome {
 }
 
 fn word_of<T: Copy + PartialEq>(all: &[(T, &'static str)], value: T) -> &'static str {
-    all.iter().find(|(known, _)| *known == value).map_or("", |(_, word)| *word)
+    all.iter()
+        .find(|(known, _)| *known == value)
+        .map_or("", |(_, word)| *word)
 }
 
 fn of_word<T: Copy>(all: &[(T, &'static str)], word: &str) -> Option<T> {
-    all.iter().find(|(_, known)| *known == word).map(|(value, _)| *value)
+    all.iter()
+        .find(|(_, known)| *known == word)
+        .map(|(value, _)| *value)
 }
 
 /// A job of the history.

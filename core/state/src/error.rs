@@ -110,16 +110,28 @@ impl StateError {
         use rusqlite::ErrorCode as Code;
         let path = path.to_path_buf();
         match error.sqlite_error_code() {
-            Some(Code::NotADatabase) => Self::Foreign { path, what: "it is no SQLite file".into() },
-            Some(Code::DatabaseCorrupt) | None => Self::Damaged { path, what: error.to_string() },
+            Some(Code::NotADatabase) => Self::Foreign {
+                path,
+                what: "it is no SQLite file".into(),
+            },
+            Some(Code::DatabaseCorrupt) | None => Self::Damaged {
+                path,
+                what: error.to_string(),
+            },
             Some(Code::DatabaseBusy | Code::DatabaseLocked) => Self::InUse { path },
-            Some(_) => Self::Open { path, why: words(error) },
+            Some(_) => Self::Open {
+                path,
+                why: words(error),
+            },
         }
     }
 
     /// An error of SQLite while the file at `path` is written.
     pub(crate) fn writing(path: &Path, error: &rusqlite::Error) -> Self {
-        Self::Write { path: path.to_path_buf(), why: words(error) }
+        Self::Write {
+            path: path.to_path_buf(),
+            why: words(error),
+        }
     }
 }
 
@@ -128,9 +140,12 @@ fn words(error: &rusqlite::Error) -> String {
     use rusqlite::ErrorCode as Code;
     match error.sqlite_error_code() {
         Some(Code::DiskFull) => "the disk is full; make room, it goes on by itself".into(),
-        Some(Code::ReadOnly) => "the file or its folder is read-only; SQLite needs both writable".into(),
+        Some(Code::ReadOnly) => {
+            "the file or its folder is read-only; SQLite needs both writable".into()
+        }
         Some(Code::CannotOpen) => {
-            "the file or its folder cannot be opened; SQLite needs both readable and writable".into()
+            "the file or its folder cannot be opened; SQLite needs both readable and writable"
+                .into()
         }
         Some(Code::PermissionDenied) => "this user may not".into(),
         Some(Code::SystemIoFailure) => format!("the disk fails ({error})"),

@@ -29,8 +29,14 @@
 //! assert_eq!(store.load().to_program(&owner.home), program);
 //! ```
 
-#![allow(clippy::doc_markdown, reason = "SQLite and LinuxCNC are names, not code")]
-#![allow(clippy::cast_possible_wrap, reason = "counts that SQLite takes as signed numbers are judged or small")]
+#![allow(
+    clippy::doc_markdown,
+    reason = "SQLite and LinuxCNC are names, not code"
+)]
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "counts that SQLite takes as signed numbers are judged or small"
+)]
 
 mod change;
 mod data;
@@ -45,8 +51,8 @@ mod write;
 
 pub use change::Change;
 pub use data::{
-    Alarm, Driven, Job, JobEnd, JobKind, LASTING_PARAMETERS, LastingState, Outcome, Tool, ToolLife, USER_PARAMETERS,
-    WorkOffsets,
+    Alarm, Driven, Job, JobEnd, JobKind, LASTING_PARAMETERS, LastingState, Outcome, Tool, ToolLife,
+    USER_PARAMETERS, WorkOffsets,
 };
 pub use error::StateError;
 pub use linuxcnc::{AtLine, LinearUnit, LinuxCnc};

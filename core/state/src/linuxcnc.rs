@@ -63,7 +63,11 @@ impl LinuxCnc<'_> {
     /// The state as a parameter file; `home` is the place of G28 and G30 where none is stored.
     pub fn variables(&self, state: &LastingState, home: &AxisVector) -> String {
         let offsets = &state.offsets;
-        let mut rows: Vec<_> = state.parameters.iter().map(|(number, value)| (*number, *value)).collect();
+        let mut rows: Vec<_> = state
+            .parameters
+            .iter()
+            .map(|(number, value)| (*number, *value))
+            .collect();
         let mut vector = |first: usize, vector: &AxisVector| {
             rows.extend((0..LETTERS.len()).map(|nth| (first + nth, self.value(nth, vector))));
         };
@@ -75,15 +79,23 @@ impl LinuxCnc<'_> {
             vector(SYSTEMS + OF_A_SYSTEM * system, origin);
         }
         let rotations = offsets.rotations_rad.iter().enumerate();
-        rows.extend(rotations.map(|(system, turn)| (SYSTEMS + OF_A_SYSTEM * system + ROTATION, turn.to_degrees())));
-        rows.push((G92_IN_FORCE, f64::from(u8::from(offsets.g92 != AxisVector::ZERO))));
+        rows.extend(
+            rotations.map(|(system, turn)| {
+                (SYSTEMS + OF_A_SYSTEM * system + ROTATION, turn.to_degrees())
+            }),
+        );
+        rows.push((
+            G92_IN_FORCE,
+            f64::from(u8::from(offsets.g92 != AxisVector::ZERO)),
+        ));
         rows.push((ACTIVE, (offsets.active_system + 1) as f64));
         // LinuxCNC refuses a file that is not in order.
         rows.sort_unstable_by_key(|row| row.0);
-        rows.iter().fold(String::new(), |mut text, (number, value)| {
-            let _ = writeln!(text, "{number}\t{value:.9}");
-            text
-        })
+        rows.iter()
+            .fold(String::new(), |mut text, (number, value)| {
+                let _ = writeln!(text, "{number}\t{value:.9}");
+                text
+            })
     }
 
     /// The tools as a tool table: wear is added to what was measured, because LinuxCNC has no place for it.
@@ -91,7 +103,12 @@ impl LinuxCnc<'_> {
         let mut text = String::new();
         for tool in state.tools.values() {
             let seen = tool.to_program();
-            let _ = write!(text, "T{} P{}", tool.number, tool.pocket.unwrap_or(tool.number));
+            let _ = write!(
+                text,
+                "T{} P{}",
+                tool.number,
+                tool.pocket.unwrap_or(tool.number)
+            );
             for (nth, letter) in LETTERS.char_indices() {
                 let value = self.value(nth, &seen.offset);
                 if value != 0.0 {
@@ -104,8 +121,16 @@ impl LinuxCnc<'_> {
                     let _ = write!(text, " {letter}{value:.9}");
                 }
             }
-            let _ = if tool.orientation == 0 { Ok(()) } else { write!(text, " Q{}", tool.orientation) };
-            let remark = if tool.remark.is_empty() { &tool.name } else { &tool.remark };
+            let _ = if tool.orientation == 0 {
+                Ok(())
+            } else {
+                write!(text, " Q{}", tool.orientation)
+            };
+            let remark = if tool.remark.is_empty() {
+                &tool.name
+            } else {
+                &tool.remark
+            };
             let _ = writeln!(text, " ;{}", remark.replace(['\n', '\r'], " "));
         }
         text
@@ -135,7 +160,11 @@ impl LinuxCnc<'_> {
     ///
     /// # Errors
     /// A line that is no number with its value; `state` is then as far as the line before.
-    pub fn read_variables(&self, text: &str, state: &mut LastingState) -> Result<Vec<AtLine>, AtLine> {
+    pub fn read_variables(
+        &self,
+        text: &str,
+        state: &mut LastingState,
+    ) -> Result<Vec<AtLine>, AtLine> {
         let mut left = Vec::new();
         let mut last = 0;
         let mut in_force = None;
@@ -151,30 +180,45 @@ impl LinuxCnc<'_> {
                     shown(text)
                 )));
             };
-            let number: usize =
-                number.parse().map_err(|_| wrong(format!("\"{}\" is no number of a parameter", shown(number))))?;
+            let number: usize = number
+                .parse()
+                .map_err(|_| wrong(format!("\"{}\" is no number of a parameter", shown(number))))?;
             let value = finite(value).map_err(wrong)?;
             if number <= last {
-                return Err(wrong(format!("#{number} stands behind #{last}: a parameter file is in order")));
+                return Err(wrong(format!(
+                    "#{number} stands behind #{last}: a parameter file is in order"
+                )));
             }
             last = number;
             if number == G92_IN_FORCE {
                 in_force = Some(value != 0.0);
             } else if let Err(why) = self.variable(number, value, state) {
-                left.push(AtLine { line, why: format!("#{number} = {value} was not taken over: {why}") });
+                left.push(AtLine {
+                    line,
+                    why: format!("#{number} = {value} was not taken over: {why}"),
+                });
             }
         }
         let offsets = &mut state.offsets;
         // Files of old versions do not say it: what is stored was in force.
-        offsets.g92 = if in_force == Some(false) { AxisVector::ZERO } else { offsets.g92_stored };
+        offsets.g92 = if in_force == Some(false) {
+            AxisVector::ZERO
+        } else {
+            offsets.g92_stored
+        };
         Ok(left)
     }
 
     fn variable(&self, number: usize, value: f64, state: &mut LastingState) -> Result<(), String> {
         let offsets = &mut state.offsets;
         let nth = |first: usize| number.checked_sub(first).filter(|nth| *nth < LETTERS.len());
-        if let Some((which, nth)) = (0..2).find_map(|which| Some((which, nth(REFERENCES[which])?))) {
-            return self.put(nth, value, state.reference[which].get_or_insert(AxisVector::ZERO));
+        if let Some((which, nth)) = (0..2).find_map(|which| Some((which, nth(REFERENCES[which])?)))
+        {
+            return self.put(
+                nth,
+                value,
+                state.reference[which].get_or_insert(AxisVector::ZERO),
+            );
         }
         if let Some(nth) = nth(G92) {
             return self.put(nth, value, &mut offsets.g92_stored);
@@ -188,7 +232,10 @@ impl LinuxCnc<'_> {
             return Ok(());
         }
         if (SYSTEMS..SYSTEMS + OF_A_SYSTEM * WORK_SYSTEMS).contains(&number) {
-            let (system, nth) = ((number - SYSTEMS) / OF_A_SYSTEM, (number - SYSTEMS) % OF_A_SYSTEM);
+            let (system, nth) = (
+                (number - SYSTEMS) / OF_A_SYSTEM,
+                (number - SYSTEMS) % OF_A_SYSTEM,
+            );
             if nth < LETTERS.len() {
                 return self.put(nth, value, &mut offsets.origins[system]);
             }
@@ -201,7 +248,11 @@ impl LinuxCnc<'_> {
             state.parameters.insert(number, value);
             return Ok(());
         }
-        if value == 0.0 { Ok(()) } else { Err("it does not last".into()) }
+        if value == 0.0 {
+            Ok(())
+        } else {
+            Err("it does not last".into())
+        }
     }
 
     /// Reads a tool table into `state`: tools are added, or take the place of those with their number, of which name, corner
@@ -230,9 +281,19 @@ impl LinuxCnc<'_> {
                 return Err(wrong(format!("tool {} is listed twice", read.number)));
             }
             let before = state.tools.remove(&read.number).unwrap_or_default();
-            let (name, life, corner_radius_mm) = (before.name, before.life, before.corner_radius_mm);
+            let (name, life, corner_radius_mm) =
+                (before.name, before.life, before.corner_radius_mm);
             let remark = remark.trim().to_owned();
-            state.tools.insert(read.number, Tool { name, corner_radius_mm, life, remark, ..read });
+            state.tools.insert(
+                read.number,
+                Tool {
+                    name,
+                    corner_radius_mm,
+                    life,
+                    remark,
+                    ..read
+                },
+            );
         }
         Ok(left)
     }
@@ -244,13 +305,17 @@ impl LinuxCnc<'_> {
             let letter = word.chars().next().unwrap_or_default();
             let upper = letter.to_ascii_uppercase();
             let value = finite(&word[letter.len_utf8()..]).map_err(|why| {
-                format!("{why} in \"{}\": a word is a letter with a number, as in T1 or Z+20.5", shown(word))
+                format!(
+                    "{why} in \"{}\": a word is a letter with a number, as in T1 or Z+20.5",
+                    shown(word)
+                )
             })?;
             let whole = |most: u32| {
-                let whole = Some(value).filter(|v| v.fract() == 0.0 && (0.0..=f64::from(most)).contains(v));
-                whole
-                    .map(|v| v as u32)
-                    .ok_or_else(|| format!("{upper} is a whole number from 0 to {most}, not {value}"))
+                let whole =
+                    Some(value).filter(|v| v.fract() == 0.0 && (0.0..=f64::from(most)).contains(v));
+                whole.map(|v| v as u32).ok_or_else(|| {
+                    format!("{upper} is a whole number from 0 to {most}, not {value}")
+                })
             };
             match upper {
                 'T' => {
@@ -277,7 +342,11 @@ impl LinuxCnc<'_> {
                 },
             }
         }
-        if has_number { Ok(tool) } else { Err("T, the number of the tool, is missing".into()) }
+        if has_number {
+            Ok(tool)
+        } else {
+            Err("T, the number of the tool, is missing".into())
+        }
     }
 }
 
@@ -306,11 +375,19 @@ mod tests {
 
     fn read(variables: bool, text: &str) -> Result<(LastingState, Vec<String>), String> {
         let axes = mill();
-        let files = LinuxCnc { axes: &axes, unit: LinearUnit::Inch };
+        let files = LinuxCnc {
+            axes: &axes,
+            unit: LinearUnit::Inch,
+        };
         let mut state = LastingState::default();
-        let read = if variables { files.read_variables(text, &mut state) } else { files.read_tools(text, &mut state) };
+        let read = if variables {
+            files.read_variables(text, &mut state)
+        } else {
+            files.read_tools(text, &mut state)
+        };
         let shown = |at: AtLine| format!("{}: {}", at.line, at.why);
-        read.map(|left| (state, left.into_iter().map(shown).collect())).map_err(shown)
+        read.map(|left| (state, left.into_iter().map(shown).collect()))
+            .map_err(shown)
     }
 
     #[test]
@@ -318,10 +395,16 @@ mod tests {
         let text = "31\t7\n5061 0\n5070 1.0\n5161\t1.0\n5210 0\n5211 2.0\n5220 3.0\n5221\t-1\n5224 90\n5225 4\n5230 45\n5399 0\n";
         let (state, left) = read(true, text).unwrap();
         assert_eq!(state.reference[0], Some(AxisVector::from_slice(&[25.4])));
-        assert_eq!((state.offsets.g92, state.offsets.g92_stored[0]), (AxisVector::ZERO, 50.8));
+        assert_eq!(
+            (state.offsets.g92, state.offsets.g92_stored[0]),
+            (AxisVector::ZERO, 50.8)
+        );
         assert_eq!(state.offsets.active_system, 2);
         let right = std::f64::consts::FRAC_PI_2;
-        assert_eq!(state.offsets.origins[0], AxisVector::from_slice(&[-25.4, 0.0, 0.0, right]));
+        assert_eq!(
+            state.offsets.origins[0],
+            AxisVector::from_slice(&[-25.4, 0.0, 0.0, right])
+        );
         assert_eq!(state.offsets.rotations_rad[0], right / 2.0);
         assert_eq!(state.parameters, [(31, 7.0)].into());
         let expected = [
@@ -333,10 +416,20 @@ mod tests {
         let text = "; my tools\nT1 P2 Z+1.5 d0.5 ;drill \"a\"\n\nT0 P0 B2\nT7 P3 A90 I5 J-5 Q2\n";
         let (state, left) = read(false, text).unwrap();
         let drill = &state.tools[&1];
-        assert_eq!((drill.offset[2], drill.diameter_mm, drill.pocket), (1.5 * 25.4, 12.7, Some(2)));
+        assert_eq!(
+            (drill.offset[2], drill.diameter_mm, drill.pocket),
+            (1.5 * 25.4, 12.7, Some(2))
+        );
         assert_eq!(drill.remark, "drill \"a\"");
         let turning = &state.tools[&7];
-        assert_eq!((turning.offset[3], turning.orientation, turning.back_angle_deg), (right, 2, -5.0));
+        assert_eq!(
+            (
+                turning.offset[3],
+                turning.orientation,
+                turning.back_angle_deg
+            ),
+            (right, 2, -5.0)
+        );
         let expected = [
             "4: B2 was not taken over: the machine has no axis B",
             "4: tool 0 was not taken over: it is the empty spindle",
@@ -347,20 +440,40 @@ mod tests {
     #[test]
     fn what_cannot_be_read_is_named_by_its_line() {
         for (variables, text, why) in [
-            (true, "5161 1\nhello\n", "2: a line has the number of a parameter and its value, not \"hello\""),
+            (
+                true,
+                "5161 1\nhello\n",
+                "2: a line has the number of a parameter and its value, not \"hello\"",
+            ),
             (true, "5161 nan\n", "1: \"nan\" is no number"),
             (true, "-3 1\n", "1: \"-3\" is no number of a parameter"),
-            (true, "5162 1\n5161 1\n", "2: #5161 stands behind #5162: a parameter file is in order"),
+            (
+                true,
+                "5162 1\n5161 1\n",
+                "2: #5161 stands behind #5162: a parameter file is in order",
+            ),
             (false, "T1 P1\nT1 P2", "2: tool 1 is listed twice"),
             (false, "P1 Z2", "1: T, the number of the tool, is missing"),
-            (false, "T1 Zx", "1: \"x\" is no number in \"Zx\": a word is a letter with a number, as in T1 or Z+20.5"),
-            (false, "T1.5", "1: T is a whole number from 0 to 99999, not 1.5"),
+            (
+                false,
+                "T1 Zx",
+                "1: \"x\" is no number in \"Zx\": a word is a letter with a number, as in T1 or Z+20.5",
+            ),
+            (
+                false,
+                "T1.5",
+                "1: T is a whole number from 0 to 99999, not 1.5",
+            ),
             (
                 false,
                 "POC FMS",
                 "1: \"OC\" is no number in \"POC\": a word is a letter with a number, as in T1 or Z+20.5",
             ),
-            (false, "T1 ü5", "1: \"ü5\" is no word of a tool table: those are T P X Y Z A B C U V W D I J Q"),
+            (
+                false,
+                "T1 ü5",
+                "1: \"ü5\" is no word of a tool table: those are T P X Y Z A B C U V W D I J Q",
+            ),
         ] {
             assert_eq!(read(variables, text).unwrap_err(), why, "{text}");
         }

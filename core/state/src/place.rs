@@ -15,9 +15,16 @@ pub fn default_path(name: &str) -> Result<PathBuf, StateError> {
     path_with(name, |variable| std::env::var_os(variable))
 }
 
-fn path_with(name: &str, variable: impl Fn(&str) -> Option<OsString>) -> Result<PathBuf, StateError> {
+fn path_with(
+    name: &str,
+    variable: impl Fn(&str) -> Option<OsString>,
+) -> Result<PathBuf, StateError> {
     // What is relative is to be passed over, says the XDG base directory specification.
-    let folder = |name: &str| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let folder = |name: &str| {
+        variable(name)
+            .map(PathBuf::from)
+            .filter(|path| path.is_absolute())
+    };
     // Systemd names several folders with colons between.
     let systemd = variable("STATE_DIRECTORY").and_then(|list| std::env::split_paths(&list).next());
     let folder = systemd
@@ -29,10 +36,20 @@ fn path_with(name: &str, variable: impl Fn(&str) -> Option<OsString>) -> Result<
 }
 
 fn file_name(name: &str) -> String {
-    let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
     let name: String = name.chars().map(plain).take(80).collect();
     let name = name.trim_start_matches('.');
-    if name.is_empty() { "machine".into() } else { name.into() }
+    if name.is_empty() {
+        "machine".into()
+    } else {
+        name.into()
+    }
 }
 
 #[cfg(test)]
@@ -40,24 +57,43 @@ mod tests {
     use super::*;
 
     fn path(name: &str, set: &[(&str, &str)]) -> String {
-        let variable = |wanted: &str| set.iter().find(|(name, _)| *name == wanted).map(|(_, value)| value.into());
+        let variable = |wanted: &str| {
+            set.iter()
+                .find(|(name, _)| *name == wanted)
+                .map(|(_, value)| value.into())
+        };
         path_with(name, variable).unwrap().display().to_string()
     }
 
     #[test]
     fn the_folder_that_is_set_first_counts() {
         let home = ("HOME", "/home/me");
-        assert_eq!(path("mill", &[home]), "/home/me/.local/state/tandem/mill.sqlite");
-        assert_eq!(path("mill", &[home, ("XDG_STATE_HOME", "/s")]), "/s/tandem/mill.sqlite");
-        assert_eq!(path("mill", &[home, ("XDG_STATE_HOME", "s")]), "/home/me/.local/state/tandem/mill.sqlite");
-        assert_eq!(path("mill", &[home, ("STATE_DIRECTORY", "/var/lib/tandem:/x")]), "/var/lib/tandem/mill.sqlite");
+        assert_eq!(
+            path("mill", &[home]),
+            "/home/me/.local/state/tandem/mill.sqlite"
+        );
+        assert_eq!(
+            path("mill", &[home, ("XDG_STATE_HOME", "/s")]),
+            "/s/tandem/mill.sqlite"
+        );
+        assert_eq!(
+            path("mill", &[home, ("XDG_STATE_HOME", "s")]),
+            "/home/me/.local/state/tandem/mill.sqlite"
+        );
+        assert_eq!(
+            path("mill", &[home, ("STATE_DIRECTORY", "/var/lib/tandem:/x")]),
+            "/var/lib/tandem/mill.sqlite"
+        );
         assert_eq!(path_with("mill", |_| None), Err(StateError::Nowhere));
     }
 
     #[test]
     fn a_name_cannot_leave_the_folder() {
         let home = [("HOME", "/h")];
-        assert_eq!(path("../a b/c", &home), "/h/.local/state/tandem/-a-b-c.sqlite");
+        assert_eq!(
+            path("../a b/c", &home),
+            "/h/.local/state/tandem/-a-b-c.sqlite"
+        );
         assert_eq!(path("..", &home), "/h/.local/state/tandem/machine.sqlite");
     }
 }

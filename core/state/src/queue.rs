@@ -102,7 +102,10 @@ impl Queue {
     /// Everything that waits.
     pub fn take(&mut self) -> Batch {
         self.requests = 0;
-        Batch { waiting: take(&mut self.waiting), driven: self.driven.take() }
+        Batch {
+            waiting: take(&mut self.waiting),
+            driven: self.driven.take(),
+        }
     }
 
     /// Tells those who wait how it went. What nobody waits for and was not written waits again, before what came since.
@@ -158,7 +161,10 @@ fn key(change: &Change) -> Option<(u8, usize, String)> {
         Change::PolicyParameter { name, .. } => (13, 0, name.clone()),
         Change::LastPosition(_) => (14, 0, String::new()),
         Change::Whole(_) => (15, 0, String::new()),
-        Change::JobBegan(_) | Change::JobEnded { .. } | Change::Raised(_) | Change::Acknowledged { .. } => return None,
+        Change::JobBegan(_)
+        | Change::JobEnded { .. }
+        | Change::Raised(_)
+        | Change::Acknowledged { .. } => return None,
     })
 }
 
@@ -170,7 +176,12 @@ pub(crate) struct Batch {
 
 impl Batch {
     /// One transaction: on disk, or nothing changed.
-    pub fn write(&self, connection: &mut Connection, axes: &Axes, home: &AxisVector) -> rusqlite::Result<()> {
+    pub fn write(
+        &self,
+        connection: &mut Connection,
+        axes: &Axes,
+        home: &AxisVector,
+    ) -> rusqlite::Result<()> {
         let changes = self.waiting.iter().flat_map(|entry| match entry {
             Waiting::Change(change) => std::slice::from_ref(change),
             Waiting::Request(request) => &request.changes,
@@ -181,7 +192,9 @@ impl Batch {
         }
         let writer = Writer::begin(connection, axes, home)?;
         changes.try_for_each(|change| writer.write(change))?;
-        self.driven.as_ref().map_or(Ok(()), |driven| writer.driven(driven))?;
+        self.driven
+            .as_ref()
+            .map_or(Ok(()), |driven| writer.driven(driven))?;
         writer.commit()
     }
 }

@@ -50,26 +50,43 @@ CREATE TABLE driven (
 /// Refuses what is not ours, damaged or of a later version; true where the file is new.
 pub(crate) fn examine(connection: &Connection, path: &Path) -> Result<bool, StateError> {
     let reading = |error: rusqlite::Error| StateError::reading(path, &error);
-    let number = |pragma: &str| connection.pragma_query_value(None, pragma, |row| row.get::<_, i64>(0));
-    let (application, format) = (number("application_id").map_err(reading)?, number("user_version").map_err(reading)?);
+    let number =
+        |pragma: &str| connection.pragma_query_value(None, pragma, |row| row.get::<_, i64>(0));
+    let (application, format) = (
+        number("application_id").map_err(reading)?,
+        number("user_version").map_err(reading)?,
+    );
     let objects = "SELECT count(*) FROM sqlite_master";
-    let objects = connection.query_row(objects, [], |row| row.get::<_, i64>(0)).map_err(reading)?;
+    let objects = connection
+        .query_row(objects, [], |row| row.get::<_, i64>(0))
+        .map_err(reading)?;
     if application == 0 && format == 0 && objects == 0 {
         return Ok(true);
     }
     if application != APPLICATION_ID {
         let what = "it is a database of another program".into();
-        return Err(StateError::Foreign { path: path.into(), what });
+        return Err(StateError::Foreign {
+            path: path.into(),
+            what,
+        });
     }
     let known = FORMATS.len() as i64;
     if format > known {
-        return Err(StateError::Newer { path: path.into(), found: format, known });
+        return Err(StateError::Newer {
+            path: path.into(),
+            found: format,
+            known,
+        });
     }
-    let damaged = |what: String| StateError::Damaged { path: path.into(), what };
+    let damaged = |what: String| StateError::Damaged {
+        path: path.into(),
+        what,
+    };
     if format < 1 {
         return Err(damaged(format!("its format is {format}")));
     }
-    let verdict = connection.pragma_query_value(None, "integrity_check", |row| row.get::<_, String>(0));
+    let verdict =
+        connection.pragma_query_value(None, "integrity_check", |row| row.get::<_, String>(0));
     match verdict.map_err(reading)?.as_str() {
         "ok" => Ok(false),
         what => Err(damaged(what.lines().next().unwrap_or_default().to_owned())),
@@ -84,7 +101,9 @@ pub(crate) fn bring_up(
     formats: &[&str],
 ) -> Result<Option<PathBuf>, StateError> {
     let writing = |error: rusqlite::Error| StateError::writing(path, &error);
-    let format = connection.pragma_query_value(None, "user_version", |row| row.get::<_, i64>(0)).map_err(writing)?;
+    let format = connection
+        .pragma_query_value(None, "user_version", |row| row.get::<_, i64>(0))
+        .map_err(writing)?;
     let format = format as usize;
     if format == formats.len() {
         return Ok(None);
@@ -97,8 +116,12 @@ pub(crate) fn bring_up(
     for step in &formats[format..] {
         transaction.execute_batch(step).map_err(writing)?;
     }
-    transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(writing)?;
-    transaction.pragma_update(None, "user_version", formats.len() as i64).map_err(writing)?;
+    transaction
+        .pragma_update(None, "application_id", APPLICATION_ID)
+        .map_err(writing)?;
+    transaction
+        .pragma_update(None, "user_version", formats.len() as i64)
+        .map_err(writing)?;
     transaction.commit().map_err(writing)?;
     Ok(copy)
 }
@@ -123,12 +146,18 @@ fn keep_copy(connection: &Connection, path: &Path, copy: &Path) -> Result<(), St
     fresh.push(".new");
     let fresh = PathBuf::from(fresh);
     let _ = std::fs::remove_file(&fresh);
-    let text = fresh.to_str().ok_or_else(|| failed("its name is no UTF-8".into()))?;
-    connection.execute("VACUUM INTO ?1", [text]).map_err(|error| failed(error.to_string()))?;
+    let text = fresh
+        .to_str()
+        .ok_or_else(|| failed("its name is no UTF-8".into()))?;
+    connection
+        .execute("VACUUM INTO ?1", [text])
+        .map_err(|error| failed(error.to_string()))?;
     let on_disk = || -> std::io::Result<()> {
         std::fs::File::open(&fresh)?.sync_all()?;
         std::fs::rename(&fresh, copy)?;
-        let folder = copy.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = copy
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
         std::fs::File::open(folder.unwrap_or_else(|| Path::new(".")))?.sync_all()
     };
     on_disk().map_err(|error| failed(error.to_string()))
@@ -143,12 +172,20 @@ mod tests {
     fn file_of_format_one(path: &Path) -> Connection {
         let mut connection = Connection::open(path).unwrap();
         assert_eq!(bring_up(&mut connection, path, FORMATS).unwrap(), None);
-        connection.execute("INSERT INTO parameter VALUES (500, 1.25)", []).unwrap();
+        connection
+            .execute("INSERT INTO parameter VALUES (500, 1.25)", [])
+            .unwrap();
         connection
     }
 
     fn parameter(connection: &Connection) -> f64 {
-        connection.query_row("SELECT value FROM parameter WHERE number = 500", [], |row| row.get(0)).unwrap()
+        connection
+            .query_row(
+                "SELECT value FROM parameter WHERE number = 500",
+                [],
+                |row| row.get(0),
+            )
+            .unwrap()
     }
 
     #[test]
@@ -157,17 +194,41 @@ mod tests {
         let path = folder.path().join("mill.sqlite");
         let mut connection = file_of_format_one(&path);
         let formats = [FORMATS[0], NEXT];
-        let copy = bring_up(&mut connection, &path, &formats).unwrap().expect("a copy was made");
-        assert_eq!(connection.query_row("SELECT count(coolant) FROM tool", [], |row| row.get::<_, i64>(0)).unwrap(), 0);
+        let copy = bring_up(&mut connection, &path, &formats)
+            .unwrap()
+            .expect("a copy was made");
+        assert_eq!(
+            connection
+                .query_row("SELECT count(coolant) FROM tool", [], |row| row
+                    .get::<_, i64>(0))
+                .unwrap(),
+            0
+        );
         assert_eq!(parameter(&connection), 1.25);
         let old = Connection::open(&copy).unwrap();
         assert!(!examine(&old, &copy).unwrap());
         assert_eq!(parameter(&old), 1.25);
-        assert!(old.prepare("SELECT coolant FROM tool").is_err(), "the copy has the old format");
+        assert!(
+            old.prepare("SELECT coolant FROM tool").is_err(),
+            "the copy has the old format"
+        );
         // What the new version has made is later than what this one knows, and the copy's name is in the refusal.
         let refusal = examine(&connection, &path).unwrap_err();
-        assert!(matches!(refusal, StateError::Newer { found: 2, known: 1, .. }), "{refusal}");
-        assert!(refusal.to_string().contains(copy.to_str().unwrap()), "{refusal}");
+        assert!(
+            matches!(
+                refusal,
+                StateError::Newer {
+                    found: 2,
+                    known: 1,
+                    ..
+                }
+            ),
+            "{refusal}"
+        );
+        assert!(
+            refusal.to_string().contains(copy.to_str().unwrap()),
+            "{refusal}"
+        );
     }
 
     #[test]
@@ -180,7 +241,11 @@ mod tests {
         assert!(connection.prepare("SELECT coolant FROM tool").is_err());
         assert!(!examine(&connection, &path).unwrap());
         // The copy of the attempt is in nobody's way.
-        assert!(bring_up(&mut connection, &path, &formats[..2]).unwrap().is_some());
+        assert!(
+            bring_up(&mut connection, &path, &formats[..2])
+                .unwrap()
+                .is_some()
+        );
     }
 
     #[test]
@@ -191,7 +256,10 @@ mod tests {
         // A folder with content stands where the copy would go.
         std::fs::create_dir_all(copy_path(&path, 1).join("kept")).unwrap();
         let refusal = bring_up(&mut connection, &path, &[FORMATS[0], NEXT]).unwrap_err();
-        assert!(refusal.to_string().contains(".format-1 that is made first"), "{refusal}");
+        assert!(
+            refusal.to_string().contains(".format-1 that is made first"),
+            "{refusal}"
+        );
         assert!(connection.prepare("SELECT coolant FROM tool").is_err());
     }
 }

@@ -41,7 +41,11 @@ pub struct Owner<'a> {
 impl<'a> Owner<'a> {
     /// As a machine file says.
     pub fn of(machine: &'a Machine) -> Self {
-        Self { machine: &machine.name, axes: &machine.axes, home: machine.home }
+        Self {
+            machine: &machine.name,
+            axes: &machine.axes,
+            home: machine.home,
+        }
     }
 }
 
@@ -89,7 +93,9 @@ impl Recorder {
     pub fn record(&self, change: Change) -> Result<(), StateError> {
         judge(&change)?;
         if !self.shared.queue().push(change) {
-            return Err(StateError::Closed { path: self.shared.path.clone() });
+            return Err(StateError::Closed {
+                path: self.shared.path.clone(),
+            });
         }
         self.shared.wake.notify_one();
         Ok(())
@@ -117,8 +123,14 @@ impl Store {
     /// # Errors
     /// As [`Store::open`].
     pub fn open_on(path: &Path, owner: Owner<'_>, vfs: Option<&str>) -> Result<Self, StateError> {
-        let cannot = |error: std::io::Error| StateError::Open { path: path.into(), why: error.to_string() };
-        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        let cannot = |error: std::io::Error| StateError::Open {
+            path: path.into(),
+            why: error.to_string(),
+        };
+        if let Some(folder) = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty())
+        {
             std::fs::create_dir_all(folder).map_err(cannot)?;
         }
         let lock = lock(path)?;
@@ -127,15 +139,25 @@ impl Store {
         let mut connection = connect(path, OpenFlags::default(), vfs)?;
         if connection.is_readonly("main").map_err(reading)? {
             let why = "the file or its folder is read-only; SQLite needs both writable".into();
-            return Err(StateError::Write { path: path.into(), why });
+            return Err(StateError::Write {
+                path: path.into(),
+                why,
+            });
         }
         let new = examine(&connection, path)?;
-        let mode = connection.pragma_update_and_check(None, "journal_mode", "WAL", |row| row.get::<_, String>(0));
+        let mode = connection
+            .pragma_update_and_check(None, "journal_mode", "WAL", |row| row.get::<_, String>(0));
         if mode.map_err(writing)? != "wal" {
-            let why = "this file system has no shared memory, which SQLite's write-ahead log needs".into();
-            return Err(StateError::Write { path: path.into(), why });
+            let why = "this file system has no shared memory, which SQLite's write-ahead log needs"
+                .into();
+            return Err(StateError::Write {
+                path: path.into(),
+                why,
+            });
         }
-        connection.pragma_update(None, "synchronous", "FULL").map_err(writing)?;
+        connection
+            .pragma_update(None, "synchronous", "FULL")
+            .map_err(writing)?;
         let copy = bring_up(&mut connection, path, FORMATS)?;
         if !new {
             refuse_other(&connection, path, owner)?;
@@ -148,15 +170,25 @@ impl Store {
             .and_then(|()| writer.commit());
         prepared.map_err(writing)?;
         sync_folder(path).map_err(cannot)?;
-        let rows = Rows { connection: &connection, path, axes: owner.axes };
+        let rows = Rows {
+            connection: &connection,
+            path,
+            axes: owner.axes,
+        };
         let first = rows.state()?;
         let filled = rows.note("filled")?.is_some();
         let [next_job, next_alarm] =
             [rows.highest("job")?, rows.highest("alarm")?].map(|last| AtomicU64::new(last + 1));
-        let shared = Arc::new(Shared { path: path.into(), queue: Mutex::new(Queue::default()), wake: Condvar::new() });
+        let shared = Arc::new(Shared {
+            path: path.into(),
+            queue: Mutex::new(Queue::default()),
+            wake: Condvar::new(),
+        });
         let (axes, home, theirs) = (*owner.axes, owner.home, Arc::clone(&shared));
         let thread = std::thread::Builder::new().name("state".into());
-        let writer = thread.spawn(move || write_on(&theirs, connection, &axes, &home)).map_err(cannot)?;
+        let writer = thread
+            .spawn(move || write_on(&theirs, connection, &axes, &home))
+            .map_err(cannot)?;
         Ok(Self {
             shared,
             writer: Some(writer),
@@ -193,7 +225,9 @@ impl Store {
 
     /// Who sends what happens to the writer.
     pub fn recorder(&self) -> Recorder {
-        Recorder { shared: Arc::clone(&self.shared) }
+        Recorder {
+            shared: Arc::clone(&self.shared),
+        }
     }
 
     /// Writes `changes`, all or none of them, behind everything that was recorded before, and returns when they are on disk:
@@ -204,7 +238,11 @@ impl Store {
     pub fn commit(&self, changes: Vec<Change>) -> Result<(), StateError> {
         changes.iter().try_for_each(judge)?;
         let (answer, answered) = mpsc::sync_channel(1);
-        let closed = || Err(StateError::Closed { path: self.shared.path.clone() });
+        let closed = || {
+            Err(StateError::Closed {
+                path: self.shared.path.clone(),
+            })
+        };
         if !self.shared.queue().ask(Request { changes, answer }) {
             return closed();
         }
@@ -255,15 +293,25 @@ impl Store {
     ///
     /// # Errors
     /// The file cannot be read.
-    #[allow(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime, the closure of any")]
+    #[allow(
+        clippy::redundant_closure_for_method_calls,
+        reason = "the method is of one lifetime, the closure of any"
+    )]
     pub fn read_back(&self) -> Result<LastingState, StateError> {
         self.read(|rows| rows.state())
     }
 
-    fn read<T>(&self, read: impl FnOnce(&Rows<'_>) -> Result<T, StateError>) -> Result<T, StateError> {
+    fn read<T>(
+        &self,
+        read: impl FnOnce(&Rows<'_>) -> Result<T, StateError>,
+    ) -> Result<T, StateError> {
         let path = &self.shared.path;
         let connection = connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY, self.vfs.as_deref())?;
-        read(&Rows { connection: &connection, path, axes: &self.axes })
+        read(&Rows {
+            connection: &connection,
+            path,
+            axes: &self.axes,
+        })
     }
 
     /// Writes what waits and closes the file.
@@ -304,13 +352,27 @@ impl Reader {
             return Err(StateError::Missing { path: path.into() });
         }
         let connection = connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY, None)?;
-        let nothing = || StateError::Foreign { path: path.into(), what: "it is empty".into() };
+        let nothing = || StateError::Foreign {
+            path: path.into(),
+            what: "it is empty".into(),
+        };
         if examine(&connection, path)? {
             return Err(nothing());
         }
         let axes = axes_of(&connection, path)?.ok_or_else(nothing)?;
-        let machine = Rows { connection: &connection, path, axes: &axes }.note("machine")?.unwrap_or_default();
-        Ok(Self { connection, path: path.into(), axes, machine })
+        let machine = Rows {
+            connection: &connection,
+            path,
+            axes: &axes,
+        }
+        .note("machine")?
+        .unwrap_or_default();
+        Ok(Self {
+            connection,
+            path: path.into(),
+            axes,
+            machine,
+        })
     }
 
     /// The axes of the machine, with which vectors of [`Reader::state`] are ordered.
@@ -324,7 +386,11 @@ impl Reader {
     }
 
     fn rows(&self) -> Rows<'_> {
-        Rows { connection: &self.connection, path: &self.path, axes: &self.axes }
+        Rows {
+            connection: &self.connection,
+            path: &self.path,
+            axes: &self.axes,
+        }
     }
 
     /// The state, as one instant saw it.
@@ -359,7 +425,10 @@ fn connect(path: &Path, flags: OpenFlags, vfs: Option<&str>) -> Result<Connectio
         Some(vfs) => Connection::open_with_flags_and_vfs(path, flags, vfs),
         None => Connection::open_with_flags(path, flags),
     };
-    let cannot = |error: rusqlite::Error| StateError::Open { path: path.into(), why: error.to_string() };
+    let cannot = |error: rusqlite::Error| StateError::Open {
+        path: path.into(),
+        why: error.to_string(),
+    };
     let connection = connection.map_err(cannot)?;
     connection.busy_timeout(BUSY).map_err(cannot)?;
     Ok(connection)
@@ -370,8 +439,16 @@ fn connect(path: &Path, flags: OpenFlags, vfs: Option<&str>) -> Result<Connectio
 fn lock(path: &Path) -> Result<File, StateError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
-    let cannot = |error: std::io::Error| StateError::Open { path: path.into(), why: error.to_string() };
-    let file = File::options().create(true).truncate(false).write(true).open(PathBuf::from(name)).map_err(cannot)?;
+    let cannot = |error: std::io::Error| StateError::Open {
+        path: path.into(),
+        why: error.to_string(),
+    };
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(PathBuf::from(name))
+        .map_err(cannot)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(std::fs::TryLockError::WouldBlock) => Err(StateError::InUse { path: path.into() }),
@@ -381,33 +458,64 @@ fn lock(path: &Path) -> Result<File, StateError> {
 
 /// SQLite makes the names of its journals safe, that of a new file only together with them.
 fn sync_folder(path: &Path) -> std::io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or_else(|| Path::new("."));
     File::open(folder)?.sync_all()?;
     // The folder itself may be new.
-    folder.parent().filter(|above| !above.as_os_str().is_empty()).map_or(Ok(()), |above| File::open(above)?.sync_all())
+    folder
+        .parent()
+        .filter(|above| !above.as_os_str().is_empty())
+        .map_or(Ok(()), |above| File::open(above)?.sync_all())
 }
 
 /// Offsets of another machine would drive the tool into the table.
 fn refuse_other(connection: &Connection, path: &Path, owner: Owner<'_>) -> Result<(), StateError> {
-    let other = |what: String| Err(StateError::OtherMachine { path: path.into(), what });
+    let other = |what: String| {
+        Err(StateError::OtherMachine {
+            path: path.into(),
+            what,
+        })
+    };
     // Without a name nobody came further than to make the tables.
-    let Some(machine) = (Rows { connection, path, axes: owner.axes }).note("machine")? else { return Ok(()) };
+    let Some(machine) = (Rows {
+        connection,
+        path,
+        axes: owner.axes,
+    })
+    .note("machine")?
+    else {
+        return Ok(());
+    };
     if machine != owner.machine {
-        return other(format!("it is that of \"{machine}\", and this machine is called \"{}\"", owner.machine));
+        return other(format!(
+            "it is that of \"{machine}\", and this machine is called \"{}\"",
+            owner.machine
+        ));
     }
     let known = letters_of(connection, path)?;
     for axis in 0..owner.axes.count() {
         let (letter, rotary) = (owner.axes.letter(axis), owner.axes.is_rotary(axis));
         if known.get(&letter).is_some_and(|known| *known != rotary) {
-            let kinds = if rotary { ["slides", "turns"] } else { ["turns", "slides"] };
-            return other(format!("its axis {letter} {}, that of this machine {}", kinds[0], kinds[1]));
+            let kinds = if rotary {
+                ["slides", "turns"]
+            } else {
+                ["turns", "slides"]
+            };
+            return other(format!(
+                "its axis {letter} {}, that of this machine {}",
+                kinds[0], kinds[1]
+            ));
         }
     }
     Ok(())
 }
 
 fn now_unix_ms() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let since = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default();
     i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
 
@@ -431,15 +539,25 @@ fn write_on(shared: &Shared, mut connection: Connection, axes: &Axes, home: &Axi
             let now = Instant::now();
             queue = match queue.due(retry, line, now) {
                 Due::Now => break,
-                Due::Never => shared.wake.wait(queue).unwrap_or_else(PoisonError::into_inner),
-                Due::At(at) => shared.wake.wait_timeout(queue, at - now).unwrap_or_else(PoisonError::into_inner).0,
+                Due::Never => shared
+                    .wake
+                    .wait(queue)
+                    .unwrap_or_else(PoisonError::into_inner),
+                Due::At(at) => {
+                    shared
+                        .wake
+                        .wait_timeout(queue, at - now)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
+                }
             };
         }
         let batch = queue.take();
         let closing = queue.closing;
         drop(queue);
-        let written =
-            batch.write(&mut connection, axes, home).map_err(|error| StateError::writing(&shared.path, &error));
+        let written = batch
+            .write(&mut connection, axes, home)
+            .map_err(|error| StateError::writing(&shared.path, &error));
         retry = written.is_err().then(|| Instant::now() + AGAIN_AFTER);
         line = Instant::now() + DRIVEN_EVERY;
         let mut queue = shared.queue();

@@ -9,7 +9,8 @@ use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
 use crate::change::Change;
 use crate::data::{
-    Driven, Job, JobEnd, LASTING_PARAMETERS, LastingState, Tool, ToolLife, USER_PARAMETERS, WorkOffsets,
+    Driven, Job, JobEnd, LASTING_PARAMETERS, LastingState, Tool, ToolLife, USER_PARAMETERS,
+    WorkOffsets,
 };
 use crate::error::StateError;
 use crate::rows::{G92, G92_STORED, LAST, REFERENCES, Rows};
@@ -62,7 +63,10 @@ fn judge_program(lasting: &Lasting) -> Result<(), StateError> {
     for (name, place) in REFERENCES.iter().zip(&lasting.reference) {
         vector(name, place)?;
     }
-    lasting.parameters.iter().try_for_each(|(number, value)| finite(&format!("#{number}"), *value))?;
+    lasting
+        .parameters
+        .iter()
+        .try_for_each(|(number, value)| finite(&format!("#{number}"), *value))?;
     lasting.tools.iter().try_for_each(|tool| {
         let mut row = Tool::default();
         row.measure(tool);
@@ -74,7 +78,10 @@ fn judge_offsets(offsets: &WorkOffsets) -> Result<(), StateError> {
     for system in 0..WORK_SYSTEMS {
         let name = system_code(system);
         vector(&name, &offsets.origins[system])?;
-        finite(&format!("the rotation of {name}"), offsets.rotations_rad[system])?;
+        finite(
+            &format!("the rotation of {name}"),
+            offsets.rotations_rad[system],
+        )?;
     }
     below("a coordinate system", offsets.active_system, WORK_SYSTEMS)?;
     vector("the offset of G92", &offsets.g92)?;
@@ -93,8 +100,14 @@ fn offsets_of(lasting: &Lasting) -> WorkOffsets {
 
 fn judge_parameter(number: usize, value: f64) -> Result<(), StateError> {
     if !is_user_parameter(number) {
-        let why = format!("the parameters that last are #{} to #{}", USER_PARAMETERS.0, USER_PARAMETERS.1);
-        return Err(StateError::Value { what: format!("#{number}"), why });
+        let why = format!(
+            "the parameters that last are #{} to #{}",
+            USER_PARAMETERS.0, USER_PARAMETERS.1
+        );
+        return Err(StateError::Value {
+            what: format!("#{number}"),
+            why,
+        });
     }
     finite(&format!("#{number}"), value)
 }
@@ -102,7 +115,10 @@ fn judge_parameter(number: usize, value: f64) -> Result<(), StateError> {
 fn judge_tool(tool: &Tool) -> Result<(), StateError> {
     let what = format!("tool {}", tool.number);
     if !(1..=MAX_TOOL_NUMBER).contains(&tool.number) {
-        return Err(StateError::Value { what, why: format!("tools are numbered from 1 to {MAX_TOOL_NUMBER}") });
+        return Err(StateError::Value {
+            what,
+            why: format!("tools are numbered from 1 to {MAX_TOOL_NUMBER}"),
+        });
     }
     vector(&format!("the offset of {what}"), &tool.offset)?;
     vector(&format!("the wear of {what}"), &tool.wear)?;
@@ -132,7 +148,9 @@ fn judge_end(end: Option<&JobEnd>) -> Result<(), StateError> {
     let Some(end) = end else { return Ok(()) };
     finite("the time of a job", end.motion_s)?;
     counted("the stops of a job", end.stops)?;
-    end.limited_by_s.iter().try_for_each(|(name, seconds)| finite(&format!("the time limited by {name}"), *seconds))
+    end.limited_by_s
+        .iter()
+        .try_for_each(|(name, seconds)| finite(&format!("the time limited by {name}"), *seconds))
 }
 
 fn judge_state(state: &LastingState) -> Result<(), StateError> {
@@ -140,15 +158,24 @@ fn judge_state(state: &LastingState) -> Result<(), StateError> {
     for (name, place) in REFERENCES.iter().zip(&state.reference) {
         vector(name, &place.unwrap_or_default())?;
     }
-    vector("the last position", &state.last_position.unwrap_or_default())?;
-    state.parameters.iter().try_for_each(|(number, value)| judge_parameter(*number, *value))?;
+    vector(
+        "the last position",
+        &state.last_position.unwrap_or_default(),
+    )?;
+    state
+        .parameters
+        .iter()
+        .try_for_each(|(number, value)| judge_parameter(*number, *value))?;
     for (name, value) in &state.policy_parameters {
         text("the name of a policy parameter", name)?;
         finite(&format!("the policy parameter {name}"), *value)?;
     }
     if state.tools.len() > MAX_TOOLS {
         let what = format!("a table of {} tools", state.tools.len());
-        return Err(StateError::Value { what, why: format!("{MAX_TOOLS} are the most") });
+        return Err(StateError::Value {
+            what,
+            why: format!("{MAX_TOOLS} are the most"),
+        });
     }
     state.tools.values().try_for_each(judge_tool)
 }
@@ -157,7 +184,10 @@ fn finite(what: &str, value: f64) -> Result<(), StateError> {
     if value.is_finite() {
         return Ok(());
     }
-    Err(StateError::Value { what: what.into(), why: format!("{value} is no number to go on with") })
+    Err(StateError::Value {
+        what: what.into(),
+        why: format!("{value} is no number to go on with"),
+    })
 }
 
 fn vector(what: &str, value: &AxisVector) -> Result<(), StateError> {
@@ -168,22 +198,34 @@ fn below(what: &str, index: usize, count: usize) -> Result<(), StateError> {
     if index < count {
         return Ok(());
     }
-    Err(StateError::Value { what: what.into(), why: format!("there are {count}, and no index {index}") })
+    Err(StateError::Value {
+        what: what.into(),
+        why: format!("there are {count}, and no index {index}"),
+    })
 }
 
 fn counted(what: &str, count: u64) -> Result<(), StateError> {
     if i64::try_from(count).is_ok() {
         return Ok(());
     }
-    Err(StateError::Value { what: what.into(), why: format!("a count of {count} is beyond all sense") })
+    Err(StateError::Value {
+        what: what.into(),
+        why: format!("a count of {count} is beyond all sense"),
+    })
 }
 
 fn text(what: &str, value: &str) -> Result<(), StateError> {
     if value.len() <= MAX_TEXT_BYTES {
         return Ok(());
     }
-    let why = format!("it has {} bytes, {MAX_TEXT_BYTES} are the most", value.len());
-    Err(StateError::Value { what: what.into(), why })
+    let why = format!(
+        "it has {} bytes, {MAX_TEXT_BYTES} are the most",
+        value.len()
+    );
+    Err(StateError::Value {
+        what: what.into(),
+        why,
+    })
 }
 
 /// Writes changes within one transaction.
@@ -196,9 +238,18 @@ pub(crate) struct Writer<'a> {
 type Done = rusqlite::Result<()>;
 
 impl<'a> Writer<'a> {
-    pub fn begin(connection: &'a mut Connection, axes: &'a Axes, home: &'a AxisVector) -> rusqlite::Result<Self> {
-        let transaction = connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
-        Ok(Self { transaction, axes, home })
+    pub fn begin(
+        connection: &'a mut Connection,
+        axes: &'a Axes,
+        home: &'a AxisVector,
+    ) -> rusqlite::Result<Self> {
+        let transaction =
+            connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
+        Ok(Self {
+            transaction,
+            axes,
+            home,
+        })
     }
 
     /// On disk when this returns.
@@ -207,7 +258,10 @@ impl<'a> Writer<'a> {
     }
 
     fn run(&self, statement: &str, values: impl rusqlite::Params) -> Done {
-        self.transaction.prepare(statement)?.execute(values).map(|_| ())
+        self.transaction
+            .prepare(statement)?
+            .execute(values)
+            .map(|_| ())
     }
 
     pub fn write(&self, change: &Change) -> Done {
@@ -255,7 +309,11 @@ impl<'a> Writer<'a> {
         self.offsets(&offsets_of(lasting))?;
         for (name, place) in REFERENCES.iter().zip(&lasting.reference) {
             let stored = "SELECT 1 FROM place WHERE name = ?1";
-            let is_stored = self.transaction.query_row(stored, [name], |_| Ok(())).optional()?.is_some();
+            let is_stored = self
+                .transaction
+                .query_row(stored, [name], |_| Ok(()))
+                .optional()?
+                .is_some();
             if is_stored || place != self.home {
                 self.place(name, place)?;
             }
@@ -266,7 +324,9 @@ impl<'a> Writer<'a> {
     }
 
     fn program_parameters(&self, lasting: &Lasting) -> Done {
-        let mut rows = self.transaction.prepare("SELECT number, value FROM parameter")?;
+        let mut rows = self
+            .transaction
+            .prepare("SELECT number, value FROM parameter")?;
         let rows = rows.query_map([], |row| Ok((row.get::<_, u32>(0)?, row.get::<_, f64>(1)?)))?;
         let rows = rows.collect::<rusqlite::Result<BTreeMap<_, _>>>()?;
         for (number, value) in &rows {
@@ -276,8 +336,12 @@ impl<'a> Writer<'a> {
             }
         }
         let lasts = LASTING_PARAMETERS.0 as u32..=LASTING_PARAMETERS.1 as u32;
-        let new = lasting.parameters.range(lasts).filter(|(number, _)| !rows.contains_key(number));
-        new.into_iter().try_for_each(|(number, value)| self.parameter(*number as usize, *value))
+        let new = lasting
+            .parameters
+            .range(lasts)
+            .filter(|(number, _)| !rows.contains_key(number));
+        new.into_iter()
+            .try_for_each(|(number, value)| self.parameter(*number as usize, *value))
     }
 
     fn offsets(&self, offsets: &WorkOffsets) -> Done {
@@ -298,7 +362,10 @@ impl<'a> Writer<'a> {
     }
 
     fn parameter(&self, number: usize, value: f64) -> Done {
-        self.run("INSERT OR REPLACE INTO parameter VALUES (?1, ?2)", params![number, value])
+        self.run(
+            "INSERT OR REPLACE INTO parameter VALUES (?1, ?2)",
+            params![number, value],
+        )
     }
 
     fn place(&self, name: &str, vector: &AxisVector) -> Done {
@@ -320,7 +387,10 @@ impl<'a> Writer<'a> {
             return Ok(());
         }
         let letter = self.axes.letter(axis).to_string();
-        self.run("UPDATE axis SET turns = ?2 WHERE letter = ?1", params![letter, turns])
+        self.run(
+            "UPDATE axis SET turns = ?2 WHERE letter = ?1",
+            params![letter, turns],
+        )
     }
 
     fn tool(&self, tool: &Tool) -> Done {
@@ -350,7 +420,10 @@ impl<'a> Writer<'a> {
         for axis in 0..self.axes.count() {
             let letter = self.axes.letter(axis).to_string();
             let row = params![number, letter, offset[axis], wear[axis]];
-            self.run("INSERT OR REPLACE INTO tool_offset VALUES (?1, ?2, ?3, ?4)", row)?;
+            self.run(
+                "INSERT OR REPLACE INTO tool_offset VALUES (?1, ?2, ?3, ?4)",
+                row,
+            )?;
         }
         Ok(())
     }
@@ -364,12 +437,17 @@ impl<'a> Writer<'a> {
 
     /// What [`Tool::measure`] does, where a row of the table says something else.
     fn measured(&self, lasting: &Lasting) -> Done {
-        let rows = Rows { connection: &self.transaction, path: Path::new(""), axes: self.axes };
+        let rows = Rows {
+            connection: &self.transaction,
+            path: Path::new(""),
+            axes: self.axes,
+        };
         let mut tools = rows.tools()?;
         for measured in &lasting.tools {
             let row = tools.entry(measured.number).or_default();
             let seen = row.to_program();
-            if (seen.number, seen.offset, seen.diameter_mm) != (measured.number, measured.offset, measured.diameter_mm)
+            if (seen.number, seen.offset, seen.diameter_mm)
+                != (measured.number, measured.offset, measured.diameter_mm)
             {
                 row.measure(measured);
                 self.tool(row)?;
@@ -383,9 +461,17 @@ impl<'a> Writer<'a> {
             "INSERT OR REPLACE INTO job (id, kind, program, hash, started_unix_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
             params![job.id, job.kind.word(), job.program, job.hash, job.started_unix_ms],
         )?;
-        self.run("DELETE FROM job WHERE id <= ?1 - ?2", params![job.id, MAX_HISTORY])?;
-        self.run("DELETE FROM job_time WHERE job <= ?1 - ?2", params![job.id, MAX_HISTORY])?;
-        job.end.as_ref().map_or(Ok(()), |end| self.job_end(job.id, end))
+        self.run(
+            "DELETE FROM job WHERE id <= ?1 - ?2",
+            params![job.id, MAX_HISTORY],
+        )?;
+        self.run(
+            "DELETE FROM job_time WHERE job <= ?1 - ?2",
+            params![job.id, MAX_HISTORY],
+        )?;
+        job.end
+            .as_ref()
+            .map_or(Ok(()), |end| self.job_end(job.id, end))
     }
 
     fn job_end(&self, id: u64, end: &JobEnd) -> Done {
@@ -395,24 +481,45 @@ impl<'a> Writer<'a> {
         )?;
         self.run("DELETE FROM job_time WHERE job = ?1", [id])?;
         for (name, seconds) in &end.limited_by_s {
-            self.run("INSERT INTO job_time VALUES (?1, ?2, ?3)", params![id, name, seconds])?;
+            self.run(
+                "INSERT INTO job_time VALUES (?1, ?2, ?3)",
+                params![id, name, seconds],
+            )?;
         }
         Ok(())
     }
 
     fn whole(&self, state: &LastingState) -> Done {
-        for table in ["place", "number", "parameter", "policy_parameter", "tool", "tool_offset"] {
+        for table in [
+            "place",
+            "number",
+            "parameter",
+            "policy_parameter",
+            "tool",
+            "tool_offset",
+        ] {
             self.run(&format!("DELETE FROM {table}"), [])?;
         }
         self.offsets(&state.offsets)?;
         for (name, place) in REFERENCES.iter().zip(&state.reference) {
-            place.as_ref().map_or(Ok(()), |place| self.place(name, place))?;
+            place
+                .as_ref()
+                .map_or(Ok(()), |place| self.place(name, place))?;
         }
-        state.last_position.as_ref().map_or(Ok(()), |position| self.place(LAST, position))?;
+        state
+            .last_position
+            .as_ref()
+            .map_or(Ok(()), |position| self.place(LAST, position))?;
         self.number("tool_in_spindle", f64::from(state.tool_in_spindle))?;
-        state.parameters.iter().try_for_each(|(number, value)| self.parameter(*number, *value))?;
+        state
+            .parameters
+            .iter()
+            .try_for_each(|(number, value)| self.parameter(*number, *value))?;
         for (name, value) in &state.policy_parameters {
-            self.run("INSERT INTO policy_parameter VALUES (?1, ?2)", params![name, value])?;
+            self.run(
+                "INSERT INTO policy_parameter VALUES (?1, ?2)",
+                params![name, value],
+            )?;
         }
         for (axis, turns) in state.turns.iter().enumerate() {
             self.turns(axis, *turns)?;

@@ -22,7 +22,9 @@ fn open(path: &Path) -> Store {
 /// What the killed process does: writes without end, and says what is on disk. Does nothing as a test of its own.
 #[test]
 fn child() {
-    let Some(path) = std::env::var_os(CHILD) else { return };
+    let Some(path) = std::env::var_os(CHILD) else {
+        return;
+    };
     let store = open(Path::new(&path));
     let first = said(store.load()).unwrap();
     let recorder = store.recorder();
@@ -30,10 +32,18 @@ fn child() {
     for n in first + 1.. {
         // What is only recorded comes before what is committed behind it.
         recorder.record(recorded(n)).unwrap();
-        recorder.driven(Driven { job: n, hash: "h".into(), line: 1, epoch: n });
+        recorder.driven(Driven {
+            job: n,
+            hash: "h".into(),
+            line: 1,
+            epoch: n,
+        });
         store.commit(all_say(n)).unwrap();
         // The parent has gone: the test has failed.
-        if writeln!(out, "on disk {n}").and_then(|()| out.flush()).is_err() {
+        if writeln!(out, "on disk {n}")
+            .and_then(|()| out.flush())
+            .is_err()
+        {
             return;
         }
     }
@@ -41,15 +51,25 @@ fn child() {
 
 #[test]
 fn a_killed_process_has_lost_nothing_acknowledged_and_torn_nothing() {
-    let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
-    let (kills, seed) = (number("STATE_KILLS").unwrap_or(100), number("STATE_SEED").unwrap_or(1));
+    let number = |name| {
+        std::env::var(name)
+            .ok()
+            .and_then(|text| text.parse::<u64>().ok())
+    };
+    let (kills, seed) = (
+        number("STATE_KILLS").unwrap_or(100),
+        number("STATE_SEED").unwrap_or(1),
+    );
     let mut random = Random::new(seed);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mill.sqlite");
     let (mut acknowledged, mut longest) = (0, Duration::ZERO);
     for kill in 0..kills {
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", "child", "--nocapture"]).env(CHILD, &path).stdout(Stdio::piped());
+        command
+            .args(["--exact", "child", "--nocapture"])
+            .env(CHILD, &path)
+            .stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap());
         // Some die while they open the file, most in the stream.
@@ -57,7 +77,10 @@ fn a_killed_process_has_lost_nothing_acknowledged_and_torn_nothing() {
             let mut line = String::new();
             while !line.contains("on disk") {
                 line.clear();
-                assert!(lines.read_line(&mut line).unwrap() > 0, "kill {kill}, seed {seed}: the child ended by itself");
+                assert!(
+                    lines.read_line(&mut line).unwrap() > 0,
+                    "kill {kill}, seed {seed}: the child ended by itself"
+                );
             }
             acknowledged = last_number(&line).unwrap();
         }
@@ -66,20 +89,28 @@ fn a_killed_process_has_lost_nothing_acknowledged_and_torn_nothing() {
         child.wait().unwrap();
         let mut rest = String::new();
         lines.read_to_string(&mut rest).unwrap();
-        acknowledged = rest.lines().rev().find_map(last_number).unwrap_or(acknowledged);
+        acknowledged = rest
+            .lines()
+            .rev()
+            .find_map(last_number)
+            .unwrap_or(acknowledged);
 
         let before = Instant::now();
         let store = open(&path);
         longest = longest.max(before.elapsed());
         let state = store.load();
-        let whole = said(state).unwrap_or_else(|| panic!("kill {kill}, seed {seed}: torn: {state:?}"));
+        let whole =
+            said(state).unwrap_or_else(|| panic!("kill {kill}, seed {seed}: torn: {state:?}"));
         // The write that nobody was told of any more may be there.
         assert!(
             whole == acknowledged || whole == acknowledged + 1,
             "kill {kill}, seed {seed}: {acknowledged} was on disk, now it is {whole}"
         );
         let recorded = state.parameters.get(&100).copied().unwrap_or(0.0) as u64;
-        assert!(recorded >= whole, "kill {kill}, seed {seed}: {recorded} was recorded before {whole}");
+        assert!(
+            recorded >= whole,
+            "kill {kill}, seed {seed}: {recorded} was recorded before {whole}"
+        );
         acknowledged = whole;
     }
     println!("{kills} kills, seed {seed}: {acknowledged} writes, opened again within {longest:?}");

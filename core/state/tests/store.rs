@@ -10,8 +10,8 @@ use common::{any_state, any_tool, change, machine_of, owner};
 use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector};
 use tandem_state::{
-    Alarm, Change, Driven, Job, JobEnd, JobKind, LastingState, Outcome, Owner, Reader, StateError, Store, Tool,
-    ToolLife,
+    Alarm, Change, Driven, Job, JobEnd, JobKind, LastingState, Outcome, Owner, Reader, StateError,
+    Store, Tool, ToolLife,
 };
 
 fn folder() -> (tempfile::TempDir, PathBuf) {
@@ -37,12 +37,18 @@ fn any_state_of_any_machine_is_there_again_bit_for_bit() {
         let state = any_state(&mut random, &axes);
         let store = open(&path, &axes).unwrap();
         assert!(store.is_new(), "seed {seed}");
-        store.commit(vec![Change::Whole(Box::new(state.clone()))]).unwrap();
+        store
+            .commit(vec![Change::Whole(Box::new(state.clone()))])
+            .unwrap();
         drop(store);
         let store = open(&path, &axes).unwrap();
         assert!(!store.is_new(), "seed {seed}");
         assert_eq!(store.load(), &state, "seed {seed}");
-        assert_eq!(Reader::open(&path).unwrap().state().unwrap(), state, "seed {seed}, while it is open");
+        assert_eq!(
+            Reader::open(&path).unwrap().state().unwrap(),
+            state,
+            "seed {seed}, while it is open"
+        );
     }
 }
 
@@ -53,18 +59,43 @@ fn axes_may_come_go_and_change_their_order() {
     let origin = AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]);
     let mut state = LastingState::default();
     state.offsets.origins[0] = origin;
-    open(&path, &full).unwrap().commit(vec![change(&state)]).unwrap();
+    open(&path, &full)
+        .unwrap()
+        .commit(vec![change(&state)])
+        .unwrap();
     let turned = Axes::new(&[('Z', false), ('X', false), ('W', false)]).unwrap();
     let store = open(&path, &turned).unwrap();
-    assert_eq!(store.load().offsets.origins[0], AxisVector::from_slice(&[3.0, 1.0, 0.0]));
+    assert_eq!(
+        store.load().offsets.origins[0],
+        AxisVector::from_slice(&[3.0, 1.0, 0.0])
+    );
     drop(store);
     // What the machine had no axis for was not lost.
-    assert_eq!(open(&path, &full).unwrap().load().offsets.origins[0], origin);
+    assert_eq!(
+        open(&path, &full).unwrap().load().offsets.origins[0],
+        origin
+    );
     let other = Axes::new(&[('X', false), ('A', false)]).unwrap();
     let refusal = open(&path, &other).unwrap_err().to_string();
-    assert!(refusal.contains("its axis A turns, that of this machine slides"), "{refusal}");
-    let refusal = Store::open(&path, Owner { machine: "lathe", ..owner(&full) }).unwrap_err().to_string();
-    assert!(refusal.contains("\"mill\"") && refusal.contains("\"lathe\"") && refusal.contains("--state"), "{refusal}");
+    assert!(
+        refusal.contains("its axis A turns, that of this machine slides"),
+        "{refusal}"
+    );
+    let refusal = Store::open(
+        &path,
+        Owner {
+            machine: "lathe",
+            ..owner(&full)
+        },
+    )
+    .unwrap_err()
+    .to_string();
+    assert!(
+        refusal.contains("\"mill\"")
+            && refusal.contains("\"lathe\"")
+            && refusal.contains("--state"),
+        "{refusal}"
+    );
 }
 
 #[test]
@@ -72,15 +103,33 @@ fn changes_one_by_one_end_where_the_state_says() {
     let (_folder, path) = folder();
     let axes = mill();
     let home = AxisVector::from_slice(&[1.0, 1.0, 1.0]);
-    let store = Store::open(&path, Owner { home, ..owner(&axes) }).unwrap();
+    let store = Store::open(
+        &path,
+        Owner {
+            home,
+            ..owner(&axes)
+        },
+    )
+    .unwrap();
     let recorder = store.recorder();
     let mut tool = any_tool(&mut Random::new(1), &axes, 3);
     let worn = any_tool(&mut Random::new(3), &axes, 5);
     let place = AxisVector::from_slice(&[7.0, 8.0]);
-    let life = ToolLife { used_s: 12.0, limit_s: None, uses: 4, limit_uses: Some(5) };
+    let life = ToolLife {
+        used_s: 12.0,
+        limit_s: None,
+        uses: 4,
+        limit_uses: Some(5),
+    };
     for change in [
-        Change::ListParameter { number: 101, value: 1.0 },
-        Change::ListParameter { number: 102, value: 7.0 },
+        Change::ListParameter {
+            number: 101,
+            value: 1.0,
+        },
+        Change::ListParameter {
+            number: 102,
+            value: 7.0,
+        },
         Change::Tool(Box::new(tool.clone())),
         Change::Tool(Box::new(worn.clone())),
         Change::ToolLife { number: 3, life },
@@ -96,15 +145,25 @@ fn changes_one_by_one_end_where_the_state_says() {
     // A program measures tool 3 and a new tool 6, stores G28 and sets parameters; #100 is nobody's, #102 becomes zero.
     let mut program = store.read_back().unwrap().to_program(&home);
     assert_eq!(program.reference, [home; 2]);
-    let measured = |number| tandem_gcode::Tool { number, pocket: Some(9), offset: place, diameter_mm: 5.0 };
-    program.tools[0] = tandem_gcode::Tool { pocket: tool.pocket, ..measured(3) };
+    let measured = |number| tandem_gcode::Tool {
+        number,
+        pocket: Some(9),
+        offset: place,
+        diameter_mm: 5.0,
+    };
+    program.tools[0] = tandem_gcode::Tool {
+        pocket: tool.pocket,
+        ..measured(3)
+    };
     program.tools.push(measured(6));
     program.reference[0] = place;
     program.parameters = [(100, 3.0), (101, 4.0), (500, 2.0), (5061, 1.0)].into();
     program.active_system = 8;
     program.g92_stored = place;
     program.tool_offset = place;
-    recorder.record(Change::Program(Arc::new(program.clone()))).unwrap();
+    recorder
+        .record(Change::Program(Arc::new(program.clone())))
+        .unwrap();
     store.close().unwrap();
 
     tool.measure(&program.tools[0]);
@@ -128,7 +187,9 @@ fn changes_one_by_one_end_where_the_state_says() {
     program.tool_offset = AxisVector::ZERO;
     program.parameters = [(101, 4.0), (500, 2.0)].into();
     assert_eq!(store.load().to_program(&home), program);
-    store.commit(vec![Change::Program(Arc::new(program.clone()))]).unwrap();
+    store
+        .commit(vec![Change::Program(Arc::new(program.clone()))])
+        .unwrap();
     assert_eq!(store.read_back().unwrap().tools, expected.tools);
     // That the place of G30 is home by now is known only by who is told to forget it.
     store.commit(vec![Change::ForgetReference(0)]).unwrap();
@@ -168,16 +229,40 @@ fn jobs_and_alarms_are_history() {
         acknowledged_unix_ms: None,
     };
     let alarms = [store.next_alarm(), store.next_alarm()];
-    recorder.record(Change::JobBegan(Box::new(job(first)))).unwrap();
-    recorder.record(Change::JobEnded { id: first, end: Box::new(end.clone()) }).unwrap();
-    recorder.record(Change::JobBegan(Box::new(job(second)))).unwrap();
+    recorder
+        .record(Change::JobBegan(Box::new(job(first))))
+        .unwrap();
+    recorder
+        .record(Change::JobEnded {
+            id: first,
+            end: Box::new(end.clone()),
+        })
+        .unwrap();
+    recorder
+        .record(Change::JobBegan(Box::new(job(second))))
+        .unwrap();
     for id in alarms {
-        recorder.record(Change::Raised(Box::new(alarm(id)))).unwrap();
+        recorder
+            .record(Change::Raised(Box::new(alarm(id))))
+            .unwrap();
     }
-    let driven = Driven { job: second, hash: "abc".into(), line: 17, epoch: 3 };
-    recorder.driven(Driven { line: 16, ..driven.clone() });
+    let driven = Driven {
+        job: second,
+        hash: "abc".into(),
+        line: 17,
+        epoch: 3,
+    };
+    recorder.driven(Driven {
+        line: 16,
+        ..driven.clone()
+    });
     recorder.driven(driven.clone());
-    store.commit(vec![Change::Acknowledged { id: alarms[0], at_unix_ms: 1600 }]).unwrap();
+    store
+        .commit(vec![Change::Acknowledged {
+            id: alarms[0],
+            at_unix_ms: 1600,
+        }])
+        .unwrap();
     // As after a crash: the second job has no end.
     store.close().unwrap();
     let store = open(&path, &axes).unwrap();
@@ -186,8 +271,17 @@ fn jobs_and_alarms_are_history() {
     assert!(store.next_job() > second && store.next_alarm() > alarms[1]);
     let jobs = store.jobs(10).unwrap();
     assert_eq!(jobs.len(), 2);
-    assert_eq!(jobs[0].end.as_ref().map(|end| end.outcome), Some(Outcome::Lost));
-    assert_eq!(jobs[1], Job { end: Some(end), ..job(first) });
+    assert_eq!(
+        jobs[0].end.as_ref().map(|end| end.outcome),
+        Some(Outcome::Lost)
+    );
+    assert_eq!(
+        jobs[1],
+        Job {
+            end: Some(end),
+            ..job(first)
+        }
+    );
     let seen = store.alarms(1).unwrap();
     assert_eq!(seen, [alarm(alarms[1])]);
 }
@@ -198,7 +292,10 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
     let axes = mill();
     let store = open(&path, &axes).unwrap();
     let good = Change::LastPosition(AxisVector::from_slice(&[1.0]));
-    let mut tool = Tool { number: 5, ..Tool::default() };
+    let mut tool = Tool {
+        number: 5,
+        ..Tool::default()
+    };
     tool.wear[2] = f64::INFINITY;
     let program = |spoil: &dyn Fn(&mut LastingState)| {
         let mut state = LastingState::default();
@@ -210,14 +307,29 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
         program(&|state| state.offsets.active_system = 9),
         program(&|state| state.offsets.g92[0] = f64::NEG_INFINITY),
         program(&|state| state.offsets.rotations_rad[8] = f64::NAN),
-        Change::ListParameter { number: 5221, value: 1.0 },
+        Change::ListParameter {
+            number: 5221,
+            value: 1.0,
+        },
         Change::Tool(Box::new(tool.clone())),
-        Change::Tool(Box::new(Tool { number: 0, ..Tool::default() })),
-        Change::Whole(Box::new(LastingState { tools: BTreeMap::from([(5, tool)]), ..LastingState::default() })),
-        Change::PolicyParameter { name: "x".repeat(100_000), value: 1.0 },
+        Change::Tool(Box::new(Tool {
+            number: 0,
+            ..Tool::default()
+        })),
+        Change::Whole(Box::new(LastingState {
+            tools: BTreeMap::from([(5, tool)]),
+            ..LastingState::default()
+        })),
+        Change::PolicyParameter {
+            name: "x".repeat(100_000),
+            value: 1.0,
+        },
     ] {
         let refusal = store.commit(vec![good.clone(), bad.clone()]).unwrap_err();
-        assert!(matches!(refusal, StateError::Value { .. }), "{bad:?}: {refusal}");
+        assert!(
+            matches!(refusal, StateError::Value { .. }),
+            "{bad:?}: {refusal}"
+        );
         assert_eq!(store.recorder().record(bad).unwrap_err(), refusal);
     }
     assert_eq!(store.read_back().unwrap(), LastingState::default());
@@ -227,9 +339,17 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
 fn one_process_writes_and_others_look() {
     let (_folder, path) = folder();
     let axes = mill();
-    let in_spindle = |number| change(&LastingState { tool_in_spindle: number, ..LastingState::default() });
+    let in_spindle = |number| {
+        change(&LastingState {
+            tool_in_spindle: number,
+            ..LastingState::default()
+        })
+    };
     let missing = Reader::open(&path).unwrap_err();
-    assert!(missing.to_string().contains("there is no such file"), "{missing}");
+    assert!(
+        missing.to_string().contains("there is no such file"),
+        "{missing}"
+    );
     let store = open(&path, &axes).unwrap();
     let refusal = open(&path, &axes).unwrap_err();
     assert!(matches!(refusal, StateError::InUse { .. }), "{refusal}");
@@ -248,7 +368,10 @@ fn damaged_and_foreign_files_are_refused_and_left_alone() {
     let (_folder, path) = folder();
     let axes = mill();
     let whole = any_state(&mut Random::new(7), &axes);
-    open(&path, &axes).unwrap().commit(vec![Change::Whole(Box::new(whole))]).unwrap();
+    open(&path, &axes)
+        .unwrap()
+        .commit(vec![Change::Whole(Box::new(whole))])
+        .unwrap();
     let sound = std::fs::read(&path).unwrap();
     let mut refused = 0;
     for seed in 0..60 {
@@ -263,7 +386,9 @@ fn damaged_and_foreign_files_are_refused_and_left_alone() {
         // Free space may have been hit; what is opened all the same must be read without a panic.
         match open(&path, &axes) {
             Ok(_) | Err(StateError::OtherMachine { .. }) => {}
-            Err(StateError::Damaged { .. } | StateError::Foreign { .. } | StateError::Newer { .. }) => refused += 1,
+            Err(
+                StateError::Damaged { .. } | StateError::Foreign { .. } | StateError::Newer { .. },
+            ) => refused += 1,
             Err(other) => panic!("seed {seed}: {other}"),
         }
         for beside in ["-wal", "-shm"] {
@@ -274,7 +399,8 @@ fn damaged_and_foreign_files_are_refused_and_left_alone() {
     std::fs::write(&path, &sound[..sound.len() / 2]).unwrap();
     let refusal = open(&path, &axes).unwrap_err();
     assert!(
-        matches!(refusal, StateError::Damaged { .. }) && refusal.to_string().contains("Move the file away"),
+        matches!(refusal, StateError::Damaged { .. })
+            && refusal.to_string().contains("Move the file away"),
         "{refusal}"
     );
     assert_eq!(std::fs::read(&path).unwrap(), sound[..sound.len() / 2]);
@@ -284,12 +410,18 @@ fn damaged_and_foreign_files_are_refused_and_left_alone() {
     assert!(matches!(refusal, StateError::Foreign { .. }), "{refusal}");
     std::fs::remove_file(&path).unwrap();
     let other = rusqlite::Connection::open(&path).unwrap();
-    other.execute_batch("CREATE TABLE bookmarks (url TEXT)").unwrap();
+    other
+        .execute_batch("CREATE TABLE bookmarks (url TEXT)")
+        .unwrap();
     drop(other);
     let refusal = open(&path, &axes).unwrap_err();
     assert!(
-        matches!(refusal, StateError::Foreign { .. }) && refusal.to_string().contains("another program"),
+        matches!(refusal, StateError::Foreign { .. })
+            && refusal.to_string().contains("another program"),
         "{refusal}"
     );
-    assert!(matches!(Reader::open(&path), Err(StateError::Foreign { .. })));
+    assert!(matches!(
+        Reader::open(&path),
+        Err(StateError::Foreign { .. })
+    ));
 }

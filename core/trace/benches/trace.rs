@@ -27,7 +27,15 @@ fn sample(tick: u64) -> Sample {
     let angle = tick as f64 * 1e-3;
     let command = AxisVector::from_slice(&[20.0 * angle.cos(), 20.0 * angle.sin(), -1.0]);
     let state = MachineState::Running;
-    Sample { tick, state, command, feedback: command, sigma: 1.0, ratio: 1.0, ..Sample::default() }
+    Sample {
+        tick,
+        state,
+        command,
+        feedback: command,
+        sigma: 1.0,
+        ratio: 1.0,
+        ..Sample::default()
+    }
 }
 
 fn written(samples: &[Sample]) -> Vec<u8> {
@@ -42,7 +50,9 @@ fn written(samples: &[Sample]) -> Vec<u8> {
 #[divan::bench]
 fn write_10000(bencher: Bencher) {
     let samples: Vec<_> = (0..COUNT).map(sample).collect();
-    bencher.counter(divan::counter::ItemsCount::new(COUNT)).bench_local(|| written(&samples));
+    bencher
+        .counter(divan::counter::ItemsCount::new(COUNT))
+        .bench_local(|| written(&samples));
 }
 
 /// Ten thousand records from memory.
@@ -50,7 +60,9 @@ fn write_10000(bencher: Bencher) {
 fn read_10000(bencher: Bencher) {
     let bytes = written(&(0..COUNT).map(sample).collect::<Vec<_>>());
     let count = || Reader::new(&bytes[..]).expect("a header").count();
-    bencher.counter(divan::counter::ItemsCount::new(COUNT)).bench_local(count);
+    bencher
+        .counter(divan::counter::ItemsCount::new(COUNT))
+        .bench_local(count);
 }
 
 /// What recording costs the fine loop: one push, whatever the soft side does with it.
@@ -65,5 +77,10 @@ fn push_100(bencher: Bencher) {
     bencher
         .counter(divan::counter::ItemsCount::new(100_u32))
         .with_inputs(|| while host.samples.pop().is_ok() {})
-        .bench_local_values(|()| samples.iter().filter(|sample| fine.samples.push(**sample).is_ok()).count());
+        .bench_local_values(|()| {
+            samples
+                .iter()
+                .filter(|sample| fine.samples.push(**sample).is_ok())
+                .count()
+        });
 }

@@ -18,11 +18,17 @@ pub struct History {
 
 impl History {
     /// No row yet: all words are foretold as zero.
-    pub const EMPTY: Self = Self { last: [0; MAX_WORDS], before: [0; MAX_WORDS] };
+    pub const EMPTY: Self = Self {
+        last: [0; MAX_WORDS],
+        before: [0; MAX_WORDS],
+    };
 
     /// A history of one row that stood still.
     pub fn after_key(row: &Words) -> Self {
-        Self { last: *row, before: *row }
+        Self {
+            last: *row,
+            before: *row,
+        }
     }
 
     /// Goes on by one row.
@@ -61,7 +67,9 @@ impl History {
             let (rest, others) = rests.split_at_checked(length)?;
             let mut eight = [0; 8];
             eight.get_mut(..length)?.copy_from_slice(rest);
-            row[index] = self.foretold(&row, index, shape).wrapping_add(unzigzag(u64::from_le_bytes(eight)));
+            row[index] = self
+                .foretold(&row, index, shape)
+                .wrapping_add(unzigzag(u64::from_le_bytes(eight)));
             rests = others;
         }
         rests.is_empty().then_some(row)
@@ -82,11 +90,22 @@ fn unzigzag(number: u64) -> u64 {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape { axes: 8, signals: 8, switched: true };
+    const SHAPE: Shape = Shape {
+        axes: 8,
+        signals: 8,
+        switched: true,
+    };
 
     #[test]
     fn differences_of_either_sign_come_back() {
-        for difference in [0, 1, u64::MAX, 1 << 63, i64::MAX.cast_unsigned(), 0x1234_5678_9abc_def0] {
+        for difference in [
+            0,
+            1,
+            u64::MAX,
+            1 << 63,
+            i64::MAX.cast_unsigned(),
+            0x1234_5678_9abc_def0,
+        ] {
             assert_eq!(unzigzag(zigzag(difference)), difference);
         }
         assert_eq!([zigzag(0), zigzag(u64::MAX), zigzag(1)], [0, 1, 2]);
@@ -94,21 +113,33 @@ mod tests {
 
     #[test]
     fn constant_speed_takes_hardly_a_byte() {
-        let row = |k: u32| std::array::from_fn(|i| (100.0 + 0.05 * f64::from(k) + i as f64).to_bits());
+        let row =
+            |k: u32| std::array::from_fn(|i| (100.0 + 0.05 * f64::from(k) + i as f64).to_bits());
         let mut history = History::after_key(&row(0));
         history.push(&row(1));
         let mut bytes = vec![];
         history.encode(&row(2), SHAPE, &mut bytes);
-        assert!(bytes.len() <= MAX_WORDS.div_ceil(2) + 2 * MAX_WORDS, "{} bytes", bytes.len());
+        assert!(
+            bytes.len() <= MAX_WORDS.div_ceil(2) + 2 * MAX_WORDS,
+            "{} bytes",
+            bytes.len()
+        );
         assert_eq!(history.decode(&bytes, SHAPE), Some(row(2)));
     }
 
     #[test]
     fn what_is_no_row_is_none() {
-        let shape = Shape { axes: 1, signals: 0, switched: false };
+        let shape = Shape {
+            axes: 1,
+            signals: 0,
+            switched: false,
+        };
         let decoded = |bytes: &[u8]| History::EMPTY.decode(bytes, shape);
         assert!(decoded(&[0; 5]).is_some() && decoded(&[1, 0, 0, 0, 0, 7]).is_some());
-        assert_eq!(decoded(&[9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None);
+        assert_eq!(
+            decoded(&[9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+            None
+        );
         for bytes in [&[1, 0, 0, 0, 0][..], &[0; 6], &[0; 4], &[]] {
             assert_eq!(decoded(bytes), None);
         }

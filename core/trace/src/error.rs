@@ -35,6 +35,9 @@ pub enum Cause {
 
 impl TraceError {
     pub(crate) fn at(offset: u64, cause: impl Into<Cause>) -> Self {
-        Self { offset, cause: cause.into() }
+        Self {
+            offset,
+            cause: cause.into(),
+        }
     }
 }

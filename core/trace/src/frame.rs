@@ -29,7 +29,9 @@ pub enum Kind {
 
 impl Kind {
     fn from_number(number: u16) -> Option<Self> {
-        [Self::Command, Self::Sample, Self::Key, Self::End].into_iter().find(|kind| *kind as u16 == number)
+        [Self::Command, Self::Sample, Self::Key, Self::End]
+            .into_iter()
+            .find(|kind| *kind as u16 == number)
     }
 
     /// Whether reading can begin here.
@@ -71,7 +73,13 @@ pub struct Seeds {
 }
 
 /// Appends a record to `bytes`, and returns its checksum. `number` goes with keys and the end.
-pub fn put(kind: Kind, number: u64, seed: u32, bytes: &mut Vec<u8>, row: impl FnOnce(&mut Vec<u8>)) -> u32 {
+pub fn put(
+    kind: Kind,
+    number: u64,
+    seed: u32,
+    bytes: &mut Vec<u8>,
+    row: impl FnOnce(&mut Vec<u8>),
+) -> u32 {
     let start = bytes.len();
     bytes.extend([0; HEAD_BYTES]);
     if kind.is_sync() {
@@ -98,19 +106,35 @@ pub fn get(bytes: &[u8], seeds: Seeds) -> Result<Frame<'_>, Flaw> {
     }
     let (stored, rest) = rest.split_first_chunk::<4>().ok_or(Flaw::Short)?;
     let content = rest.get(..length).ok_or(Flaw::Short)?;
-    let seed = if kind.is_sync() { Some(seeds.header) } else { seeds.previous };
+    let seed = if kind.is_sync() {
+        Some(seeds.header)
+    } else {
+        seeds.previous
+    };
     let seed = seed.ok_or(Flaw::Wrong("the record before is lost"))?;
     let checksum = checksum(seed, first, content);
     if checksum != u32::from_le_bytes(*stored) {
         return Err(Flaw::Wrong("the checksum differs"));
     }
-    let (number, row) = if kind.is_sync() { number(content)? } else { (None, content) };
-    Ok(Frame { kind, number, row, checksum, length: HEAD_BYTES + length })
+    let (number, row) = if kind.is_sync() {
+        number(content)?
+    } else {
+        (None, content)
+    };
+    Ok(Frame {
+        kind,
+        number,
+        row,
+        checksum,
+        length: HEAD_BYTES + length,
+    })
 }
 
 /// Splits the content of a record at which reading can begin.
 fn number(content: &[u8]) -> Result<(Option<u64>, &[u8]), Flaw> {
-    let numbered = content.strip_prefix(&MARKER).and_then(<[u8]>::split_first_chunk::<8>);
+    let numbered = content
+        .strip_prefix(&MARKER)
+        .and_then(<[u8]>::split_first_chunk::<8>);
     let (number, row) = numbered.ok_or(Flaw::Wrong("the marker is missing"))?;
     Ok((Some(u64::from_le_bytes(*number)), row))
 }

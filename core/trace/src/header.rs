@@ -44,7 +44,11 @@ pub fn has_switched(format: u32) -> bool {
 impl Header {
     /// Of the samples of this `format`.
     pub(crate) fn shape(&self, format: u32) -> Shape {
-        Shape { axes: self.axes.count(), signals: self.signals.len(), switched: has_switched(format) }
+        Shape {
+            axes: self.axes.count(),
+            signals: self.signals.len(),
+            switched: has_switched(format),
+        }
     }
 
     /// The header as bytes, its checksum last.
@@ -55,7 +59,13 @@ impl Header {
             let cause = "no trace has such a period, so many signals or such long names";
             return Err(io::Error::new(io::ErrorKind::InvalidInput, cause));
         }
-        let mut bytes = [&MAGIC[..], &FORMAT.to_le_bytes(), &(body.len() as u32).to_le_bytes(), &body].concat();
+        let mut bytes = [
+            &MAGIC[..],
+            &FORMAT.to_le_bytes(),
+            &(body.len() as u32).to_le_bytes(),
+            &body,
+        ]
+        .concat();
         let checksum = crc32fast::hash(&bytes);
         bytes.extend(checksum.to_le_bytes());
         Ok((bytes, checksum))
@@ -65,7 +75,10 @@ impl Header {
         let mut body = self.fine_period_s.to_le_bytes().to_vec();
         body.push(self.axes.count() as u8);
         for axis in 0..self.axes.count() {
-            body.extend([self.axes.letter(axis) as u8, u8::from(self.axes.is_rotary(axis))]);
+            body.extend([
+                self.axes.letter(axis) as u8,
+                u8::from(self.axes.is_rotary(axis)),
+            ]);
         }
         for name in [&self.machine, &self.program, &self.planner] {
             put_text(&mut body, name);
@@ -81,7 +94,8 @@ impl Header {
     /// Takes the header, its format and its checksum from the start of a trace.
     pub(crate) fn take(source: &mut Source<impl Read>) -> Result<(Self, u32, u32), TraceError> {
         let bytes = source.peek(FIXED_BYTES).map_err(|e| TraceError::at(0, e))?;
-        let (format, length) = fixed(bytes).map_err(|(offset, cause)| TraceError::at(offset, cause))?;
+        let (format, length) =
+            fixed(bytes).map_err(|(offset, cause)| TraceError::at(offset, cause))?;
         if !(1..=FORMAT).contains(&format) {
             return Err(TraceError::at(MAGIC.len() as u64, Cause::Format(format)));
         }
@@ -99,8 +113,8 @@ impl Header {
         if checksum != u32::from_le_bytes(*stored) {
             return Err(TraceError::at(0, Cause::Header("its checksum differs")));
         }
-        let header =
-            Self::parse(body, format).map_err(|cause| TraceError::at(FIXED_BYTES as u64, Cause::Header(cause)))?;
+        let header = Self::parse(body, format)
+            .map_err(|cause| TraceError::at(FIXED_BYTES as u64, Cause::Header(cause)))?;
         source.skip(whole);
         Ok((header, format, checksum))
     }
@@ -111,7 +125,9 @@ impl Header {
         let axes = body.axes()?;
         let [machine, program, planner] = [body.text()?, body.text()?, body.text()?];
         let [count] = *body.chunk::<1>()?;
-        let signals = (0..count).map(|_| body.text()).collect::<Result<Vec<_>, _>>()?;
+        let signals = (0..count)
+            .map(|_| body.text())
+            .collect::<Result<Vec<_>, _>>()?;
         let dry_run = format > 1 && *body.chunk::<1>()? == [1];
         if !body.0.is_empty() || signals.len() > MAX_SIGNALS {
             return Err("it holds more than it should");
@@ -119,7 +135,15 @@ impl Header {
         if !fine_period_s.is_finite() || fine_period_s <= 0.0 {
             return Err("its period is none");
         }
-        Ok(Self { fine_period_s, axes, machine, program, planner, dry_run, signals })
+        Ok(Self {
+            fine_period_s,
+            axes,
+            machine,
+            program,
+            planner,
+            dry_run,
+            signals,
+        })
     }
 }
 
@@ -129,8 +153,17 @@ fn fixed(bytes: &[u8]) -> Result<(u32, usize), (u64, Cause)> {
     if magic.is_empty() || !MAGIC.starts_with(magic) {
         return Err((0, Cause::Magic));
     }
-    let numbers = bytes.get(MAGIC.len()..FIXED_BYTES).ok_or((bytes.len() as u64, Cause::Short))?;
-    let number = |at: usize| u32::from_le_bytes([numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3]]);
+    let numbers = bytes
+        .get(MAGIC.len()..FIXED_BYTES)
+        .ok_or((bytes.len() as u64, Cause::Short))?;
+    let number = |at: usize| {
+        u32::from_le_bytes([
+            numbers[at],
+            numbers[at + 1],
+            numbers[at + 2],
+            numbers[at + 3],
+        ])
+    };
     Ok((number(0), number(4) as usize))
 }
 
@@ -144,14 +177,20 @@ struct Body<'a>(&'a [u8]);
 
 impl<'a> Body<'a> {
     fn chunk<const N: usize>(&mut self) -> Result<&'a [u8; N], &'static str> {
-        let (chunk, rest) = self.0.split_first_chunk().ok_or("it holds less than it should")?;
+        let (chunk, rest) = self
+            .0
+            .split_first_chunk()
+            .ok_or("it holds less than it should")?;
         self.0 = rest;
         Ok(chunk)
     }
 
     fn text(&mut self) -> Result<String, &'static str> {
         let length = u32::from_le_bytes(*self.chunk()?) as usize;
-        let (text, rest) = self.0.split_at_checked(length).ok_or("it holds less than it should")?;
+        let (text, rest) = self
+            .0
+            .split_at_checked(length)
+            .ok_or("it holds less than it should")?;
         self.0 = rest;
         String::from_utf8(text.to_vec()).map_err(|_| "a name is not UTF-8")
     }

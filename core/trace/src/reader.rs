@@ -83,8 +83,20 @@ impl<R: Read> Reader<R> {
     pub fn new(inner: R) -> Result<Self, TraceError> {
         let mut source = Source::new(inner);
         let (header, format, checksum) = Header::take(&mut source)?;
-        let seeds = Seeds { header: checksum, previous: None };
-        Ok(Self { source, header, format, seeds, history: History::EMPTY, next: 0, ending: None, failed: false })
+        let seeds = Seeds {
+            header: checksum,
+            previous: None,
+        };
+        Ok(Self {
+            source,
+            header,
+            format,
+            seeds,
+            history: History::EMPTY,
+            next: 0,
+            ending: None,
+            failed: false,
+        })
     }
 
     /// What the trace is of.
@@ -114,9 +126,19 @@ impl<R: Read> Reader<R> {
     /// The record that begins here, if one does.
     fn look(&mut self) -> Result<Result<Found, Flaw>, TraceError> {
         let offset = self.source.offset();
-        let bytes = self.source.peek(MAX_FRAME_BYTES).map_err(|e| TraceError::at(offset, e))?;
+        let bytes = self
+            .source
+            .peek(MAX_FRAME_BYTES)
+            .map_err(|e| TraceError::at(offset, e))?;
         let frame = frame::get(bytes, self.seeds);
-        Ok(frame.and_then(|frame| Found::decode(&frame, self.next, &self.history, self.header.shape(self.format))))
+        Ok(frame.and_then(|frame| {
+            Found::decode(
+                &frame,
+                self.next,
+                &self.history,
+                self.header.shape(self.format),
+            )
+        }))
     }
 
     fn take(&mut self, found: Found) -> Result<Option<Item>, TraceError> {
@@ -141,7 +163,12 @@ impl<R: Read> Reader<R> {
             self.history.push(&row);
         }
         self.next += 1;
-        Ok(Some(Item::Record(Record { number: found.number, offset, sample, signals })))
+        Ok(Some(Item::Record(Record {
+            number: found.number,
+            offset,
+            sample,
+            signals,
+        })))
     }
 
     /// What follows the closing record, which should be nothing.
@@ -151,7 +178,12 @@ impl<R: Read> Reader<R> {
             self.source.skip(MAX_FRAME_BYTES);
         }
         let to = self.source.offset();
-        let damage = Damage { from, to, lost_records: Some(0), cause: "bytes after the closing record" };
+        let damage = Damage {
+            from,
+            to,
+            lost_records: Some(0),
+            cause: "bytes after the closing record",
+        };
         Ok((to > from).then_some(Item::Damage(damage)))
     }
 
@@ -171,7 +203,12 @@ impl<R: Read> Reader<R> {
             }
         }
         self.ending = Some(Ending::Truncated { byte: from });
-        let damage = Damage { from, to: self.source.offset(), lost_records: None, cause };
+        let damage = Damage {
+            from,
+            to: self.source.offset(),
+            lost_records: None,
+            cause,
+        };
         Ok((flaw != Flaw::Short).then_some(Item::Damage(damage)))
     }
 
@@ -179,18 +216,32 @@ impl<R: Read> Reader<R> {
     fn damage(&mut self, from: u64, found: &Found, cause: &'static str) -> Item {
         let lost_records = Some(found.number - self.next);
         self.next = found.number;
-        Item::Damage(Damage { from, to: self.source.offset(), lost_records, cause })
+        Item::Damage(Damage {
+            from,
+            to: self.source.offset(),
+            lost_records,
+            cause,
+        })
     }
 
     fn is_at_marker(&mut self) -> Result<bool, TraceError> {
         let offset = self.source.offset();
-        let bytes = self.source.peek(MAX_FRAME_BYTES).map_err(|e| TraceError::at(offset, e))?;
-        Ok(bytes.get(HEAD_BYTES..).is_some_and(|content| content.starts_with(&MARKER)))
+        let bytes = self
+            .source
+            .peek(MAX_FRAME_BYTES)
+            .map_err(|e| TraceError::at(offset, e))?;
+        Ok(bytes
+            .get(HEAD_BYTES..)
+            .is_some_and(|content| content.starts_with(&MARKER)))
     }
 
     fn is_at_end(&mut self) -> Result<bool, TraceError> {
         let offset = self.source.offset();
-        Ok(self.source.peek(MAX_FRAME_BYTES).map_err(|e| TraceError::at(offset, e))?.is_empty())
+        Ok(self
+            .source
+            .peek(MAX_FRAME_BYTES)
+            .map_err(|e| TraceError::at(offset, e))?
+            .is_empty())
     }
 }
 
@@ -228,7 +279,12 @@ struct Found {
 impl Found {
     /// Decodes a record whose checksum holds. `next` is the number that it should have.
     fn decode(frame: &Frame<'_>, next: u64, history: &History, shape: Shape) -> Result<Self, Flaw> {
-        let Frame { kind, checksum, length, .. } = *frame;
+        let Frame {
+            kind,
+            checksum,
+            length,
+            ..
+        } = *frame;
         let number = frame.number.unwrap_or(next);
         if number < next {
             return Err(Flaw::Wrong("a record's number goes back"));
@@ -239,7 +295,13 @@ impl Found {
             Kind::Key => decode(frame.row, &History::EMPTY, shape)?,
             Kind::Sample => decode(frame.row, history, shape)?,
         };
-        Ok(Self { kind, number, content, checksum, length })
+        Ok(Self {
+            kind,
+            number,
+            content,
+            checksum,
+            length,
+        })
     }
 }
 
@@ -248,7 +310,11 @@ fn text(row: &[u8]) -> Result<String, Flaw> {
 }
 
 fn decode(row: &[u8], history: &History, shape: Shape) -> Result<Content, Flaw> {
-    let words = history.decode(row, shape).ok_or(Flaw::Wrong("a record holds no row of numbers"))?;
-    let (sample, signals) = shape.to_sample(&words).ok_or(Flaw::Wrong("a record holds no sample"))?;
+    let words = history
+        .decode(row, shape)
+        .ok_or(Flaw::Wrong("a record holds no row of numbers"))?;
+    let (sample, signals) = shape
+        .to_sample(&words)
+        .ok_or(Flaw::Wrong("a record holds no sample"))?;
     Ok(Content::Row(words, sample, signals))
 }

@@ -18,7 +18,13 @@ pub struct Source<R> {
 
 impl<R: Read> Source<R> {
     pub fn new(inner: R) -> Self {
-        Self { inner, buffer: vec![], taken: 0, offset: 0, ended: false }
+        Self {
+            inner,
+            buffer: vec![],
+            taken: 0,
+            offset: 0,
+            ended: false,
+        }
     }
 
     /// Place of the next byte, in bytes from the start.

@@ -38,15 +38,24 @@ impl Shape {
 
     /// The words of a sample.
     pub fn to_words(self, sample: &Sample, signals: &[f64]) -> Words {
-        let numbers = [sample.tick, sample.block, u64::from(sample.line), sample.state as u64];
-        let positions = sample.command.0[..self.axes].iter().chain(&sample.feedback.0[..self.axes]);
+        let numbers = [
+            sample.tick,
+            sample.block,
+            u64::from(sample.line),
+            sample.state as u64,
+        ];
+        let positions = sample.command.0[..self.axes]
+            .iter()
+            .chain(&sample.feedback.0[..self.axes]);
         let rates = [sample.feed_mm_per_s, sample.sigma, sample.ratio];
         let switched = [
             sample.switched.outputs,
             sample.switched.spindle_rad_per_s.to_bits(),
             sample.phase_ns.map_or(NO_PHASE, i64::cast_unsigned),
         ];
-        let switched = switched.into_iter().take(if self.switched { SWITCHED_WORDS } else { 0 });
+        let switched = switched
+            .into_iter()
+            .take(if self.switched { SWITCHED_WORDS } else { 0 });
         let bits = |value: &f64| value.to_bits();
         let all = numbers.into_iter().chain(positions.chain(&rates).map(bits));
         let all = all.chain(switched).chain(signals.iter().map(bits));
@@ -63,13 +72,22 @@ impl Shape {
         let mut words_left = words[4..].iter().copied();
         let mut take = |count: usize| {
             let mut values = [0; MAX_AXES];
-            values.iter_mut().take(count).for_each(|value| *value = words_left.next().unwrap_or_default());
+            values
+                .iter_mut()
+                .take(count)
+                .for_each(|value| *value = words_left.next().unwrap_or_default());
             values
         };
-        let (command, feedback) = (take(self.axes).map(f64::from_bits), take(self.axes).map(f64::from_bits));
+        let (command, feedback) = (
+            take(self.axes).map(f64::from_bits),
+            take(self.axes).map(f64::from_bits),
+        );
         let [feed_mm_per_s, sigma, ratio, ..] = take(3).map(f64::from_bits);
-        let [outputs, spindle, phase, ..] =
-            if self.switched { take(SWITCHED_WORDS) } else { [0, 0, NO_PHASE, 0, 0, 0, 0, 0] };
+        let [outputs, spindle, phase, ..] = if self.switched {
+            take(SWITCHED_WORDS)
+        } else {
+            [0, 0, NO_PHASE, 0, 0, 0, 0, 0]
+        };
         let sample = Sample {
             tick: words[0],
             block: words[1],
@@ -80,7 +98,11 @@ impl Shape {
             feed_mm_per_s,
             sigma,
             ratio,
-            switched: Switched { outputs, spindle_rad_per_s: f64::from_bits(spindle), ..Switched::default() },
+            switched: Switched {
+                outputs,
+                spindle_rad_per_s: f64::from_bits(spindle),
+                ..Switched::default()
+            },
             phase_ns: (phase != NO_PHASE).then_some(phase.cast_signed()),
             ..Sample::default()
         };

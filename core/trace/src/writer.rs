@@ -34,7 +34,15 @@ impl<W: Write> Writer<W> {
         let (bytes, checksum) = header.to_bytes()?;
         out.write_all(&bytes)?;
         let (shape, history) = (header.shape(FORMAT), History::EMPTY);
-        Ok(Self { out, shape, header: checksum, previous: checksum, history, records: 0, bytes })
+        Ok(Self {
+            out,
+            shape,
+            header: checksum,
+            previous: checksum,
+            history,
+            records: 0,
+            bytes,
+        })
     }
 
     /// Adds a sample and the strategy's signals, as many as the header names.
@@ -46,7 +54,10 @@ impl<W: Write> Writer<W> {
     /// `out` refuses; another number of signals.
     pub fn sample(&mut self, sample: &Sample, signals: &[f64]) -> io::Result<()> {
         if signals.len() != self.shape.signals {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not as many signals as the header names"));
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "not as many signals as the header names",
+            ));
         }
         let row = self.shape.to_words(sample, signals);
         let is_key = self.records.is_multiple_of(KEY_INTERVAL);
@@ -55,8 +66,14 @@ impl<W: Write> Writer<W> {
             self.out.flush()?;
             self.history = History::EMPTY;
         }
-        let (kind, seed) = if is_key { (Kind::Key, self.header) } else { (Kind::Sample, self.previous) };
-        self.put(kind, seed, |history, shape, bytes| history.encode(&row, shape, bytes))?;
+        let (kind, seed) = if is_key {
+            (Kind::Key, self.header)
+        } else {
+            (Kind::Sample, self.previous)
+        };
+        self.put(kind, seed, |history, shape, bytes| {
+            history.encode(&row, shape, bytes)
+        })?;
         self.records += 1;
         if is_key {
             self.history = History::after_key(&row);
@@ -72,9 +89,14 @@ impl<W: Write> Writer<W> {
     /// `out` refuses; a text longer than a record.
     pub fn command(&mut self, text: &str) -> io::Result<()> {
         if text.len() > MAX_ROW_BYTES {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "no command is so long"));
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "no command is so long",
+            ));
         }
-        self.put(Kind::Command, self.header, |_, _, bytes| bytes.extend(text.as_bytes()))
+        self.put(Kind::Command, self.header, |_, _, bytes| {
+            bytes.extend(text.as_bytes())
+        })
     }
 
     /// Closes the trace and returns what it was written to.
@@ -105,7 +127,12 @@ impl<W: Write> Writer<W> {
         self.out
     }
 
-    fn put(&mut self, kind: Kind, seed: u32, row: impl FnOnce(&History, Shape, &mut Vec<u8>)) -> io::Result<()> {
+    fn put(
+        &mut self,
+        kind: Kind,
+        seed: u32,
+        row: impl FnOnce(&History, Shape, &mut Vec<u8>),
+    ) -> io::Result<()> {
         self.bytes.clear();
         let fill = |bytes: &mut Vec<u8>| row(&self.history, self.shape, bytes);
         self.previous = frame::put(kind, self.records, seed, &mut self.bytes, fill);

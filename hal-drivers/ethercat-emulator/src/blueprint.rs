@@ -79,11 +79,18 @@ pub(crate) struct PdoEntry {
 
 impl Pdo {
     pub(crate) fn direction(&self) -> Direction {
-        if (0x1A00..0x1C00).contains(&self.index) { Direction::ToMaster } else { Direction::ToDevice }
+        if (0x1A00..0x1C00).contains(&self.index) {
+            Direction::ToMaster
+        } else {
+            Direction::ToDevice
+        }
     }
 
     pub(crate) fn bits(&self) -> usize {
-        self.entries.iter().map(|entry| usize::from(entry.bits)).sum()
+        self.entries
+            .iter()
+            .map(|entry| usize::from(entry.bits))
+            .sum()
     }
 }
 
@@ -91,7 +98,10 @@ impl Blueprint {
     /// The size of each sync manager's process data follows from what it carries from the start.
     pub(crate) fn measure(&mut self) {
         for plan in &mut self.process {
-            let carried = self.pdos.iter().filter(|pdo| pdo.manager == Some(plan.manager));
+            let carried = self
+                .pdos
+                .iter()
+                .filter(|pdo| pdo.manager == Some(plan.manager));
             plan.length = carried.map(Pdo::bits).sum::<usize>().div_ceil(8) as u16;
         }
     }

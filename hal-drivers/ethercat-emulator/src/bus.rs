@@ -45,11 +45,21 @@ impl Bus {
     pub fn new(description: &BusDescription) -> Result<Self, DescriptionError> {
         let described = &description.devices;
         if described.len() > MAX_DEVICES {
-            return Err(DescriptionError::Reference(format!("a bus has at most {MAX_DEVICES} devices")));
+            return Err(DescriptionError::Reference(format!(
+                "a bus has at most {MAX_DEVICES} devices"
+            )));
         }
-        let devices: Result<Vec<Device>, _> = (0..).zip(described).map(|(n, d)| Device::new(d, n)).collect();
+        let devices: Result<Vec<Device>, _> = (0..)
+            .zip(described)
+            .map(|(n, d)| Device::new(d, n))
+            .collect();
         let cable = |(number, of): (usize, &crate::description::DeviceDescription)| Cable {
-            plug: (number > 0).then(|| of.plug.unwrap_or(Plug { device: number.saturating_sub(1), port: 1 })),
+            plug: (number > 0).then(|| {
+                of.plug.unwrap_or(Plug {
+                    device: number.saturating_sub(1),
+                    port: 1,
+                })
+            }),
             travel_ns: of.cable_ns.min(1_000_000),
             cut_behind: false,
             arrival_ns: None,
@@ -71,11 +81,20 @@ impl Bus {
 
     fn judge_cables(&mut self) -> Result<(), DescriptionError> {
         for (device, cable) in self.cables.iter().enumerate() {
-            let Some(Plug { device: parent, port }) = cable.plug else { continue };
-            let taken = self.cables[..device].iter().any(|other| other.plug == cable.plug);
+            let Some(Plug {
+                device: parent,
+                port,
+            }) = cable.plug
+            else {
+                continue;
+            };
+            let taken = self.cables[..device]
+                .iter()
+                .any(|other| other.plug == cable.plug);
             if parent >= device || !(1..=3).contains(&port) || taken {
-                let cause =
-                    format!("plug is port 1 to 3, and free, of a device before it; not port {port} of {parent}");
+                let cause = format!(
+                    "plug is port 1 to 3, and free, of a device before it; not port {port} of {parent}"
+                );
                 return Err(DescriptionError::Device { device, cause });
             }
         }
@@ -86,7 +105,10 @@ impl Bus {
         match (0..).zip(&order).find(|(place, device)| place != *device) {
             Some((place, _)) => {
                 let cause = "a frame does not meet the devices in this order: it leaves by port 3, then 1, then 2";
-                Err(DescriptionError::Device { device: place, cause: cause.to_string() })
+                Err(DescriptionError::Device {
+                    device: place,
+                    cause: cause.to_string(),
+                })
             }
             None => Ok(()),
         }
@@ -94,10 +116,19 @@ impl Bus {
 
     fn judge_switches(&self) -> Result<(), DescriptionError> {
         for switch in &self.switches {
-            let input = self.devices.get(switch.device).is_some_and(|device| switch.input < device.input_count());
-            let drive = self.devices.get(switch.drive).is_some_and(|device| device.plan.drive.is_some());
+            let input = self
+                .devices
+                .get(switch.device)
+                .is_some_and(|device| switch.input < device.input_count());
+            let drive = self
+                .devices
+                .get(switch.drive)
+                .is_some_and(|device| device.plan.drive.is_some());
             if !input || !drive {
-                let cause = format!("switches: input {} of {} by drive {}", switch.input, switch.device, switch.drive);
+                let cause = format!(
+                    "switches: input {} of {} by drive {}",
+                    switch.input, switch.device, switch.drive
+                );
                 return Err(DescriptionError::Reference(format!("{cause} is not there")));
             }
         }
@@ -106,9 +137,13 @@ impl Bus {
 
     /// Refuses a fault that names what is not there.
     pub(crate) fn judge_fault(&self, what: &What) -> Result<(), DescriptionError> {
-        let Some(number) = what.device() else { return Ok(()) };
+        let Some(number) = what.device() else {
+            return Ok(());
+        };
         let Some(device) = self.devices.get(number) else {
-            return Err(DescriptionError::Reference(format!("a fault is about device {number}, which is not there")));
+            return Err(DescriptionError::Reference(format!(
+                "a fault is about device {number}, which is not there"
+            )));
         };
         if what.needs_drive() && device.plan.drive.is_none() {
             return Err(DescriptionError::Reference(format!(
@@ -129,9 +164,15 @@ impl Bus {
         self.cables[device].arrival_ns = Some(arrival_ns);
         let mut times = [Some(0), None, None, None];
         let mut now_ns = arrival_ns;
-        let ports = if self.cables[device].cut_behind { &[][..] } else { &PORTS };
+        let ports = if self.cables[device].cut_behind {
+            &[][..]
+        } else {
+            &PORTS
+        };
         for port in ports.iter().copied() {
-            let Some(child) = self.child(device, port) else { continue };
+            let Some(child) = self.child(device, port) else {
+                continue;
+            };
             let travel_ns = self.cables[child].travel_ns;
             now_ns = self.walk(child, now_ns + travel_ns, order) + travel_ns;
             times[port] = Some(now_ns - arrival_ns);
@@ -162,7 +203,12 @@ impl Bus {
             device.advance(self.now_ns);
         }
         for switch in &self.switches {
-            let Some(place) = self.devices[switch.drive].firmware.drive.as_ref().map(crate::drive::Drive::place) else {
+            let Some(place) = self.devices[switch.drive]
+                .firmware
+                .drive
+                .as_ref()
+                .map(crate::drive::Drive::place)
+            else {
                 continue;
             };
             self.devices[switch.device].set_input(switch.input, place > switch.above_counts);
@@ -179,7 +225,9 @@ impl Bus {
         self.found.clear();
         self.found.extend(datagrams(frame));
         for (device, cable) in self.devices.iter_mut().zip(&self.cables) {
-            let Some(arrival_ns) = cable.arrival_ns else { continue };
+            let Some(arrival_ns) = cable.arrival_ns else {
+                continue;
+            };
             let at_ns = self.now_ns + arrival_ns;
             device.advance(at_ns);
             for datagram in &self.found {
@@ -234,7 +282,11 @@ impl Bus {
 fn dl_status(times: &[Option<u64>; 4]) -> u16 {
     let ports = times.iter().enumerate().map(|(port, time)| {
         let shift = 2 * port as u16;
-        if time.is_some() { 1 << (4 + port) | 2 << (8 + shift) } else { 1 << (8 + shift) }
+        if time.is_some() {
+            1 << (4 + port) | 2 << (8 + shift)
+        } else {
+            1 << (8 + shift)
+        }
     });
     ports.sum::<u16>() | 0x01
 }

@@ -43,9 +43,15 @@ pub(crate) fn copy_bits(from: &[u8], from_bit: usize, to: &mut [u8], to_bit: usi
     }
     for bit in 0..bits {
         let (source, target) = (from_bit + bit, to_bit + bit);
-        let (Some(byte), Some(into)) = (from.get(source / 8), to.get_mut(target / 8)) else { return };
+        let (Some(byte), Some(into)) = (from.get(source / 8), to.get_mut(target / 8)) else {
+            return;
+        };
         let mask = 1 << (target % 8);
-        *into = if byte >> (source % 8) & 1 == 1 { *into | mask } else { *into & !mask };
+        *into = if byte >> (source % 8) & 1 == 1 {
+            *into | mask
+        } else {
+            *into & !mask
+        };
     }
 }
 

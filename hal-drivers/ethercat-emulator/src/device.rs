@@ -44,7 +44,15 @@ impl Device {
         let firmware = Firmware::new(&plan);
         let channels = Channels::of(&plan, &firmware);
         let clock_start_ns = of.clock_start_ns;
-        Ok(Self { plan, esc, firmware, clock_start_ns, drift_ppb, next_tick_ns: 0, channels })
+        Ok(Self {
+            plan,
+            esc,
+            firmware,
+            clock_start_ns,
+            drift_ppb,
+            next_tick_ns: 0,
+            channels,
+        })
     }
 
     /// Loses everything but its SII and the place of its axis, as without power.
@@ -100,7 +108,9 @@ impl Device {
                 self.broadcast(at_ns, datagram, frame, reads, writes);
                 datagram.pass(frame);
             }
-            Command::Logical { reads, writes } => self.logical(at_ns, datagram, frame, reads, writes),
+            Command::Logical { reads, writes } => {
+                self.logical(at_ns, datagram, frame, reads, writes)
+            }
             Command::PositionReadOthersWrite => {
                 self.access(at_ns, datagram, frame, station == 0, station != 0);
                 datagram.pass(frame);
@@ -112,7 +122,14 @@ impl Device {
         }
     }
 
-    fn access(&mut self, at_ns: u64, datagram: &Datagram, frame: &mut [u8], reads: bool, writes: bool) {
+    fn access(
+        &mut self,
+        at_ns: u64,
+        datagram: &Datagram,
+        frame: &mut [u8],
+        reads: bool,
+        writes: bool,
+    ) {
         let address = datagram.address(frame);
         let data = datagram.data(frame);
         let mut counted = 0;
@@ -134,7 +151,14 @@ impl Device {
         datagram.count(frame, counted);
     }
 
-    fn broadcast(&mut self, at_ns: u64, datagram: &Datagram, frame: &mut [u8], reads: bool, writes: bool) {
+    fn broadcast(
+        &mut self,
+        at_ns: u64,
+        datagram: &Datagram,
+        frame: &mut [u8],
+        reads: bool,
+        writes: bool,
+    ) {
         let address = datagram.address(frame);
         let data = datagram.data(frame);
         let mut counted = 0;
@@ -153,12 +177,21 @@ impl Device {
         datagram.count(frame, counted);
     }
 
-    fn logical(&mut self, at_ns: u64, datagram: &Datagram, frame: &mut [u8], reads: bool, writes: bool) {
+    fn logical(
+        &mut self,
+        at_ns: u64,
+        datagram: &Datagram,
+        frame: &mut [u8],
+        reads: bool,
+        writes: bool,
+    ) {
         if self.firmware.trouble.deaf {
             return;
         }
         let address = datagram.logical_address(frame);
-        let (read, written) = self.esc.logical(at_ns, address, datagram.data(frame), reads, writes);
+        let (read, written) = self
+            .esc
+            .logical(at_ns, address, datagram.data(frame), reads, writes);
         let weight = if reads { 2 } else { 1 };
         datagram.count(frame, u16::from(read) + weight * u16::from(written));
     }
@@ -200,7 +233,10 @@ impl Device {
 
     /// Position, in counts, and velocity, in counts/s, of a drive's axis.
     pub fn position_and_velocity_counts(&self) -> Option<(f64, f64)> {
-        self.firmware.drive.as_ref().map(crate::drive::Drive::position_and_velocity)
+        self.firmware
+            .drive
+            .as_ref()
+            .map(crate::drive::Drive::position_and_velocity)
     }
 
     /// Where a drive's axis stands by its switches, in counts: homing does not change it.
@@ -234,7 +270,10 @@ impl Device {
 
     /// A digital output of a terminal, from 0; none where it has not so many.
     pub fn output(&self, output: usize) -> Option<bool> {
-        self.channels.outputs.get(output).map(|slot| self.firmware.dictionary.unsigned(*slot) & 1 == 1)
+        self.channels
+            .outputs
+            .get(output)
+            .map(|slot| self.firmware.dictionary.unsigned(*slot) & 1 == 1)
     }
 
     /// Sets an analog input of a terminal, from 0.
@@ -247,21 +286,35 @@ impl Device {
 
     /// An analog output of a terminal, from 0; none where it has not so many.
     pub fn analog_output(&self, output: usize) -> Option<i16> {
-        self.channels.analog_outputs.get(output).map(|slot| self.firmware.dictionary.signed(*slot) as i16)
+        self.channels
+            .analog_outputs
+            .get(output)
+            .map(|slot| self.firmware.dictionary.signed(*slot) as i16)
     }
 
     /// How many digital inputs can be set.
     pub(crate) fn input_count(&self) -> usize {
-        if self.plan.drive.is_some() { 2 } else { self.channels.inputs.len() }
+        if self.plan.drive.is_some() {
+            2
+        } else {
+            self.channels.inputs.len()
+        }
     }
 }
 
 impl Channels {
     fn of(plan: &Blueprint, firmware: &Firmware) -> Self {
         let find = |direction: Direction, bits: u8| {
-            let pdos = plan.pdos.iter().filter(|pdo: &&Pdo| pdo.direction() == direction);
-            let entries = pdos.flat_map(|pdo| &pdo.entries).filter(|entry| entry.index != 0 && entry.bits == bits);
-            entries.filter_map(|entry| firmware.dictionary.slot(entry.index, entry.sub)).collect()
+            let pdos = plan
+                .pdos
+                .iter()
+                .filter(|pdo: &&Pdo| pdo.direction() == direction);
+            let entries = pdos
+                .flat_map(|pdo| &pdo.entries)
+                .filter(|entry| entry.index != 0 && entry.bits == bits);
+            entries
+                .filter_map(|entry| firmware.dictionary.slot(entry.index, entry.sub))
+                .collect()
         };
         Self {
             inputs: find(Direction::ToMaster, 1),

@@ -96,7 +96,8 @@ impl Datagram {
 
     /// Replaces the working counter.
     pub(crate) fn set_counter(&self, frame: &mut [u8], counter: u16) {
-        frame[self.start + HEADER + self.length..][..COUNTER].copy_from_slice(&counter.to_le_bytes());
+        frame[self.start + HEADER + self.length..][..COUNTER]
+            .copy_from_slice(&counter.to_le_bytes());
     }
 
     /// Adds to the working counter.
@@ -107,7 +108,10 @@ impl Datagram {
 
 /// Whether this is a frame of EtherCAT datagrams.
 pub fn is_ethercat(frame: &[u8]) -> bool {
-    let protocol = u16::from_be_bytes([frame.get(12).copied().unwrap_or(0), frame.get(13).copied().unwrap_or(0)]);
+    let protocol = u16::from_be_bytes([
+        frame.get(12).copied().unwrap_or(0),
+        frame.get(13).copied().unwrap_or(0),
+    ]);
     let kind = number_at(frame, 14, 2) >> 12;
     protocol == ETHERTYPE && kind == 1 && frame.len() <= MAX_FRAME
 }
@@ -116,7 +120,10 @@ pub fn is_ethercat(frame: &[u8]) -> bool {
 pub(crate) fn datagrams(frame: &[u8]) -> Datagrams<'_> {
     let stated = usize::from(u16_at(frame, 14) & 0x7ff);
     let end = (FIRST_DATAGRAM + stated).min(frame.len());
-    Datagrams { frame: &frame[..end], at: Some(FIRST_DATAGRAM) }
+    Datagrams {
+        frame: &frame[..end],
+        at: Some(FIRST_DATAGRAM),
+    }
 }
 
 /// Walks over the datagrams of a frame.
@@ -139,11 +146,16 @@ impl Iterator for Datagrams<'_> {
         if size & 0x8000 != 0 {
             self.at = Some(end);
         }
-        Some(Datagram { command: Command::of(self.frame[start]), start, length })
+        Some(Datagram {
+            command: Command::of(self.frame[start]),
+            start,
+            length,
+        })
     }
 }
 
 /// Whether a frame carries process data.
 pub(crate) fn is_cyclic(frame: &[u8]) -> bool {
-    is_ethercat(frame) && datagrams(frame).any(|datagram| matches!(datagram.command, Command::Logical { .. }))
+    is_ethercat(frame)
+        && datagrams(frame).any(|datagram| matches!(datagram.command, Command::Logical { .. }))
 }

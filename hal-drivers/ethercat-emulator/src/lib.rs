@@ -28,7 +28,8 @@ pub use al::{AlCode, AlState};
 pub use blueprint::Identity;
 pub use bus::{Bus, MAX_FRAME};
 pub use description::{
-    BusDescription, Clocking, DescriptionError, DeviceDescription, Kind, ObjectDescription, Plug, Switch,
+    BusDescription, Clocking, DescriptionError, DeviceDescription, Kind, ObjectDescription, Plug,
+    Switch,
 };
 pub use device::Device;
 pub use drive::{DriveDescription, DriveState};

@@ -45,11 +45,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let socket = RawSocket::open(&arguments.interface)?;
     let begin = Instant::now();
     let now_ns = || begin.elapsed().as_nanos() as u64;
-    let end_ns = arguments.seconds.map_or(u64::MAX, |seconds| (seconds.max(0.0) * 1e9) as u64);
+    let end_ns = arguments
+        .seconds
+        .map_or(u64::MAX, |seconds| (seconds.max(0.0) * 1e9) as u64);
     let mut seen: Vec<Shown> = wire.bus().devices().iter().map(Shown::of).collect();
     println!("{} devices on {}", seen.len(), arguments.interface);
     while now_ns() < end_ns {
-        let next_ns = wire.next_reply_ns().map_or(MAX_WAIT_NS, |due_ns| due_ns.saturating_sub(now_ns()));
+        let next_ns = wire
+            .next_reply_ns()
+            .map_or(MAX_WAIT_NS, |due_ns| due_ns.saturating_sub(now_ns()));
         if next_ns > 0 {
             socket.wait(next_ns.min(MAX_WAIT_NS));
         }
@@ -89,8 +93,15 @@ struct Shown {
 
 impl Shown {
     fn of(device: &Device) -> Self {
-        let outputs = (0..64).filter(|output| device.output(*output) == Some(true)).fold(0, |sum, bit| sum | 1 << bit);
-        Self { state: device.al_state(), code: device.al_code(), drive: device.drive_state(), outputs }
+        let outputs = (0..64)
+            .filter(|output| device.output(*output) == Some(true))
+            .fold(0, |sum, bit| sum | 1 << bit);
+        Self {
+            state: device.al_state(),
+            code: device.al_code(),
+            drive: device.drive_state(),
+            outputs,
+        }
     }
 }
 
@@ -101,10 +112,22 @@ fn tell(wire: &Wire, seen: &mut [Shown], now_ns: u64) {
             continue;
         }
         *seen = now;
-        let code = now.code.map_or(String::new(), |code| format!(", error 0x{:04X}", code.0));
-        let drive = now.drive.map_or(String::new(), |state| format!(", {state:?}"));
-        let outputs = if device.output(0).is_some() { format!(", outputs 0x{:x}", now.outputs) } else { String::new() };
+        let code = now
+            .code
+            .map_or(String::new(), |code| format!(", error 0x{:04X}", code.0));
+        let drive = now
+            .drive
+            .map_or(String::new(), |state| format!(", {state:?}"));
+        let outputs = if device.output(0).is_some() {
+            format!(", outputs 0x{:x}", now.outputs)
+        } else {
+            String::new()
+        };
         let time_s = now_ns as f64 / 1e9;
-        println!("{time_s:.4} s, device {number} {}: {:?}{code}{drive}{outputs}", device.name(), now.state);
+        println!(
+            "{time_s:.4} s, device {number} {}: {:?}{code}{drive}{outputs}",
+            device.name(),
+            now.state
+        );
     }
 }

@@ -19,7 +19,9 @@ pub enum RawError {
     #[error("there is no network interface {0}")]
     NoInterface(String),
     /// The process may not.
-    #[error("raw sockets need the capability CAP_NET_RAW: run as root, or `setcap cap_net_raw+ep` the command")]
+    #[error(
+        "raw sockets need the capability CAP_NET_RAW: run as root, or `setcap cap_net_raw+ep` the command"
+    )]
     NoPermission,
     /// It is down.
     #[error("the network interface {0} is down: `ip link set {0} up`")]
@@ -47,12 +49,22 @@ impl RawSocket {
             _ => RawError::System(name.to_string(), error),
         };
         let protocol = ETHERTYPE.to_be();
-        let socket =
-            Socket::new(Domain::PACKET, Type::RAW, Some(Protocol::from(i32::from(protocol)))).map_err(system)?;
-        let index = name_to_index(&socket, name).map_err(|_| RawError::NoInterface(name.to_string()))?;
-        socket.bind(&link_address(index, protocol).map_err(system)?).map_err(system)?;
+        let socket = Socket::new(
+            Domain::PACKET,
+            Type::RAW,
+            Some(Protocol::from(i32::from(protocol))),
+        )
+        .map_err(system)?;
+        let index =
+            name_to_index(&socket, name).map_err(|_| RawError::NoInterface(name.to_string()))?;
+        socket
+            .bind(&link_address(index, protocol).map_err(system)?)
+            .map_err(system)?;
         socket.set_nonblocking(true).map_err(system)?;
-        Ok(Self { socket, name: name.to_string() })
+        Ok(Self {
+            socket,
+            name: name.to_string(),
+        })
     }
 
     /// Waits for a frame for at most `timeout_ns`.
@@ -80,7 +92,14 @@ impl RawSocket {
                 }
                 Ok(Some(&into[..length]))
             }
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => Ok(None),
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(None)
+            }
             Err(error) => Err(self.failed(error)),
         }
     }
@@ -90,7 +109,10 @@ impl RawSocket {
     /// # Errors
     /// The interface went away or down.
     pub fn send(&self, frame: &[u8]) -> Result<(), RawError> {
-        self.socket.send(frame).map(|_| ()).map_err(|error| self.failed(error))
+        self.socket
+            .send(frame)
+            .map(|_| ())
+            .map_err(|error| self.failed(error))
     }
 
     fn failed(&self, error: io::Error) -> RawError {

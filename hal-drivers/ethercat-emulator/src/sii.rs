@@ -25,8 +25,17 @@ pub(crate) fn image(plan: &Blueprint) -> Vec<u8> {
     let mut image = header(plan);
     category(&mut image, STRINGS, &strings(&[&plan.order, &plan.name]));
     category(&mut image, GENERAL, &general(plan));
-    let mut usage: Vec<u8> =
-        plan.process.iter().map(|process| if process.direction == Direction::ToDevice { 1 } else { 2 }).collect();
+    let mut usage: Vec<u8> = plan
+        .process
+        .iter()
+        .map(|process| {
+            if process.direction == Direction::ToDevice {
+                1
+            } else {
+                2
+            }
+        })
+        .collect();
     if plan.mailbox.is_some() {
         usage.push(3);
     }
@@ -48,19 +57,38 @@ pub(crate) fn image(plan: &Blueprint) -> Vec<u8> {
 
 fn header(plan: &Blueprint) -> Vec<u8> {
     let mut image = vec![0; CATEGORIES];
-    let Identity { vendor, product, revision, serial } = plan.identity;
+    let Identity {
+        vendor,
+        product,
+        revision,
+        serial,
+    } = plan.identity;
     // Interface to the firmware: digital outputs without firmware, or a processor.
     put(&mut image[0..2], if plan.simple { 0x0104 } else { 0x0C08 });
     put(&mut image[8..10], u64::from(plan.alias));
     let sum = checksum(&image[..14]);
     put(&mut image[14..16], u64::from(sum));
-    for (at, value) in [(0x10, vendor), (0x14, product), (0x18, revision), (0x1c, serial)] {
+    for (at, value) in [
+        (0x10, vendor),
+        (0x14, product),
+        (0x18, revision),
+        (0x1c, serial),
+    ] {
         put(&mut image[at..at + 4], u64::from(value));
     }
     if let Some(mailbox) = plan.mailbox {
-        let fields = [mailbox.to_device.0, mailbox.to_device.1, mailbox.to_master.0, mailbox.to_master.1, COE];
+        let fields = [
+            mailbox.to_device.0,
+            mailbox.to_device.1,
+            mailbox.to_master.0,
+            mailbox.to_master.1,
+            COE,
+        ];
         for (field, value) in fields.into_iter().enumerate() {
-            put(&mut image[0x30 + 2 * field..0x32 + 2 * field], u64::from(value));
+            put(
+                &mut image[0x30 + 2 * field..0x32 + 2 * field],
+                u64::from(value),
+            );
         }
     }
     put(&mut image[0x7e..0x80], 1);
@@ -70,7 +98,13 @@ fn header(plan: &Blueprint) -> Vec<u8> {
 /// The check sum over the configuration area: x⁸ + x² + x + 1, from ones.
 fn checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0xff, |sum, byte| {
-        (0..8).fold(sum ^ byte, |sum: u8, _| if sum & 0x80 == 0 { sum << 1 } else { sum << 1 ^ 7 })
+        (0..8).fold(sum ^ byte, |sum: u8, _| {
+            if sum & 0x80 == 0 {
+                sum << 1
+            } else {
+                sum << 1 ^ 7
+            }
+        })
     })
 }
 
@@ -102,7 +136,12 @@ fn general(plan: &Blueprint) -> Vec<u8> {
     bytes[2] = 1;
     bytes[3] = 2;
     if let Some(mailbox) = plan.mailbox {
-        bytes[5] = COE_DETAILS | if mailbox.complete_access { COMPLETE_ACCESS } else { 0 };
+        bytes[5] = COE_DETAILS
+            | if mailbox.complete_access {
+                COMPLETE_ACCESS
+            } else {
+                0
+            };
     }
     // What each port is, four bits each: 1 MII, 3 E-bus.
     for port in 0..4 {
@@ -128,15 +167,32 @@ fn sync_managers(plan: &Blueprint) -> Vec<u8> {
         one(mailbox.to_master.0, mailbox.to_master.1, 0x22, 1, 2);
     }
     for process in &plan.process {
-        let usage = if process.direction == Direction::ToDevice { 3 } else { 4 };
-        one(process.start, process.length, process.control, u8::from(process.length > 0), usage);
+        let usage = if process.direction == Direction::ToDevice {
+            3
+        } else {
+            4
+        };
+        one(
+            process.start,
+            process.length,
+            process.control,
+            u8::from(process.length > 0),
+            usage,
+        );
     }
     bytes
 }
 
 fn put_pdo(bytes: &mut Vec<u8>, pdo: &Pdo) {
     bytes.extend(pdo.index.to_le_bytes());
-    bytes.extend([pdo.entries.len() as u8, pdo.manager.unwrap_or(0xff), 0, 0, 0, 0]);
+    bytes.extend([
+        pdo.entries.len() as u8,
+        pdo.manager.unwrap_or(0xff),
+        0,
+        0,
+        0,
+        0,
+    ]);
     for entry in &pdo.entries {
         bytes.extend(entry.index.to_le_bytes());
         bytes.extend([entry.sub, 0, type_of(entry.bits), entry.bits, 0, 0]);
@@ -169,7 +225,12 @@ pub(crate) fn contents(image: &[u8]) -> Contents {
     let word = |at: usize| u16_at(image, 2 * at);
     let long = |at: usize| u32_at(image, 2 * at);
     let mut contents = Contents {
-        identity: Identity { vendor: long(8), product: long(10), revision: long(12), serial: long(14) },
+        identity: Identity {
+            vendor: long(8),
+            product: long(10),
+            revision: long(12),
+            serial: long(14),
+        },
         alias: word(4),
         mailbox: None,
         process: vec![],
@@ -209,15 +270,27 @@ fn processes(bytes: &[u8]) -> Vec<ProcessPlan> {
             _ => return None,
         };
         let (start, length) = (u16_at(bytes, 0), u16_at(bytes, 2));
-        Some(ProcessPlan { manager: number as u8, start, length, control: bytes[4], direction })
+        Some(ProcessPlan {
+            manager: number as u8,
+            start,
+            length,
+            control: bytes[4],
+            direction,
+        })
     };
     bytes.chunks_exact(8).enumerate().filter_map(one).collect()
 }
 
 fn read_pdos(mut bytes: &[u8], pdos: &mut Vec<Pdo>) {
     while let Some((head, rest)) = bytes.split_at_checked(8) {
-        let Some((entries, rest)) = rest.split_at_checked(8 * usize::from(head[2])) else { return };
-        let entry = |bytes: &[u8]| PdoEntry { index: u16_at(bytes, 0), sub: bytes[2], bits: bytes[5] };
+        let Some((entries, rest)) = rest.split_at_checked(8 * usize::from(head[2])) else {
+            return;
+        };
+        let entry = |bytes: &[u8]| PdoEntry {
+            index: u16_at(bytes, 0),
+            sub: bytes[2],
+            bits: bytes[5],
+        };
         pdos.push(Pdo {
             index: u16_at(head, 0),
             manager: (head[3] < 16).then_some(head[3]),

@@ -13,7 +13,9 @@ impl Bus {
             What::Cut { behind } => self.cut(*behind, on),
             What::PowerCycle { device } if on => self.power_cycle(*device),
             _ => {
-                let Some(device) = what.device().and_then(|number| self.device_mut(number)) else { return };
+                let Some(device) = what.device().and_then(|number| self.device_mut(number)) else {
+                    return;
+                };
                 device.trouble(now_ns, what, on);
             }
         }
@@ -50,20 +52,34 @@ impl crate::device::Device {
                 }
             }
             What::Drift { ppm, .. } => {
-                let ppb = if on { (ppm * 1000.0) as i64 } else { self.drift_ppb() };
-                self.esc.clock.set_drift(now_ns, ppb.clamp(-10_000_000, 10_000_000));
+                let ppb = if on {
+                    (ppm * 1000.0) as i64
+                } else {
+                    self.drift_ppb()
+                };
+                self.esc
+                    .clock
+                    .set_drift(now_ns, ppb.clamp(-10_000_000, 10_000_000));
             }
             What::ClockJump { by_ns, .. } if on => self.esc.clock.jump(now_ns, *by_ns),
-            What::LostClock { .. } => self.esc.set_clocking(if on { Clocking::None } else { self.plan.make.clocking }),
+            What::LostClock { .. } => self.esc.set_clocking(if on {
+                Clocking::None
+            } else {
+                self.plan.make.clocking
+            }),
             What::MissedSync { pulses, .. } if on => self.esc.clock.sync.swallow = *pulses,
             What::Input { input, .. } => self.set_input(*input, on),
-            What::Analog { input, value, .. } => self.set_analog_input(*input, if on { *value } else { 0 }),
+            What::Analog { input, value, .. } => {
+                self.set_analog_input(*input, if on { *value } else { 0 })
+            }
             _ => {}
         }
     }
 
     fn drive_trouble(&mut self, what: &What, on: bool) {
-        let Some(drive) = &mut self.firmware.drive else { return };
+        let Some(drive) = &mut self.firmware.drive else {
+            return;
+        };
         let trouble = &mut drive.trouble;
         match what {
             What::DriveFault { code, stays, .. } => {

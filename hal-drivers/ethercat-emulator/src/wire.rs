@@ -113,15 +113,26 @@ impl Wire {
     /// What names a device that is not there, or cannot be built.
     pub fn add(&mut self, fault: Fault) -> Result<(), DescriptionError> {
         self.bus.judge_fault(&fault.what)?;
-        let span = fault.lasts.or(fault.what.is_of_frames().then_some(Span::Frames(1)));
+        let span = fault
+            .lasts
+            .or(fault.what.is_of_frames().then_some(Span::Frames(1)));
         let times = [
             matches!(fault.at, When::Ms(ms) if !(0.0..1e12).contains(&ms)),
             matches!(span, Some(Span::Ms(ms)) if !(0.0..1e12).contains(&ms)),
         ];
         if times.contains(&true) {
-            return Err(DescriptionError::Reference("a fault begins and lasts at least 0 ms".to_string()));
+            return Err(DescriptionError::Reference(
+                "a fault begins and lasts at least 0 ms".to_string(),
+            ));
         }
-        self.faults.push(Scheduled { fault: Fault { lasts: span, ..fault }, ends: None, state: Progress::Waits });
+        self.faults.push(Scheduled {
+            fault: Fault {
+                lasts: span,
+                ..fault
+            },
+            ends: None,
+            state: Progress::Waits,
+        });
         Ok(())
     }
 
@@ -130,8 +141,11 @@ impl Wire {
     /// # Errors
     /// What names a device that is not there, or cannot be built.
     pub fn inject(&mut self, what: What, lasts: Option<Span>) -> Result<(), DescriptionError> {
-        let at =
-            if what.is_of_frames() { When::Frame(self.frames + 1) } else { When::Ms(self.bus.now_ns() as f64 / 1e6) };
+        let at = if what.is_of_frames() {
+            When::Frame(self.frames + 1)
+        } else {
+            When::Ms(self.bus.now_ns() as f64 / 1e6)
+        };
         self.add(Fault { at, lasts, what })?;
         self.advance(self.bus.now_ns());
         Ok(())
@@ -166,12 +180,17 @@ impl Wire {
 
     /// The fault that begins or ends next by the time.
     fn next_by_time(&self) -> Option<(usize, u64)> {
-        let due = |scheduled: &Scheduled| match (scheduled.state, scheduled.fault.at, scheduled.ends) {
-            (Progress::Waits, When::Ms(ms), _) => Some((ms * 1e6) as u64),
-            (Progress::Active, _, Some(End::Ns(ns))) => Some(ns),
-            _ => None,
-        };
-        let all = self.faults.iter().enumerate().filter_map(|(index, fault)| Some((index, due(fault)?)));
+        let due =
+            |scheduled: &Scheduled| match (scheduled.state, scheduled.fault.at, scheduled.ends) {
+                (Progress::Waits, When::Ms(ms), _) => Some((ms * 1e6) as u64),
+                (Progress::Active, _, Some(End::Ns(ns))) => Some(ns),
+                _ => None,
+            };
+        let all = self
+            .faults
+            .iter()
+            .enumerate()
+            .filter_map(|(index, fault)| Some((index, due(fault)?)));
         all.min_by_key(|(_, at_ns)| *at_ns)
     }
 
@@ -216,12 +235,18 @@ impl Wire {
 
     fn fate(&self) -> Fate {
         let mut fate = Fate::default();
-        for scheduled in self.faults.iter().filter(|scheduled| scheduled.state == Progress::Active) {
+        for scheduled in self
+            .faults
+            .iter()
+            .filter(|scheduled| scheduled.state == Progress::Active)
+        {
             match scheduled.fault.what {
                 What::LostRequest => fate.lost = Some(Lost::Request),
                 What::LostReply => fate.lost = Some(Lost::Reply),
                 What::Late { by_us } => fate.late_ns = (by_us * 1000.0) as u64,
-                What::Duplicate { after_us } => fate.duplicate_ns = Some((after_us * 1000.0) as u64),
+                What::Duplicate { after_us } => {
+                    fate.duplicate_ns = Some((after_us * 1000.0) as u64)
+                }
                 What::Swapped => fate.swapped = true,
                 What::Corrupt { byte, mask } => fate.corrupt = Some((byte, mask)),
                 What::Truncated { bytes } => fate.bytes = Some(bytes),
@@ -256,7 +281,11 @@ impl Wire {
             self.free.push(reply);
             return;
         }
-        self.answer(now_ns + if self.travel { travel_ns } else { 0 }, reply, &fate);
+        self.answer(
+            now_ns + if self.travel { travel_ns } else { 0 },
+            reply,
+            &fate,
+        );
     }
 
     fn answer(&mut self, due_ns: u64, mut reply: Vec<u8>, fate: &Fate) {
@@ -285,7 +314,10 @@ impl Wire {
             self.queue(due_ns + after_ns, again);
         }
         if fate.swapped {
-            self.held = Some(Reply { due_ns, frame: reply });
+            self.held = Some(Reply {
+                due_ns,
+                frame: reply,
+            });
             return;
         }
         self.queue(due_ns, reply);
@@ -295,7 +327,10 @@ impl Wire {
     }
 
     fn buffer(&mut self, frame: &[u8]) -> Vec<u8> {
-        let mut buffer = self.free.pop().unwrap_or_else(|| Vec::with_capacity(MAX_FRAME));
+        let mut buffer = self
+            .free
+            .pop()
+            .unwrap_or_else(|| Vec::with_capacity(MAX_FRAME));
         buffer.clear();
         buffer.extend(frame);
         buffer
@@ -320,7 +355,11 @@ impl Wire {
     pub fn receive(&mut self, now_ns: u64, into: &mut [u8]) -> Option<usize> {
         self.advance(now_ns);
         let due = self.next_reply_ns().is_some_and(|due_ns| due_ns <= now_ns);
-        let reply = if due { self.replies.pop_front()? } else { return None };
+        let reply = if due {
+            self.replies.pop_front()?
+        } else {
+            return None;
+        };
         let length = reply.frame.len().min(into.len());
         into[..length].copy_from_slice(&reply.frame[..length]);
         self.free.push(reply.frame);

@@ -90,22 +90,39 @@ pub(crate) async fn bring_up(
     })?;
     let found: Vec<Identity> = group.iter(main).map(|device| identity(&device)).collect();
     let order = assign(options, &found)?;
-    let called: Vec<String> =
-        order.iter().enumerate().map(|(place, index)| options.devices[*index].called(place)).collect();
+    let called: Vec<String> = order
+        .iter()
+        .enumerate()
+        .map(|(place, index)| options.devices[*index].called(place))
+        .collect();
     let mut devices = vec![];
     for (place, index) in order.iter().enumerate() {
         let device = &options.devices[*index];
-        let station = group.subdevice(main, place).map_err(|error| error.to_string())?.configured_address();
+        let station = group
+            .subdevice(main, place)
+            .map_err(|error| error.to_string())?
+            .configured_address();
         set_watchdog(main, station, options.watchdog_ms)
             .await
             .map_err(|error| format!("{}: {error}", called[place]))?;
-        let drive = set_up(main, &group, place, device, &called[place], context, options).await?;
+        let drive = set_up(
+            main,
+            &group,
+            place,
+            device,
+            &called[place],
+            context,
+            options,
+        )
+        .await?;
         devices.push((*index, station, drive));
     }
     let dc = options.sync == Sync::Dc;
     // `ethercrab` has set the others after the first clock that there is.
     let clocks = group.iter(main).find(|device| device.dc_support().any());
-    let reference = clocks.map(|device| device.configured_address()).filter(|_| dc);
+    let reference = clocks
+        .map(|device| device.configured_address())
+        .filter(|_| dc);
     if dc {
         for (mut device, index) in group.iter_mut(main).zip(&order) {
             if options.devices[*index].is_drive() {
@@ -113,24 +130,42 @@ pub(crate) async fn bring_up(
             }
         }
     }
-    let mapped =
-        group.into_pre_op_pdi(main).await.map_err(|error| format!("the process data cannot be mapped: {error}"))?;
+    let mapped = group
+        .into_pre_op_pdi(main)
+        .await
+        .map_err(|error| format!("the process data cannot be mapped: {error}"))?;
     let mut ready = vec![];
     for (place, (index, address, drive)) in devices.into_iter().enumerate() {
-        let station = areas(main, address).await.map_err(|error| format!("{}: {error}", called[place]))?;
-        ready.push(Ready { options: index, called: called[place].clone(), station, drive });
+        let station = areas(main, address)
+            .await
+            .map_err(|error| format!("{}: {error}", called[place]))?;
+        ready.push(Ready {
+            options: index,
+            called: called[place].clone(),
+            station,
+            drive,
+        });
     }
     if dc {
         let period = Duration::from_secs_f64(context.fine_period_s);
         let start_delay = Duration::from_millis(FIRST_SYNC_MS);
-        let configuration = DcConfiguration { start_delay, sync0_period: period, sync0_shift: Duration::ZERO };
+        let configuration = DcConfiguration {
+            start_delay,
+            sync0_period: period,
+            sync0_shift: Duration::ZERO,
+        };
         let configured = mapped.configure_dc_sync(main, configuration).await;
-        configured.map_err(|error| format!("distributed clocks: {error}; sync = \"free-run\" does without them"))?;
+        configured.map_err(|error| {
+            format!("distributed clocks: {error}; sync = \"free-run\" does without them")
+        })?;
     }
     for device in &ready {
         step(main, device, 4).await?;
     }
-    Ok(Up { devices: ready, reference })
+    Ok(Up {
+        devices: ready,
+        reference,
+    })
 }
 
 /// What a device says of itself.
@@ -151,8 +186,16 @@ pub(crate) fn identity<S: std::ops::Deref<Target = ethercrab::SubDevice>>(
 fn assign(options: &Options, found: &[Identity]) -> Result<Vec<usize>, String> {
     let list = || {
         let line = |(place, device): (usize, &Identity)| {
-            let Identity { vendor, product, revision, alias, name } = device;
-            format!("\n  {place}: {vendor:#06x}:{product:#06x} revision {revision:#x} alias {alias} {name}")
+            let Identity {
+                vendor,
+                product,
+                revision,
+                alias,
+                name,
+            } = device;
+            format!(
+                "\n  {place}: {vendor:#06x}:{product:#06x} revision {revision:#x} alias {alias} {name}"
+            )
         };
         found.iter().enumerate().map(line).collect::<String>()
     };
@@ -200,7 +243,10 @@ fn assign(options: &Options, found: &[Identity]) -> Result<Vec<usize>, String> {
 fn judge_identity(device: &DeviceOptions, place: usize, found: &Identity) -> Result<(), String> {
     let called = device.called(place);
     let (vendor, product) = pair(&device.product).unwrap_or_default();
-    for (what, wanted, is) in [("vendor", vendor, found.vendor), ("product", product, found.product)] {
+    for (what, wanted, is) in [
+        ("vendor", vendor, found.vendor),
+        ("product", product, found.product),
+    ] {
         if wanted != is {
             return Err(format!(
                 "{called}: its {what} is {is:#06x}, and the machine file wants {wanted:#06x}; the device there is {:?} \
@@ -218,11 +264,21 @@ fn judge_identity(device: &DeviceOptions, place: usize, found: &Identity) -> Res
     }
 }
 
-async fn set_watchdog(main: &MainDevice<'static>, station: u16, watchdog_ms: f64) -> Result<(), String> {
+async fn set_watchdog(
+    main: &MainDevice<'static>,
+    station: u16,
+    watchdog_ms: f64,
+) -> Result<(), String> {
     let counts = (watchdog_ms * 10.0).round().clamp(1.0, 65535.0) as u16;
-    for (register, value) in [(WATCHDOG_DIVIDER, COUNTS_OF_100_US), (WATCHDOG_TIME, counts)] {
+    for (register, value) in [
+        (WATCHDOG_DIVIDER, COUNTS_OF_100_US),
+        (WATCHDOG_TIME, counts),
+    ] {
         // A device without outputs may have no watchdog.
-        let sent = Command::fpwr(station, register).ignore_wkc().send(main, value).await;
+        let sent = Command::fpwr(station, register)
+            .ignore_wkc()
+            .send(main, value)
+            .await;
         sent.map_err(|error| format!("register {register:#06x}: {error}"))?;
     }
     Ok(())
@@ -238,8 +294,13 @@ async fn set_up(
     context: &DriverContext,
     options: &Options,
 ) -> Result<Option<Drive>, String> {
-    let subdevice = group.subdevice(main, place).map_err(|error| error.to_string())?;
-    let objects = Objects { device: &subdevice, called };
+    let subdevice = group
+        .subdevice(main, place)
+        .map_err(|error| error.to_string())?;
+    let objects = Objects {
+        device: &subdevice,
+        called,
+    };
     let joint = device.joint.as_ref().and_then(|name| {
         let joints = &context.joints[..context.joint_count as usize];
         joints.iter().position(|joint| joint.name.as_str() == name)
@@ -256,11 +317,25 @@ async fn set_up(
     let drive = match moves {
         None => None,
         Some(moves) => {
-            let counts = device.counts_per_unit(description.is_none_or(|joint| joint.rotary != 0)).unwrap_or(1.0);
-            let homing_percent = description.map_or(f64::INFINITY, |joint| joint.homing_torque_percent);
-            let constants = judge_drive(&objects, device, moves, counts, homing_percent, context.fine_period_s).await?;
+            let counts = device
+                .counts_per_unit(description.is_none_or(|joint| joint.rotary != 0))
+                .unwrap_or(1.0);
+            let homing_percent =
+                description.map_or(f64::INFINITY, |joint| joint.homing_torque_percent);
+            let constants = judge_drive(
+                &objects,
+                device,
+                moves,
+                counts,
+                homing_percent,
+                context.fine_period_s,
+            )
+            .await?;
             // It says in which state it stays before the host gives up.
-            let constants = Constants { enable_s: options.enable_s * ENABLE_SHARE, ..constants };
+            let constants = Constants {
+                enable_s: options.enable_s * ENABLE_SHARE,
+                ..constants
+            };
             if options.drives_watch_following && joint.is_some() {
                 judge_window(&objects).await?;
             }
@@ -273,10 +348,17 @@ async fn set_up(
     for startup in &device.startup {
         let (index, sub) = object(&startup.sdo).unwrap_or_default();
         let bytes = startup.bytes().unwrap_or_default();
-        let value = bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
-        objects.write_and_judge(index, sub, value, bytes.len()).await?;
+        let value = bytes
+            .iter()
+            .rev()
+            .fold(0, |value, byte| value << 8 | u32::from(*byte));
+        objects
+            .write_and_judge(index, sub, value, bytes.len())
+            .await?;
     }
-    let Some((constants, limits_torque)) = drive else { return Ok(None) };
+    let Some((constants, limits_torque)) = drive else {
+        return Ok(None);
+    };
     let [out, back] = drive::wanted(device, limits_torque);
     if device.map == MapBy::Driver {
         objects.map(0x1C12, 0x1600, &out).await?;
@@ -286,7 +368,9 @@ async fn set_up(
     let drive = Drive::new(constants, device, [&out, &back]);
     match drive.missing(device) {
         None => Ok(Some(drive)),
-        Some(index) => Err(format!("{called}: its process data have no {index:04X}, which this machine file needs")),
+        Some(index) => Err(format!(
+            "{called}: its process data have no {index:04X}, which this machine file needs"
+        )),
     }
 }
 
@@ -306,7 +390,9 @@ async fn judge_drive(
     };
     let modes = objects.read_if_there(0x6502, 0, 4).await?;
     if let Some(modes) = modes.filter(|modes| modes >> (mode - 1) & 1 == 0) {
-        return Err(format!("{called}: it cannot do mode {mode}: its supported modes (6502) are {modes:#x}"));
+        return Err(format!(
+            "{called}: it cannot do mode {mode}: its supported modes (6502) are {modes:#x}"
+        ));
     }
     if matches!(moves, Moves::Joint(_)) {
         set_period(objects, period_s).await?;
@@ -331,7 +417,11 @@ async fn judge_drive(
         None => f64::from(objects.read_if_there(0x6075, 0, 4).await?.unwrap_or(0)) / 1000.0,
     };
     let max_torque = objects.read_if_there(0x6072, 0, 2).await?.unwrap_or(0) as u16;
-    let homing_torque = if homing_percent.is_finite() { (homing_percent * 10.0).round() as u16 } else { max_torque };
+    let homing_torque = if homing_percent.is_finite() {
+        (homing_percent * 10.0).round() as u16
+    } else {
+        max_torque
+    };
     Ok(Constants {
         moves,
         counts_per_unit,
@@ -357,12 +447,18 @@ async fn set_period(objects: &Objects<'_, '_>, period_s: f64) -> Result<(), Stri
     }
     if (period_s * 1e6 - period_us).abs() > 1e-6 || !(1..=255).contains(&steps) {
         let words = "a fine period of 1 to 255 steps of 1, 10, 100 or 1000 µs is what 60C2 can say";
-        return Err(format!("{}: {words}, and {} µs is none", objects.called, period_s * 1e6));
+        return Err(format!(
+            "{}: {words}, and {} µs is none",
+            objects.called,
+            period_s * 1e6
+        ));
     }
     if objects.read_if_there(0x60C2, 1, 1).await?.is_none() {
         return Ok(());
     }
-    objects.write_and_judge(0x60C2, 2, u32::from(exponent.cast_unsigned()), 1).await?;
+    objects
+        .write_and_judge(0x60C2, 2, u32::from(exponent.cast_unsigned()), 1)
+        .await?;
     objects.write_and_judge(0x60C2, 1, steps, 1).await
 }
 
@@ -377,23 +473,51 @@ async fn judge_window(objects: &Objects<'_, '_>) -> Result<(), String> {
     }
 }
 
-async fn set_homing(objects: &Objects<'_, '_>, device: &DeviceOptions, method: i32, counts: f64) -> Result<(), String> {
-    let method =
-        i8::try_from(method).map_err(|_| format!("{}: homing method {method}: -128 to 127", objects.called))?;
-    objects.write_and_judge(0x6098, 0, u32::from(method.cast_unsigned()), 1).await?;
-    let Some(speeds) = device.homing else { return Ok(()) };
+async fn set_homing(
+    objects: &Objects<'_, '_>,
+    device: &DeviceOptions,
+    method: i32,
+    counts: f64,
+) -> Result<(), String> {
+    let method = i8::try_from(method)
+        .map_err(|_| format!("{}: homing method {method}: -128 to 127", objects.called))?;
+    objects
+        .write_and_judge(0x6098, 0, u32::from(method.cast_unsigned()), 1)
+        .await?;
+    let Some(speeds) = device.homing else {
+        return Ok(());
+    };
     let scale = counts.abs() * device.velocity_scale;
-    objects.write_and_judge(0x6099, 1, (speeds.fast_per_s * scale).round() as u32, 4).await?;
-    objects.write_and_judge(0x6099, 2, (speeds.slow_per_s * scale).round() as u32, 4).await?;
-    objects.write_and_judge(0x609A, 0, (speeds.acceleration_per_s2 * scale).round() as u32, 4).await
+    objects
+        .write_and_judge(0x6099, 1, (speeds.fast_per_s * scale).round() as u32, 4)
+        .await?;
+    objects
+        .write_and_judge(0x6099, 2, (speeds.slow_per_s * scale).round() as u32, 4)
+        .await?;
+    objects
+        .write_and_judge(
+            0x609A,
+            0,
+            (speeds.acceleration_per_s2 * scale).round() as u32,
+            4,
+        )
+        .await
 }
 
 /// Where the process data of a device lie, as its own units say that map logical addresses.
 async fn areas(main: &MainDevice<'static>, address: u16) -> Result<Station, String> {
-    let mut station = Station { address, outputs: Area::default(), inputs: Area::default() };
+    let mut station = Station {
+        address,
+        outputs: Area::default(),
+        inputs: Area::default(),
+    };
     for unit in 0..FMMUS {
-        let read = Command::fprd(address, FMMU + 16 * unit).ignore_wkc().receive::<[u8; 16]>(main).await;
-        let unit = read.map_err(|error| format!("its logical addresses cannot be read: {error}"))?;
+        let read = Command::fprd(address, FMMU + 16 * unit)
+            .ignore_wkc()
+            .receive::<[u8; 16]>(main)
+            .await;
+        let unit =
+            read.map_err(|error| format!("its logical addresses cannot be read: {error}"))?;
         let start = u32::from_le_bytes([unit[0], unit[1], unit[2], unit[3]]);
         let bytes = usize::from(u16::from_le_bytes([unit[4], unit[5]]));
         let (reads, writes, active) = (unit[11] & 1 == 1, unit[11] & 2 == 2, unit[12] & 1 == 1);
@@ -403,9 +527,21 @@ async fn areas(main: &MainDevice<'static>, address: u16) -> Result<Station, Stri
         }
         for (counts, area) in [(reads, &mut station.inputs), (writes, &mut station.outputs)] {
             if counts {
-                let end = if area.bytes == 0 { start } else { area.address + area.bytes as u32 };
-                let first = if area.bytes == 0 { start } else { area.address.min(start) };
-                *area = Area { address: first, bytes: (end.max(start + bytes as u32) - first) as usize, counts: 1 };
+                let end = if area.bytes == 0 {
+                    start
+                } else {
+                    area.address + area.bytes as u32
+                };
+                let first = if area.bytes == 0 {
+                    start
+                } else {
+                    area.address.min(start)
+                };
+                *area = Area {
+                    address: first,
+                    bytes: (end.max(start + bytes as u32) - first) as usize,
+                    counts: 1,
+                };
             }
         }
     }
@@ -416,14 +552,23 @@ async fn areas(main: &MainDevice<'static>, address: u16) -> Result<Station, Stri
 async fn step(main: &MainDevice<'static>, device: &Ready, wanted: u16) -> Result<(), String> {
     let (address, called) = (device.station.address, &device.called);
     let lost = |error: ethercrab::error::Error| format!("{called}: it does not answer: {error}");
-    Command::fpwr(address, AL_CONTROL).send(main, wanted).await.map_err(lost)?;
+    Command::fpwr(address, AL_CONTROL)
+        .send(main, wanted)
+        .await
+        .map_err(lost)?;
     let until_ns = time::now_ns() + STATE_NS;
     loop {
-        let status = Command::fprd(address, AL_STATUS).receive::<u16>(main).await.map_err(lost)?;
+        let status = Command::fprd(address, AL_STATUS)
+            .receive::<u16>(main)
+            .await
+            .map_err(lost)?;
         if status & 0x1f == wanted {
             return Ok(());
         }
-        let code = Command::fprd(address, AL_CODE).receive::<u16>(main).await.map_err(lost)?;
+        let code = Command::fprd(address, AL_CODE)
+            .receive::<u16>(main)
+            .await
+            .map_err(lost)?;
         if status & 0x10 != 0 {
             return Err(refuses(called, wanted, status, code));
         }
@@ -442,11 +587,19 @@ async fn step(main: &MainDevice<'static>, device: &Ready, wanted: u16) -> Result
 
 /// A device that refuses a state, in words.
 pub(crate) fn refuses(called: &str, wanted: u16, status: u16, code: u16) -> String {
-    format!("{called}: it refuses {} and is in {}: {code:04X}, {}", al_state(wanted), al_state(status), al_code(code))
+    format!(
+        "{called}: it refuses {} and is in {}: {code:04X}, {}",
+        al_state(wanted),
+        al_state(status),
+        al_code(code)
+    )
 }
 
 /// Takes all devices back to INIT: their drives have no torque there.
 pub(crate) async fn leave(main: &MainDevice<'static>) {
     // Nobody may be there any more.
-    let _ = Command::bwr(AL_CONTROL).ignore_wkc().send(main, 0x11_u16).await;
+    let _ = Command::bwr(AL_CONTROL)
+        .ignore_wkc()
+        .send(main, 0x11_u16)
+        .await;
 }

@@ -1,7 +1,9 @@
 //! A bus that is up: one exchange in a period, and what is known of every device.
 
 use tandem_ethercat_emulator::BusDescription;
-use tandem_sdk::{Attached, AxisVector, DriverContext, Feedback, JointState, MAX_AXES, MAX_DIGITAL, Setpoint};
+use tandem_sdk::{
+    Attached, AxisVector, DriverContext, Feedback, JointState, MAX_AXES, MAX_DIGITAL, Setpoint,
+};
 
 use crate::bring_up::{self, Ready, refuses};
 use crate::check::emulated;
@@ -93,7 +95,8 @@ impl Bus {
     /// Takes the interface, or gives an emulated bus its power.
     pub(crate) fn open(options: &Options, context: &DriverContext) -> Result<Self, String> {
         let link = if options.interface == EMULATED {
-            let description: BusDescription = emulated(options, context).map_err(|error| error.to_string())?;
+            let description: BusDescription =
+                emulated(options, context).map_err(|error| error.to_string())?;
             Link::emulated(&description, context.real_time != 0)?
         } else {
             Link::interface(&options.interface)?
@@ -124,8 +127,16 @@ impl Bus {
 
     /// Brings the bus into OP, and tells where the joints stand.
     pub(crate) fn start(&mut self) -> Result<Attached, String> {
-        let Self { options, context, link, master, .. } = self;
-        let master = master.as_mut().ok_or_else(|| "the bus is closed".to_string())?;
+        let Self {
+            options,
+            context,
+            link,
+            master,
+            ..
+        } = self;
+        let master = master
+            .as_mut()
+            .ok_or_else(|| "the bus is closed".to_string())?;
         let up = master.run(link, |main| bring_up::bring_up(main, options, context))?;
         let stations: Vec<_> = up.devices.iter().map(|device| device.station).collect();
         let mut cyclic = Cyclic::new(&stations, up.reference)?;
@@ -140,7 +151,8 @@ impl Bus {
             al_code: 0,
         };
         self.members = up.devices.into_iter().map(member).collect();
-        (self.last, self.counters, self.phase_ns) = (Setpoint::default(), Counters::default(), None);
+        (self.last, self.counters, self.phase_ns) =
+            (Setpoint::default(), Counters::default(), None);
         (self.asks, self.sent) = (0, false);
         self.next_ns = self.link.now_ns();
         self.come_into_op()?;
@@ -151,7 +163,10 @@ impl Bus {
     fn come_into_op(&mut self) -> Result<(), String> {
         let most = (OP_S / self.context.fine_period_s) as u64;
         for exchange in 0..most {
-            let asked = exchange.checked_sub(SETTLE_EXCHANGES).map(|n| n as usize).filter(|n| *n < self.members.len());
+            let asked = exchange
+                .checked_sub(SETTLE_EXCHANGES)
+                .map(|n| n as usize)
+                .filter(|n| *n < self.members.len());
             if let Some(cyclic) = &mut self.cyclic {
                 cyclic.request(asked.map(|device| (device, OP)));
             }
@@ -164,7 +179,10 @@ impl Bus {
                     return Err(refuses(&member.ready.called, OP, member.al, member.al_code));
                 }
             }
-            let all = self.members.iter().all(|member| member.al & 0x0f == OP && member.silent == 0);
+            let all = self
+                .members
+                .iter()
+                .all(|member| member.al & 0x0f == OP && member.silent == 0);
             if all {
                 self.begin_drives();
                 return Ok(());
@@ -182,7 +200,10 @@ impl Bus {
     }
 
     fn why_not_op(&self) -> String {
-        let late = self.members.iter().find(|member| member.al & 0x0f != OP || member.silent > 0);
+        let late = self
+            .members
+            .iter()
+            .find(|member| member.al & 0x0f != OP || member.silent > 0);
         late.map_or_else(String::new, |member| {
             let (called, al) = (&member.ready.called, al_state(member.al));
             if self.counters.lost > self.counters.exchanges / 2 {
@@ -192,7 +213,9 @@ impl Bus {
                 );
             }
             if member.al & 0x0f == OP {
-                return format!("{called}: it is in OP, and does not take part in the exchange of process data");
+                return format!(
+                    "{called}: it is in OP, and does not take part in the exchange of process data"
+                );
             }
             format!(
                 "{called}: it stays in {al} and does not come to OP within {OP_S} s: {:04X}, {}",
@@ -213,7 +236,9 @@ impl Bus {
     /// When the next exchange is due: a period later, and towards the phase where clocks lead.
     fn steer(&mut self) {
         let most = self.period_ns as f64 * MAX_STEER_SHARE;
-        let by = self.phase_ns.map_or(0.0, |phase| (phase as f64 * STEER_SHARE).clamp(-most, most));
+        let by = self
+            .phase_ns
+            .map_or(0.0, |phase| (phase as f64 * STEER_SHARE).clamp(-most, most));
         self.next_ns = (self.next_ns + self.period_ns).saturating_add_signed(-(by as i64));
         if !self.link.is_virtual() {
             // A wait that was too long is not made up for by exchanges in a row.
@@ -246,7 +271,9 @@ impl Bus {
     /// An exchange while the host does not ask for one: enabled joints hold where they were told to be last.
     pub(crate) fn keep_alive(&mut self) {
         let mut setpoint = self.last;
-        let moving = setpoint.velocity.0[..MAX_AXES].iter().any(|velocity| *velocity != 0.0);
+        let moving = setpoint.velocity.0[..MAX_AXES]
+            .iter()
+            .any(|velocity| *velocity != 0.0);
         if moving {
             for member in &mut self.members {
                 if let Some(drive) = &mut member.ready.drive {
@@ -269,7 +296,9 @@ impl Bus {
 
     fn lay_out(&mut self, setpoint: &Setpoint) {
         self.last = *setpoint;
-        let Some(cyclic) = &mut self.cyclic else { return };
+        let Some(cyclic) = &mut self.cyclic else {
+            return;
+        };
         for (number, member) in self.members.iter_mut().enumerate() {
             let out = cyclic.outputs(number);
             if let Some(drive) = &mut member.ready.drive {
@@ -278,7 +307,9 @@ impl Bus {
             }
             let lines = &self.options.devices[member.ready.options].outputs;
             for (bit, line) in lines.iter().enumerate().filter(|(_, line)| **line >= 0) {
-                let Some(byte) = out.get_mut(bit / 8) else { break };
+                let Some(byte) = out.get_mut(bit / 8) else {
+                    break;
+                };
                 let mask = 1 << (bit % 8);
                 let on = setpoint.outputs >> line & 1 == 1;
                 *byte = if on { *byte | mask } else { *byte & !mask };
@@ -289,7 +320,9 @@ impl Bus {
 
     /// Waits for the reply and takes in what it says.
     fn take_in(&mut self) {
-        let Some(cyclic) = &mut self.cyclic else { return };
+        let Some(cyclic) = &mut self.cyclic else {
+            return;
+        };
         self.sent = false;
         let wait_ns = (self.period_ns as f64 * REPLY_SHARE) as u64;
         let until_ns = self.link.now_ns() + wait_ns;
@@ -316,7 +349,8 @@ impl Bus {
             }
         }
         let clock_ns = if came { cyclic.clock_ns() } else { None };
-        self.phase_ns = clock_ns.map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
+        self.phase_ns =
+            clock_ns.map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
         self.ask_on(came);
     }
 
@@ -345,7 +379,9 @@ impl Bus {
                 feedback.input_age_periods[*line as usize % MAX_DIGITAL] = age;
             }
             let (lost, silent) = (member.lost, member.silent);
-            let Some(drive) = &mut member.ready.drive else { continue };
+            let Some(drive) = &mut member.ready.drive else {
+                continue;
+            };
             drive.report(lost, feedback);
             match drive.moves() {
                 Moves::Joint(joint) => {
@@ -355,8 +391,10 @@ impl Bus {
                     }
                 }
                 Moves::Spindle { at_speed_share, .. } => {
-                    let (state, code) = lost.map_or_else(|| drive.state(), |code| (JointState::Lost, code));
-                    spindle_trouble = matches!(state, JointState::Fault | JointState::Lost).then_some(code);
+                    let (state, code) =
+                        lost.map_or_else(|| drive.state(), |code| (JointState::Lost, code));
+                    spindle_trouble =
+                        matches!(state, JointState::Fault | JointState::Lost).then_some(code);
                     let at_speed = drive.is_at_speed(setpoint.spindle_rad_per_s, at_speed_share);
                     feedback.spindle_at_speed = u32::from(at_speed && spindle_trouble.is_none());
                 }
@@ -365,13 +403,16 @@ impl Bus {
         let joints = self.context.joint_count as usize;
         if let Some(code) = spindle_trouble
             && joints > 0
-            && feedback.state[..joints].iter().all(|state| *state == JointState::Enabled)
+            && feedback.state[..joints]
+                .iter()
+                .all(|state| *state == JointState::Enabled)
         {
             // The contract has no state for a spindle: what stops the axes on their ramps is a joint's.
             (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE + code);
         }
         // Where nothing was heard, the clock is not steered by what was heard before.
-        (feedback.has_phase, feedback.phase_ns) = self.phase_ns.map_or((0, 0), |phase_ns| (1, phase_ns));
+        (feedback.has_phase, feedback.phase_ns) =
+            self.phase_ns.map_or((0, 0), |phase_ns| (1, phase_ns));
     }
 
     /// Where the joints stand.
@@ -379,15 +420,19 @@ impl Bus {
         let mut feedback = Feedback::default();
         let setpoint = self.last;
         self.report(&setpoint, &mut feedback);
-        let delay = self.options.delay_periods.unwrap_or(if self.options.sync == Sync::Dc { 2 } else { 1 });
+        let delay = self
+            .options
+            .delay_periods
+            .unwrap_or(if self.options.sync == Sync::Dc { 2 } else { 1 });
         let mut attached = Attached::at(feedback.position);
         (attached.state, attached.fault_code) = (feedback.state, feedback.fault_code);
         attached.delay_periods = [delay; MAX_AXES];
         for member in &self.members {
             let options = &self.options.devices[member.ready.options];
-            if let (Some(Moves::Joint(joint)), Encoder::Incremental) =
-                (member.ready.drive.as_ref().map(Drive::moves), options.encoder)
-            {
+            if let (Some(Moves::Joint(joint)), Encoder::Incremental) = (
+                member.ready.drive.as_ref().map(Drive::moves),
+                options.encoder,
+            ) {
                 attached.known &= !(1 << joint);
                 attached.homed &= !(1 << joint);
             }
@@ -459,7 +504,10 @@ impl Member {
             (false, true) => own::WORKING_COUNTER,
             (false, false) => own::NO_ANSWER,
         };
-        let better = left && self.lost.is_some_and(|lost| lost & 0xffff_0000 != own::LEFT_STATE);
+        let better = left
+            && self
+                .lost
+                .is_some_and(|lost| lost & 0xffff_0000 != own::LEFT_STATE);
         if self.lost.is_none() || better {
             self.lost = Some(why);
         }
@@ -470,11 +518,23 @@ impl Member {
 fn read_lines(options: &crate::options::DeviceOptions, member: &Member, feedback: &mut Feedback) {
     let bits = |bit: usize| match &member.ready.drive {
         Some(drive) => bit < 32 && drive.digital >> bit & 1 == 1,
-        None => member.inputs.get(bit / 8).is_some_and(|byte| byte >> (bit % 8) & 1 == 1),
+        None => member
+            .inputs
+            .get(bit / 8)
+            .is_some_and(|byte| byte >> (bit % 8) & 1 == 1),
     };
-    for (bit, line) in options.inputs.iter().enumerate().filter(|(_, line)| **line >= 0) {
+    for (bit, line) in options
+        .inputs
+        .iter()
+        .enumerate()
+        .filter(|(_, line)| **line >= 0)
+    {
         let mask = 1_u64 << line;
-        feedback.inputs = if bits(bit) { feedback.inputs | mask } else { feedback.inputs & !mask };
+        feedback.inputs = if bits(bit) {
+            feedback.inputs | mask
+        } else {
+            feedback.inputs & !mask
+        };
     }
     for analog in &options.analog {
         let value = f64::from(u16_at(&member.inputs, analog.byte).cast_signed());
@@ -484,7 +544,9 @@ fn read_lines(options: &crate::options::DeviceOptions, member: &Member, feedback
 
 /// Puts a latch to one of the same edge, or behind those that are there.
 fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Latch) -> usize {
-    let same = latches[..count].iter_mut().find(|other| other.input == latch.input && other.edge == latch.edge);
+    let same = latches[..count]
+        .iter_mut()
+        .find(|other| other.input == latch.input && other.edge == latch.edge);
     if let Some(other) = same {
         other.joints |= latch.joints;
         other.position += latch.position;
@@ -502,8 +564,13 @@ fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Lat
 /// How much later than its phase an exchange passed the clock that leads, ns; within half a period either way.
 fn phase(clock_ns: u64, period_ns: u64, phase_us: Option<f64>) -> i64 {
     let wanted_ns = phase_us.map_or(period_ns / 2, |phase| (phase * 1000.0) as u64);
-    let late_ns = ((clock_ns % period_ns + period_ns - wanted_ns % period_ns) % period_ns).cast_signed();
-    if late_ns > (period_ns / 2).cast_signed() { late_ns - period_ns.cast_signed() } else { late_ns }
+    let late_ns =
+        ((clock_ns % period_ns + period_ns - wanted_ns % period_ns) % period_ns).cast_signed();
+    if late_ns > (period_ns / 2).cast_signed() {
+        late_ns - period_ns.cast_signed()
+    } else {
+        late_ns
+    }
 }
 
 #[cfg(test)]

@@ -54,7 +54,12 @@ impl Objects<'_, '_> {
     }
 
     /// Reads a number where the device has the object.
-    pub(crate) async fn read_if_there(&self, index: u16, sub: u8, bytes: usize) -> Result<Option<u32>, String> {
+    pub(crate) async fn read_if_there(
+        &self,
+        index: u16,
+        sub: u8,
+        bytes: usize,
+    ) -> Result<Option<u32>, String> {
         let value = match bytes {
             1 => patiently!(self.device.sdo_read::<u8>(index, sub)).map(u32::from),
             2 => patiently!(self.device.sdo_read::<u16>(index, sub)).map(u32::from),
@@ -71,7 +76,13 @@ impl Objects<'_, '_> {
     }
 
     /// Writes a number of so many bytes.
-    pub(crate) async fn write(&self, index: u16, sub: u8, value: u32, bytes: usize) -> Result<(), String> {
+    pub(crate) async fn write(
+        &self,
+        index: u16,
+        sub: u8,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), String> {
         let written = match bytes {
             1 => patiently!(self.device.sdo_write(index, sub, value as u8)),
             2 => patiently!(self.device.sdo_write(index, sub, value as u16)),
@@ -81,17 +92,31 @@ impl Objects<'_, '_> {
     }
 
     /// Writes a number and reads it back.
-    pub(crate) async fn write_and_judge(&self, index: u16, sub: u8, value: u32, bytes: usize) -> Result<(), String> {
+    pub(crate) async fn write_and_judge(
+        &self,
+        index: u16,
+        sub: u8,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), String> {
         self.write(index, sub, value, bytes).await?;
         let now = self.read(index, sub, bytes).await?;
         if now == value {
             return Ok(());
         }
-        Err(format!("{}: {index:04X}:{sub:02X} was written as {value:#x} and reads {now:#x}", self.called))
+        Err(format!(
+            "{}: {index:04X}:{sub:02X} was written as {value:#x} and reads {now:#x}",
+            self.called
+        ))
     }
 
     /// Maps objects: `assignment` is 1C12 or 1C13, `mapping` 1600 or 1A00.
-    pub(crate) async fn map(&self, assignment: u16, mapping: u16, entries: &[Entry]) -> Result<(), String> {
+    pub(crate) async fn map(
+        &self,
+        assignment: u16,
+        mapping: u16,
+        entries: &[Entry],
+    ) -> Result<(), String> {
         self.write(assignment, 0, 0, 1).await?;
         self.write(mapping, 0, 0, 1).await?;
         for (sub, entry) in (1..).zip(entries) {

@@ -111,9 +111,13 @@ impl Cyclic {
         let clock = reference.map(|station| add(FRMW, register(station, SYSTEM_TIME), 8));
         let mut devices = vec![];
         for station in stations {
-            let mut area =
-                |command, area: Area| (area.bytes > 0).then(|| (add(command, area.address, area.bytes), area.counts));
-            devices.push(Datagrams { outputs: area(LWR, station.outputs), inputs: area(LRD, station.inputs) });
+            let mut area = |command, area: Area| {
+                (area.bytes > 0).then(|| (add(command, area.address, area.bytes), area.counts))
+            };
+            devices.push(Datagrams {
+                outputs: area(LWR, station.outputs),
+                inputs: area(LRD, station.inputs),
+            });
         }
         let first = stations.first().map_or(0, |station| station.address);
         let status = add(FPRD, register(first, AL_STATUS), 6);
@@ -164,13 +168,17 @@ impl Cyclic {
 
     /// Whether a device took its outputs.
     pub(crate) fn took(&self, device: usize) -> bool {
-        self.devices[device].outputs.is_none_or(|(place, counts)| self.counter(place) == counts)
+        self.devices[device]
+            .outputs
+            .is_none_or(|(place, counts)| self.counter(place) == counts)
     }
 
     /// Time of the clock that leads, ns; none where there is none, or it did not answer.
     pub(crate) fn clock_ns(&self) -> Option<u64> {
         let place = self.clock.filter(|place| self.counter(*place) > 0)?;
-        let bytes = self.reply[place.data..place.data + 8].try_into().unwrap_or_default();
+        let bytes = self.reply[place.data..place.data + 8]
+            .try_into()
+            .unwrap_or_default();
         Some(u64::from_le_bytes(bytes))
     }
 
@@ -179,7 +187,11 @@ impl Cyclic {
         let at = self.status.data;
         let word = |at: usize| u16::from_le_bytes([self.reply[at], self.reply[at + 1]]);
         let answered = self.counter(self.status) == 1;
-        answered.then(|| AlStatus { device: self.asked, status: word(at), code: word(at + 4) })
+        answered.then(|| AlStatus {
+            device: self.asked,
+            status: word(at),
+            code: word(at + 4),
+        })
     }
 
     /// Asks for the state of a device in the next frame.
@@ -230,8 +242,12 @@ impl Cyclic {
 
     /// Whether what came is the reply to the frame that was sent last: its number, and every header as it was sent.
     fn is_reply(&self, length: usize) -> bool {
-        let stated = FIRST + usize::from(u16::from_le_bytes([self.frame[14], self.frame[15]]) & 0x7ff);
-        if length < stated || self.reply[12..16] != self.frame[12..16] || self.reply[6..12] == SOURCE {
+        let stated =
+            FIRST + usize::from(u16::from_le_bytes([self.frame[14], self.frame[15]]) & 0x7ff);
+        if length < stated
+            || self.reply[12..16] != self.frame[12..16]
+            || self.reply[6..12] == SOURCE
+        {
             return false;
         }
         let number = FIRST..FIRST + HEADER + 4;

@@ -136,7 +136,11 @@ pub(crate) struct Drive {
 /// The objects that a drive is to map, towards it and from it.
 pub(crate) fn wanted(device: &DeviceOptions, limits_torque: bool) -> [Vec<Entry>; 2] {
     let mut out = vec![Entry::new(0x6040, 16)];
-    let mut back = vec![Entry::new(0x6041, 16), Entry::new(0x6064, 32), Entry::new(0x606C, 32)];
+    let mut back = vec![
+        Entry::new(0x6041, 16),
+        Entry::new(0x6064, 32),
+        Entry::new(0x606C, 32),
+    ];
     if device.spindle.is_some() {
         out.push(Entry::new(0x60FF, 32));
     } else {
@@ -155,7 +159,11 @@ pub(crate) fn wanted(device: &DeviceOptions, limits_torque: bool) -> [Vec<Entry>
     if let Some(probe) = device.probe {
         out.push(Entry::new(0x60B8, 16));
         let [rising, falling] = Probe::objects(probe.latch);
-        back.extend([Entry::new(0x60B9, 16), Entry::new(rising, 32), Entry::new(falling, 32)]);
+        back.extend([
+            Entry::new(0x60B9, 16),
+            Entry::new(rising, 32),
+            Entry::new(falling, 32),
+        ]);
     }
     if !device.inputs.is_empty() {
         back.push(Entry::new(0x60FD, 32));
@@ -250,7 +258,10 @@ impl Drive {
             (0x60B9, device.probe.is_some(), places.probe_status),
             (0x60FD, !device.inputs.is_empty(), places.inputs),
         ];
-        needs.into_iter().find(|(_, needed, place)| *needed && place.is_none()).map(|(index, ..)| index)
+        needs
+            .into_iter()
+            .find(|(_, needed, place)| *needed && place.is_none())
+            .map(|(index, ..)| index)
     }
 
     pub(crate) fn moves(&self) -> Moves {
@@ -301,7 +312,11 @@ impl Drive {
             Moves::Joint(joint) => self.command_joint(joint, setpoint, out),
             Moves::Spindle { .. } => {
                 let counts_per_s = setpoint.spindle_rad_per_s * self.constants.counts_per_unit;
-                let velocity = if self.wanted { (counts_per_s * self.constants.velocity_scale).round() } else { 0.0 };
+                let velocity = if self.wanted {
+                    (counts_per_s * self.constants.velocity_scale).round()
+                } else {
+                    0.0
+                };
                 put(out, place.target_velocity, &(velocity as i32).to_le_bytes());
             }
         }
@@ -313,21 +328,40 @@ impl Drive {
         let mut velocity = 0.0;
         let mut torque = 0.0;
         if self.follows && self.homing_is_over() {
-            self.target = (setpoint.position[joint] * counts).round() as i64 + constants.zero_counts;
+            self.target =
+                (setpoint.position[joint] * counts).round() as i64 + constants.zero_counts;
             velocity = setpoint.velocity[joint] * counts * constants.velocity_scale;
-            torque = setpoint.acceleration[joint] * constants.torque_permille_per_acceleration * counts.signum();
+            torque = setpoint.acceleration[joint]
+                * constants.torque_permille_per_acceleration
+                * counts.signum();
         } else {
             self.target = self.count;
         }
         // The drive counts in 32 bits and past their end.
         put(out, place.target, &(self.target as i32).to_le_bytes());
-        put(out, place.velocity_offset, &(velocity.round() as i32).to_le_bytes());
-        put(out, place.torque_offset, &(torque.round() as i16).to_le_bytes());
+        put(
+            out,
+            place.velocity_offset,
+            &(velocity.round() as i32).to_le_bytes(),
+        );
+        put(
+            out,
+            place.torque_offset,
+            &(torque.round() as i16).to_le_bytes(),
+        );
         let limited = setpoint.limited >> joint & 1 == 1;
-        let max_torque = if limited { constants.homing_torque } else { constants.max_torque };
+        let max_torque = if limited {
+            constants.homing_torque
+        } else {
+            constants.max_torque
+        };
         put(out, place.max_torque, &max_torque.to_le_bytes());
         if let Some(probe) = &mut self.probe {
-            put(out, place.probe, &probe.function(setpoint.arm).to_le_bytes());
+            put(
+                out,
+                place.probe,
+                &probe.function(setpoint.arm).to_le_bytes(),
+            );
         }
     }
 
@@ -368,7 +402,11 @@ impl Drive {
         self.reset_left = 0;
         let quick_stop_active = self.status & 0x6f == 0x07;
         if self.quick {
-            return if self.is_operation_enabled() || quick_stop_active { QUICK_STOP } else { 0 };
+            return if self.is_operation_enabled() || quick_stop_active {
+                QUICK_STOP
+            } else {
+                0
+            };
         }
         if !self.wanted || self.code != 0 {
             return match self.status & 0x6f {
@@ -381,7 +419,13 @@ impl Drive {
             (0x40, _) => 0x06,
             (_, 0x21) => 0x07,
             (_, 0x23) => 0x0f,
-            (_, 0x27) => 0x0f | if matches!(self.homing, HomingPhase::Moving(_)) { START_HOMING } else { 0 },
+            (_, 0x27) => {
+                0x0f | if matches!(self.homing, HomingPhase::Moving(_)) {
+                    START_HOMING
+                } else {
+                    0
+                }
+            }
             _ => 0,
         }
     }
@@ -390,7 +434,11 @@ impl Drive {
     fn lead_homing(&mut self, asked: bool) {
         self.homing = match self.homing {
             HomingPhase::Idle if asked && self.follows => HomingPhase::Mode,
-            HomingPhase::Mode | HomingPhase::Moving(_) if !asked || !self.is_operation_enabled() => HomingPhase::Back,
+            HomingPhase::Mode | HomingPhase::Moving(_)
+                if !asked || !self.is_operation_enabled() =>
+            {
+                HomingPhase::Back
+            }
             HomingPhase::Mode if self.mode_shown == HOMING => HomingPhase::Moving(0),
             HomingPhase::Moving(exchanges) if exchanges >= STALE_EXCHANGES => match self.status {
                 status if status & HOMING_ERROR != 0 => {
@@ -405,13 +453,20 @@ impl Drive {
                 // It calls the same place otherwise now.
                 self.count = i64::from(self.raw);
                 self.count_before = self.count;
-                if asked && self.code == 0 { HomingPhase::Done } else { HomingPhase::Idle }
+                if asked && self.code == 0 {
+                    HomingPhase::Done
+                } else {
+                    HomingPhase::Idle
+                }
             }
             HomingPhase::Done if !asked => HomingPhase::Idle,
             phase => phase,
         };
-        self.mode =
-            if matches!(self.homing, HomingPhase::Mode | HomingPhase::Moving(_)) { HOMING } else { CYCLIC_POSITION };
+        self.mode = if matches!(self.homing, HomingPhase::Mode | HomingPhase::Moving(_)) {
+            HOMING
+        } else {
+            CYCLIC_POSITION
+        };
     }
 
     /// Takes in its answer.
@@ -446,9 +501,18 @@ impl Drive {
     /// The latch of a position so many counts behind the one that was just read.
     fn latch_of(&self, joint: usize, input: u32, edge: u32, behind: f64) -> Latch {
         let moved = (self.count - self.count_before) as f64;
-        let periods = if moved == 0.0 { 0.0 } else { (behind / moved).clamp(0.0, 3.0) };
-        let mut latch =
-            Latch { input, edge, joints: 1 << joint, before_s: periods * self.constants.period_s, ..Latch::default() };
+        let periods = if moved == 0.0 {
+            0.0
+        } else {
+            (behind / moved).clamp(0.0, 3.0)
+        };
+        let mut latch = Latch {
+            input,
+            edge,
+            joints: 1 << joint,
+            before_s: periods * self.constants.period_s,
+            ..Latch::default()
+        };
         latch.position[joint] = self.position() - behind / self.constants.counts_per_unit;
         latch
     }
@@ -515,8 +579,9 @@ impl Drive {
                 feedback.fault_code[joint] = code;
                 feedback.position[joint] = self.position();
                 feedback.speed[joint] = self.speed();
-                feedback.current_a[joint] =
-                    self.torque / 1000.0 * self.constants.rated_current_a * self.constants.counts_per_unit.signum();
+                feedback.current_a[joint] = self.torque / 1000.0
+                    * self.constants.rated_current_a
+                    * self.constants.counts_per_unit.signum();
                 let bit = u32::from(self.homing == HomingPhase::Done) << joint;
                 feedback.homed = feedback.homed & !(1 << joint) | bit;
             }

@@ -6,7 +6,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError, Setpoint, Words,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, PluginError,
+    Setpoint, Words,
 };
 
 use crate::bus::{Bus, Counters};
@@ -64,8 +65,12 @@ impl Shared {
         loop {
             match self.bus.try_lock() {
                 Ok(bus) => return Some(bus),
-                Err(std::sync::TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
-                Err(std::sync::TryLockError::WouldBlock) if begun.elapsed() < until => std::hint::spin_loop(),
+                Err(std::sync::TryLockError::Poisoned(poisoned)) => {
+                    return Some(poisoned.into_inner());
+                }
+                Err(std::sync::TryLockError::WouldBlock) if begun.elapsed() < until => {
+                    std::hint::spin_loop()
+                }
                 Err(std::sync::TryLockError::WouldBlock) => return None,
             }
         }
@@ -80,16 +85,28 @@ impl EthercatDrives {
     pub fn new(options: &Options) -> Result<Self, PluginError> {
         check::judge_alone(options)?;
         let context = DriverContext::new(0, 0.001); // replaced by `open`
-        Ok(Self { options: options.clone(), context, shared: None, keeper: None, running: false })
+        Ok(Self {
+            options: options.clone(),
+            context,
+            shared: None,
+            keeper: None,
+            running: false,
+        })
     }
 
     /// What became of the exchanges since the start. Host; for tests and for people who watch.
     pub fn counters(&self) -> Counters {
-        self.shared.as_ref().map(|shared| shared.bus().counters).unwrap_or_default()
+        self.shared
+            .as_ref()
+            .map(|shared| shared.bus().counters)
+            .unwrap_or_default()
     }
 
     /// Looks into the emulated bus, and changes it: for tests. Nothing where it is another.
-    pub fn with_emulator<T>(&mut self, look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T) -> Option<T> {
+    pub fn with_emulator<T>(
+        &mut self,
+        look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T,
+    ) -> Option<T> {
         let shared = self.shared.as_ref()?;
         let mut bus = shared.bus();
         bus.link_mut().wire_mut().map(look)
@@ -101,7 +118,9 @@ impl EthercatDrives {
 
     /// Starts the thread that keeps the bus alive, on the wall clock.
     fn keep(&mut self) {
-        let Some(shared) = self.shared.clone().filter(|_| self.context.real_time != 0) else { return };
+        let Some(shared) = self.shared.clone().filter(|_| self.context.real_time != 0) else {
+            return;
+        };
         shared.ends.store(false, Ordering::Relaxed);
         shared.heard_ns.store(0, Ordering::Relaxed);
         let period = self.period();
@@ -114,7 +133,8 @@ impl EthercatDrives {
                 while !shared.ends.load(Ordering::Relaxed) {
                     let begun = Instant::now();
                     let heard_ns = shared.heard_ns.load(Ordering::Acquire);
-                    let silent = heard_ns == 0 || shared.now_ns().saturating_sub(heard_ns) > silent_ns;
+                    let silent =
+                        heard_ns == 0 || shared.now_ns().saturating_sub(heard_ns) > silent_ns;
                     if silent && let Ok(mut bus) = shared.bus.try_lock() {
                         bus.keep_alive();
                     }
@@ -153,12 +173,15 @@ impl Driver for EthercatDrives {
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         if self.running {
-            return Err(PluginError::fixed("ethercat: open is refused: the driver is running"));
+            return Err(PluginError::fixed(
+                "ethercat: open is refused: the driver is running",
+            ));
         }
         check::judge(&self.options, context)?;
         self.context = *context;
         self.shared = None;
-        let bus = Bus::open(&self.options, context).map_err(|words| PluginError::new(format!("ethercat: {words}")))?;
+        let bus = Bus::open(&self.options, context)
+            .map_err(|words| PluginError::new(format!("ethercat: {words}")))?;
         self.shared = Some(Arc::new(Shared {
             bus: Mutex::new(bus),
             opened: Instant::now(),
@@ -170,7 +193,9 @@ impl Driver for EthercatDrives {
 
     fn start(&mut self) -> Result<Attached, PluginError> {
         let Some(shared) = self.shared.as_ref().filter(|_| !self.running) else {
-            return Err(PluginError::fixed("ethercat: start is refused: the driver is closed, or runs already"));
+            return Err(PluginError::fixed(
+                "ethercat: start is refused: the driver is closed, or runs already",
+            ));
         };
         let attached = shared.bus().start();
         match attached {
@@ -191,24 +216,37 @@ impl Driver for EthercatDrives {
         if let Some(shared) = self.shared.as_ref().filter(|_| self.running)
             && let Some(mut bus) = shared.try_bus(until)
         {
-            shared.heard_ns.store(shared.now_ns().max(1), Ordering::Release);
+            shared
+                .heard_ns
+                .store(shared.now_ns().max(1), Ordering::Release);
             bus.send(setpoint);
         }
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         let until = self.period() / 2;
         let Some(shared) = self.shared.as_ref().filter(|_| self.running) else {
-            return Err(PluginError::fixed("ethercat: exchange is refused: the driver is not started"));
+            return Err(PluginError::fixed(
+                "ethercat: exchange is refused: the driver is not started",
+            ));
         };
-        let finite =
-            setpoint.position.is_finite() && setpoint.velocity.is_finite() && setpoint.acceleration.is_finite();
+        let finite = setpoint.position.is_finite()
+            && setpoint.velocity.is_finite()
+            && setpoint.acceleration.is_finite();
         if !(finite && setpoint.spindle_rad_per_s.is_finite()) {
-            return Err(PluginError::fixed("ethercat: exchange is refused: the setpoint is not a finite number"));
+            return Err(PluginError::fixed(
+                "ethercat: exchange is refused: the setpoint is not a finite number",
+            ));
         }
         match shared.try_bus(until) {
             Some(mut bus) => {
-                shared.heard_ns.store(shared.now_ns().max(1), Ordering::Release);
+                shared
+                    .heard_ns
+                    .store(shared.now_ns().max(1), Ordering::Release);
                 bus.exchange(setpoint, feedback);
             }
             None => grow_old(feedback, self.context.joint_count as usize),
@@ -235,9 +273,22 @@ impl Driver for EthercatDrives {
     }
 
     fn explain(&self, joint: u32, code: u32) -> Words {
-        let name = self.context.joints.get(joint as usize).map_or("", |joint| joint.name.as_str());
-        let device = self.options.devices.iter().find(|device| device.joint.as_deref() == Some(name));
-        let own = device.and_then(|device| device.codes.iter().find(|known| number(&known.code) == Some(code)));
+        let name = self
+            .context
+            .joints
+            .get(joint as usize)
+            .map_or("", |joint| joint.name.as_str());
+        let device = self
+            .options
+            .devices
+            .iter()
+            .find(|device| device.joint.as_deref() == Some(name));
+        let own = device.and_then(|device| {
+            device
+                .codes
+                .iter()
+                .find(|known| number(&known.code) == Some(code))
+        });
         let words = own.map_or_else(|| joint_code(code), |known| known.text.clone());
         let place = device.and_then(|device| device.position);
         match place.filter(|_| !words.is_empty()) {
@@ -252,9 +303,13 @@ const KEEPER_PRIORITY: i32 = 40;
 
 /// Asks for real-time priority for this thread; a computer that grants none keeps the bus alive as well as it can.
 fn ask_for_priority() {
-    let parameter = libc::sched_param { sched_priority: KEEPER_PRIORITY };
+    let parameter = libc::sched_param {
+        sched_priority: KEEPER_PRIORITY,
+    };
     // SAFETY: the thread is this one, and the structure is read only.
-    let _ = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameter) };
+    let _ = unsafe {
+        libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameter)
+    };
 }
 
 /// The keeper had the bus for too long: nothing was heard in this period.
@@ -268,7 +323,11 @@ fn grow_old(feedback: &mut Feedback, joints: usize) {
     for latch in &mut feedback.latches {
         latch.edge = 0;
     }
-    debug_assert!(feedback.state[..joints].iter().all(|state| JointState::is_known(*state)));
+    debug_assert!(
+        feedback.state[..joints]
+            .iter()
+            .all(|state| JointState::is_known(*state))
+    );
 }
 
 impl Drop for EthercatDrives {

@@ -4,7 +4,10 @@
 //! reply has, and in which each device has a working counter of its own. `docs/ethercat.md` tells how a machine is set up;
 //! with `interface = "emulated"` the whole runs on `tandem-ethercat-emulator` in this process, on either clock.
 
-#![allow(clippy::large_futures, reason = "the futures of ethercrab hold its group of devices")]
+#![allow(
+    clippy::large_futures,
+    reason = "the futures of ethercrab hold its group of devices"
+)]
 
 mod bring_up;
 mod bus;
@@ -27,8 +30,8 @@ pub use bring_up::Identity;
 pub use bus::Counters;
 pub use driver::EthercatDrives;
 pub use options::{
-    AnalogOptions, CodeOptions, DeviceOptions, Encoder, HomingOptions, MapBy, Mode, Options, ProbeOptions, SpindleMode,
-    SpindleOptions, StartupOptions, Sync,
+    AnalogOptions, CodeOptions, DeviceOptions, Encoder, HomingOptions, MapBy, Mode, Options,
+    ProbeOptions, SpindleMode, SpindleOptions, StartupOptions, Sync,
 };
 pub use survey::{Found, State, Survey, Value, Watched, context_of, watch};
 

@@ -26,7 +26,11 @@ pub(crate) struct Link {
 #[derive(Debug)]
 enum Medium {
     Emulated(Box<Wire>),
-    Interface { socket: RawSocket, buffer: Box<[u8; MAX_FRAME]>, _lock: File },
+    Interface {
+        socket: RawSocket,
+        buffer: Box<[u8; MAX_FRAME]>,
+        _lock: File,
+    },
 }
 
 impl Link {
@@ -45,8 +49,17 @@ impl Link {
     pub(crate) fn interface(name: &str) -> Result<Self, String> {
         let lock = lock(name)?;
         let socket = RawSocket::open(name).map_err(|error| error.to_string())?;
-        let medium = Medium::Interface { socket, buffer: Box::new([0; MAX_FRAME]), _lock: lock };
-        let mut link = Self { medium, opened: Some(Instant::now()), virtual_ns: 0, recorder: None };
+        let medium = Medium::Interface {
+            socket,
+            buffer: Box::new([0; MAX_FRAME]),
+            _lock: lock,
+        };
+        let mut link = Self {
+            medium,
+            opened: Some(Instant::now()),
+            virtual_ns: 0,
+            recorder: None,
+        };
         let mut frame = [0; MAX_FRAME];
         let until_ns = link.now_ns() + LISTEN_NS;
         while let Some(length) = link.receive(until_ns, &mut frame) {
@@ -68,7 +81,8 @@ impl Link {
 
     /// Its time, ns.
     pub(crate) fn now_ns(&self) -> u64 {
-        self.opened.map_or(self.virtual_ns, |opened| opened.elapsed().as_nanos() as u64)
+        self.opened
+            .map_or(self.virtual_ns, |opened| opened.elapsed().as_nanos() as u64)
     }
 
     /// The emulator, where it is one.
@@ -136,7 +150,9 @@ impl Link {
     }
 
     fn receive_virtual(&mut self, until_ns: u64, into: &mut [u8; MAX_FRAME]) -> Option<usize> {
-        let Medium::Emulated(wire) = &mut self.medium else { return None };
+        let Medium::Emulated(wire) = &mut self.medium else {
+            return None;
+        };
         let due_ns = wire.next_reply_ns().filter(|due_ns| *due_ns <= until_ns);
         self.virtual_ns = self.virtual_ns.max(due_ns.unwrap_or(until_ns));
         due_ns.and_then(|_| wire.receive(self.virtual_ns, into))
@@ -153,7 +169,9 @@ impl Link {
     pub(crate) fn wait_until(&mut self, at_ns: u64) {
         match self.opened {
             None => self.virtual_ns = self.virtual_ns.max(at_ns),
-            Some(_) => std::thread::sleep(Duration::from_nanos(at_ns.saturating_sub(self.now_ns()))),
+            Some(_) => {
+                std::thread::sleep(Duration::from_nanos(at_ns.saturating_sub(self.now_ns())))
+            }
         }
     }
 }
@@ -162,9 +180,17 @@ impl Link {
 fn lock(name: &str) -> Result<File, String> {
     let path = std::env::temp_dir().join(format!("tandem-ethercat-{name}.lock"));
     let file = File::options().create(true).append(true).open(&path);
-    let file = file.map_err(|error| format!("the lock of the interface {name}: {}: {error}", path.display()))?;
+    let file = file.map_err(|error| {
+        format!(
+            "the lock of the interface {name}: {}: {error}",
+            path.display()
+        )
+    })?;
     match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(_) => Err(format!("another process drives the interface {name} (it holds {})", path.display())),
+        Err(_) => Err(format!(
+            "another process drives the interface {name} (it holds {})",
+            path.display()
+        )),
     }
 }

@@ -10,7 +10,11 @@ pub(crate) struct Entry {
 
 impl Entry {
     pub(crate) const fn new(index: u16, bits: u8) -> Self {
-        Self { index, sub: 0, bits }
+        Self {
+            index,
+            sub: 0,
+            bits,
+        }
     }
 
     /// As it stands in an object of a mapping.
@@ -20,7 +24,11 @@ impl Entry {
 
     /// Out of an object of a mapping.
     pub(crate) fn of(word: u32) -> Self {
-        Self { index: (word >> 16) as u16, sub: (word >> 8) as u8, bits: word as u8 }
+        Self {
+            index: (word >> 16) as u16,
+            sub: (word >> 8) as u8,
+            bits: word as u8,
+        }
     }
 }
 
@@ -43,11 +51,15 @@ impl Map {
 }
 
 pub(crate) fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    bytes.get(at..at + 2).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]))
+    bytes
+        .get(at..at + 2)
+        .map_or(0, |b| u16::from_le_bytes([b[0], b[1]]))
 }
 
 pub(crate) fn i32_at(bytes: &[u8], at: usize) -> i32 {
-    bytes.get(at..at + 4).map_or(0, |b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    bytes
+        .get(at..at + 4)
+        .map_or(0, |b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }
 
 /// Writes `value` where there is a place for it.
@@ -63,12 +75,31 @@ mod tests {
 
     #[test]
     fn objects_lie_behind_each_other() {
-        let map = Map(vec![Entry::new(0x6041, 16), Entry::new(0x6061, 8), Entry::new(0, 8), Entry::new(0x6064, 32)]);
-        assert_eq!((map.place(0x6041, 16), map.place(0x6064, 32)), (Some(0), Some(4)));
+        let map = Map(vec![
+            Entry::new(0x6041, 16),
+            Entry::new(0x6061, 8),
+            Entry::new(0, 8),
+            Entry::new(0x6064, 32),
+        ]);
+        assert_eq!(
+            (map.place(0x6041, 16), map.place(0x6064, 32)),
+            (Some(0), Some(4))
+        );
         assert_eq!((map.place(0x6064, 16), map.place(0x606C, 32)), (None, None));
         assert_eq!(
-            Entry::of(Entry { index: 0x6099, sub: 1, bits: 32 }.word()),
-            Entry { index: 0x6099, sub: 1, bits: 32 }
+            Entry::of(
+                Entry {
+                    index: 0x6099,
+                    sub: 1,
+                    bits: 32
+                }
+                .word()
+            ),
+            Entry {
+                index: 0x6099,
+                sub: 1,
+                bits: 32
+            }
         );
     }
 }

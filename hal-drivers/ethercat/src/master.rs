@@ -63,12 +63,19 @@ impl Master {
             dc_static_sync_iterations: if clocks { STATIC_SYNC_FRAMES } else { 0 },
             retry_behaviour: RetryBehaviour::Count(3),
         };
-        Some(Self { main: MainDevice::new(pdu_loop, timeouts, config), ports: Ports { tx, rx }, clocks })
+        Some(Self {
+            main: MainDevice::new(pdu_loop, timeouts, config),
+            ports: Ports { tx, rx },
+            clocks,
+        })
     }
 
     /// Gives it to whoever comes next.
     pub(crate) fn give_back(self) {
-        UNUSED.lock().unwrap_or_else(PoisonError::into_inner).push(self);
+        UNUSED
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(self);
     }
 
     /// Runs what `job` makes of the main device to its end.

@@ -269,7 +269,11 @@ pub(crate) fn pair(text: &str) -> Option<(u32, u32)> {
 
 /// Index and sub-index of `0x6085` or `0x6099:1`.
 pub(crate) fn object(text: &str) -> Option<(u16, u8)> {
-    let (index, sub) = if text.contains(':') { pair(text)? } else { (number(text)?, 0) };
+    let (index, sub) = if text.contains(':') {
+        pair(text)?
+    } else {
+        (number(text)?, 0)
+    };
     Some((index.try_into().ok()?, sub.try_into().ok()?))
 }
 
@@ -293,7 +297,12 @@ impl StartupOptions {
 impl DeviceOptions {
     /// Counts for a mm, or a rad where it turns; none where nothing says so.
     pub(crate) fn counts_per_unit(&self, rotary: bool) -> Option<f64> {
-        let counts = match (rotary, self.counts_per_mm, self.counts_per_turn, self.mm_per_turn) {
+        let counts = match (
+            rotary,
+            self.counts_per_mm,
+            self.counts_per_turn,
+            self.mm_per_turn,
+        ) {
             (false, Some(counts), None, None) => counts,
             (false, None, Some(counts), Some(mm)) => counts / mm,
             (true, None, Some(counts), None) => counts / std::f64::consts::TAU,
@@ -310,8 +319,20 @@ impl DeviceOptions {
 
     /// What messages call it: `device 2 (z)`.
     pub(crate) fn called(&self, place: usize) -> String {
-        let name = if self.name.is_empty() { self.joint.as_deref().unwrap_or_default() } else { &self.name };
-        let name = if name.is_empty() && self.spindle.is_some() { "spindle" } else { name };
-        if name.is_empty() { format!("device {place}") } else { format!("device {place} ({name})") }
+        let name = if self.name.is_empty() {
+            self.joint.as_deref().unwrap_or_default()
+        } else {
+            &self.name
+        };
+        let name = if name.is_empty() && self.spindle.is_some() {
+            "spindle"
+        } else {
+            name
+        };
+        if name.is_empty() {
+            format!("device {place}")
+        } else {
+            format!("device {place} ({name})")
+        }
     }
 }

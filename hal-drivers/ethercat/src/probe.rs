@@ -36,12 +36,21 @@ pub(crate) struct Probe {
 
 impl Probe {
     pub(crate) fn new(options: ProbeOptions) -> Self {
-        Self { input: options.input, shift: if options.latch == 2 { 8 } else { 0 }, phase: Phase::Off, clear: true }
+        Self {
+            input: options.input,
+            shift: if options.latch == 2 { 8 } else { 0 },
+            phase: Phase::Off,
+            clear: true,
+        }
     }
 
     /// Objects of the positions at the rising and at the falling edge.
     pub(crate) fn objects(latch: u8) -> [u16; 2] {
-        if latch == 2 { [0x60BC, 0x60BD] } else { [0x60BA, 0x60BB] }
+        if latch == 2 {
+            [0x60BC, 0x60BD]
+        } else {
+            [0x60BA, 0x60BB]
+        }
     }
 
     /// The function that it is told in this period: what it caught before is put away first, so that an edge is never told twice.
@@ -55,7 +64,13 @@ impl Probe {
         match self.phase {
             Phase::Off => 0,
             Phase::Armed(edge) | Phase::Caught(edge) => {
-                (ENABLE | if edge == RISING { FUNCTION_RISING } else { FUNCTION_FALLING }) << self.shift
+                (ENABLE
+                    | if edge == RISING {
+                        FUNCTION_RISING
+                    } else {
+                        FUNCTION_FALLING
+                    })
+                    << self.shift
             }
         }
     }
@@ -64,9 +79,14 @@ impl Probe {
     pub(crate) fn answer(&mut self, status: u16, positions: [i32; 2]) -> Option<(u32, u32, i32)> {
         let status = status >> self.shift & ANY;
         self.clear = status == 0;
-        let Phase::Armed(edge) = self.phase else { return None };
-        let (caught, position) =
-            if edge == RISING { (CAUGHT_RISING, positions[0]) } else { (CAUGHT_FALLING, positions[1]) };
+        let Phase::Armed(edge) = self.phase else {
+            return None;
+        };
+        let (caught, position) = if edge == RISING {
+            (CAUGHT_RISING, positions[0])
+        } else {
+            (CAUGHT_FALLING, positions[1])
+        };
         if status & caught == 0 {
             return None;
         }
@@ -92,7 +112,10 @@ mod tests {
         assert_eq!(probe.function(UP), 0x1100);
         assert_eq!(probe.answer(0x0100, [7, 8]), None);
         assert_eq!(probe.answer(0x0300, [9, 8]), Some((3, 1, 9)));
-        assert_eq!((probe.function(UP), probe.answer(0x0300, [9, 8])), (0x1100, None));
+        assert_eq!(
+            (probe.function(UP), probe.answer(0x0300, [9, 8])),
+            (0x1100, None)
+        );
         assert_eq!(probe.function(Arm { input: 2, edge: 1 }), 0);
     }
 }

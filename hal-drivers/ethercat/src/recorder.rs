@@ -27,8 +27,16 @@ impl Recorder {
     /// Adds a frame; what cannot be written ends up missing at the end of the file.
     pub(crate) fn add(&mut self, now_ns: u64, frame: &[u8]) {
         let bytes = frame.len() as u32;
-        let header =
-            [(now_ns / 1_000_000_000) as u32, (now_ns % 1_000_000_000) as u32, bytes, bytes].map(u32::to_le_bytes);
-        let _ = self.file.write_all(header.as_flattened()).and_then(|()| self.file.write_all(frame));
+        let header = [
+            (now_ns / 1_000_000_000) as u32,
+            (now_ns % 1_000_000_000) as u32,
+            bytes,
+            bytes,
+        ]
+        .map(u32::to_le_bytes);
+        let _ = self
+            .file
+            .write_all(header.as_flattened())
+            .and_then(|()| self.file.write_all(frame));
     }
 }

@@ -25,8 +25,16 @@ const AL_STATUS: u16 = 0x0130;
 const MAX_BYTES: usize = 1400;
 
 /// The modes of operation that 6502 has bits for, by their numbers.
-const MODES: [(u32, &str); 8] =
-    [(1, "pp"), (2, "vl"), (3, "pv"), (4, "tq"), (6, "hm"), (8, "csp"), (9, "csv"), (10, "cst")];
+const MODES: [(u32, &str); 8] = [
+    (1, "pp"),
+    (2, "vl"),
+    (3, "pv"),
+    (4, "tq"),
+    (6, "hm"),
+    (8, "csp"),
+    (9, "csv"),
+    (10, "cst"),
+];
 
 /// A device that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,13 +96,18 @@ impl Survey {
     pub fn open(interface: &str, emulated: Option<&str>) -> Result<Self, String> {
         let link = match emulated {
             Some(text) => {
-                let description = BusDescription::from_toml(text).map_err(|error| error.to_string())?;
+                let description =
+                    BusDescription::from_toml(text).map_err(|error| error.to_string())?;
                 Link::emulated(&description, false)?
             }
             None => Link::interface(interface)?,
         };
-        let master = Master::take(false).ok_or_else(|| "there is no memory for another bus".to_string())?;
-        Ok(Self { link, master: Some(master) })
+        let master =
+            Master::take(false).ok_or_else(|| "there is no memory for another bus".to_string())?;
+        Ok(Self {
+            link,
+            master: Some(master),
+        })
     }
 
     /// At the bus of a driver's options.
@@ -105,9 +118,14 @@ impl Survey {
         if options.interface != EMULATED {
             return Self::open(&options.interface, None);
         }
-        let description = crate::check::emulated(options, context).map_err(|error| error.to_string())?;
-        let master = Master::take(false).ok_or_else(|| "there is no memory for another bus".to_string())?;
-        Ok(Self { link: Link::emulated(&description, false)?, master: Some(master) })
+        let description =
+            crate::check::emulated(options, context).map_err(|error| error.to_string())?;
+        let master =
+            Master::take(false).ok_or_else(|| "there is no memory for another bus".to_string())?;
+        Ok(Self {
+            link: Link::emulated(&description, false)?,
+            master: Some(master),
+        })
     }
 
     /// Writes every frame from here on into a file that Wireshark opens.
@@ -119,7 +137,10 @@ impl Survey {
     }
 
     fn parts(&mut self) -> Result<(&mut Master, &mut Link), String> {
-        let master = self.master.as_mut().ok_or_else(|| "the bus is closed".to_string())?;
+        let master = self
+            .master
+            .as_mut()
+            .ok_or_else(|| "the bus is closed".to_string())?;
         Ok((master, &mut self.link))
     }
 
@@ -130,12 +151,17 @@ impl Survey {
     pub fn scan(&mut self) -> Result<Vec<Found>, String> {
         let (master, link) = self.parts()?;
         master.run(link, |main| async move {
-            let group: SubDeviceGroup<MAX_DEVICES, MAX_BYTES> =
-                main.init_single_group(time::now_ns).await.map_err(|error| failed(&error))?;
+            let group: SubDeviceGroup<MAX_DEVICES, MAX_BYTES> = main
+                .init_single_group(time::now_ns)
+                .await
+                .map_err(|error| failed(&error))?;
             let mut found = vec![];
             for (place, device) in group.iter(main).enumerate() {
                 let called = format!("device {place}");
-                let objects = Objects { device: &device, called: &called };
+                let objects = Objects {
+                    device: &device,
+                    called: &called,
+                };
                 let mut one = Found {
                     identity: bring_up::identity(&device),
                     clock: device.dc_support().enhanced(),
@@ -144,14 +170,23 @@ impl Survey {
                 };
                 for (map, assignment) in one.maps.iter_mut().zip([0x1C12, 0x1C13]) {
                     // A device without a mailbox has no objects.
-                    let Ok(mapped) = objects.mapped(assignment).await else { break };
-                    *map = mapped.0.iter().map(|e| format!("{:04X}:{:02X} {}", e.index, e.sub, e.bits)).collect();
+                    let Ok(mapped) = objects.mapped(assignment).await else {
+                        break;
+                    };
+                    *map = mapped
+                        .0
+                        .iter()
+                        .map(|e| format!("{:04X}:{:02X} {}", e.index, e.sub, e.bits))
+                        .collect();
                 }
                 if !one.maps[0].is_empty()
                     && let Ok(Some(modes)) = objects.read_if_there(0x6502, 0, 4).await
                 {
-                    one.modes =
-                        MODES.iter().filter(|(mode, _)| modes >> (mode - 1) & 1 == 1).map(|(_, name)| *name).collect();
+                    one.modes = MODES
+                        .iter()
+                        .filter(|(mode, _)| modes >> (mode - 1) & 1 == 1)
+                        .map(|(_, name)| *name)
+                        .collect();
                 }
                 found.push(one);
             }
@@ -169,16 +204,25 @@ impl Survey {
         master.run(link, |main| async move {
             let mut states = vec![];
             for place in 0..MAX_DEVICES as u16 {
-                let words = match Command::aprd(place, AL_STATUS).receive::<[u8; 6]>(main).await {
+                let words = match Command::aprd(place, AL_STATUS)
+                    .receive::<[u8; 6]>(main)
+                    .await
+                {
                     Ok(words) => words,
                     // Behind the last device nobody answers.
                     Err(Error::WorkingCounter { .. }) if place > 0 => break,
                     Err(error) => return Err(failed(&error)),
                 };
-                let (status, code) =
-                    (u16::from_le_bytes([words[0], words[1]]), u16::from_le_bytes([words[4], words[5]]));
+                let (status, code) = (
+                    u16::from_le_bytes([words[0], words[1]]),
+                    u16::from_le_bytes([words[4], words[5]]),
+                );
                 let error = (status & 0x10 != 0).then(|| (code, al_code(code)));
-                states.push(State { place, state: al_state(status), error });
+                states.push(State {
+                    place,
+                    state: al_state(status),
+                    error,
+                });
             }
             Ok(states)
         })
@@ -193,7 +237,12 @@ impl Survey {
             let mut refused = String::new();
             for bytes in [4, 2, 1] {
                 match objects.read(index, sub, bytes).await {
-                    Ok(number) => return Ok(Value { number, bits: bytes as u8 * 8 }),
+                    Ok(number) => {
+                        return Ok(Value {
+                            number,
+                            bits: bytes as u8 * 8,
+                        });
+                    }
                     Err(words) => refused = words,
                 }
             }
@@ -207,7 +256,9 @@ impl Survey {
     /// What the device refuses, in words.
     pub fn write(&mut self, place: usize, index: u16, sub: u8, value: Value) -> Result<(), String> {
         self.with_objects(place, async |objects| {
-            objects.write_and_judge(index, sub, value.number, usize::from(value.bits / 8)).await
+            objects
+                .write_and_judge(index, sub, value.number, usize::from(value.bits / 8))
+                .await
         })
     }
 
@@ -218,13 +269,23 @@ impl Survey {
     ) -> Result<T, String> {
         let (master, link) = self.parts()?;
         master.run(link, |main| async move {
-            let group: SubDeviceGroup<MAX_DEVICES, MAX_BYTES> =
-                main.init_single_group(time::now_ns).await.map_err(|error| failed(&error))?;
+            let group: SubDeviceGroup<MAX_DEVICES, MAX_BYTES> = main
+                .init_single_group(time::now_ns)
+                .await
+                .map_err(|error| failed(&error))?;
             let device = group.subdevice(main, place);
-            let device =
-                device.map_err(|_| format!("there is no device {place}: {} are on the bus, from 0", group.len()))?;
+            let device = device.map_err(|_| {
+                format!(
+                    "there is no device {place}: {} are on the bus, from 0",
+                    group.len()
+                )
+            })?;
             let called = format!("device {place}");
-            let answer = ask(&Objects { device: &device, called: &called }).await;
+            let answer = ask(&Objects {
+                device: &device,
+                called: &called,
+            })
+            .await;
             bring_up::leave(main).await;
             answer
         })
@@ -240,12 +301,18 @@ impl Drop for Survey {
 }
 
 fn failed(error: &Error) -> String {
-    format!("the bus cannot be set up ({error}); is it powered, and the first cable at its input port?")
+    format!(
+        "the bus cannot be set up ({error}); is it powered, and the first cable at its input port?"
+    )
 }
 
 /// A context with the joints that the options name, for those who bring a bus up without a machine.
 pub fn context_of(options: &Options, fine_period_s: f64, real_time: bool) -> DriverContext {
-    let named: Vec<_> = options.devices.iter().filter(|device| device.joint.is_some()).collect();
+    let named: Vec<_> = options
+        .devices
+        .iter()
+        .filter(|device| device.joint.is_some())
+        .collect();
     let mut context = DriverContext::new(named.len().min(tandem_sdk::MAX_AXES), fine_period_s);
     for (joint, device) in context.joints.iter_mut().zip(named) {
         joint.name = Name::new(device.joint.as_deref().unwrap_or_default());
@@ -289,11 +356,17 @@ pub fn watch(
 fn watched(bus: &Bus) -> Vec<Watched> {
     let line = |seen: Seen<'_>| {
         let (al, code) = (seen.al, seen.al_code);
-        let error = if al & 0x10 != 0 { format!(", {code:04X}: {}", al_code(code)) } else { String::new() };
+        let error = if al & 0x10 != 0 {
+            format!(", {code:04X}: {}", al_code(code))
+        } else {
+            String::new()
+        };
         Watched {
             called: seen.called.to_string(),
             state: format!("{}{error}", al_state(al)),
-            status: seen.status.map(|word| format!("{word:04X} {}", status(word))),
+            status: seen
+                .status
+                .map(|word| format!("{word:04X} {}", status(word))),
             lost: seen.lost.map(joint_code),
         }
     };

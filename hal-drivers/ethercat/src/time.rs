@@ -35,5 +35,12 @@ pub(crate) fn now_ns() -> u64 {
 /// Waits for so long.
 pub(crate) async fn pass(ns: u64) {
     let at_ns = now_ns() + ns;
-    std::future::poll_fn(|_| if now_ns() >= at_ns { Poll::Ready(()) } else { Poll::Pending }).await;
+    std::future::poll_fn(|_| {
+        if now_ns() >= at_ns {
+            Poll::Ready(())
+        } else {
+            Poll::Pending
+        }
+    })
+    .await;
 }

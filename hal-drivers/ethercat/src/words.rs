@@ -137,7 +137,12 @@ const DRIVE_CODES: &[(u16, &str)] = &[
 
 /// What a code of 603F means for any drive; none where it is a maker's own.
 pub(crate) fn drive_code(code: u16) -> Option<&'static str> {
-    let known = |code: u16| DRIVE_CODES.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
+    let known = |code: u16| {
+        DRIVE_CODES
+            .iter()
+            .find(|(known, _)| *known == code)
+            .map(|(_, words)| *words)
+    };
     known(code).or_else(|| known(code & 0xff00))
 }
 
@@ -191,10 +196,16 @@ mod tests {
 
     #[test]
     fn codes_are_words() {
-        assert_eq!(joint_code(0x1_001B), "it left OP: 001B, sync manager watchdog: no process data for too long");
+        assert_eq!(
+            joint_code(0x1_001B),
+            "it left OP: 001B, sync manager watchdog: no process data for too long"
+        );
         assert_eq!(joint_code(0x7305), "encoder 1");
         assert_eq!(joint_code(0x73FE), "sensor");
         assert_eq!(joint_code(0x0815), "");
-        assert_eq!((status(0x1637), status(0x1208)), ("operation enabled", "fault"));
+        assert_eq!(
+            (status(0x1637), status(0x1208)),
+            ("operation enabled", "fault")
+        );
     }
 }

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use tandem_ethercat::{EthercatDrives, Options};
 use tandem_ethercat_emulator::{AlCode, AlState, DriveState, What};
 use tandem_sdk::{
-    Arm, Attached, AxisVector, Driver, DriverContext, Feedback, JointState, Latch, Name, PluginOptions, Setpoint,
+    Arm, Attached, AxisVector, Driver, DriverContext, Feedback, JointState, Latch, Name,
+    PluginOptions, Setpoint,
 };
 
 const PERIOD_S: f64 = 0.001;
@@ -47,14 +48,28 @@ impl Rig {
     fn with(mut driver: EthercatDrives, context: &DriverContext) -> Self {
         driver.open(context).unwrap();
         let attached = driver.start().unwrap();
-        let setpoint = Setpoint { position: attached.position, ..Setpoint::default() };
-        let feedback = Feedback { position: attached.position, state: attached.state, ..Feedback::default() };
-        Self { driver, setpoint, feedback, attached }
+        let setpoint = Setpoint {
+            position: attached.position,
+            ..Setpoint::default()
+        };
+        let feedback = Feedback {
+            position: attached.position,
+            state: attached.state,
+            ..Feedback::default()
+        };
+        Self {
+            driver,
+            setpoint,
+            feedback,
+            attached,
+        }
     }
 
     fn exchange(&mut self) {
         self.setpoint.tick += 1;
-        self.driver.exchange(&self.setpoint, &mut self.feedback).unwrap();
+        self.driver
+            .exchange(&self.setpoint, &mut self.feedback)
+            .unwrap();
         self.setpoint.reset = 0;
     }
 
@@ -66,7 +81,10 @@ impl Rig {
                 return;
             }
         }
-        panic!("it stays {:?} {:x}", self.feedback.state[0], self.feedback.fault_code[0]);
+        panic!(
+            "it stays {:?} {:x}",
+            self.feedback.state[0], self.feedback.fault_code[0]
+        );
     }
 
     fn enable(&mut self) {
@@ -83,7 +101,11 @@ impl Rig {
     }
 
     fn latch(&self) -> Option<Latch> {
-        self.feedback.latches.iter().find(|latch| latch.edge != 0).copied()
+        self.feedback
+            .latches
+            .iter()
+            .find(|latch| latch.edge != 0)
+            .copied()
     }
 
     fn emulator<T>(&mut self, look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T) -> T {
@@ -97,12 +119,22 @@ impl Rig {
     fn drive_state(&mut self) -> (AlState, Option<AlCode>, DriveState) {
         self.emulator(|wire| {
             let device = &wire.bus().devices()[0];
-            (device.al_state(), device.al_code(), device.drive_state().unwrap())
+            (
+                device.al_state(),
+                device.al_code(),
+                device.drive_state().unwrap(),
+            )
         })
     }
 
     fn place_mm(&mut self) -> f64 {
-        self.emulator(|wire| wire.bus().devices()[0].position_and_velocity_counts().unwrap().0 / COUNTS)
+        self.emulator(|wire| {
+            wire.bus().devices()[0]
+                .position_and_velocity_counts()
+                .unwrap()
+                .0
+                / COUNTS
+        })
     }
 }
 
@@ -132,7 +164,11 @@ fn an_edge_in_any_period_is_told_once_with_the_drives_own_position() {
         assert_eq!(caught.len(), 1, "{at_mm}: {caught:?}");
         let latch = caught[0];
         assert_eq!((latch.input, latch.edge, latch.joints), (5, 1, 1));
-        assert!((latch.position[0] - at_mm).abs() < 2.0 / COUNTS, "{at_mm}: {}", latch.position[0]);
+        assert!(
+            (latch.position[0] - at_mm).abs() < 2.0 / COUNTS,
+            "{at_mm}: {}",
+            latch.position[0]
+        );
         assert!((0.0..0.004).contains(&latch.before_s), "{}", latch.before_s);
         // A second touch, armed anew.
         rig.setpoint.arm = Arm::default();
@@ -158,7 +194,10 @@ fn an_edge_in_any_period_is_told_once_with_the_drives_own_position() {
 
 #[test]
 fn counts_go_on_past_the_end_of_32_bits_both_ways() {
-    for (start, step) in [(i64::from(i32::MAX) - 2000, 0.01), (i64::from(i32::MIN) + 2000, -0.01)] {
+    for (start, step) in [
+        (i64::from(i32::MAX) - 2000, 0.01),
+        (i64::from(i32::MIN) + 2000, -0.01),
+    ] {
         let of_drive = drive(0, "x", &format!("zero_counts = {start}"));
         let place = emulated(&format!("drive = {{ position_counts = {start}.0 }}"));
         let mut rig = Rig::of(&format!("{of_drive}{place}"), &["x"]);
@@ -170,7 +209,10 @@ fn counts_go_on_past_the_end_of_32_bits_both_ways() {
         let moved = rig.feedback.position[0];
         assert!((moved - 100.0 * step).abs() < 2.0 / COUNTS, "{moved}");
         let really = rig.place_mm() - start as f64 / COUNTS;
-        assert!((really - 100.0 * step).abs() < 2.0 / COUNTS, "the axis itself: {really}");
+        assert!(
+            (really - 100.0 * step).abs() < 2.0 / COUNTS,
+            "the axis itself: {really}"
+        );
     }
 }
 
@@ -201,7 +243,12 @@ fn nothing_moves_when_a_drive_is_enabled() {
 /// A drive's fault in each of its states is told with its code, stays until a reset, and is gone behind it.
 #[test]
 fn a_fault_in_any_state_stays_until_it_is_reset() {
-    for before in [JointState::Disabled, JointState::Enabling, JointState::Enabled, JointState::QuickStop] {
+    for before in [
+        JointState::Disabled,
+        JointState::Enabling,
+        JointState::Enabled,
+        JointState::QuickStop,
+    ] {
         let place = emulated("drive = { brake_open_ms = 50.0 }");
         let mut rig = Rig::of(&format!("{}{place}", drive(0, "x", "")), &["x"]);
         match before {
@@ -218,17 +265,28 @@ fn a_fault_in_any_state_stays_until_it_is_reset() {
             (0..3).for_each(|_| rig.exchange());
         }
         assert_eq!(rig.feedback.state[0], before);
-        rig.inject(What::DriveFault { device: 0, code: 0x7305, stays: false });
+        rig.inject(What::DriveFault {
+            device: 0,
+            code: 0x7305,
+            stays: false,
+        });
         rig.until(JointState::Fault);
         assert_eq!(rig.feedback.fault_code[0], 0x7305, "{before:?}");
-        assert_eq!(rig.driver.explain(0, 0x7305).as_str(), "device 0: encoder 1");
+        assert_eq!(
+            rig.driver.explain(0, 0x7305).as_str(),
+            "device 0: encoder 1"
+        );
         for enable in [1, 0, 1, 0] {
             rig.setpoint.enable = enable;
             rig.setpoint.position = rig.feedback.position;
             rig.setpoint.velocity = AxisVector::ZERO;
             for _ in 0..20 {
                 rig.exchange();
-                assert_eq!(rig.feedback.state[0], JointState::Fault, "{before:?}: without a reset");
+                assert_eq!(
+                    rig.feedback.state[0],
+                    JointState::Fault,
+                    "{before:?}: without a reset"
+                );
             }
         }
         rig.setpoint.reset = 1;
@@ -267,9 +325,16 @@ fn no_reply_of_another_exchange_is_taken_for_the_one_awaited() {
         (What::LostReply, 1),
     ] {
         let seen = ride(Some(what.clone()));
-        assert_eq!(seen.iter().map(|(age, _)| u64::from(*age)).sum::<u64>(), old, "{what:?}");
+        assert_eq!(
+            seen.iter().map(|(age, _)| u64::from(*age)).sum::<u64>(),
+            old,
+            "{what:?}"
+        );
         for (n, ((age, position), (_, undisturbed))) in seen.iter().zip(&whole).enumerate() {
-            assert!(*age > 0 || position == undisturbed, "{what:?}: exchange {n}: {position} is not new");
+            assert!(
+                *age > 0 || position == undisturbed,
+                "{what:?}: exchange {n}: {position} is not new"
+            );
         }
     }
 }
@@ -279,18 +344,28 @@ fn no_reply_of_another_exchange_is_taken_for_the_one_awaited() {
 fn eight_drives_are_up_within_three_seconds_and_exchange_every_250_us() {
     let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
     for sync in ["free-run", "dc"] {
-        let drives: String = (0..).zip(names).map(|(position, name)| drive(position, name, "")).collect();
+        let drives: String = (0..)
+            .zip(names)
+            .map(|(position, name)| drive(position, name, ""))
+            .collect();
         let (driver, mut context) = Rig::open(&format!("sync = \"{sync}\"\n{drives}"), &names);
         context.fine_period_s = 250e-6;
         let mut rig = Rig::with(driver, &context);
         let up_ns = rig.emulator(|wire| wire.bus().now_ns());
         assert!(up_ns < 3_000_000_000, "{sync}: {} ms", up_ns / 1_000_000);
-        println!("{sync}: eight drives are in OP {} ms behind their power-on", up_ns / 1_000_000);
+        println!(
+            "{sync}: eight drives are in OP {} ms behind their power-on",
+            up_ns / 1_000_000
+        );
         rig.setpoint.enable = 1;
         (0..400).for_each(|_| rig.exchange());
         assert_eq!(rig.feedback.state, [JointState::Enabled; 8], "{sync}");
         let counters = rig.driver.counters();
-        assert_eq!((counters.lost, counters.short, counters.strays), (0, 0, 0), "{sync}");
+        assert_eq!(
+            (counters.lost, counters.short, counters.strays),
+            (0, 0, 0),
+            "{sync}"
+        );
     }
 }
 
@@ -300,11 +375,20 @@ fn a_lost_drive_stays_lost_until_the_bus_is_brought_up_again() {
     let mut rig = Rig::of(&format!("{}{}", drive(0, "x", ""), emulated("")), &["x"]);
     rig.enable();
     (0..100).for_each(|_| rig.go(0.02));
-    rig.inject(What::AlError { device: 0, state: AlState::SafeOp, code: AlCode::FATAL_SYNC_ERROR });
+    rig.inject(What::AlError {
+        device: 0,
+        state: AlState::SafeOp,
+        code: AlCode::FATAL_SYNC_ERROR,
+    });
     rig.setpoint.velocity = AxisVector::ZERO;
     rig.until(JointState::Lost);
     assert_eq!(rig.feedback.fault_code[0], 0x1_002C);
-    assert!(rig.driver.explain(0, 0x1_002C).as_str().contains("it left OP: 002C, fatal synchronization error"));
+    assert!(
+        rig.driver
+            .explain(0, 0x1_002C)
+            .as_str()
+            .contains("it left OP: 002C, fatal synchronization error")
+    );
     rig.setpoint.reset = 1;
     for _ in 0..50 {
         rig.exchange();
@@ -312,9 +396,18 @@ fn a_lost_drive_stays_lost_until_the_bus_is_brought_up_again() {
     }
     rig.driver.stop().unwrap();
     let attached = rig.driver.start().unwrap();
-    assert_eq!(attached.state[0], JointState::Fault, "its drive says why it stopped");
-    (rig.setpoint, rig.feedback) =
-        (Setpoint { position: attached.position, ..Setpoint::default() }, Feedback::default());
+    assert_eq!(
+        attached.state[0],
+        JointState::Fault,
+        "its drive says why it stopped"
+    );
+    (rig.setpoint, rig.feedback) = (
+        Setpoint {
+            position: attached.position,
+            ..Setpoint::default()
+        },
+        Feedback::default(),
+    );
     rig.setpoint.reset = 1;
     rig.until(JointState::Disabled);
     rig.enable();
@@ -324,12 +417,18 @@ fn a_lost_drive_stays_lost_until_the_bus_is_brought_up_again() {
 /// The devices' own watchdog stops the drives where the master falls silent: it was set to `watchdog_ms`.
 #[test]
 fn a_master_that_falls_silent_is_noticed_after_its_watchdog_ms() {
-    let mut rig = Rig::of(&format!("watchdog_ms = 7\n{}{}", drive(0, "x", ""), emulated("")), &["x"]);
+    let mut rig = Rig::of(
+        &format!("watchdog_ms = 7\n{}{}", drive(0, "x", ""), emulated("")),
+        &["x"],
+    );
     rig.enable();
     (0..50).for_each(|_| rig.go(0.02));
     let now_ns = rig.emulator(|wire| wire.bus().now_ns());
     rig.emulator(|wire| wire.advance(now_ns + 6_500_000));
-    assert_eq!(rig.drive_state(), (AlState::Op, None, DriveState::OperationEnabled));
+    assert_eq!(
+        rig.drive_state(),
+        (AlState::Op, None, DriveState::OperationEnabled)
+    );
     rig.emulator(|wire| wire.advance(now_ns + 7_600_000));
     let (state, code, _) = rig.drive_state();
     assert_eq!((state, code), (AlState::SafeOp, Some(AlCode::WATCHDOG)));
@@ -344,8 +443,16 @@ fn quick_stop_ramps_by_the_drive_and_holds_until_it_is_let_go() {
     for _ in 0..200 {
         rig.go(0.05);
     }
-    let velocity = rig.emulator(|wire| wire.bus().devices()[0].position_and_velocity_counts().unwrap().1);
-    assert!(velocity.abs() < 10.0, "it still moves by {velocity} counts/s");
+    let velocity = rig.emulator(|wire| {
+        wire.bus().devices()[0]
+            .position_and_velocity_counts()
+            .unwrap()
+            .1
+    });
+    assert!(
+        velocity.abs() < 10.0,
+        "it still moves by {velocity} counts/s"
+    );
     assert_ne!(rig.feedback.state[0], JointState::Enabled);
     assert_eq!(rig.feedback.fault_code[0], 0);
     rig.setpoint.enable = 0;
@@ -382,25 +489,48 @@ proptest! {
 }
 
 fn counters(rig: &mut Rig, of: impl Fn(tandem_ethercat_emulator::Counters) -> u64) -> Vec<u64> {
-    rig.emulator(|wire| wire.bus().devices().iter().map(|device| of(device.counters())).collect())
+    rig.emulator(|wire| {
+        wire.bus()
+            .devices()
+            .iter()
+            .map(|device| of(device.counters()))
+            .collect()
+    })
 }
 
 /// What goes wrong with a clock in operation is a lost joint with the reason, never a silent one.
 #[test]
 fn missed_sync0_and_lost_clocks_are_told() {
     let of = |more: &str| {
-        format!("sync = \"dc\"\n{}{}{}{}", drive(0, "x", ""), drive(1, "y", ""), emulated(more), emulated(""))
+        format!(
+            "sync = \"dc\"\n{}{}{}{}",
+            drive(0, "x", ""),
+            drive(1, "y", ""),
+            emulated(more),
+            emulated("")
+        )
     };
     let mut rig = Rig::of(&of(""), &["x", "y"]);
     rig.enable();
     // A jump is slewed back.
-    rig.inject(What::ClockJump { device: 1, by_ns: 50_000 });
+    rig.inject(What::ClockJump {
+        device: 1,
+        by_ns: 50_000,
+    });
     (0..1000).for_each(|_| rig.exchange());
     assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
-    rig.inject(What::AlError { device: 0, state: AlState::SafeOp, code: AlCode::SYNC_ERROR });
+    rig.inject(What::AlError {
+        device: 0,
+        state: AlState::SafeOp,
+        code: AlCode::SYNC_ERROR,
+    });
     rig.until(JointState::Lost);
     assert_eq!(rig.feedback.fault_code[0], 0x1_001A);
-    assert_eq!(rig.feedback.state[1], JointState::Enabled, "the other one goes on");
+    assert_eq!(
+        rig.feedback.state[1],
+        JointState::Enabled,
+        "the other one goes on"
+    );
 }
 
 /// Terminals: bits and words of any device are the lines and values that the options name.
@@ -413,7 +543,10 @@ fn lines_and_analog_values_of_terminals() {
     let mut rig = Rig::of(text, &["x"]);
     rig.emulator(|wire| {
         wire.bus_mut().device_mut(1).unwrap().set_input(1, true);
-        wire.bus_mut().device_mut(3).unwrap().set_analog_input(0, -100);
+        wire.bus_mut()
+            .device_mut(3)
+            .unwrap()
+            .set_analog_input(0, -100);
     });
     rig.setpoint.outputs = 1 << 1 | 1 << 63;
     (0..5).for_each(|_| rig.exchange());
@@ -435,22 +568,52 @@ fn options_are_refused_with_their_key() {
             let (_, context) = Rig::open(&drive(0, "x", ""), &["x"]);
             driver.check(&context).err()
         };
-        let error = EthercatDrives::new(&options).map_or_else(Some, of_machine).unwrap();
-        (error.option().unwrap_or_default().to_string(), error.message().to_string())
+        let error = EthercatDrives::new(&options)
+            .map_or_else(Some, of_machine)
+            .unwrap();
+        (
+            error.option().unwrap_or_default().to_string(),
+            error.message().to_string(),
+        )
     };
     let ok = format!("interface = \"emulated\"\n{}", drive(0, "x", ""));
     let with = |from: &str, to: &str| refused(&ok.replace(from, to));
     assert_eq!(refused("").0, "interface");
     assert_eq!(with("0x0e1a:0x0402", "0e1a").0, "devices[0].product");
     assert_eq!(with("position = 0", "").0, "devices[0]");
-    assert_eq!(with("position = 0", "position = 4").0, "devices[0].position");
-    assert_eq!(with("joint = \"x\"", "joint = \"q\"").1, "\"q\": this driver's joints are x");
-    assert_eq!(with(&format!("counts_per_mm = {COUNTS}"), "counts_per_turn = 3").0, "devices[0]");
-    assert_eq!(with("[[devices]]", "watchdog_ms = 1\n[[devices]]").0, "watchdog_ms");
-    assert_eq!(with("[[devices]]", "phase_us = 1000\n[[devices]]").0, "phase_us");
+    assert_eq!(
+        with("position = 0", "position = 4").0,
+        "devices[0].position"
+    );
+    assert_eq!(
+        with("joint = \"x\"", "joint = \"q\"").1,
+        "\"q\": this driver's joints are x"
+    );
+    assert_eq!(
+        with(&format!("counts_per_mm = {COUNTS}"), "counts_per_turn = 3").0,
+        "devices[0]"
+    );
+    assert_eq!(
+        with("[[devices]]", "watchdog_ms = 1\n[[devices]]").0,
+        "watchdog_ms"
+    );
+    assert_eq!(
+        with("[[devices]]", "phase_us = 1000\n[[devices]]").0,
+        "phase_us"
+    );
     let startup = "joint = \"x\"\nstartup = [{ sdo = \"6o85\", u32 = 1 }]";
-    assert_eq!(with("joint = \"x\"", startup).0, "devices[0].startup[0].sdo");
+    assert_eq!(
+        with("joint = \"x\"", startup).0,
+        "devices[0].startup[0].sdo"
+    );
     let startup = "joint = \"x\"\nstartup = [{ sdo = \"0x6085\", u32 = 1, i8 = 1 }]";
     assert_eq!(with("joint = \"x\"", startup).0, "devices[0].startup[0]");
-    assert_eq!(with("interface = \"emulated\"", "interface = \"eth9\"\nemulated = {}").0, "emulated");
+    assert_eq!(
+        with(
+            "interface = \"emulated\"",
+            "interface = \"eth9\"\nemulated = {}"
+        )
+        .0,
+        "emulated"
+    );
 }

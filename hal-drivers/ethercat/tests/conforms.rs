@@ -19,7 +19,13 @@ fn options(of_bus: &str, of_device: &str) -> String {
 }
 
 fn judged(options: String) -> Report {
-    judge(tandem_ethercat::PLUGIN, &Setup { options, ..Setup::default() })
+    judge(
+        tandem_ethercat::PLUGIN,
+        &Setup {
+            options,
+            ..Setup::default()
+        },
+    )
 }
 
 #[test]

@@ -16,7 +16,11 @@ const MASTER: &str = "veth-master";
 fn within_namespace(test: &str) -> Result<String, String> {
     let binary = std::env::current_exe().unwrap();
     // Beside the tests of this package: the workspace's programs.
-    let emulator = binary.parent().and_then(Path::parent).unwrap().join("tandem-ethercat-emulator");
+    let emulator = binary
+        .parent()
+        .and_then(Path::parent)
+        .unwrap()
+        .join("tandem-ethercat-emulator");
     if !emulator.exists() {
         return Err(format!("{} is not built", emulator.display()));
     }
@@ -31,7 +35,10 @@ fn within_namespace(test: &str) -> Result<String, String> {
     );
     let mut refused = String::new();
     for namespace in [&["--net"][..], &["--user", "--map-root-user", "--net"]] {
-        let run = Command::new("unshare").args(namespace).args(["sh", "-c", &script]).output();
+        let run = Command::new("unshare")
+            .args(namespace)
+            .args(["sh", "-c", &script])
+            .output();
         let run = run.map_err(|error| format!("no unshare: {error}"))?;
         let told = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
         let cannot = run.status.code() == Some(99) || told.contains("unshare failed");
@@ -60,20 +67,35 @@ fn a_bus_behind_a_network_interface_is_scanned_read_and_written() {
     let mut survey = Survey::open(MASTER, None).unwrap();
     let found = survey.scan().unwrap();
     assert_eq!(found.len(), 8);
-    assert_eq!((found[0].identity.vendor, found[0].identity.product), (0x0E1A, 0x0402));
+    assert_eq!(
+        (found[0].identity.vendor, found[0].identity.product),
+        (0x0E1A, 0x0402)
+    );
     assert_eq!(found[0].modes, ["pv", "hm", "csp", "csv"]);
-    let value = tandem_ethercat::Value { number: 12_345_678, bits: 32 };
+    let value = tandem_ethercat::Value {
+        number: 12_345_678,
+        bits: 32,
+    };
     survey.write(1, 0x6085, 0, value).unwrap();
     assert_eq!(survey.read(1, 0x6085, 0).unwrap(), value);
     // The interface is this process's alone.
     let taken = Survey::open(MASTER, None).err().unwrap();
-    assert!(taken.contains("another process drives the interface"), "{taken}");
+    assert!(
+        taken.contains("another process drives the interface"),
+        "{taken}"
+    );
     println!("{} devices seen", found.len());
 }
 
 #[test]
 fn an_interface_that_is_not_there_is_refused_in_words() {
     let refused = Survey::open("tandem-nowhere", None).err().unwrap();
-    let known = ["there is no network interface tandem-nowhere", "CAP_NET_RAW"];
-    assert!(known.iter().any(|words| refused.contains(words)), "{refused}");
+    let known = [
+        "there is no network interface tandem-nowhere",
+        "CAP_NET_RAW",
+    ];
+    assert!(
+        known.iter().any(|words| refused.contains(words)),
+        "{refused}"
+    );
 }

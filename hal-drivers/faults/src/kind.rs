@@ -72,7 +72,11 @@ pub struct Line {
 impl Line {
     /// An empty line on which `periods` setpoints have room. Host; allocates.
     pub fn new(periods: u64) -> Self {
-        Self { waiting: vec![Setpoint::default(); periods as usize].into(), count: 0, next: 0 }
+        Self {
+            waiting: vec![Setpoint::default(); periods as usize].into(),
+            count: 0,
+            next: 0,
+        }
     }
 
     /// Puts `setpoint` in; gives the one that comes out, or none while the line fills. Fine loop; does not allocate.

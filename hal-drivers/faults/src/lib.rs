@@ -25,6 +25,7 @@ use wrapper::Wrapper;
 /// Puts `faults` around `driver`, before its first exchange. Host; allocates.
 pub fn wrap(driver: Box<dyn Driver>, faults: Faults) -> Box<dyn Driver> {
     let seed = faults.seed;
-    let around = |inner, (index, plan)| Box::new(Wrapper::new(inner, plan, seed, index)) as Box<dyn Driver>;
+    let around =
+        |inner, (index, plan)| Box::new(Wrapper::new(inner, plan, seed, index)) as Box<dyn Driver>;
     (0..).zip(faults.wrap).fold(driver, around)
 }

@@ -36,7 +36,11 @@ mod tests {
     fn is_the_published_generator() {
         // The first outputs of the reference implementation (Vigna, splitmix64.c) for the seed 1234567.
         let mut random = Random(1_234_567);
-        let expected = [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423];
+        let expected = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+        ];
         assert_eq!([0; 3].map(|_| random.next()), expected);
     }
 

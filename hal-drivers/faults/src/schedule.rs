@@ -40,7 +40,12 @@ pub struct Schedule {
 impl Schedule {
     /// Before the first exchange.
     pub fn new(when: When, random: Random) -> Self {
-        Self { when, random, calls: 0, left: 0 }
+        Self {
+            when,
+            random,
+            calls: 0,
+            left: 0,
+        }
     }
 
     /// Whether the exchange with this tick, the next one, is hit. Fine loop; does not allocate.
@@ -73,7 +78,12 @@ mod tests {
     use super::*;
 
     fn hits(rate: Rate, periods: u64, window: (u64, u64), seed: u64) -> Vec<u64> {
-        let when = When { from_tick: window.0, until_tick: window.1, rate, periods };
+        let when = When {
+            from_tick: window.0,
+            until_tick: window.1,
+            rate,
+            periods,
+        };
         let mut schedule = Schedule::new(when, Random::new(seed, 0));
         (0..1000).filter(|tick| schedule.hits(*tick)).collect()
     }
@@ -81,12 +91,24 @@ mod tests {
     #[test]
     fn rates_and_windows() {
         let all = (0, u64::MAX);
-        assert_eq!(hits(Rate::AtCall(120), 1, all, 0), [119], "calls are counted from 1, ticks from 0");
+        assert_eq!(
+            hits(Rate::AtCall(120), 1, all, 0),
+            [119],
+            "calls are counted from 1, ticks from 0"
+        );
         assert_eq!(hits(Rate::AtCall(120), 3, all, 0), [119, 120, 121]);
         assert_eq!(hits(Rate::Every(400), 2, all, 0), [399, 400, 799, 800]);
-        assert_eq!(hits(Rate::Every(3), 1, (100, 108), 0), [102, 105], "counted within the window");
+        assert_eq!(
+            hits(Rate::Every(3), 1, (100, 108), 0),
+            [102, 105],
+            "counted within the window"
+        );
         assert_eq!(hits(Rate::Always, 1, (10, 13), 0), [10, 11, 12]);
-        assert_eq!(hits(Rate::Every(5), 4, (100, 106), 0), [104, 105], "ends with the window");
+        assert_eq!(
+            hits(Rate::Every(5), 4, (100, 106), 0),
+            [104, 105],
+            "ends with the window"
+        );
         assert_eq!(hits(Rate::Probability(0.0), 1, all, 0), [0; 0]);
     }
 

@@ -18,12 +18,26 @@ fn no_wrapper_allocates_in_an_exchange() {
     let mut failed = 0;
     let used = heap_use_of(|| {
         for tick in 0..1000 {
-            let setpoint = Setpoint { tick, ..Setpoint::default() };
-            failed += usize::from(driver.exchange(&setpoint, &mut Feedback::default()).is_err());
+            let setpoint = Setpoint {
+                tick,
+                ..Setpoint::default()
+            };
+            failed += usize::from(
+                driver
+                    .exchange(&setpoint, &mut Feedback::default())
+                    .is_err(),
+            );
         }
         driver.quick_stop();
     });
     assert_eq!((used, failed), (HeapUse::default(), 1000 / 11));
     let used = heap_use_of(|| drop(std::hint::black_box(vec![1_u8; 100])));
-    assert_eq!(used, HeapUse { allocations: 1, frees: 1 }, "the counter counts");
+    assert_eq!(
+        used,
+        HeapUse {
+            allocations: 1,
+            frees: 1
+        },
+        "the counter counts"
+    );
 }

@@ -1,7 +1,8 @@
 //! The wrapper: a driver around a driver.
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_LATCHES, PluginError, Setpoint, Words,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_LATCHES, PluginError,
+    Setpoint, Words,
 };
 
 use crate::kind::{Kind, Line, freeze};
@@ -36,13 +37,30 @@ impl Wrapper {
     /// Wraps `inner`, which is not open yet, as entry `index` of the list. Host; allocates.
     pub fn new(inner: Box<dyn Driver>, plan: Plan, seed: u64, index: u64) -> Self {
         let random = Random::new(seed, index);
-        let line = Line::new(if let Kind::Delay(periods) = plan.kind { periods } else { 0 });
+        let line = Line::new(if let Kind::Delay(periods) = plan.kind {
+            periods
+        } else {
+            0
+        });
         let schedule = Schedule::new(plan.when, random);
         let (handed, answered) = (Setpoint::default(), Feedback::default());
-        Self { inner, plan, random, schedule, line, handed, left: answered, answered }
+        Self {
+            inner,
+            plan,
+            random,
+            schedule,
+            line,
+            handed,
+            left: answered,
+            answered,
+        }
     }
 
-    fn hand_over(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn hand_over(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.handed = *setpoint;
         self.hand_over_again(feedback)
     }
@@ -80,8 +98,12 @@ impl Wrapper {
 /// What is handed out again of an answer where none has come: the same numbers, one period older, and no latch once more.
 fn older(answered: &Feedback) -> Feedback {
     let mut old = *answered;
-    old.age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
-    old.input_age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
+    old.age_periods
+        .iter_mut()
+        .for_each(|age| *age = age.saturating_add(1));
+    old.input_age_periods
+        .iter_mut()
+        .for_each(|age| *age = age.saturating_add(1));
     old.latches = [Latch::default(); MAX_LATCHES];
     old
 }
@@ -102,11 +124,19 @@ impl Driver for Wrapper {
     fn start(&mut self) -> Result<Attached, PluginError> {
         self.schedule = Schedule::new(self.plan.when, self.random);
         self.line.clear();
-        (self.handed, self.left, self.answered) = (Setpoint::default(), Feedback::default(), Feedback::default());
+        (self.handed, self.left, self.answered) = (
+            Setpoint::default(),
+            Feedback::default(),
+            Feedback::default(),
+        );
         self.inner.start()
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         if self.schedule.hits(setpoint.tick) {
             self.hit(setpoint, feedback)?;
         } else {

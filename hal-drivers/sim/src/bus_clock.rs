@@ -38,7 +38,12 @@ impl BusClock {
     pub fn new(options: &BusClockOptions, period_s: f64, seed: u64) -> Self {
         let period_ns = period_s * 1e9 / (1.0 + options.drift_ppm * 1e-6);
         let noise = Noise::new(seed.wrapping_add(PHASE));
-        Self { period_ns, jitter_ns: options.jitter_us * 1e3, noise, first_ns: None }
+        Self {
+            period_ns,
+            jitter_ns: options.jitter_us * 1e3,
+            noise,
+            first_ns: None,
+        }
     }
 
     /// How much later than the nearest tick of the bus an exchange at `now_ns` of the host's clock is, ns. Fine loop.
@@ -58,8 +63,17 @@ mod tests {
     use super::*;
 
     fn phases(drift_ppm: f64, jitter_us: f64, exchanges: i64) -> Vec<i64> {
-        let mut clock = BusClock::new(&BusClockOptions { drift_ppm, jitter_us }, 0.001, 1);
-        (0..exchanges).map(|n| clock.phase_ns(7 + n * 1_000_000)).collect()
+        let mut clock = BusClock::new(
+            &BusClockOptions {
+                drift_ppm,
+                jitter_us,
+            },
+            0.001,
+            1,
+        );
+        (0..exchanges)
+            .map(|n| clock.phase_ns(7 + n * 1_000_000))
+            .collect()
     }
 
     #[test]
@@ -71,7 +85,11 @@ mod tests {
     fn drift_adds_up_to_half_a_period_and_then_the_next_tick_is_nearer() {
         let phases = phases(100.0, 0.0, 10_001);
         // 100 ppm of 1 ms are 100 ns a period.
-        assert!((phases[1000] - 100_000).abs() < 50 && (phases[4000] - 400_000).abs() < 100, "{}", phases[4000]);
+        assert!(
+            (phases[1000] - 100_000).abs() < 50 && (phases[4000] - 400_000).abs() < 100,
+            "{}",
+            phases[4000]
+        );
         assert!((phases[9000] + 100_000).abs() < 200, "{}", phases[9000]);
     }
 
@@ -79,6 +97,9 @@ mod tests {
     fn jitter_stays_within_its_bound_and_uses_it() {
         let phases = phases(0.0, 100.0, 1000);
         assert!(phases.iter().all(|phase| phase.abs() <= 100_000));
-        assert!(phases.iter().any(|phase| *phase > 90_000) && phases.iter().any(|phase| *phase < -90_000));
+        assert!(
+            phases.iter().any(|phase| *phase > 90_000)
+                && phases.iter().any(|phase| *phase < -90_000)
+        );
     }
 }

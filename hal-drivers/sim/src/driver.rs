@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_AXES, PluginError, Setpoint,
-    Words,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_AXES,
+    PluginError, Setpoint, Words,
 };
 
 use crate::bus_clock::BusClock;
@@ -123,13 +123,20 @@ impl SimulatedDrives {
     fn check_machine(&self, context: &DriverContext) -> Result<(), PluginError> {
         let count = context.joint_count as usize;
         if !(1..=MAX_AXES).contains(&count) {
-            return Err(PluginError::new(format!("sim: a machine has 1 to {MAX_AXES} joints, not {count}")));
+            return Err(PluginError::new(format!(
+                "sim: a machine has 1 to {MAX_AXES} joints, not {count}"
+            )));
         }
         if !(context.fine_period_s.is_finite() && context.fine_period_s > 0.0) {
-            return Err(PluginError::new(format!("sim: no fine period: {} s", context.fine_period_s)));
+            return Err(PluginError::new(format!(
+                "sim: no fine period: {} s",
+                context.fine_period_s
+            )));
         }
         if !context.start_position.is_finite() {
-            return Err(PluginError::fixed("sim: the start position is not a finite number"));
+            return Err(PluginError::fixed(
+                "sim: the start position is not a finite number",
+            ));
         }
         self.options.check_joint_numbers(count)
     }
@@ -138,10 +145,14 @@ impl SimulatedDrives {
     fn power_on(&mut self, start: &AxisVector) {
         let (options, period_s) = (&self.options, self.period_s);
         let PowerOn { reading, shift } = PowerOn::new(options, start);
-        let of_joint = |list: &[f64], joint: usize| list.get(joint).or(list.last()).copied().unwrap_or(0.0);
+        let of_joint =
+            |list: &[f64], joint: usize| list.get(joint).or(list.last()).copied().unwrap_or(0.0);
         let power = |joint: usize| {
             let wake_periods = periods(of_joint(&options.enable_s, joint), period_s);
-            Power::new(wake_periods, periods(of_joint(&options.brake_s, joint), period_s))
+            Power::new(
+                wake_periods,
+                periods(of_joint(&options.brake_s, joint), period_s),
+            )
         };
         self.powers = std::array::from_fn(power);
         self.mechanics = Mechanics::new(options, &reading, self.joint_count, period_s);
@@ -154,7 +165,10 @@ impl SimulatedDrives {
         let (options, period_s) = (&self.options, self.period_s);
         self.spindle = Spindle::new(options.spindle_time_constant_s, period_s);
         self.watchdog = Watchdog::new(options.watchdog_periods);
-        self.bus_clock = options.bus_clock.as_ref().map(|clock| BusClock::new(clock, period_s, options.seed));
+        self.bus_clock = options
+            .bus_clock
+            .as_ref()
+            .map(|clock| BusClock::new(clock, period_s, options.seed));
         (self.heard, self.unheard_reset, self.exchanges) = (Setpoint::default(), 0, 0);
         self.quick_stopping = false;
         self.faults.start();
@@ -209,7 +223,9 @@ impl SimulatedDrives {
             self.watchdog.silence();
         }
         if self.watchdog.is_tripped() {
-            self.powers.iter_mut().for_each(|power| power.fail(WATCHDOG_FAULT));
+            self.powers
+                .iter_mut()
+                .for_each(|power| power.fail(WATCHDOG_FAULT));
         }
         let to = self.mechanics.coast();
         self.advance(&to);
@@ -222,7 +238,9 @@ impl SimulatedDrives {
         for power in powers.iter_mut() {
             power.command(follow);
         }
-        let to = self.stops.press(to, &self.shift, self.heard.limited, powers);
+        let to = self
+            .stops
+            .press(to, &self.shift, self.heard.limited, powers);
         self.mechanics.step(powers, &to, self.spindle.speed);
         for (joint, power) in powers.iter_mut().enumerate() {
             power.settle(self.mechanics.is_at_rest(joint));
@@ -249,10 +267,14 @@ impl SimulatedDrives {
             self.silent_periods[joint] = self.silent_periods[joint].saturating_add(1);
         } else {
             let seen = self.mechanics.seen(joint);
-            self.told[joint] = Motion { position: self.encoders.read(seen.position), speed: seen.speed };
+            self.told[joint] = Motion {
+                position: self.encoders.read(seen.position),
+                speed: seen.speed,
+            };
             self.silent_periods[joint] = 0;
         }
-        (feedback.position[joint], feedback.speed[joint]) = (self.told[joint].position, self.told[joint].speed);
+        (feedback.position[joint], feedback.speed[joint]) =
+            (self.told[joint].position, self.told[joint].speed);
         (feedback.state[joint], feedback.fault_code[joint]) = (power.state(), power.code());
         feedback.age_periods[joint] = self.silent_periods[joint];
     }
@@ -260,16 +282,24 @@ impl SimulatedDrives {
     /// The inputs after a period, and the positions caught in it, as the drives see them.
     fn switch(&mut self, feedback: &mut Feedback) {
         feedback.inputs = 0;
-        feedback.latches.iter_mut().filter(|latch| latch.edge != 0).for_each(|latch| *latch = Latch::default());
+        feedback
+            .latches
+            .iter_mut()
+            .filter(|latch| latch.edge != 0)
+            .for_each(|latch| *latch = Latch::default());
         if self.switches.are_none() {
             return;
         }
         let [from, to] = self.real_way();
         let latches = &mut feedback.latches;
-        feedback.inputs = self.switches.step([&from, &to], self.heard.arm, self.period_s, latches);
+        feedback.inputs = self
+            .switches
+            .step([&from, &to], self.heard.arm, self.period_s, latches);
         for latch in latches.iter_mut().filter(|latch| latch.edge != 0) {
             for joint in (0..self.joint_count).filter(|joint| latch.joints >> joint & 1 == 1) {
-                latch.position[joint] = self.encoders.read(latch.position[joint] - self.shift[joint]);
+                latch.position[joint] = self
+                    .encoders
+                    .read(latch.position[joint] - self.shift[joint]);
             }
         }
     }
@@ -288,14 +318,21 @@ impl SimulatedDrives {
     }
 
     fn refuse_unless(&self, wanted: &[Life], call: [&'static str; 4]) -> Result<(), PluginError> {
-        if wanted.contains(&self.life) { Ok(()) } else { Err(PluginError::fixed(call[self.life as usize])) }
+        if wanted.contains(&self.life) {
+            Ok(())
+        } else {
+            Err(PluginError::fixed(call[self.life as usize]))
+        }
     }
 }
 
 impl Driver for SimulatedDrives {
     fn describe(&self) -> DriverDescription {
         let gives_phase = u32::from(self.options.bus_clock.is_some());
-        let ideal = DriverDescription { gives_phase, ..DriverDescription::simulated() };
+        let ideal = DriverDescription {
+            gives_phase,
+            ..DriverDescription::simulated()
+        };
         let (enable_s, brake_s) = (&self.options.enable_s, &self.options.brake_s);
         if enable_s.is_empty() && brake_s.is_empty() {
             return ideal;
@@ -322,8 +359,13 @@ impl Driver for SimulatedDrives {
         self.refuse_unless(&[Life::Closed, Life::Stopped], REFUSED)?;
         self.check_machine(context)?;
         self.joint_count = context.joint_count as usize;
-        let bus_start_s = if context.real_time != 0 { self.options.bus_start_s } else { 0.0 };
-        (self.period_s, self.bus_start) = (context.fine_period_s, Duration::from_secs_f64(bus_start_s));
+        let bus_start_s = if context.real_time != 0 {
+            self.options.bus_start_s
+        } else {
+            0.0
+        };
+        (self.period_s, self.bus_start) =
+            (context.fine_period_s, Duration::from_secs_f64(bus_start_s));
         self.stops.open(context);
         self.power_on(&context.start_position);
         self.life = Life::Opened;
@@ -347,10 +389,19 @@ impl Driver for SimulatedDrives {
         self.life = Life::Running;
         let stands = attached(self.options.encoder, first.position);
         let delay_periods = [self.options.delay_periods; MAX_AXES];
-        Ok(Attached { state: first.state, fault_code: first.fault_code, delay_periods, ..stands })
+        Ok(Attached {
+            state: first.state,
+            fault_code: first.fault_code,
+            delay_periods,
+            ..stands
+        })
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         const REFUSED: [&str; 4] = [
             "sim: exchange is refused: the driver is closed",
             "sim: exchange is refused: the driver is opened but not started",
@@ -360,14 +411,17 @@ impl Driver for SimulatedDrives {
         self.refuse_unless(&[Life::Running], REFUSED)?;
         let finite = setpoint.position.is_finite() && setpoint.velocity.is_finite();
         if !(finite && setpoint.spindle_rad_per_s.is_finite()) {
-            return Err(PluginError::fixed("sim: exchange is refused: the setpoint is not a finite number"));
+            return Err(PluginError::fixed(
+                "sim: exchange is refused: the setpoint is not a finite number",
+            ));
         }
         let frame = self.wire.send(setpoint.tick);
         self.hand_over(setpoint, frame);
         self.exchanges += 1;
         self.mechanics.begin();
         self.live();
-        self.faults.step(setpoint.tick, self.exchanges, &mut self.powers);
+        self.faults
+            .step(setpoint.tick, self.exchanges, &mut self.powers);
         self.spindle.follow(self.heard.spindle_rad_per_s);
         self.report(feedback);
         self.heard.reset = 0;

@@ -29,13 +29,25 @@ impl Encoders {
     /// Those of checked options.
     pub fn new(options: &Options) -> Self {
         let noise = Noise::new(options.seed.wrapping_add(NOISE));
-        Self { count_mm: options.encoder_count_mm, noise_mm: options.encoder_noise_mm, noise }
+        Self {
+            count_mm: options.encoder_count_mm,
+            noise_mm: options.encoder_noise_mm,
+            noise,
+        }
     }
 
     /// What is read where a joint is at `position`: with noise, then in whole counts. Fine loop.
     pub fn read(&mut self, position: f64) -> f64 {
-        let noisy = if self.noise_mm == 0.0 { position } else { position + self.noise_mm * self.noise.normal() };
-        if self.count_mm == 0.0 { noisy } else { (noisy / self.count_mm).round() * self.count_mm }
+        let noisy = if self.noise_mm == 0.0 {
+            position
+        } else {
+            position + self.noise_mm * self.noise.normal()
+        };
+        if self.count_mm == 0.0 {
+            noisy
+        } else {
+            (noisy / self.count_mm).round() * self.count_mm
+        }
     }
 }
 
@@ -55,13 +67,23 @@ impl PowerOn {
         let stands = |joint: usize| {
             let place = options.start_mm.get(joint).copied().unwrap_or(start[joint]);
             let share = 2.0 * spread.uniform() - 1.0;
-            if options.start_spread_mm == 0.0 { place } else { place + options.start_spread_mm * share }
+            if options.start_spread_mm == 0.0 {
+                place
+            } else {
+                place + options.start_spread_mm * share
+            }
         };
         let stands = AxisVector(std::array::from_fn(stands));
         let error = unknown_start(options);
         match options.encoder {
-            Encoder::Absolute => Self { reading: stands, shift: error },
-            Encoder::Incremental => Self { reading: AxisVector::ZERO, shift: stands + error },
+            Encoder::Absolute => Self {
+                reading: stands,
+                shift: error,
+            },
+            Encoder::Incremental => Self {
+                reading: AxisVector::ZERO,
+                shift: stands + error,
+            },
         }
     }
 }
@@ -71,7 +93,11 @@ pub(crate) fn attached(encoder: Encoder, position: AxisVector) -> Attached {
     let at = Attached::at(position);
     match encoder {
         Encoder::Absolute => at,
-        Encoder::Incremental => Attached { known: 0, homed: 0, ..at },
+        Encoder::Incremental => Attached {
+            known: 0,
+            homed: 0,
+            ..at
+        },
     }
 }
 
@@ -79,7 +105,9 @@ pub(crate) fn attached(encoder: Encoder, position: AxisVector) -> Attached {
 fn unknown_start(options: &Options) -> AxisVector {
     let mut state = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     AxisVector(std::array::from_fn::<_, MAX_AXES, _>(|_| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let share = (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
         share * options.unknown_start_mm
     }))
@@ -100,20 +128,31 @@ mod tests {
     #[test]
     fn an_encoder_is_exact_unless_it_is_told_otherwise() {
         let mut exact = Encoders::new(&options(""));
-        assert_eq!([0.1, -7.300_001, 1e-300].map(|at| exact.read(at)), [0.1, -7.300_001, 1e-300]);
+        assert_eq!(
+            [0.1, -7.300_001, 1e-300].map(|at| exact.read(at)),
+            [0.1, -7.300_001, 1e-300]
+        );
         let mut counts = Encoders::new(&options("encoder_count_mm = 0.25"));
-        assert_eq!([0.1, 0.2, -0.4].map(|at| counts.read(at)), [0.0, 0.25, -0.5]);
+        assert_eq!(
+            [0.1, 0.2, -0.4].map(|at| counts.read(at)),
+            [0.0, 0.25, -0.5]
+        );
     }
 
     #[test]
     fn noise_has_the_width_that_is_asked_for_and_repeats() {
         let row = |seed: u64| {
-            let mut noisy = Encoders::new(&options(&format!("encoder_noise_mm = 0.01\nseed = {seed}")));
+            let mut noisy =
+                Encoders::new(&options(&format!("encoder_noise_mm = 0.01\nseed = {seed}")));
             (0..10_000).map(|_| noisy.read(5.0)).collect::<Vec<_>>()
         };
         let values = row(3);
         let variance = values.iter().map(|v| (v - 5.0).powi(2)).sum::<f64>() / 1e4;
-        assert!((0.0095..0.0105).contains(&variance.sqrt()), "{}", variance.sqrt());
+        assert!(
+            (0.0095..0.0105).contains(&variance.sqrt()),
+            "{}",
+            variance.sqrt()
+        );
         assert!(row(3) == values && row(4) != values);
     }
 
@@ -121,13 +160,25 @@ mod tests {
     fn joints_stand_where_they_are_told_to_or_anywhere_near() {
         let machine = AxisVector::from_slice(&[1.0, 2.0, 3.0]);
         let at = |text: &str| PowerOn::new(&options(text), &machine);
-        assert_eq!(at(""), PowerOn { reading: machine, shift: AxisVector::ZERO });
+        assert_eq!(
+            at(""),
+            PowerOn {
+                reading: machine,
+                shift: AxisVector::ZERO
+            }
+        );
         assert_eq!(at("start_mm = [37.5]").reading.0[..3], [37.5, 2.0, 3.0]);
         let spread = at("start_spread_mm = 20\nseed = 7");
-        assert!((0..3).all(|i| spread.reading[i] != machine[i] && (spread.reading[i] - machine[i]).abs() <= 20.0));
+        assert!(
+            (0..3).all(|i| spread.reading[i] != machine[i]
+                && (spread.reading[i] - machine[i]).abs() <= 20.0)
+        );
         assert_eq!(spread, at("start_spread_mm = 20\nseed = 7"));
         let blind = at("encoder = \"incremental\"\nstart_mm = [37.5]");
-        assert_eq!((blind.reading, blind.shift.0[..2].to_vec()), (AxisVector::ZERO, vec![37.5, 2.0]));
+        assert_eq!(
+            (blind.reading, blind.shift.0[..2].to_vec()),
+            (AxisVector::ZERO, vec![37.5, 2.0])
+        );
         assert_eq!(attached(Encoder::Incremental, blind.reading).known, 0);
     }
 }

@@ -34,23 +34,37 @@ impl DriveFault {
     pub(crate) fn check(&self) -> Result<(), PluginError> {
         let refuse = |words: &str| Err(refusal("faults", words));
         if self.joint >= MAX_AXES {
-            return refuse(&format!("joint = {}: a machine has 8 joints at most", self.joint));
+            return refuse(&format!(
+                "joint = {}: a machine has 8 joints at most",
+                self.joint
+            ));
         }
         match (self.tick, self.exchange, self.lost, self.code) {
-            (None, None, ..) | (Some(_), Some(_), ..) => refuse("a fault comes at a tick or at an exchange"),
-            (.., true, code) if code != 0 => refuse("nothing is heard of a drive that is lost: it has no code"),
+            (None, None, ..) | (Some(_), Some(_), ..) => {
+                refuse("a fault comes at a tick or at an exchange")
+            }
+            (.., true, code) if code != 0 => {
+                refuse("nothing is heard of a drive that is lost: it has no code")
+            }
             (.., false, 0) => refuse("a drive in fault has a code above 0"),
             _ => Ok(()),
         }
     }
 
     fn is_due(&self, tick: u64, exchange: u64) -> bool {
-        self.tick.is_some_and(|at| exchange > 0 && tick >= at) || self.exchange.is_some_and(|at| exchange >= at)
+        self.tick.is_some_and(|at| exchange > 0 && tick >= at)
+            || self.exchange.is_some_and(|at| exchange >= at)
     }
 
     fn happen(&self, powers: &mut [Power]) {
-        let Some(power) = powers.get_mut(self.joint) else { return };
-        if self.lost { power.lose() } else { power.fail(self.code) }
+        let Some(power) = powers.get_mut(self.joint) else {
+            return;
+        };
+        if self.lost {
+            power.lose()
+        } else {
+            power.fail(self.code)
+        }
     }
 }
 
@@ -63,7 +77,10 @@ pub(crate) struct DriveFaults {
 
 impl DriveFaults {
     pub fn new(faults: &[DriveFault]) -> Self {
-        Self { faults: faults.to_vec(), happened: vec![false; faults.len()] }
+        Self {
+            faults: faults.to_vec(),
+            happened: vec![false; faults.len()],
+        }
     }
 
     /// The driver is started: everything is to come once more.
@@ -83,11 +100,16 @@ impl DriveFaults {
 
     /// What a code means.
     pub fn explain(&self, code: u32) -> Words {
-        let stated = self.faults.iter().find(|fault| fault.code == code && !fault.text.is_empty());
+        let stated = self
+            .faults
+            .iter()
+            .find(|fault| fault.code == code && !fault.text.is_empty());
         match stated {
             Some(fault) => Words::new(fault.text.as_str()),
             None if code == WATCHDOG_FAULT => Words::fixed("the host was silent too long"),
-            None if code == TORQUE_FAULT => Words::fixed("more torque than it may have: something is in its way"),
+            None if code == TORQUE_FAULT => {
+                Words::fixed("more torque than it may have: something is in its way")
+            }
             None => Words::default(),
         }
     }
@@ -99,12 +121,23 @@ mod tests {
     use tandem_sdk::JointState;
 
     fn fault(joint: usize, tick: Option<u64>, exchange: Option<u64>, code: u32) -> DriveFault {
-        DriveFault { joint, tick, exchange, code, text: format!("text {code}"), lost: code == 0 }
+        DriveFault {
+            joint,
+            tick,
+            exchange,
+            code,
+            text: format!("text {code}"),
+            lost: code == 0,
+        }
     }
 
     #[test]
     fn each_comes_once_at_its_time() {
-        let list = [fault(0, Some(5), None, 9), fault(1, None, Some(3), 0), fault(2, None, Some(0), 7)];
+        let list = [
+            fault(0, Some(5), None, 9),
+            fault(1, None, Some(3), 0),
+            fault(2, None, Some(0), 7),
+        ];
         let mut faults = DriveFaults::new(&list);
         let mut powers = [Power::new(0, 0); 3];
         let mut at = |tick, exchange, powers: &mut [Power; 3]| {
@@ -115,7 +148,11 @@ mod tests {
         assert_eq!(at(0, 0, &mut powers), [off, off, fault]);
         assert_eq!(at(0, 3, &mut powers), [off, lost, fault]);
         powers.iter_mut().for_each(Power::reset);
-        assert_eq!(at(6, 4, &mut powers), [fault, off, off], "a tick that never came is made up for");
+        assert_eq!(
+            at(6, 4, &mut powers),
+            [fault, off, off],
+            "a tick that never came is made up for"
+        );
         powers.iter_mut().for_each(Power::reset);
         assert_eq!(at(7, 5, &mut powers), [off; 3]);
     }

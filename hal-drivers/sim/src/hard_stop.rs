@@ -34,7 +34,10 @@ impl HardStop {
     pub(crate) fn check(&self) -> Result<(), PluginError> {
         let refuse = |words: &str| Err(refusal("hard_stops", words));
         if self.joint >= MAX_AXES {
-            return refuse(&format!("joint = {}: a machine has 8 joints at most", self.joint));
+            return refuse(&format!(
+                "joint = {}: a machine has 8 joints at most",
+                self.joint
+            ));
         }
         match (self.above_mm, self.below_mm) {
             (Some(at), None) | (None, Some(at)) if at.is_finite() => Ok(()),
@@ -54,7 +57,10 @@ pub(crate) struct HardStops {
 impl HardStops {
     /// No drive has a limit of its own. Host; allocates.
     pub fn new(stops: &[HardStop]) -> Self {
-        Self { stops: stops.to_vec(), homing_percent: [f64::INFINITY; MAX_AXES] }
+        Self {
+            stops: stops.to_vec(),
+            homing_percent: [f64::INFINITY; MAX_AXES],
+        }
     }
 
     /// The driver is opened for these joints.
@@ -64,15 +70,32 @@ impl HardStops {
 
     /// Where the joints come that are told to be at `to`, both as their drives read it: `shift` is what they stand beside that. A
     /// drive that pushes with more than it may goes into its fault; those in `limited` are homed. Fine loop.
-    pub fn press(&self, to: &AxisVector, shift: &AxisVector, limited: u32, powers: &mut [Power]) -> AxisVector {
+    pub fn press(
+        &self,
+        to: &AxisVector,
+        shift: &AxisVector,
+        limited: u32,
+        powers: &mut [Power],
+    ) -> AxisVector {
         let mut reached = *to;
         for stop in &self.stops {
-            let Some(power) = powers.get_mut(stop.joint) else { continue };
+            let Some(power) = powers.get_mut(stop.joint) else {
+                continue;
+            };
             let real = to[stop.joint] + shift[stop.joint];
-            let end = stop.above_mm.map(|at| real.min(at)).or(stop.below_mm.map(|at| real.max(at)));
-            let Some(end) = end.filter(|end| *end != real) else { continue };
+            let end = stop
+                .above_mm
+                .map(|at| real.min(at))
+                .or(stop.below_mm.map(|at| real.max(at)));
+            let Some(end) = end.filter(|end| *end != real) else {
+                continue;
+            };
             reached[stop.joint] = end - shift[stop.joint];
-            let homing = if limited >> stop.joint & 1 == 1 { self.homing_percent[stop.joint] } else { f64::INFINITY };
+            let homing = if limited >> stop.joint & 1 == 1 {
+                self.homing_percent[stop.joint]
+            } else {
+                f64::INFINITY
+            };
             if (real - end).abs() * PERCENT_PER_MM > homing.min(PEAK_PERCENT) {
                 power.fail(TORQUE_FAULT);
             }
@@ -88,7 +111,11 @@ mod tests {
 
     #[test]
     fn a_joint_stays_at_its_stop_and_its_drive_pushes_as_far_as_it_may() {
-        let stop = HardStop { joint: 1, above_mm: None, below_mm: Some(-10.0) };
+        let stop = HardStop {
+            joint: 1,
+            above_mm: None,
+            below_mm: Some(-10.0),
+        };
         let mut stops = HardStops::new(&[stop]);
         let mut context = DriverContext::new(2, 0.001);
         context.joints[1].homing_torque_percent = 20.0;
@@ -105,14 +132,29 @@ mod tests {
             let to = AxisVector::from_slice(&[-50.0, to_mm]);
             let reached = stops.press(&to, &shift, limited, &mut powers);
             assert_eq!((reached[0], reached[1]), (-50.0, reached_mm));
-            assert_eq!(powers[1].state() == JointState::Fault, fails, "{to_mm} {limited}");
+            assert_eq!(
+                powers[1].state() == JointState::Fault,
+                fails,
+                "{to_mm} {limited}"
+            );
         }
     }
 
     #[test]
     fn a_stop_has_one_side() {
-        let of = |above_mm, below_mm| HardStop { joint: 0, above_mm, below_mm }.check();
+        let of = |above_mm, below_mm| {
+            HardStop {
+                joint: 0,
+                above_mm,
+                below_mm,
+            }
+            .check()
+        };
         assert!(of(Some(1.0), None).is_ok() && of(None, Some(-1.0)).is_ok());
-        assert!(of(None, None).is_err() && of(Some(1.0), Some(-1.0)).is_err() && of(Some(f64::NAN), None).is_err());
+        assert!(
+            of(None, None).is_err()
+                && of(Some(1.0), Some(-1.0)).is_err()
+                && of(Some(f64::NAN), None).is_err()
+        );
     }
 }

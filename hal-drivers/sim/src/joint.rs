@@ -44,8 +44,15 @@ impl Servo {
     pub fn new(omega: f64, zeta: f64, period_s: f64) -> Self {
         let (even, odd) = decaying_pair(omega, zeta, period_s);
         let damping = zeta * omega * odd;
-        let transition = [[even + damping, odd], [-omega * omega * odd, even - damping]];
-        Self { transition, lag_s: 2.0 * zeta / omega, period_s }
+        let transition = [
+            [even + damping, odd],
+            [-omega * omega * odd, even - damping],
+        ];
+        Self {
+            transition,
+            lag_s: 2.0 * zeta / omega,
+            period_s,
+        }
     }
 
     /// One period in which the setpoint runs from `from` to `to`. Fine loop; does not allocate.
@@ -101,20 +108,36 @@ mod tests {
             let b = rate(t + h / 2.0, go(s, a, h / 2.0));
             let c = rate(t + h / 2.0, go(s, b, h / 2.0));
             let d = rate(t + h, go(s, c, h));
-            s = go(s, std::array::from_fn(|i| (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]) / 6.0), h);
+            s = go(
+                s,
+                std::array::from_fn(|i| (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]) / 6.0),
+                h,
+            );
         }
-        Motion { position: s[0], speed: s[1] }
+        Motion {
+            position: s[0],
+            speed: s[1],
+        }
     }
 
     #[test]
     fn closed_form_agrees_with_runge_kutta() {
         for zeta in [0.05, 0.7, 0.999_999_999, 1.0, 1.000_000_001, 1.4, 8.0] {
-            let start = Motion { position: 3.0, speed: -40.0 };
+            let start = Motion {
+                position: 3.0,
+                speed: -40.0,
+            };
             let mut motion = start;
             Servo::new(190.0, zeta, 0.004).follow(&mut motion, 2.0, 2.5);
             let expected = runge_kutta(start, 190.0, zeta, (2.0, 2.5), 0.004);
-            assert!((motion.position - expected.position).abs() < 1e-9, "ζ {zeta}: {motion:?} {expected:?}");
-            assert!((motion.speed - expected.speed).abs() < 1e-7, "ζ {zeta}: {motion:?} {expected:?}");
+            assert!(
+                (motion.position - expected.position).abs() < 1e-9,
+                "ζ {zeta}: {motion:?} {expected:?}"
+            );
+            assert!(
+                (motion.speed - expected.speed).abs() < 1e-7,
+                "ζ {zeta}: {motion:?} {expected:?}"
+            );
         }
     }
 
@@ -128,19 +151,33 @@ mod tests {
                 highest.max(motion.position)
             });
             let formula = 1.0 + (-PI * zeta / (1.0 - zeta * zeta).sqrt()).exp();
-            assert!((highest - formula).abs() < 1e-6, "ζ {zeta}: {highest} {formula}");
+            assert!(
+                (highest - formula).abs() < 1e-6,
+                "ζ {zeta}: {highest} {formula}"
+            );
         }
     }
 
     #[test]
     fn braking_ends_at_the_formula() {
-        let mut motion = Motion { position: 10.0, speed: -100.0 };
+        let mut motion = Motion {
+            position: 10.0,
+            speed: -100.0,
+        };
         let periods = (0..1000).take_while(|_| {
             motion.brake(5000.0, 0.0011);
             motion.speed != 0.0
         });
-        assert_eq!(periods.count(), 18, "100 / 5000 s are 18.2 periods of 1.1 ms");
-        assert!((motion.position - 9.0).abs() < 1e-12, "10 − 100²/(2·5000) mm, not {}", motion.position);
+        assert_eq!(
+            periods.count(),
+            18,
+            "100 / 5000 s are 18.2 periods of 1.1 ms"
+        );
+        assert!(
+            (motion.position - 9.0).abs() < 1e-12,
+            "10 − 100²/(2·5000) mm, not {}",
+            motion.position
+        );
     }
 
     proptest! {

@@ -33,11 +33,19 @@ pub(crate) struct Mechanics {
 impl Mechanics {
     /// Joints at rest. Host; allocates.
     pub fn new(options: &Options, start: &AxisVector, count: usize, period_s: f64) -> Self {
-        let joints = std::array::from_fn(|i| Motion { position: start[i], speed: 0.0 });
-        let motors = (options.model == Model::Servo).then(|| ServoJoints::new(options, start, count, period_s));
+        let joints = std::array::from_fn(|i| Motion {
+            position: start[i],
+            speed: 0.0,
+        });
+        let motors = (options.model == Model::Servo)
+            .then(|| ServoJoints::new(options, start, count, period_s));
         Self {
             model: options.model,
-            servo: Servo::new(TAU * options.natural_frequency_hz, options.damping_ratio, period_s),
+            servo: Servo::new(
+                TAU * options.natural_frequency_hz,
+                options.damping_ratio,
+                period_s,
+            ),
             motors,
             joints,
             before: joints,
@@ -45,7 +53,9 @@ impl Mechanics {
             followed: [None; MAX_AXES],
             velocity: AxisVector::ZERO,
             deceleration_mm_per_s2: options.quick_stop_deceleration_mm_per_s2,
-            sag_mm_per_s: AxisVector(std::array::from_fn(|i| options.sag_mm_per_s.get(i).copied().unwrap_or(0.0))),
+            sag_mm_per_s: AxisVector(std::array::from_fn(|i| {
+                options.sag_mm_per_s.get(i).copied().unwrap_or(0.0)
+            })),
             period_s,
         }
     }
@@ -72,8 +82,11 @@ impl Mechanics {
 
     /// Where the joints go where no new setpoint comes: on at the last velocity. Fine loop.
     pub fn coast(&self) -> AxisVector {
-        let next =
-            |i: usize| self.followed[i].map_or(self.joints[i].position, |last| last + self.velocity[i] * self.period_s);
+        let next = |i: usize| {
+            self.followed[i].map_or(self.joints[i].position, |last| {
+                last + self.velocity[i] * self.period_s
+            })
+        };
         AxisVector(std::array::from_fn(next))
     }
 
@@ -95,14 +108,24 @@ impl Mechanics {
     }
 
     fn drive_motors(&mut self, powers: &[Power], to: &AxisVector, spindle_rad_per_s: f64) {
-        let Some(motors) = &mut self.motors else { return };
+        let Some(motors) = &mut self.motors else {
+            return;
+        };
         let follows = |joint: usize| powers.get(joint).is_some_and(Power::follows);
         if !(0..self.count).any(follows) {
             return motors.rest();
         }
         let joints = &self.joints;
-        let aim = AxisVector(std::array::from_fn(|i| if follows(i) { to[i] } else { joints[i].position }));
-        let velocity = AxisVector(std::array::from_fn(|i| if follows(i) { self.velocity[i] } else { 0.0 }));
+        let aim = AxisVector(std::array::from_fn(|i| {
+            if follows(i) {
+                to[i]
+            } else {
+                joints[i].position
+            }
+        }));
+        let velocity = AxisVector(std::array::from_fn(|i| {
+            if follows(i) { self.velocity[i] } else { 0.0 }
+        }));
         motors.follow(&aim, &velocity, spindle_rad_per_s);
     }
 
@@ -113,8 +136,14 @@ impl Mechanics {
         match self.model {
             Model::SecondOrder => self.servo.follow(joint, from, to),
             Model::Ideal | Model::Servo => {
-                let ideal = Motion { position: to, speed: self.velocity[index] };
-                *joint = self.motors.as_ref().map_or(ideal, |motors| motors.motion(index));
+                let ideal = Motion {
+                    position: to,
+                    speed: self.velocity[index],
+                };
+                *joint = self
+                    .motors
+                    .as_ref()
+                    .map_or(ideal, |motors| motors.motion(index));
             }
         }
         self.followed[index] = Some(to);
@@ -139,7 +168,9 @@ impl Mechanics {
 
     /// What the drive of a joint sees.
     pub fn seen(&self, joint: usize) -> Motion {
-        self.motors.as_ref().map_or(self.joints[joint], |motors| motors.measured(joint))
+        self.motors
+            .as_ref()
+            .map_or(self.joints[joint], |motors| motors.measured(joint))
     }
 
     /// The current of a joint's motor over this exchange, A. Fine loop.
@@ -155,6 +186,8 @@ impl Mechanics {
     /// What only a simulation knows, for the analog inputs.
     pub fn analog(&self) -> [f64; MAX_ANALOG] {
         let truth = self.motors.as_ref().map(|motors| &motors.truth);
-        truth.map_or([0.0; MAX_ANALOG], |truth| [truth.cutting_torque_nm, truth.depth_mm, 0.0, 0.0])
+        truth.map_or([0.0; MAX_ANALOG], |truth| {
+            [truth.cutting_torque_nm, truth.depth_mm, 0.0, 0.0]
+        })
     }
 }

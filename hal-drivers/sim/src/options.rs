@@ -140,10 +140,25 @@ impl Options {
         // The bounds keep the closed form of the servo far from overflow and underflow at any fine period.
         within("natural_frequency_hz", self.natural_frequency_hz, 1e-3, 1e5)?;
         within("damping_ratio", self.damping_ratio, 1e-3, 1e3)?;
-        within("quick_stop_deceleration_mm_per_s2", self.quick_stop_deceleration_mm_per_s2, 1e-3, 1e9)?;
-        within("spindle_time_constant_s", self.spindle_time_constant_s, 0.0, 1e4)?;
+        within(
+            "quick_stop_deceleration_mm_per_s2",
+            self.quick_stop_deceleration_mm_per_s2,
+            1e-3,
+            1e9,
+        )?;
+        within(
+            "spindle_time_constant_s",
+            self.spindle_time_constant_s,
+            0.0,
+            1e4,
+        )?;
         within("unknown_start_mm", self.unknown_start_mm, 0.0, 1e6)?;
-        within("watchdog_periods", f64::from(self.watchdog_periods), 0.0, 100.0)?;
+        within(
+            "watchdog_periods",
+            f64::from(self.watchdog_periods),
+            0.0,
+            100.0,
+        )?;
         self.switches.iter().try_for_each(Switch::check)?;
         self.check_joints()?;
         self.check_bus()?;
@@ -156,13 +171,29 @@ impl Options {
     /// The option that names another one.
     pub(crate) fn check_joint_numbers(&self, count: usize) -> Result<(), PluginError> {
         let last_joint = |switch: &Switch| switch.shape().map_or(0, |shape| shape.last_joint());
-        let switches = self.switches.iter().map(|switch| ("switches", last_joint(switch)));
+        let switches = self
+            .switches
+            .iter()
+            .map(|switch| ("switches", last_joint(switch)));
         let faults = self.faults.iter().map(|fault| ("faults", fault.joint));
-        let stops = self.hard_stops.iter().map(|stop| ("hard_stops", stop.joint));
-        let latches = self.latch_joints.iter().map(|joint| ("latch_joints", *joint));
-        let wrong = switches.chain(faults).chain(stops).chain(latches).find(|(_, joint)| *joint >= count);
+        let stops = self
+            .hard_stops
+            .iter()
+            .map(|stop| ("hard_stops", stop.joint));
+        let latches = self
+            .latch_joints
+            .iter()
+            .map(|joint| ("latch_joints", *joint));
+        let wrong = switches
+            .chain(faults)
+            .chain(stops)
+            .chain(latches)
+            .find(|(_, joint)| *joint >= count);
         wrong.map_or(Ok(()), |(key, joint)| {
-            Err(PluginError::of_option(key, format!("joint = {joint}: the machine has joints 0 to {}", count - 1)))
+            Err(PluginError::of_option(
+                key,
+                format!("joint = {joint}: the machine has joints 0 to {}", count - 1),
+            ))
         })
     }
 
@@ -176,9 +207,10 @@ impl Options {
         all_within("brake_s", &self.brake_s, 0.0, 60.0)?;
         all_within("sag_mm_per_s", &self.sag_mm_per_s, -1e4, 1e4)?;
         match self.latch_joints.iter().find(|joint| **joint >= MAX_AXES) {
-            Some(joint) => {
-                Err(refusal("latch_joints", &format!("{joint}: a machine has joints 0 to {}", MAX_AXES - 1)))
-            }
+            Some(joint) => Err(refusal(
+                "latch_joints",
+                &format!("{joint}: a machine has joints 0 to {}", MAX_AXES - 1),
+            )),
             None => Ok(()),
         }
     }
@@ -186,22 +218,35 @@ impl Options {
     fn check_bus(&self) -> Result<(), PluginError> {
         // Longer than this is a bus that does not start.
         within("bus_start_s", self.bus_start_s, 0.0, 30.0)?;
-        within("patience_periods", f64::from(self.patience_periods), 0.0, 1e3)?;
+        within(
+            "patience_periods",
+            f64::from(self.patience_periods),
+            0.0,
+            1e3,
+        )?;
         wire::check(self)?;
         self.faults.iter().try_for_each(DriveFault::check)?;
         self.hard_stops.iter().try_for_each(HardStop::check)?;
-        self.bus_clock.as_ref().map_or(Ok(()), BusClockOptions::check)
+        self.bus_clock
+            .as_ref()
+            .map_or(Ok(()), BusClockOptions::check)
     }
 
     fn check_servo(&self) -> Result<(), PluginError> {
         if self.model != Model::Servo {
-            let unused = [("servo", !self.servo.is_empty()), ("cutting", self.cutting.is_some())];
+            let unused = [
+                ("servo", !self.servo.is_empty()),
+                ("cutting", self.cutting.is_some()),
+            ];
             return match unused.iter().find(|(_, stated)| *stated) {
                 Some((key, _)) => Err(refusal(key, "goes with model = \"servo\" only")),
                 None => Ok(()),
             };
         }
-        self.servo.iter().enumerate().try_for_each(|(index, servo)| servo.check(index))?;
+        self.servo
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, servo)| servo.check(index))?;
         self.cutting.as_ref().map_or(Ok(()), CuttingOptions::check)
     }
 }
@@ -209,27 +254,54 @@ impl Options {
 impl Switch {
     fn check(&self) -> Result<(), PluginError> {
         if self.input > 63 {
-            return Err(refusal("switches", &format!("input = {}: the inputs are 0 to 63", self.input)));
+            return Err(refusal(
+                "switches",
+                &format!("input = {}: the inputs are 0 to 63", self.input),
+            ));
         }
         let positions = [self.above_mm, self.below_mm].into_iter().flatten();
         let corners = [self.low_mm, self.high_mm].into_iter().flatten().flatten();
-        let circle = self
-            .bore
-            .iter()
-            .flat_map(|bore| [bore.centre_mm[0], bore.centre_mm[1], bore.radius_mm, bore.top_mm.unwrap_or(0.0)]);
-        if let Some(wrong) = positions.chain(corners).chain(circle).find(|v| !v.is_finite()) {
+        let circle = self.bore.iter().flat_map(|bore| {
+            [
+                bore.centre_mm[0],
+                bore.centre_mm[1],
+                bore.radius_mm,
+                bore.top_mm.unwrap_or(0.0),
+            ]
+        });
+        if let Some(wrong) = positions
+            .chain(corners)
+            .chain(circle)
+            .find(|v| !v.is_finite())
+        {
             return Err(refusal("switches", &format!("{wrong}: not a position")));
         }
-        within("switches.bounce_periods", f64::from(self.bounce_periods), 0.0, 1e4)?;
-        self.shape().map(|_| ()).ok_or_else(|| refusal("switches", SHAPES))
+        within(
+            "switches.bounce_periods",
+            f64::from(self.bounce_periods),
+            0.0,
+            1e4,
+        )?;
+        self.shape()
+            .map(|_| ())
+            .ok_or_else(|| refusal("switches", SHAPES))
     }
 
     /// Where it is on; none where the keys do not say one shape.
     pub(crate) fn shape(&self) -> Option<Shape> {
-        match (self.joint, self.above_mm, self.below_mm, self.low_mm, self.high_mm, self.bore) {
+        match (
+            self.joint,
+            self.above_mm,
+            self.below_mm,
+            self.low_mm,
+            self.high_mm,
+            self.bore,
+        ) {
             (Some(joint), Some(mm), None, None, None, None) => Some(Shape::Above { joint, mm }),
             (Some(joint), None, Some(mm), None, None, None) => Some(Shape::Below { joint, mm }),
-            (None, None, None, Some(low_mm), Some(high_mm), None) => Some(Shape::Box { low_mm, high_mm }),
+            (None, None, None, Some(low_mm), Some(high_mm), None) => {
+                Some(Shape::Box { low_mm, high_mm })
+            }
             (None, None, None, None, None, Some(bore)) => Some(Shape::Bore(bore)),
             _ => None,
         }
@@ -237,22 +309,34 @@ impl Switch {
 }
 
 /// What a switch is made of.
-const SHAPES: &str = "a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
+const SHAPES: &str =
+    "a switch has joint and above_mm, joint and below_mm, low_mm and high_mm, or bore";
 
 pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), PluginError> {
     // A comparison with NaN is false, so NaN is refused as well.
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(PluginError::of_option(key, format!("{value}: must be {low} to {high}")))
+    Err(PluginError::of_option(
+        key,
+        format!("{value}: must be {low} to {high}"),
+    ))
 }
 
 /// Each of at most one number a joint.
 fn all_within(key: &str, values: &[f64], low: f64, high: f64) -> Result<(), PluginError> {
     if values.len() > MAX_AXES {
-        return Err(refusal(key, &format!("{} numbers: a machine has {MAX_AXES} joints at most", values.len())));
+        return Err(refusal(
+            key,
+            &format!(
+                "{} numbers: a machine has {MAX_AXES} joints at most",
+                values.len()
+            ),
+        ));
     }
-    values.iter().try_for_each(|value| within(key, *value, low, high))
+    values
+        .iter()
+        .try_for_each(|value| within(key, *value, low, high))
 }
 
 pub(crate) fn refusal(key: &str, what: &str) -> PluginError {
@@ -278,15 +362,34 @@ mod tests {
                     [[switches]]\ninput = 4\nbore = { centre_mm = [1, 2], radius_mm = 3 }\nbounce_periods = 4\n";
         let options = Options::parse(text).unwrap();
         assert_eq!(options.model, Model::SecondOrder);
-        assert_eq!((options.natural_frequency_hz, options.damping_ratio), (12.0, 1.5));
-        assert_eq!((options.spindle_time_constant_s, options.quick_stop_deceleration_mm_per_s2), (0.25, 800.0));
+        assert_eq!(
+            (options.natural_frequency_hz, options.damping_ratio),
+            (12.0, 1.5)
+        );
+        assert_eq!(
+            (
+                options.spindle_time_constant_s,
+                options.quick_stop_deceleration_mm_per_s2
+            ),
+            (0.25, 800.0)
+        );
         assert_eq!(options.watchdog_periods, 9);
-        assert_eq!(options.switches[0].shape(), Some(Shape::Above { joint: 1, mm: 12.5 }));
+        assert_eq!(
+            options.switches[0].shape(),
+            Some(Shape::Above { joint: 1, mm: 12.5 })
+        );
         assert_eq!(
             options.switches[1].shape(),
-            Some(Shape::Bore(Bore { centre_mm: [1.0, 2.0], radius_mm: 3.0, top_mm: None }))
+            Some(Shape::Bore(Bore {
+                centre_mm: [1.0, 2.0],
+                radius_mm: 3.0,
+                top_mm: None
+            }))
         );
-        assert_eq!((options.switches[1].bounce_periods, options.latches), (4, false));
+        assert_eq!(
+            (options.switches[1].bounce_periods, options.latches),
+            (4, false)
+        );
         assert_eq!((options.unknown_start_mm, options.seed), (2.5, 7));
     }
 
@@ -298,13 +401,25 @@ mod tests {
             ("damping_ratio = -0.1", "damping_ratio"),
             ("damping_ratio = inf", "damping_ratio"),
             ("spindle_time_constant_s = -1", "spindle_time_constant_s"),
-            ("quick_stop_deceleration_mm_per_s2 = 0", "quick_stop_deceleration_mm_per_s2"),
+            (
+                "quick_stop_deceleration_mm_per_s2 = 0",
+                "quick_stop_deceleration_mm_per_s2",
+            ),
             ("watchdog_periods = 101", "0 to 100"),
             ("frequency_hz = 3", "frequency_hz"),
             ("model = \"third-order\"", "third-order"),
-            ("[[switches]]\ninput = 64\njoint = 0\nabove_mm = 1", "0 to 63"),
-            ("[[switches]]\ninput = 1\njoint = 0\nabove_mm = nan", "not a position"),
-            ("[[switches]]\ninput = 1\njoint = 0\nabove_mm = 1\nbelow_mm = 2", "joint and below_mm"),
+            (
+                "[[switches]]\ninput = 64\njoint = 0\nabove_mm = 1",
+                "0 to 63",
+            ),
+            (
+                "[[switches]]\ninput = 1\njoint = 0\nabove_mm = nan",
+                "not a position",
+            ),
+            (
+                "[[switches]]\ninput = 1\njoint = 0\nabove_mm = 1\nbelow_mm = 2",
+                "joint and below_mm",
+            ),
             ("unknown_start_mm = -1", "unknown_start_mm"),
             ("[[switches]]\ninput = 1\njoint = 0", "above_mm"),
             ("[[switches]]\ninput = 1\njoint = -1\nabove_mm = 1", "-1"),
@@ -318,10 +433,19 @@ mod tests {
             ("bus_start_s = 31", "bus_start_s"),
             ("delay_periods = 16", "0 to 15"),
             ("lost_frames = { periods = 2 }", "never happen"),
-            ("late_frames = { probability = 2 }", "late_frames.probability"),
-            ("[[faults]]\njoint = 0\ncode = 3", "at a tick or at an exchange"),
+            (
+                "late_frames = { probability = 2 }",
+                "late_frames.probability",
+            ),
+            (
+                "[[faults]]\njoint = 0\ncode = 3",
+                "at a tick or at an exchange",
+            ),
             ("[[faults]]\njoint = 0\ntick = 3", "above 0"),
-            ("[[faults]]\njoint = 0\ntick = 3\nlost = true\ncode = 3", "no code"),
+            (
+                "[[faults]]\njoint = 0\ntick = 3\nlost = true\ncode = 3",
+                "no code",
+            ),
             ("[[faults]]\njoint = 8\ntick = 3\ncode = 3", "joint = 8"),
             ("bus_clock = { drift = 3 }", "drift"),
         ];

@@ -34,7 +34,14 @@ pub(crate) struct Power {
 impl Power {
     /// A drive that is off.
     pub fn new(wake_periods: u64, brake_periods: u64) -> Self {
-        Self { stage: Stage::Off, left: 0, wake_periods, brake_periods, fault: None, is_lost: false }
+        Self {
+            stage: Stage::Off,
+            left: 0,
+            wake_periods,
+            brake_periods,
+            fault: None,
+            is_lost: false,
+        }
     }
 
     /// Before a period: whether the drive is to follow. Fine loop.
@@ -157,7 +164,13 @@ mod tests {
 
     #[test]
     fn without_delays_it_follows_and_lets_go_at_once() {
-        let told = [(true, true), (true, false), (false, false), (false, true), (true, true)];
+        let told = [
+            (true, true),
+            (true, false),
+            (false, false),
+            (false, true),
+            (true, true),
+        ];
         let (on, off) = (JointState::Enabled, JointState::Disabled);
         let said = [on, on, JointState::QuickStop, off, on];
         assert_eq!(states(&mut Power::new(0, 0), &told), said);
@@ -167,9 +180,19 @@ mod tests {
     fn torque_comes_before_the_brake_opens_and_goes_behind_it() {
         let mut power = Power::new(2, 3);
         let coming = states(&mut power, &[(true, true); 6]);
-        assert_eq!(coming, [[JointState::Enabling; 5].as_slice(), &[JointState::Enabled]].concat());
+        assert_eq!(
+            coming,
+            [[JointState::Enabling; 5].as_slice(), &[JointState::Enabled]].concat()
+        );
         let going = states(&mut power, &[(false, true); 4]);
-        assert_eq!(going, [[JointState::QuickStop; 3].as_slice(), &[JointState::Disabled]].concat());
+        assert_eq!(
+            going,
+            [
+                [JointState::QuickStop; 3].as_slice(),
+                &[JointState::Disabled]
+            ]
+            .concat()
+        );
         assert!(!power.sags(), "the brake holds it");
         assert!(Power::new(2, 0).sags());
     }
@@ -180,12 +203,18 @@ mod tests {
         states(&mut power, &[(true, true)]);
         power.fail(7);
         power.fail(8);
-        assert_eq!(states(&mut power, &[(true, false), (false, true), (true, true)]), [JointState::Fault; 3]);
+        assert_eq!(
+            states(&mut power, &[(true, false), (false, true), (true, true)]),
+            [JointState::Fault; 3]
+        );
         assert_eq!((power.code(), power.follows()), (7, false));
         power.reset();
         assert_eq!(states(&mut power, &[(true, true)]), [JointState::Enabled]);
         power.lose();
-        assert_eq!(states(&mut power, &[(true, true), (false, true)]), [JointState::Lost; 2]);
+        assert_eq!(
+            states(&mut power, &[(true, true), (false, true)]),
+            [JointState::Lost; 2]
+        );
         power.reset();
         assert_eq!((power.code(), power.state()), (0, JointState::Disabled));
     }

@@ -52,12 +52,14 @@ impl Shape {
         match self {
             Self::Above { joint, mm } => at[*joint] - mm,
             Self::Below { joint, mm } => mm - at[*joint],
-            Self::Box { low_mm, high_mm } => {
-                (0..3).map(|i| (at[i] - low_mm[i]).min(high_mm[i] - at[i])).fold(f64::INFINITY, f64::min)
-            }
+            Self::Box { low_mm, high_mm } => (0..3)
+                .map(|i| (at[i] - low_mm[i]).min(high_mm[i] - at[i]))
+                .fold(f64::INFINITY, f64::min),
             Self::Bore(bore) => {
-                let wall_mm = (at[0] - bore.centre_mm[0]).hypot(at[1] - bore.centre_mm[1]) - bore.radius_mm;
-                bore.top_mm.map_or(wall_mm, |top_mm| wall_mm.min(top_mm - at[2]))
+                let wall_mm =
+                    (at[0] - bore.centre_mm[0]).hypot(at[1] - bore.centre_mm[1]) - bore.radius_mm;
+                bore.top_mm
+                    .map_or(wall_mm, |top_mm| wall_mm.min(top_mm - at[2]))
             }
         }
     }
@@ -70,13 +72,25 @@ pub(crate) fn is_on<'a>(mut shapes: impl Iterator<Item = &'a Shape>, at: &AxisVe
 
 /// Where on the straight way between two positions `is_on` changes, which differs between their ends, and the share of the way up
 /// to there. Fine loop, bounded.
-pub(crate) fn edge(from: &AxisVector, to: &AxisVector, is_on: impl Fn(&AxisVector) -> bool) -> (AxisVector, f64) {
+pub(crate) fn edge(
+    from: &AxisVector,
+    to: &AxisVector,
+    is_on: impl Fn(&AxisVector) -> bool,
+) -> (AxisVector, f64) {
     let before = is_on(from);
-    let at = |share: f64| AxisVector(std::array::from_fn::<_, MAX_AXES, _>(|i| from[i] + (to[i] - from[i]) * share));
+    let at = |share: f64| {
+        AxisVector(std::array::from_fn::<_, MAX_AXES, _>(|i| {
+            from[i] + (to[i] - from[i]) * share
+        }))
+    };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(low, high);
-        if is_on(&at(middle)) == before { low = middle } else { high = middle }
+        if is_on(&at(middle)) == before {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     (at(high), high)
 }
@@ -87,25 +101,54 @@ mod tests {
 
     #[test]
     fn edges_lie_on_the_surface() {
-        let plate = Bore { centre_mm: [1.0, 2.0], radius_mm: 5.0, top_mm: None };
+        let plate = Bore {
+            centre_mm: [1.0, 2.0],
+            radius_mm: 5.0,
+            top_mm: None,
+        };
         let bore = Shape::Bore(plate);
-        let top = Shape::Bore(Bore { top_mm: Some(-3.0), ..plate });
-        let boxed = Shape::Box { low_mm: [-1.0; 3], high_mm: [1.0; 3] };
+        let top = Shape::Bore(Bore {
+            top_mm: Some(-3.0),
+            ..plate
+        });
+        let boxed = Shape::Box {
+            low_mm: [-1.0; 3],
+            high_mm: [1.0; 3],
+        };
         let cases = [
-            (Shape::Above { joint: 1, mm: 0.3 }, [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.3, 0.0]),
-            (Shape::Below { joint: 2, mm: -0.3 }, [0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, -0.3]),
+            (
+                Shape::Above { joint: 1, mm: 0.3 },
+                [0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [0.0, 0.3, 0.0],
+            ),
+            (
+                Shape::Below { joint: 2, mm: -0.3 },
+                [0.0, 0.0, 0.0],
+                [0.0, 0.0, -1.0],
+                [0.0, 0.0, -0.3],
+            ),
             (boxed, [0.0, 0.0, 1.5], [0.5, 0.0, 0.5], [0.25, 0.0, 1.0]),
             (bore, [4.0, 2.0, 0.0], [7.0, 2.0, 0.0], [6.0, 2.0, 0.0]),
             (top, [9.0, 2.0, -2.0], [9.0, 2.0, -4.0], [9.0, 2.0, -3.0]),
         ];
         for (shape, from, to, expected) in cases {
-            let (found, share) =
-                edge(&AxisVector::from_slice(&from), &AxisVector::from_slice(&to), |at| shape.depth_mm(at) > 0.0);
-            let (back, rest) =
-                edge(&AxisVector::from_slice(&to), &AxisVector::from_slice(&from), |at| shape.depth_mm(at) > 0.0);
+            let (found, share) = edge(
+                &AxisVector::from_slice(&from),
+                &AxisVector::from_slice(&to),
+                |at| shape.depth_mm(at) > 0.0,
+            );
+            let (back, rest) = edge(
+                &AxisVector::from_slice(&to),
+                &AxisVector::from_slice(&from),
+                |at| shape.depth_mm(at) > 0.0,
+            );
             assert!((share + rest - 1.0).abs() < 1e-12, "{share} {rest}");
             for axis in 0..3 {
-                assert!((found[axis] - expected[axis]).abs() < 1e-12 && (back[axis] - expected[axis]).abs() < 1e-12);
+                assert!(
+                    (found[axis] - expected[axis]).abs() < 1e-12
+                        && (back[axis] - expected[axis]).abs() < 1e-12
+                );
             }
         }
     }

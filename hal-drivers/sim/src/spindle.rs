@@ -25,7 +25,14 @@ impl Spindle {
         } else {
             (0.0, 0.0)
         };
-        Self { speed: 0.0, angle: 0.0, kept, kept_s, period_s, command: 0.0 }
+        Self {
+            speed: 0.0,
+            angle: 0.0,
+            kept,
+            kept_s,
+            period_s,
+            command: 0.0,
+        }
     }
 
     /// One period under the speed `command` (rad/s), exactly integrated. Fine loop; does not allocate.

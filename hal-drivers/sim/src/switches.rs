@@ -31,20 +31,40 @@ impl Switches {
     pub fn new(options: &Options) -> Self {
         let mut lines: Vec<Line> = Vec::new();
         for switch in &options.switches {
-            let Some(shape) = switch.shape() else { continue };
+            let Some(shape) = switch.shape() else {
+                continue;
+            };
             let found = lines.iter().position(|line| line.input == switch.input);
             let index = found.unwrap_or_else(|| {
                 let (input, shapes) = (switch.input, Vec::new());
-                lines.push(Line { input, shapes, bounce_periods: 0, on: false, bouncing: 0 });
+                lines.push(Line {
+                    input,
+                    shapes,
+                    bounce_periods: 0,
+                    on: false,
+                    bouncing: 0,
+                });
                 lines.len() - 1
             });
             lines[index].shapes.push(shape);
             lines[index].bounce_periods = lines[index].bounce_periods.max(switch.bounce_periods);
         }
-        let catching = options.latch_joints.iter().fold(0, |mask, joint| mask | 1 << joint);
-        let catching = if options.latch_joints.is_empty() { u32::MAX } else { catching };
+        let catching = options
+            .latch_joints
+            .iter()
+            .fold(0, |mask, joint| mask | 1 << joint);
+        let catching = if options.latch_joints.is_empty() {
+            u32::MAX
+        } else {
+            catching
+        };
         // A generator of this kind must not start at zero.
-        Self { lines, latching: options.latches, catching, random: options.seed.wrapping_mul(2).wrapping_add(1) }
+        Self {
+            lines,
+            latching: options.latches,
+            catching,
+            random: options.seed.wrapping_mul(2).wrapping_add(1),
+        }
     }
 
     /// The machine stands at `at` and has not moved: nothing bounces.
@@ -74,13 +94,20 @@ impl Switches {
             let on = is_on(shapes.iter(), to);
             if on != line.on {
                 (line.on, line.bouncing) = (on, line.bounce_periods);
-                let came = Arm { input: line.input, edge: if on { 1 } else { 2 } };
+                let came = Arm {
+                    input: line.input,
+                    edge: if on { 1 } else { 2 },
+                };
                 if self.latching && came == armed {
                     let (position, share) = edge(from, to, |at| is_on(shapes.iter(), at));
                     latches[0] = caught(came, self.catching, position, (1.0 - share) * period_s);
                 }
             }
-            let shown = if line.bouncing > 0 { random_bit(&mut self.random) } else { line.on };
+            let shown = if line.bouncing > 0 {
+                random_bit(&mut self.random)
+            } else {
+                line.on
+            };
             line.bouncing = line.bouncing.saturating_sub(1);
             inputs |= u64::from(shown) << line.input;
         }
@@ -93,7 +120,13 @@ fn caught(edge: Arm, joints: u32, mut position: AxisVector, before_s: f64) -> La
     for joint in (0..MAX_AXES).filter(|joint| joints >> joint & 1 == 0) {
         position[joint] = 0.0;
     }
-    Latch { input: edge.input, edge: edge.edge, joints, before_s, position }
+    Latch {
+        input: edge.input,
+        edge: edge.edge,
+        joints,
+        before_s,
+        position,
+    }
 }
 
 /// The next bit of an xorshift generator.

@@ -7,7 +7,11 @@ pub fn periods(seconds: f64, period_s: f64) -> u64 {
 
 /// The longest of the times that end.
 pub fn longest(seconds: &[f64]) -> f64 {
-    seconds.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max)
+    seconds
+        .iter()
+        .copied()
+        .filter(|s| s.is_finite())
+        .fold(0.0, f64::max)
 }
 
 /// Time beyond the delays of drives within which they are up or down for certain, s: a second to come to rest in, lost frames.

@@ -33,17 +33,30 @@ pub(crate) struct Heard {
 impl Watchdog {
     /// A watchdog that has heard nothing yet and trips in the first silent period after `limit` ones; 0: never.
     pub fn new(limit: u32) -> Self {
-        Self { limit, heard: 0, period: 0, silent: 0, tripped: false }
+        Self {
+            limit,
+            heard: 0,
+            period: 0,
+            silent: 0,
+            tripped: false,
+        }
     }
 
     /// An exchange with this tick. Fine loop; does not allocate.
     pub fn hear(&mut self, tick: u64) -> Heard {
         let begun = self.heard > 0;
         let fresh = tick > self.heard || !begun;
-        let now = if begun { self.period.saturating_add(1) } else { tick };
+        let now = if begun {
+            self.period.saturating_add(1)
+        } else {
+            tick
+        };
         self.period = now.max(tick);
         self.heard = self.heard.max(tick);
-        Heard { missed: tick.saturating_sub(now).min(MOST_MISSED), fresh }
+        Heard {
+            missed: tick.saturating_sub(now).min(MOST_MISSED),
+            fresh,
+        }
     }
 
     /// A period of the drives' own clock goes by without an exchange.
@@ -84,15 +97,41 @@ mod tests {
     #[test]
     fn ticks_tell_lost_and_late_setpoints_apart() {
         let mut watchdog = Watchdog::new(5);
-        let hear = |watchdog: &mut Watchdog, ticks: &[u64]| ticks.iter().map(|t| watchdog.hear(*t)).last().unwrap();
-        assert_eq!(hear(&mut watchdog, &[0, 0, 0, 1, 2]), heard(0, true), "waiting is no silence");
-        assert_eq!(hear(&mut watchdog, &[6]), heard(3, true), "three exchanges never came");
-        assert_eq!(hear(&mut watchdog, &[6]), heard(0, false), "the same once more: a period without a new one");
-        assert_eq!(hear(&mut watchdog, &[8]), heard(0, true), "what was late is not missed as well");
+        let hear = |watchdog: &mut Watchdog, ticks: &[u64]| {
+            ticks.iter().map(|t| watchdog.hear(*t)).last().unwrap()
+        };
+        assert_eq!(
+            hear(&mut watchdog, &[0, 0, 0, 1, 2]),
+            heard(0, true),
+            "waiting is no silence"
+        );
+        assert_eq!(
+            hear(&mut watchdog, &[6]),
+            heard(3, true),
+            "three exchanges never came"
+        );
+        assert_eq!(
+            hear(&mut watchdog, &[6]),
+            heard(0, false),
+            "the same once more: a period without a new one"
+        );
+        assert_eq!(
+            hear(&mut watchdog, &[8]),
+            heard(0, true),
+            "what was late is not missed as well"
+        );
         assert_eq!(hear(&mut watchdog, &[7]), heard(0, false), "an old one");
         assert_eq!(hear(&mut watchdog, &[10]), heard(0, true));
-        assert_eq!(hear(&mut watchdog, &[u64::MAX]), heard(MOST_MISSED, true), "bounded");
-        assert_eq!(hear(&mut watchdog, &[u64::MAX]), heard(0, false), "no overflow");
+        assert_eq!(
+            hear(&mut watchdog, &[u64::MAX]),
+            heard(MOST_MISSED, true),
+            "bounded"
+        );
+        assert_eq!(
+            hear(&mut watchdog, &[u64::MAX]),
+            heard(0, false),
+            "no overflow"
+        );
     }
 
     #[test]

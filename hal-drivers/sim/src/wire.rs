@@ -20,7 +20,11 @@ pub struct Frames {
 
 impl Default for Frames {
     fn default() -> Self {
-        Self { probability: 0.0, ticks: Vec::new(), periods: 1 }
+        Self {
+            probability: 0.0,
+            ticks: Vec::new(),
+            periods: 1,
+        }
     }
 }
 
@@ -29,7 +33,10 @@ impl Frames {
         within(&format!("{key}.probability"), self.probability, 0.0, 1.0)?;
         within(&format!("{key}.periods"), f64::from(self.periods), 1.0, 1e6)?;
         if self.probability == 0.0 && self.ticks.is_empty() {
-            return Err(refusal(key, "neither a probability nor ticks: it would never happen"));
+            return Err(refusal(
+                key,
+                "neither a probability nor ticks: it would never happen",
+            ));
         }
         Ok(())
     }
@@ -48,7 +55,12 @@ struct Gate {
 
 impl Gate {
     fn new(frames: &Frames, seed: u64) -> Self {
-        Self { frames: frames.clone(), noise: Noise::new(seed), left: 0, begun: None }
+        Self {
+            frames: frames.clone(),
+            noise: Noise::new(seed),
+            left: 0,
+            begun: None,
+        }
     }
 
     fn hits(&mut self, tick: u64) -> bool {
@@ -99,8 +111,11 @@ pub(crate) struct Wire {
 impl Wire {
     /// A wire whose drives would have answered `first` up to now.
     pub fn new(options: &Options, first: &Feedback, period_s: f64) -> Self {
-        let gate =
-            |frames: &Option<Frames>, salt| frames.as_ref().map(|f| Gate::new(f, options.seed.wrapping_add(salt)));
+        let gate = |frames: &Option<Frames>, salt| {
+            frames
+                .as_ref()
+                .map(|f| Gate::new(f, options.seed.wrapping_add(salt)))
+        };
         Self {
             lost: gate(&options.lost_frames, LOST),
             late: gate(&options.late_frames, LATE),
@@ -137,8 +152,14 @@ impl Wire {
             std::mem::swap(oldest, feedback);
             self.next = (self.next + 1) % self.coming.len();
         }
-        self.caught.iter_mut().for_each(|latch| latch.before_s += self.period_s);
-        feedback.latches.iter().filter(|latch| latch.edge != 0).for_each(|latch| keep(&mut self.caught, latch));
+        self.caught
+            .iter_mut()
+            .for_each(|latch| latch.before_s += self.period_s);
+        feedback
+            .latches
+            .iter()
+            .filter(|latch| latch.edge != 0)
+            .for_each(|latch| keep(&mut self.caught, latch));
         if frame == Frame::Sound {
             feedback.latches = std::mem::take(&mut self.caught);
             (self.told, self.age) = (*feedback, 0);
@@ -156,7 +177,10 @@ impl Wire {
         let input_age = u16::try_from(self.age).unwrap_or(u16::MAX);
         feedback.input_age_periods = [input_age; MAX_DIGITAL];
         // A joint whose drive is lost was old already.
-        feedback.age_periods.iter_mut().for_each(|age| *age = age.saturating_add(self.age));
+        feedback
+            .age_periods
+            .iter_mut()
+            .for_each(|age| *age = age.saturating_add(self.age));
     }
 }
 
@@ -173,9 +197,20 @@ const LATE: u64 = 0x6c61_7465;
 
 /// Whether the numbers of the options make a wire.
 pub(crate) fn check(options: &Options) -> Result<(), PluginError> {
-    options.lost_frames.as_ref().map_or(Ok(()), |frames| frames.check("lost_frames"))?;
-    options.late_frames.as_ref().map_or(Ok(()), |frames| frames.check("late_frames"))?;
-    within("delay_periods", f64::from(options.delay_periods), 0.0, f64::from(MAX_DELAY_PERIODS))
+    options
+        .lost_frames
+        .as_ref()
+        .map_or(Ok(()), |frames| frames.check("lost_frames"))?;
+    options
+        .late_frames
+        .as_ref()
+        .map_or(Ok(()), |frames| frames.check("late_frames"))?;
+    within(
+        "delay_periods",
+        f64::from(options.delay_periods),
+        0.0,
+        f64::from(MAX_DELAY_PERIODS),
+    )
 }
 
 #[cfg(test)]
@@ -184,7 +219,10 @@ mod tests {
     use tandem_sdk::{AxisVector, MAX_AXES};
 
     fn said(number: u32) -> Feedback {
-        Feedback { position: AxisVector([f64::from(number); MAX_AXES]), ..Feedback::default() }
+        Feedback {
+            position: AxisVector([f64::from(number); MAX_AXES]),
+            ..Feedback::default()
+        }
     }
 
     /// Place and age that the driver hears of joint 0 in each of ten exchanges, and whether it has lost its patience.
@@ -193,7 +231,10 @@ mod tests {
         let exchange = |tick: u32| {
             let (frame, mut feedback) = (wire.send(u64::from(tick)), said(tick));
             let impatient = wire.deliver(frame, &mut feedback);
-            assert_eq!(u32::from(feedback.input_age_periods[63]), feedback.age_periods[0]);
+            assert_eq!(
+                u32::from(feedback.input_age_periods[63]),
+                feedback.age_periods[0]
+            );
             (feedback.position[0], feedback.age_periods[0], impatient)
         };
         (1..=10).map(exchange).collect()
@@ -202,8 +243,16 @@ mod tests {
     #[test]
     fn old_numbers_go_out_with_their_age() {
         for key in ["lost_frames", "late_frames"] {
-            let heard = heard(&format!("patience_periods = 2\n{key} = {{ ticks = [3], periods = 3 }}"));
-            let some = [(2.0, 0, false), (2.0, 1, false), (2.0, 2, false), (2.0, 3, true), (6.0, 0, false)];
+            let heard = heard(&format!(
+                "patience_periods = 2\n{key} = {{ ticks = [3], periods = 3 }}"
+            ));
+            let some = [
+                (2.0, 0, false),
+                (2.0, 1, false),
+                (2.0, 2, false),
+                (2.0, 3, true),
+                (6.0, 0, false),
+            ];
             assert_eq!(heard[1..6], some);
         }
     }
@@ -211,7 +260,15 @@ mod tests {
     #[test]
     fn answers_may_take_their_time() {
         let heard = heard("delay_periods = 2");
-        assert_eq!(heard[..4], [(0.0, 0, false), (0.0, 0, false), (1.0, 0, false), (2.0, 0, false)]);
+        assert_eq!(
+            heard[..4],
+            [
+                (0.0, 0, false),
+                (0.0, 0, false),
+                (1.0, 0, false),
+                (2.0, 0, false)
+            ]
+        );
     }
 
     #[test]
@@ -219,7 +276,9 @@ mod tests {
         let row = |seed: u32| {
             let text = format!("seed = {seed}\nlost_frames = {{ probability = 0.1 }}");
             let mut wire = Wire::new(&Options::parse(&text).unwrap(), &said(0), 0.001);
-            (1..=10_000).filter(|tick| wire.send(*tick) == Frame::Lost).collect::<Vec<_>>()
+            (1..=10_000)
+                .filter(|tick| wire.send(*tick) == Frame::Lost)
+                .collect::<Vec<_>>()
         };
         assert!((900..1100).contains(&row(1).len()), "{}", row(1).len());
         assert!(row(1) == row(1) && row(1) != row(2));
@@ -233,10 +292,21 @@ mod tests {
         for tick in 1..=8_u32 {
             let (frame, mut feedback) = (wire.send(u64::from(tick)), said(tick));
             if tick == 3 {
-                feedback.latches[0] = Latch { edge: 1, joints: 1, before_s: 0.000_25, ..Latch::default() };
+                feedback.latches[0] = Latch {
+                    edge: 1,
+                    joints: 1,
+                    before_s: 0.000_25,
+                    ..Latch::default()
+                };
             }
             wire.deliver(frame, &mut feedback);
-            told.extend(feedback.latches.iter().filter(|l| l.edge != 0).map(|l| (tick, (l.before_s * 1e6).round())));
+            told.extend(
+                feedback
+                    .latches
+                    .iter()
+                    .filter(|l| l.edge != 0)
+                    .map(|l| (tick, (l.before_s * 1e6).round())),
+            );
         }
         assert_eq!(told, [(5, 2250.0)]);
     }

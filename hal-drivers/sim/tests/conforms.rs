@@ -6,7 +6,13 @@ use tandem_conformance::{CountingAllocator, Report, Setup, judge};
 static COUNTING: CountingAllocator = CountingAllocator;
 
 fn judged(options: &str) -> Report {
-    judge(tandem_sim::PLUGIN, &Setup { options: options.to_string(), ..Setup::default() })
+    judge(
+        tandem_sim::PLUGIN,
+        &Setup {
+            options: options.to_string(),
+            ..Setup::default()
+        },
+    )
 }
 
 #[test]

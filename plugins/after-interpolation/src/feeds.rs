@@ -16,7 +16,10 @@ pub(crate) struct Feeds {
 impl Feeds {
     /// No block.
     pub fn new() -> Self {
-        Self { falling: VecDeque::with_capacity(64), linear_until_s: f64::NEG_INFINITY }
+        Self {
+            falling: VecDeque::with_capacity(64),
+            linear_until_s: f64::NEG_INFINITY,
+        }
     }
 
     /// Forgets all blocks.
@@ -27,7 +30,11 @@ impl Feeds {
 
     /// A block with a command feed, which moves the machine until `until_s`; `linear` where it moves a linear axis.
     pub fn push(&mut self, feed_mm_per_s: f64, until_s: f64, linear: bool) {
-        while self.falling.back().is_some_and(|(feed, _)| *feed <= feed_mm_per_s) {
+        while self
+            .falling
+            .back()
+            .is_some_and(|(feed, _)| *feed <= feed_mm_per_s)
+        {
             self.falling.pop_back();
         }
         self.falling.push_back((feed_mm_per_s, until_s));
@@ -67,7 +74,10 @@ mod tests {
         feeds.push(7.0, 3.0, false);
         feeds.push(7.0, 4.0, false);
         assert_eq!(feeds.falling.len(), 2);
-        assert_eq!([0.0, 1.99, 2.0, 5.0].map(|t| feeds.highest_mm_per_s(t)), [9.0, 9.0, 7.0, 7.0]);
+        assert_eq!(
+            [0.0, 1.99, 2.0, 5.0].map(|t| feeds.highest_mm_per_s(t)),
+            [9.0, 9.0, 7.0, 7.0]
+        );
     }
 
     #[test]
@@ -77,7 +87,13 @@ mod tests {
         let mut feeds = Feeds::new();
         feeds.push(5.0, 1.0, true);
         feeds.push(5.0, 2.0, false);
-        assert_eq!(feeds.counted(&velocity, &axes, 0.5), AxisVector::from_slice(&[3.0]));
-        assert_eq!(feeds.counted(&velocity, &axes, 1.0), AxisVector::from_slice(&[0.0, 4.0]));
+        assert_eq!(
+            feeds.counted(&velocity, &axes, 0.5),
+            AxisVector::from_slice(&[3.0])
+        );
+        assert_eq!(
+            feeds.counted(&velocity, &axes, 1.0),
+            AxisVector::from_slice(&[0.0, 4.0])
+        );
     }
 }

@@ -19,7 +19,10 @@ pub(crate) struct Knot {
 impl Knot {
     /// At rest.
     pub fn rest(position: &AxisVector) -> Self {
-        Self { position: *position, velocity: AxisVector::ZERO }
+        Self {
+            position: *position,
+            velocity: AxisVector::ZERO,
+        }
     }
 }
 
@@ -38,14 +41,21 @@ impl Filter {
     /// The filter of the options; the axis limits bound how far an exponential filter can lag.
     pub fn new(options: &Options, axes: &[AxisLimits]) -> Self {
         let tau_s = options.time_constant_ms / 1000.0;
-        let fastest = axes.iter().map(|axis| axis.feed_mm_per_s.max(axis.rapid_mm_per_s)).fold(0.0, f64::max);
+        let fastest = axes
+            .iter()
+            .map(|axis| axis.feed_mm_per_s.max(axis.rapid_mm_per_s))
+            .fold(0.0, f64::max);
         let settle_s = match options.filter {
             FilterKind::Linear => tau_s,
             FilterKind::Bell => 1.5 * tau_s,
             // An axis lags by at most its speed times T when its command comes to rest, then by e^(−t/T) of that.
             FilterKind::Exponential => tau_s * (fastest * tau_s / SETTLED_MM).ln().max(1.0),
         };
-        Self { kind: options.filter, tau_s, settle_s }
+        Self {
+            kind: options.filter,
+            tau_s,
+            settle_s,
+        }
     }
 
     /// Time constant, s.
@@ -70,12 +80,19 @@ impl Filter {
 
     /// How far back the signal is still needed, s.
     pub fn memory_s(&self) -> f64 {
-        self.delays().iter().fold(0.0, |most: f64, delay| most.max(*delay)) * self.tau_s
+        self.delays()
+            .iter()
+            .fold(0.0, |most: f64, delay| most.max(*delay))
+            * self.tau_s
     }
 
     /// The longest piece that one polynomial may stand for, s: an exponential is fitted over a tenth of T.
     pub fn longest_s(&self) -> f64 {
-        if self.kind == FilterKind::Exponential { self.tau_s / 10.0 } else { f64::INFINITY }
+        if self.kind == FilterKind::Exponential {
+            self.tau_s / 10.0
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// The knot at `t_s`, `step_s` after the knot `last`.
@@ -85,23 +102,38 @@ impl Filter {
         match self.kind {
             FilterKind::Linear => {
                 let velocity = (now - signal.position(t_s - tau_s)) * (1.0 / tau_s);
-                Knot { position: average(signal, t_s, tau_s), velocity }
+                Knot {
+                    position: average(signal, t_s, tau_s),
+                    velocity,
+                }
             }
             FilterKind::Bell => {
                 let step = average(signal, t_s, tau_s) - average(signal, t_s - tau_s / 2.0, tau_s);
-                Knot { position: self.bell(signal, t_s, &now), velocity: step * (2.0 / tau_s) }
+                Knot {
+                    position: self.bell(signal, t_s, &now),
+                    velocity: step * (2.0 / tau_s),
+                }
             }
             FilterKind::Exponential => {
                 let weight = |s: f64| ((s - t_s) / tau_s).exp() / tau_s;
                 let kept = (last.position - now) * (-step_s / tau_s).exp();
                 let position = now + kept + signal.integral(t_s - step_s, t_s, &now, weight);
-                Knot { position, velocity: (now - position) * (1.0 / tau_s) }
+                Knot {
+                    position,
+                    velocity: (now - position) * (1.0 / tau_s),
+                }
             }
         }
     }
 
     /// Acceleration at `t_s`, where the velocity is `velocity`; at a kink that of the piece around `inside_s`.
-    pub fn acceleration(&self, signal: &Signal, t_s: f64, inside_s: f64, velocity: &AxisVector) -> AxisVector {
+    pub fn acceleration(
+        &self,
+        signal: &Signal,
+        t_s: f64,
+        inside_s: f64,
+        velocity: &AxisVector,
+    ) -> AxisVector {
         let tau_s = self.tau_s;
         match self.kind {
             FilterKind::Linear => {
@@ -151,21 +183,34 @@ mod tests {
     }
 
     fn knots(kind: FilterKind, times: &[f64]) -> Vec<[f64; 3]> {
-        let filter = Filter::new(&Options { filter: kind, time_constant_ms: 200.0 }, &[]);
+        let filter = Filter::new(
+            &Options {
+                filter: kind,
+                time_constant_ms: 200.0,
+            },
+            &[],
+        );
         let signal = ramp();
         let mut knot = Knot::rest(&AxisVector::from_slice(&[1.0]));
         let mut last = 0.0;
         let mut at = |t: &f64| {
             knot = filter.knot(&signal, *t, t - last, &knot);
             last = *t;
-            [knot.position[0], knot.velocity[0], filter.acceleration(&signal, *t, *t, &knot.velocity)[0]]
+            [
+                knot.position[0],
+                knot.velocity[0],
+                filter.acceleration(&signal, *t, *t, &knot.velocity)[0],
+            ]
         };
         times.iter().map(&mut at).collect()
     }
 
     fn assert_near(found: &[[f64; 3]], expected: &[[f64; 3]]) {
         for (f, e) in found.iter().zip(expected) {
-            assert!(f.iter().zip(e).all(|(a, b)| (a - b).abs() < 1e-9), "{f:?} is not {e:?}");
+            assert!(
+                f.iter().zip(e).all(|(a, b)| (a - b).abs() < 1e-9),
+                "{f:?} is not {e:?}"
+            );
         }
     }
 
@@ -182,7 +227,10 @@ mod tests {
         let at_50 = [1.0 + 2000.0 * 0.05_f64.powi(3) / 6.0, 2.5, 100.0];
         let at_100 = [1.0 + 2.0 / 6.0, 10.0, 200.0];
         let at_150 = [1.0 + 2.0 / 6.0 + 0.5 + 0.25, 20.0, 200.0];
-        assert_near(&found, &[at_50, at_100, at_150, [1.0 + 40.0 * 0.85, 40.0, 0.0]]);
+        assert_near(
+            &found,
+            &[at_50, at_100, at_150, [1.0 + 40.0 * 0.85, 40.0, 0.0]],
+        );
     }
 
     #[test]
@@ -191,7 +239,10 @@ mod tests {
         for (t, found) in times.iter().zip(knots(FilterKind::Exponential, &times)) {
             let left = (-t / 0.2_f64).exp();
             let lag = 40.0 * 0.2 * (1.0 - left);
-            assert_near(&[found], &[[1.0 + 40.0 * t - lag, 40.0 * (1.0 - left), 200.0 * left]]);
+            assert_near(
+                &[found],
+                &[[1.0 + 40.0 * t - lag, 40.0 * (1.0 - left), 200.0 * left]],
+            );
         }
     }
 }

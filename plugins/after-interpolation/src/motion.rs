@@ -96,7 +96,12 @@ impl Motion {
             self.signal.push_rest(path.end(), self.filter.settle_s());
         }
         let end_s = self.signal.end_s();
-        self.driving = Some(Driving { blank: *blank, end_s, stops, goal: *path.end() });
+        self.driving = Some(Driving {
+            blank: *blank,
+            end_s,
+            stops,
+            goal: *path.end(),
+        });
         end_s - begin_s
     }
 
@@ -148,7 +153,11 @@ impl Motion {
         let middle_s = f64::midpoint(now_s, end_s);
         let from = self.knot;
         let settled = Knot::rest(&driving.goal);
-        let to = if at_goal { settled } else { filter.knot(signal, end_s, end_s - now_s, &from) };
+        let to = if at_goal {
+            settled
+        } else {
+            filter.knot(signal, end_s, end_s - now_s, &from)
+        };
         let piece = Piece {
             duration_s: end_s - now_s,
             from,
@@ -156,11 +165,16 @@ impl Motion {
             from_acceleration: filter.acceleration(signal, now_s, middle_s, &from.velocity),
             to_acceleration: filter.acceleration(signal, end_s, middle_s, &to.velocity),
         };
-        let mut segment = Segment { duration_s: piece.duration_s, ..driving.blank };
+        let mut segment = Segment {
+            duration_s: piece.duration_s,
+            ..driving.blank
+        };
         segment.coefficients = piece.coefficients();
         let feeds = &self.feeds;
         let axes = &self.context.axes;
-        segment.path = piece.path(&segment, self.path_mm, |velocity| feeds.counted(velocity, axes, middle_s));
+        segment.path = piece.path(&segment, self.path_mm, |velocity| {
+            feeds.counted(velocity, axes, middle_s)
+        });
         segment.feed_mm_per_s = self.feeds.highest_mm_per_s(middle_s);
         if at_goal {
             segment.flags = segment.flags.with(SegmentFlags::ENDS_AT_REST);

@@ -57,7 +57,13 @@ mod tests {
     fn options_are_read_and_checked() {
         assert_eq!(parse("").unwrap(), Options::default());
         let bell = parse("filter = \"bell\"\ntime_constant_ms = 30").unwrap();
-        assert_eq!(bell, Options { filter: FilterKind::Bell, time_constant_ms: 30.0 });
+        assert_eq!(
+            bell,
+            Options {
+                filter: FilterKind::Bell,
+                time_constant_ms: 30.0
+            }
+        );
         for (text, word) in [
             ("filter = \"parabolic\"", "parabolic"),
             ("time_constant_ms = 0", "time_constant_ms"),

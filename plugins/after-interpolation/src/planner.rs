@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use tandem_motion::Path;
 use tandem_motion::blocks::{self, BlockId, BlockWriter, limited_by_feed};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, LimitedBy, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, LimitedBy, Planner,
+    PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
 use crate::motion::Motion;
@@ -44,8 +44,13 @@ impl AfterInterpolation {
     /// A machine with a speed or acceleration limit that is no positive number.
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         let axes = context.limits.axes();
-        let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
-        if !values.into_iter().all(|value| value > 0.0 && value.is_finite()) {
+        let values = axes
+            .iter()
+            .flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
+        if !values
+            .into_iter()
+            .all(|value| value > 0.0 && value.is_finite())
+        {
             return Err(PluginError::fixed(
                 "after-interpolation needs finite speed and acceleration limits of all axes",
             ));
@@ -66,22 +71,43 @@ impl AfterInterpolation {
 
     /// Begins the next block; `false` where there is none, or it is not known yet whether it stops.
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let Some(Waiting { block, stops: Some(stops) }) = self.waiting.front().copied() else { return false };
+        let Some(Waiting {
+            block,
+            stops: Some(stops),
+        }) = self.waiting.front().copied()
+        else {
+            return false;
+        };
         self.waiting.pop_front();
         if let Some(path) = Path::with_lanes(&block, self.context.joint_lanes) {
             self.begin_motion(&block, &path, stops, sink);
         } else {
             let path_mm = self.motion.path_mm();
-            self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, path_mm, sink);
+            self.writer.begin_dwell(
+                BlockId::from(&block),
+                &block.end,
+                block.dwell_s,
+                path_mm,
+                sink,
+            );
         }
         true
     }
 
-    fn begin_motion(&mut self, block: &Block, path: &Path, stops: bool, sink: &mut dyn SegmentSink) {
+    fn begin_motion(
+        &mut self,
+        block: &Block,
+        path: &Path,
+        stops: bool,
+        sink: &mut dyn SegmentSink,
+    ) {
         let (feed, limited_by) = self.feed_mm_per_s(block, path);
         let time_s = self.motion.begin(&self.blank(block), path, feed, stops);
         let report = blocks::report(block.index, limited_by, [feed; 3], time_s);
-        sink.block(&BlockReport { time_constant_s: self.motion.time_constant_s(), ..report });
+        sink.block(&BlockReport {
+            time_constant_s: self.motion.time_constant_s(),
+            ..report
+        });
     }
 
     /// The feed of a block's step, mm/s: the command at the highest ratio that may be asked, within the axis speeds.
@@ -101,7 +127,10 @@ impl AfterInterpolation {
     fn blank(&self, block: &Block) -> Segment {
         let mut blank = self.writer.blank(block);
         let axes = self.context.limits.axes();
-        let weakest = axes.iter().map(|axis| axis.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
+        let weakest = axes
+            .iter()
+            .map(|axis| axis.acceleration_mm_per_s2)
+            .fold(f64::INFINITY, f64::min);
         // A path deceleration that no axis exceeds, whatever the direction. The plan's own accelerations follow from feed
         // and time constant and leave nothing by design; this one serves simulated drives only.
         blank.stop_deceleration_mm_per_s2 = weakest;
@@ -123,12 +152,18 @@ impl AfterInterpolation {
 
 impl Planner for AfterInterpolation {
     fn describe(&self) -> PlannerDescription {
-        PlannerDescription { breaks_limits: 1, leaves_path: 1, ..PlannerDescription::order_2() }
+        PlannerDescription {
+            breaks_limits: 1,
+            leaves_path: 1,
+            ..PlannerDescription::order_2()
+        }
     }
 
     fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
-            return Err(PluginError::fixed("after-interpolation drives lines and arcs; for NURBS use planner nurbs"));
+            return Err(PluginError::fixed(
+                "after-interpolation drives lines and arcs; for NURBS use planner nurbs",
+            ));
         }
         blocks::check(block, &self.context.axes)
     }
@@ -138,11 +173,18 @@ impl Planner for AfterInterpolation {
         if self.waiting.len() >= BUFFER_BLOCKS {
             return Ok(Accepted::Full);
         }
-        if let Some(Waiting { stops: stops @ None, .. }) = self.waiting.back_mut() {
+        if let Some(Waiting {
+            stops: stops @ None,
+            ..
+        }) = self.waiting.back_mut()
+        {
             *stops = Some(block.starts_at_rest());
         }
         let stops = block.ends_at_rest().then_some(true);
-        self.waiting.push_back(Waiting { block: *block, stops });
+        self.waiting.push_back(Waiting {
+            block: *block,
+            stops,
+        });
         self.finished = false;
         Ok(Accepted::Accepted)
     }
@@ -154,7 +196,11 @@ impl Planner for AfterInterpolation {
         self.finished = true;
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         while emitted_s < duration_s {
             match self.emit(duration_s - emitted_s, sink) {
@@ -162,8 +208,12 @@ impl Planner for AfterInterpolation {
                 None => break,
             }
         }
-        let empty = self.waiting.is_empty() && !self.motion.is_driving() && !self.writer.is_dwelling();
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
+        let empty =
+            self.waiting.is_empty() && !self.motion.is_driving() && !self.writer.is_dwelling();
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(empty && self.finished),
+        })
     }
 
     fn reset(&mut self, position: &AxisVector) {

@@ -31,29 +31,42 @@ impl Span {
     pub fn turn_rad_per_s(&self) -> f64 {
         match &self.course {
             Course::Rest(_) => 0.0,
-            Course::Path { path, feed_mm_per_s } => path.rad_per_mm() * feed_mm_per_s,
+            Course::Path {
+                path,
+                feed_mm_per_s,
+            } => path.rad_per_mm() * feed_mm_per_s,
         }
     }
 
     fn position(&self, t_s: f64) -> AxisVector {
         match &self.course {
             Course::Rest(position) => *position,
-            Course::Path { path, feed_mm_per_s } => path.position((t_s - self.begin_s) * feed_mm_per_s),
+            Course::Path {
+                path,
+                feed_mm_per_s,
+            } => path.position((t_s - self.begin_s) * feed_mm_per_s),
         }
     }
 
     fn velocity(&self, t_s: f64) -> AxisVector {
         match &self.course {
             Course::Rest(_) => AxisVector::ZERO,
-            Course::Path { path, feed_mm_per_s } => {
-                path.direction((t_s - self.begin_s) * feed_mm_per_s) * *feed_mm_per_s
-            }
+            Course::Path {
+                path,
+                feed_mm_per_s,
+            } => path.direction((t_s - self.begin_s) * feed_mm_per_s) * *feed_mm_per_s,
         }
     }
 
     /// `∫ weight(t)·(position(t) − base) dt` from `from_s` to `to_s`, both in the span, by Gauss-Legendre quadrature:
     /// to rounding where `weight` is smooth on the scale of the interval.
-    fn integral(&self, from_s: f64, to_s: f64, base: &AxisVector, weight: &impl Fn(f64) -> f64) -> AxisVector {
+    fn integral(
+        &self,
+        from_s: f64,
+        to_s: f64,
+        base: &AxisVector,
+        weight: &impl Fn(f64) -> f64,
+    ) -> AxisVector {
         let turned = self.turn_rad_per_s() * (to_s - from_s);
         let nodes: &[(f64, f64)] = if turned == 0.0 { &GAUSS_3 } else { &GAUSS_5 };
         let parts = (turned / MAX_TURN_RAD).ceil().max(1.0) as u32;
@@ -71,8 +84,11 @@ impl Span {
 }
 
 /// Nodes and weights on −1…1. Three are exact for a line under a weight of degree 4.
-const GAUSS_3: [(f64, f64); 3] =
-    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+const GAUSS_3: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 9.0),
+    (0.0, 8.0 / 9.0),
+    (0.774_596_669_241_483_4, 5.0 / 9.0),
+];
 
 /// Five leave less than 1e-15 of a sine over [`MAX_TURN_RAD`].
 const GAUSS_5: [(f64, f64); 5] = [
@@ -95,7 +111,9 @@ pub(crate) struct Signal {
 impl Signal {
     /// At rest at `position` since ever.
     pub fn new(position: &AxisVector) -> Self {
-        let mut this = Self { spans: VecDeque::with_capacity(256) };
+        let mut this = Self {
+            spans: VecDeque::with_capacity(256),
+        };
         this.restart(position);
         this
     }
@@ -103,20 +121,35 @@ impl Signal {
     /// Forgets everything: at rest at `position` since ever, and time starts at zero.
     pub fn restart(&mut self, position: &AxisVector) {
         self.spans.clear();
-        self.spans.push_back(Span { begin_s: f64::NEG_INFINITY, end_s: 0.0, course: Course::Rest(*position) });
+        self.spans.push_back(Span {
+            begin_s: f64::NEG_INFINITY,
+            end_s: 0.0,
+            course: Course::Rest(*position),
+        });
     }
 
     /// A block follows, driven at `feed_mm_per_s`.
     pub fn push_path(&mut self, path: &Path, feed_mm_per_s: f64) {
         let begin_s = self.end_s();
         let end_s = begin_s + path.length_mm() / feed_mm_per_s;
-        self.spans.push_back(Span { begin_s, end_s, course: Course::Path { path: *path, feed_mm_per_s } });
+        self.spans.push_back(Span {
+            begin_s,
+            end_s,
+            course: Course::Path {
+                path: *path,
+                feed_mm_per_s,
+            },
+        });
     }
 
     /// A rest at `position` follows.
     pub fn push_rest(&mut self, position: &AxisVector, duration_s: f64) {
         let begin_s = self.end_s();
-        self.spans.push_back(Span { begin_s, end_s: begin_s + duration_s, course: Course::Rest(*position) });
+        self.spans.push_back(Span {
+            begin_s,
+            end_s: begin_s + duration_s,
+            course: Course::Rest(*position),
+        });
     }
 
     /// Where the known signal ends, s.
@@ -137,7 +170,9 @@ impl Signal {
     }
 
     fn index_at(&self, t_s: f64) -> usize {
-        self.spans.partition_point(|span| span.end_s <= t_s).min(self.spans.len() - 1)
+        self.spans
+            .partition_point(|span| span.end_s <= t_s)
+            .min(self.spans.len() - 1)
     }
 
     /// The span that holds `t_s`; at a border the later one.
@@ -156,13 +191,24 @@ impl Signal {
     }
 
     /// `∫ weight(t)·(position(t) − base) dt` from `from_s` to `to_s`.
-    pub fn integral(&self, from_s: f64, to_s: f64, base: &AxisVector, weight: impl Fn(f64) -> f64) -> AxisVector {
+    pub fn integral(
+        &self,
+        from_s: f64,
+        to_s: f64,
+        base: &AxisVector,
+        weight: impl Fn(f64) -> f64,
+    ) -> AxisVector {
         let mut sum = AxisVector::ZERO;
         for span in self.spans.range(self.index_at(from_s)..) {
             if span.begin_s >= to_s {
                 break;
             }
-            sum += span.integral(from_s.max(span.begin_s), to_s.min(span.end_s), base, &weight);
+            sum += span.integral(
+                from_s.max(span.begin_s),
+                to_s.min(span.end_s),
+                base,
+                &weight,
+            );
         }
         sum
     }
@@ -178,7 +224,13 @@ mod tests {
         block.kind = BlockKind::Arc;
         block.length_mm = 3.0 * std::f64::consts::TAU;
         let sweep_rad = std::f64::consts::TAU;
-        block.arc = ArcGeometry { plane: [0, 1], center_mm: [0.0; 2], radius_mm: 3.0, start_angle_rad: 0.0, sweep_rad };
+        block.arc = ArcGeometry {
+            plane: [0, 1],
+            center_mm: [0.0; 2],
+            radius_mm: 3.0,
+            start_angle_rad: 0.0,
+            sweep_rad,
+        };
         Path::new(&block).unwrap()
     }
 

@@ -9,19 +9,31 @@ use tandem_rig::{arc, numbered};
 use tandem_sdk::{AxisVector, Segment};
 
 fn fixture() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/cases/000_adai_error.json");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/cases/000_adai_error.json"
+    );
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The smallest value of `of` in a segment: the best of some samples, then narrowed down around it.
 fn smallest(segment: &Segment, of: impl Fn(&Segment, f64) -> f64) -> f64 {
     let step = segment.duration_s / 16.0;
-    let best = (0..=16).map(|k| f64::from(k) * step).min_by(|a, b| of(segment, *a).total_cmp(&of(segment, *b)));
+    let best = (0..=16)
+        .map(|k| f64::from(k) * step)
+        .min_by(|a, b| of(segment, *a).total_cmp(&of(segment, *b)));
     let middle = best.unwrap();
-    let (mut low, mut high) = ((middle - step).max(0.0), (middle + step).min(segment.duration_s));
+    let (mut low, mut high) = (
+        (middle - step).max(0.0),
+        (middle + step).min(segment.duration_s),
+    );
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if of(segment, a) < of(segment, b) { high = b } else { low = a }
+        if of(segment, a) < of(segment, b) {
+            high = b
+        } else {
+            low = a
+        }
     }
     of(segment, f64::midpoint(low, high)).min(of(segment, middle))
 }
@@ -33,20 +45,35 @@ fn corner_error(filter: &str, feed: f64, tau_ms: f64) -> f64 {
     let recorder = drive(&mut *open(filter, tau_ms, &context(0.001)), &blocks);
     let vertex = AxisVector::from_slice(&[leg, 0.0]);
     let distance = |s: &Segment, t: f64| norm(&(s.position(t) - vertex));
-    recorder.segments.iter().map(|s| smallest(s, distance)).fold(f64::INFINITY, f64::min)
+    recorder
+        .segments
+        .iter()
+        .map(|s| smallest(s, distance))
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Smallest and largest loss of radius once the transient of the start is over, before the end.
 fn arc_error(filter: &str, radius: f64, feed: f64, tau_ms: f64) -> (f64, f64) {
     let turns = 6.0;
-    let blocks = numbered(vec![arc(&AxisVector::from_slice(&[radius]), [0.0; 2], turns * TAU, feed)]);
+    let blocks = numbered(vec![arc(
+        &AxisVector::from_slice(&[radius]),
+        [0.0; 2],
+        turns * TAU,
+        feed,
+    )]);
     let mut machine = context(0.001);
     machine.position = blocks[0].start;
     let recorder = drive(&mut *open(filter, tau_ms, &machine), &blocks);
     let commanded_s = blocks[0].length_mm / feed;
-    let steady = recorder.timed().filter(|(t, s)| *t > commanded_s / 2.0 && *t + s.duration_s <= commanded_s);
-    let errors = steady.flat_map(|(_, s)| [0.0, 0.3, 0.5, 0.7].map(|u| radius - norm(&s.position(u * s.duration_s))));
-    errors.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| (low.min(e), high.max(e)))
+    let steady = recorder
+        .timed()
+        .filter(|(t, s)| *t > commanded_s / 2.0 && *t + s.duration_s <= commanded_s);
+    let errors = steady.flat_map(|(_, s)| {
+        [0.0, 0.3, 0.5, 0.7].map(|u| radius - norm(&s.position(u * s.duration_s)))
+    });
+    errors.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
+        (low.min(e), high.max(e))
+    })
 }
 
 /// The closed form of the bell at a right angle: `√2·F·E|A − 3τ/4|/2`, where A, the age under the filter, is the sum of two
@@ -66,7 +93,10 @@ fn table_bias(feed: f64) -> f64 {
 fn bell_corners_are_those_of_the_closed_form() {
     for tau_ms in [10.0, 30.0, 100.0] {
         let error = corner_error("bell", 5000.0 / 60.0, tau_ms);
-        assert!((error - bell_corner(5000.0 / 60.0, tau_ms)).abs() < 1e-9, "{tau_ms} ms: {error} mm");
+        assert!(
+            (error - bell_corner(5000.0 / 60.0, tau_ms)).abs() < 1e-9,
+            "{tau_ms} ms: {error} mm"
+        );
     }
 }
 
@@ -89,10 +119,20 @@ fn every_error_of_the_table_is_reproduced() {
             let mut expected = number(key);
             if *filter == "bell" && case["kind"] == "corner90" {
                 expected -= table_bias(feed);
-                assert!((expected - bell_corner(feed, tau_ms)).abs() < tolerance, "{case}");
+                assert!(
+                    (expected - bell_corner(feed, tau_ms)).abs() < tolerance,
+                    "{case}"
+                );
             }
-            println!("{filter:12} {expected:.9} found {:+.1e} {:+.1e}", low - expected, high - expected);
-            assert!((low - expected).abs() <= tolerance && (high - expected).abs() <= tolerance, "{filter} {case}");
+            println!(
+                "{filter:12} {expected:.9} found {:+.1e} {:+.1e}",
+                low - expected,
+                high - expected
+            );
+            assert!(
+                (low - expected).abs() <= tolerance && (high - expected).abs() <= tolerance,
+                "{filter} {case}"
+            );
         }
     }
 }
@@ -101,15 +141,29 @@ fn every_error_of_the_table_is_reproduced() {
 const SQUARE_TAU_MS: f64 = 5000.0 / 60.0 / 355.0 * 1000.0;
 
 fn square() -> Vec<tandem_sdk::Block> {
-    polyline(&[[20.0, 0.0, 0.0], [20.0, 20.0, 0.0], [0.0, 20.0, 0.0], [0.0; 3]], 5000.0 / 60.0)
+    polyline(
+        &[
+            [20.0, 0.0, 0.0],
+            [20.0, 20.0, 0.0],
+            [0.0, 20.0, 0.0],
+            [0.0; 3],
+        ],
+        5000.0 / 60.0,
+    )
 }
 
 #[test]
 fn square_takes_its_nominal_time_and_one_time_constant() {
-    let recorder = drive(&mut *open("linear", SQUARE_TAU_MS, &context(0.001)), &square());
+    let recorder = drive(
+        &mut *open("linear", SQUARE_TAU_MS, &context(0.001)),
+        &square(),
+    );
     assert!((recorder.duration_s() - (0.96 + SQUARE_TAU_MS / 1000.0)).abs() < 1e-9);
     assert!((recorder.duration_s() - 1.1947).abs() < 5e-5);
-    let bell = drive(&mut *open("bell", SQUARE_TAU_MS, &context(0.001)), &square());
+    let bell = drive(
+        &mut *open("bell", SQUARE_TAU_MS, &context(0.001)),
+        &square(),
+    );
     assert!((bell.duration_s() - (0.96 + 1.5 * SQUARE_TAU_MS / 1000.0)).abs() < 1e-9);
 }
 
@@ -119,19 +173,36 @@ fn feed_at_a_corner_falls_to_the_cosine_of_half_the_turn() {
     for turn in [0.3, FRAC_PI_2, 2.5] {
         for (filter, tau_ms) in [("linear", 80.0), ("exponential", 20.0)] {
             let (sin, cos) = f64::sin_cos(turn);
-            let blocks = polyline(&[[60.0, 0.0, 0.0], [60.0 + 60.0 * cos, 60.0 * sin, 0.0]], feed);
+            let blocks = polyline(
+                &[[60.0, 0.0, 0.0], [60.0 + 60.0 * cos, 60.0 * sin, 0.0]],
+                feed,
+            );
             let recorder = drive(&mut *open(filter, tau_ms, &context(0.0005)), &blocks);
             // Near the corner only: at both ends the machine is at rest anyway.
             let corner_s = 60.0 / feed;
-            let near = recorder.timed().filter(|(t, _)| (*t - corner_s).abs() < 0.2).map(|(_, s)| s);
+            let near = recorder
+                .timed()
+                .filter(|(t, _)| (*t - corner_s).abs() < 0.2)
+                .map(|(_, s)| s);
             let (speed, path): (Vec<f64>, Vec<f64>) = near
-                .map(|s| (smallest(s, |s, t| norm(&s.velocity(t))), smallest(s, Segment::path_speed_mm_per_s)))
+                .map(|s| {
+                    (
+                        smallest(s, |s, t| norm(&s.velocity(t))),
+                        smallest(s, Segment::path_speed_mm_per_s),
+                    )
+                })
                 .unzip();
             let lowest = speed.into_iter().fold(f64::INFINITY, f64::min);
             let expected = feed * (turn / 2.0).cos();
-            assert!((lowest - expected).abs() < 1e-6 * feed, "{filter}, turn {turn}: {lowest}, not {expected}");
+            assert!(
+                (lowest - expected).abs() < 1e-6 * feed,
+                "{filter}, turn {turn}: {lowest}, not {expected}"
+            );
             let declared = path.into_iter().fold(f64::INFINITY, f64::min);
-            assert!((declared - expected).abs() < 1e-4 * feed, "{filter}, turn {turn}: path speed {declared}");
+            assert!(
+                (declared - expected).abs() < 1e-4 * feed,
+                "{filter}, turn {turn}: path speed {declared}"
+            );
         }
     }
 }

@@ -7,5 +7,12 @@ static COUNTING: CountingAllocator = CountingAllocator;
 
 #[test]
 fn it_conforms() {
-    judge(tandem_after_interpolation::PLUGIN, &Setup { programs: 3, ..Setup::default() }).assert_conforms();
+    judge(
+        tandem_after_interpolation::PLUGIN,
+        &Setup {
+            programs: 3,
+            ..Setup::default()
+        },
+    )
+    .assert_conforms();
 }

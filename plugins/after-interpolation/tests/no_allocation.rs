@@ -10,7 +10,9 @@ use tandem_rig::feed;
 
 #[test]
 fn a_steady_stream_does_not_allocate() {
-    let points: Vec<_> = (1..4000_u32).map(|k| [f64::from(k) * 0.05, f64::from(k % 2) * 0.01, 0.0]).collect();
+    let points: Vec<_> = (1..4000_u32)
+        .map(|k| [f64::from(k) * 0.05, f64::from(k % 2) * 0.01, 0.0])
+        .collect();
     let blocks = polyline(&points, 50.0);
     for filter in FILTERS {
         let opening = heap_use_of(|| drop(open(filter, 50.0, &context(0.001))));

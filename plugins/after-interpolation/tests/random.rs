@@ -11,14 +11,22 @@ use tandem_sdk::{AxisVector, Block, PathMode};
 
 /// Lines and arcs of very different length, feed and direction, some with an exact stop.
 fn programs() -> impl Strategy<Value = Vec<Block>> {
-    let step = ([-20.0..20.0_f64, -20.0..20.0, -5.0..5.0], -3.0..1.0_f64, 5.0..150.0_f64, -6.0..6.0_f64, 0..8_u32);
+    let step = (
+        [-20.0..20.0_f64, -20.0..20.0, -5.0..5.0],
+        -3.0..1.0_f64,
+        5.0..150.0_f64,
+        -6.0..6.0_f64,
+        0..8_u32,
+    );
     proptest::collection::vec(step, 1..12).prop_map(|steps| {
         let mut at = AxisVector::ZERO;
         let mut blocks = Vec::new();
         for ([x, y, z], decade, feed, sweep, kind) in steps {
             let [x, y, z] = [x, y, z].map(|v| v * 10_f64.powf(decade));
             let mut block = match kind {
-                0..3 if sweep.abs() > 0.1 && x.hypot(y) > 0.01 => arc(&at, [at[0] + x, at[1] + y], sweep, feed),
+                0..3 if sweep.abs() > 0.1 && x.hypot(y) > 0.01 => {
+                    arc(&at, [at[0] + x, at[1] + y], sweep, feed)
+                }
                 _ => line(&at, &[at[0] + x, at[1] + y, at[2] + z], feed),
             };
             if kind == 7 {
@@ -48,7 +56,9 @@ fn commanded(blocks: &[Block], t_s: f64) -> AxisVector {
     for block in blocks {
         let time_s = block.length_mm / block.feed_mm_per_s;
         if left_s < time_s {
-            return Path::new(block).unwrap().position(left_s * block.feed_mm_per_s);
+            return Path::new(block)
+                .unwrap()
+                .position(left_s * block.feed_mm_per_s);
         }
         left_s -= time_s;
     }
@@ -58,7 +68,9 @@ fn commanded(blocks: &[Block], t_s: f64) -> AxisVector {
 /// The filters as difference equations on a grid of step `h`: nothing in common with the planner's closed forms.
 fn filtered(filter: &str, tau_s: f64, h: f64, blocks: &[Block], count: usize) -> Vec<AxisVector> {
     let start = blocks[0].start;
-    let raw: Vec<_> = (0..count).map(|k| commanded(blocks, k as f64 * h)).collect();
+    let raw: Vec<_> = (0..count)
+        .map(|k| commanded(blocks, k as f64 * h))
+        .collect();
     let average = |input: &[AxisVector], width: usize| -> Vec<AxisVector> {
         let at = |k: usize, age: usize| if k >= age { input[k - age] } else { start };
         // Trapezoids under the window, one added and one dropped at each step.
@@ -88,7 +100,11 @@ fn filtered(filter: &str, tau_s: f64, h: f64, blocks: &[Block], count: usize) ->
 /// Seeds of programs that failed are printed and kept beside this file.
 fn config() -> ProptestConfig {
     let seeds = FileFailurePersistence::WithSource("regressions");
-    ProptestConfig { cases: 96, failure_persistence: Some(Box::new(seeds)), ..ProptestConfig::default() }
+    ProptestConfig {
+        cases: 96,
+        failure_persistence: Some(Box::new(seeds)),
+        ..ProptestConfig::default()
+    }
 }
 
 proptest! {

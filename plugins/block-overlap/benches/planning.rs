@@ -16,11 +16,14 @@ fn main() {
 #[divan::bench(args = ["raster", "spiral"])]
 fn block_overlap(bencher: divan::Bencher, name: &str) {
     let blocks = program(name);
-    let mut planner = BlockOverlap::new(&Options::default(), &context(&[1000.0; 3], 0.001)).unwrap();
-    bencher.counter(ItemsCount::new(blocks.len())).bench_local(|| {
-        let mut away = Away::default();
-        planner.reset(&AxisVector::ZERO);
-        stream(&mut planner, &blocks, 0.008, &mut away);
-        away.segments
-    });
+    let mut planner =
+        BlockOverlap::new(&Options::default(), &context(&[1000.0; 3], 0.001)).unwrap();
+    bencher
+        .counter(ItemsCount::new(blocks.len()))
+        .bench_local(|| {
+            let mut away = Away::default();
+            planner.reset(&AxisVector::ZERO);
+            stream(&mut planner, &blocks, 0.008, &mut away);
+            away.segments
+        });
 }

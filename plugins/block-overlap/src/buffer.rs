@@ -83,14 +83,23 @@ impl Buffer {
         let entries = vec![Entry::blank(); room];
         let corners = vec![Corner::default(); room];
         Self {
-            ring: Ring { entries, corners, mask: room - 1, first: 0, end: 0 },
+            ring: Ring {
+                entries,
+                corners,
+                mask: room - 1,
+                first: 0,
+                end: 0,
+            },
             capacity,
             plan: Plan::new(capacity),
             feeds: vec![0.0; room],
             modes: vec![Mode::Rest; room],
             planned: 0,
             finished: false,
-            before: Before { feed_mm_per_s: None, tau_s },
+            before: Before {
+                feed_mm_per_s: None,
+                tau_s,
+            },
             up_s: 0.0,
         }
     }
@@ -116,7 +125,10 @@ impl Buffer {
         self.ring.end = 0;
         self.planned = 0;
         self.finished = false;
-        self.before = Before { feed_mm_per_s: None, tau_s };
+        self.before = Before {
+            feed_mm_per_s: None,
+            tau_s,
+        };
     }
 
     /// Adds the block that `write` puts into its slot.
@@ -129,7 +141,13 @@ impl Buffer {
             ring.corners[last] = Corner::new(rules, &ring.entries[last], &ring.entries[slot]);
         }
         let tau_s = ring.entries[slot].tau_s;
-        ring.corners[slot] = Corner { rest: true, tau_s, longest_s: tau_s, spare: 1.0, ..Corner::default() };
+        ring.corners[slot] = Corner {
+            rest: true,
+            tau_s,
+            longest_s: tau_s,
+            spare: 1.0,
+            ..Corner::default()
+        };
         ring.end += 1;
         self.finished = false;
     }
@@ -172,10 +190,27 @@ impl Buffer {
         let corner = self.ring.corners[slots[0]];
         let feed = self.feeds[slots[0]];
         let fixed = self.before.feed_mm_per_s.is_some();
-        let mut taken = Taken { number, feed_mm_per_s: feed, mode, corner, ..Taken::default() };
+        let mut taken = Taken {
+            number,
+            feed_mm_per_s: feed,
+            mode,
+            corner,
+            ..Taken::default()
+        };
         if !block.is_dwell() {
-            taken.up_s = if fixed { self.up_s } else { rest_ramp_s(rules, block, feed, self.before.tau_s) };
-            let feeds = [feed, if mode == Mode::Rest { feed } else { self.feeds[slots[1]] }];
+            taken.up_s = if fixed {
+                self.up_s
+            } else {
+                rest_ramp_s(rules, block, feed, self.before.tau_s)
+            };
+            let feeds = [
+                feed,
+                if mode == Mode::Rest {
+                    feed
+                } else {
+                    self.feeds[slots[1]]
+                },
+            ];
             let blocks = [block, if mode == Mode::Rest { block } else { next }];
             taken.join = Join::new(rules, &corner, blocks, feeds, mode);
             taken.next_feed_mm_per_s = feeds[1];

@@ -28,14 +28,20 @@ impl Item<'_> {
     /// Whether the block may be joined to the next one in full overlap at most at `flow_mm_per_s`, and otherwise.
     fn possible(&self, corner: &Corner, flow_mm_per_s: f64) -> [bool; 2] {
         let kept = |feed: f64| !self.fixed || feed >= self.own_mm_per_s * (1.0 - ROUNDING);
-        [!corner.rest && corner.cap_mm_per_s > 0.0 && kept(flow_mm_per_s), kept(self.ramped_mm_per_s)]
+        [
+            !corner.rest && corner.cap_mm_per_s > 0.0 && kept(flow_mm_per_s),
+            kept(self.ramped_mm_per_s),
+        ]
     }
 }
 
 /// Feeds that differ by less are the same.
 pub const ROUNDING: f64 = 1e-12;
 
-#[allow(clippy::struct_field_names, reason = "all of them are named after their unit")]
+#[allow(
+    clippy::struct_field_names,
+    reason = "all of them are named after their unit"
+)]
 /// The state of the way at one junction: what both modes have cost so far, s; infinite where a mode is impossible.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
@@ -50,11 +56,21 @@ const LATE: usize = 1;
 
 impl Way {
     /// At rest, or where the feed of the next block is fixed already.
-    pub const START: Self = Self { cost_s: [f64::INFINITY, 0.0], highest_mm_per_s: 0.0, lent_s: 0.0 };
+    pub const START: Self = Self {
+        cost_s: [f64::INFINITY, 0.0],
+        highest_mm_per_s: 0.0,
+        lent_s: 0.0,
+    };
 
     /// The way over `item` to `corner`, which leads to `next`; gives it and, for each mode there, the better mode at the
     /// junction before.
-    pub fn over(&self, rules: &Rules, item: &Item<'_>, corner: &Corner, next: Option<&Item<'_>>) -> (Self, [Mode; 2]) {
+    pub fn over(
+        &self,
+        rules: &Rules,
+        item: &Item<'_>,
+        corner: &Corner,
+        next: Option<&Item<'_>>,
+    ) -> (Self, [Mode; 2]) {
         if item.block.is_dwell() {
             return (Self::START, [Mode::Late; 2]);
         }
@@ -67,21 +83,48 @@ impl Way {
         }
         let possible = item.possible(corner, flow_mm_per_s[0]);
         let ramp = |item: &Item<'_>| item.ramped_mm_per_s * item.block.slope_s2_per_mm;
-        let overlap_s = late_overlap_s(rules, corner, [item.block, next.block], lesser(ramp(item), ramp(next)));
+        let overlap_s = late_overlap_s(
+            rules,
+            corner,
+            [item.block, next.block],
+            lesser(ramp(item), ramp(next)),
+        );
         self.further(item, possible, flow_mm_per_s, overlap_s)
     }
 
     /// Full overlap holds neither block down: it is taken, and what came before no longer matters.
     fn freely(&self, item: &Item<'_>) -> (Self, [Mode; 2]) {
-        let way = Self { cost_s: [0.0, f64::INFINITY], highest_mm_per_s: f64::INFINITY, lent_s: 0.0 };
+        let way = Self {
+            cost_s: [0.0, f64::INFINITY],
+            highest_mm_per_s: f64::INFINITY,
+            lent_s: 0.0,
+        };
         let open = self.cost_s[FLOW] < f64::INFINITY && self.cost_s[LATE] < f64::INFINITY;
         let further_s = |from: usize| self.time_s(item, [from, FLOW], item.own_mm_per_s, 0.0);
-        let ways_s = [FLOW, LATE].map(|from| self.cost_s[from] + if open { further_s(from) } else { 0.0 });
-        (way, [if ways_s[FLOW] <= ways_s[LATE] { Mode::Flow } else { Mode::Late }; 2])
+        let ways_s =
+            [FLOW, LATE].map(|from| self.cost_s[from] + if open { further_s(from) } else { 0.0 });
+        (
+            way,
+            [if ways_s[FLOW] <= ways_s[LATE] {
+                Mode::Flow
+            } else {
+                Mode::Late
+            }; 2],
+        )
     }
 
-    fn further(&self, item: &Item<'_>, possible: [bool; 2], flow: [f64; 2], overlap_s: f64) -> (Self, [Mode; 2]) {
-        let mut way = Self { cost_s: [f64::INFINITY; 2], highest_mm_per_s: flow[1], lent_s: overlap_s };
+    fn further(
+        &self,
+        item: &Item<'_>,
+        possible: [bool; 2],
+        flow: [f64; 2],
+        overlap_s: f64,
+    ) -> (Self, [Mode; 2]) {
+        let mut way = Self {
+            cost_s: [f64::INFINITY; 2],
+            highest_mm_per_s: flow[1],
+            lent_s: overlap_s,
+        };
         let mut before = [Mode::Flow; 2];
         for to in [FLOW, LATE] {
             for from in [FLOW, LATE] {
@@ -99,9 +142,19 @@ impl Way {
     }
 
     /// Time of a block: length over feed, and half of each ramp that nothing overlaps.
-    fn time_s(&self, item: &Item<'_>, [from, to]: [usize; 2], flow_mm_per_s: f64, overlap_s: f64) -> f64 {
+    fn time_s(
+        &self,
+        item: &Item<'_>,
+        [from, to]: [usize; 2],
+        flow_mm_per_s: f64,
+        overlap_s: f64,
+    ) -> f64 {
         let late = (from == LATE) || (to == LATE);
-        let mut feed = if late { item.ramped_mm_per_s } else { item.reach_mm_per_s };
+        let mut feed = if late {
+            item.ramped_mm_per_s
+        } else {
+            item.reach_mm_per_s
+        };
         if from == FLOW {
             feed = lesser(feed, self.highest_mm_per_s);
         }
@@ -109,7 +162,13 @@ impl Way {
             feed = lesser(feed, flow_mm_per_s);
         }
         let ramp_s = feed * item.block.slope_s2_per_mm;
-        let side = |late: bool, overlap_s: f64| if late { (ramp_s - lesser(overlap_s, ramp_s)) / 2.0 } else { 0.0 };
+        let side = |late: bool, overlap_s: f64| {
+            if late {
+                (ramp_s - lesser(overlap_s, ramp_s)) / 2.0
+            } else {
+                0.0
+            }
+        };
         item.block.length_mm / feed + side(from == LATE, self.lent_s) + side(to == LATE, overlap_s)
     }
 
@@ -120,7 +179,11 @@ impl Way {
 
     /// The better mode at the last junction.
     pub fn best(&self) -> Mode {
-        if self.cost_s[FLOW] <= self.cost_s[LATE] { Mode::Flow } else { Mode::Late }
+        if self.cost_s[FLOW] <= self.cost_s[LATE] {
+            Mode::Flow
+        } else {
+            Mode::Late
+        }
     }
 }
 
@@ -131,9 +194,15 @@ fn flow_mm_per_s(item: &Item<'_>, corner: &Corner, next: &Item<'_>) -> [f64; 2] 
         return feeds;
     }
     if feeds[0] > feeds[1] {
-        feeds[0] = lesser(feeds[0], corner.lift_mm_per_s(feeds[1], item.block.slope_s2_per_mm));
+        feeds[0] = lesser(
+            feeds[0],
+            corner.lift_mm_per_s(feeds[1], item.block.slope_s2_per_mm),
+        );
     } else {
-        feeds[1] = lesser(feeds[1], corner.lift_mm_per_s(feeds[0], next.block.slope_s2_per_mm));
+        feeds[1] = lesser(
+            feeds[1],
+            corner.lift_mm_per_s(feeds[0], next.block.slope_s2_per_mm),
+        );
     }
     feeds
 }

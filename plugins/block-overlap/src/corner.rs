@@ -35,32 +35,65 @@ impl Corner {
     pub fn new(rules: &Rules, before: &Entry, after: &Entry) -> Self {
         let tau_s = before.tau_s;
         let rest = before.rests_before(after);
-        let blank = Self { rest, tau_s, longest_s: tau_s, spare: 1.0, ..Self::default() };
+        let blank = Self {
+            rest,
+            tau_s,
+            longest_s: tau_s,
+            spare: 1.0,
+            ..Self::default()
+        };
         if rest {
             return blank;
         }
         let (turn, squares) = rules.turn(&before.directions[1], &after.directions[0]);
-        let span_mm = if rules.controlled { span_mm(rules, before, after, squares) } else { f64::INFINITY };
+        let span_mm = if rules.controlled {
+            span_mm(rules, before, after, squares)
+        } else {
+            f64::INFINITY
+        };
         if rules.limits == LimitMode::Off {
             let fastest = greater(before.feed_mm_per_s, after.feed_mm_per_s);
             let ticks = most_ticks(span_mm / (fastest * rules.tick_s));
             if ticks < 1.0 {
-                return Self { rest: true, tight: true, ..blank };
+                return Self {
+                    rest: true,
+                    tight: true,
+                    ..blank
+                };
             }
             let tau_s = lesser(tau_s, ticks * rules.tick_s);
-            return Self { tau_s, cap_mm_per_s: f64::INFINITY, room_mm: f64::INFINITY, span_mm, ..blank };
+            return Self {
+                tau_s,
+                cap_mm_per_s: f64::INFINITY,
+                room_mm: f64::INFINITY,
+                span_mm,
+                ..blank
+            };
         }
         let shorter = lesser(before.length_mm, after.length_mm);
         // Without corner control a short block is slowed by its constants; longer ones would not fit into it.
-        let fits = rules.shorten || before.reach_mm <= before.length_mm && after.reach_mm <= after.length_mm;
+        let fits = rules.shorten
+            || before.reach_mm <= before.length_mm && after.reach_mm <= after.length_mm;
         let stretch = rules.limits == LimitMode::Stretch && fits;
-        let room_mm = if rules.shorten || stretch { lesser(span_mm, shorter) } else { span_mm };
+        let room_mm = if rules.shorten || stretch {
+            lesser(span_mm, shorter)
+        } else {
+            span_mm
+        };
         let longest_s = if stretch { f64::INFINITY } else { tau_s };
         let bend = ARC_OVERLAP * greater(before.bend, after.bend);
         let cap = cap_mm_per_s(turn, room_mm, longest_s, bend);
         let bent = bend * lesser(cap, greater(before.feed_mm_per_s, after.feed_mm_per_s)).powi(2);
         let spare = 1.0 - lesser(bent, TURN_SHARE);
-        Self { turn_s2_per_mm: turn, span_mm, room_mm, longest_s, cap_mm_per_s: cap, spare, ..blank }
+        Self {
+            turn_s2_per_mm: turn,
+            span_mm,
+            room_mm,
+            longest_s,
+            cap_mm_per_s: cap,
+            spare,
+            ..blank
+        }
     }
 
     /// The highest feed of the faster of two blocks in full overlap where the slower has `slow_mm_per_s`; `slope` is
@@ -72,9 +105,13 @@ impl Corner {
             return self.cap_mm_per_s;
         }
         let level = slow_mm_per_s * (slope - self.turn_s2_per_mm);
-        let by_room = (level + (level * level + 4.0 * slope * self.spare * self.room_mm).sqrt()) / (2.0 * slope);
+        let by_room = (level + (level * level + 4.0 * slope * self.spare * self.room_mm).sqrt())
+            / (2.0 * slope);
         let by_time = (self.spare * self.longest_s + level) / slope;
-        greater(lesser(lesser(by_room, by_time), self.cap_mm_per_s), slow_mm_per_s)
+        greater(
+            lesser(lesser(by_room, by_time), self.cap_mm_per_s),
+            slow_mm_per_s,
+        )
     }
 }
 
@@ -82,7 +119,11 @@ impl Corner {
 /// F·τ that the tolerance allows, in ticks of travel. The chord between two samples lies inside the corner by its n-th part
 /// of a tick: `n + 1/n ≤ span`.
 fn most_ticks(span: f64) -> f64 {
-    if span < 2.0 { 0.0 } else { (f64::midpoint(span, (span * span - 4.0).sqrt()) + 1e-9).floor() }
+    if span < 2.0 {
+        0.0
+    } else {
+        (f64::midpoint(span, (span * span - 4.0).sqrt()) + 1e-9).floor()
+    }
 }
 
 /// The largest F with `F·g/τ + bend·F² ≤ TURN_SHARE` and `τ = min(longest, room/F)`.
@@ -91,7 +132,11 @@ fn cap_mm_per_s(turn: f64, room_mm: f64, longest_s: f64, bend: f64) -> f64 {
         return 0.0;
     }
     let square = turn / room_mm + bend;
-    let by_room = if square > 0.0 { (TURN_SHARE / square).sqrt() } else { f64::INFINITY };
+    let by_room = if square > 0.0 {
+        (TURN_SHARE / square).sqrt()
+    } else {
+        f64::INFINITY
+    };
     let linear = turn / longest_s;
     let by_time = match bend {
         0.0 if linear > 0.0 => TURN_SHARE / linear,
@@ -109,7 +154,11 @@ fn span_mm(rules: &Rules, before: &Entry, after: &Entry, squares: f64) -> f64 {
     let sharp = squares.sqrt() / 8.0;
     let curved = CURVED * (before.curvature_per_mm + after.curvature_per_mm) / 64.0;
     if allowed_mm <= 0.0 {
-        return if sharp < STRAIGHT && curved == 0.0 { f64::INFINITY } else { 0.0 };
+        return if sharp < STRAIGHT && curved == 0.0 {
+            f64::INFINITY
+        } else {
+            0.0
+        };
     }
     if curved == 0.0 {
         return allowed_mm / sharp;
@@ -128,7 +177,12 @@ const CURVED: f64 = 1.1;
 ///
 /// For equal feeds `F·τ/4·sin(θ/2)`. Else the point is at `s/(1−s) = r`, r the positive root of
 /// `b²·r³ + a·b·c·r² − a·b·c·r − a² = 0` with a and b half of feed times τ and c = cos θ. Does not allocate.
-pub fn corner_error_mm(before_mm_per_s: f64, after_mm_per_s: f64, tau_s: f64, turn_rad: f64) -> f64 {
+pub fn corner_error_mm(
+    before_mm_per_s: f64,
+    after_mm_per_s: f64,
+    tau_s: f64,
+    turn_rad: f64,
+) -> f64 {
     let a = before_mm_per_s * tau_s / 2.0;
     let b = after_mm_per_s * tau_s / 2.0;
     let c = turn_rad.cos();
@@ -140,7 +194,11 @@ pub fn corner_error_mm(before_mm_per_s: f64, after_mm_per_s: f64, tau_s: f64, tu
     let mut high = 2.0 * (1.0 + (a / b).max(1.0));
     for _ in 0..80 {
         let middle = f64::midpoint(low, high);
-        *(if value(middle) > 0.0 { &mut high } else { &mut low }) = middle;
+        *(if value(middle) > 0.0 {
+            &mut high
+        } else {
+            &mut low
+        }) = middle;
     }
     let s = low / (1.0 + low);
     let p = a * (1.0 - s) * (1.0 - s);

@@ -60,7 +60,9 @@ impl Drive {
 
     /// Whether the next block starts now.
     pub fn wants_next(&self) -> bool {
-        self.newer.as_ref().is_none_or(|newer| self.next_at.is_some_and(|at| newer.at >= at))
+        self.newer
+            .as_ref()
+            .is_none_or(|newer| self.next_at.is_some_and(|at| newer.at >= at))
     }
 
     /// Where the blocks driven so far end on the path of the run, mm.
@@ -113,7 +115,9 @@ impl Drive {
     /// The programmed position itself, for the sample at rest.
     fn rest(&mut self, ring: &Ring, sink: &mut dyn SegmentSink) {
         self.path_mm = self.path_mm();
-        let Some(newer) = self.newer.take() else { return };
+        let Some(newer) = self.newer.take() else {
+            return;
+        };
         let entry = ring.numbered(newer.number);
         let mut rest = Segment::rest(&entry.end, 0.0);
         rest.block = entry.index;
@@ -128,7 +132,10 @@ impl Drive {
         let Some(newer) = &self.newer else { return };
         let piece = newer.piece(ticks);
         let entry = ring.numbered(newer.number);
-        let older = self.older.as_ref().map(|older| (ring.numbered(older.number), older.piece(ticks)));
+        let older = self
+            .older
+            .as_ref()
+            .map(|older| (ring.numbered(older.number), older.piece(ticks)));
         let segment = &mut self.segment;
         segment.duration_s = piece.duration_s;
         segment.block = entry.index;
@@ -144,7 +151,11 @@ impl Drive {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
         }
         let start_mm = self.path_mm + piece.start_mm;
-        segment.path[..3].copy_from_slice(&[start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0]);
+        segment.path[..3].copy_from_slice(&[
+            start_mm,
+            piece.speed_mm_per_s,
+            piece.acceleration_mm_per_s2 / 2.0,
+        ]);
         if let Some((older, second)) = &older {
             segment.feed_mm_per_s = greater(segment.feed_mm_per_s, older.command_mm_per_s);
             segment.stop_deceleration_mm_per_s2 = self.overlap_stop[0];
@@ -152,7 +163,8 @@ impl Drive {
             segment.path[1] += second.speed_mm_per_s;
             segment.path[2] += second.acceleration_mm_per_s2 / 2.0;
         }
-        let curved = entry.arc.is_some() || older.as_ref().is_some_and(|(older, _)| older.arc.is_some());
+        let curved =
+            entry.arc.is_some() || older.as_ref().is_some_and(|(older, _)| older.arc.is_some());
         let moving = (older, (entry, piece));
         let coefficients = &mut segment.coefficients[..self.axes];
         if curved {
@@ -170,11 +182,19 @@ impl Drive {
 type Moving<'a> = (Option<(&'a Entry, SpeedPiece)>, (&'a Entry, SpeedPiece));
 
 fn feed(entry: &Entry) -> f64 {
-    if entry.kind == BlockKind::Rapid { f64::INFINITY } else { entry.command_mm_per_s }
+    if entry.kind == BlockKind::Rapid {
+        f64::INFINITY
+    } else {
+        entry.command_mm_per_s
+    }
 }
 
 fn flags(entry: &Entry) -> SegmentFlags {
-    if entry.kind == BlockKind::Rapid { SegmentFlags::RAPID } else { SegmentFlags::default() }
+    if entry.kind == BlockKind::Rapid {
+        SegmentFlags::RAPID
+    } else {
+        SegmentFlags::default()
+    }
 }
 
 /// Straight blocks: what moves adds up. What is left of the older block is negative and ends in exactly nothing.
@@ -182,8 +202,15 @@ fn flags(entry: &Entry) -> SegmentFlags {
 fn parabola(moving: &Moving<'_>, clear: bool, coefficients: &mut [[f64; 6]]) {
     let (older, (entry, piece)) = moving;
     let direction = &entry.directions[0];
-    let [mm, speed, half] = [piece.start_mm, piece.speed_mm_per_s, piece.acceleration_mm_per_s2 / 2.0];
-    for (c, (start, direction)) in coefficients.iter_mut().zip(entry.start.0.iter().zip(&direction.0)) {
+    let [mm, speed, half] = [
+        piece.start_mm,
+        piece.speed_mm_per_s,
+        piece.acceleration_mm_per_s2 / 2.0,
+    ];
+    for (c, (start, direction)) in coefficients
+        .iter_mut()
+        .zip(entry.start.0.iter().zip(&direction.0))
+    {
         c[0] = start + direction * mm;
         c[1] = direction * speed;
         c[2] = direction * half;
@@ -218,6 +245,10 @@ fn quintic((older, newer): &Moving<'_>, duration_s: f64, coefficients: &mut [[f6
         }
     }
     for (axis, c) in coefficients.iter_mut().enumerate() {
-        *c = hermite(ends[0].map(|v| v[axis]), ends[1].map(|v| v[axis]), duration_s);
+        *c = hermite(
+            ends[0].map(|v| v[axis]),
+            ends[1].map(|v| v[axis]),
+            duration_s,
+        );
     }
 }

@@ -63,7 +63,10 @@ pub struct Entry {
 impl Entry {
     /// What names it in segments.
     pub fn id(&self) -> BlockId {
-        BlockId { index: self.index, line: self.line }
+        BlockId {
+            index: self.index,
+            line: self.line,
+        }
     }
 
     /// A dwell of no duration.
@@ -102,7 +105,11 @@ impl Entry {
         self.tau_s = taus_s[1];
         self.command_mm_per_s = block.command_feed_mm_per_s();
         let stated = block.path_tolerance_mm;
-        self.tolerance_mm = if stated.is_nan() { rules.tolerance_mm } else { stated };
+        self.tolerance_mm = if stated.is_nan() {
+            rules.tolerance_mm
+        } else {
+            stated
+        };
         self.start = block.start;
         self.end = block.end;
         self.bend = 0.0;
@@ -133,13 +140,18 @@ impl Entry {
     /// Slope and bend of an arc: over its whole circle, whatever part of it is driven. A joint that is a sum of axes sways
     /// with the circle and rises with the helix at once: for the rise it has what turning leaves, `√(0.6² + 0.8²)` being all.
     fn set_arc(&mut self, block: &Block, rules: &Rules) {
-        let Some(path) = Path::with_lanes(block, rules.joint_lanes) else { return };
+        let Some(path) = Path::with_lanes(block, rules.joint_lanes) else {
+            return;
+        };
         self.length_mm = path.length_mm();
         self.directions = [path.direction(0.0), path.direction(self.length_mm)];
         let turn = path.rad_per_mm();
         let radius_mm = path.radius_mm();
         let plane = block.arc.plane.map(|axis| axis as usize);
-        let mut weak = greater(rules.per_acceleration[plane[0]], rules.per_acceleration[plane[1]]);
+        let mut weak = greater(
+            rules.per_acceleration[plane[0]],
+            rules.per_acceleration[plane[1]],
+        );
         let mut rise = self.directions[0];
         rise[plane[0]] = 0.0;
         rise[plane[1]] = 0.0;
@@ -148,7 +160,10 @@ impl Entry {
             lanes.fill(&mut rise);
             for (weights, lane) in lanes.weights().iter().zip(lanes.first()..) {
                 let per_acceleration = rules.per_acceleration[lane];
-                weak = greater(weak, per_acceleration * weights[plane[0]].hypot(weights[plane[1]]));
+                weak = greater(
+                    weak,
+                    per_acceleration * weights[plane[0]].hypot(weights[plane[1]]),
+                );
                 rising = greater(rising, per_acceleration * rise[lane].abs());
             }
         }
@@ -157,7 +172,10 @@ impl Entry {
         self.curvature_per_mm = radius_mm * turn * turn;
         self.bend = self.curvature_per_mm * weak;
         self.set_feed(block, rules, &path.max_direction());
-        self.arc = Some(Arc { path, fit: Builder::new(&path, 0.0) });
+        self.arc = Some(Arc {
+            path,
+            fit: Builder::new(&path, 0.0),
+        });
     }
 
     /// `most` is the largest share of each axis in the path.
@@ -166,12 +184,21 @@ impl Entry {
         let command = block.feed_mm_per_s * rules.feed_ratio;
         let policy = block.feed_cap_mm_per_s;
         let mut feed = lesser(command, policy);
-        for (speed, share) in rules.axis_mm_per_s[usize::from(rapid)].0.iter().zip(&most.0).take(rules.axes) {
+        for (speed, share) in rules.axis_mm_per_s[usize::from(rapid)]
+            .0
+            .iter()
+            .zip(&most.0)
+            .take(rules.axes)
+        {
             if feed * share.abs() > *speed {
                 feed = speed / share.abs();
             }
         }
-        let turning = if self.bend > 0.0 { (TURN_SHARE / self.bend).sqrt() } else { f64::INFINITY };
+        let turning = if self.bend > 0.0 {
+            (TURN_SHARE / self.bend).sqrt()
+        } else {
+            f64::INFINITY
+        };
         self.reason = match () {
             () if turning < feed => LimitedBy::Curvature,
             () if feed >= command || rapid => LimitedBy::Feed,

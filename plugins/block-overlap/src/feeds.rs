@@ -106,9 +106,16 @@ impl Plan {
             let lost_s = self.lost_s;
             self.swap();
             self.capped = round + 1 == ROUNDS;
-            let chosen = if round + 2 == ROUNDS { self.overlap_all(ring) } else { self.choose(rules, ring) };
-            let time_s =
-                if chosen && self.settle(rules, ring) { self.time_s(rules, ring, tau_s) } else { f64::INFINITY };
+            let chosen = if round + 2 == ROUNDS {
+                self.overlap_all(ring)
+            } else {
+                self.choose(rules, ring)
+            };
+            let time_s = if chosen && self.settle(rules, ring) {
+                self.time_s(rules, ring, tau_s)
+            } else {
+                f64::INFINITY
+            };
             if time_s < least_s {
                 least_s = time_s;
             } else {
@@ -153,11 +160,13 @@ impl Plan {
                 Mode::Late => ramp_s / 2.0,
                 Mode::Rest => rest_ramp_s(rules, block, feed, tau_s) / 2.0,
             };
-            time_s += block.length_mm / feed + side(before, tau_s) + side(mode, ring.corner(k).tau_s);
+            time_s +=
+                block.length_mm / feed + side(before, tau_s) + side(mode, ring.corner(k).tau_s);
             if mode == Mode::Late {
                 let next = ring.entry(k + 1);
                 let next_s = self.feeds[k + 1] * next.slope_s2_per_mm;
-                time_s -= late_overlap_s(rules, ring.corner(k), [block, next], lesser(ramp_s, next_s));
+                time_s -=
+                    late_overlap_s(rules, ring.corner(k), [block, next], lesser(ramp_s, next_s));
             }
             tau_s = ring.corner(k).tau_s;
             before = mode;
@@ -176,8 +185,16 @@ impl Plan {
             if !block.is_dwell() {
                 tau_s = corner.tau_s;
             }
-            let own = if rules.shorten { block.feed_mm_per_s } else { slowed_mm_per_s(block, taus_s) };
-            let ramped = if rules.shorten { block.triangle_mm_per_s } else { ramped_mm_per_s(block, taus_s) };
+            let own = if rules.shorten {
+                block.feed_mm_per_s
+            } else {
+                slowed_mm_per_s(block, taus_s)
+            };
+            let ramped = if rules.shorten {
+                block.triangle_mm_per_s
+            } else {
+                ramped_mm_per_s(block, taus_s)
+            };
             self.own.push([own, lesser(own, ramped)]);
         }
         if let (Some(feed), Some(own)) = (before.feed_mm_per_s, self.own.first_mut()) {
@@ -188,7 +205,13 @@ impl Plan {
     fn item<'a>(&self, ring: &'a Ring, k: usize) -> Item<'a> {
         let [own_mm_per_s, ramped_mm_per_s] = self.own[k];
         let reach_mm_per_s = self.reach[k];
-        Item { block: ring.entry(k), own_mm_per_s, reach_mm_per_s, ramped_mm_per_s, fixed: self.fixed && k == 0 }
+        Item {
+            block: ring.entry(k),
+            own_mm_per_s,
+            reach_mm_per_s,
+            ramped_mm_per_s,
+            fixed: self.fixed && k == 0,
+        }
     }
 
     fn choose(&mut self, rules: &Rules, ring: &Ring) -> bool {
@@ -197,7 +220,11 @@ impl Plan {
         self.better.clear();
         let mut item = self.item(ring, 0);
         for k in 0..count {
-            let next = if k + 1 < count { Some(self.item(ring, k + 1)) } else { None };
+            let next = if k + 1 < count {
+                Some(self.item(ring, k + 1))
+            } else {
+                None
+            };
             let (further, better) = way.over(rules, &item, ring.corner(k), next.as_ref());
             if further.is_closed() {
                 return false;
@@ -233,7 +260,11 @@ impl Plan {
         for k in 0..ring.len() {
             let after = self.modes[k];
             let [own, ramped] = self.own[k];
-            let mut feed = if before == Mode::Flow && after == Mode::Flow { own } else { ramped };
+            let mut feed = if before == Mode::Flow && after == Mode::Flow {
+                own
+            } else {
+                ramped
+            };
             if self.capped {
                 feed = lesser(feed, self.reach[k]);
             }
@@ -255,8 +286,12 @@ impl Plan {
             if self.modes[k] != Mode::Flow || self.feeds[k] <= self.feeds[k + 1] {
                 continue;
             }
-            let lift = ring.corner(k).lift_mm_per_s(self.feeds[k + 1], ring.entry(k).slope_s2_per_mm);
-            if self.feeds[k] <= lift * (1.0 + ROUNDING) || self.start_late(rules, ring, k, (k, lift)) {
+            let lift = ring
+                .corner(k)
+                .lift_mm_per_s(self.feeds[k + 1], ring.entry(k).slope_s2_per_mm);
+            if self.feeds[k] <= lift * (1.0 + ROUNDING)
+                || self.start_late(rules, ring, k, (k, lift))
+            {
                 continue;
             }
             if self.fixed && k == 0 {
@@ -273,7 +308,9 @@ impl Plan {
             if self.modes[k] != Mode::Flow || self.feeds[k + 1] <= self.feeds[k] {
                 continue;
             }
-            let lift = ring.corner(k).lift_mm_per_s(self.feeds[k], ring.entry(k + 1).slope_s2_per_mm);
+            let lift = ring
+                .corner(k)
+                .lift_mm_per_s(self.feeds[k], ring.entry(k + 1).slope_s2_per_mm);
             if self.feeds[k + 1] > lift && !self.start_late(rules, ring, k, (k + 1, lift)) {
                 self.lower(ring, k + 1, lift);
             }
@@ -295,7 +332,13 @@ impl Plan {
 
     /// Lets the block after junction `k` start late where that costs less than lowering the feed of one block to `lift`.
     /// Either feed comes down to what leaves room for its ramps.
-    fn start_late(&mut self, rules: &Rules, ring: &Ring, k: usize, (lowered, lift): (usize, f64)) -> bool {
+    fn start_late(
+        &mut self,
+        rules: &Rules,
+        ring: &Ring,
+        k: usize,
+        (lowered, lift): (usize, f64),
+    ) -> bool {
         let blocks = [ring.entry(k), ring.entry(k + 1)];
         let feeds = [self.feeds[k], self.feeds[k + 1]];
         let late = [0, 1].map(|i| lesser(feeds[i], self.own[k + i][1]));
@@ -303,15 +346,28 @@ impl Plan {
             return false;
         }
         let ramps_s = [0, 1].map(|i| late[i] * blocks[i].slope_s2_per_mm);
-        let overlap_s = late_overlap_s(rules, ring.corner(k), blocks, lesser(ramps_s[0], ramps_s[1]));
+        let overlap_s = late_overlap_s(
+            rules,
+            ring.corner(k),
+            blocks,
+            lesser(ramps_s[0], ramps_s[1]),
+        );
         // A ramp on the other side of a block becomes shorter with its feed.
-        let ramped =
-            [k == 0 && !self.fixed || k > 0 && self.modes[k - 1] != Mode::Flow, self.modes[k + 1] != Mode::Flow];
+        let ramped = [
+            k == 0 && !self.fixed || k > 0 && self.modes[k - 1] != Mode::Flow,
+            self.modes[k + 1] != Mode::Flow,
+        ];
         let longer_s = |i: usize, feed: f64| {
-            let saved_s = if ramped[i] { (feeds[i] - feed) * blocks[i].slope_s2_per_mm / 2.0 } else { 0.0 };
+            let saved_s = if ramped[i] {
+                (feeds[i] - feed) * blocks[i].slope_s2_per_mm / 2.0
+            } else {
+                0.0
+            };
             blocks[i].length_mm * (1.0 / feed - 1.0 / feeds[i]) - saved_s
         };
-        let late_s = f64::midpoint(ramps_s[0], ramps_s[1]) - overlap_s + longer_s(0, late[0]) + longer_s(1, late[1]);
+        let late_s = f64::midpoint(ramps_s[0], ramps_s[1]) - overlap_s
+            + longer_s(0, late[0])
+            + longer_s(1, late[1]);
         let chosen = late_s < longer_s(lowered - k, lift) || self.fixed && lowered == 0;
         if chosen {
             self.modes[k] = Mode::Late;
@@ -327,7 +383,10 @@ impl Plan {
         if k == 0 || backward || self.modes[k - 1] != Mode::Flow {
             return !(self.fixed && k == 0);
         }
-        self.feeds[k - 1] <= ring.corner(k - 1).lift_mm_per_s(feed, ring.entry(k - 1).slope_s2_per_mm)
+        self.feeds[k - 1]
+            <= ring
+                .corner(k - 1)
+                .lift_mm_per_s(feed, ring.entry(k - 1).slope_s2_per_mm)
     }
 
     /// The published rounding: whole ticks where both ends have the time constant, and the axes still take the feed.
@@ -343,9 +402,15 @@ impl Plan {
             if self.fixed && k == 0 || !self.is_plain(block, k, taus_s) {
                 continue;
             }
-            let feed = whole_ticks_mm_per_s(block, taus_s.map(|tau| tau / rules.tick_s), self.feeds[k], rules.tick_s);
+            let feed = whole_ticks_mm_per_s(
+                block,
+                taus_s.map(|tau| tau / rules.tick_s),
+                self.feeds[k],
+                rules.tick_s,
+            );
             let fits = |at: usize, feeds: [f64; 2]| {
-                self.modes[at] != Mode::Flow || is_flow(ring.corner(at), [ring.entry(at), ring.entry(at + 1)], feeds)
+                self.modes[at] != Mode::Flow
+                    || is_flow(ring.corner(at), [ring.entry(at), ring.entry(at + 1)], feeds)
             };
             if (k == 0 || fits(k - 1, [self.feeds[k - 1], feed]))
                 && (k + 1 == ring.len() || fits(k, [feed, self.feeds[k + 1]]))
@@ -373,7 +438,10 @@ fn whole_ticks_mm_per_s(block: &Entry, ticks: [f64; 2], feed: f64, tick_s: f64) 
     let [na, nd] = ticks.map(f64::round);
     let x = block.length_mm / (feed * tick_s);
     let n = greater(na, (x + (na - nd) / 2.0 - 1e-9).ceil());
-    lesser(block.length_mm / (tick_s * (n + (nd - na) / 2.0)), feed * (1.0 + 1e-11))
+    lesser(
+        block.length_mm / (tick_s * (n + (nd - na) / 2.0)),
+        feed * (1.0 + 1e-11),
+    )
 }
 
 /// Whether two feeds may meet in full overlap.
@@ -381,12 +449,16 @@ fn is_flow(corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2]) -> bool {
     let fast = usize::from(feeds[1] > feeds[0]);
     let change = (feeds[fast] - feeds[1 - fast]) * blocks[fast].slope_s2_per_mm;
     let turn = corner.turn_s2_per_mm;
-    feeds[1 - fast] * turn + change <= corner.spare * corner.tau_s && feeds[fast] * turn <= TURN_SHARE * corner.tau_s
+    feeds[1 - fast] * turn + change <= corner.spare * corner.tau_s
+        && feeds[fast] * turn <= TURN_SHARE * corner.tau_s
 }
 
 /// A block shorter than its time constants is slowed: `F ≤ l/((τa + τd)/2)`.
 fn slowed_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
-    lesser(block.feed_mm_per_s, 2.0 * block.length_mm / (taus_s[0] + taus_s[1]))
+    lesser(
+        block.feed_mm_per_s,
+        2.0 * block.length_mm / (taus_s[0] + taus_s[1]),
+    )
 }
 
 /// The same where a ramp may be longer than its time constant, because the axes ask for it: every combination holds.
@@ -397,5 +469,8 @@ fn ramped_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
         return f64::INFINITY;
     }
     let one = |tau: f64| ((tau * tau + 8.0 * h * l).sqrt() - tau) / (2.0 * h);
-    lesser(block.triangle_mm_per_s, lesser(one(taus_s[0]), one(taus_s[1])))
+    lesser(
+        block.triangle_mm_per_s,
+        lesser(one(taus_s[0]), one(taus_s[1])),
+    )
 }

@@ -39,7 +39,13 @@ const HALF: f64 = 0.5;
 
 impl Join {
     /// The junction `corner` between two blocks and their feeds.
-    pub fn new(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2], mode: Mode) -> Self {
+    pub fn new(
+        rules: &Rules,
+        corner: &Corner,
+        blocks: [&Entry; 2],
+        feeds: [f64; 2],
+        mode: Mode,
+    ) -> Self {
         match mode {
             Mode::Flow => Self::flow(rules, corner, blocks, feeds),
             Mode::Late => Self::late(rules, corner, blocks, feeds),
@@ -50,7 +56,12 @@ impl Join {
     /// At rest: each ramp as long as the time constant asks, or longer where the axes do.
     fn rest(rules: &Rules, tau_s: f64, blocks: [&Entry; 2], feeds: [f64; 2]) -> Self {
         let [down_s, up_s] = [0, 1].map(|i| rest_ramp_s(rules, blocks[i], feeds[i], tau_s));
-        Self { down_s, up_s, overlap_s: 0.0, stop_mm_per_s2: f64::INFINITY }
+        Self {
+            down_s,
+            up_s,
+            overlap_s: 0.0,
+            stop_mm_per_s2: f64::INFINITY,
+        }
     }
 
     fn flow(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2]) -> Self {
@@ -59,7 +70,11 @@ impl Join {
             let short = |i: usize| blocks[i].length_mm / feeds[i];
             let most = lesser(corner.span_mm / fastest, lesser(short(0), short(1)));
             let stretched = corner.longest_s.is_infinite();
-            let needed_s = if stretched { needed_s(corner, blocks, feeds) } else { 0.0 };
+            let needed_s = if stretched {
+                needed_s(corner, blocks, feeds)
+            } else {
+                0.0
+            };
             lesser(most, greater(corner.tau_s, needed_s))
         } else {
             corner.tau_s
@@ -67,11 +82,19 @@ impl Join {
         let slope = greater(blocks[0].slope_s2_per_mm, blocks[1].slope_s2_per_mm);
         let stop = if slope > 0.0 {
             let bent = ARC_OVERLAP * greater(blocks[0].bend, blocks[1].bend) * fastest * fastest;
-            greater(1.0 - fastest * corner.turn_s2_per_mm / tau_s - bent, MIN_STOP) / slope
+            greater(
+                1.0 - fastest * corner.turn_s2_per_mm / tau_s - bent,
+                MIN_STOP,
+            ) / slope
         } else {
             rules.weakest_mm_per_s2
         };
-        Self { down_s: tau_s, up_s: tau_s, overlap_s: tau_s, stop_mm_per_s2: stop }
+        Self {
+            down_s: tau_s,
+            up_s: tau_s,
+            overlap_s: tau_s,
+            stop_mm_per_s2: stop,
+        }
     }
 
     /// Ramps at the acceleration of the axes; in the overlap the remaining and the growing speed are in proportion to it.
@@ -82,15 +105,33 @@ impl Join {
         let overlap_s = late_overlap_s(rules, corner, blocks, ramp_s);
         let slope = greater(slopes[0], slopes[1]);
         if overlap_s < NO_OVERLAP_TICKS * rules.tick_s {
-            return Self { down_s, up_s, overlap_s: 0.0, stop_mm_per_s2: f64::INFINITY };
+            return Self {
+                down_s,
+                up_s,
+                overlap_s: 0.0,
+                stop_mm_per_s2: f64::INFINITY,
+            };
         }
         let turn = corner.turn_s2_per_mm / lesser(slopes[0], slopes[1]);
         let bent = bent_share(blocks, overlap_s);
         // A short overlap leaves half, a long one what turning leaves.
-        let turning = if turn + bent <= TURN_SHARE { 1.0 - turn - bent } else { 0.0 };
-        let halved = if overlap_s <= HALF * ramp_s { HALF } else { MIN_STOP };
+        let turning = if turn + bent <= TURN_SHARE {
+            1.0 - turn - bent
+        } else {
+            0.0
+        };
+        let halved = if overlap_s <= HALF * ramp_s {
+            HALF
+        } else {
+            MIN_STOP
+        };
         let left = greater(turning, halved);
-        Self { down_s, up_s, overlap_s, stop_mm_per_s2: left / slope }
+        Self {
+            down_s,
+            up_s,
+            overlap_s,
+            stop_mm_per_s2: left / slope,
+        }
     }
 }
 
@@ -103,12 +144,19 @@ fn needed_s(corner: &Corner, blocks: [&Entry; 2], feeds: [f64; 2]) -> f64 {
     let change_s = (feeds[fast] - feeds[1 - fast]) * blocks[fast].slope_s2_per_mm;
     let turn = corner.turn_s2_per_mm;
     let bent = 1.0 - corner.spare;
-    greater((feeds[1 - fast] * turn + change_s) / corner.spare, feeds[fast] * turn / greater(TURN_SHARE - bent, 1e-3))
+    greater(
+        (feeds[1 - fast] * turn + change_s) / corner.spare,
+        feeds[fast] * turn / greater(TURN_SHARE - bent, 1e-3),
+    )
 }
 
 /// How long the ramp of a block is that ends or starts at rest, s.
 pub fn rest_ramp_s(rules: &Rules, block: &Entry, feed_mm_per_s: f64, tau_s: f64) -> f64 {
-    let wanted_s = if rules.shorten { lesser(tau_s, block.length_mm / feed_mm_per_s) } else { tau_s };
+    let wanted_s = if rules.shorten {
+        lesser(tau_s, block.length_mm / feed_mm_per_s)
+    } else {
+        tau_s
+    };
     greater(wanted_s, feed_mm_per_s * block.slope_s2_per_mm)
 }
 
@@ -125,7 +173,11 @@ pub fn late_overlap_s(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], ramp_
     let bent = bent_share(blocks, 1.0);
     let bounded_s = |ramp_s: f64, spare: f64| {
         let most_s = lesser(longest_s, ramp_s);
-        if bent * most_s * most_s > spare { (spare / bent).sqrt() } else { most_s }
+        if bent * most_s * most_s > spare {
+            (spare / bent).sqrt()
+        } else {
+            most_s
+        }
     };
     // A right angle between two axes takes all of both, to rounding.
     let spare = 1.0 + ROUNDING - turn_share(rules, blocks);
@@ -133,7 +185,11 @@ pub fn late_overlap_s(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], ramp_
         return 0.0;
     }
     let half_s = bounded_s(HALF * ramp_s, spare);
-    if turn < TURN_SHARE { greater(half_s, bounded_s(ramp_s, lesser(spare, TURN_SHARE - turn))) } else { half_s }
+    if turn < TURN_SHARE {
+        greater(half_s, bounded_s(ramp_s, lesser(spare, TURN_SHARE - turn)))
+    } else {
+        half_s
+    }
 }
 
 /// What the axis that turns most needs of its acceleration while one ramp falls and the other rises, at most.

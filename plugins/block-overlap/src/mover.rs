@@ -38,7 +38,10 @@ impl Mover {
         let tick_s = rules.tick_s;
         let per_tick = 1.0 / tick_s;
         let [up, down] = [taken.up_s, taken.join.down_s].map(|s| round(s * per_tick, rules.grid));
-        let cruise = round(entry.length_mm / feed * per_tick + (up - down) / 2.0, rules.grid);
+        let cruise = round(
+            entry.length_mm / feed * per_tick + (up - down) / 2.0,
+            rules.grid,
+        );
         let slow_from = greater(up, cruise);
         let slope = entry.slope_s2_per_mm;
         // A block without a ramp begins behind its first knot.
@@ -47,7 +50,11 @@ impl Mover {
         Some(Self {
             at: 0.0,
             phase,
-            stop_mm_per_s2: if slope > 0.0 { 1.0 / slope } else { rules.weakest_mm_per_s2 },
+            stop_mm_per_s2: if slope > 0.0 {
+                1.0 / slope
+            } else {
+                rules.weakest_mm_per_s2
+            },
             number: taken.number,
             length_mm: entry.length_mm,
             feed_mm_per_s: feed,
@@ -67,7 +74,11 @@ impl Mover {
         let [_, slow_from, end] = self.knots;
         // A full overlap starts with the deceleration, to the last bit: else one block would speed up alone.
         let before_end = overlap_s / self.tick_s;
-        if (end - before_end - slow_from).abs() < SAME_TICKS { slow_from } else { end - before_end }
+        if (end - before_end - slow_from).abs() < SAME_TICKS {
+            slow_from
+        } else {
+            end - before_end
+        }
     }
 
     /// Length, mm.
@@ -83,14 +94,19 @@ impl Mover {
     /// Ticks to where its acceleration next changes.
     #[inline]
     pub fn left(&self) -> f64 {
-        self.knots.get(self.phase).map_or(0.0, |knot| knot - self.at)
+        self.knots
+            .get(self.phase)
+            .map_or(0.0, |knot| knot - self.at)
     }
 
     /// The longest piece from here, at most `most`, that one polynomial fits, ticks.
     #[inline]
     pub fn fitted(&self, entry: &Entry, most: f64) -> f64 {
         let Some(arc) = &entry.arc else { return most };
-        lesser(most, arc.fit.longest_s(&arc.path, &self.piece(most)) / self.tick_s)
+        lesser(
+            most,
+            arc.fit.longest_s(&arc.path, &self.piece(most)) / self.tick_s,
+        )
     }
 
     /// Moves on; a knot is met exactly.
@@ -113,15 +129,30 @@ impl Mover {
         if self.phase == 0 {
             let speed = self.accelerations[0] * at * tick_s;
             let start_mm = speed * at * tick_s / 2.0;
-            SpeedPiece { start_mm, speed_mm_per_s: speed, acceleration_mm_per_s2: self.accelerations[0], duration_s }
+            SpeedPiece {
+                start_mm,
+                speed_mm_per_s: speed,
+                acceleration_mm_per_s2: self.accelerations[0],
+                duration_s,
+            }
         } else if self.phase == 1 {
             let start_mm = feed * tick_s * (at - up / 2.0);
-            SpeedPiece { start_mm, speed_mm_per_s: feed, acceleration_mm_per_s2: 0.0, duration_s }
+            SpeedPiece {
+                start_mm,
+                speed_mm_per_s: feed,
+                acceleration_mm_per_s2: 0.0,
+                duration_s,
+            }
         } else {
             let left = end - at;
             let speed = -self.accelerations[1] * left * tick_s;
             let start_mm = self.length_mm - speed * left * tick_s / 2.0;
-            SpeedPiece { start_mm, speed_mm_per_s: speed, acceleration_mm_per_s2: self.accelerations[1], duration_s }
+            SpeedPiece {
+                start_mm,
+                speed_mm_per_s: speed,
+                acceleration_mm_per_s2: self.accelerations[1],
+                duration_s,
+            }
         }
     }
 }
@@ -134,5 +165,9 @@ fn round(ticks: f64, grid: bool) -> f64 {
         return ticks;
     }
     let whole = ticks.round();
-    if (ticks - whole).abs() < 1e-7 { whole } else { ticks }
+    if (ticks - whole).abs() < 1e-7 {
+        whole
+    } else {
+        ticks
+    }
 }

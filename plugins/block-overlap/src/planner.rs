@@ -2,8 +2,8 @@
 
 use tandem_motion::blocks::{self, BlockWriter};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, Planner, PlannerContext, PlannerDescription,
-    PluginError, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, Planner, PlannerContext,
+    PlannerDescription, PluginError, SegmentSink,
 };
 
 use crate::buffer::{Buffer, Taken};
@@ -47,10 +47,14 @@ impl BlockOverlap {
         if !(4..=MAX_BUFFER_BLOCKS).contains(&options.buffer_blocks) {
             let asked = options.buffer_blocks;
             let most = MAX_BUFFER_BLOCKS;
-            return Err(PluginError::new(format!("buffer_blocks = {asked}: from 4 to {most}")));
+            return Err(PluginError::new(format!(
+                "buffer_blocks = {asked}: from 4 to {most}"
+            )));
         }
         if !(context.time_constant_s > 0.0 && context.time_constant_s.is_finite()) {
-            return Err(PluginError::fixed("block-overlap needs motion.time_constant_ms above zero"));
+            return Err(PluginError::fixed(
+                "block-overlap needs motion.time_constant_ms above zero",
+            ));
         }
         let rules = Rules::new(options, context);
         let tau_s = rules.on_tick_s(context.time_constant_s);
@@ -72,7 +76,11 @@ impl BlockOverlap {
     /// The time constant of a block, on a tick, s. Most blocks state the one of the block before.
     fn tau_s(&mut self, block: &Block) -> f64 {
         let stated = block.time_constant_s;
-        let stated_s = if stated.is_nan() { self.context.time_constant_s } else { stated };
+        let stated_s = if stated.is_nan() {
+            self.context.time_constant_s
+        } else {
+            stated
+        };
         if stated_s != self.stated_s {
             self.stated_s = stated_s;
             self.on_tick_s = self.rules.on_tick_s(stated_s);
@@ -82,18 +90,38 @@ impl BlockOverlap {
 
     /// Takes the next block out of the buffer; `false` where there is none.
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let Some(taken) = self.buffer.pop(&self.rules) else { return false };
+        let Some(taken) = self.buffer.pop(&self.rules) else {
+            return false;
+        };
         let entry = self.buffer.ring().numbered(taken.number);
         let Some(mover) = Mover::new(&self.rules, entry, &taken) else {
-            self.writer.begin_dwell(entry.id(), &entry.end, entry.dwell_s, self.drive.path_mm(), sink);
+            self.writer.begin_dwell(
+                entry.id(),
+                &entry.end,
+                entry.dwell_s,
+                self.drive.path_mm(),
+                sink,
+            );
             return true;
         };
         let time_s = mover.end() * self.rules.tick_s - taken.join.overlap_s;
-        let end_mm_per_s = passing(taken.next_feed_mm_per_s, taken.join.overlap_s, taken.join.up_s);
-        let limited_by = limited_by(&self.rules, entry, self.buffer.ring().numbered(taken.number + 1), &taken);
+        let end_mm_per_s = passing(
+            taken.next_feed_mm_per_s,
+            taken.join.overlap_s,
+            taken.join.up_s,
+        );
+        let limited_by = limited_by(
+            &self.rules,
+            entry,
+            self.buffer.ring().numbered(taken.number + 1),
+            &taken,
+        );
         let feeds_mm_per_s = [self.start_mm_per_s, taken.feed_mm_per_s, end_mm_per_s];
         let report = blocks::report(entry.index, limited_by, feeds_mm_per_s, time_s);
-        sink.block(&BlockReport { time_constant_s: constant_s(&taken), ..report });
+        sink.block(&BlockReport {
+            time_constant_s: constant_s(&taken),
+            ..report
+        });
         self.start_mm_per_s = passing(taken.feed_mm_per_s, taken.join.overlap_s, taken.join.down_s);
         self.drive.start(mover, &taken);
         true
@@ -107,7 +135,11 @@ impl BlockOverlap {
         if self.drive.wants_next() {
             return self.begin(sink).then_some(0.0);
         }
-        Some(self.drive.step(self.buffer.ring(), left_s / self.rules.tick_s, sink) * self.rules.tick_s)
+        Some(
+            self.drive
+                .step(self.buffer.ring(), left_s / self.rules.tick_s, sink)
+                * self.rules.tick_s,
+        )
     }
 }
 
@@ -123,7 +155,9 @@ impl Planner for BlockOverlap {
 
     fn check(&self, block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         if block.kind == BlockKind::Nurbs {
-            return Err(PluginError::fixed("block-overlap drives lines and arcs; for NURBS use planner nurbs"));
+            return Err(PluginError::fixed(
+                "block-overlap drives lines and arcs; for NURBS use planner nurbs",
+            ));
         }
         blocks::check(block, &self.context.axes)?;
         let constant_s = block.time_constant_s;
@@ -141,7 +175,8 @@ impl Planner for BlockOverlap {
         self.finished = false;
         let taus_s = [self.last_tau_s, self.tau_s(block)];
         let rules = &self.rules;
-        self.buffer.push(rules, |entry| entry.set(block, rules, taus_s));
+        self.buffer
+            .push(rules, |entry| entry.set(block, rules, taus_s));
         if block.kind != BlockKind::Dwell {
             self.last_tau_s = taus_s[1];
         }
@@ -153,7 +188,11 @@ impl Planner for BlockOverlap {
         self.finished = true;
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         while duration_s - emitted_s > NOTHING_S {
             match self.emit(duration_s - emitted_s, sink) {
@@ -162,7 +201,10 @@ impl Planner for BlockOverlap {
             }
         }
         let empty = self.buffer.is_empty() && !self.drive.is_moving() && !self.writer.is_dwelling();
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(empty && self.finished),
+        })
     }
 
     fn reset(&mut self, position: &AxisVector) {
@@ -178,10 +220,18 @@ impl Planner for BlockOverlap {
 
 /// Speed of a block at the edge of an overlap inside its ramp, mm/s.
 fn passing(feed_mm_per_s: f64, overlap_s: f64, ramp_s: f64) -> f64 {
-    if ramp_s > 0.0 { feed_mm_per_s * overlap_s / ramp_s } else { 0.0 }
+    if ramp_s > 0.0 {
+        feed_mm_per_s * overlap_s / ramp_s
+    } else {
+        0.0
+    }
 }
 
 /// The time constant as it is reported: how long the block overlaps the next one, or its ramp where it ends at rest, s.
 fn constant_s(taken: &Taken) -> f64 {
-    if taken.join.overlap_s > 0.0 { taken.join.overlap_s } else { taken.join.down_s }
+    if taken.join.overlap_s > 0.0 {
+        taken.join.overlap_s
+    } else {
+        taken.join.down_s
+    }
 }

@@ -26,13 +26,22 @@ pub fn limited_by(rules: &Rules, entry: &Entry, next: &Entry, taken: &Taken) -> 
     let rounded_s = entry.length_mm / feed - entry.length_mm / entry.feed_mm_per_s;
     match () {
         () if taken.mode == Mode::Flow && at_most(corner.cap_mm_per_s) => {
-            let room_mm = lesser(lesser(entry.length_mm, corner.room_mm), corner.cap_mm_per_s * corner.longest_s);
-            if room_mm < corner.span_mm { LimitedBy::Junction } else { LimitedBy::Tolerance }
+            let room_mm = lesser(
+                lesser(entry.length_mm, corner.room_mm),
+                corner.cap_mm_per_s * corner.longest_s,
+            );
+            if room_mm < corner.span_mm {
+                LimitedBy::Junction
+            } else {
+                LimitedBy::Tolerance
+            }
         }
         () if at_most(entry.triangle_mm_per_s) => LimitedBy::Acceleration,
         () if rules.grid && at_most(slowed) && taken.mode != Mode::Late => LimitedBy::TimeConstant,
         () if rules.grid && rounded_s <= rules.tick_s => entry.reason,
-        () if taken.mode == Mode::Flow && taken.next_feed_mm_per_s < feed => LimitedBy::Acceleration,
+        () if taken.mode == Mode::Flow && taken.next_feed_mm_per_s < feed => {
+            LimitedBy::Acceleration
+        }
         () => LimitedBy::Junction,
     }
 }
@@ -50,7 +59,13 @@ fn late_by(entry: &Entry, next: &Entry, taken: &Taken) -> LimitedBy {
     match () {
         () if reaches((corner.span_mm * slope).sqrt()) => LimitedBy::Tolerance,
         () if reaches(corner.longest_s) => LimitedBy::TimeConstant,
-        () if reaches(lesser(join.down_s, taken.next_feed_mm_per_s * next.slope_s2_per_mm)) => LimitedBy::Acceleration,
+        () if reaches(lesser(
+            join.down_s,
+            taken.next_feed_mm_per_s * next.slope_s2_per_mm,
+        )) =>
+        {
+            LimitedBy::Acceleration
+        }
         () => LimitedBy::Junction,
     }
 }

@@ -55,7 +55,9 @@ impl Rules {
     pub fn new(options: &Options, context: &PlannerContext) -> Self {
         let axes = context.limits.axes();
         let each = |of: &dyn Fn(usize) -> f64, other: f64| {
-            AxisVector(std::array::from_fn(|i| if i < axes.len() { of(i) } else { other }))
+            AxisVector(std::array::from_fn(|i| {
+                if i < axes.len() { of(i) } else { other }
+            }))
         };
         let acceleration = |i: usize| AIM * axes[i].acceleration_mm_per_s2;
         let unlimited = options.limits == LimitMode::Off;
@@ -76,12 +78,21 @@ impl Rules {
             limits: options.limits,
             shorten: controlled && !unlimited,
             grid: !controlled || unlimited,
-            per_acceleration: if unlimited { AxisVector::ZERO } else { each(&|i| 1.0 / acceleration(i), 0.0) },
-            axis_mm_per_s: [each(&|i| axes[i].feed_mm_per_s, 0.0), each(&|i| axes[i].rapid_mm_per_s, 0.0)],
+            per_acceleration: if unlimited {
+                AxisVector::ZERO
+            } else {
+                each(&|i| 1.0 / acceleration(i), 0.0)
+            },
+            axis_mm_per_s: [
+                each(&|i| axes[i].feed_mm_per_s, 0.0),
+                each(&|i| axes[i].rapid_mm_per_s, 0.0),
+            ],
             metric,
             tick_s,
             sag_mm: squares.sum::<f64>().sqrt() * tick_s * tick_s / 8.0,
-            weakest_mm_per_s2: (0..axes.len()).map(acceleration).fold(f64::INFINITY, f64::min),
+            weakest_mm_per_s2: (0..axes.len())
+                .map(acceleration)
+                .fold(f64::INFINITY, f64::min),
             tolerance_mm: context.path_tolerance_mm,
             feed_ratio: context.max_feed_ratio,
             joint_lanes: context.joint_lanes,
@@ -106,7 +117,11 @@ impl Rules {
     /// The largest |v|/acceleration of an axis.
     #[inline]
     pub fn largest(&self, vector: &AxisVector) -> f64 {
-        let shares = vector.0.iter().zip(&self.per_acceleration.0).take(self.axes);
+        let shares = vector
+            .0
+            .iter()
+            .zip(&self.per_acceleration.0)
+            .take(self.axes);
         shares.fold(0.0, |most, (v, w)| greater(most, (v * w).abs()))
     }
 

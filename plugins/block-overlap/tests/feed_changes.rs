@@ -13,12 +13,16 @@ const PERIOD_S: f64 = 1e-3;
 /// Lines, straight on or around corners, whose feeds change by up to 15 times.
 fn program(seed: u64) -> Vec<Block> {
     let mut random = Random::new(seed);
-    let (straight, tau_s) = (seed.is_multiple_of(3), random.between(1.0, 100.0).round() / 1e3);
+    let (straight, tau_s) = (
+        seed.is_multiple_of(3),
+        random.between(1.0, 100.0).round() / 1e3,
+    );
     let mut points = vec![AxisVector::ZERO];
     let (mut heading, mut feed, mut feeds) = (0.0, 1000.0, vec![]);
     for _ in 0..3 + (random.unit() * 12.0) as usize {
         if !straight {
-            heading += random.pick(&[0.0, 0.01, 0.1, 0.5, 1.5, std::f64::consts::PI]) * random.between(-1.0, 1.0);
+            heading += random.pick(&[0.0, 0.01, 0.1, 0.5, 1.5, std::f64::consts::PI])
+                * random.between(-1.0, 1.0);
         }
         let length = random.pick(&[0.3, 2.0, 10.0, 20.0, 60.0]) * random.between(0.5, 1.0);
         let step = [length * f64::cos(heading), length * f64::sin(heading)];
@@ -38,7 +42,13 @@ fn machine() -> PlannerContext {
 }
 
 fn options() -> [Options; 2] {
-    [Options::default(), Options { limits: LimitMode::Stretch, ..Options::default() }]
+    [
+        Options::default(),
+        Options {
+            limits: LimitMode::Stretch,
+            ..Options::default()
+        },
+    ]
 }
 
 fn time_s(options: &Options, blocks: &[Block]) -> f64 {
@@ -81,8 +91,14 @@ fn a_higher_feed_hardly_ever_costs_time() {
             for feed in [600.0, 1500.0, 4000.0, 8000.0, 15000.0] {
                 blocks[raised].feed_mm_per_s = feed / 60.0;
                 let time_s = time_s(&options, &blocks);
-                let place = format!("seed {seed}, {:?}: block {raised} at F{feed}", options.limits);
-                assert!(time_s <= 1.02 * last_s, "{place} takes {time_s} s instead of {last_s} s");
+                let place = format!(
+                    "seed {seed}, {:?}: block {raised} at F{feed}",
+                    options.limits
+                );
+                assert!(
+                    time_s <= 1.02 * last_s,
+                    "{place} takes {time_s} s instead of {last_s} s"
+                );
                 if time_s > last_s + slack_s(time_s) {
                     println!("{place} takes {time_s} s instead of {last_s} s");
                     slower += 1;
@@ -98,7 +114,8 @@ fn a_higher_feed_hardly_ever_costs_time() {
 /// Times with the feeds of the middle one of three lines on the X axis.
 fn three_lines_s(lengths_mm: [f64; 3], feed: f64, middle: f64, tau_s: f64) -> f64 {
     let [first, second, third] = lengths_mm;
-    let points = [0.0, first, first + second, first + second + third].map(|x| AxisVector::from_slice(&[x]));
+    let points =
+        [0.0, first, first + second, first + second + third].map(|x| AxisVector::from_slice(&[x]));
     let mut blocks = lines(&points, |index| if index == 1 { middle } else { feed });
     for block in &mut blocks {
         block.time_constant_s = tau_s;
@@ -112,6 +129,10 @@ fn a_fast_line_between_slow_ones_is_driven_fast() {
         let through_s = three_lines_s([10.0, 60.0, 10.0], 1000.0, 15000.0, tau_s);
         assert!(through_s <= stopping_s, "TA {tau_s}: {through_s} s");
     }
-    let [slow_s, fast_s] = [8000.0, 15000.0].map(|middle| three_lines_s([20.0; 3], 600.0, middle, 0.005));
-    assert!(fast_s <= slow_s + PERIOD_S && slow_s < 4.32, "F8000 {slow_s} s, F15000 {fast_s} s");
+    let [slow_s, fast_s] =
+        [8000.0, 15000.0].map(|middle| three_lines_s([20.0; 3], 600.0, middle, 0.005));
+    assert!(
+        fast_s <= slow_s + PERIOD_S && slow_s < 4.32,
+        "F8000 {slow_s} s, F15000 {fast_s} s"
+    );
 }

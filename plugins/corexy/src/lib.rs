@@ -45,13 +45,23 @@ impl CoreXy {
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
         let [x, y] = options.axes;
         let index = |letter: char| {
-            let found = context.axes.index(letter.to_ascii_uppercase()).filter(|axis| !context.axes.is_rotary(*axis));
-            found.ok_or_else(|| PluginError::of_option("axes", format!("the machine has no linear axis {letter}")))
+            let found = context
+                .axes
+                .index(letter.to_ascii_uppercase())
+                .filter(|axis| !context.axes.is_rotary(*axis));
+            found.ok_or_else(|| {
+                PluginError::of_option("axes", format!("the machine has no linear axis {letter}"))
+            })
         };
         if x == y {
-            return Err(PluginError::of_option("axes", format!("{x} is named twice")));
+            return Err(PluginError::of_option(
+                "axes",
+                format!("{x} is named twice"),
+            ));
         }
-        Ok(Self { axes: [index(x)?, index(y)?] })
+        Ok(Self {
+            axes: [index(x)?, index(y)?],
+        })
     }
 }
 
@@ -83,7 +93,10 @@ mod tests {
     fn both_motors_pull() {
         let map = made("").unwrap();
         let axes = AxisVector::from_slice(&[10.0, 7.0, 4.0, 1.0]);
-        assert_eq!(map.to_joints(&axes), AxisVector::from_slice(&[14.0, 7.0, 6.0, 1.0]));
+        assert_eq!(
+            map.to_joints(&axes),
+            AxisVector::from_slice(&[14.0, 7.0, 6.0, 1.0])
+        );
         assert_eq!(map.to_axes(&map.to_joints(&axes)), axes);
         assert_eq!(map.joint_count(4), 4);
     }
@@ -91,9 +104,11 @@ mod tests {
     #[test]
     fn axes_are_checked() {
         assert!(made("axes = [\"x\", \"z\"]").is_ok());
-        for (options, word) in
-            [("axes = [\"x\", \"a\"]", "linear axis a"), ("axes = [\"x\", \"x\"]", "twice"), ("axis = 1", "axis")]
-        {
+        for (options, word) in [
+            ("axes = [\"x\", \"a\"]", "linear axis a"),
+            ("axes = [\"x\", \"x\"]", "twice"),
+            ("axis = 1", "axis"),
+        ] {
             let words = made(options).err().expect(options).to_string();
             assert!(words.contains(word), "{words}");
         }

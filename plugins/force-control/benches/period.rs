@@ -25,9 +25,14 @@ fn fine_period_of_three_axes(bencher: Bencher<'_, '_>) {
         max_feed_ratio: 2.0,
         joints_are_axes: 1,
     };
-    let options =
-        ["x", "y", "z"].iter().fold(OPTIONS.to_string(), |text, axis| text + &format!("[axes.{axis}]\n{AXIS}"));
-    let mut strategy = tandem_force_control::PLUGIN.feed_strategy(&options, &context).unwrap();
+    let options = ["x", "y", "z"]
+        .iter()
+        .fold(OPTIONS.to_string(), |text, axis| {
+            text + &format!("[axes.{axis}]\n{AXIS}")
+        });
+    let mut strategy = tandem_force_control::PLUGIN
+        .feed_strategy(&options, &context)
+        .unwrap();
     let sample = |tick: u64| {
         let place = |axis: f64| 0.0025 * tick as f64 + 0.01 * (tick as f64 * axis).sin();
         FineSample {
@@ -48,7 +53,12 @@ fn fine_period_of_three_axes(bencher: Bencher<'_, '_>) {
         samples
             .chunks(8)
             .enumerate()
-            .map(|(n, eight)| strategy.update(&Window::new(n as u64, eight)).unwrap().ratio)
+            .map(|(n, eight)| {
+                strategy
+                    .update(&Window::new(n as u64, eight))
+                    .unwrap()
+                    .ratio
+            })
             .sum::<f64>()
     });
 }

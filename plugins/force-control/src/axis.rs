@@ -33,8 +33,12 @@ pub struct AxisLoad {
 impl AxisLoad {
     /// The axis `index` of a machine, from checked options. Allocates; the other methods do not.
     pub fn new(index: usize, options: &AxisOptions, period_s: f64, time_constant_s: f64) -> Self {
-        let [inertia_kg_m2, torque_constant, lead_mm] =
-            [options.inertia_kg_m2, options.torque_constant_nm_per_a, options.lead_mm].map(|v| v.unwrap_or(1.0));
+        let [inertia_kg_m2, torque_constant, lead_mm] = [
+            options.inertia_kg_m2,
+            options.torque_constant_nm_per_a,
+            options.lead_mm,
+        ]
+        .map(|v| v.unwrap_or(1.0));
         Self {
             index,
             turns: TAU / lead_mm,
@@ -54,14 +58,26 @@ impl AxisLoad {
         let speed = sample.speed[self.index] * self.turns;
         let command = sample.command[self.index] * self.turns;
         let last = self.last_command.replace(command);
-        let commanded = last.filter(|_| follows).map_or(speed, |last| (command - last) * self.rate_per_s);
-        let commanded = if commanded.abs() > FASTEST_RAD_PER_S { speed } else { commanded };
+        let commanded = last
+            .filter(|_| follows)
+            .map_or(speed, |last| (command - last) * self.rate_per_s);
+        let commanded = if commanded.abs() > FASTEST_RAD_PER_S {
+            speed
+        } else {
+            commanded
+        };
         let free_a = self.friction.torque_nm(commanded) / self.torque_constant_nm_per_a;
         if !follows {
             self.observer.restart(speed);
         }
-        let felt_nm = self.observer.step(speed, sample.current_a[self.index] - free_a);
-        self.torque_nm = if commanded == 0.0 { self.beyond_holding(felt_nm) } else { felt_nm };
+        let felt_nm = self
+            .observer
+            .step(speed, sample.current_a[self.index] - free_a);
+        self.torque_nm = if commanded == 0.0 {
+            self.beyond_holding(felt_nm)
+        } else {
+            felt_nm
+        };
         self.mean.push(self.torque_nm);
     }
 

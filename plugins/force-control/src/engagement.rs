@@ -41,14 +41,22 @@ pub struct Engagement {
 impl Engagement {
     /// In air below `air_torque_nm`.
     pub fn new(air_torque_nm: f64) -> Self {
-        Self { air_torque_nm, low: 0, tool: Tool::Standing }
+        Self {
+            air_torque_nm,
+            low: 0,
+            tool: Tool::Standing,
+        }
     }
 
     /// Takes the mean torque of a rough period. Whether the tool has just come into material.
     pub fn update(&mut self, moving: bool, torque_nm: f64) -> bool {
         let before = self.tool;
         // Air begins at half the torque at which it ends: a shallow cut is either.
-        self.low = if torque_nm < 0.5 * self.air_torque_nm { self.low.saturating_add(1) } else { 0 };
+        self.low = if torque_nm < 0.5 * self.air_torque_nm {
+            self.low.saturating_add(1)
+        } else {
+            0
+        };
         self.tool = match before {
             _ if !moving => Tool::Standing,
             _ if torque_nm >= self.air_torque_nm => Tool::Cutting,
@@ -70,10 +78,14 @@ mod tests {
     #[test]
     fn standing_entering_air_cutting() {
         let mut engagement = Engagement::new(0.01);
-        assert!(!engagement.update(false, 0.05) && engagement.tool == Tool::Standing, "what holds it is no cut");
+        assert!(
+            !engagement.update(false, 0.05) && engagement.tool == Tool::Standing,
+            "what holds it is no cut"
+        );
         assert!(!engagement.update(true, 0.0) && engagement.tool == Tool::Entering);
-        let periods =
-            (0..20).take_while(|_| !engagement.update(true, 0.0) && engagement.tool == Tool::Entering).count();
+        let periods = (0..20)
+            .take_while(|_| !engagement.update(true, 0.0) && engagement.tool == Tool::Entering)
+            .count();
         assert_eq!((periods, engagement.tool), (7, Tool::Air));
         assert!(engagement.update(true, 0.011) && engagement.tool == Tool::Cutting);
         assert!(!engagement.update(true, 0.2));

@@ -40,7 +40,8 @@ pub fn stribeck(points: &[Point], constant: bool) -> Option<Fit> {
     let mut best = Some(coulomb_viscous(points, constant)?);
     for _ in 0..ROUNDS {
         let step = (high / low).powf(1.0 / f64::from(STEPS));
-        let fits = (0..=STEPS).filter_map(|i| solve(points, Some(low * step.powf(f64::from(i))), constant));
+        let fits = (0..=STEPS)
+            .filter_map(|i| solve(points, Some(low * step.powf(f64::from(i))), constant));
         // An excess is positive; a negative one would only follow noise.
         let fits = fits.filter(|fit| fit.model.stribeck_nm >= 0.0).chain(best);
         best = fits.min_by(|a, b| a.rms_nm.total_cmp(&b.rms_nm));
@@ -48,7 +49,10 @@ pub fn stribeck(points: &[Point], constant: bool) -> Option<Fit> {
         if speed == 0.0 {
             break;
         }
-        (low, high) = ((speed / step).max(STRIBECK_SPEEDS.0), (speed * step).min(STRIBECK_SPEEDS.1));
+        (low, high) = (
+            (speed / step).max(STRIBECK_SPEEDS.0),
+            (speed * step).min(STRIBECK_SPEEDS.1),
+        );
     }
     best
 }
@@ -74,13 +78,28 @@ fn solve(points: &[Point], stribeck_speed: Option<f64>, constant: bool) -> Optio
         }
     }
     // What is not fitted stays zero.
-    (0..4).filter(|i| !used[*i]).for_each(|i| normal[i][i] = 1.0);
+    (0..4)
+        .filter(|i| !used[*i])
+        .for_each(|i| normal[i][i] = 1.0);
     let inverse = inverse(normal)?;
     let found: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| inverse[i][j] * right[j]).sum());
-    let miss = |point: &Point| row(point).iter().zip(&found).map(|(r, f)| r * f).sum::<f64>() - point.torque_nm;
+    let miss = |point: &Point| {
+        row(point)
+            .iter()
+            .zip(&found)
+            .map(|(r, f)| r * f)
+            .sum::<f64>()
+            - point.torque_nm
+    };
     let squares: f64 = points.iter().map(|point| miss(point).powi(2)).sum();
     let variance = squares / (points.len() - unknowns) as f64;
-    let deviation = |i: usize| if used[i] { (variance * inverse[i][i]).sqrt() } else { 0.0 };
+    let deviation = |i: usize| {
+        if used[i] {
+            (variance * inverse[i][i]).sqrt()
+        } else {
+            0.0
+        }
+    };
     Some(Fit {
         model: FrictionModel {
             coulomb_nm: found[0],
@@ -101,7 +120,8 @@ fn inverse(mut a: [[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         return None;
     }
     (0..16).for_each(|ij| a[ij / 4][ij % 4] /= scale[ij / 4] * scale[ij % 4]);
-    let mut b: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    let mut b: [[f64; 4]; 4] =
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     for pivot in 0..4 {
         let by = a[pivot][pivot];
         if by < 1e-9 {
@@ -128,7 +148,11 @@ mod tests {
 
     fn points(of: impl Fn(f64) -> f64) -> Vec<Point> {
         let both = SPEEDS.iter().flat_map(|speed| [*speed, -*speed]);
-        both.map(|speed| Point { speed_rad_per_s: speed, torque_nm: of(speed) }).collect()
+        both.map(|speed| Point {
+            speed_rad_per_s: speed,
+            torque_nm: of(speed),
+        })
+        .collect()
     }
 
     #[test]
@@ -136,8 +160,14 @@ mod tests {
         let of = |w: f64| 0.05 + (0.06 + 0.02 * (-(w / 0.4).powi(2)).exp()) * w.signum() + 6e-4 * w;
         let fit = stribeck(&points(of), true).unwrap();
         let model = fit.model;
-        assert!((model.coulomb_nm - 0.06).abs() < 1e-5 && (model.viscous_nm_s_per_rad - 6e-4).abs() < 1e-6);
-        assert!((model.stribeck_nm - 0.02).abs() < 1e-4 && (model.stribeck_speed_rad_per_s - 0.4).abs() < 5e-3);
+        assert!(
+            (model.coulomb_nm - 0.06).abs() < 1e-5
+                && (model.viscous_nm_s_per_rad - 6e-4).abs() < 1e-6
+        );
+        assert!(
+            (model.stribeck_nm - 0.02).abs() < 1e-4
+                && (model.stribeck_speed_rad_per_s - 0.4).abs() < 5e-3
+        );
         assert!((model.constant_nm - 0.05).abs() < 1e-5 && fit.rms_nm < 1e-5);
         let plain = coulomb_viscous(&points(|w| 0.01 * w.signum() + 5e-5 * w), false).unwrap();
         assert!((plain.model.coulomb_nm - 0.01).abs() < 1e-12 && plain.rms_nm < 1e-12);
@@ -147,7 +177,16 @@ mod tests {
     #[test]
     fn too_few_points_are_no_fit() {
         assert!(coulomb_viscous(&points(|w| w)[..2], false).is_none());
-        let same = vec![Point { speed_rad_per_s: 2.0, torque_nm: 0.1 }; 9];
-        assert!(coulomb_viscous(&same, false).is_none(), "one speed says nothing of two unknowns");
+        let same = vec![
+            Point {
+                speed_rad_per_s: 2.0,
+                torque_nm: 0.1
+            };
+            9
+        ];
+        assert!(
+            coulomb_viscous(&same, false).is_none(),
+            "one speed says nothing of two unknowns"
+        );
     }
 }

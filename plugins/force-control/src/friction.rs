@@ -27,10 +27,20 @@ impl FrictionModel {
     pub fn torque_nm(&self, speed_rad_per_s: f64) -> f64 {
         let smooth = speed_rad_per_s / SMOOTH_RAD_PER_S;
         // Beyond that tanh is 1 to 16 digits, and exp(−40) nothing.
-        let sign = if smooth.abs() > 20.0 { smooth.signum() } else { smooth.tanh() };
+        let sign = if smooth.abs() > 20.0 {
+            smooth.signum()
+        } else {
+            smooth.tanh()
+        };
         let excess = (speed_rad_per_s / self.stribeck_speed_rad_per_s).powi(2);
-        let stribeck_nm = if excess < 40.0 { self.stribeck_nm * (-excess).exp() } else { 0.0 };
-        (self.coulomb_nm + stribeck_nm) * sign + self.viscous_nm_s_per_rad * speed_rad_per_s + self.constant_nm
+        let stribeck_nm = if excess < 40.0 {
+            self.stribeck_nm * (-excess).exp()
+        } else {
+            0.0
+        };
+        (self.coulomb_nm + stribeck_nm) * sign
+            + self.viscous_nm_s_per_rad * speed_rad_per_s
+            + self.constant_nm
     }
 
     /// The torque that friction may hold at rest, in either direction, N·m.
@@ -58,6 +68,10 @@ mod tests {
             let whole = level * (speed / 0.05).tanh() + 6e-4 * speed - 0.01;
             assert!((model.torque_nm(speed) - whole).abs() < 1e-15, "{speed}");
         }
-        assert_eq!(FrictionModel::default().torque_nm(3.0), 0.0, "no friction needs no speeds");
+        assert_eq!(
+            FrictionModel::default().torque_nm(3.0),
+            0.0,
+            "no friction needs no speeds"
+        );
     }
 }

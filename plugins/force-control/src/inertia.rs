@@ -14,7 +14,13 @@ impl Rls {
     /// Starts at `value` with the covariance `covariance`; large ones mean that the start counts little. A forgetting factor of
     /// 1 forgets nothing.
     pub fn new(value: f64, covariance: f64, forgetting: f64) -> Self {
-        Self { forgetting, covariance, value, squares: 0.0, weight: 0.0 }
+        Self {
+            forgetting,
+            covariance,
+            value,
+            squares: 0.0,
+            weight: 0.0,
+        }
     }
 
     /// Takes `input` and the `output` that is to be value × input.
@@ -39,7 +45,11 @@ impl Rls {
 
     /// Standard deviation of the value, from the residuals; infinite before three samples.
     pub fn deviation(&self) -> f64 {
-        if self.weight < 3.0 { f64::INFINITY } else { (self.squares / (self.weight - 1.0) * self.covariance).sqrt() }
+        if self.weight < 3.0 {
+            f64::INFINITY
+        } else {
+            (self.squares / (self.weight - 1.0) * self.covariance).sqrt()
+        }
     }
 }
 
@@ -61,7 +71,13 @@ impl Differences {
     /// Differences over `span` periods; samples near a reversal, below `least_speed_rad_per_s`, are left out: Coulomb friction
     /// changes its sign there. Allocates; [`Differences::push`] does not.
     pub fn new(span: usize, period_s: f64, least_speed_rad_per_s: f64) -> Self {
-        Self { span, period_s, least_speed_rad_per_s, rows: vec![(0.0, 0.0); 3 * span + 1], seen: 0 }
+        Self {
+            span,
+            period_s,
+            least_speed_rad_per_s,
+            rows: vec![(0.0, 0.0); 3 * span + 1],
+            seen: 0,
+        }
     }
 
     /// Takes the angle at the end of a period, rad, and the mean current of that period, A. Gives the change of the
@@ -88,9 +104,16 @@ impl Differences {
         // Row i ended i periods ago: its current weighs as much as its middle is far from the triangle's end.
         let weight = |i: usize| {
             let middle = i as f64 + 0.5;
-            if middle < span { middle } else { 2.0 * span - middle }
+            if middle < span {
+                middle
+            } else {
+                2.0 * span - middle
+            }
         };
-        (0..2 * self.span).map(|i| weight(i) * self.rows[ago + i].1).sum::<f64>() / (span * span)
+        (0..2 * self.span)
+            .map(|i| weight(i) * self.rows[ago + i].1)
+            .sum::<f64>()
+            / (span * span)
     }
 
     /// Whether any speed over `span` periods is low: the window is as long as what the differences see.
@@ -98,6 +121,8 @@ impl Differences {
         let time_s = self.span as f64 * self.period_s;
         let speed = |i: usize| (self.rows[i].0 - self.rows[i + self.span].0) / time_s;
         let first = speed(0);
-        [0, self.span, 2 * self.span].iter().any(|i| speed(*i) * first.signum() < self.least_speed_rad_per_s)
+        [0, self.span, 2 * self.span]
+            .iter()
+            .any(|i| speed(*i) * first.signum() < self.least_speed_rad_per_s)
     }
 }

@@ -49,7 +49,13 @@ pub struct FeedLaw {
 impl FeedLaw {
     /// A law that begins at the feed `feed_mm_per_s`.
     pub fn new(law: Law, bounds: Bounds, feed_mm_per_s: f64) -> Self {
-        Self { law, bounds, ceiling_mm_per_s: f64::INFINITY, integral_mm_per_s: 0.0, feed_mm_per_s }
+        Self {
+            law,
+            bounds,
+            ceiling_mm_per_s: f64::INFINITY,
+            integral_mm_per_s: 0.0,
+            feed_mm_per_s,
+        }
     }
 
     /// The feed to ask for, mm/s, after a rough period of mean torque `torque_nm` in a block of `programmed_mm_per_s`.
@@ -58,7 +64,10 @@ impl FeedLaw {
         let error_nm = self.bounds.reference_nm - torque_nm;
         let wanted = match self.law {
             Law::Proportional { gain } => programmed_mm_per_s + gain * error_nm,
-            Law::Pi { gain, integral_gain } => {
+            Law::Pi {
+                gain,
+                integral_gain,
+            } => {
                 let held = self.integral_mm_per_s;
                 let integral = held + integral_gain * error_nm;
                 let wanted = programmed_mm_per_s + gain * error_nm + integral;
@@ -96,7 +105,9 @@ impl FeedLaw {
     }
 
     fn clip(&self, feed_mm_per_s: f64) -> f64 {
-        feed_mm_per_s.min(self.bounds.max_mm_per_s.min(self.ceiling_mm_per_s)).max(self.bounds.min_mm_per_s)
+        feed_mm_per_s
+            .min(self.bounds.max_mm_per_s.min(self.ceiling_mm_per_s))
+            .max(self.bounds.min_mm_per_s)
     }
 }
 
@@ -110,7 +121,10 @@ pub struct RateLimit {
 impl RateLimit {
     /// Begins at `feed_mm_per_s`.
     pub fn new(step_mm_per_s: f64, feed_mm_per_s: f64) -> Self {
-        Self { step_mm_per_s, feed_mm_per_s }
+        Self {
+            step_mm_per_s,
+            feed_mm_per_s,
+        }
     }
 
     /// The feed after one rough period, on the way to `target_mm_per_s`.
@@ -130,7 +144,11 @@ impl RateLimit {
 mod tests {
     use super::*;
 
-    const BOUNDS: Bounds = Bounds { reference_nm: 0.1, min_mm_per_s: 0.5, max_mm_per_s: 5.0 };
+    const BOUNDS: Bounds = Bounds {
+        reference_nm: 0.1,
+        min_mm_per_s: 0.5,
+        max_mm_per_s: 5.0,
+    };
 
     /// Torque and feed where a law and a cut of `depth` times the demo's gain come to rest.
     fn settled(law: Law, torque_per_feed: f64) -> (f64, f64) {
@@ -147,20 +165,42 @@ mod tests {
     fn only_the_integrating_laws_hold_the_reference() {
         let at_4_mm = 2.0 / 37.5;
         let (torque, _) = settled(Law::Proportional { gain: 25.0 }, at_4_mm);
-        assert!((torque - 0.114_285_7).abs() < 1e-6, "the published offset, not {torque}");
-        for law in [Law::Pi { gain: 10.0, integral_gain: 0.5 }, Law::Ratio { exponent: 0.05 }] {
+        assert!(
+            (torque - 0.114_285_7).abs() < 1e-6,
+            "the published offset, not {torque}"
+        );
+        for law in [
+            Law::Pi {
+                gain: 10.0,
+                integral_gain: 0.5,
+            },
+            Law::Ratio { exponent: 0.05 },
+        ] {
             let (torque, feed) = settled(law, at_4_mm);
-            assert!((torque - 0.1).abs() < 1e-9 && (feed - 1.875).abs() < 1e-7, "{law:?}: {torque} {feed}");
+            assert!(
+                (torque - 0.1).abs() < 1e-9 && (feed - 1.875).abs() < 1e-7,
+                "{law:?}: {torque} {feed}"
+            );
         }
     }
 
     #[test]
     fn nothing_winds_up_at_a_bound_or_while_the_feed_is_not_driven() {
         for may_rise in [true, false] {
-            let mut law = FeedLaw::new(Law::Pi { gain: 16.0, integral_gain: 0.8 }, BOUNDS, 2.5);
+            let mut law = FeedLaw::new(
+                Law::Pi {
+                    gain: 16.0,
+                    integral_gain: 0.8,
+                },
+                BOUNDS,
+                2.5,
+            );
             let _ = (0..1000).map(|_| law.next(2.5, 0.0, may_rise)).last();
             let after = law.next(2.5, 0.1, true);
-            assert!(after <= if may_rise { 5.0 } else { 2.5 + 1e-12 }, "{may_rise}: {after}");
+            assert!(
+                after <= if may_rise { 5.0 } else { 2.5 + 1e-12 },
+                "{may_rise}: {after}"
+            );
         }
         let mut law = FeedLaw::new(Law::Ratio { exponent: 0.05 }, BOUNDS, 2.5);
         let _ = (0..1000).map(|_| law.next(2.5, 0.0, false)).last();
@@ -169,7 +209,13 @@ mod tests {
 
     #[test]
     fn a_restart_is_bumpless() {
-        for law in [Law::Pi { gain: 16.0, integral_gain: 0.0 }, Law::Ratio { exponent: 0.0 }] {
+        for law in [
+            Law::Pi {
+                gain: 16.0,
+                integral_gain: 0.0,
+            },
+            Law::Ratio { exponent: 0.0 },
+        ] {
             let mut law = FeedLaw::new(law, BOUNDS, 2.5);
             law.restart(2.5, 0.03, 1.25);
             assert!((law.next(2.5, 0.03, true) - 1.25).abs() < 1e-12);
@@ -179,6 +225,14 @@ mod tests {
     #[test]
     fn the_feed_changes_in_steps() {
         let mut limit = RateLimit::new(0.8, 0.0);
-        assert_eq!([limit.next(2.0), limit.next(2.0), limit.next(2.0), limit.next(0.0)], [0.8, 1.6, 2.0, 1.2]);
+        assert_eq!(
+            [
+                limit.next(2.0),
+                limit.next(2.0),
+                limit.next(2.0),
+                limit.next(0.0)
+            ],
+            [0.8, 1.6, 2.0, 1.2]
+        );
     }
 }

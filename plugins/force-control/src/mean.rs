@@ -15,7 +15,11 @@ pub struct RunningMean {
 impl RunningMean {
     /// No samples yet.
     pub fn new() -> Self {
-        Self { sums: vec![0.0; LONGEST + 2], at: 0, seen: 0 }
+        Self {
+            sums: vec![0.0; LONGEST + 2],
+            at: 0,
+            seen: 0,
+        }
     }
 
     /// Takes a sample.
@@ -36,14 +40,20 @@ impl RunningMean {
         let ago = |count: usize| self.sums[(self.at + self.sums.len() - count) % self.sums.len()];
         let (near, far) = (ago(whole as usize), ago(whole as usize + 1));
         // Where nothing is older, the part of a sample is 0.
-        let start = if samples == whole { near } else { near + (far - near) * (samples - whole) };
+        let start = if samples == whole {
+            near
+        } else {
+            near + (far - near) * (samples - whole)
+        };
         (self.sums[self.at] - start) / samples
     }
 
     /// Multiplies everything remembered. Only differences of sums count: the sums start again from zero.
     pub(crate) fn scale(&mut self, factor: f64) {
         let now = self.sums[self.at];
-        self.sums.iter_mut().for_each(|sum| *sum = (*sum - now) * factor);
+        self.sums
+            .iter_mut()
+            .for_each(|sum| *sum = (*sum - now) * factor);
     }
 }
 
@@ -56,9 +66,15 @@ impl Default for RunningMean {
 /// How many samples to average: the fewest whole tooth periods that are no shorter than `rough`, the samples of a rough
 /// period; `rough` itself where no tooth period is known, or where one is longer than [`LONGEST`].
 pub fn window(rough: f64, tooth: Option<f64>) -> f64 {
-    let Some(tooth) = tooth.filter(|tooth| *tooth > 0.0 && *tooth <= LONGEST as f64) else { return rough };
+    let Some(tooth) = tooth.filter(|tooth| *tooth > 0.0 && *tooth <= LONGEST as f64) else {
+        return rough;
+    };
     let periods = (rough / tooth).ceil().max(1.0);
-    if periods * tooth <= LONGEST as f64 { periods * tooth } else { rough }
+    if periods * tooth <= LONGEST as f64 {
+        periods * tooth
+    } else {
+        rough
+    }
 }
 
 #[cfg(test)]
@@ -72,7 +88,14 @@ mod tests {
         assert_eq!(window(8.0, Some(100.0 / 3.0)), 100.0 / 3.0);
         assert_eq!(window(8.0, Some(3.0)), 9.0);
         assert_eq!(window(8.0, Some(8.0)), 8.0);
-        assert_eq!((window(8.0, Some(0.0)), window(8.0, Some(1e4)), window(8.0, Some(f64::NAN))), (8.0, 8.0, 8.0));
+        assert_eq!(
+            (
+                window(8.0, Some(0.0)),
+                window(8.0, Some(1e4)),
+                window(8.0, Some(f64::NAN))
+            ),
+            (8.0, 8.0, 8.0)
+        );
     }
 
     #[test]
@@ -87,7 +110,10 @@ mod tests {
                 rough = rough.max((mean.of(8.0) - 0.1).abs());
             }
         }
-        assert!(worst < 2e-4 && rough > 0.04, "{worst} over a tooth period, {rough} over 8 samples");
+        assert!(
+            worst < 2e-4 && rough > 0.04,
+            "{worst} over a tooth period, {rough} over 8 samples"
+        );
     }
 
     #[test]
@@ -96,6 +122,9 @@ mod tests {
         assert_eq!(mean.of(8.0), 0.0);
         mean.push(3.0);
         mean.push(5.0);
-        assert_eq!((mean.of(1.0), mean.of(8.0), mean.of(1.5)), (5.0, 4.0, 6.5 / 1.5));
+        assert_eq!(
+            (mean.of(1.0), mean.of(8.0), mean.of(1.5)),
+            (5.0, 4.0, 6.5 / 1.5)
+        );
     }
 }

@@ -18,7 +18,12 @@ pub struct Observer {
 impl Observer {
     /// An observer for a motor of `inertia_kg_m2` and `torque_constant_nm_per_a` with samples `period_s` apart. A step of
     /// the torque is 63 % seen after `time_constant_s`.
-    pub fn new(inertia_kg_m2: f64, torque_constant_nm_per_a: f64, period_s: f64, time_constant_s: f64) -> Self {
+    pub fn new(
+        inertia_kg_m2: f64,
+        torque_constant_nm_per_a: f64,
+        period_s: f64,
+        time_constant_s: f64,
+    ) -> Self {
         let kept = (-period_s / time_constant_s).exp();
         let gain = -(1.0 - kept) * inertia_kg_m2 / period_s;
         let per_inertia = period_s / inertia_kg_m2;
@@ -105,6 +110,9 @@ mod tests {
         let _ = (0..200).map(|_| observer.step(5.0, 0.1 / 0.378)).last();
         assert!((observer.estimate_nm() - 0.1).abs() < 1e-9);
         observer.restart(90.0);
-        assert!((observer.step(90.0, 0.1 / 0.378) - 0.1).abs() < 1e-9, "a jump over a gap is no acceleration");
+        assert!(
+            (observer.step(90.0, 0.1 / 0.378) - 0.1).abs() < 1e-9,
+            "a jump over a gap is no acceleration"
+        );
     }
 }

@@ -160,15 +160,32 @@ impl Options {
 
     fn check_values(&self, context: &StrategyContext) -> Result<(), PluginError> {
         let reference_nm = stated("reference_torque_nm", self.reference_torque_nm, 1e-6, 1e4)?;
-        within("gain_mm_per_min_per_nm", self.gain_mm_per_min_per_nm.unwrap_or(1.0), 0.0, 1e9)?;
-        within("integral_gain_mm_per_min_per_nm", self.integral_gain_mm_per_min_per_nm, 0.0, 1e9)?;
+        within(
+            "gain_mm_per_min_per_nm",
+            self.gain_mm_per_min_per_nm.unwrap_or(1.0),
+            0.0,
+            1e9,
+        )?;
+        within(
+            "integral_gain_mm_per_min_per_nm",
+            self.integral_gain_mm_per_min_per_nm,
+            0.0,
+            1e9,
+        )?;
         within("exponent", self.exponent, 0.0, 1.0)?;
         let least = stated("min_feed_mm_per_min", self.min_feed_mm_per_min, 1e-3, 1e6)?;
         let most = stated("max_feed_mm_per_min", self.max_feed_mm_per_min, least, 1e6)?;
-        within("feed_change_mm_per_s2", self.feed_change_mm_per_s2, 1e-3, 1e6)?;
+        within(
+            "feed_change_mm_per_s2",
+            self.feed_change_mm_per_s2,
+            1e-3,
+            1e6,
+        )?;
         within("air_torque_nm", self.air_torque_nm(), 0.0, reference_nm)?;
-        let feeds =
-            [("air_feed_mm_per_min", self.air_feed_mm_per_min), ("entry_feed_mm_per_min", self.entry_feed_mm_per_min)];
+        let feeds = [
+            ("air_feed_mm_per_min", self.air_feed_mm_per_min),
+            ("entry_feed_mm_per_min", self.entry_feed_mm_per_min),
+        ];
         for (key, feed) in feeds {
             if let Some(feed) = feed {
                 within(key, feed, least, most)?;
@@ -176,12 +193,19 @@ impl Options {
         }
         within("guard_torque_nm", self.guard_torque_nm(), reference_nm, 1e6)?;
         within("guard_samples", f64::from(self.guard_samples), 1.0, 1e6)?;
-        within("observer_time_constant_ms", self.observer_time_constant_ms, 1e-2, 1e4)?;
+        within(
+            "observer_time_constant_ms",
+            self.observer_time_constant_ms,
+            1e-2,
+            1e4,
+        )?;
         within("teeth", f64::from(self.teeth.unwrap_or(1)), 1.0, 100.0)?;
         if self.axes.is_empty() {
             return Err(refusal("axes", "no axis is listed"));
         }
-        self.axes.iter().try_for_each(|(letter, axis)| axis.check(letter, context))?;
+        self.axes
+            .iter()
+            .try_for_each(|(letter, axis)| axis.check(letter, context))?;
         self.stability.check()
     }
 
@@ -205,8 +229,13 @@ impl Options {
         let gain = |default: f64| self.gain_mm_per_min_per_nm.unwrap_or(default) / 60.0;
         match self.law {
             LawName::P => Law::Proportional { gain: gain(1500.0) },
-            LawName::Pi => Law::Pi { gain: gain(1000.0), integral_gain: self.integral_gain_mm_per_min_per_nm / 60.0 },
-            LawName::Ratio => Law::Ratio { exponent: self.exponent },
+            LawName::Pi => Law::Pi {
+                gain: gain(1000.0),
+                integral_gain: self.integral_gain_mm_per_min_per_nm / 60.0,
+            },
+            LawName::Ratio => Law::Ratio {
+                exponent: self.exponent,
+            },
         }
     }
 
@@ -272,12 +301,20 @@ impl AxisOptions {
         match index {
             None => return Err(refusal(&table, "the machine has no such axis")),
             Some(index) if context.axes.is_rotary(index) => {
-                return Err(refusal(&table, "a rotary axis has no screw that takes a cutting force"));
+                return Err(refusal(
+                    &table,
+                    "a rotary axis has no screw that takes a cutting force",
+                ));
             }
             Some(_) => {}
         }
         stated(&name("lead_mm"), self.lead_mm, 1e-3, 1e4)?;
-        stated(&name("torque_constant_nm_per_a"), self.torque_constant_nm_per_a, 1e-6, 1e3)?;
+        stated(
+            &name("torque_constant_nm_per_a"),
+            self.torque_constant_nm_per_a,
+            1e-6,
+            1e3,
+        )?;
         within(&name("screw_efficiency"), self.screw_efficiency, 1e-3, 1.0)?;
         let Some(inertia_kg_m2) = self.inertia_kg_m2 else {
             let what = format!("missing: tandem identify --axis {letter} finds it");
@@ -286,22 +323,66 @@ impl AxisOptions {
         within(&name("inertia_kg_m2"), inertia_kg_m2, 1e-9, 1e3)?;
         let friction = &self.friction;
         within(&name("friction.coulomb_nm"), friction.coulomb_nm, 0.0, 1e3)?;
-        within(&name("friction.viscous_nm_s_per_rad"), friction.viscous_nm_s_per_rad, -1e3, 1e3)?;
-        within(&name("friction.stribeck_nm"), friction.stribeck_nm, 0.0, 1e3)?;
-        let least_speed = if friction.stribeck_nm > 0.0 { 1e-6 } else { 0.0 };
-        within(&name("friction.stribeck_speed_rad_per_s"), friction.stribeck_speed_rad_per_s, least_speed, 1e6)?;
-        within(&name("friction.constant_nm"), friction.constant_nm, -1e3, 1e3)?;
-        within(&name("confidence.inertia_percent"), self.confidence.inertia_percent, 0.0, MOST_INERTIA_DOUBT_PERCENT)
+        within(
+            &name("friction.viscous_nm_s_per_rad"),
+            friction.viscous_nm_s_per_rad,
+            -1e3,
+            1e3,
+        )?;
+        within(
+            &name("friction.stribeck_nm"),
+            friction.stribeck_nm,
+            0.0,
+            1e3,
+        )?;
+        let least_speed = if friction.stribeck_nm > 0.0 {
+            1e-6
+        } else {
+            0.0
+        };
+        within(
+            &name("friction.stribeck_speed_rad_per_s"),
+            friction.stribeck_speed_rad_per_s,
+            least_speed,
+            1e6,
+        )?;
+        within(
+            &name("friction.constant_nm"),
+            friction.constant_nm,
+            -1e3,
+            1e3,
+        )?;
+        within(
+            &name("confidence.inertia_percent"),
+            self.confidence.inertia_percent,
+            0.0,
+            MOST_INERTIA_DOUBT_PERCENT,
+        )
     }
 }
 
 impl StabilityOptions {
     fn check(&self) -> Result<(), PluginError> {
         let name = |key: &str| format!("stability.{key}");
-        stated(&name("torque_per_feed_nm_min_per_mm"), self.torque_per_feed_nm_min_per_mm, 1e-12, 1e6)?;
-        within(&name("position_gain_per_s"), self.position_gain_per_s, 1e-3, 1e4)?;
+        stated(
+            &name("torque_per_feed_nm_min_per_mm"),
+            self.torque_per_feed_nm_min_per_mm,
+            1e-12,
+            1e6,
+        )?;
+        within(
+            &name("position_gain_per_s"),
+            self.position_gain_per_s,
+            1e-3,
+            1e4,
+        )?;
         within(&name("velocity_loop_hz"), self.velocity_loop_hz, 1e-3, 1e4)?;
-        within(&name("velocity_integral_ms"), self.velocity_integral_ms, 1e-3, 1e9)?;
+        within(
+            &name("velocity_integral_ms"),
+            self.velocity_integral_ms,
+            1e-3,
+            1e9,
+        )?;
         within(&name("tooth_period_ms"), self.tooth_period_ms, 0.1, 2000.0)?;
         within(&name("gain_margin"), self.gain_margin, 1.0, 100.0)
     }

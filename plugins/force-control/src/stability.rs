@@ -59,9 +59,15 @@ impl LoopModel {
             let torque = state.mean.of(self.mean_samples);
             integral -= integral_gain * torque;
             feeds.rotate_right(1);
-            feeds[0] = if block == 0 { 1.0 } else { integral - gain * torque };
+            feeds[0] = if block == 0 {
+                1.0
+            } else {
+                integral - gain * torque
+            };
             state.rough_period(self, feeds[self.latency], torque_per_feed);
-            let size = feeds.iter().fold(integral.abs(), |most, feed| most.max(feed.abs()));
+            let size = feeds
+                .iter()
+                .fold(integral.abs(), |most, feed| most.max(feed.abs()));
             levels.push(log_scale + size.max(f64::MIN_POSITIVE).ln());
             if size > 1e6 || (size < 1e-6 && block % ENVELOPE == 0) {
                 // Linear, so everything may be scaled; numbers stay in range.
@@ -74,20 +80,30 @@ impl LoopModel {
                 state.scale(scale, TAU / self.lead_mm);
             }
         }
-        let envelope = |end: usize| levels[end - ENVELOPE..end].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let envelope = |end: usize| {
+            levels[end - ENVELOPE..end]
+                .iter()
+                .copied()
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
         ((envelope(SETTLE + MEASURED) - envelope(SETTLE)) / MEASURED as f64).exp()
     }
 
     /// The largest factor on the gains of `law` with which the loop is still stable, to 0.5 %; at most `most`.
     pub fn gain_margin(&self, law: Law, torque_per_feed: f64, reference_nm: f64, most: f64) -> f64 {
-        let stable = |factor: f64| self.growth(law.scaled(factor), torque_per_feed, reference_nm) < 1.0;
+        let stable =
+            |factor: f64| self.growth(law.scaled(factor), torque_per_feed, reference_nm) < 1.0;
         let (mut low, mut high) = (0.0, most);
         if stable(most) {
             return most;
         }
         while high - low > 0.005 * high && high > 1e-6 {
             let middle = f64::midpoint(low, high);
-            if stable(middle) { low = middle } else { high = middle }
+            if stable(middle) {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         low
     }
@@ -97,9 +113,15 @@ impl LoopModel {
 fn linear_gains(law: Law, torque_per_feed: f64, reference_nm: f64) -> (f64, f64) {
     match law {
         Law::Proportional { gain } => (gain, 0.0),
-        Law::Pi { gain, integral_gain } => (gain, integral_gain),
+        Law::Pi {
+            gain,
+            integral_gain,
+        } => (gain, integral_gain),
         // Feed and torque are in the proportion of the cut there.
-        Law::Ratio { exponent } => (0.0, exponent * (reference_nm / torque_per_feed) / reference_nm),
+        Law::Ratio { exponent } => (
+            0.0,
+            exponent * (reference_nm / torque_per_feed) / reference_nm,
+        ),
     }
 }
 
@@ -119,9 +141,19 @@ struct State {
 impl State {
     fn new(model: &LoopModel) -> Self {
         let observer = || {
-            let LoopModel { inertia_kg_m2, torque_constant_nm_per_a, fine_period_s, observer_time_constant_s, .. } =
-                *model;
-            Observer::new(inertia_kg_m2, torque_constant_nm_per_a, fine_period_s, observer_time_constant_s)
+            let LoopModel {
+                inertia_kg_m2,
+                torque_constant_nm_per_a,
+                fine_period_s,
+                observer_time_constant_s,
+                ..
+            } = *model;
+            Observer::new(
+                inertia_kg_m2,
+                torque_constant_nm_per_a,
+                fine_period_s,
+                observer_time_constant_s,
+            )
         };
         let steps = (model.tooth_period_s / STEP_S).round().max(1.0) as usize;
         Self {
@@ -166,8 +198,16 @@ impl State {
         // Where the axis stands does not matter; kept, it would grow until differences are lost in it.
         let here = self.angle;
         (self.command, self.angle) = (self.command - here, 0.0);
-        self.driven.iter_mut().for_each(|driven| *driven -= here / turns);
-        for value in [&mut self.command, &mut self.angle, &mut self.speed, &mut self.integral, &mut self.current] {
+        self.driven
+            .iter_mut()
+            .for_each(|driven| *driven -= here / turns);
+        for value in [
+            &mut self.command,
+            &mut self.angle,
+            &mut self.speed,
+            &mut self.integral,
+            &mut self.current,
+        ] {
             *value *= scale;
         }
         self.driven.iter_mut().for_each(|driven| *driven *= scale);
@@ -179,9 +219,19 @@ impl Law {
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
-            Self::Proportional { gain } => Self::Proportional { gain: gain * factor },
-            Self::Pi { gain, integral_gain } => Self::Pi { gain: gain * factor, integral_gain: integral_gain * factor },
-            Self::Ratio { exponent } => Self::Ratio { exponent: exponent * factor },
+            Self::Proportional { gain } => Self::Proportional {
+                gain: gain * factor,
+            },
+            Self::Pi {
+                gain,
+                integral_gain,
+            } => Self::Pi {
+                gain: gain * factor,
+                integral_gain: integral_gain * factor,
+            },
+            Self::Ratio { exponent } => Self::Ratio {
+                exponent: exponent * factor,
+            },
         }
     }
 }

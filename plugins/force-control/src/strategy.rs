@@ -1,6 +1,9 @@
 //! The strategy: samples of a rough period in, a feed ratio out.
 
-use tandem_sdk::{Answer, Axes, FeedStrategy, FineSample, MAX_SIGNALS, PluginError, Request, StrategyContext, Window};
+use tandem_sdk::{
+    Answer, Axes, FeedStrategy, FineSample, MAX_SIGNALS, PluginError, Request, StrategyContext,
+    Window,
+};
 
 use crate::axis::AxisLoad;
 use crate::conversion::resultant_nm;
@@ -11,7 +14,14 @@ use crate::mean::window;
 use crate::options::Options;
 
 /// Names of the signals, in the order of [`Answer::signals`].
-const SIGNALS: [&str; 6] = ["torque_nm", "reference_nm", "force_n", "asked_feed_mm_per_min", "asked_ratio", "tool"];
+const SIGNALS: [&str; 6] = [
+    "torque_nm",
+    "reference_nm",
+    "force_n",
+    "asked_feed_mm_per_min",
+    "asked_ratio",
+    "tool",
+];
 
 /// The value of the signal `tool` in the rough period in which the guard trips.
 const TRIPPED: f64 = 4.0;
@@ -63,10 +73,20 @@ impl ForceControl {
     }
 
     fn new(options: Options, context: &StrategyContext) -> Self {
-        let index = |letter: &str| letter.chars().next().and_then(|c| index_of(&context.axes, c));
+        let index = |letter: &str| {
+            letter
+                .chars()
+                .next()
+                .and_then(|c| index_of(&context.axes, c))
+        };
         let time_constant_s = options.observer_time_constant_ms * 1e-3;
         let axes = options.axes.iter().filter_map(|(letter, axis)| {
-            Some(AxisLoad::new(index(letter)?, axis, context.fine_period_s, time_constant_s))
+            Some(AxisLoad::new(
+                index(letter)?,
+                axis,
+                context.fine_period_s,
+                time_constant_s,
+            ))
         });
         let bounds = options.bounds();
         let step_mm_per_s = options.feed_change_mm_per_s2 * context.rough_period_s;
@@ -98,11 +118,18 @@ impl ForceControl {
         if !sample.is_new() {
             return false;
         }
-        let follows = self.last_tick.replace(sample.tick).is_some_and(|last| sample.tick == last + 1);
+        let follows = self
+            .last_tick
+            .replace(sample.tick)
+            .is_some_and(|last| sample.tick == last + 1);
         for axis in &mut self.axes {
             axis.step(sample, follows);
         }
-        let now_nm = resultant_nm(self.axes.iter().map(|axis| (axis.torque_nm, axis.force_per_torque_per_m)));
+        let now_nm = resultant_nm(
+            self.axes
+                .iter()
+                .map(|axis| (axis.torque_nm, axis.force_per_torque_per_m)),
+        );
         self.guard.trips(now_nm)
     }
 
@@ -130,18 +157,27 @@ impl ForceControl {
         } else if motion.tripped {
             self.holding = LONGEST_HOLD;
             // Resumed in the same material, the torque is to be the reference.
-            self.entry_cap_mm_per_s = motion.feed_mm_per_s * bounds.reference_nm / self.options.guard_torque_nm();
+            self.entry_cap_mm_per_s =
+                motion.feed_mm_per_s * bounds.reference_nm / self.options.guard_torque_nm();
         }
     }
 
     /// Mean torque over whole tooth periods where they are known, N·m.
     fn mean_nm(&self, spindle_rad_per_s: f64) -> f64 {
-        let teeth_per_s =
-            self.options.teeth.map(|teeth| f64::from(teeth) * spindle_rad_per_s.abs() / std::f64::consts::TAU);
-        let tooth = teeth_per_s.filter(|rate| *rate > 0.0).map(|rate| 1.0 / (rate * self.fine_period_s));
+        let teeth_per_s = self
+            .options
+            .teeth
+            .map(|teeth| f64::from(teeth) * spindle_rad_per_s.abs() / std::f64::consts::TAU);
+        let tooth = teeth_per_s
+            .filter(|rate| *rate > 0.0)
+            .map(|rate| 1.0 / (rate * self.fine_period_s));
         let samples = window(self.per_rough, tooth);
         // Each axis is averaged before the resultant: the size of a vector never averages its noise to zero.
-        resultant_nm(self.axes.iter().map(|axis| (axis.mean_nm(samples), axis.force_per_torque_per_m)))
+        resultant_nm(
+            self.axes
+                .iter()
+                .map(|axis| (axis.mean_nm(samples), axis.force_per_torque_per_m)),
+        )
     }
 
     /// The feed to ask for, mm/s.
@@ -183,16 +219,45 @@ impl ForceControl {
         let torque_nm = self.mean_nm(motion.spindle_rad_per_s);
         let target = self.target(motion, torque_nm);
         let bounds = self.options.bounds();
-        let feed = self.limit.next(target.clamp(bounds.min_mm_per_s, bounds.max_mm_per_s));
+        let feed = self
+            .limit
+            .next(target.clamp(bounds.min_mm_per_s, bounds.max_mm_per_s));
         let programmed = self.programmed_mm_per_s;
-        let ratio = if programmed > 0.0 { (feed / programmed).min(self.max_ratio) } else { 1.0 };
+        let ratio = if programmed > 0.0 {
+            (feed / programmed).min(self.max_ratio)
+        } else {
+            1.0
+        };
         self.asked_mm_per_s = [feed, self.asked_mm_per_s[0], self.asked_mm_per_s[1]];
-        let force_n = self.axes.first().map_or(0.0, |axis| axis.force_per_torque_per_m) * torque_nm;
-        let tool = if motion.tripped { TRIPPED } else { self.engagement.tool.number() };
+        let force_n = self
+            .axes
+            .first()
+            .map_or(0.0, |axis| axis.force_per_torque_per_m)
+            * torque_nm;
+        let tool = if motion.tripped {
+            TRIPPED
+        } else {
+            self.engagement.tool.number()
+        };
         let mut signals = [0.0; MAX_SIGNALS];
-        let values = [torque_nm, bounds.reference_nm, force_n, feed * 60.0, ratio, tool];
+        let values = [
+            torque_nm,
+            bounds.reference_nm,
+            force_n,
+            feed * 60.0,
+            ratio,
+            tool,
+        ];
         signals[..values.len()].copy_from_slice(&values);
-        Answer { ratio, request: if motion.tripped { Request::Hold } else { Request::None }, signals }
+        Answer {
+            ratio,
+            request: if motion.tripped {
+                Request::Hold
+            } else {
+                Request::None
+            },
+            signals,
+        }
     }
 }
 

@@ -13,6 +13,9 @@ const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_
 
 #[test]
 fn it_conforms() {
-    let setup = Setup { options: OPTIONS.to_string(), ..Setup::default() };
+    let setup = Setup {
+        options: OPTIONS.to_string(),
+        ..Setup::default()
+    };
     judge(tandem_force_control::PLUGIN, &setup).assert_conforms();
 }

@@ -20,7 +20,9 @@ fn updates_do_not_allocate() {
         max_feed_ratio: 2.0,
         joints_are_axes: 1,
     };
-    let mut strategy = tandem_force_control::PLUGIN.feed_strategy(OPTIONS, &context).unwrap();
+    let mut strategy = tandem_force_control::PLUGIN
+        .feed_strategy(OPTIONS, &context)
+        .unwrap();
     let sample = |tick: u64| FineSample {
         tick,
         command: AxisVector::from_slice(&[0.0025 * tick as f64]),

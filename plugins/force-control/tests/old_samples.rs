@@ -16,7 +16,9 @@ fn answers(spoilt: f64) -> Vec<f64> {
         max_feed_ratio: 2.0,
         joints_are_axes: 1,
     };
-    let mut strategy = tandem_force_control::PLUGIN.feed_strategy(OPTIONS, &context).unwrap();
+    let mut strategy = tandem_force_control::PLUGIN
+        .feed_strategy(OPTIONS, &context)
+        .unwrap();
     let sample = |tick: u64| {
         let old = tick % 9 > 5;
         let by = if old { spoilt } else { 1.0 };
@@ -44,7 +46,10 @@ fn answers(spoilt: f64) -> Vec<f64> {
 #[test]
 fn what_is_old_changes_no_answer() {
     let whole = answers(1.0);
-    assert!(whole.iter().any(|value| *value > 0.0 && *value != 1.0), "something is felt");
+    assert!(
+        whole.iter().any(|value| *value > 0.0 && *value != 1.0),
+        "something is felt"
+    );
     for spoilt in [0.0, -3.0, 1e6] {
         assert_eq!(answers(spoilt), whole, "{spoilt}");
     }

@@ -18,7 +18,12 @@ struct Node {
 }
 
 impl Node {
-    const BLANK: Self = Self { cap: 0.0, reach: 0.0, start: 0.0, transfer: Transfer::BLANK };
+    const BLANK: Self = Self {
+        cap: 0.0,
+        reach: 0.0,
+        start: 0.0,
+        transfer: Transfer::BLANK,
+    };
 }
 
 /// A block taken out of the buffer. Its entry stays where it is until the next one is taken.
@@ -92,10 +97,15 @@ impl Buffer {
             return;
         }
         let slots = [self.end & self.mask, (self.end + 1) & self.mask];
-        let Ok([before, after]) = self.entries.get_disjoint_mut(slots) else { unreachable!("there are two slots") };
+        let Ok([before, after]) = self.entries.get_disjoint_mut(slots) else {
+            unreachable!("there are two slots")
+        };
         write(after);
         rule.join(before, after);
-        let end = End { junction_mm_per_s: after.junction_mm_per_s, half_step: &after.half_step };
+        let end = End {
+            junction_mm_per_s: after.junction_mm_per_s,
+            half_step: &after.half_step,
+        };
         rule.limit(before, &end, &mut self.nodes[self.end & self.mask].transfer);
         self.close();
     }
@@ -104,7 +114,11 @@ impl Buffer {
     pub fn finish(&mut self, rule: &Rule) {
         if self.open {
             let slot = self.end & self.mask;
-            rule.limit(&mut self.entries[slot], &End::REST, &mut self.nodes[slot].transfer);
+            rule.limit(
+                &mut self.entries[slot],
+                &End::REST,
+                &mut self.nodes[slot].transfer,
+            );
             self.close();
             self.open = false;
         }
@@ -131,9 +145,16 @@ impl Buffer {
             return None;
         }
         let number = self.first;
-        let end = if self.len() > 1 { self.nodes[(number + 1) & self.mask].start } else { 0.0 };
+        let end = if self.len() > 1 {
+            self.nodes[(number + 1) & self.mask].start
+        } else {
+            0.0
+        };
         self.first += 1;
-        Some(Taken { squares: [self.nodes[number & self.mask].start, end], number })
+        Some(Taken {
+            squares: [self.nodes[number & self.mask].start, end],
+            number,
+        })
     }
 
     /// What is known of a block that was taken.

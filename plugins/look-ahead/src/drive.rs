@@ -59,14 +59,22 @@ impl Drive {
     }
 
     /// One segment of at most `duration_s` from the current piece.
-    fn step(&mut self, path: &Path, duration_s: f64, segment: &mut Segment, sink: &mut dyn SegmentSink) -> f64 {
+    fn step(
+        &mut self,
+        path: &Path,
+        duration_s: f64,
+        segment: &mut Segment,
+        sink: &mut dyn SegmentSink,
+    ) -> f64 {
         let piece = &self.pieces[self.piece];
         if piece.duration_s == 0.0 {
             self.piece += 1;
             return 0.0;
         }
         // Short blocks are driven piece by piece, so the whole piece comes first.
-        if self.in_piece_s == 0.0 && piece.duration_s <= duration_s.min(self.builder.longest_s(path, piece)) {
+        if self.in_piece_s == 0.0
+            && piece.duration_s <= duration_s.min(self.builder.longest_s(path, piece))
+        {
             let all_s = piece.duration_s;
             self.emit(path, piece, true, segment, sink);
             self.in_block_s += all_s;
@@ -77,7 +85,13 @@ impl Drive {
     }
 
     /// One segment of at most `duration_s` from within the current piece.
-    fn step_inside(&mut self, path: &Path, duration_s: f64, segment: &mut Segment, sink: &mut dyn SegmentSink) -> f64 {
+    fn step_inside(
+        &mut self,
+        path: &Path,
+        duration_s: f64,
+        segment: &mut Segment,
+        sink: &mut dyn SegmentSink,
+    ) -> f64 {
         let piece = &self.pieces[self.piece];
         let mut part = SpeedPiece {
             start_mm: piece.path_mm(self.in_piece_s),
@@ -94,7 +108,11 @@ impl Drive {
             self.emit(path, &part, last, segment, sink);
         }
         self.in_block_s += part.duration_s;
-        self.in_piece_s = if last { 0.0 } else { self.in_piece_s + part.duration_s };
+        self.in_piece_s = if last {
+            0.0
+        } else {
+            self.in_piece_s + part.duration_s
+        };
         self.piece += usize::from(last);
         part.duration_s
     }
@@ -109,7 +127,11 @@ impl Drive {
     ) {
         self.builder.draw(path, part, segment);
         segment.step_velocity = self.lead + segment.step_acceleration * -self.in_block_s;
-        if last_of_piece && self.pieces[self.piece + 1..].iter().all(|p| p.duration_s == 0.0) {
+        if last_of_piece
+            && self.pieces[self.piece + 1..]
+                .iter()
+                .all(|p| p.duration_s == 0.0)
+        {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
         }
         sink.segment(segment);
@@ -122,7 +144,10 @@ impl Drive {
         rest.block = segment.block;
         rest.line = segment.line;
         rest.feed_mm_per_s = segment.feed_mm_per_s;
-        rest.flags = segment.flags.without(SegmentFlags::BLOCK_ENDS).with(SegmentFlags::ENDS_AT_REST);
+        rest.flags = segment
+            .flags
+            .without(SegmentFlags::BLOCK_ENDS)
+            .with(SegmentFlags::ENDS_AT_REST);
         rest.path[0] = self.builder.path_start_mm() + path.length_mm();
         sink.segment(&rest);
     }

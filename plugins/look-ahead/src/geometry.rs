@@ -100,7 +100,11 @@ impl Entry {
         let command = block.feed_mm_per_s * caps.feed_ratio;
         let policy = block.feed_cap_mm_per_s;
         let most = path.max_direction();
-        let axes = caps.axis_mm_per_s.iter().zip(&most.0).map(|(v, most)| (*v, *most));
+        let axes = caps
+            .axis_mm_per_s
+            .iter()
+            .zip(&most.0)
+            .map(|(v, most)| (*v, *most));
         let buffer = path.length_mm() * caps.most_blocks_per_s;
         self.feed_mm_per_s = lesser(least_ratio(lesser(command, policy), axes), buffer);
         self.feed_reason = match self.feed_mm_per_s {
@@ -119,7 +123,9 @@ impl Entry {
     /// Direction at the start and at the end, axis units per mm; zero for a dwell.
     pub fn direction(&self, at_end: bool) -> AxisVector {
         let place = |path: &Path| if at_end { path.length_mm() } else { 0.0 };
-        self.path.as_ref().map_or(AxisVector::ZERO, |path| path.direction(place(path)))
+        self.path
+            .as_ref()
+            .map_or(AxisVector::ZERO, |path| path.direction(place(path)))
     }
 
     /// Whether the machine rests between this block and `next`.

@@ -33,7 +33,11 @@ pub struct Rule {
 impl Rule {
     /// The rule `kind` for the given axes. The fine period enters the tangent feed only.
     pub fn new(kind: Junction, axes: &[AxisLimits], fine_period_s: f64) -> Self {
-        Self { kind, axes: axes.to_vec(), fine_period_s }
+        Self {
+            kind,
+            axes: axes.to_vec(),
+            fine_period_s,
+        }
     }
 
     /// Sets the junction between `before` and `after`: its feed, and half the step.
@@ -54,22 +58,45 @@ impl Rule {
     /// `max(A·T_s/(1 − cos θ), V)`: equation (4) with its floor. The floor belongs to the tangent feed only.
     fn tangent(&self, before: &Entry, after: &Entry, directions: &[AxisVector; 2]) -> f64 {
         let drop = tandem_motion::one_minus_cos(&directions[0], &directions[1]);
-        let acceleration = self.smallest_acceleration(before).min(self.smallest_acceleration(after));
-        let floor = self.axes.iter().map(|a| a.speed_difference_mm_per_s).fold(f64::INFINITY, f64::min);
-        if drop < STRAIGHT * STRAIGHT { f64::INFINITY } else { (acceleration * self.fine_period_s / drop).max(floor) }
+        let acceleration = self
+            .smallest_acceleration(before)
+            .min(self.smallest_acceleration(after));
+        let floor = self
+            .axes
+            .iter()
+            .map(|a| a.speed_difference_mm_per_s)
+            .fold(f64::INFINITY, f64::min);
+        if drop < STRAIGHT * STRAIGHT {
+            f64::INFINITY
+        } else {
+            (acceleration * self.fine_period_s / drop).max(floor)
+        }
     }
 
     /// The highest feed up to `most` at which no axis steps by more than its allowable speed difference.
     fn speed_difference(&self, step: &AxisVector, most: f64) -> f64 {
-        let stepping = self.axes.iter().zip(step.0.map(f64::abs)).filter(|(_, step)| *step > STRAIGHT);
-        least_ratio(most, stepping.map(|(axis, step)| (MARGIN * axis.speed_difference_mm_per_s, step)))
+        let stepping = self
+            .axes
+            .iter()
+            .zip(step.0.map(f64::abs))
+            .filter(|(_, step)| *step > STRAIGHT);
+        least_ratio(
+            most,
+            stepping.map(|(axis, step)| (MARGIN * axis.speed_difference_mm_per_s, step)),
+        )
     }
 
     /// The smallest acceleration of the axes that move in a block, as published.
     fn smallest_acceleration(&self, entry: &Entry) -> f64 {
-        let most = entry.path.as_ref().map(tandem_motion::Path::max_direction).unwrap_or_default();
+        let most = entry
+            .path
+            .as_ref()
+            .map(tandem_motion::Path::max_direction)
+            .unwrap_or_default();
         let moving = self.axes.iter().enumerate().filter(|(i, _)| most[*i] > 0.0);
-        moving.map(|(_, a)| a.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min)
+        moving
+            .map(|(_, a)| a.acceleration_mm_per_s2)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Fills in what limits the speed inside `entry`, whose end junction is `end`, and from one end of it to the other.
@@ -80,14 +107,22 @@ impl Rule {
         let bend = path.max_curvature();
         let length_mm = path.length_mm();
         if self.kind == Junction::Tangent {
-            let row = Row { h: 1.0, k: 0.0, a: self.smallest_acceleration(entry) };
+            let row = Row {
+                h: 1.0,
+                k: 0.0,
+                a: self.smallest_acceleration(entry),
+            };
             entry.rows.push(row);
             return transfer.push(&row, length_mm);
         }
         let costs = Costs::new(entry, length_mm, end.junction_mm_per_s);
         let mut turning = Least::new(entry.own_square);
         for (axis, limits) in self.axes.iter().enumerate() {
-            let straight = Row { h: most[axis], k: bend[axis], a: MARGIN * limits.acceleration_mm_per_s2 };
+            let straight = Row {
+                h: most[axis],
+                k: bend[axis],
+                a: MARGIN * limits.acceleration_mm_per_s2,
+            };
             let row = costs.row(straight, entry.half_step[axis], end.half_step[axis]);
             if row.limits() {
                 entry.rows.push(row);
@@ -110,7 +145,10 @@ pub struct End<'a> {
 
 impl End<'_> {
     /// At rest.
-    pub const REST: Self = Self { junction_mm_per_s: 0.0, half_step: &AxisVector::ZERO };
+    pub const REST: Self = Self {
+        junction_mm_per_s: 0.0,
+        half_step: &AxisVector::ZERO,
+    };
 }
 
 /// What all axes of one block share in the cost of its junctions.
@@ -144,17 +182,32 @@ impl Costs {
         }
         let [start, end] = self.ends_mm_per_s;
         let taken = self.feed_mm_per_s * (start * before.abs() + end * after.abs()) * self.per_mm;
-        let constant = Row { a: row.a - taken, ..row };
-        let square =
-            Row { h: row.h + before.abs().max(after.abs()), k: row.k + (before + after).abs() * self.per_mm, a: row.a };
+        let constant = Row {
+            a: row.a - taken,
+            ..row
+        };
+        let square = Row {
+            h: row.h + before.abs().max(after.abs()),
+            k: row.k + (before + after).abs() * self.per_mm,
+            a: row.a,
+        };
         let affordable = constant.a >= (1.0 - CONSTANT_SHARE) * row.a;
-        if affordable && self.reaches_as_far(&constant, &square) { constant } else { square }
+        if affordable && self.reaches_as_far(&constant, &square) {
+            constant
+        } else {
+            square
+        }
     }
 
     /// Whether from the slower junction `one` reaches the feed, or at least as much speed as `other`.
     fn reaches_as_far(&self, one: &Row, other: &Row) -> bool {
         let slow = lesser(self.ends_mm_per_s[0], self.ends_mm_per_s[1]).powi(2);
-        let reach = |r: &Row| (r.h * slow + 2.0 * self.length_mm * r.a, r.h + 2.0 * self.length_mm * r.k);
+        let reach = |r: &Row| {
+            (
+                r.h * slow + 2.0 * self.length_mm * r.a,
+                r.h + 2.0 * self.length_mm * r.k,
+            )
+        };
         let one = reach(one);
         let other = reach(other);
         one.0 >= self.feed_mm_per_s.powi(2) * one.1 || one.0 * other.1 >= other.0 * one.1

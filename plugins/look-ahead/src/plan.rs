@@ -34,10 +34,18 @@ impl Plan {
     ) -> Self {
         let length_mm = entry.length_mm();
         let [start, end] = squares;
-        let most = entry.rows.peak(f64::midpoint(start, end), length_mm, entry.own_square);
+        let most = entry
+            .rows
+            .peak(f64::midpoint(start, end), length_mm, entry.own_square);
         let peak_square = greater(greater(most, start), end);
         // While the machine cruises there is no root to draw.
-        let root = |square: f64| if square == start { start_mm_per_s } else { square.sqrt() };
+        let root = |square: f64| {
+            if square == start {
+                start_mm_per_s
+            } else {
+                square.sqrt()
+            }
+        };
         let profile = Profile {
             length_mm,
             start_mm_per_s,
@@ -47,9 +55,17 @@ impl Plan {
         };
         let steps = match rule {
             Junction::Tangent => [AxisVector::ZERO; 2],
-            Junction::Axis => [entry.half_step * profile.start_mm_per_s, *end_half_step * profile.end_mm_per_s],
+            Junction::Axis => [
+                entry.half_step * profile.start_mm_per_s,
+                *end_half_step * profile.end_mm_per_s,
+            ],
         };
-        Self { profile, durations_s: profile.durations_s(), steps, peak_square }
+        Self {
+            profile,
+            durations_s: profile.durations_s(),
+            steps,
+            peak_square,
+        }
     }
 
     /// Duration of the block, s.
@@ -59,9 +75,19 @@ impl Plan {
 
     /// The block's row of the report.
     pub fn report(&self, entry: &Entry) -> BlockReport {
-        let Profile { start_mm_per_s, peak_mm_per_s, end_mm_per_s, .. } = self.profile;
+        let Profile {
+            start_mm_per_s,
+            peak_mm_per_s,
+            end_mm_per_s,
+            ..
+        } = self.profile;
         let feeds_mm_per_s = [start_mm_per_s, peak_mm_per_s, end_mm_per_s];
-        report(entry.index, self.limited_by(entry), feeds_mm_per_s, self.duration_s())
+        report(
+            entry.index,
+            self.limited_by(entry),
+            feeds_mm_per_s,
+            self.duration_s(),
+        )
     }
 
     fn limited_by(&self, entry: &Entry) -> LimitedBy {

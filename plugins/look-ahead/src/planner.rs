@@ -2,8 +2,8 @@
 
 use tandem_motion::blocks::{self, BlockId, BlockWriter};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, MAX_AXES, Planner, PlannerContext, PlannerDescription,
-    PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, MAX_AXES, Planner, PlannerContext,
+    PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
 use crate::buffer::Buffer;
@@ -73,16 +73,28 @@ impl LookAhead {
 
     /// Takes the next block out of the buffer; `false` where there is none.
     fn start_block(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let Some(taken) = self.buffer.pop() else { return false };
+        let Some(taken) = self.buffer.pop() else {
+            return false;
+        };
         let entry = self.buffer.entry(&taken);
         let Some(path) = &entry.path else {
-            let id = BlockId { index: entry.index, line: entry.line };
+            let id = BlockId {
+                index: entry.index,
+                line: entry.line,
+            };
             let (position, duration_s) = entry.dwell;
-            self.writer.begin_dwell(id, &position, duration_s, self.path_mm, sink);
+            self.writer
+                .begin_dwell(id, &position, duration_s, self.path_mm, sink);
             return true;
         };
         let half_step = self.buffer.end_half_step(&taken);
-        let plan = Plan::new(entry, half_step, taken.squares, self.speed_mm_per_s, self.options.junction);
+        let plan = Plan::new(
+            entry,
+            half_step,
+            taken.squares,
+            self.speed_mm_per_s,
+            self.options.junction,
+        );
         self.speed_mm_per_s = plan.profile.end_mm_per_s;
         sink.block(&plan.report(entry));
         begin(&mut self.segment, entry, &plan);
@@ -94,8 +106,12 @@ impl LookAhead {
     fn emit(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Option<f64> {
         if self.driving {
             let entry = self.buffer.entry(self.drive.taken());
-            let Some(path) = &entry.path else { unreachable!("a dwell is not driven") };
-            let (emitted_s, over) = self.drive.advance(path, duration_s, &mut self.segment, sink);
+            let Some(path) = &entry.path else {
+                unreachable!("a dwell is not driven")
+            };
+            let (emitted_s, over) = self
+                .drive
+                .advance(path, duration_s, &mut self.segment, sink);
             if over {
                 self.path_mm += path.length_mm();
                 self.driving = false;
@@ -113,7 +129,10 @@ impl Planner for LookAhead {
     fn describe(&self) -> PlannerDescription {
         let mut description = PlannerDescription::order_2();
         let axes = self.context.limits.axes();
-        for (step, axis) in description.speed_difference_mm_per_s[..MAX_AXES].iter_mut().zip(axes) {
+        for (step, axis) in description.speed_difference_mm_per_s[..MAX_AXES]
+            .iter_mut()
+            .zip(axes)
+        {
             *step = axis.speed_difference_mm_per_s;
         }
         description.breaks_limits = u32::from(self.options.junction == Junction::Tangent);
@@ -136,14 +155,19 @@ impl Planner for LookAhead {
         self.check(block, curve)?;
         self.finished = false;
         let rapid = block.kind == BlockKind::Rapid;
-        let axes = if rapid { &self.rapid_axis_mm_per_s } else { &self.feed_axis_mm_per_s };
+        let axes = if rapid {
+            &self.rapid_axis_mm_per_s
+        } else {
+            &self.feed_axis_mm_per_s
+        };
         let caps = FeedCaps {
             feed_ratio: self.context.max_feed_ratio,
             axis_mm_per_s: axes,
             joint_lanes: self.context.joint_lanes,
             most_blocks_per_s: self.most_blocks_per_s,
         };
-        self.buffer.push(&self.rule, |entry| entry.set(block, &caps));
+        self.buffer
+            .push(&self.rule, |entry| entry.set(block, &caps));
         Ok(Accepted::Accepted)
     }
 
@@ -152,7 +176,11 @@ impl Planner for LookAhead {
         self.finished = true;
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         while emitted_s < duration_s {
             match self.emit(duration_s - emitted_s, sink) {
@@ -161,7 +189,10 @@ impl Planner for LookAhead {
             }
         }
         let empty = self.buffer.len() == 0 && !self.driving && !self.writer.is_dwelling();
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(empty && self.finished) })
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(empty && self.finished),
+        })
     }
 
     fn reset(&mut self, position: &AxisVector) {

@@ -51,7 +51,11 @@ impl Rows {
 
     /// Square of the highest speed, up to `most`, inside a block of `length_mm` whose ends have the mean square `mean`.
     pub fn peak(&self, mean: f64, length_mm: f64, most: f64) -> f64 {
-        least_ratio(most, self.iter().map(|r| (r.h * mean + length_mm * r.a, r.h + length_mm * r.k)))
+        least_ratio(
+            most,
+            self.iter()
+                .map(|r| (r.h * mean + length_mm * r.a, r.h + length_mm * r.k)),
+        )
     }
 }
 
@@ -105,7 +109,11 @@ impl Least {
     /// The least.
     #[inline]
     pub fn value(&self) -> f64 {
-        if self.d == 1.0 { self.n } else { self.n / self.d }
+        if self.d == 1.0 {
+            self.n
+        } else {
+            self.n / self.d
+        }
     }
 }
 
@@ -126,7 +134,10 @@ pub struct Transfer {
 
 impl Transfer {
     /// Everything comes to rest.
-    pub const BLANK: Self = Self { lines: [(0.0, 0.0); MAX_AXES], count: 0 };
+    pub const BLANK: Self = Self {
+        lines: [(0.0, 0.0); MAX_AXES],
+        count: 0,
+    };
 
     /// Forgets all rows.
     pub fn clear(&mut self) {
@@ -143,8 +154,12 @@ impl Transfer {
     /// The highest square of the speed at one end when it is `w` at the other.
     #[inline]
     pub fn apply(&self, w: f64) -> f64 {
-        let Some(((p, q), others)) = self.lines[..self.count].split_first() else { return 0.0 };
-        others.iter().fold(p * w + q, |least, (p, q)| lesser(least, p * w + q))
+        let Some(((p, q), others)) = self.lines[..self.count].split_first() else {
+            return 0.0;
+        };
+        others
+            .iter()
+            .fold(p * w + q, |least, (p, q)| lesser(least, p * w + q))
     }
 }
 
@@ -154,13 +169,15 @@ mod tests {
     use proptest::prelude::*;
 
     fn rows() -> impl Strategy<Value = Rows> {
-        proptest::collection::vec((0.01..1.5f64, 0.0..2.0f64, 10.0..2000.0f64), 1..5).prop_map(|rows| {
-            let mut all = Rows::default();
-            for (h, k, a) in rows {
-                all.push(Row { h, k, a });
-            }
-            all
-        })
+        proptest::collection::vec((0.01..1.5f64, 0.0..2.0f64, 10.0..2000.0f64), 1..5).prop_map(
+            |rows| {
+                let mut all = Rows::default();
+                for (h, k, a) in rows {
+                    all.push(Row { h, k, a });
+                }
+                all
+            },
+        )
     }
 
     fn transfer(rows: &Rows, length_mm: f64) -> Transfer {

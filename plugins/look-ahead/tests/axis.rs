@@ -37,7 +37,9 @@ fn sample(collected: &Collected, count: usize) -> Vec<AxisVector> {
     let (mut index, mut start_s) = (0, 0.0);
     for tick in 0..count {
         let t_s = tick as f64 * PERIOD_S;
-        while index + 1 < collected.segments.len() && t_s > start_s + collected.segments[index].duration_s {
+        while index + 1 < collected.segments.len()
+            && t_s > start_s + collected.segments[index].duration_s
+        {
             start_s += collected.segments[index].duration_s;
             index += 1;
         }
@@ -50,15 +52,27 @@ fn sample(collected: &Collected, count: usize) -> Vec<AxisVector> {
 fn feed_respected(collected: &Collected, blocks: &[Block]) -> bool {
     let feeds = collected.reports.iter().zip(blocks);
     collected.reports.len() == blocks.len()
-        && feeds.into_iter().all(|(r, b)| r.peak_feed_mm_per_s <= b.feed_mm_per_s * (1.0 + 1e-12))
+        && feeds
+            .into_iter()
+            .all(|(r, b)| r.peak_feed_mm_per_s <= b.feed_mm_per_s * (1.0 + 1e-12))
 }
 
 /// Steps of a walk: mixtures of long moves, chords, noise, reversals and collinear pieces.
 fn walk() -> impl Strategy<Value = Vec<(AxisVector, f64)>> {
-    let step =
-        (0..6u8, -1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64, 200.0..12000.0f64).prop_map(|(kind, x, y, z, feed)| {
+    let step = (
+        0..6u8,
+        -1.0..1.0f64,
+        -1.0..1.0f64,
+        -1.0..1.0f64,
+        200.0..12000.0f64,
+    )
+        .prop_map(|(kind, x, y, z, feed)| {
             let scale = [20.0, 1.0, 0.05, 0.01, 0.3, 3.0][kind as usize];
-            let bend = if kind == 3 { [1.0, 0.01 * y, 0.0] } else { [x, y, z] };
+            let bend = if kind == 3 {
+                [1.0, 0.01 * y, 0.0]
+            } else {
+                [x, y, z]
+            };
             (AxisVector::from_slice(&bend) * scale, feed)
         });
     proptest::collection::vec(step, 1..120)
@@ -74,27 +88,38 @@ fn blocks(steps: &[(AxisVector, f64)]) -> Vec<Block> {
 
 #[test]
 fn random_walks_keep_the_limits() {
-    let mut runner = TestRunner::new(Config { cases: 400, failure_persistence: None, ..Config::default() });
+    let mut runner = TestRunner::new(Config {
+        cases: 400,
+        failure_persistence: None,
+        ..Config::default()
+    });
     runner
-        .run(&(walk(), 0.0..400.0f64, 2..200usize), |(steps, allowed, buffer)| {
-            let context = context(&[1000.0, 700.0, 300.0], allowed, PERIOD_S);
-            let blocks = blocks(&steps);
-            let options = Options { buffer_blocks: buffer, ..Options::default() };
-            let collected = run(&context, &options, &blocks, 0.008);
-            let excess = worst_excess(&collected, &context);
-            prop_assert!(excess < 1e-6, "exceeds by {excess} mm/s");
-            prop_assert!(feed_respected(&collected, &blocks));
-            let last = collected.segments.last().unwrap();
-            prop_assert_eq!(last.position(last.duration_s), blocks.last().unwrap().end);
-            Ok(())
-        })
+        .run(
+            &(walk(), 0.0..400.0f64, 2..200usize),
+            |(steps, allowed, buffer)| {
+                let context = context(&[1000.0, 700.0, 300.0], allowed, PERIOD_S);
+                let blocks = blocks(&steps);
+                let options = Options {
+                    buffer_blocks: buffer,
+                    ..Options::default()
+                };
+                let collected = run(&context, &options, &blocks, 0.008);
+                let excess = worst_excess(&collected, &context);
+                prop_assert!(excess < 1e-6, "exceeds by {excess} mm/s");
+                prop_assert!(feed_respected(&collected, &blocks));
+                let last = collected.segments.last().unwrap();
+                prop_assert_eq!(last.position(last.duration_s), blocks.last().unwrap().end);
+                Ok(())
+            },
+        )
         .unwrap();
 }
 
 fn circle_chords(radius_mm: f64, chord_mm: f64) -> Vec<AxisVector> {
     let count = (std::f64::consts::TAU * radius_mm / chord_mm).ceil();
     let angle = |i: f64| std::f64::consts::TAU * i / count;
-    let at = |i: f64| AxisVector::from_slice(&[radius_mm * angle(i).cos(), radius_mm * angle(i).sin()]);
+    let at =
+        |i: f64| AxisVector::from_slice(&[radius_mm * angle(i).cos(), radius_mm * angle(i).sin()]);
     (0..=count as u32).map(|i| at(f64::from(i))).collect()
 }
 
@@ -104,11 +129,18 @@ fn a_circle_of_fine_chords_is_driven_at_its_centripetal_speed() {
     let blocks = lines(&circle_chords(2.0, 0.01), |_| 5000.0);
     let collected = run(&context, &Options::default(), &blocks, 0.008);
     assert!(worst_excess(&collected, &context) < 1e-6);
-    let peak = collected.reports.iter().map(|r| r.peak_feed_mm_per_s).fold(0.0, f64::max);
+    let peak = collected
+        .reports
+        .iter()
+        .map(|r| r.peak_feed_mm_per_s)
+        .fold(0.0, f64::max);
     // Turning takes 0.8 of each axis: at 45° both share it, and the circle is √√2 times as fast as at the quadrants.
     let slow = (0.8 * 999.0 * 2.0f64).sqrt();
     let fast = slow * 2.0f64.powf(0.25);
-    assert!((0.95 * fast..=1.001 * fast).contains(&peak), "{peak} against {fast}");
+    assert!(
+        (0.95 * fast..=1.001 * fast).contains(&peak),
+        "{peak} against {fast}"
+    );
     let mean = std::f64::consts::TAU * 2.0 / collected.duration_s();
     assert!(mean > 0.9 * slow, "{mean} against {slow}");
 }
@@ -116,11 +148,20 @@ fn a_circle_of_fine_chords_is_driven_at_its_centripetal_speed() {
 #[test]
 fn a_reversal_and_a_right_angle_step_by_the_allowed_difference() {
     let context = context(&[1000.0, 1000.0], 100.0, PERIOD_S);
-    let points = [[0.0, 0.0], [20.0, 0.0], [0.0, 0.0], [0.0, 20.0]].map(|p| AxisVector::from_slice(&p));
-    let collected = run(&context, &Options::default(), &lines(&points, |_| 5000.0), 0.008);
+    let points =
+        [[0.0, 0.0], [20.0, 0.0], [0.0, 0.0], [0.0, 20.0]].map(|p| AxisVector::from_slice(&p));
+    let collected = run(
+        &context,
+        &Options::default(),
+        &lines(&points, |_| 5000.0),
+        0.008,
+    );
     assert!(worst_excess(&collected, &context) < 1e-6);
     let feeds = collected.junction_feeds();
-    assert!((feeds[1] - 49.95).abs() < 1e-9 && (feeds[2] - 99.9).abs() < 1e-9, "{feeds:?}");
+    assert!(
+        (feeds[1] - 49.95).abs() < 1e-9 && (feeds[2] - 99.9).abs() < 1e-9,
+        "{feeds:?}"
+    );
 }
 
 fn arc(from: &Block, radius_mm: f64) -> Block {
@@ -141,12 +182,18 @@ fn arc(from: &Block, radius_mm: f64) -> Block {
 #[test]
 fn an_arc_entered_at_speed_keeps_the_limits() {
     let context = context(&[1000.0, 1000.0], 100.0, PERIOD_S);
-    let first = lines(&[AxisVector::ZERO, AxisVector::from_slice(&[40.0, 0.0])], |_| 6000.0)[0];
+    let first = lines(
+        &[AxisVector::ZERO, AxisVector::from_slice(&[40.0, 0.0])],
+        |_| 6000.0,
+    )[0];
     let second = arc(&first, 5.0);
     let collected = run(&context, &Options::default(), &[first, second], 0.008);
     assert!(worst_excess(&collected, &context) < 1e-6);
     let entered = collected.reports[1].start_feed_mm_per_s;
-    assert!((entered - (0.8 * 999.0 * 5.0f64).sqrt()).abs() < 1e-9, "{entered}");
+    assert!(
+        (entered - (0.8 * 999.0 * 5.0f64).sqrt()).abs() < 1e-9,
+        "{entered}"
+    );
 }
 
 #[test]
@@ -155,7 +202,16 @@ fn a_planner_one_percent_too_fast_is_noticed() {
     let honest = context(&[1000.0, 1000.0], 10.0, PERIOD_S);
     let optimist = context(&[1010.0, 1010.0], 10.0, PERIOD_S);
     let points = [[0.0, 0.0], [40.0, 0.0]].map(|p| AxisVector::from_slice(&p));
-    let excess =
-        |planned| worst_excess(&run(planned, &Options::default(), &lines(&points, |_| 12000.0), 0.008), &honest);
+    let excess = |planned| {
+        worst_excess(
+            &run(
+                planned,
+                &Options::default(),
+                &lines(&points, |_| 12000.0),
+                0.008,
+            ),
+            &honest,
+        )
+    };
     assert!(excess(&honest) < 1e-6 && excess(&optimist) > 0.1);
 }

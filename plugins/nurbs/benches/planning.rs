@@ -22,26 +22,38 @@ const CURVES: [&str; 3] = ["butterfly", "trident", "infinity"];
 fn main() {
     divan::main();
     // With the name of a benchmark that one alone is run.
-    if std::env::args().skip(1).any(|argument| !argument.starts_with("--")) {
+    if std::env::args()
+        .skip(1)
+        .any(|argument| !argument.starts_with("--"))
+    {
         return;
     }
     for form in ["scan", "windowed"] {
         for (name, path_s, axes_s) in BEST_S {
             let (mut planner, block) = planner(form, name);
-            let batches: Vec<Batch> = (0..BATCHES).map(|_| Batch::drive(&mut planner, &block)).collect();
+            let batches: Vec<Batch> = (0..BATCHES)
+                .map(|_| Batch::drive(&mut planner, &block))
+                .collect();
             let best = batches.iter().min_by_key(|batch| batch.planning).unwrap();
-            let (planning_s, longest) = (best.planning.as_secs_f64() / f64::from(RUNS), best.longest);
+            let (planning_s, longest) =
+                (best.planning.as_secs_f64() / f64::from(RUNS), best.longest);
             let ratio = best.motion_s / if form == "scan" { axes_s } else { path_s };
             let speed = best.motion_s / planning_s;
-            println!("{form} {name}: {speed:.0} × real time, {ratio:.4} of T_ref, longest call {longest:?}");
+            println!(
+                "{form} {name}: {speed:.0} × real time, {ratio:.4} of T_ref, longest call {longest:?}"
+            );
         }
     }
 }
 
 /// Processor time of this thread.
 fn processor_time() -> Duration {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells the time of a thread");
-    let running = text.split_whitespace().next().and_then(|number| number.parse().ok());
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat")
+        .expect("Linux tells the time of a thread");
+    let running = text
+        .split_whitespace()
+        .next()
+        .and_then(|number| number.parse().ok());
     Duration::from_nanos(running.expect("a number"))
 }
 
@@ -77,7 +89,11 @@ impl Batch {
         let started = processor_time();
         let runs: Vec<Run> = (0..RUNS).map(|_| drive(planner, block)).collect();
         let longest = runs.iter().map(|run| run.longest).min().unwrap_or_default();
-        Self { motion_s: runs[0].motion_s, planning: processor_time().saturating_sub(started), longest }
+        Self {
+            motion_s: runs[0].motion_s,
+            planning: processor_time().saturating_sub(started),
+            longest,
+        }
     }
 }
 
@@ -85,7 +101,10 @@ fn planner(form: &str, name: &str) -> (NurbsPlanner, Given) {
     let (data, length_mm) = canonical(name);
     let block = curve_block(data, length_mm, 250.0);
     let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
-    (NurbsPlanner::new(&options, &context(block.0.start)).unwrap(), block)
+    (
+        NurbsPlanner::new(&options, &context(block.0.start)).unwrap(),
+        block,
+    )
 }
 
 /// From the curve to the last segment.
@@ -100,7 +119,10 @@ fn drive(planner: &mut NurbsPlanner, block: &Given) -> Run {
         let done = planner.advance(0.008, &mut counter).unwrap().done;
         longest = longest.max(called.elapsed());
         if done != 0 {
-            return Run { motion_s: counter.motion_s, longest };
+            return Run {
+                motion_s: counter.motion_s,
+                longest,
+            };
         }
     }
 }

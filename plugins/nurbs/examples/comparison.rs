@@ -9,7 +9,11 @@ use std::fmt::Write;
 use common::measure::{BEST_S, Figures, figures};
 use common::{Collected, canonical, context, curve_block, run};
 
-const FORMS: [(&str, &str); 3] = [("adaptive", "#999999"), ("windowed", "#d97706"), ("scan", "#1d4ed8")];
+const FORMS: [(&str, &str); 3] = [
+    ("adaptive", "#999999"),
+    ("windowed", "#d97706"),
+    ("scan", "#1d4ed8"),
+];
 const PERIOD_S: f64 = 0.002;
 
 /// A panel of the picture: its place, and the ends of its scales.
@@ -29,7 +33,10 @@ const POINTS: usize = 900;
 impl Panel {
     fn point(&self, (t, value): (f64, f64)) -> (f64, f64) {
         let share = ((value - self.least) / (self.most - self.least)).clamp(-0.02, 1.02);
-        (LEFT + WIDTH * t / self.time_s, self.top + self.height * (1.0 - share))
+        (
+            LEFT + WIDTH * t / self.time_s,
+            self.top + self.height * (1.0 - share),
+        )
     }
 
     fn frame(&self, title: &str) -> String {
@@ -40,11 +47,21 @@ impl Panel {
             top - 6.0
         );
         for (value, y) in [(self.most, top + 10.0), (self.least, top + height)] {
-            writeln!(text, "<text x=\"{}\" y=\"{y}\" text-anchor=\"end\">{value}</text>", LEFT - 6.0).unwrap();
+            writeln!(
+                text,
+                "<text x=\"{}\" y=\"{y}\" text-anchor=\"end\">{value}</text>",
+                LEFT - 6.0
+            )
+            .unwrap();
         }
         let end = format!("{:.2} s", self.time_s);
-        writeln!(text, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{end}</text>", LEFT + WIDTH, top + height + 14.0)
-            .unwrap();
+        writeln!(
+            text,
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{end}</text>",
+            LEFT + WIDTH,
+            top + height + 14.0
+        )
+        .unwrap();
         text
     }
 
@@ -55,16 +72,29 @@ impl Panel {
             .step_by(values.len().div_ceil(POINTS))
             .map(|(n, value)| self.point((n as f64 * PERIOD_S, *value)));
         let text: Vec<String> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-        format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\"/>\n", text.join(" "))
+        format!(
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\"/>\n",
+            text.join(" ")
+        )
     }
 }
 
 fn difference(values: &[f64]) -> Vec<f64> {
-    values.windows(2).map(|pair| (pair[1] - pair[0]) / PERIOD_S).collect()
+    values
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / PERIOD_S)
+        .collect()
 }
 
 fn row(form: &str, name: &str, figures: &Figures, (along_s, axes_s): (f64, f64)) {
-    let Figures { time_s, path, axis, chord_um, fluctuation, .. } = figures;
+    let Figures {
+        time_s,
+        path,
+        axis,
+        chord_um,
+        fluctuation,
+        ..
+    } = figures;
     println!(
         "| {name} | `{form}` | {time_s:.4} | {:.4} | {:.4} | {:.0} | {:.2e} | {:.0} | {:.2e} | {chord_um:.3} | {:.5} |",
         time_s / along_s,
@@ -80,15 +110,32 @@ fn row(form: &str, name: &str, figures: &Figures, (along_s, axes_s): (f64, f64))
 /// Feeds of one curve in all forms; of the first curve the jerk of X too.
 fn draw(name: &str, driven: &[Collected], top: f64, jerk_too: bool) -> String {
     let time_s = driven.iter().map(Collected::duration_s).fold(0.0, f64::max);
-    let feeds = Panel { top, height: 130.0, time_s, most: 250.0, least: 0.0 };
-    let jerks = Panel { top: top + 175.0, height: 130.0, time_s, most: 4e5, least: -4e5 };
+    let feeds = Panel {
+        top,
+        height: 130.0,
+        time_s,
+        most: 250.0,
+        least: 0.0,
+    };
+    let jerks = Panel {
+        top: top + 175.0,
+        height: 130.0,
+        time_s,
+        most: 4e5,
+        least: -4e5,
+    };
     let mut text = feeds.frame(&format!("{name}: feed, mm/s"));
     if jerk_too {
-        text += &jerks.frame(&format!("{name}: jerk of X, mm/s³; adaptive lies up to a hundred times outside"));
+        text += &jerks.frame(&format!(
+            "{name}: jerk of X, mm/s³; adaptive lies up to a hundred times outside"
+        ));
     }
     for (collected, (form, colour)) in driven.iter().zip(FORMS) {
         let samples = collected.path_samples(PERIOD_S);
-        text += &feeds.line(&difference(&samples.iter().map(|s| s.1).collect::<Vec<_>>()), colour);
+        text += &feeds.line(
+            &difference(&samples.iter().map(|s| s.1).collect::<Vec<_>>()),
+            colour,
+        );
         if jerk_too && form != "adaptive" {
             let x: Vec<f64> = samples.iter().map(|s| s.0[0]).collect();
             text += &jerks.line(&difference(&difference(&difference(&x))), colour);
@@ -110,19 +157,32 @@ fn main() {
         let blocks = [block];
         let driven = FORMS.map(|(form, _)| run(&format!("form = \"{form}\""), &context, &blocks));
         for (collected, (form, _)) in driven.iter().zip(FORMS) {
-            row(form, name, &figures(collected, &data, &context), (along_s, axes_s));
+            row(
+                form,
+                name,
+                &figures(collected, &data, &context),
+                (along_s, axes_s),
+            );
         }
         let first = name == "butterfly";
         picture += &draw(name, &driven, top, first);
         top += if first { 350.0 } else { 175.0 };
     }
-    let Some(file) = std::env::args().nth(1) else { return };
+    let Some(file) = std::env::args().nth(1) else {
+        return;
+    };
     let mut names = String::new();
     for (n, (form, colour)) in FORMS.iter().enumerate() {
-        writeln!(names, "<text x=\"{}\" y=\"24\" fill=\"{colour}\">{form}</text>", LEFT + 100.0 * n as f64).unwrap();
+        writeln!(
+            names,
+            "<text x=\"{}\" y=\"24\" fill=\"{colour}\">{form}</text>",
+            LEFT + 100.0 * n as f64
+        )
+        .unwrap();
     }
-    let head =
-        format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"{top}\" font-family=\"sans-serif\"");
+    let head = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"{top}\" font-family=\"sans-serif\""
+    );
     let text = format!(
         "{head} font-size=\"13\">\n<rect width=\"1000\" height=\"{top}\" fill=\"white\"/>\n{names}{picture}</svg>\n"
     );

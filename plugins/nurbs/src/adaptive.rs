@@ -24,7 +24,12 @@ impl Adaptive {
         let chord_feed = chord_feed_mm_per_s(curvature, self.chord_error_mm, self.period_s);
         let speed_mm_per_s = self.feed_mm_per_s.min(chord_feed);
         let left_s = (course.stretches()[index].length_mm - s_mm) / speed_mm_per_s;
-        Piece { start_mm: s_mm, speed_mm_per_s, duration_s: left_s.min(self.period_s), ..Piece::default() }
+        Piece {
+            start_mm: s_mm,
+            speed_mm_per_s,
+            duration_s: left_s.min(self.period_s),
+            ..Piece::default()
+        }
     }
 
     /// Duration, and feed at the start, highest and at the end.
@@ -37,7 +42,11 @@ impl Adaptive {
             while s_mm < stretch.length_mm {
                 let piece = self.piece(course, index, s_mm, &mut place);
                 let speed = piece.speed_mm_per_s;
-                feeds = [if feeds[0].is_nan() { speed } else { feeds[0] }, feeds[1].max(speed), speed];
+                feeds = [
+                    if feeds[0].is_nan() { speed } else { feeds[0] },
+                    feeds[1].max(speed),
+                    speed,
+                ];
                 time_s += piece.duration_s;
                 s_mm = next_mm(&piece, stretch.length_mm, self.period_s);
             }
@@ -48,5 +57,9 @@ impl Adaptive {
 
 /// Where the next piece begins: at the end of the stretch exactly, where this one was the last.
 pub fn next_mm(piece: &Piece, length_mm: f64, period_s: f64) -> f64 {
-    if piece.duration_s < period_s { length_mm } else { piece.start_mm + piece.speed_mm_per_s * piece.duration_s }
+    if piece.duration_s < period_s {
+        length_mm
+    } else {
+        piece.start_mm + piece.speed_mm_per_s * piece.duration_s
+    }
 }

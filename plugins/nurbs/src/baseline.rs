@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 
 use tandem_motion::blocks::{BlockId, BlockWriter, limited_by_feed, report};
 use tandem_motion::nurbs::Place;
-use tandem_sdk::{AxisVector, Block, BlockKind, LimitedBy, PlannerContext, Segment, SegmentFlags, SegmentSink};
+use tandem_sdk::{
+    AxisVector, Block, BlockKind, LimitedBy, PlannerContext, Segment, SegmentFlags, SegmentSink,
+};
 
 use crate::adaptive::{Adaptive, next_mm};
 use crate::course::Course;
@@ -77,7 +79,10 @@ impl Baseline {
 
     /// Takes a block.
     pub fn accept(&mut self, block: &Block, course: Option<Course>) {
-        self.waiting.push_back(Waiting { block: *block, course });
+        self.waiting.push_back(Waiting {
+            block: *block,
+            course,
+        });
         self.finished = false;
     }
 
@@ -88,7 +93,10 @@ impl Baseline {
 
     /// Whether all is emitted.
     pub fn is_done(&self) -> bool {
-        let empty = self.waiting.is_empty() && self.driving.is_none() && !self.writer.is_dwelling() && !self.moving;
+        let empty = self.waiting.is_empty()
+            && self.driving.is_none()
+            && !self.writer.is_dwelling()
+            && !self.moving;
         empty && self.finished
     }
 
@@ -104,15 +112,26 @@ impl Baseline {
     }
 
     fn begin(&mut self, sink: &mut dyn SegmentSink) -> bool {
-        let next_rests = self.waiting.front().map_or(self.finished, |next| next.block.starts_at_rest());
+        let next_rests = self
+            .waiting
+            .front()
+            .map_or(self.finished, |next| next.block.starts_at_rest());
         if self.moving && (self.ends_at_rest || next_rests) {
             self.rest(sink);
             return true;
         }
-        let Some(Waiting { block, course }) = self.waiting.pop_front() else { return false };
+        let Some(Waiting { block, course }) = self.waiting.pop_front() else {
+            return false;
+        };
         match course {
             Some(course) => self.begin_motion(&block, course, sink),
-            None => self.writer.begin_dwell(BlockId::from(&block), &block.end, block.dwell_s, self.path_mm, sink),
+            None => self.writer.begin_dwell(
+                BlockId::from(&block),
+                &block.end,
+                block.dwell_s,
+                self.path_mm,
+                sink,
+            ),
         }
         true
     }
@@ -121,15 +140,30 @@ impl Baseline {
         let (feed_mm_per_s, limited_by) = self.feed_mm_per_s(block, &course);
         let chord_error_mm = self.chord_error_mm;
         let period_s = self.context.fine_period_s;
-        let profile = Adaptive { feed_mm_per_s, chord_error_mm, period_s };
+        let profile = Adaptive {
+            feed_mm_per_s,
+            chord_error_mm,
+            period_s,
+        };
         let (time_s, feeds) = profile.summary(&course);
         let slowed = feeds[1] < feed_mm_per_s;
-        let limited_by = if slowed { LimitedBy::Tolerance } else { limited_by };
+        let limited_by = if slowed {
+            LimitedBy::Tolerance
+        } else {
+            limited_by
+        };
         sink.block(&report(block.index, limited_by, feeds, time_s));
         self.segment = self.blank(block);
         self.end = *course.end();
         self.ends_at_rest = block.ends_at_rest();
-        self.driving = Some(Driving { course, profile, stretch: 0, s_mm: 0.0, place: Place::default(), piece: None });
+        self.driving = Some(Driving {
+            course,
+            profile,
+            stretch: 0,
+            s_mm: 0.0,
+            place: Place::default(),
+            piece: None,
+        });
         self.moving = true;
     }
 
@@ -140,21 +174,29 @@ impl Baseline {
             let limits = self.context.limits.along(&direction);
             return (AIM * limits.rapid_mm_per_s, LimitedBy::Feed);
         }
-        (block.command_feed_mm_per_s() * self.context.max_feed_ratio, limited_by_feed(block))
+        (
+            block.command_feed_mm_per_s() * self.context.max_feed_ratio,
+            limited_by_feed(block),
+        )
     }
 
     fn blank(&self, block: &Block) -> Segment {
         let mut blank = self.writer.blank(block);
         // A path deceleration that no axis exceeds, whatever the direction; this form serves simulated drives only.
         let axes = self.context.limits.axes();
-        blank.stop_deceleration_mm_per_s2 =
-            axes.iter().map(|axis| axis.acceleration_mm_per_s2).fold(f64::INFINITY, f64::min);
+        blank.stop_deceleration_mm_per_s2 = axes
+            .iter()
+            .map(|axis| axis.acceleration_mm_per_s2)
+            .fold(f64::INFINITY, f64::min);
         blank
     }
 
     /// Rest where the last block ended, exactly.
     fn rest(&mut self, sink: &mut dyn SegmentSink) {
-        let id = BlockId { index: self.segment.block, line: self.segment.line };
+        let id = BlockId {
+            index: self.segment.block,
+            line: self.segment.line,
+        };
         self.moving = false;
         sink.segment(&self.writer.rest(id, &self.end, self.path_mm));
     }
@@ -164,7 +206,9 @@ impl Baseline {
         if let Some(emitted_s) = self.writer.emit_dwell(left_s, sink) {
             return Some(emitted_s);
         }
-        let Some(mut driving) = self.driving.take() else { return self.begin(sink).then_some(0.0) };
+        let Some(mut driving) = self.driving.take() else {
+            return self.begin(sink).then_some(0.0);
+        };
         let over = driving.draw(left_s, &mut self.segment);
         self.segment.path[0] += self.path_mm + driving.before_mm();
         if over {
@@ -174,7 +218,11 @@ impl Baseline {
             self.driving = Some(driving);
         }
         sink.segment(&self.segment);
-        self.segment.flags = self.segment.flags.without(SegmentFlags::BLOCK_BEGINS).without(SegmentFlags::BLOCK_ENDS);
+        self.segment.flags = self
+            .segment
+            .flags
+            .without(SegmentFlags::BLOCK_BEGINS)
+            .without(SegmentFlags::BLOCK_ENDS);
         Some(self.segment.duration_s)
     }
 }
@@ -183,9 +231,16 @@ impl Driving {
     /// Draws the next segment, at most `left_s` long; true where it ends the block.
     fn draw(&mut self, left_s: f64, segment: &mut Segment) -> bool {
         let whole = self.piece.take();
-        let piece = whole.unwrap_or_else(|| self.profile.piece(&self.course, self.stretch, self.s_mm, &mut self.place));
+        let piece = whole.unwrap_or_else(|| {
+            self.profile
+                .piece(&self.course, self.stretch, self.s_mm, &mut self.place)
+        });
         if whole.is_none() {
-            self.s_mm = next_mm(&piece, self.course.stretches()[self.stretch].length_mm, self.profile.period_s);
+            self.s_mm = next_mm(
+                &piece,
+                self.course.stretches()[self.stretch].length_mm,
+                self.profile.period_s,
+            );
         }
         let now = piece.part(0.0, piece.duration_s.min(left_s));
         let undrawn = now.draw(&self.course, self.stretch, &mut self.place, segment);
@@ -213,10 +268,17 @@ impl Driving {
     }
 
     fn before_mm(&self) -> f64 {
-        self.course.stretches()[..self.stretch].iter().map(|stretch| stretch.length_mm).sum()
+        self.course.stretches()[..self.stretch]
+            .iter()
+            .map(|stretch| stretch.length_mm)
+            .sum()
     }
 
     fn length_mm(&self) -> f64 {
-        self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
+        self.course
+            .stretches()
+            .iter()
+            .map(|stretch| stretch.length_mm)
+            .sum()
     }
 }

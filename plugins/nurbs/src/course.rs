@@ -53,27 +53,60 @@ impl Course {
     ///
     /// # Errors
     /// A curve that is none.
-    pub fn new(context: &PlannerContext, block: &Block, curve: Option<Curve<'_>>) -> Result<Option<Self>, NurbsError> {
+    pub fn new(
+        context: &PlannerContext,
+        block: &Block,
+        curve: Option<Curve<'_>>,
+    ) -> Result<Option<Self>, NurbsError> {
         let end = block.end;
         let count = context.axes.count();
         if block.kind != BlockKind::Nurbs {
             return Ok(Path::with_lanes(block, context.joint_lanes).map(|path| {
-                let stretches =
-                    vec![Stretch { length_mm: path.length_mm(), turns: false, table: None, knots_mm: Vec::new() }];
-                Self { shape: Shape::Path(Box::new(path)), stretches, end, axes: count }
+                let stretches = vec![Stretch {
+                    length_mm: path.length_mm(),
+                    turns: false,
+                    table: None,
+                    knots_mm: Vec::new(),
+                }];
+                Self {
+                    shape: Shape::Path(Box::new(path)),
+                    stretches,
+                    end,
+                    axes: count,
+                }
             }));
         }
         let curve = curve_of(&context.axes, curve)?;
         let stretch = |(piece, turns): &(Piece, bool)| {
             let table = ArcLength::of_piece(&curve, piece);
-            let inside = curve.inner_knots().filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
+            let inside = curve
+                .inner_knots()
+                .filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
             let knots_mm = inside.map(|knot| table.length_at(&curve, knot)).collect();
-            Stretch { length_mm: table.length().mm, turns: *turns, table: Some(table), knots_mm }
+            Stretch {
+                length_mm: table.length().mm,
+                turns: *turns,
+                table: Some(table),
+                knots_mm,
+            }
         };
         // Between points of a polygon that coincide there is nothing to drive.
-        let pieces = curve.pieces().into_iter().flat_map(|piece| between_hairpins(&curve, piece)).collect::<Vec<_>>();
-        let stretches = pieces.iter().map(stretch).filter(|stretch| stretch.length_mm > MIN_MM).collect();
-        Ok(Some(Self { shape: Shape::Curve(Box::new(curve)), stretches, end, axes: count }))
+        let pieces = curve
+            .pieces()
+            .into_iter()
+            .flat_map(|piece| between_hairpins(&curve, piece))
+            .collect::<Vec<_>>();
+        let stretches = pieces
+            .iter()
+            .map(stretch)
+            .filter(|stretch| stretch.length_mm > MIN_MM)
+            .collect();
+        Ok(Some(Self {
+            shape: Shape::Curve(Box::new(curve)),
+            stretches,
+            end,
+            axes: count,
+        }))
     }
 
     /// Its smooth stretches.
@@ -90,10 +123,15 @@ impl Course {
     /// (a cusp) direction and curvature are zero. Does not allocate.
     pub fn at(&self, index: usize, s_mm: f64, place: &mut Place) -> AlongPath {
         match (&self.shape, &self.stretches[index].table) {
-            (Shape::Curve(curve), Some(table)) => table.along_path(curve, s_mm, place).unwrap_or_else(|| {
-                let position = table.position(curve, s_mm, place);
-                AlongPath { position, ..AlongPath::default() }
-            }),
+            (Shape::Curve(curve), Some(table)) => {
+                table.along_path(curve, s_mm, place).unwrap_or_else(|| {
+                    let position = table.position(curve, s_mm, place);
+                    AlongPath {
+                        position,
+                        ..AlongPath::default()
+                    }
+                })
+            }
             (Shape::Path(path), _) => AlongPath {
                 position: path.position(s_mm),
                 direction: path.direction(s_mm),
@@ -108,7 +146,9 @@ impl Course {
     /// Distance from `s_mm` of stretch `index` within which the path has no feature that it does not have there, mm. Does
     /// not allocate.
     pub fn smooth_for_mm(&self, index: usize, s_mm: f64, place: &mut Place) -> f64 {
-        let Some(table) = &self.stretches[index].table else { return f64::INFINITY };
+        let Some(table) = &self.stretches[index].table else {
+            return f64::INFINITY;
+        };
         let (length_mm, end_mm) = table.part(s_mm, place);
         (length_mm / 3.0).min((end_mm - s_mm).max(length_mm / 100.0))
     }
@@ -124,7 +164,11 @@ impl Course {
             Shape::Curve(curve) => curve.counted_length(vector),
             // The derivatives of lines and arcs are by path length already.
             Shape::Path(path) if path.is_straight() => 0.0,
-            Shape::Path(_) => vector.0[..self.axes].iter().map(|v| v * v).sum::<f64>().sqrt(),
+            Shape::Path(_) => vector.0[..self.axes]
+                .iter()
+                .map(|v| v * v)
+                .sum::<f64>()
+                .sqrt(),
         }
     }
 }
@@ -140,5 +184,8 @@ fn between_hairpins(curve: &Nurbs, piece: Piece) -> Vec<(Piece, bool)> {
 
 /// The curve that was handed over with a block, checked. Without one it is a curve of no points.
 pub(crate) fn curve_of(axes: &Axes, curve: Option<Curve<'_>>) -> Result<Nurbs, NurbsError> {
-    Nurbs::new(&curve.map_or_else(NurbsData::default, |curve| curve.to_data()), axes)
+    Nurbs::new(
+        &curve.map_or_else(NurbsData::default, |curve| curve.to_data()),
+        axes,
+    )
 }

@@ -59,13 +59,25 @@ mod tests {
     #[test]
     fn options_are_read_and_checked() {
         let plain = Options::parse("form = \"adaptive\"").unwrap();
-        assert_eq!(plain, Options { form: Form::Adaptive, chord_error_um: 1.0 });
+        assert_eq!(
+            plain,
+            Options {
+                form: Form::Adaptive,
+                chord_error_um: 1.0
+            }
+        );
         assert_eq!(Options::parse("").unwrap().form, Form::Scan);
-        assert_eq!(Options::parse("form = \"windowed\"").unwrap().form, Form::Windowed);
+        assert_eq!(
+            Options::parse("form = \"windowed\"").unwrap().form,
+            Form::Windowed
+        );
         for (text, word) in [
             ("form = \"fast\"", "fast"),
             ("form = \"adaptive\"\nchord_error_um = 0", "chord_error_um"),
-            ("form = \"adaptive\"\nchord_error_um = nan", "chord_error_um"),
+            (
+                "form = \"adaptive\"\nchord_error_um = nan",
+                "chord_error_um",
+            ),
             ("form = \"adaptive\"\nchord_error_mm = 1", "chord_error_mm"),
         ] {
             let message = Options::parse(text).unwrap_err().to_string();

@@ -43,7 +43,13 @@ impl Piece {
     /// Draws the longest segment at the start of the piece that follows stretch `index` of `course` within 5e-9 mm: the
     /// quintics with position, velocity and acceleration of both ends, compared with the path in the middle and at the
     /// quarters, halved until they fit. Gives what is left. Does not allocate.
-    pub fn draw(&self, course: &Course, index: usize, place: &mut Place, segment: &mut Segment) -> Option<Self> {
+    pub fn draw(
+        &self,
+        course: &Course,
+        index: usize,
+        place: &mut Place,
+        segment: &mut Segment,
+    ) -> Option<Self> {
         let mut part = *self;
         let start = state(course, index, &part.part(0.0, 0.0), place);
         for _ in 0..MAX_HALVINGS {
@@ -51,7 +57,10 @@ impl Piece {
             fill(segment, &start, &end, part.duration_s);
             let follows = [0.25, 0.5, 0.75].iter().all(|share| {
                 let t_s = share * part.duration_s;
-                let on = course.at(index, part.part(t_s, 0.0).start_mm, place).position - segment.position(t_s);
+                let on = course
+                    .at(index, part.part(t_s, 0.0).start_mm, place)
+                    .position
+                    - segment.position(t_s);
                 on.0.iter().all(|off| off.abs() <= OFF_MM)
             });
             if follows {
@@ -78,6 +87,7 @@ fn state(course: &Course, index: usize, piece: &Piece, place: &mut Place) -> [Ax
 
 fn fill(segment: &mut Segment, from: &[AxisVector; 3], to: &[AxisVector; 3], duration_s: f64) {
     for axis in 0..MAX_AXES {
-        segment.coefficients[axis] = tandem_motion::hermite(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
+        segment.coefficients[axis] =
+            tandem_motion::hermite(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
     }
 }

@@ -2,8 +2,8 @@
 
 use tandem_motion::blocks;
 use tandem_sdk::{
-    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext, PlannerDescription,
-    PluginError, SegmentSink,
+    Accepted, Advanced, Axes, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext,
+    PlannerDescription, PluginError, SegmentSink,
 };
 
 use crate::baseline::Baseline;
@@ -39,9 +39,13 @@ impl NurbsPlanner {
     pub fn new(options: &Options, context: &PlannerContext) -> Result<Self, PluginError> {
         let axes = context.limits.axes();
         let sound = |value: f64| value > 0.0 && value.is_finite();
-        let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
+        let values = axes
+            .iter()
+            .flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
         if !values.into_iter().all(sound) {
-            return Err(PluginError::fixed("nurbs needs finite speed and acceleration limits of all axes"));
+            return Err(PluginError::fixed(
+                "nurbs needs finite speed and acceleration limits of all axes",
+            ));
         }
         if options.form != Form::Adaptive && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
             return Err(PluginError::fixed(
@@ -54,10 +58,17 @@ impl NurbsPlanner {
             Form::Windowed => Driver::Windowed(Box::new(Streamer::new(context, chord_error_mm))),
             Form::Scan => Driver::Scan(Box::new(Streamer::new(context, chord_error_mm))),
         };
-        Ok(Self { context: *context, form })
+        Ok(Self {
+            context: *context,
+            form,
+        })
     }
 
-    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+    fn emit(
+        &mut self,
+        left_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Option<f64>, PluginError> {
         match &mut self.form {
             Driver::Adaptive(form) => Ok(form.emit(left_s, sink)),
             Driver::Windowed(form) => form.emit(left_s, sink),
@@ -81,14 +92,24 @@ fn check_curve(axes: &Axes, curve: Option<Curve<'_>>) -> Result<(), PluginError>
 impl Planner for NurbsPlanner {
     fn describe(&self) -> PlannerDescription {
         match self.form {
-            Driver::Adaptive(_) => PlannerDescription { breaks_limits: 1, ..PlannerDescription::order_2() },
-            Driver::Windowed(_) | Driver::Scan(_) => PlannerDescription { order: 3, ..PlannerDescription::order_2() },
+            Driver::Adaptive(_) => PlannerDescription {
+                breaks_limits: 1,
+                ..PlannerDescription::order_2()
+            },
+            Driver::Windowed(_) | Driver::Scan(_) => PlannerDescription {
+                order: 3,
+                ..PlannerDescription::order_2()
+            },
         }
     }
 
     fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         blocks::check(block, &self.context.axes)?;
-        if block.kind == BlockKind::Nurbs { check_curve(&self.context.axes, curve) } else { Ok(()) }
+        if block.kind == BlockKind::Nurbs {
+            check_curve(&self.context.axes, curve)
+        } else {
+            Ok(())
+        }
     }
 
     fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
@@ -101,7 +122,8 @@ impl Planner for NurbsPlanner {
             return Ok(Accepted::Full);
         }
         self.check(block, curve)?;
-        let course = Course::new(&self.context, block, curve).map_err(|error| PluginError::new(error.to_string()))?;
+        let course = Course::new(&self.context, block, curve)
+            .map_err(|error| PluginError::new(error.to_string()))?;
         match &mut self.form {
             Driver::Adaptive(form) => form.accept(block, course),
             Driver::Windowed(form) => form.accept(block, course),
@@ -118,7 +140,11 @@ impl Planner for NurbsPlanner {
         }
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         while emitted_s < duration_s {
             match self.emit(duration_s - emitted_s, sink)? {
@@ -131,7 +157,10 @@ impl Planner for NurbsPlanner {
             Driver::Windowed(form) => form.is_done(),
             Driver::Scan(form) => form.is_done(),
         };
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(done) })
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(done),
+        })
     }
 
     fn reset(&mut self, position: &AxisVector) {

@@ -25,12 +25,22 @@ fn a_part_below_the_rounding_of_a_dwell_is_emitted_once() {
     for form in ["adaptive", "windowed", "scan"] {
         let options = Options::parse(&format!("form = \"{form}\"")).unwrap();
         let mut planner = NurbsPlanner::new(&options, &context(AxisVector::ZERO)).unwrap();
-        let dwell = Block { dwell_s: 1.0, ..Block::at(AxisVector::ZERO) };
+        let dwell = Block {
+            dwell_s: 1.0,
+            ..Block::at(AxisVector::ZERO)
+        };
         planner.accept(&dwell, None).unwrap();
         planner.finish();
-        let mut sink = Few { left: 200, driven_s: 0.0 };
+        let mut sink = Few {
+            left: 200,
+            driven_s: 0.0,
+        };
         planner.advance(1e-18, &mut sink).unwrap();
         while planner.advance(0.008, &mut sink).unwrap().done == 0 {}
-        assert!((sink.driven_s - 1.0).abs() < 1e-12, "{form}: {}", sink.driven_s);
+        assert!(
+            (sink.driven_s - 1.0).abs() < 1e-12,
+            "{form}: {}",
+            sink.driven_s
+        );
     }
 }

@@ -10,7 +10,9 @@ use std::fmt::Write;
 use common::Collected;
 use tandem_nurbs::{NurbsPlanner, Options};
 use tandem_rig::{Given, Offer, Random, arc, line, numbered};
-use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, Planner, PlannerContext, Segment};
+use tandem_sdk::{
+    AxisLimits, AxisVector, Block, BlockKind, NurbsData, Planner, PlannerContext, Segment,
+};
 
 const AXES: usize = 4;
 const PERIODS_MS: [f64; 7] = [0.125, 0.25, 0.37, 0.5, 1.0, 1.3, 2.0];
@@ -45,15 +47,28 @@ fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
     let alike = limits(&mut random, false);
     let same = random.below(3) == 0;
-    let axes: [AxisLimits; AXES] =
-        std::array::from_fn(|n| if same && n < 3 { alike } else { limits(&mut random, n == 3) });
+    let axes: [AxisLimits; AXES] = std::array::from_fn(|n| {
+        if same && n < 3 {
+            alike
+        } else {
+            limits(&mut random, n == 3)
+        }
+    });
     let period_s = random.pick(&PERIODS_MS) * 1e-3;
     let mut context = tandem_rig::context(&axes, period_s);
     context.rough_period_s = period_s * (1 + random.below(25)) as f64;
     context.max_feed_ratio = random.pick(&[1.0, 1.0, 1.2, 2.0]);
     let blocks = program(&mut random);
-    let form = if random.below(2) == 0 { "scan" } else { "windowed" };
-    Case { context, blocks, form }
+    let form = if random.below(2) == 0 {
+        "scan"
+    } else {
+        "windowed"
+    };
+    Case {
+        context,
+        blocks,
+        form,
+    }
 }
 
 /// Lines that turn a little or much, arcs, curves, with and without the rotary axis.
@@ -74,7 +89,11 @@ fn program(random: &mut Random) -> Vec<Given> {
         let mut to = at;
         to[0] += length * heading.cos();
         to[1] += length * heading.sin();
-        to[2] += if random.below(3) == 0 { random.between(-0.5, 0.5) * length } else { 0.0 };
+        to[2] += if random.below(3) == 0 {
+            random.between(-0.5, 0.5) * length
+        } else {
+            0.0
+        };
         if turns {
             to[3] += random.between(-1.0, 1.0) * random.pick(&[0.0, 0.01, 1.0]);
         }
@@ -83,7 +102,10 @@ fn program(random: &mut Random) -> Vec<Given> {
             0 => {
                 let radius = length * random.length(0.1, 2.0);
                 let side = random.pick(&[-1.0, 1.0]);
-                let center = [at[0] - side * radius * heading.sin(), at[1] + side * radius * heading.cos()];
+                let center = [
+                    at[0] - side * radius * heading.sin(),
+                    at[1] + side * radius * heading.cos(),
+                ];
                 let sweep = side * random.between(0.1, 6.2);
                 blocks.push((arc(&at, center, sweep, feed), None));
                 heading += sweep;
@@ -101,7 +123,8 @@ fn program(random: &mut Random) -> Vec<Given> {
                 points.push(to);
                 let knots = [0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0];
                 let mut block = Block::at(at);
-                (block.end, block.kind, block.length_mm, block.feed_mm_per_s) = (to, BlockKind::Nurbs, length, feed);
+                (block.end, block.kind, block.length_mm, block.feed_mm_per_s) =
+                    (to, BlockKind::Nurbs, length, feed);
                 let data = NurbsData {
                     degree: 3,
                     weights: vec![1.0; points.len()],
@@ -120,7 +143,11 @@ fn program(random: &mut Random) -> Vec<Given> {
         at = blocks[blocks.len() - 1].0.end;
     }
     let facts = numbered(blocks.iter().map(|(block, _)| *block).collect());
-    facts.into_iter().zip(blocks).map(|(block, (_, data))| (block, data.map(Into::into))).collect()
+    facts
+        .into_iter()
+        .zip(blocks)
+        .map(|(block, (_, data))| (block, data.map(Into::into)))
+        .collect()
 }
 
 /// All that the planner makes of it, or why not.
@@ -131,7 +158,10 @@ fn drive(case: &Case) -> Result<Collected, String> {
     let mut collected = Collected::default();
     for _ in 0..3_000_000 {
         while let Some(block) = waiting.peek() {
-            match block.offer(&mut planner).map_err(|error| error.to_string())? {
+            match block
+                .offer(&mut planner)
+                .map_err(|error| error.to_string())?
+            {
                 tandem_sdk::Accepted::Accepted => waiting.next(),
                 tandem_sdk::Accepted::Full => break,
             };
@@ -139,8 +169,9 @@ fn drive(case: &Case) -> Result<Collected, String> {
         if waiting.peek().is_none() {
             planner.finish();
         }
-        let advanced =
-            planner.advance(case.context.rough_period_s, &mut collected).map_err(|error| error.to_string())?;
+        let advanced = planner
+            .advance(case.context.rough_period_s, &mut collected)
+            .map_err(|error| error.to_string())?;
         if advanced.done != 0 {
             return Ok(collected);
         }
@@ -172,12 +203,34 @@ impl Judge<'_> {
             let rapid = segment.flags.contains(tandem_sdk::SegmentFlags::RAPID);
             for n in 0..=POINTS {
                 let t_s = segment.duration_s * f64::from(n) / f64::from(POINTS);
-                let (x, v, a) = (segment.position(t_s), segment.velocity(t_s), segment.acceleration(t_s));
+                let (x, v, a) = (
+                    segment.position(t_s),
+                    segment.velocity(t_s),
+                    segment.acceleration(t_s),
+                );
                 for (axis, limits) in axes.iter().enumerate().take(AXES) {
-                    let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
-                    self.ask("velocity", axis, segment.line, v[axis], most * (1.0 + ROUNDING), 0.0);
+                    let most = if rapid {
+                        limits.rapid_mm_per_s
+                    } else {
+                        limits.feed_mm_per_s
+                    };
+                    self.ask(
+                        "velocity",
+                        axis,
+                        segment.line,
+                        v[axis],
+                        most * (1.0 + ROUNDING),
+                        0.0,
+                    );
                     let acceleration = limits.acceleration_mm_per_s2 * (1.0 + ROUNDING);
-                    self.ask("acceleration", axis, segment.line, a[axis], acceleration, 0.0);
+                    self.ask(
+                        "acceleration",
+                        axis,
+                        segment.line,
+                        a[axis],
+                        acceleration,
+                        0.0,
+                    );
                     let beyond = (limits.min_mm - x[axis]).max(x[axis] - limits.max_mm);
                     self.ask("travel", axis, segment.line, beyond.max(0.0), 1e-11, 0.0);
                 }
@@ -187,17 +240,29 @@ impl Judge<'_> {
 
     /// Samples from rest to rest at a phase, and how they go on behind a rest: `all` are the samples of the run.
     fn samples(&mut self, all: &[(AxisVector, u32)]) {
-        let (axes, period_s) = (self.case.context.limits.axes, self.case.context.fine_period_s);
+        let (axes, period_s) = (
+            self.case.context.limits.axes,
+            self.case.context.fine_period_s,
+        );
         for four in all.windows(4) {
             let at = |n: usize, axis: usize| four[n].0[axis];
             for (axis, limits) in axes.iter().enumerate().take(AXES) {
                 let [d0, d1, d2] = [0, 1, 2].map(|n| at(n + 1, axis) - at(n, axis));
                 let noise = 8.0 * f64::EPSILON * at(3, axis).abs().max(1.0);
                 let top = limits.feed_mm_per_s.max(limits.rapid_mm_per_s) * (1.0 + ROUNDING);
-                let (acceleration, jerk) =
-                    (limits.acceleration_mm_per_s2 * (1.0 + ROUNDING), limits.jerk_mm_per_s3 * (1.0 + JERK));
+                let (acceleration, jerk) = (
+                    limits.acceleration_mm_per_s2 * (1.0 + ROUNDING),
+                    limits.jerk_mm_per_s3 * (1.0 + JERK),
+                );
                 let line = four[3].1;
-                self.ask("sampled velocity", axis, line, d2 / period_s, top, noise / period_s);
+                self.ask(
+                    "sampled velocity",
+                    axis,
+                    line,
+                    d2 / period_s,
+                    top,
+                    noise / period_s,
+                );
                 self.ask(
                     "sampled acceleration",
                     axis,
@@ -207,7 +272,14 @@ impl Judge<'_> {
                     noise / period_s.powi(2),
                 );
                 let value = (d2 - 2.0 * d1 + d0) / period_s.powi(3);
-                self.ask("sampled jerk", axis, line, value, jerk, 2.0 * noise / period_s.powi(3));
+                self.ask(
+                    "sampled jerk",
+                    axis,
+                    line,
+                    value,
+                    jerk,
+                    2.0 * noise / period_s.powi(3),
+                );
             }
         }
     }
@@ -227,7 +299,11 @@ fn samples(segments: &[Segment], period_s: f64, phase: f64) -> Vec<(AxisVector, 
         next_s -= segment.duration_s;
         if segment.duration_s == 0.0 {
             all.push((segment.position(0.0), segment.line));
-            next_s = if phase == 0.0 { period_s } else { phase * period_s };
+            next_s = if phase == 0.0 {
+                period_s
+            } else {
+                phase * period_s
+            };
         }
     }
     let last = all[all.len() - 1];
@@ -236,10 +312,17 @@ fn samples(segments: &[Segment], period_s: f64, phase: f64) -> Vec<(AxisVector, 
 }
 
 fn judge(case: &Case, collected: &Collected) -> String {
-    let mut judge = Judge { case, found: String::new() };
+    let mut judge = Judge {
+        case,
+        found: String::new(),
+    };
     judge.points(&collected.segments);
     for phase in 0..PHASES {
-        judge.samples(&samples(&collected.segments, case.context.fine_period_s, f64::from(phase) / f64::from(PHASES)));
+        judge.samples(&samples(
+            &collected.segments,
+            case.context.fine_period_s,
+            f64::from(phase) / f64::from(PHASES),
+        ));
     }
     let (end, programmed) = (collected.end(), case.blocks[case.blocks.len() - 1].0.end);
     if end != programmed {
@@ -249,7 +332,11 @@ fn judge(case: &Case, collected: &Collected) -> String {
 }
 
 fn seeds(count: u64) -> Vec<u64> {
-    let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
+    let number = |name: &str| {
+        std::env::var(name)
+            .ok()
+            .map(|text| text.parse::<u64>().unwrap())
+    };
     match (number("TANDEM_SEED"), number("TANDEM_SEEDS")) {
         (Some(seed), None) => vec![seed],
         (Some(seed), Some(count)) => (seed..seed + count).collect(),

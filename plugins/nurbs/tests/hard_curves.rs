@@ -15,7 +15,12 @@ fn clamped(points: &[[f64; 2]], weights: Vec<f64>, degree: usize) -> NurbsData {
     knots.extend((0..=spans).map(|n| n as f64));
     knots.extend(vec![spans as f64; degree]);
     let control_points = points.iter().map(|p| AxisVector::from_slice(p)).collect();
-    NurbsData { degree, control_points, weights, knots }
+    NurbsData {
+        degree,
+        control_points,
+        weights,
+        knots,
+    }
 }
 
 fn even(points: &[[f64; 2]], degree: usize) -> NurbsData {
@@ -34,15 +39,24 @@ fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
         if segment.duration_s > 0.0 {
             continue;
         }
-        let mut positions: Vec<AxisVector> = motion.path_samples(period_s).into_iter().map(|sample| sample.0).collect();
+        let mut positions: Vec<AxisVector> = motion
+            .path_samples(period_s)
+            .into_iter()
+            .map(|sample| sample.0)
+            .collect();
         positions.splice(0..0, [positions[0]; 3]);
         positions.extend([positions[positions.len() - 1]; 3]);
         for axis in 0..2 {
             let mut values: Vec<f64> = positions.iter().map(|p| p[axis]).collect();
             for (order, limit) in [f64::INFINITY, 5000.0, 4e5].into_iter().enumerate() {
-                values = values.windows(2).map(|pair| (pair[1] - pair[0]) / period_s).collect();
+                values = values
+                    .windows(2)
+                    .map(|pair| (pair[1] - pair[0]) / period_s)
+                    .collect();
                 if order > 0 {
-                    worst[order - 1] = values.iter().fold(worst[order - 1], |most, v| most.max(v.abs() / limit));
+                    worst[order - 1] = values
+                        .iter()
+                        .fold(worst[order - 1], |most, v| most.max(v.abs() / limit));
                 }
             }
         }
@@ -53,16 +67,23 @@ fn shares(collected: &Collected, context: &PlannerContext) -> [f64; 2] {
 
 /// Of both ends, the middle and between.
 fn at_points(segments: &[Segment]) -> f64 {
-    let at = |segment: &Segment, n: i32| segment.acceleration(f64::from(n) / 8.0 * segment.duration_s);
-    let all = segments.iter().flat_map(|segment| (0..=8).map(move |n| at(segment, n)));
-    all.flat_map(|a| a.0).fold(0.0, |most, a| most.max(a.abs() / 5000.0))
+    let at =
+        |segment: &Segment, n: i32| segment.acceleration(f64::from(n) / 8.0 * segment.duration_s);
+    let all = segments
+        .iter()
+        .flat_map(|segment| (0..=8).map(move |n| at(segment, n)));
+    all.flat_map(|a| a.0)
+        .fold(0.0, |most, a| most.max(a.abs() / 5000.0))
 }
 
 /// In both forms; where both find a motion `scan` is no slower.
 fn drive(name: &str, data: &NurbsData) {
     let [scan_s, windowed_s] = ["scan", "windowed"].map(|form| drive_in(form, name, data.clone()));
     if let (Some(scan_s), Some(windowed_s)) = (scan_s, windowed_s) {
-        assert!(scan_s <= windowed_s * 1.001, "{name}: {scan_s} s, {windowed_s} s");
+        assert!(
+            scan_s <= windowed_s * 1.001,
+            "{name}: {scan_s} s, {windowed_s} s"
+        );
     }
 }
 
@@ -72,7 +93,11 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
     let block = curve_block(data, 1.0, 100.0);
     let context = context(block.0.start);
     let end = block.0.end;
-    let mut planner = NurbsPlanner::new(&Options::parse(&format!("form = \"{form}\"")).unwrap(), &context).unwrap();
+    let mut planner = NurbsPlanner::new(
+        &Options::parse(&format!("form = \"{form}\"")).unwrap(),
+        &context,
+    )
+    .unwrap();
     if let Err(error) = block.offer(&mut planner) {
         println!("{name}: refused: {error}");
         return None;
@@ -90,11 +115,27 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
             }
         }
     }
-    let numbers = |segment: &Segment| segment.coefficients.iter().flatten().chain(&segment.path).all(|v| v.is_finite());
-    assert!(collected.segments.iter().all(numbers), "{name}: a number that is not finite");
+    let numbers = |segment: &Segment| {
+        segment
+            .coefficients
+            .iter()
+            .flatten()
+            .chain(&segment.path)
+            .all(|v| v.is_finite())
+    };
+    assert!(
+        collected.segments.iter().all(numbers),
+        "{name}: a number that is not finite"
+    );
     let [acceleration, jerk] = shares(&collected, &context);
-    println!("{name}: {:.3} s, acceleration {acceleration:.3}, jerk {jerk:.3}", collected.duration_s());
-    assert!(acceleration <= 1.0 && jerk <= 1.0, "{name}: {acceleration} {jerk}");
+    println!(
+        "{name}: {:.3} s, acceleration {acceleration:.3}, jerk {jerk:.3}",
+        collected.duration_s()
+    );
+    assert!(
+        acceleration <= 1.0 && jerk <= 1.0,
+        "{name}: {acceleration} {jerk}"
+    );
     let last = collected.segments.last().unwrap();
     assert_eq!(last.position(0.0), end, "{name}");
     Some(collected.duration_s())
@@ -105,9 +146,17 @@ fn drive_in(form: &str, name: &str, data: NurbsData) -> Option<f64> {
 fn corners_of_coinciding_points_are_rests() {
     let rests = |form: &str, data: &NurbsData| {
         let block = curve_block(data.clone(), 1.0, 100.0);
-        let collected = run(&format!("form = \"{form}\""), &context(block.0.start), &[block]);
-        let rests: Vec<AxisVector> =
-            collected.segments.iter().filter(|s| s.duration_s == 0.0).map(|s| s.position(0.0)).collect();
+        let collected = run(
+            &format!("form = \"{form}\""),
+            &context(block.0.start),
+            &[block],
+        );
+        let rests: Vec<AxisVector> = collected
+            .segments
+            .iter()
+            .filter(|s| s.duration_s == 0.0)
+            .map(|s| s.position(0.0))
+            .collect();
         (rests, collected.duration_s())
     };
     let (start, corner, end) = ([0.0, 0.0], [10.0, 0.0], [20.0, 10.0]);
@@ -115,13 +164,19 @@ fn corners_of_coinciding_points_are_rests() {
     for form in ["scan", "windowed"] {
         for (degree, count) in [(2, 2), (2, 3), (2, 5), (3, 3), (3, 4), (3, 6)] {
             // As often as the degree; and so often that the curve waits there.
-            let points: Vec<_> =
-                std::iter::once(start).chain(std::iter::repeat_n(corner, count)).chain([end]).collect();
+            let points: Vec<_> = std::iter::once(start)
+                .chain(std::iter::repeat_n(corner, count))
+                .chain([end])
+                .collect();
             let (rests, time_s) = rests(form, &even(&points, degree));
             let what = format!("{form}, degree {degree}, {count} points: {rests:?}, {time_s} s");
-            let near =
-                |(at, programmed): (&AxisVector, &[f64; 2])| (0..2).all(|n| (at[n] - programmed[n]).abs() < 1e-9);
-            assert!(rests.len() == 2 && rests.iter().zip([&corner, &end]).all(near), "{what}");
+            let near = |(at, programmed): (&AxisVector, &[f64; 2])| {
+                (0..2).all(|n| (at[n] - programmed[n]).abs() < 1e-9)
+            };
+            assert!(
+                rests.len() == 2 && rests.iter().zip([&corner, &end]).all(near),
+                "{what}"
+            );
             assert!(time_s > straight && time_s < straight + 0.15, "{what}");
         }
     }
@@ -131,36 +186,68 @@ fn corners_of_coinciding_points_are_rests() {
 /// within rounding of each other are one, or their number doubles in every round.
 #[test]
 fn a_start_that_bends_without_bound_costs_no_time() {
-    let data = even(&[[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-0.0448, 0.0588], [26.22, 0.06]], 4);
+    let data = even(
+        &[
+            [0.0, 0.0],
+            [0.0, 0.0],
+            [0.0, 0.0],
+            [-0.0448, 0.0588],
+            [26.22, 0.06],
+        ],
+        4,
+    );
     for form in ["scan", "windowed"] {
         let block = curve_block(data.clone(), 1.0, 1.0);
-        let collected = run(&format!("form = \"{form}\""), &context(block.0.start), &[block]);
-        let length_mm: f64 = collected.segments.iter().map(|s| s.path_mm(s.duration_s)).fold(0.0, f64::max);
+        let collected = run(
+            &format!("form = \"{form}\""),
+            &context(block.0.start),
+            &[block],
+        );
+        let length_mm: f64 = collected
+            .segments
+            .iter()
+            .map(|s| s.path_mm(s.duration_s))
+            .fold(0.0, f64::max);
         let time_s = collected.duration_s();
-        assert!(length_mm > 26.0 && time_s < 1.005 * length_mm + 0.1, "{form}: {length_mm} mm in {time_s} s");
+        assert!(
+            length_mm > 26.0 && time_s < 1.005 * length_mm + 0.1,
+            "{form}: {length_mm} mm in {time_s} s"
+        );
     }
 }
 
 #[test]
 fn hard_curves_keep_their_limits() {
-    let zigzag: Vec<[f64; 2]> = (0..12).map(|n| [f64::from(n), f64::from(n % 2) * 3.0]).collect();
+    let zigzag: Vec<[f64; 2]> = (0..12)
+        .map(|n| [f64::from(n), f64::from(n % 2) * 3.0])
+        .collect();
     drive("degree 1", &even(&zigzag, 1));
     drive("degree 2", &even(&zigzag, 2));
     drive("degree 3", &even(&zigzag, 3));
     drive("degree 5", &even(&zigzag, 5));
     let doubled: Vec<[f64; 2]> = zigzag.iter().flat_map(|p| [*p, *p]).collect();
     drive("coincident points", &even(&doubled, 3));
-    let weights = (0..12).map(|n| if n % 3 == 0 { 1e4 } else { 1.0 }).collect();
+    let weights = (0..12)
+        .map(|n| if n % 3 == 0 { 1e4 } else { 1.0 })
+        .collect();
     drive("weights 1e4", &clamped(&zigzag, weights, 3));
     let small: Vec<[f64; 2]> = zigzag.iter().map(|p| [p[0] * 1e-3, p[1] * 1e-3]).collect();
     drive("small", &even(&small, 3));
-    drive("straight", &even(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]], 3));
-    drive("cusp", &even(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]], 3));
+    drive(
+        "straight",
+        &even(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]], 3),
+    );
+    drive(
+        "cusp",
+        &even(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]], 3),
+    );
     let mut pinched = even(&zigzag, 3);
     let knot = pinched.knots[6];
     pinched.knots[7] = knot;
     drive("double knot", &pinched);
-    let long: Vec<[f64; 2]> = (0..10_000).map(|n| [0.02 * f64::from(n), (0.05 * f64::from(n)).sin()]).collect();
+    let long: Vec<[f64; 2]> = (0..10_000)
+        .map(|n| [0.02 * f64::from(n), (0.05 * f64::from(n)).sin()])
+        .collect();
     drive("10 000 points", &even(&long, 3));
 }
 
@@ -169,17 +256,26 @@ fn hard_curves_keep_their_limits() {
 #[test]
 fn turns_back_are_slow_at_the_turn_only() {
     for form in ["scan", "windowed"] {
-        for (degree, points) in [(3, [0.0, 10.0, 0.0, 5.0, 6.0]), (2, [0.0, 10.0, 0.0, 5.0, 6.0])] {
+        for (degree, points) in [
+            (3, [0.0, 10.0, 0.0, 5.0, 6.0]),
+            (2, [0.0, 10.0, 0.0, 5.0, 6.0]),
+        ] {
             let time_s = |off: f64| {
-                let points: Vec<[f64; 2]> =
-                    points.iter().zip([0.0, 1.0, 1.0, 0.0, 0.0]).map(|(x, y)| [*x, y * off]).collect();
+                let points: Vec<[f64; 2]> = points
+                    .iter()
+                    .zip([0.0, 1.0, 1.0, 0.0, 0.0])
+                    .map(|(x, y)| [*x, y * off])
+                    .collect();
                 let name = format!("turns back, degree {degree}, beside by {off:e} mm");
                 drive_in(form, &name, even(&points, degree)).expect("driven")
             };
             let on_line_s = time_s(0.0);
             for off in [1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
                 let beside_s = time_s(off);
-                assert!(beside_s < 1.25 * on_line_s, "{form} {degree} {off}: {beside_s} s, {on_line_s} s");
+                assert!(
+                    beside_s < 1.25 * on_line_s,
+                    "{form} {degree} {off}: {beside_s} s, {on_line_s} s"
+                );
             }
         }
     }
@@ -191,11 +287,22 @@ fn lines_run_into_arcs_without_rest() {
     for form in ["scan", "windowed"] {
         for short_rad in [0.0, 4e-4] {
             let context = context(AxisVector::ZERO);
-            let collected = run(&format!("form = \"{form}\""), &context, &rounded(40.0, 10.0, short_rad));
-            let rests = collected.segments.iter().filter(|segment| segment.duration_s == 0.0).count();
+            let collected = run(
+                &format!("form = \"{form}\""),
+                &context,
+                &rounded(40.0, 10.0, short_rad),
+            );
+            let rests = collected
+                .segments
+                .iter()
+                .filter(|segment| segment.duration_s == 0.0)
+                .count();
             assert_eq!(rests, 1, "{form} {short_rad}: at the end only");
             let [acceleration, jerk] = shares(&collected, &context);
-            assert!(acceleration <= 1.0 && jerk <= 1.0, "{form} {short_rad}: {acceleration} {jerk}");
+            assert!(
+                acceleration <= 1.0 && jerk <= 1.0,
+                "{form} {short_rad}: {acceleration} {jerk}"
+            );
         }
     }
 }
@@ -212,7 +319,10 @@ fn rounded(side_mm: f64, radius_mm: f64, short_rad: f64) -> Vec<Given> {
         (at, along) = (corner.end, side);
         blocks.push(corner);
     }
-    numbered(blocks).into_iter().map(|block| (block, None)).collect()
+    numbered(blocks)
+        .into_iter()
+        .map(|block| (block, None))
+        .collect()
 }
 
 /// Random curves, among them on lines and near to lines as programs with six decimals write them, with weights up to 1e3 apart
@@ -227,12 +337,19 @@ fn random_curves_are_driven() {
             let time_s = drive_in(form, &format!("seed {seed}"), data.clone());
             time_s.unwrap_or_else(|| panic!("seed {seed} {form}: refused"))
         });
-        assert!(scan_s <= windowed_s * 1.001, "seed {seed}: {scan_s} s, {windowed_s} s");
+        assert!(
+            scan_s <= windowed_s * 1.001,
+            "seed {seed}: {scan_s} s, {windowed_s} s"
+        );
     }
 }
 
 fn random_curve(random: &mut Random) -> NurbsData {
-    let (degree, kind, weighted) = (random.pick(&[1, 2, 2, 3, 3, 4, 5]), random.below(5), random.below(3));
+    let (degree, kind, weighted) = (
+        random.pick(&[1, 2, 2, 3, 3, 4, 5]),
+        random.below(5),
+        random.below(3),
+    );
     let scale = random.pick(&[0.01, 0.1, 1.0, 10.0]);
     let mut points = vec![[0.0, 0.0]];
     for n in 1..=degree as u64 + random.below(9) {
@@ -248,6 +365,9 @@ fn random_curve(random: &mut Random) -> NurbsData {
         points.push(next.map(|v| (v * 1e6).round() / 1e6));
     }
     let decades = [0.0, 1.0, 3.0][weighted as usize];
-    let weights = points.iter().map(|_| 10f64.powf(random.between(-decades, decades))).collect();
+    let weights = points
+        .iter()
+        .map(|_| 10f64.powf(random.between(-decades, decades)))
+        .collect();
     clamped(&points, weights, degree)
 }

@@ -8,7 +8,11 @@ use tandem_sdk::{AxisLimits, AxisVector, PlannerContext, SegmentFlags};
 
 /// A machine that drives a tenth of a micrometre in a fraction of a microsecond.
 fn fast() -> PlannerContext {
-    let axis = AxisLimits { feed_mm_per_s: 600.0, jerk_mm_per_s3: 2e7, ..tandem_rig::axis(1e5) };
+    let axis = AxisLimits {
+        feed_mm_per_s: 600.0,
+        jerk_mm_per_s3: 2e7,
+        ..tandem_rig::axis(1e5)
+    };
     tandem_rig::context(&[axis; 2], 1e-3)
 }
 
@@ -17,7 +21,9 @@ fn blocks_that_take_less_time_than_a_segment_are_driven_and_reported() {
     for form in ["scan", "windowed"] {
         for count in [3, 40, 63, 400] {
             for length in [1e-4, 3e-4, 2e-3] {
-                let at = |n: usize| AxisVector::from_slice(&[0.6 * length * n as f64, 0.8 * length * n as f64]);
+                let at = |n: usize| {
+                    AxisVector::from_slice(&[0.6 * length * n as f64, 0.8 * length * n as f64])
+                };
                 let blocks: Vec<_> = (0..count)
                     .map(|n| {
                         let mut block = line(&at(n), &at(n + 1), 500.0);
@@ -43,8 +49,12 @@ fn a_rotary_axis_that_turns_on_blocks_of_a_ten_millionth_of_a_millimetre_is_driv
         jerk_mm_per_s3: jerk,
         ..tandem_rig::axis(acceleration)
     };
-    let axes =
-        [limits(20.0, 1000.0, 5e4), limits(20.0, 1000.0, 5e4), limits(20.0, 1000.0, 5e4), limits(0.3, 20.0, 300.0)];
+    let axes = [
+        limits(20.0, 1000.0, 5e4),
+        limits(20.0, 1000.0, 5e4),
+        limits(20.0, 1000.0, 5e4),
+        limits(0.3, 20.0, 300.0),
+    ];
     let context = tandem_rig::context(&axes, 1e-3);
     for form in ["scan", "windowed"] {
         let at = |n: usize| AxisVector::from_slice(&[7e-8 * n as f64, 0.0, 0.0, 2e-4 * n as f64]);
@@ -58,23 +68,42 @@ fn a_rotary_axis_that_turns_on_blocks_of_a_ten_millionth_of_a_millimetre_is_driv
         let driven = run(&format!("form = \"{form}\""), &context, &blocks);
         assert_eq!(driven.end(), at(30), "{form}");
         assert_eq!(driven.reports.len(), 30, "{form}");
-        let rests = driven.segments.iter().filter(|s| s.flags.contains(SegmentFlags::ENDS_AT_REST)).count();
+        let rests = driven
+            .segments
+            .iter()
+            .filter(|s| s.flags.contains(SegmentFlags::ENDS_AT_REST))
+            .count();
         assert_eq!(rests, 1, "{form}: they lie on one line");
         // With a jerk of 300 rad/s³ from rest to rest alone 0.008 rad take the rotary axis 0.09 s.
-        assert!(driven.duration_s() < 0.2, "{form}: {} s", driven.duration_s());
+        assert!(
+            driven.duration_s() < 0.2,
+            "{form}: {} s",
+            driven.duration_s()
+        );
     }
 }
 
 #[test]
 fn the_last_nanometre_before_a_rest_is_driven_where_jerk_is_low() {
-    let slow = AxisLimits { feed_mm_per_s: 160.0, jerk_mm_per_s3: 90.0, ..tandem_rig::axis(3e4) };
-    let context = PlannerContext { rough_period_s: 0.125e-3, ..tandem_rig::context(&[slow; 2], 0.125e-3) };
+    let slow = AxisLimits {
+        feed_mm_per_s: 160.0,
+        jerk_mm_per_s3: 90.0,
+        ..tandem_rig::axis(3e4)
+    };
+    let context = PlannerContext {
+        rough_period_s: 0.125e-3,
+        ..tandem_rig::context(&[slow; 2], 0.125e-3)
+    };
     for form in ["scan", "windowed"] {
         let end = AxisVector::from_slice(&[-15.0]);
         let block = (line(&AxisVector::ZERO, &end, 500.0), None);
         let driven = run(&format!("form = \"{form}\""), &context, &[block]);
         assert_eq!(driven.end(), end, "{form}");
-        let last = driven.segments.iter().rfind(|segment| segment.duration_s > 0.0).unwrap();
+        let last = driven
+            .segments
+            .iter()
+            .rfind(|segment| segment.duration_s > 0.0)
+            .unwrap();
         let left = last.velocity(last.duration_s)[0].abs();
         assert!(left < 1e-9, "{form}: {left} mm/s at the rest");
     }

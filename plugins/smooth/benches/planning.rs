@@ -31,7 +31,10 @@ impl SegmentSink for Away {
 }
 
 fn program(name: &str) -> Vec<Block> {
-    let (points, feed) = read(&format!("{}/../../examples/programs/{name}.ngc", env!("CARGO_MANIFEST_DIR")));
+    let (points, feed) = read(&format!(
+        "{}/../../examples/programs/{name}.ngc",
+        env!("CARGO_MANIFEST_DIR")
+    ));
     lines(&points, feed)
 }
 
@@ -39,7 +42,9 @@ fn stream(planner: &mut SmoothPlanner, blocks: &[Block], mut advanced: impl FnMu
     let mut next = 0;
     planner.reset(&AxisVector::ZERO);
     loop {
-        while next < blocks.len() && planner.accept(&blocks[next], None).unwrap() == Accepted::Accepted {
+        while next < blocks.len()
+            && planner.accept(&blocks[next], None).unwrap() == Accepted::Accepted
+        {
             next += 1;
         }
         if next == blocks.len() {
@@ -58,7 +63,9 @@ fn stream(planner: &mut SmoothPlanner, blocks: &[Block], mut advanced: impl FnMu
 fn smooth(bencher: divan::Bencher, name: &str) {
     let blocks = program(name);
     let mut planner = SmoothPlanner::new(&Options::default(), &context(&[0.0; 3], 0.01)).unwrap();
-    bencher.counter(ItemsCount::new(blocks.len())).bench_local(|| stream(&mut planner, &blocks, |_| ()));
+    bencher
+        .counter(ItemsCount::new(blocks.len()))
+        .bench_local(|| stream(&mut planner, &blocks, |_| ()));
 }
 
 /// The calls of `advance` that plan a window, by their time: of 20 runs the fastest of each call.
@@ -79,12 +86,21 @@ fn histogram(name: &str) {
     let windows = planner.effort().windows as usize / 20;
     fastest.sort_by(|a, b| b.total_cmp(a));
     fastest.truncate(windows);
-    println!("{name}: {windows} windows, the longest {:.2} ms", fastest[0] * 1e3);
+    println!(
+        "{name}: {windows} windows, the longest {:.2} ms",
+        fastest[0] * 1e3
+    );
     for bin in 0..10 {
         let (low, high) = (f64::from(bin) * 0.5, f64::from(bin + 1) * 0.5);
-        let count = fastest.iter().filter(|took_s| (low..high).contains(&(**took_s * 1e3))).count();
+        let count = fastest
+            .iter()
+            .filter(|took_s| (low..high).contains(&(**took_s * 1e3)))
+            .count();
         if count > 0 {
-            println!("  {low:.1} to {high:.1} ms: {count:3} {}", "#".repeat(count));
+            println!(
+                "  {low:.1} to {high:.1} ms: {count:3} {}",
+                "#".repeat(count)
+            );
         }
     }
 }

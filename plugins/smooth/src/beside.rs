@@ -55,10 +55,17 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
         if best < NEAR_ENOUGH * NEAR_ENOUGH || step > 3 && best <= DEVIATION * DEVIATION {
             break;
         }
-        for i in [near.checked_add(step), near.checked_sub(step)].into_iter().flatten() {
+        for i in [near.checked_add(step), near.checked_sub(step)]
+            .into_iter()
+            .flatten()
+        {
             if i < chords.len() {
                 let share = look(i);
-                (best, found) = if share < best { (share, i) } else { (best, found) };
+                (best, found) = if share < best {
+                    (share, i)
+                } else {
+                    (best, found)
+                };
             }
         }
     }
@@ -66,7 +73,13 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
     let along = dot(&minus(point, &chord.start), &chord.direction).clamp(0.0, chord.length);
     let share = best.sqrt();
     let foot = plus(&chord.start, along, &chord.direction);
-    Beside { point: *point, chord: found, foot, off: share * chord.tolerance, share: share / ALLOWED }
+    Beside {
+        point: *point,
+        chord: found,
+        foot,
+        off: share * chord.tolerance,
+        share: share / ALLOWED,
+    }
 }
 
 /// A bound of the distance from the path between two places of the motion, as a share of what is allowed. The line between
@@ -106,7 +119,9 @@ pub fn closer<const L: usize>(
     let ends = larger(a.share, b.share);
     if left == 0 {
         let way = minus(&b.point, &a.point);
-        let least = run.chords[a.chord].tolerance.min(run.chords[b.chord].tolerance);
+        let least = run.chords[a.chord]
+            .tolerance
+            .min(run.chords[b.chord].tolerance);
         return ends + (dot(&way, &way).sqrt() / 2.0 + bulge) / (ALLOWED * least);
     }
     let t = f64::midpoint(from_s, to_s);
@@ -118,7 +133,11 @@ pub fn closer<const L: usize>(
             break;
         }
         let between = stretch(run, places.0, places.1, bulge / 4.0);
-        let between = if between > 1.0 { closer(run, window, times, places, bulge / 4.0, left - 1) } else { between };
+        let between = if between > 1.0 {
+            closer(run, window, times, places, bulge / 4.0, left - 1)
+        } else {
+            between
+        };
         worst = larger(worst, between);
     }
     worst
@@ -130,7 +149,11 @@ pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) ->
     let chord = minus(b, a);
     let way = minus(point, a);
     let squared = dot(&chord, &chord);
-    let along = if squared > 0.0 { (dot(&way, &chord) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    let along = if squared > 0.0 {
+        (dot(&way, &chord) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
     dot(&across, &across)
 }

@@ -61,7 +61,8 @@ pub trait AnyCore: Send + std::fmt::Debug {
     /// Takes a block that was checked.
     fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError>;
     fn finish(&mut self);
-    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError>;
+    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink)
+    -> Result<Option<f64>, PluginError>;
     fn is_done(&self) -> bool;
     fn reset(&mut self, position: &AxisVector);
     fn effort(&self) -> Effort;
@@ -70,7 +71,10 @@ pub trait AnyCore: Send + std::fmt::Debug {
 impl<const L: usize> Core<L> {
     /// At rest.
     pub fn new(context: &PlannerContext, tuning: Tuning) -> Self {
-        Self { stream: Stream::new(&context.position), ahead: PathAhead::new(context, tuning) }
+        Self {
+            stream: Stream::new(&context.position),
+            ahead: PathAhead::new(context, tuning),
+        }
     }
 }
 
@@ -99,10 +103,18 @@ impl<const L: usize> PathAhead<L> {
             self.held_s -= leg.least_s;
             if !blocks.is_reported(&leg.block) {
                 let index = leg.block.index;
-                blocks.report(&report(index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0), sink);
+                blocks.report(
+                    &report(index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0),
+                    sink,
+                );
             }
             self.position = self.frame.lanes(&leg.block.end);
-            blocks.rest(BlockId::from(&leg.block), &leg.block.end, self.driven.path_mm, sink);
+            blocks.rest(
+                BlockId::from(&leg.block),
+                &leg.block.end,
+                self.driven.path_mm,
+                sink,
+            );
         }
     }
 
@@ -133,14 +145,23 @@ impl<const L: usize> PathAhead<L> {
                 }
                 // The next try ends where the path first turns, or has half the chords.
                 let last = run.chord_at(end.min(self.planning.end()) - 1e-9, here);
-                let cut = (here + 1..=last).find(|i| run.chords[*i].turn > CUT).map(|i| run.chords[i].s);
+                let cut = (here + 1..=last)
+                    .find(|i| run.chords[*i].turn > CUT)
+                    .map(|i| run.chords[i].s);
                 let half = run.chords[usize::midpoint(here, last)].end();
                 end = cut.filter(|s| *s < end - 1e-9).unwrap_or(half);
             }
         }
         let chord = run.chords[here];
         let counted = frame.counted(run.rotary);
-        profile::drive(&run, frame, &counted, &chord, (at, chord.end()), &mut self.window);
+        profile::drive(
+            &run,
+            frame,
+            &counted,
+            &chord,
+            (at, chord.end()),
+            &mut self.window,
+        );
     }
 
     /// Forgets everything: at rest at `position`.
@@ -154,7 +175,11 @@ impl<const L: usize> PathAhead<L> {
 
     fn tolerance_mm(&self, block: &Block) -> f64 {
         let stated = block.path_tolerance_mm;
-        if stated.is_nan() { self.context.path_tolerance_mm } else { stated }
+        if stated.is_nan() {
+            self.context.path_tolerance_mm
+        } else {
+            stated
+        }
     }
 
     /// Until when the window is driven, s: to its end where that is a rest of the program, else to where it is fastest.
@@ -182,9 +207,15 @@ impl<const L: usize> PathAhead<L> {
         let window = &self.window;
         let whole_s = window.duration_s();
         let later_s = now_s + LATER * whole_s;
-        let place = window.pieces.partition_point(|piece| piece.end_s() < later_s);
+        let place = window
+            .pieces
+            .partition_point(|piece| piece.end_s() < later_s);
         let commit_s = window.pieces.get(place).map_or(whole_s, Piece::end_s);
-        if commit_s > 0.97 * whole_s { whole_s } else { commit_s }
+        if commit_s > 0.97 * whole_s {
+            whole_s
+        } else {
+            commit_s
+        }
     }
 }
 
@@ -239,13 +270,21 @@ impl<const L: usize> Windows for PathAhead<L> {
         };
         let known = run.end() <= self.window.end() + 1e-9;
         let closed = run.closed;
-        let planned = if !known && self.planning.plan(&run, &self.frame, &start, &mut self.next) {
+        let planned = if !known
+            && self
+                .planning
+                .plan(&run, &self.frame, &start, &mut self.next)
+        {
             std::mem::swap(&mut self.window, &mut self.next);
             self.driven.begin_window();
-            Planned::NextWindow { commit_s: self.commit_s() }
+            Planned::NextWindow {
+                commit_s: self.commit_s(),
+            }
         } else {
             self.window.whole |= known && closed;
-            Planned::SameWindow { commit_s: self.later_s(now_s) }
+            Planned::SameWindow {
+                commit_s: self.later_s(now_s),
+            }
         };
         self.route.forget(s);
         planned
@@ -275,7 +314,9 @@ impl<const L: usize> Windows for PathAhead<L> {
 impl<const L: usize> AnyCore for Core<L> {
     fn has_room(&self, most_chords: usize) -> bool {
         let Self { stream, ahead } = self;
-        let driven_s = stream.driven_s().map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
+        let driven_s = stream
+            .driven_s()
+            .map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
         let enough_s = HELD.0 * ahead.planning.tuning.window_s + HELD.1;
         let held = ahead.route.chord_count().max(ahead.route.items.len());
         ahead.route.items.is_empty() || held < most_chords && ahead.held_s - driven_s < enough_s
@@ -284,7 +325,12 @@ impl<const L: usize> AnyCore for Core<L> {
     fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
         let ahead = &self.ahead;
         let tolerance_mm = ahead.tolerance_mm(block);
-        flatten::check(&ahead.context.axes, &ahead.frame, (block, curve), tolerance_mm)
+        flatten::check(
+            &ahead.context.axes,
+            &ahead.frame,
+            (block, curve),
+            tolerance_mm,
+        )
     }
 
     fn push(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
@@ -295,9 +341,17 @@ impl<const L: usize> AnyCore for Core<L> {
             return Ok(());
         }
         let tolerance_mm = ahead.tolerance_mm(block);
-        ahead.flat.lay(&ahead.context.axes, &ahead.frame, (block, curve), tolerance_mm)?;
+        ahead.flat.lay(
+            &ahead.context.axes,
+            &ahead.frame,
+            (block, curve),
+            tolerance_mm,
+        )?;
         let feed_ratio = ahead.context.max_feed_ratio;
-        ahead.held_s += ahead.route.push(block, &ahead.flat, &ahead.frame, feed_ratio, tolerance_mm);
+        ahead.held_s +=
+            ahead
+                .route
+                .push(block, &ahead.flat, &ahead.frame, feed_ratio, tolerance_mm);
         ahead.flat.forget();
         Ok(())
     }
@@ -306,7 +360,11 @@ impl<const L: usize> AnyCore for Core<L> {
         self.stream.finish();
     }
 
-    fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+    fn emit(
+        &mut self,
+        left_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Option<f64>, PluginError> {
         self.stream.emit(&mut self.ahead, left_s, sink)
     }
 

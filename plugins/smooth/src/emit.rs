@@ -33,7 +33,9 @@ impl DrivenPath {
 impl<const L: usize> PathAhead<L> {
     /// Least time of the part of the leg in front that is driven when `driven_s` of the window are, s.
     pub(crate) fn front_driven_s(&self, driven_s: f64) -> f64 {
-        let Some(leg) = self.route.front() else { return 0.0 };
+        let Some(leg) = self.route.front() else {
+            return 0.0;
+        };
         let share = (self.window.along(driven_s) - leg.start) / (leg.end - leg.start).max(1e-12);
         leg.least_s * share.clamp(0.0, 1.0)
     }
@@ -55,7 +57,11 @@ impl<const L: usize> PathAhead<L> {
         let mut merged_feed = 0.0f64;
         let mut ends = false;
         while let Some(leg) = self.route.front() {
-            let end_s = if leg.end < self.window.end() - 1e-9 { self.window.time_of(leg.end) } else { f64::INFINITY };
+            let end_s = if leg.end < self.window.end() - 1e-9 {
+                self.window.time_of(leg.end)
+            } else {
+                f64::INFINITY
+            };
             self.begin_leg(from_s, end_s, blocks, sink);
             // Blocks of which less than a fine period is left share a segment: it is named by the last of them, and has the
             // highest of their feeds.
@@ -80,18 +86,28 @@ impl<const L: usize> PathAhead<L> {
         blocks.has_begun();
         segment.duration_s = until_s - from_s;
         sink.segment(&segment);
-        Emitted { until_s, duration_s: segment.duration_s }
+        Emitted {
+            until_s,
+            duration_s: segment.duration_s,
+        }
     }
 
     /// Gives the report of the leg in front, where that was not done.
     fn begin_leg(&self, from_s: f64, end_s: f64, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
-        let Some(leg) = self.route.front() else { return };
+        let Some(leg) = self.route.front() else {
+            return;
+        };
         if blocks.is_reported(&leg.block) {
             return;
         }
         let to_s = end_s.min(self.window.duration_s()).max(from_s);
         let start_s = self.window.time_of(leg.start).min(from_s).min(to_s);
-        let report = of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (start_s, to_s));
+        let report = of_leg(
+            &self.window,
+            &self.frame.counted(leg.rotary),
+            leg,
+            (start_s, to_s),
+        );
         blocks.begin(&leg.block, &report, sink);
     }
 
@@ -155,7 +171,12 @@ impl<const L: usize> PathAhead<L> {
         if !blocks.is_reported(&leg.block) {
             let to_s = self.window.duration_s();
             let from_s = self.window.time_of(leg.start).min(to_s);
-            let report = of_leg(&self.window, &self.frame.counted(leg.rotary), leg, (from_s, to_s));
+            let report = of_leg(
+                &self.window,
+                &self.frame.counted(leg.rotary),
+                leg,
+                (from_s, to_s),
+            );
             blocks.report(&report, sink);
         }
     }

@@ -20,7 +20,9 @@ pub struct Feeds<'a, const L: usize> {
 impl<const L: usize> Feeds<'_, L> {
     /// The feed of interval `k`.
     pub fn of(&mut self, k: usize) -> f64 {
-        while self.at + 1 < self.waypoints.len() && (self.waypoints[self.at + 1].interval as usize) < k {
+        while self.at + 1 < self.waypoints.len()
+            && (self.waypoints[self.at + 1].interval as usize) < k
+        {
             self.at += 1;
         }
         let mut feed = f64::INFINITY;
@@ -38,7 +40,11 @@ impl<const L: usize> Feeds<'_, L> {
             n += 1;
         }
         if feed.is_infinite() && self.waypoints.is_empty() {
-            feed = self.run.chords.iter().fold(f64::INFINITY, |least, chord| least.min(chord.feed));
+            feed = self
+                .run
+                .chords
+                .iter()
+                .fold(f64::INFINITY, |least, chord| least.min(chord.feed));
         }
         feed
     }
@@ -60,7 +66,10 @@ impl<const L: usize> Feeder<'_, L> {
             self.timer_at += 1;
         }
         self.chord = self.run.chord_at(marks[self.timer_at].s, self.chord);
-        let mut range = (self.run.chords[self.chord].feed, self.run.chords[self.chord].feed);
+        let mut range = (
+            self.run.chords[self.chord].feed,
+            self.run.chords[self.chord].feed,
+        );
         let mut mark = self.timer_at;
         while mark + 1 < marks.len() && marks[mark].t < piece.end_s() {
             mark += 1;

@@ -56,7 +56,11 @@ impl<const L: usize> Flat<L> {
             }
             _ => self.points.push(frame.lanes(&block.end)),
         }
-        if self.points.len() > MAX_CHORDS { Err(too_many()) } else { Ok(()) }
+        if self.points.len() > MAX_CHORDS {
+            Err(too_many())
+        } else {
+            Ok(())
+        }
     }
 
     /// Gives memory back that only a block of very many chords needs.
@@ -87,7 +91,12 @@ impl<const L: usize> Flat<L> {
         let curve = Nurbs::new(&data, axes)?;
         for piece in &curve.pieces() {
             let table = ArcLength::of_piece(&curve, piece);
-            self.lay_piece(&Smooth { frame, curve: &curve, table, sagitta });
+            self.lay_piece(&Smooth {
+                frame,
+                curve: &curve,
+                table,
+                sagitta,
+            });
         }
         if let Some(last) = self.points.last_mut() {
             *last = frame.lanes(&block.end);
@@ -103,7 +112,11 @@ impl<const L: usize> Flat<L> {
         let mut from = part.at(s, &mut place);
         while s < length && self.points.len() <= MAX_CHORDS {
             let reach = part.reach(s, &mut place);
-            let mut to = if length - s < 1.3 * reach { length } else { s + reach };
+            let mut to = if length - s < 1.3 * reach {
+                length
+            } else {
+                s + reach
+            };
             let mut at = part.at(to, &mut place);
             while !part.is_beside((s, to), (&from, &at), &mut place) {
                 to = s + SHORTER * (to - s);
@@ -135,32 +148,57 @@ impl<const L: usize> Smooth<'_, L> {
         let first = self.step(s, place);
         let length = self.table.length().mm;
         let further = [0.5, 1.0].map(|share| self.step((s + share * first).min(length), place));
-        further.into_iter().fold(first, |least, next| least.min(next.max(0.3 * first)))
+        further
+            .into_iter()
+            .fold(first, |least, next| least.min(next.max(0.3 * first)))
     }
 
     /// Length of a chord that stands off the curve by the sagitta where it bends as at `s`.
     fn step(&self, s: f64, place: &mut Place) -> f64 {
-        let bend = self.table.along_path(self.curve, s, place).map_or(0.0, |at| {
-            let lanes = self.frame.lanes(&at.curvature);
-            lanes.iter().map(|v| v * v).sum::<f64>().sqrt()
-        });
-        (8.0 * self.sagitta / bend.max(1e-9)).sqrt().min(0.3 / bend.max(1e-9)).clamp(SHORTEST_MM, LONGEST_MM)
+        let bend = self
+            .table
+            .along_path(self.curve, s, place)
+            .map_or(0.0, |at| {
+                let lanes = self.frame.lanes(&at.curvature);
+                lanes.iter().map(|v| v * v).sum::<f64>().sqrt()
+            });
+        (8.0 * self.sagitta / bend.max(1e-9))
+            .sqrt()
+            .min(0.3 / bend.max(1e-9))
+            .clamp(SHORTEST_MM, LONGEST_MM)
     }
 
     /// Whether the curve between two path coordinates stands off its chord by no more than the sagitta, and does not run to and
     /// fro beside it. How it bends at some places tells nothing of what lies between: where control points coincide it is
     /// straight at its ends, and a narrow bend or a cusp is stepped over.
-    fn is_beside(&self, (from, to): (f64, f64), (start, end): (&Lanes<L>, &Lanes<L>), place: &mut Place) -> bool {
+    fn is_beside(
+        &self,
+        (from, to): (f64, f64),
+        (start, end): (&Lanes<L>, &Lanes<L>),
+        place: &mut Place,
+    ) -> bool {
         let way = minus(end, start);
         // What path speed counts, as the length of the curve does.
-        let straight =
-            (0..L).map(|l| if self.frame.rotary[l] > 0.0 { 0.0 } else { way[l] * way[l] }).sum::<f64>().sqrt();
-        let range = (self.table.parameter(from, place).0, self.table.parameter(to, place).0);
+        let straight = (0..L)
+            .map(|l| {
+                if self.frame.rotary[l] > 0.0 {
+                    0.0
+                } else {
+                    way[l] * way[l]
+                }
+            })
+            .sum::<f64>()
+            .sqrt();
+        let range = (
+            self.table.parameter(from, place).0,
+            self.table.parameter(to, place).0,
+        );
         // The chord of a circle meets it exactly; rounding is not to make it shorter.
         let most = (1.001 * self.sagitta).powi(2);
         let near = |at: &AxisVector| to_chord(&self.frame.lanes(at), start, end) <= most;
         to - from <= MIN_MM
-            || to - from <= straight + 2.0 * self.sagitta && self.curve.lies_inside(range, HALVINGS, &near)
+            || to - from <= straight + 2.0 * self.sagitta
+                && self.curve.lies_inside(range, HALVINGS, &near)
     }
 }
 
@@ -180,7 +218,13 @@ pub fn check<const L: usize>(
     (block, curve): (&Block, Option<Curve<'_>>),
     tolerance_mm: f64,
 ) -> Result<(), PluginError> {
-    let arc = || count(block.arc.radius_mm, block.arc.sweep_rad, SAGITTA_SHARE * tolerance_mm);
+    let arc = || {
+        count(
+            block.arc.radius_mm,
+            block.arc.sweep_rad,
+            SAGITTA_SHARE * tolerance_mm,
+        )
+    };
     match block.kind {
         BlockKind::Nurbs => Flat::default().lay(axes, frame, (block, curve), tolerance_mm),
         BlockKind::Arc if arc() > MAX_CHORDS => Err(too_many()),
@@ -190,7 +234,10 @@ pub fn check<const L: usize>(
 
 /// Chords of a circle.
 pub fn count(radius: f64, sweep_rad: f64, sagitta: f64) -> usize {
-    let angle = (8.0 * sagitta / radius).sqrt().min(LONGEST_MM / radius).min(0.3);
+    let angle = (8.0 * sagitta / radius)
+        .sqrt()
+        .min(LONGEST_MM / radius)
+        .min(0.3);
     ((sweep_rad.abs() / angle).ceil() as usize).clamp(1, MAX_CHORDS + 1)
 }
 
@@ -236,7 +283,13 @@ mod tests {
         block.kind = BlockKind::Nurbs;
         block.end = data.control_points[data.degree];
         let mut flat = Flat::default();
-        flat.lay(&axes, &frame, (&block, Some(data.curve())), SAGITTA / SAGITTA_SHARE).unwrap();
+        flat.lay(
+            &axes,
+            &frame,
+            (&block, Some(data.curve())),
+            SAGITTA / SAGITTA_SHARE,
+        )
+        .unwrap();
         let mut chain = vec![frame.lanes(&block.start)];
         chain.append(&mut flat.points);
         (chain, Nurbs::new(data, &axes).unwrap())
@@ -246,9 +299,14 @@ mod tests {
     fn off_chords(data: &NurbsData) -> f64 {
         let (chain, curve) = chain_and_curve(data);
         let (_, frame) = machine();
-        let places = (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
-        let off =
-            |at| chain.windows(2).map(|ends| to_chord(&at, &ends[0], &ends[1]).sqrt()).fold(f64::INFINITY, f64::min);
+        let places =
+            (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
+        let off = |at| {
+            chain
+                .windows(2)
+                .map(|ends| to_chord(&at, &ends[0], &ends[1]).sqrt())
+                .fold(f64::INFINITY, f64::min)
+        };
         places.map(off).fold(0.0, f64::max)
     }
 
@@ -256,29 +314,51 @@ mod tests {
     fn coinciding_control_points_are_not_flattened_to_their_chord() {
         // At both ends a cubic is straight whose inner control points coincide.
         let corner = [-0.1, 0.05, 0.0];
-        assert!(off_chords(&bezier(&[[0.0; 3], corner, corner, [-0.1, 0.0, 0.0]])) <= 1.01 * SAGITTA);
+        assert!(
+            off_chords(&bezier(&[[0.0; 3], corner, corner, [-0.1, 0.0, 0.0]])) <= 1.01 * SAGITTA
+        );
     }
 
     #[test]
     fn a_narrow_bend_is_not_stepped_over() {
         // Almost a cusp, and control points that are nearly those of one.
-        let narrow = [[-0.06537, -4.364, 0.0], [-0.0679, -4.361, 0.0], [-0.03, -4.409, 0.0], [-0.053, -4.38, 0.0]];
+        let narrow = [
+            [-0.06537, -4.364, 0.0],
+            [-0.0679, -4.361, 0.0],
+            [-0.03, -4.409, 0.0],
+            [-0.053, -4.38, 0.0],
+        ];
         assert!(off_chords(&bezier(&narrow)) <= 1.01 * SAGITTA);
     }
 
     fn length(chain: &[Lanes<4>]) -> f64 {
-        chain.windows(2).map(|ends| minus(&ends[1], &ends[0])).map(|way| dot(&way, &way).sqrt()).sum()
+        chain
+            .windows(2)
+            .map(|ends| minus(&ends[1], &ends[0]))
+            .map(|way| dot(&way, &way).sqrt())
+            .sum()
     }
 
     #[test]
     fn a_curve_that_runs_to_and_fro_beside_a_line_is_followed() {
         // All of it is beside the chord of its ends, or nearly so.
-        let near_line = [[0.0; 3], [0.15, 0.06005, 0.0], [-0.05, -0.02005, 0.0], [0.09, 0.036, 0.0]];
+        let near_line = [
+            [0.0; 3],
+            [0.15, 0.06005, 0.0],
+            [-0.05, -0.02005, 0.0],
+            [0.09, 0.036, 0.0],
+        ];
         let (chain, curve) = chain_and_curve(&bezier(&near_line));
         let (_, frame) = machine();
-        let places = (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
+        let places =
+            (0..=2000).map(|n| frame.lanes(&curve.derivatives(f64::from(n) / 2000.0).position));
         let fine: Vec<Lanes<4>> = places.collect();
-        assert!(length(&chain) > 0.99 * length(&fine), "{} for {}", length(&chain), length(&fine));
+        assert!(
+            length(&chain) > 0.99 * length(&fine),
+            "{} for {}",
+            length(&chain),
+            length(&fine)
+        );
         assert!(length(&fine) > 1.1 * length(&[fine[0], fine[2000]]));
     }
 

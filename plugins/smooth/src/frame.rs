@@ -39,7 +39,10 @@ impl<const L: usize> Frame<L> {
         let scale: Lanes<L> = std::array::from_fn(|i| if rotary(i) { DEGREES } else { 1.0 });
         // Lanes that no axis uses never move; their limits only keep them finite.
         let of = |get: fn(&AxisLimits) -> f64| -> Lanes<L> {
-            std::array::from_fn(|i| axes.get(i).map_or(get(&axes[0]), |axis| scale[i] * get(axis)))
+            std::array::from_fn(|i| {
+                axes.get(i)
+                    .map_or(get(&axes[0]), |axis| scale[i] * get(axis))
+            })
         };
         Self {
             count: axes.len(),
@@ -55,7 +58,13 @@ impl<const L: usize> Frame<L> {
 
     /// `position` in lanes, without what may stand behind the axes.
     pub fn lanes(&self, position: &AxisVector) -> Lanes<L> {
-        std::array::from_fn(|i| if i < self.count { position[i] * self.scale[i] } else { 0.0 })
+        std::array::from_fn(|i| {
+            if i < self.count {
+                position[i] * self.scale[i]
+            } else {
+                0.0
+            }
+        })
     }
 
     /// Lanes as axes.
@@ -70,7 +79,10 @@ impl<const L: usize> Frame<L> {
     /// Whether path speed counts the rotary axes of `block`: it moves no linear one. Arcs are linear.
     pub fn counts_rotary(&self, block: &Block) -> bool {
         (0..self.count).all(|i| self.rotary[i] > 0.0 || block.start[i] == block.end[i])
-            && !matches!(block.kind, tandem_sdk::BlockKind::Arc | tandem_sdk::BlockKind::Nurbs)
+            && !matches!(
+                block.kind,
+                tandem_sdk::BlockKind::Arc | tandem_sdk::BlockKind::Nurbs
+            )
     }
 
     /// Factors by which path speed counts the lanes: 1 for linear ones, or 1/scale for rotary ones.
@@ -119,5 +131,6 @@ pub fn minus<const L: usize>(a: &Lanes<L>, b: &Lanes<L>) -> Lanes<L> {
 /// The largest |entry|.
 #[inline(always)]
 pub fn largest<const L: usize>(a: &Lanes<L>) -> f64 {
-    a.iter().fold(0.0, |most, v| if v.abs() > most { v.abs() } else { most })
+    a.iter()
+        .fold(0.0, |most, v| if v.abs() > most { v.abs() } else { most })
 }

@@ -10,8 +10,14 @@
 //! A window that is refused costs time, never limits: the one before is driven on, at most to its rest, and it is checked
 //! to its end. From rest a shorter window is tried, in the end a single straight piece ([`profile`]).
 
-#![allow(clippy::inline_always, reason = "what is inlined is compiled for the number of lanes of its caller")]
-#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go side by side")]
+#![allow(
+    clippy::inline_always,
+    reason = "what is inlined is compiled for the number of lanes of its caller"
+)]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "lanes of several arrays go side by side"
+)]
 
 mod beside;
 mod core;

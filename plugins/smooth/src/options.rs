@@ -43,7 +43,10 @@ impl Options {
         ];
         for (key, value, low, high) in ranges {
             if !(low..=high).contains(&value) {
-                return Err(PluginError::of_option(key, format!("{value}: must be {low} to {high}")));
+                return Err(PluginError::of_option(
+                    key,
+                    format!("{value}: must be {low} to {high}"),
+                ));
             }
         }
         Ok(())

@@ -70,7 +70,11 @@ struct Walker<'a, const L: usize> {
 impl<'a, const L: usize> Walker<'a, L> {
     fn begin(run: &Run<'a, L>, s: f64) -> Self {
         let chord = run.chord_at(s, 0);
-        Self { chords: run.chords, chord, along: (s - run.chords[chord].s).clamp(0.0, run.chords[chord].length) }
+        Self {
+            chords: run.chords,
+            chord,
+            along: (s - run.chords[chord].s).clamp(0.0, run.chords[chord].length),
+        }
     }
 
     fn s(&self) -> f64 {
@@ -82,7 +86,11 @@ impl<'a, const L: usize> Walker<'a, L> {
     #[inline(always)]
     fn goes_on(&mut self, before: &Lanes<L>, sample: &Lanes<L>) -> bool {
         loop {
-            if let Some([first, _]) = within(&self.chords[self.chord], [self.along, f64::INFINITY], sample) {
+            if let Some([first, _]) = within(
+                &self.chords[self.chord],
+                [self.along, f64::INFINITY],
+                sample,
+            ) {
                 self.along = first;
                 return true;
             }
@@ -114,14 +122,21 @@ impl<'a, const L: usize> Walker<'a, L> {
     /// Whether the vertex at the start of chord `vertex` is near the way from one sample to another.
     #[inline(always)]
     fn is_near(&self, vertex: usize, from: &Lanes<L>, to: &Lanes<L>) -> bool {
-        let reach = REACH * self.chords[vertex].tolerance.max(self.chords[vertex - 1].tolerance);
+        let reach = REACH
+            * self.chords[vertex]
+                .tolerance
+                .max(self.chords[vertex - 1].tolerance);
         to_chord(&self.chords[vertex].start, from, to) <= reach * reach
     }
 }
 
 /// The first and the last place on `chord` between `low` and `high` that are within tolerance of `sample`.
 #[inline(always)]
-fn within<const L: usize>(chord: &Chord<L>, [low, high]: [f64; 2], sample: &Lanes<L>) -> Option<[f64; 2]> {
+fn within<const L: usize>(
+    chord: &Chord<L>,
+    [low, high]: [f64; 2],
+    sample: &Lanes<L>,
+) -> Option<[f64; 2]> {
     let most = ALLOWED * chord.tolerance;
     let way = minus(sample, &chord.start);
     let foot = dot(&way, &chord.direction);
@@ -165,23 +180,44 @@ mod tests {
     /// Whether samples at these points have places in order on the path.
     fn in_order(path: &[[f64; 2]], samples: &[[f64; 2]]) -> bool {
         let chords = lines(path);
-        let run = Run { chords: &chords, closed: true, rotary: false, rapid: false };
+        let run = Run {
+            chords: &chords,
+            closed: true,
+            rotary: false,
+            rapid: false,
+        };
         Order::default().walk(&run, samples, 0, (0, run.end()))
     }
 
     #[test]
     fn a_motion_along_the_path_has_places_in_order() {
-        assert!(in_order(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], &[[0.0, 0.0], [0.5, 0.005], [0.995, 0.0], [1.0, 1.0]]));
+        assert!(in_order(
+            &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],
+            &[[0.0, 0.0], [0.5, 0.005], [0.995, 0.0], [1.0, 1.0]]
+        ));
     }
 
     #[test]
     fn a_motion_that_turns_back_on_a_line_has_none() {
-        assert!(!in_order(&[[0.0, 0.0], [1.0, 0.0]], &[[0.0, 0.0], [0.5, 0.0], [0.45, 0.0], [1.0, 0.0]]));
+        assert!(!in_order(
+            &[[0.0, 0.0], [1.0, 0.0]],
+            &[[0.0, 0.0], [0.5, 0.0], [0.45, 0.0], [1.0, 0.0]]
+        ));
     }
 
     #[test]
     fn a_motion_that_leaves_out_a_loop_has_none() {
-        let path = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.3], [0.7, 0.3], [1.0, 0.0], [1.0, -1.0]];
-        assert!(!in_order(&path, &[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, -0.5], [1.0, -1.0]]));
+        let path = [
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [1.0, 0.3],
+            [0.7, 0.3],
+            [1.0, 0.0],
+            [1.0, -1.0],
+        ];
+        assert!(!in_order(
+            &path,
+            &[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, -0.5], [1.0, -1.0]]
+        ));
     }
 }

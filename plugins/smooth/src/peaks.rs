@@ -51,11 +51,18 @@ pub fn highest<const L: usize, const N: usize>(
     measure: &impl Fn(&Lanes<L>) -> f64,
 ) -> f64 {
     let most = hull(control, measure);
-    if most <= enough || most.is_nan() { most } else { close_in(control, enough, measure, DEPTH) }
+    if most <= enough || most.is_nan() {
+        most
+    } else {
+        close_in(control, enough, measure, DEPTH)
+    }
 }
 
 #[inline(always)]
-fn hull<const L: usize, const N: usize>(control: &[Lanes<L>; N], measure: &impl Fn(&Lanes<L>) -> f64) -> f64 {
+fn hull<const L: usize, const N: usize>(
+    control: &[Lanes<L>; N],
+    measure: &impl Fn(&Lanes<L>) -> f64,
+) -> f64 {
     let mut most = f64::NEG_INFINITY;
     for point in control {
         most = larger(most, measure(point));
@@ -77,7 +84,10 @@ fn close_in<const L: usize, const N: usize>(
     let [left, right] = halves(control);
     let first = close_in(&left, enough, measure, depth - 1);
     // What lies below that of one half does not matter in the other.
-    larger(first, close_in(&right, larger(enough, first), measure, depth - 1))
+    larger(
+        first,
+        close_in(&right, larger(enough, first), measure, depth - 1),
+    )
 }
 
 /// The control points of both halves (de Casteljau).
@@ -129,7 +139,11 @@ fn control_of<const L: usize>(piece: &Piece<L>) -> Derivatives<L> {
         each(|l| 6.0 * c[3][l] + 12.0 * t * c[4][l]),
         each(|l| 6.0 * c[3][l] + 24.0 * t * c[4][l] + 60.0 * t2 * c[5][l]),
     ];
-    Derivatives { velocity, acceleration, jerk }
+    Derivatives {
+        velocity,
+        acceleration,
+        jerk,
+    }
 }
 
 /// The control points of the position of a piece.
@@ -147,7 +161,14 @@ pub fn positions<const L: usize>(piece: &Piece<L>) -> [Lanes<L>; 6] {
         power[n] = power[n - 1] * piece.duration_s;
     }
     // The place itself comes last, so that what is added to it is not rounded to it.
-    BINOMIAL.map(|row| each(|l| (1..6).map(|n| row[n] * power[n] * piece.c[n][l]).sum::<f64>() + piece.c[0][l]))
+    BINOMIAL.map(|row| {
+        each(|l| {
+            (1..6)
+                .map(|n| row[n] * power[n] * piece.c[n][l])
+                .sum::<f64>()
+                + piece.c[0][l]
+        })
+    })
 }
 
 /// The largest share of `limit` in a lane.
@@ -173,7 +194,11 @@ pub fn derivatives<const L: usize>(
     feed: f64,
     stop: &mut Stop,
 ) -> Reached {
-    let Derivatives { velocity, acceleration, jerk } = control_of(piece);
+    let Derivatives {
+        velocity,
+        acceleration,
+        jerk,
+    } = control_of(piece);
     let squared = |v: &Lanes<L>| {
         let counted: Lanes<L> = each(|l| counted[l] * v[l]);
         dot(&counted, &counted)
@@ -197,7 +222,13 @@ const MIN_LEFT: f64 = 0.02;
 
 /// Notes what is left for a stop: with d the direction and n what turns, `A − max(0, −sign(d)·n)` over |d|.
 #[inline(always)]
-fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &Lanes<L>, speed: f64) {
+fn leave<const L: usize>(
+    stop: &mut Stop,
+    frame: &Frame<L>,
+    v: &Lanes<L>,
+    a: &Lanes<L>,
+    speed: f64,
+) {
     let squared = dot(v, v);
     if squared < f64::MIN_POSITIVE {
         return;
@@ -207,8 +238,12 @@ fn leave<const L: usize>(stop: &mut Stop, frame: &Frame<L>, v: &Lanes<L>, a: &La
     for l in 0..L {
         let turning = (a[l] - along * v[l]) * v[l].signum();
         let left = (frame.acceleration[l] + turning.min(0.0)).max(0.0);
-        stop.time_s = stop.time_s.max(v[l].abs() / left.max(MIN_LEFT * frame.acceleration[l]));
-        stop.jerk_per_speed = stop.jerk_per_speed.min(frame.jerk[l] / v[l].abs().max(1e-9));
+        stop.time_s = stop
+            .time_s
+            .max(v[l].abs() / left.max(MIN_LEFT * frame.acceleration[l]));
+        stop.jerk_per_speed = stop
+            .jerk_per_speed
+            .min(frame.jerk[l] / v[l].abs().max(1e-9));
     }
 }
 
@@ -242,7 +277,10 @@ mod tests {
         let mut stop = Stop::default();
         let v = [5e-4, 0.0];
         leave(&mut stop, &frame, &v, &[0.0; 2], v[0]);
-        assert!((stop.time_s - 0.5).abs() < 1e-9 && (stop.jerk_per_speed - 20.0).abs() < 1e-9, "{stop:?}");
+        assert!(
+            (stop.time_s - 0.5).abs() < 1e-9 && (stop.jerk_per_speed - 20.0).abs() < 1e-9,
+            "{stop:?}"
+        );
     }
 
     #[test]
@@ -251,9 +289,15 @@ mod tests {
         for _ in 0..500 {
             let piece = piece(&mut random);
             let t = |n: u32| f64::from(n) / 4000.0 * piece.duration_s;
-            let Derivatives { velocity, acceleration, .. } = control_of(&piece);
+            let Derivatives {
+                velocity,
+                acceleration,
+                ..
+            } = control_of(&piece);
             let largest = |of: &dyn Fn(f64) -> Lanes<2>| {
-                (0..=4000).flat_map(|n| of(t(n))).fold(0.0, |most: f64, value| most.max(value.abs()))
+                (0..=4000)
+                    .flat_map(|n| of(t(n)))
+                    .fold(0.0, |most: f64, value| most.max(value.abs()))
             };
             let one = share_of(&[1.0; 2]);
             let said = [
@@ -261,11 +305,20 @@ mod tests {
                 highest(&velocity, 0.0, &one),
                 highest(&acceleration, 0.0, &one),
             ];
-            let reached =
-                [largest(&|t| piece.position(t)), largest(&|t| piece.velocity(t)), largest(&|t| piece.acceleration(t))];
+            let reached = [
+                largest(&|t| piece.position(t)),
+                largest(&|t| piece.velocity(t)),
+                largest(&|t| piece.acceleration(t)),
+            ];
             for (said, reached) in said.into_iter().zip(reached) {
-                assert!(said >= reached * (1.0 - 1e-12), "{said} is said, {reached} is reached");
-                assert!(said <= reached * (1.0 + 1e-4), "{said} is said, and no more than {reached} is reached");
+                assert!(
+                    said >= reached * (1.0 - 1e-12),
+                    "{said} is said, {reached} is reached"
+                );
+                assert!(
+                    said <= reached * (1.0 + 1e-4),
+                    "{said} is said, and no more than {reached} is reached"
+                );
             }
         }
     }

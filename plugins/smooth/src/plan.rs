@@ -141,11 +141,18 @@ impl<const L: usize> Planning<L> {
     }
 
     /// Plans into `window`; false where what was found does not pass.
-    pub fn plan(&mut self, run: &Run<'_, L>, frame: &Frame<L>, start: &Start<'_, L>, window: &mut Window<L>) -> bool {
+    pub fn plan(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        start: &Start<'_, L>,
+        window: &mut Window<L>,
+    ) -> bool {
         self.effort.windows += 1;
         let counted = frame.counted(run.rotary);
         let reach = self.take_over(start);
-        self.timing.make(run, frame, &counted, &reach, &mut self.marks);
+        self.timing
+            .make(run, frame, &counted, &reach, &mut self.marks);
         if self.marks.len() < 2 {
             // There is no path between the start and the end.
             self.effort.rejected += 1;
@@ -164,7 +171,11 @@ impl<const L: usize> Planning<L> {
         };
         let mut before_s = self.marks[self.marks.len() - 1].t;
         // Without the timing of a window before there is more to be found.
-        let rounds = if start.old.is_none() { 2 * self.tuning.rounds } else { self.tuning.rounds };
+        let rounds = if start.old.is_none() {
+            2 * self.tuning.rounds
+        } else {
+            self.tuning.rounds
+        };
         let mut round = 1;
         let mut repairs = 0;
         let mut settled = false;
@@ -185,7 +196,9 @@ impl<const L: usize> Planning<L> {
                 continue;
             }
             self.build(window);
-            let checked = self.checker.check(run, frame, &counted, start, (window, travel.as_ref()));
+            let checked =
+                self.checker
+                    .check(run, frame, &counted, start, (window, travel.as_ref()));
             if checked.passes() {
                 window.whole = run.closed && end >= run.end() - 1e-9;
                 return true;
@@ -195,7 +208,10 @@ impl<const L: usize> Planning<L> {
                 return false;
             }
             shares = if self.infeasible && !start.resting {
-                Shares { firm: 10.0 * shares.firm, ..shares }
+                Shares {
+                    firm: 10.0 * shares.firm,
+                    ..shares
+                }
             } else {
                 take_back(shares, &checked)
             };
@@ -210,11 +226,22 @@ impl<const L: usize> Planning<L> {
         self.marks.clear();
         self.marks.push(Mark { t: 0.0, s: start.s });
         let size = |v: &Lanes<L>| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let mut reach = Reach { s: start.s, speed: size(&start.state[1]), window_s: start.window_s, end: start.end };
+        let mut reach = Reach {
+            s: start.s,
+            speed: size(&start.state[1]),
+            window_s: start.window_s,
+            end: start.end,
+        };
         if let Some((old, now_s)) = start.old {
             let until_s = now_s + WARM * (old.duration_s() - now_s);
-            let known = old.marks.iter().filter(|mark| mark.t > now_s && mark.t <= until_s && mark.s > start.s);
-            self.marks.extend(known.map(|mark| Mark { t: mark.t - now_s, s: mark.s }));
+            let known = old
+                .marks
+                .iter()
+                .filter(|mark| mark.t > now_s && mark.t <= until_s && mark.s > start.s);
+            self.marks.extend(known.map(|mark| Mark {
+                t: mark.t - now_s,
+                s: mark.s,
+            }));
             let last = self.marks[self.marks.len() - 1];
             reach.s = last.s;
             reach.speed = size(&old.state(now_s + last.t)[1]);
@@ -234,21 +261,49 @@ impl<const L: usize> Planning<L> {
         last: bool,
     ) -> bool {
         let total_s = self.marks[self.marks.len() - 1].t;
-        let intervals = ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
-        let grid = Grid { intervals, step_s: total_s / intervals as f64, lanes: frame.count };
+        let intervals =
+            ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
+        let grid = Grid {
+            intervals,
+            step_s: total_s / intervals as f64,
+            lanes: frame.count,
+        };
         self.lay_spline(run, start, &grid);
         let ends = (start.s, self.marks[self.marks.len() - 1].s);
-        let keep = Keep { share: shares.boxes, travel, margin: shares.margin, ends };
+        let keep = Keep {
+            share: shares.boxes,
+            travel,
+            margin: shares.margin,
+            ends,
+        };
         self.waypoints.choose(run, &self.marks, grid, &keep);
-        self.smoother.firm = if start.resting { (0, 1.0) } else { (FIRM_INTERVALS, shares.firm) };
-        let smoothed = self.smoother.smooth(&mut self.spline, &self.waypoints.chosen, &frame.jerk);
+        self.smoother.firm = if start.resting {
+            (0, 1.0)
+        } else {
+            (FIRM_INTERVALS, shares.firm)
+        };
+        let smoothed = self
+            .smoother
+            .smooth(&mut self.spline, &self.waypoints.chosen, &frame.jerk);
         self.fill_pacer(run, frame, shares, counted);
         let asked = if last {
-            Asked { gap: GAP, violation: INFEASIBLE, iterations: 25 }
+            Asked {
+                gap: GAP,
+                violation: INFEASIBLE,
+                iterations: 25,
+            }
         } else {
-            Asked { gap: LOOSE, violation: 0.05, iterations: 25 }
+            Asked {
+                gap: LOOSE,
+                violation: 0.05,
+                iterations: 25,
+            }
         };
-        let begin = if start.resting { End::Rest } else { End::Moving };
+        let begin = if start.resting {
+            End::Rest
+        } else {
+            End::Moving
+        };
         let paced = self.pacer.solve((begin, End::Rest), &asked);
         self.infeasible = paced.violation > INFEASIBLE;
         self.effort.intervals += intervals as u64;
@@ -282,12 +337,24 @@ impl<const L: usize> Planning<L> {
         self.spline.end(&run.chords[last].at(end));
     }
 
-    fn fill_pacer(&mut self, run: &Run<'_, L>, frame: &Frame<L>, shares: &Shares, counted: &Lanes<L>) {
+    fn fill_pacer(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        shares: &Shares,
+        counted: &Lanes<L>,
+    ) {
         let speed = &frame.speed[usize::from(run.rapid)];
         let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
         let per_jerk: Lanes<L> = frame.jerk.map(|j| 1.0 / (shares.jerk * j));
-        let per_acceleration: Lanes<L> = frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
-        let mut feeds = Feeds { run, along: &self.waypoints.along, waypoints: &self.waypoints.chosen, at: 0 };
+        let per_acceleration: Lanes<L> =
+            frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
+        let mut feeds = Feeds {
+            run,
+            along: &self.waypoints.along,
+            waypoints: &self.waypoints.chosen,
+            at: 0,
+        };
         let place = |[_, first, second, _]: &[Lanes<L>; 4], feed: f64| {
             let mut squared = 0.0;
             let mut axis = 0.0f64;
@@ -297,8 +364,14 @@ impl<const L: usize> Planning<L> {
                 axis = if share > axis { share } else { axis };
             }
             let most = (shares.feed * feed).powi(2) / squared.max(1e-12);
-            let most = most.min(1.0 / (axis * axis).max(1e-12)).min(MAX_RATE_SQUARED);
-            Place { first: *first, second: *second, most }
+            let most = most
+                .min(1.0 / (axis * axis).max(1e-12))
+                .min(MAX_RATE_SQUARED);
+            Place {
+                first: *first,
+                second: *second,
+                most,
+            }
         };
         self.pacer.begin();
         let mut ends = self.spline.at(0, 0.0);
@@ -310,7 +383,12 @@ impl<const L: usize> Planning<L> {
             let middle = place(&middle, feed);
             ends = self.spline.at(k, 1.0);
             let limits = (&per_acceleration, &per_jerk);
-            self.pacer.push((&start, &middle, [&ends[1], &ends[2]]), &third, limits, self.spline.step_s);
+            self.pacer.push(
+                (&start, &middle, [&ends[1], &ends[2]]),
+                &third,
+                limits,
+                self.spline.step_s,
+            );
         }
     }
 
@@ -346,14 +424,20 @@ impl<const L: usize> Planning<L> {
             let [x, x1, x2, _] = self.spline.at(k, z);
             let [b, slope, _] = self.pacer.rate.at(k, z, h);
             let rate = b.max(1e-9).sqrt();
-            [x, each(|l| x1[l] * rate), each(|l| x2[l] * b + x1[l] * (slope / 2.0))]
+            [
+                x,
+                each(|l| x1[l] * rate),
+                each(|l| x2[l] * b + x1[l] * (slope / 2.0)),
+            ]
         };
         let mut from = state(0, 0.0);
         for k in 0..self.spline.intervals() {
             let to = state(k, 1.0);
             let start_s = self.times[k];
             let end_s = self.times[k + 1];
-            window.pieces.push(Piece::between(&from, &to, start_s, end_s - start_s));
+            window
+                .pieces
+                .push(Piece::between(&from, &to, start_s, end_s - start_s));
             from = to;
         }
     }
@@ -364,9 +448,19 @@ const BULGE: f64 = 0.25;
 
 /// Shares for the next round: what was exceeded, in proportion.
 fn take_back(shares: Shares, checked: &Checked) -> Shares {
-    let less = |share: f64, ratio: f64, aim: f64| if ratio > 1.0 { share * (aim / ratio).max(0.7) } else { share };
+    let less = |share: f64, ratio: f64, aim: f64| {
+        if ratio > 1.0 {
+            share * (aim / ratio).max(0.7)
+        } else {
+            share
+        }
+    };
     // Where the motion leaves the path between two samples, it has to turn more slowly.
-    let slower = if checked.deviation > 1.0 && checked.bulge > BULGE { (BULGE / checked.bulge).max(0.3) } else { 1.0 };
+    let slower = if checked.deviation > 1.0 && checked.bulge > BULGE {
+        (BULGE / checked.bulge).max(0.3)
+    } else {
+        1.0
+    };
     Shares {
         jerk: less(shares.jerk, checked.jerk, 0.998),
         acceleration: slower * less(shares.acceleration, checked.acceleration, 0.998),

@@ -2,8 +2,8 @@
 
 use tandem_motion::blocks;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext, PlannerDescription, PluginError,
-    SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerContext,
+    PlannerDescription, PluginError, SegmentSink,
 };
 
 use crate::core::{AnyCore, Core};
@@ -34,12 +34,18 @@ impl SmoothPlanner {
         let axis_by_axis = context.axis_by_axis();
         let axes = axis_by_axis.limits.axes();
         let sound = |value: f64| value > 0.0 && value.is_finite();
-        let values = axes.iter().flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
+        let values = axes
+            .iter()
+            .flat_map(|a| [a.feed_mm_per_s, a.rapid_mm_per_s, a.acceleration_mm_per_s2]);
         if !values.into_iter().all(sound) {
-            return Err(PluginError::fixed("smooth needs finite speed and acceleration limits of all axes"));
+            return Err(PluginError::fixed(
+                "smooth needs finite speed and acceleration limits of all axes",
+            ));
         }
         if !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
-            return Err(PluginError::fixed("smooth needs a jerk limit (max_jerk) of all axes"));
+            return Err(PluginError::fixed(
+                "smooth needs a jerk limit (max_jerk) of all axes",
+            ));
         }
         let tuning = options.tuning();
         let core: Box<dyn AnyCore> = if axes.len() <= 4 {
@@ -47,7 +53,10 @@ impl SmoothPlanner {
         } else {
             Box::new(Core::<8>::new(context, tuning))
         };
-        Ok(Self { context: *context, core })
+        Ok(Self {
+            context: *context,
+            core,
+        })
     }
 
     /// What was planned so far.
@@ -58,7 +67,10 @@ impl SmoothPlanner {
 
 impl Planner for SmoothPlanner {
     fn describe(&self) -> PlannerDescription {
-        PlannerDescription { order: 3, ..PlannerDescription::order_2() }
+        PlannerDescription {
+            order: 3,
+            ..PlannerDescription::order_2()
+        }
     }
 
     fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
@@ -79,7 +91,11 @@ impl Planner for SmoothPlanner {
         self.core.finish();
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
         // What rounding leaves of the duration is no time to rest or move.
         while duration_s - emitted_s > MIN_S {
@@ -88,7 +104,10 @@ impl Planner for SmoothPlanner {
                 None => break,
             }
         }
-        Ok(Advanced { duration_s: emitted_s, done: u32::from(self.core.is_done()) })
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(self.core.is_done()),
+        })
     }
 
     fn reset(&mut self, position: &AxisVector) {
@@ -102,13 +121,19 @@ impl SmoothPlanner {
     fn check_facts(&self, block: &Block) -> Result<(), PluginError> {
         blocks::check(block, &self.context.axes)?;
         let stated = block.path_tolerance_mm;
-        let tolerance_mm = if stated.is_nan() { self.context.path_tolerance_mm } else { stated };
+        let tolerance_mm = if stated.is_nan() {
+            self.context.path_tolerance_mm
+        } else {
+            stated
+        };
         match block.kind {
             BlockKind::Dwell => Ok(()),
             BlockKind::Rapid | BlockKind::Line if block.ends_at_rest() => Ok(()),
-            _ if tolerance_mm.is_nan() || tolerance_mm < MIN_TOLERANCE_MM => Err(PluginError::fixed(
-                "smooth needs a path tolerance of 0.0001 mm or more (G64 P); G61 drives lines exactly",
-            )),
+            _ if tolerance_mm.is_nan() || tolerance_mm < MIN_TOLERANCE_MM => {
+                Err(PluginError::fixed(
+                    "smooth needs a path tolerance of 0.0001 mm or more (G64 P); G61 drives lines exactly",
+                ))
+            }
             _ => Ok(()),
         }
     }

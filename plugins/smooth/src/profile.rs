@@ -36,7 +36,11 @@ impl Along {
         let rise = a / j;
         // With constant acceleration: v²/a + v·a/j = length; without: 2·v·√(v/j) = length.
         let long = a / 2.0 * ((rise * rise + 4.0 * length / a).sqrt() - rise);
-        let v = if long >= a * rise { long } else { (length * length / 4.0 * j).cbrt() };
+        let v = if long >= a * rise {
+            long
+        } else {
+            (length * length / 4.0 * j).cbrt()
+        };
         v.min(self.speed)
     }
 }
@@ -61,28 +65,56 @@ pub fn drive<const L: usize>(
     let peak = limits.peak(length);
     let (rise, constant) = limits.ramp(peak);
     let cruise = ((length - peak * (2.0 * rise + constant)) / peak).max(0.0);
-    let jerk = if rise > 0.0 { peak / (rise * (rise + constant)) } else { 0.0 };
-    let phases =
-        [(rise, jerk), (constant, 0.0), (rise, -jerk), (cruise, 0.0), (rise, -jerk), (constant, 0.0), (rise, jerk)];
+    let jerk = if rise > 0.0 {
+        peak / (rise * (rise + constant))
+    } else {
+        0.0
+    };
+    let phases = [
+        (rise, jerk),
+        (constant, 0.0),
+        (rise, -jerk),
+        (cruise, 0.0),
+        (rise, -jerk),
+        (constant, 0.0),
+        (rise, jerk),
+    ];
     window.pieces.clear();
     window.marks.clear();
     window.marks.push(Mark { t: 0.0, s: from });
-    let bound = if peak >= limits.speed { Bound::Feed } else { Bound::Jerk };
+    let bound = if peak >= limits.speed {
+        Bound::Feed
+    } else {
+        Bound::Jerk
+    };
     let mut t = 0.0;
     let mut way = 0.0;
     let mut v = 0.0;
     let mut a = 0.0;
     for (time, j) in phases.into_iter().filter(|(time, _)| *time > 1e-12) {
         let start = chord.at(from + way);
-        let c = [start, direction.map(|d| d * v), direction.map(|d| d * a / 2.0), direction.map(|d| d * j / 6.0)];
+        let c = [
+            start,
+            direction.map(|d| d * v),
+            direction.map(|d| d * a / 2.0),
+            direction.map(|d| d * j / 6.0),
+        ];
         let zero = [0.0; L];
         let c = [c[0], c[1], c[2], c[3], zero, zero];
-        window.pieces.push(Piece { c, start_s: t, duration_s: time, bound });
+        window.pieces.push(Piece {
+            c,
+            start_s: t,
+            duration_s: time,
+            bound,
+        });
         way += time * (v + time * (a / 2.0 + time * j / 6.0));
         v += time * (a + time * j / 2.0);
         a += time * j;
         t += time;
-        window.marks.push(Mark { t, s: from + way.min(length) });
+        window.marks.push(Mark {
+            t,
+            s: from + way.min(length),
+        });
     }
     if let Some(last) = window.marks.last_mut() {
         last.s = to;
@@ -92,8 +124,17 @@ pub fn drive<const L: usize>(
 }
 
 /// What is left for a stop on a straight path: all of the limits.
-fn stop<const L: usize>(frame: &Frame<L>, counted: &Lanes<L>, direction: &Lanes<L>, peak: f64) -> Stop {
-    let per = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>().sqrt().max(1e-12);
+fn stop<const L: usize>(
+    frame: &Frame<L>,
+    counted: &Lanes<L>,
+    direction: &Lanes<L>,
+    peak: f64,
+) -> Stop {
+    let per = (0..L)
+        .map(|l| (counted[l] * direction[l]).powi(2))
+        .sum::<f64>()
+        .sqrt()
+        .max(1e-12);
     Stop {
         time_s: peak / along(&frame.acceleration, direction),
         jerk_per_speed: along(&frame.jerk, direction) / peak,

@@ -9,7 +9,12 @@ use crate::window::{Bound, Window};
 
 /// Path speed of a velocity.
 pub fn path_speed<const L: usize>(counted: &Lanes<L>, velocity: &Lanes<L>) -> f64 {
-    velocity.iter().zip(counted).map(|(v, c)| (v * c) * (v * c)).sum::<f64>().sqrt()
+    velocity
+        .iter()
+        .zip(counted)
+        .map(|(v, c)| (v * c) * (v * c))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// The report of the leg that is driven from `from_s` to `to_s` of `window`. Where it goes on beyond the window, its time is
@@ -23,7 +28,10 @@ pub fn of_leg<const L: usize>(
     let first = window.piece_at(from_s);
     let speed = |n: usize, t: f64| {
         let piece = &window.pieces[n];
-        path_speed(counted, &piece.velocity((t - piece.start_s).clamp(0.0, piece.duration_s)))
+        path_speed(
+            counted,
+            &piece.velocity((t - piece.start_s).clamp(0.0, piece.duration_s)),
+        )
     };
     let start = speed(first, from_s);
     let mut peak = start;
@@ -47,11 +55,19 @@ pub fn of_leg<const L: usize>(
     } else {
         to_s - from_s
     };
-    report(leg.block.index, limited_by(&bound_s, leg), [start, peak, end], time_s)
+    report(
+        leg.block.index,
+        limited_by(&bound_s, leg),
+        [start, peak, end],
+        time_s,
+    )
 }
 
 fn limited_by(bound_s: &[f64; 5], leg: &Leg) -> LimitedBy {
-    let most = (0..5).fold(0, |best, n| if bound_s[n] > bound_s[best] { n } else { best });
+    let most = (0..5).fold(
+        0,
+        |best, n| if bound_s[n] > bound_s[best] { n } else { best },
+    );
     match most {
         n if n == Bound::Jerk as usize => LimitedBy::Jerk,
         n if n == Bound::Acceleration as usize => LimitedBy::Acceleration,
@@ -82,8 +98,14 @@ pub fn path<const L: usize>(
     let a0 = along(&piece.velocity(0.0), &piece.acceleration(0.0), v0);
     let a1 = along(&piece.velocity(t), &piece.acceleration(t), v1);
     *path = tandem_motion::hermite([from_mm, v0, a0], [from_mm + length, v1, a1], t);
-    let rate = |t: f64| path[1] + t * (2.0 * path[2] + t * (3.0 * path[3] + t * (4.0 * path[4] + t * 5.0 * path[5])));
-    if [0.125, 0.25, 0.5, 0.75, 0.875].iter().any(|share| rate(share * t) < 0.0) {
+    let rate = |t: f64| {
+        path[1]
+            + t * (2.0 * path[2] + t * (3.0 * path[3] + t * (4.0 * path[4] + t * 5.0 * path[5])))
+    };
+    if [0.125, 0.25, 0.5, 0.75, 0.875]
+        .iter()
+        .any(|share| rate(share * t) < 0.0)
+    {
         *path = [from_mm, length / t, 0.0, 0.0, 0.0, 0.0];
     }
     from_mm + length

@@ -95,7 +95,13 @@ pub struct Route<const L: usize> {
 
 impl<const L: usize> Default for Route<L> {
     fn default() -> Self {
-        Self { items: VecDeque::new(), chords: Vec::new(), first: 0, run_first: 0, end: 0.0 }
+        Self {
+            items: VecDeque::new(),
+            chords: Vec::new(),
+            first: 0,
+            run_first: 0,
+            end: 0.0,
+        }
     }
 }
 
@@ -170,18 +176,35 @@ impl<const L: usize> Route<L> {
 
     /// Takes a block with a path; `flat` are the ends of its chords behind `block.start`. Gives the time that it takes at
     /// its feed, s. Allocates.
-    pub fn push(&mut self, block: &Block, flat: &Flat<L>, frame: &Frame<L>, feed_ratio: f64, tolerance_mm: f64) -> f64 {
+    pub fn push(
+        &mut self,
+        block: &Block,
+        flat: &Flat<L>,
+        frame: &Frame<L>,
+        feed_ratio: f64,
+        tolerance_mm: f64,
+    ) -> f64 {
         let rotary = frame.counts_rotary(block);
         let counted = frame.counted(rotary);
         let joins = match self.items.back() {
-            Some(Item::Leg(last)) => !last.rests && last.rotary == rotary && !block.starts_at_rest(),
+            Some(Item::Leg(last)) => {
+                !last.rests && last.rotary == rotary && !block.starts_at_rest()
+            }
             _ => false,
         };
-        let mut before = self.chords.last().filter(|_| joins).map(|chord| chord.direction);
+        let mut before = self
+            .chords
+            .last()
+            .filter(|_| joins)
+            .map(|chord| chord.direction);
         let start = self.end;
         let first_chord = self.first + self.chords.len() as u64;
         let limits = &frame.speed[usize::from(block.kind == BlockKind::Rapid)];
-        let least = |limits: &Lanes<L>| limits[..frame.count].iter().fold(f64::INFINITY, |least, v| v.min(least));
+        let least = |limits: &Lanes<L>| {
+            limits[..frame.count]
+                .iter()
+                .fold(f64::INFINITY, |least, v| v.min(least))
+        };
         let jerk = least(&frame.jerk);
         let acceleration = least(&frame.acceleration);
         let mut from = frame.lanes(&block.start);
@@ -204,17 +227,37 @@ impl<const L: usize> Route<L> {
             if first_chord == self.first + self.chords.len() as u64 && before.is_none() {
                 self.rest_behind_last();
             }
-            let speed: f64 = (0..L).map(|l| (counted[l] * direction[l]).powi(2)).sum::<f64>();
+            let speed: f64 = (0..L)
+                .map(|l| (counted[l] * direction[l]).powi(2))
+                .sum::<f64>();
             // A vertex of a chord whose direction path speed does not count takes no feed: axis limits alone hold.
-            let feed = if speed > 0.0 { block.command_feed_mm_per_s() * feed_ratio } else { f64::INFINITY };
+            let feed = if speed > 0.0 {
+                block.command_feed_mm_per_s() * feed_ratio
+            } else {
+                f64::INFINITY
+            };
             let tolerance = tolerance_mm * (1.0 - if flat.curved { SAGITTA_SHARE } else { 0.0 });
             let fastest = along(limits, &direction);
-            let fastest = if speed > 0.0 { fastest.min(feed / speed.sqrt()) } else { fastest };
+            let fastest = if speed > 0.0 {
+                fastest.min(feed / speed.sqrt())
+            } else {
+                fastest
+            };
             let turn_s = 2.0 * (fastest / jerk).sqrt() + fastest / acceleration;
             let start = from;
             let s = self.end;
             let speed = fastest;
-            self.chords.push(Chord { start, direction, s, length, feed, tolerance, speed, turn_s, turn });
+            self.chords.push(Chord {
+                start,
+                direction,
+                s,
+                length,
+                feed,
+                tolerance,
+                speed,
+                turn_s,
+                turn,
+            });
             self.end += length;
             from = *point;
             before = Some(direction);
@@ -222,8 +265,8 @@ impl<const L: usize> Route<L> {
         let chords = (self.first + self.chords.len() as u64 - first_chord) as u32;
         let rests = block.ends_at_rest();
         let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
-        let least_s =
-            (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio)).max((self.end - start) / fastest);
+        let least_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio))
+            .max((self.end - start) / fastest);
         self.items.push_back(Item::Leg(Leg {
             block: *block,
             start,
@@ -239,12 +282,19 @@ impl<const L: usize> Route<L> {
 
     /// The machine rests at `s`: what lies before it belongs to no run any more.
     pub fn begin_run(&mut self, s: f64) {
-        self.run_first = self.first + self.chords.partition_point(|chord| chord.end() <= s + 1e-9) as u64;
+        self.run_first =
+            self.first + self.chords.partition_point(|chord| chord.end() <= s + 1e-9) as u64;
     }
 
     /// The path around `s` from the last rest to the next.
     pub fn run(&self, s: f64, finished: bool) -> Run<'_, L> {
-        let legs = self.items.iter().map_while(|item| if let Item::Leg(leg) = item { Some(leg) } else { None });
+        let legs = self.items.iter().map_while(|item| {
+            if let Item::Leg(leg) = item {
+                Some(leg)
+            } else {
+                None
+            }
+        });
         let mut end = self.first;
         let mut closed = false;
         let mut rotary = false;
@@ -258,9 +308,15 @@ impl<const L: usize> Route<L> {
                 break;
             }
         }
-        let all = &self.chords[(self.run_first.max(self.first) - self.first) as usize..(end - self.first) as usize];
+        let all = &self.chords
+            [(self.run_first.max(self.first) - self.first) as usize..(end - self.first) as usize];
         let from = all.partition_point(|chord| chord.end() <= s - BEHIND);
-        Run { chords: &all[from.min(all.len().saturating_sub(1))..], closed: closed || finished, rotary, rapid }
+        Run {
+            chords: &all[from.min(all.len().saturating_sub(1))..],
+            closed: closed || finished,
+            rotary,
+            rapid,
+        }
     }
 
     /// Takes the leg in front off.
@@ -270,7 +326,9 @@ impl<const L: usize> Route<L> {
 
     /// Forgets chords that lie well behind `s`.
     pub fn forget(&mut self, s: f64) {
-        let count = self.chords.partition_point(|chord| chord.end() < s - BEHIND);
+        let count = self
+            .chords
+            .partition_point(|chord| chord.end() < s - BEHIND);
         // Moving the rest down is worth it only where there is not much of it.
         if count > 256 && 2 * count > self.chords.len() {
             self.chords.drain(..count);

@@ -78,7 +78,13 @@ impl<const L: usize> Looker<'_, L> {
 
 /// The highest speed, of `most` and downwards, at which a motion that runs over the path around `s` for the time of a corner
 /// keeps acceleration and jerk.
-fn cap<const L: usize>(looker: &Looker<'_, L>, frame: &Frame<L>, s: f64, most: f64, corner_s: f64) -> f64 {
+fn cap<const L: usize>(
+    looker: &Looker<'_, L>,
+    frame: &Frame<L>,
+    s: f64,
+    most: f64,
+    corner_s: f64,
+) -> f64 {
     let here = looker.here(s);
     let mut v = most;
     for _ in 0..80 {
@@ -126,12 +132,23 @@ impl Timing {
             // From rest and to rest way goes with the third power of time.
             let from_rest = pair[0].speed == 0.0;
             let to_rest = pair[1].speed == 0.0;
-            let cell_s = if from_rest || to_rest { 1.5 * cell_s } else { cell_s };
+            let cell_s = if from_rest || to_rest {
+                1.5 * cell_s
+            } else {
+                cell_s
+            };
             if from_rest != to_rest {
                 for share in [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] {
                     let part: f64 = if from_rest { share } else { 1.0 - share };
-                    let gone = if from_rest { part.powi(3) } else { 1.0 - part.powi(3) };
-                    marks.push(Mark { t: t + share * cell_s, s: pair[0].s + gone * way });
+                    let gone = if from_rest {
+                        part.powi(3)
+                    } else {
+                        1.0 - part.powi(3)
+                    };
+                    marks.push(Mark {
+                        t: t + share * cell_s,
+                        s: pair[0].s + gone * way,
+                    });
                 }
             }
             t += cell_s;
@@ -139,9 +156,18 @@ impl Timing {
         }
     }
 
-    fn place_nodes<const L: usize>(&mut self, run: &Run<'_, L>, frame: &Frame<L>, counted: &Lanes<L>, reach: &Reach) {
+    fn place_nodes<const L: usize>(
+        &mut self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        counted: &Lanes<L>,
+        reach: &Reach,
+    ) {
         self.nodes.clear();
-        let mut looker = Looker { chords: run.chords, at: run.chord_at(reach.s, 0) };
+        let mut looker = Looker {
+            chords: run.chords,
+            at: run.chord_at(reach.s, 0),
+        };
         let limits = frame.speed[usize::from(run.rapid)];
         let mut s = reach.s;
         let mut t = 0.0;
@@ -160,7 +186,12 @@ impl Timing {
             let cap = cap(&looker, frame, s, most, corner_s);
             last_cap = cap;
             let acceleration = along(&frame.acceleration, &chord.direction);
-            let mut node = Node { s, speed: cap, acceleration, jerk };
+            let mut node = Node {
+                s,
+                speed: cap,
+                acceleration,
+                jerk,
+            };
             if let Some(before) = self.nodes.last() {
                 let way = s - before.s;
                 node.speed = cap.min(gain(before, way));
@@ -192,14 +223,22 @@ fn next_node<const L: usize>(
     let i = looker.at;
     *ahead = (*ahead).max(i + 1);
     // Nodes gather around sharp turns and the ends: behind one the distance grows, before one it shrinks.
-    let behind = if i == 0 || chords[i].turn > SHARP { s - chords[i].s.max(reach.s) } else { f64::INFINITY };
+    let behind = if i == 0 || chords[i].turn > SHARP {
+        s - chords[i].s.max(reach.s)
+    } else {
+        f64::INFINITY
+    };
     let next = chords.get(i + 1);
     let vertex = next.map_or(reach.end, |next| next.s.min(reach.end));
     let sharp = next.is_none_or(|next| next.turn > SHARP) || vertex >= reach.end;
     let before = if sharp { vertex - s } else { f64::INFINITY };
     let spread = (GRADED.1 - 1.0) * behind + GRADED.0;
     let narrow = ((GRADED.1 - 1.0) / GRADED.1 * before).max(GRADED.0);
-    *grown = if i + 1 == *ahead && s > chords[i].s { (*grown * 1.2).min(LONGEST) } else { 0.25 };
+    *grown = if i + 1 == *ahead && s > chords[i].s {
+        (*grown * 1.2).min(LONGEST)
+    } else {
+        0.25
+    };
     let step = spread.min(narrow).min(*grown).min(longest);
     if !sharp && step >= vertex - s {
         // Vertices that are near each other share a node.
@@ -209,19 +248,29 @@ fn next_node<const L: usize>(
         }
         return chords[k].s.min(reach.end).max(s + 1e-9);
     }
-    if vertex - s < 1.3 * step { vertex } else { s + step }
+    if vertex - s < 1.3 * step {
+        vertex
+    } else {
+        s + step
+    }
 }
 
 /// The lane speed along a chord at which path speed reaches the feed.
 pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
     let weighted: Lanes<L> = each(|l| counted[l] * chord.direction[l]);
     let size = weighted.iter().map(|v| v * v).sum::<f64>().sqrt();
-    if size > 0.0 && largest(&weighted) > 0.0 { chord.feed / size } else { f64::INFINITY }
+    if size > 0.0 && largest(&weighted) > 0.0 {
+        chord.feed / size
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The speed reached from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
 fn gain(from: &Node, way: f64) -> f64 {
     let v = from.speed;
     let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way;
-    (ramp * ramp).cbrt().min((v * v + 1.6 * from.acceleration * way).sqrt())
+    (ramp * ramp)
+        .cbrt()
+        .min((v * v + 1.6 * from.acceleration * way).sqrt())
 }

@@ -38,14 +38,32 @@ impl<const L: usize> Travel<L> {
         let joints = context.joint_lanes.map_or(&[][..], |lanes| lanes.weights());
         let count = limits.len() - joints.len();
         let mut travel = Self {
-            low: each(|l| if l < count { scale[l] * limits[l].min_mm } else { f64::NEG_INFINITY }),
-            high: each(|l| if l < count { scale[l] * limits[l].max_mm } else { f64::INFINITY }),
+            low: each(|l| {
+                if l < count {
+                    scale[l] * limits[l].min_mm
+                } else {
+                    f64::NEG_INFINITY
+                }
+            }),
+            high: each(|l| {
+                if l < count {
+                    scale[l] * limits[l].max_mm
+                } else {
+                    f64::INFINITY
+                }
+            }),
             joints: [([0.0; L], [f64::NEG_INFINITY, f64::INFINITY]); MAX_AXES],
             joint_count: joints.len(),
         };
         for (n, weights) in joints.iter().enumerate() {
             let limits = &limits[count + n];
-            let of_lanes = each(|l| if l < count { weights[l] / scale[l] } else { 0.0 });
+            let of_lanes = each(|l| {
+                if l < count {
+                    weights[l] / scale[l]
+                } else {
+                    0.0
+                }
+            });
             travel.joints[n] = (of_lanes, [limits.min_mm, limits.max_mm]);
         }
         travel
@@ -57,7 +75,12 @@ impl<const L: usize> Travel<L> {
 
     /// The travel around the path from `from` to `to`, where a motion within the tolerance may come to an end of it; none where
     /// it cannot. A path that is itself beyond an end, of axes that are not homed, may be followed there.
-    pub fn around(&self, run: &Run<'_, L>, (from, to): (f64, f64), here: &Lanes<L>) -> Option<Self> {
+    pub fn around(
+        &self,
+        run: &Run<'_, L>,
+        (from, to): (f64, f64),
+        here: &Lanes<L>,
+    ) -> Option<Self> {
         let first = run.chord_at(from, 0);
         let last = run.chord_at(to, 0);
         let mut low = *here;
@@ -70,13 +93,21 @@ impl<const L: usize> Travel<L> {
         }
         let end = run.chords[last].at(to.min(run.chords[last].end()));
         (low, high) = (each(|l| low[l].min(end[l])), each(|l| high[l].max(end[l])));
-        let mut near = (0..L).any(|l| low[l] - tolerance < self.low[l] || high[l] + tolerance > self.high[l]);
-        let mut travel =
-            Self { low: each(|l| self.low[l].min(low[l])), high: each(|l| self.high[l].max(high[l])), ..*self };
+        let mut near =
+            (0..L).any(|l| low[l] - tolerance < self.low[l] || high[l] + tolerance > self.high[l]);
+        let mut travel = Self {
+            low: each(|l| self.low[l].min(low[l])),
+            high: each(|l| self.high[l].max(high[l])),
+            ..*self
+        };
         for (weights, ends) in &mut travel.joints[..self.joint_count] {
-            let starts = run.chords[first..=last].iter().map(|chord| dot(weights, &chord.start));
+            let starts = run.chords[first..=last]
+                .iter()
+                .map(|chord| dot(weights, &chord.start));
             let values = starts.chain([dot(weights, here), dot(weights, &end)]);
-            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(v), b.max(v))
+            });
             let tolerance = tolerance * dot(weights, weights).sqrt();
             near |= low - tolerance < ends[0] || high + tolerance > ends[1];
             *ends = [ends[0].min(low), ends[1].max(high)];
@@ -88,8 +119,9 @@ impl<const L: usize> Travel<L> {
     #[inline(always)]
     pub fn beyond(&self, position: &Lanes<L>) -> f64 {
         let mut most = f64::NEG_INFINITY;
-        let over =
-            |value: f64, [low, high]: [f64; 2]| (value - high).max(low - value) - ROUNDING * value.abs().max(1.0);
+        let over = |value: f64, [low, high]: [f64; 2]| {
+            (value - high).max(low - value) - ROUNDING * value.abs().max(1.0)
+        };
         for l in 0..L {
             most = most.max(over(position[l], [self.low[l], self.high[l]]));
         }
@@ -103,7 +135,9 @@ impl<const L: usize> Travel<L> {
     /// the nearer of the window's start and end.
     pub fn cut(&self, middle: &mut Lanes<L>, half: &mut Lanes<L>, margin: f64, way: f64) {
         for l in 0..L {
-            let free = (FREE * half[l] + margin).min((1.0 - LEFT) * half[l]).min(SLOPE * way);
+            let free = (FREE * half[l] + margin)
+                .min((1.0 - LEFT) * half[l])
+                .min(SLOPE * way);
             let above = self.high[l] - free - middle[l];
             let below = middle[l] - self.low[l] - free;
             // What is cut off on one side is not to draw the motion far to the other.

@@ -7,7 +7,9 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::beside::{ALLOWED, Beside, DEVIATION, HALVINGS, NEAR_ENOUGH, SEARCHED, beside, closer, stretch, to_chord};
+use crate::beside::{
+    ALLOWED, Beside, DEVIATION, HALVINGS, NEAR_ENOUGH, SEARCHED, beside, closer, stretch, to_chord,
+};
 use crate::feeds::Feeder;
 use crate::frame::{Frame, dot};
 use crate::order::Order;
@@ -42,7 +44,11 @@ impl Checked {
     /// Whether all is kept.
     pub fn passes(&self) -> bool {
         // A comparison with NaN is false.
-        self.speed <= 1.0 && self.acceleration <= 1.0 && self.jerk <= 1.0 && self.deviation <= 1.0 && self.travel <= 0.0
+        self.speed <= 1.0
+            && self.acceleration <= 1.0
+            && self.jerk <= 1.0
+            && self.deviation <= 1.0
+            && self.travel <= 0.0
     }
 
     pub fn is_finite(&self) -> bool {
@@ -62,7 +68,12 @@ pub struct Checker<const L: usize> {
 
 impl<const L: usize> Default for Checker<L> {
     fn default() -> Self {
-        Self { samples: Vec::new(), bends: Vec::new(), jerks: Vec::new(), order: Order::default() }
+        Self {
+            samples: Vec::new(),
+            bends: Vec::new(),
+            jerks: Vec::new(),
+            order: Order::default(),
+        }
     }
 }
 
@@ -112,15 +123,29 @@ impl<const L: usize> Checker<L> {
         self.bends.clear();
         self.jerks.clear();
         let size_of_jerk = dot(&frame.jerk, &frame.jerk).sqrt();
-        let mut feeder = Feeder { run, timer_at: 0, chord: run.chord_at(start.s, 0) };
+        let mut feeder = Feeder {
+            run,
+            timer_at: 0,
+            chord: run.chord_at(start.s, 0),
+        };
         let speed = &frame.speed[usize::from(run.rapid)];
         for n in 0..window.pieces.len() {
             let (least, feed) = feeder.range(window, n);
-            let mut shares = derivatives(&window.pieces[n], frame, speed, counted, feed, &mut window.stop);
+            let mut shares = derivatives(
+                &window.pieces[n],
+                frame,
+                speed,
+                counted,
+                feed,
+                &mut window.stop,
+            );
             if least < feed && shares.feed * feed > least {
                 let counted_jerk: Lanes<L> = each(|l| counted[l] * frame.jerk[l]);
                 let jerk = shares.jerk * dot(&counted_jerk, &counted_jerk).sqrt();
-                shares.feed = larger(shares.feed, feeder.peak(&window.pieces[n], counted, frame.period_s, jerk));
+                shares.feed = larger(
+                    shares.feed,
+                    feeder.peak(&window.pieces[n], counted, frame.period_s, jerk),
+                );
             }
             window.pieces[n].bound = bound(&shares);
             checked.speed = larger(checked.speed, larger(shares.feed, shares.speed) / SPEED);
@@ -135,15 +160,24 @@ impl<const L: usize> Checker<L> {
         }
         let finite = checked.is_finite() && window.duration_s().is_finite();
         if !finite {
-            return Checked { jerk: f64::NAN, ..checked };
+            return Checked {
+                jerk: f64::NAN,
+                ..checked
+            };
         }
         self.sample(start, window, frame.period_s);
         let before = start.before.len();
         checked.deviation = self.motion_off(run, window, frame.period_s, before);
         if checked.deviation <= 1.0 {
             let near = run.chord_at(window.marks[0].s, 0);
-            if !self.order.walk(run, &self.samples, before, (near, window.end())) {
-                return Checked { deviation: FAR, ..checked };
+            if !self
+                .order
+                .walk(run, &self.samples, before, (near, window.end()))
+            {
+                return Checked {
+                    deviation: FAR,
+                    ..checked
+                };
             }
             let (off, bulge) = self.vertices_off(run, start, window, frame.period_s);
             checked.deviation = checked.deviation.max(off);
@@ -172,7 +206,13 @@ impl<const L: usize> Checker<L> {
     /// A bound of the distance of the motion from the path, as a share of what is allowed, at samples of any phase: what lies
     /// between two of this one is looked at again where it matters.
     #[inline(always)]
-    fn motion_off(&self, run: &Run<'_, L>, window: &Window<L>, period_s: f64, before: usize) -> f64 {
+    fn motion_off(
+        &self,
+        run: &Run<'_, L>,
+        window: &Window<L>,
+        period_s: f64,
+        before: usize,
+    ) -> f64 {
         let mut worst = 0.0f64;
         let mut mark = 0;
         let mut piece = 0;
@@ -214,17 +254,30 @@ impl<const L: usize> Checker<L> {
     /// A bound of the distance of a vertex from the chain of samples, as a share of what is allowed, at any phase, and of what
     /// lies between samples of that, as a share of the tolerance.
     #[inline(always)]
-    fn vertices_off(&self, run: &Run<'_, L>, start: &Start<'_, L>, window: &Window<L>, period_s: f64) -> (f64, f64) {
+    fn vertices_off(
+        &self,
+        run: &Run<'_, L>,
+        start: &Start<'_, L>,
+        window: &Window<L>,
+        period_s: f64,
+    ) -> (f64, f64) {
         let from = start.s - AROUND;
         let to = window.end();
-        let mut timer = Timer { marks: &window.marks, at: 0 };
+        let mut timer = Timer {
+            marks: &window.marks,
+            at: 0,
+        };
         let mut worst = 0.0f64;
         let mut most_bulge = 0.0f64;
         let mut piece = 0;
         let mut i = run.chord_at(from, 0).max(1);
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
-            let t = if chord.s <= start.s { 0.0 } else { timer.time(chord.s) };
+            let t = if chord.s <= start.s {
+                0.0
+            } else {
+                timer.time(chord.s)
+            };
             let tolerance = chord.tolerance.max(run.chords[i - 1].tolerance);
             while piece + 1 < window.pieces.len() && window.pieces[piece].end_s() < t {
                 piece += 1;
@@ -255,14 +308,18 @@ impl<const L: usize> Checker<L> {
     /// known for a period.
     fn bulge_around(&self, window: &Window<L>, near: usize, t: f64, period_s: f64) -> f64 {
         let around = near.saturating_sub(1)..(near + 2).min(self.bends.len());
-        let bend = self.bends[around].iter().fold(0.0, |most, bend| larger(most, *bend));
+        let bend = self.bends[around]
+            .iter()
+            .fold(0.0, |most, bend| larger(most, *bend));
         let piece = &window.pieces[near];
         let local = (t - piece.start_s).clamp(0.0, piece.duration_s);
         let v = piece.velocity(local);
         let a = piece.acceleration(local);
         let squared = dot(&v, &v);
         let along = dot(&v, &a);
-        let across = (dot(&a, &a) - along * along / squared.max(1e-12)).max(0.0).sqrt();
+        let across = (dot(&a, &a) - along * along / squared.max(1e-12))
+            .max(0.0)
+            .sqrt();
         let change = self.jerks[near] * period_s;
         let turned = (bend * period_s / squared.sqrt().max(1e-9)).min(1.0);
         (across + change + turned * bend).min(bend) * period_s * period_s / 8.0
@@ -270,7 +327,13 @@ impl<const L: usize> Checker<L> {
 
     /// The distance of `vertex` from the chain of those samples that may pass it, `among` which sample `near` is sought first.
     #[inline(always)]
-    fn nearest_sample(&self, near: usize, (first, last): (usize, usize), vertex: &Lanes<L>, tolerance: f64) -> f64 {
+    fn nearest_sample(
+        &self,
+        near: usize,
+        (first, last): (usize, usize),
+        vertex: &Lanes<L>,
+        tolerance: f64,
+    ) -> f64 {
         let last = last.min(self.samples.len() - 2);
         let first = first.min(last);
         let near = near.clamp(first, last);
@@ -281,10 +344,16 @@ impl<const L: usize> Checker<L> {
             let below = near.checked_sub(step).filter(|n| *n >= first);
             let above = near + step;
             if let Some(below) = below {
-                best = smaller(best, to_chord(vertex, &self.samples[below], &self.samples[below + 1]));
+                best = smaller(
+                    best,
+                    to_chord(vertex, &self.samples[below], &self.samples[below + 1]),
+                );
             }
             if above <= last && step > 0 {
-                best = smaller(best, to_chord(vertex, &self.samples[above], &self.samples[above + 1]));
+                best = smaller(
+                    best,
+                    to_chord(vertex, &self.samples[above], &self.samples[above + 1]),
+                );
             }
             // A few around, and then only as long as it is too far.
             if best < enough || step >= 3 && best <= allowed * allowed {

@@ -56,7 +56,11 @@ pub struct Waypoints<const L: usize> {
 
 impl<const L: usize> Default for Waypoints<L> {
     fn default() -> Self {
-        Self { candidates: Vec::new(), chosen: Vec::new(), along: Vec::new() }
+        Self {
+            candidates: Vec::new(),
+            chosen: Vec::new(),
+            along: Vec::new(),
+        }
     }
 }
 
@@ -88,16 +92,29 @@ impl<const L: usize> Waypoints<L> {
         let mut i = run.chord_at(from, 0);
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
-            let turn = run.chords.get(i + 1).map_or(chord.turn, |next| next.turn.max(chord.turn));
+            let turn = run
+                .chords
+                .get(i + 1)
+                .map_or(chord.turn, |next| next.turn.max(chord.turn));
             let sagitta = turn * chord.length / 8.0;
             let mut add = |s: f64, vertex: bool, firm: bool| {
                 if s > from && s < to {
-                    self.candidates.push(Candidate { s, chord: i as u32, vertex, firm, half: None });
+                    self.candidates.push(Candidate {
+                        s,
+                        chord: i as u32,
+                        vertex,
+                        firm,
+                        half: None,
+                    });
                 }
             };
             add(chord.s, true, i > 0 && is_marked(run.chords, i));
             if sagitta > 0.05 * chord.tolerance {
-                add(chord.s + chord.length / 2.0, false, sagitta > 0.3 * chord.tolerance);
+                add(
+                    chord.s + chord.length / 2.0,
+                    false,
+                    sagitta > 0.3 * chord.tolerance,
+                );
             }
             i += 1;
         }
@@ -121,7 +138,9 @@ impl<const L: usize> Waypoints<L> {
             }
             self.fill(run, marks, &mut last_t, t, grid, keep);
             if t > 0.4 * h && t < end_s {
-                let half = candidate.half.unwrap_or_else(|| half_widths(run, &candidate, grid));
+                let half = candidate
+                    .half
+                    .unwrap_or_else(|| half_widths(run, &candidate, grid));
                 self.candidates[n].half = Some(half);
                 self.add(run, t, &candidate, &half, grid, keep);
             }
@@ -131,7 +150,15 @@ impl<const L: usize> Waypoints<L> {
     }
 
     /// Places between `last_t` and `t`.
-    fn fill(&mut self, run: &Run<'_, L>, marks: &[Mark], last_t: &mut f64, t: f64, grid: Grid, keep: &Keep<L>) {
+    fn fill(
+        &mut self,
+        run: &Run<'_, L>,
+        marks: &[Mark],
+        last_t: &mut f64,
+        t: f64,
+        grid: Grid,
+        keep: &Keep<L>,
+    ) {
         let h = grid.step_s;
         let count = ((t - *last_t) / (0.75 * h) * (1.0 - 1e-9)).ceil() as usize;
         if count < 2 {
@@ -151,23 +178,44 @@ impl<const L: usize> Waypoints<L> {
             let b = marks[mark];
             let s = a.s + (b.s - a.s) * ((time - a.t) / (b.t - a.t)).clamp(0.0, 1.0);
             at = run.chord_at(s, at);
-            let candidate = Candidate { s, chord: at as u32, vertex: false, firm: false, half: None };
+            let candidate = Candidate {
+                s,
+                chord: at as u32,
+                vertex: false,
+                firm: false,
+                half: None,
+            };
             let half = half_widths(run, &candidate, grid);
             self.add(run, time, &candidate, &half, grid, keep);
         }
     }
 
-    fn add(&mut self, run: &Run<'_, L>, t: f64, candidate: &Candidate<L>, half: &Lanes<L>, grid: Grid, keep: &Keep<L>) {
+    fn add(
+        &mut self,
+        run: &Run<'_, L>,
+        t: f64,
+        candidate: &Candidate<L>,
+        half: &Lanes<L>,
+        grid: Grid,
+        keep: &Keep<L>,
+    ) {
         let place = t / grid.step_s;
         let interval = (place as usize).min(grid.intervals - 1);
         let point = run.chords[candidate.chord as usize].at(candidate.s);
         let mut point = point;
         let mut half = each(|l| keep.share * half[l]);
         if let Some(travel) = &keep.travel {
-            let way = (candidate.s - keep.ends.0).min(keep.ends.1 - candidate.s).max(0.0);
+            let way = (candidate.s - keep.ends.0)
+                .min(keep.ends.1 - candidate.s)
+                .max(0.0);
             travel.cut(&mut point, &mut half, keep.margin, way);
         }
-        self.chosen.push(Waypoint { interval: interval as u32, z: place - interval as f64, point, half });
+        self.chosen.push(Waypoint {
+            interval: interval as u32,
+            z: place - interval as f64,
+            point,
+            half,
+        });
         self.along.push((candidate.s, candidate.chord));
     }
 }
@@ -188,7 +236,11 @@ impl Timer<'_> {
         let a = self.marks[self.at];
         let b = self.marks[self.at + 1];
         let way = b.s - a.s;
-        if way > 0.0 { a.t + (b.t - a.t) * ((s - a.s) / way).clamp(0.0, 1.0) } else { b.t }
+        if way > 0.0 {
+            a.t + (b.t - a.t) * ((s - a.s) / way).clamp(0.0, 1.0)
+        } else {
+            b.t
+        }
     }
 }
 
@@ -199,10 +251,19 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
     let i = candidate.chord as usize;
     let s = candidate.s;
     let lanes = grid.lanes;
-    let before = if candidate.vertex && i > 0 { &chords[i - 1] } else { &chords[i] };
-    let swing = chords[i].speed.max(before.speed) * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
+    let before = if candidate.vertex && i > 0 {
+        &chords[i - 1]
+    } else {
+        &chords[i]
+    };
+    let swing = chords[i].speed.max(before.speed)
+        * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
     let tolerance = chords[i].tolerance.min(before.tolerance).min(swing);
-    let Needs { mut need, sharp_way, timely } = needs(run, i, s);
+    let Needs {
+        mut need,
+        sharp_way,
+        timely,
+    } = needs(run, i, s);
     let most = largest(&need);
     if most > 0.0 {
         need = each(|l| (need[l] + 0.08 * most) / (1.08 * most));
@@ -212,7 +273,13 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
     // Lanes without an axis take nothing of the tolerance.
     need[lanes..].fill(0.0);
     let widen = |half: Lanes<L>, along: Lanes<L>| {
-        each(|l| if half[l] > 0.0 { half[l].min(timely / along[l].abs().max(1e-9)) } else { tolerance })
+        each(|l| {
+            if half[l] > 0.0 {
+                half[l].min(timely / along[l].abs().max(1e-9))
+            } else {
+                tolerance
+            }
+        })
     };
     let Some(tangent) = tangent(run, candidate) else {
         // Round a sharp vertex the motion may be anywhere in a disc.
@@ -227,7 +294,8 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
     }
     let worst = farthest(&need, &tangent);
     widen(
-        each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance).map(|half| half.min(LONGEST_SWING * swing)),
+        each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance)
+            .map(|half| half.min(LONGEST_SWING * swing)),
         tangent,
     )
 }
@@ -242,7 +310,11 @@ fn is_marked<const L: usize>(chords: &[Chord<L>], v: usize) -> bool {
 fn timely<const L: usize>(chords: &[Chord<L>], v: usize) -> f64 {
     let last = chords[v - 1].feed;
     let feed = chords[v].feed;
-    if last.min(feed) < OTHER_FEED * last.max(feed) { TIMELY_S * last.min(feed) } else { f64::INFINITY }
+    if last.min(feed) < OTHER_FEED * last.max(feed) {
+        TIMELY_S * last.min(feed)
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// What lies around a place.
@@ -287,7 +359,11 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
         }
         look(v);
     }
-    Needs { need, sharp_way: sharp_way.min(run.end() - s), timely: in_time }
+    Needs {
+        need,
+        sharp_way: sharp_way.min(run.end() - s),
+        timely: in_time,
+    }
 }
 
 /// The direction of the path; none at a sharp vertex.
@@ -318,7 +394,13 @@ fn farthest<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>) -> f64 {
     }
     let mut most = 0.0f64;
     for signs in 0..1 << (L - 1) {
-        let corner: Lanes<L> = each(|l| if signs >> l & 1 == 1 { -need[l] } else { need[l] });
+        let corner: Lanes<L> = each(|l| {
+            if signs >> l & 1 == 1 {
+                -need[l]
+            } else {
+                need[l]
+            }
+        });
         let along = dot(&corner, tangent);
         most = most.max(dot(&corner, &corner) - along * along);
     }

@@ -46,7 +46,12 @@ impl<const L: usize> Piece<L> {
                 c[n][l] = lane[n];
             }
         }
-        Self { c, start_s, duration_s, bound: Bound::default() }
+        Self {
+            c,
+            start_s,
+            duration_s,
+            bound: Bound::default(),
+        }
     }
 
     /// When it ends.
@@ -58,14 +63,20 @@ impl<const L: usize> Piece<L> {
     #[inline(always)]
     pub fn position(&self, t: f64) -> Lanes<L> {
         let c = &self.c;
-        each(|l| c[0][l] + t * (c[1][l] + t * (c[2][l] + t * (c[3][l] + t * (c[4][l] + t * c[5][l])))))
+        each(|l| {
+            c[0][l] + t * (c[1][l] + t * (c[2][l] + t * (c[3][l] + t * (c[4][l] + t * c[5][l]))))
+        })
     }
 
     /// Velocity at local time `t`.
     #[inline(always)]
     pub fn velocity(&self, t: f64) -> Lanes<L> {
         let c = &self.c;
-        each(|l| c[1][l] + t * (2.0 * c[2][l] + t * (3.0 * c[3][l] + t * (4.0 * c[4][l] + t * 5.0 * c[5][l]))))
+        each(|l| {
+            c[1][l]
+                + t * (2.0 * c[2][l]
+                    + t * (3.0 * c[3][l] + t * (4.0 * c[4][l] + t * 5.0 * c[5][l])))
+        })
     }
 
     /// Acceleration at local time `t`.
@@ -108,13 +119,21 @@ pub struct Stop {
 impl Stop {
     /// The deceleration that is left everywhere, in proportion to speed.
     pub fn deceleration(&self) -> f64 {
-        if self.time_s > 0.0 { self.speed / self.time_s } else { f64::INFINITY }
+        if self.time_s > 0.0 {
+            self.speed / self.time_s
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
 impl Default for Stop {
     fn default() -> Self {
-        Self { time_s: 0.0, jerk_per_speed: f64::INFINITY, speed: 0.0 }
+        Self {
+            time_s: 0.0,
+            jerk_per_speed: f64::INFINITY,
+            speed: 0.0,
+        }
     }
 }
 
@@ -136,7 +155,10 @@ impl<const L: usize> Window<L> {
 
     /// The piece at `t`: the later one at a border.
     pub fn piece_at(&self, t: f64) -> usize {
-        self.pieces.partition_point(|piece| piece.start_s <= t).max(1) - 1
+        self.pieces
+            .partition_point(|piece| piece.start_s <= t)
+            .max(1)
+            - 1
     }
 
     /// Position, velocity and acceleration at `t`.
@@ -148,16 +170,27 @@ impl<const L: usize> Window<L> {
     /// When the motion passes `s`.
     pub fn time_of(&self, s: f64) -> f64 {
         let at = self.marks.partition_point(|mark| mark.s <= s).max(1) - 1;
-        Timer { marks: &self.marks, at: at.min(self.marks.len().saturating_sub(2)) }.time(s)
+        Timer {
+            marks: &self.marks,
+            at: at.min(self.marks.len().saturating_sub(2)),
+        }
+        .time(s)
     }
 
     /// Path coordinate at `t`.
     pub fn along(&self, t: f64) -> f64 {
-        let at = self.marks.partition_point(|mark| mark.t <= t).clamp(1, self.marks.len() - 1);
+        let at = self
+            .marks
+            .partition_point(|mark| mark.t <= t)
+            .clamp(1, self.marks.len() - 1);
         let a = self.marks[at - 1];
         let b = self.marks[at];
         let time = b.t - a.t;
-        if time > 0.0 { a.s + (b.s - a.s) * ((t - a.t) / time).clamp(0.0, 1.0) } else { b.s }
+        if time > 0.0 {
+            a.s + (b.s - a.s) * ((t - a.t) / time).clamp(0.0, 1.0)
+        } else {
+            b.s
+        }
     }
 
     /// Path coordinate of its end.

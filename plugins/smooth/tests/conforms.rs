@@ -7,7 +7,14 @@ static COUNTING: CountingAllocator = CountingAllocator;
 
 #[test]
 fn it_conforms() {
-    judge(tandem_smooth::PLUGIN, &Setup { programs: 2, ..Setup::default() }).assert_conforms();
+    judge(
+        tandem_smooth::PLUGIN,
+        &Setup {
+            programs: 2,
+            ..Setup::default()
+        },
+    )
+    .assert_conforms();
 }
 
 /// Programs of the kit in which once an acceleration or a feed was exceeded between the places that the check looked at, a
@@ -17,6 +24,14 @@ const HARD: [u64; 4] = [12_884_901_900, 8_589_934_620, 4_294_967_308, 4_294_967_
 #[test]
 fn hard_programs() {
     for seed in HARD {
-        judge(tandem_smooth::PLUGIN, &Setup { programs: 1, seed, ..Setup::default() }).assert_conforms();
+        judge(
+            tandem_smooth::PLUGIN,
+            &Setup {
+                programs: 1,
+                seed,
+                ..Setup::default()
+            },
+        )
+        .assert_conforms();
     }
 }

@@ -6,7 +6,9 @@ mod counting_allocator;
 
 use counting_allocator::peak_bytes_of;
 use tandem_rig::{Collected, Random, arc, line, numbered, stream};
-use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, Limits, PathMode, Planner, PlannerContext, Segment};
+use tandem_sdk::{
+    AxisLimits, AxisVector, Block, BlockKind, Limits, PathMode, Planner, PlannerContext, Segment,
+};
 use tandem_smooth::{Effort, Options, SmoothPlanner};
 
 /// Machines in all.
@@ -36,7 +38,9 @@ fn machine(random: &mut Random) -> PlannerContext {
     };
     let first = draw(random);
     let count = 2 + random.below(3) as usize;
-    let axes: Vec<AxisLimits> = (0..count).map(|_| if alike { first } else { draw(random) }).collect();
+    let axes: Vec<AxisLimits> = (0..count)
+        .map(|_| if alike { first } else { draw(random) })
+        .collect();
     let period_s = random.pick(&[0.125e-3, 0.25e-3, 0.37e-3, 0.5e-3, 1e-3, 1.3e-3, 2e-3]);
     let context = tandem_rig::context(&axes, period_s);
     PlannerContext {
@@ -52,8 +56,13 @@ fn program(random: &mut Random, context: &PlannerContext) -> Vec<Block> {
     let count = context.limits.count as usize;
     let (low, high) = random.pick(&[(1e-4, 0.01), (1e-3, 1.0), (0.1, 30.0), (1e-4, 30.0)]);
     let mut feed_mm_per_s = random.length(1.0 / 60.0, 300.0);
-    let (turn, changes, arcs) = (random.pick(&[0.05, 0.5, 3.1]), random.below(4) == 0, random.below(2) == 0);
-    let (mut at, mut heading, mut blocks) = (AxisVector::ZERO, random.between(-3.1, 3.1), Vec::new());
+    let (turn, changes, arcs) = (
+        random.pick(&[0.05, 0.5, 3.1]),
+        random.below(4) == 0,
+        random.below(2) == 0,
+    );
+    let (mut at, mut heading, mut blocks) =
+        (AxisVector::ZERO, random.between(-3.1, 3.1), Vec::new());
     // No program takes more than some minutes.
     let (mut left_s, most) = (30.0, random.length(2.0, 400.0) as usize);
     while blocks.len() < most && left_s > 0.0 {
@@ -64,19 +73,31 @@ fn program(random: &mut Random, context: &PlannerContext) -> Vec<Block> {
         let length = random.length(low, high).min(20.0 * feed_mm_per_s);
         let mut block = if arcs && length > 1e-3 && random.below(3) == 0 {
             let (radius, sweep) = (length, random.between(-4.0, 4.0));
-            let center = [at[0] + radius * heading.cos(), at[1] + radius * heading.sin()];
+            let center = [
+                at[0] + radius * heading.cos(),
+                at[1] + radius * heading.sin(),
+            ];
             arc(&at, center, sweep, feed_mm_per_s)
         } else {
             let mut to = at;
-            (to[0], to[1]) = (at[0] + length * heading.cos(), at[1] + length * heading.sin());
+            (to[0], to[1]) = (
+                at[0] + length * heading.cos(),
+                at[1] + length * heading.sin(),
+            );
             for axis in 2..count {
-                to[axis] += if random.below(2) == 0 { random.between(-length, length) } else { 0.0 };
+                to[axis] += if random.below(2) == 0 {
+                    random.between(-length, length)
+                } else {
+                    0.0
+                };
             }
             line(&at, &to, feed_mm_per_s)
         };
         match random.below(40) {
             0 => block.path_mode = PathMode::ExactStop,
-            1 if block.kind == BlockKind::Line => (block.kind, block.feed_mm_per_s) = (BlockKind::Rapid, f64::INFINITY),
+            1 if block.kind == BlockKind::Line => {
+                (block.kind, block.feed_mm_per_s) = (BlockKind::Rapid, f64::INFINITY)
+            }
             _ => {}
         }
         left_s -= block.length_mm / feed_mm_per_s;
@@ -101,8 +122,14 @@ fn hem_in(context: &mut PlannerContext, blocks: &[Block]) {
 /// Points along a block, near enough to stand for it.
 fn path_of(block: &Block) -> Vec<AxisVector> {
     let path = tandem_motion::Path::new(block).unwrap();
-    let count = if block.kind == BlockKind::Arc { 4000 } else { 1 };
-    (0..=count).map(|n| path.position(block.length_mm * f64::from(n) / f64::from(count))).collect()
+    let count = if block.kind == BlockKind::Arc {
+        4000
+    } else {
+        1
+    };
+    (0..=count)
+        .map(|n| path.position(block.length_mm * f64::from(n) / f64::from(count)))
+        .collect()
 }
 
 /// Samples of a fine period, the first `phase` of one behind the start; a rest ends its period.
@@ -139,10 +166,20 @@ fn judge(samples: &[AxisVector], context: &PlannerContext) -> Result<(), String>
             let jerk = (acceleration - before[2]) / period_s;
             let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
             let told = |what: &str, value: f64, limit: f64| {
-                Err(format!("sample {n} axis {axis} {what} {value}, limit {limit}"))
+                Err(format!(
+                    "sample {n} axis {axis} {what} {value}, limit {limit}"
+                ))
             };
             if *at < limits.min_mm - rounding || *at > limits.max_mm + rounding {
-                return told("position", *at, if *at < 0.0 { limits.min_mm } else { limits.max_mm });
+                return told(
+                    "position",
+                    *at,
+                    if *at < 0.0 {
+                        limits.min_mm
+                    } else {
+                        limits.max_mm
+                    },
+                );
             }
             if velocity.abs() > fastest * (1.0 + GUARD) + rounding {
                 return told("velocity", velocity, fastest);
@@ -151,7 +188,10 @@ fn judge(samples: &[AxisVector], context: &PlannerContext) -> Result<(), String>
             if acceleration.abs() > most {
                 return told("acceleration", acceleration, limits.acceleration_mm_per_s2);
             }
-            if jerk.abs() > limits.jerk_mm_per_s3 * (1.0 + GUARD_JERK) + 4.0 * rounding / (period_s * period_s) {
+            if jerk.abs()
+                > limits.jerk_mm_per_s3 * (1.0 + GUARD_JERK)
+                    + 4.0 * rounding / (period_s * period_s)
+            {
                 return told("jerk", jerk, limits.jerk_mm_per_s3);
             }
             before = [*at, velocity, acceleration];
@@ -162,13 +202,29 @@ fn judge(samples: &[AxisVector], context: &PlannerContext) -> Result<(), String>
 
 /// In the lanes of the planner: a rotary axis counts by degree.
 fn lanes(context: &PlannerContext, at: &AxisVector) -> [f64; 4] {
-    let scale = |i: usize| if context.axes.is_rotary(i) { 180.0 / std::f64::consts::PI } else { 1.0 };
-    std::array::from_fn(|i| if i < context.limits.count as usize { scale(i) * at[i] } else { 0.0 })
+    let scale = |i: usize| {
+        if context.axes.is_rotary(i) {
+            180.0 / std::f64::consts::PI
+        } else {
+            1.0
+        }
+    };
+    std::array::from_fn(|i| {
+        if i < context.limits.count as usize {
+            scale(i) * at[i]
+        } else {
+            0.0
+        }
+    })
 }
 
 /// The largest distance of samples from the path, mm: looked for ahead of where the last one was, and a little behind.
 fn deviation_mm(samples: &[AxisVector], blocks: &[Block], context: &PlannerContext) -> f64 {
-    let points: Vec<[f64; 4]> = blocks.iter().flat_map(path_of).map(|point| lanes(context, &point)).collect();
+    let points: Vec<[f64; 4]> = blocks
+        .iter()
+        .flat_map(path_of)
+        .map(|point| lanes(context, &point))
+        .collect();
     let (mut near, mut worst) = (0usize, 0.0f64);
     for sample in samples {
         let sample = lanes(context, sample);
@@ -195,15 +251,23 @@ fn distance(p: &[f64; 4], a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let of = |f: &dyn Fn(usize) -> f64| (0..4).map(f).sum::<f64>();
     let squared = of(&|i| (b[i] - a[i]).powi(2));
     let along = of(&|i| (b[i] - a[i]) * (p[i] - a[i]));
-    let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+    let share = if squared > 0.0 {
+        (along / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     of(&|i| (p[i] - a[i] - share * (b[i] - a[i])).powi(2)).sqrt()
 }
 
 /// How long the deceleration of a stop takes to be built up, as segments declare it for the depth of the queue: with half of
 /// the jerk, the time of the slowest axis twice. More would let the machine wait for more than can be queued.
 fn longest_ramp_s(segments: &[Segment]) -> f64 {
-    let moving = segments.iter().filter(|segment| segment.duration_s > 0.0 && segment.max_sigma_rate_per_s.is_finite());
-    moving.map(|s| s.max_sigma_rate_per_s / s.max_sigma_acceleration_per_s2).fold(0.0, f64::max)
+    let moving = segments
+        .iter()
+        .filter(|segment| segment.duration_s > 0.0 && segment.max_sigma_rate_per_s.is_finite());
+    moving
+        .map(|s| s.max_sigma_rate_per_s / s.max_sigma_acceleration_per_s2)
+        .fold(0.0, f64::max)
 }
 
 fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
@@ -219,18 +283,31 @@ fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
         ..Options::default()
     };
     let mut planner = SmoothPlanner::new(&options, &context).map_err(|e| e.to_string())?;
-    if let Some(refused) = blocks.iter().find_map(|block| planner.check(block, None).err()) {
+    if let Some(refused) = blocks
+        .iter()
+        .find_map(|block| planner.check(block, None).err())
+    {
         return Err(format!("refused: {refused}"));
     }
     let mut collected = Collected::default();
     planner.reset(&context.position);
-    stream(&mut planner, &blocks, context.rough_period_s, &mut collected);
+    stream(
+        &mut planner,
+        &blocks,
+        context.rough_period_s,
+        &mut collected,
+    );
     let effort = planner.effort();
     // What is collected does not count.
     let bytes = if seed.is_multiple_of(4) {
         peak_bytes_of(|| {
             let mut planner = SmoothPlanner::new(&options, &context).unwrap();
-            stream(&mut planner, &blocks, context.rough_period_s, &mut tandem_rig::Away::default());
+            stream(
+                &mut planner,
+                &blocks,
+                context.rough_period_s,
+                &mut tandem_rig::Away::default(),
+            );
         })
     } else {
         0
@@ -246,9 +323,15 @@ fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
         )
     };
     let ramp_s = longest_ramp_s(&collected.segments);
-    let slowest = context.limits.axes().iter().map(|axis| axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3);
+    let slowest = context
+        .limits
+        .axes()
+        .iter()
+        .map(|axis| axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3);
     if ramp_s > 2.0 * slowest.fold(0.0, f64::max) * (1.0 + 1e-9) {
-        return Err(told(format!("a stop is said to take {ramp_s} s to build up")));
+        return Err(told(format!(
+            "a stop is said to take {ramp_s} s to build up"
+        )));
     }
     for phase in 0..PHASES {
         let phase = phase as f64 / PHASES as f64;
@@ -271,8 +354,16 @@ fn attempt(seed: u64) -> Result<(Effort, f64, usize, usize), String> {
 
 #[test]
 fn random_machines_keep_all_limits_at_every_phase() {
-    let number = |name: &str, default| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
-    let (first, count) = (number("SMOOTH_SEED", 0), number("SMOOTH_MACHINES", MACHINES));
+    let number = |name: &str, default| {
+        std::env::var(name)
+            .ok()
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(default)
+    };
+    let (first, count) = (
+        number("SMOOTH_SEED", 0),
+        number("SMOOTH_MACHINES", MACHINES),
+    );
     let (mut failed, mut totals, mut total_s) = (Vec::new(), Effort::default(), 0.0);
     for seed in first..first + count {
         let began = std::time::Instant::now();
@@ -293,6 +384,14 @@ fn random_machines_keep_all_limits_at_every_phase() {
             Err(why) => failed.push(format!("SMOOTH_SEED={seed} SMOOTH_MACHINES=1: {why}")),
         }
     }
-    println!("seeds {first} to {}: {total_s:.1} s, {totals:?}", first + count - 1);
-    assert!(failed.is_empty(), "{} of {count}:\n{}", failed.len(), failed.join("\n"));
+    println!(
+        "seeds {first} to {}: {total_s:.1} s, {totals:?}",
+        first + count - 1
+    );
+    assert!(
+        failed.is_empty(),
+        "{} of {count}:\n{}",
+        failed.len(),
+        failed.join("\n")
+    );
 }

@@ -27,14 +27,21 @@ fn peak_of(blocks: &[Block], options: &Options, tolerance_mm: f64) -> usize {
 
 /// `points` again and again, as lines.
 fn repeated(points: &[Point], times: usize, feed_mm_per_s: f64) -> Vec<Block> {
-    let all: Vec<Point> = std::iter::repeat_n(points, times).flatten().copied().collect();
+    let all: Vec<Point> = std::iter::repeat_n(points, times)
+        .flatten()
+        .copied()
+        .collect();
     lines(&all, feed_mm_per_s)
 }
 
 #[test]
 fn memory_does_not_grow_with_the_number_of_windows() {
     let there_and_back: [Point; 4] = [[0.0; 3], [0.04, 0.0, 0.0], [0.0; 3], [0.04, 0.04, 0.0]];
-    let bytes = peak_of(&repeated(&there_and_back, 60, 150.0), &Options::default(), 0.05);
+    let bytes = peak_of(
+        &repeated(&there_and_back, 60, 150.0),
+        &Options::default(),
+        0.05,
+    );
     assert!(bytes < MAX_BYTES, "{bytes} bytes for there and back");
     let mut marks: Vec<Point> = Vec::new();
     for n in 0..300 {
@@ -46,7 +53,10 @@ fn memory_does_not_grow_with_the_number_of_windows() {
         (block.kind, block.feed_mm_per_s) = (BlockKind::Rapid, f64::INFINITY);
     }
     let bytes = peak_of(&blocks, &Options::default(), 0.01);
-    assert!(bytes < MAX_BYTES, "{bytes} bytes for marks with rapids between");
+    assert!(
+        bytes < MAX_BYTES,
+        "{bytes} bytes for marks with rapids between"
+    );
 }
 
 #[test]
@@ -60,9 +70,18 @@ fn memory_is_bounded_for_features_of_any_size() {
             at = at.map(|v| v + random.between(-feature, feature));
             points.push(at);
         }
-        let options = Options { window_ms: random.between(100.0, 2000.0), ..Options::default() };
-        let bytes = peak_of(&lines(&points, random.length(0.1, 200.0)), &options, tolerance_mm);
-        println!("seed {seed}: features of {feature} mm, tolerance {tolerance_mm} mm: {bytes} bytes");
+        let options = Options {
+            window_ms: random.between(100.0, 2000.0),
+            ..Options::default()
+        };
+        let bytes = peak_of(
+            &lines(&points, random.length(0.1, 200.0)),
+            &options,
+            tolerance_mm,
+        );
+        println!(
+            "seed {seed}: features of {feature} mm, tolerance {tolerance_mm} mm: {bytes} bytes"
+        );
         assert!(bytes < MAX_BYTES, "seed {seed}: {bytes} bytes");
     }
 }
@@ -71,7 +90,9 @@ fn memory_is_bounded_for_features_of_any_size() {
 #[test]
 fn no_more_blocks_are_held_than_there_is_room_for() {
     let program = |dwells: bool| {
-        let points: Vec<Point> = (0..3 * BUFFER_CHORDS).map(|n| [f64::from(n as u32 % 2) * 1e-13, 0.0, 0.0]).collect();
+        let points: Vec<Point> = (0..3 * BUFFER_CHORDS)
+            .map(|n| [f64::from(n as u32 % 2) * 1e-13, 0.0, 0.0])
+            .collect();
         let mut blocks = lines(&points, 100.0);
         for block in blocks.iter_mut().filter(|_| dwells) {
             (block.kind, block.dwell_s) = (BlockKind::Dwell, 0.0);

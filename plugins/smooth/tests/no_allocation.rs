@@ -19,9 +19,13 @@ fn drive(planner: &mut SmoothPlanner, blocks: &[Block]) {
 #[test]
 fn a_warm_planner_does_not_allocate() {
     for name in ["serpentine", "spiral"] {
-        let (points, feed) = read(&format!("{}/../../examples/programs/{name}.ngc", env!("CARGO_MANIFEST_DIR")));
+        let (points, feed) = read(&format!(
+            "{}/../../examples/programs/{name}.ngc",
+            env!("CARGO_MANIFEST_DIR")
+        ));
         let blocks = lines(&points, feed);
-        let mut planner = SmoothPlanner::new(&Options::default(), &context(&points[0], 0.01)).unwrap();
+        let mut planner =
+            SmoothPlanner::new(&Options::default(), &context(&points[0], 0.01)).unwrap();
         drive(&mut planner, &blocks);
         let uses = heap_use_of(|| drive(&mut planner, &blocks));
         assert_eq!(uses.allocations, 0, "{name}");

@@ -14,8 +14,14 @@ const PROGRAMS: u64 = 208;
 fn random_programs_keep_all_limits() {
     let (mut stops, mut refused) = (0, 0);
     let mut ratios = [(0.0, 0); KINDS.len()];
-    let first: u64 = std::env::var("SMOOTH_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(0);
-    let count: u64 = std::env::var("SMOOTH_PROGRAMS").ok().and_then(|n| n.parse().ok()).unwrap_or(PROGRAMS);
+    let first: u64 = std::env::var("SMOOTH_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok())
+        .unwrap_or(0);
+    let count: u64 = std::env::var("SMOOTH_PROGRAMS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(PROGRAMS);
     for seed in first..first + count {
         let (kind, blocks, points) = program(seed);
         let context = context(&points[0], 0.01);
@@ -23,19 +29,37 @@ fn random_programs_keep_all_limits() {
         let peaks = judge(&samples(&collected.segments), &points);
         let what = format!("SMOOTH_SEED={seed} SMOOTH_PROGRAMS=1 ({kind}): {peaks:?}");
         let feed = blocks[0].feed_mm_per_s;
-        assert!(peaks.axis_speed <= 250.0 && peaks.speed <= feed * (1.0 + 1e-6), "feed {feed}, {what}");
-        assert!(peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01, "{what}");
+        assert!(
+            peaks.axis_speed <= 250.0 && peaks.speed <= feed * (1.0 + 1e-6),
+            "feed {feed}, {what}"
+        );
+        assert!(
+            peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01,
+            "{what}"
+        );
         assert!(peaks.deviation_mm.iter().all(|off| *off <= 0.01), "{what}");
         assert_eq!(collected.reports.len(), blocks.len(), "{what}");
         (stops, refused) = (stops + effort.stops, refused + effort.rejected);
-        let exact: Vec<Block> = blocks.iter().map(|block| Block { path_mode: PathMode::ExactStop, ..*block }).collect();
+        let exact: Vec<Block> = blocks
+            .iter()
+            .map(|block| Block {
+                path_mode: PathMode::ExactStop,
+                ..*block
+            })
+            .collect();
         let stopping = run(&exact, &Options::default(), &context).0;
         let stopping_s = samples(&stopping.segments).len() as f64 * 1e-3;
         let (sum, count) = &mut ratios[(seed % KINDS.len() as u64) as usize];
         (*sum, *count) = (*sum + peaks.time_s / stopping_s, *count + 1);
     }
-    println!("seeds {first} to {}: {stops} stops inside, {refused} windows refused", first + count - 1);
+    println!(
+        "seeds {first} to {}: {stops} stops inside, {refused} windows refused",
+        first + count - 1
+    );
     for (kind, (sum, count)) in KINDS.iter().zip(ratios) {
-        println!("{kind:16} {:.3} of the time with a stop at every corner", sum / f64::from(count.max(1)));
+        println!(
+            "{kind:16} {:.3} of the time with a stop at every corner",
+            sum / f64::from(count.max(1))
+        );
     }
 }

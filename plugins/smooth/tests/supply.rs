@@ -27,10 +27,18 @@ fn cases() -> Vec<Case> {
         points: points.to_vec(),
         step,
     };
-    let mut cases = vec![of("raster", &raster[..400], raster_feed, 13), of("zigzag", &zigzag, zigzag_feed, 1)];
+    let mut cases = vec![
+        of("raster", &raster[..400], raster_feed, 13),
+        of("zigzag", &zigzag, zigzag_feed, 1),
+    ];
     for (seed, step) in [(0, 1), (1, 1), (2, 17), (3, 131), (4, 13), (7, 3)] {
         let (kind, blocks, points) = program(seed);
-        cases.push(Case { name: format!("{kind}, seed {seed}"), blocks, points, step });
+        cases.push(Case {
+            name: format!("{kind}, seed {seed}"),
+            blocks,
+            points,
+            step,
+        });
     }
     cases
 }
@@ -40,11 +48,20 @@ fn assert_driven(collected: &Collected, blocks: &[Block], points: &[Point], what
     let driven = samples(&collected.segments);
     let peaks = judge(&driven, points);
     let what = format!("{what}: {peaks:?}");
-    assert!(peaks.axis_speed <= 250.0 && peaks.speed <= blocks[0].feed_mm_per_s * (1.0 + 1e-6), "{what}");
-    assert!(peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01, "{what}");
+    assert!(
+        peaks.axis_speed <= 250.0 && peaks.speed <= blocks[0].feed_mm_per_s * (1.0 + 1e-6),
+        "{what}"
+    );
+    assert!(
+        peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01,
+        "{what}"
+    );
     assert!(peaks.deviation_mm.iter().all(|off| *off <= 0.01), "{what}");
     let (last, end) = (driven[driven.len() - 1], points[points.len() - 1]);
-    assert!((0..3).all(|i| (last[i] - end[i]).abs() < 1e-9), "{what}: ends at {last:?}, not {end:?}");
+    assert!(
+        (0..3).all(|i| (last[i] - end[i]).abs() < 1e-9),
+        "{what}: ends at {last:?}, not {end:?}"
+    );
     assert_eq!(collected.reports.len(), blocks.len(), "{what}");
 }
 
@@ -54,13 +71,23 @@ fn a_program_may_end_at_any_block() {
         for cut in (1..case.blocks.len()).step_by(case.step) {
             let (blocks, points) = (&case.blocks[..cut], &case.points[..=cut]);
             let collected = run(blocks, &Options::default(), &context(&points[0], 0.01)).0;
-            assert_driven(&collected, blocks, points, &format!("{}, {cut} blocks", case.name));
+            assert_driven(
+                &collected,
+                blocks,
+                points,
+                &format!("{}, {cut} blocks", case.name),
+            );
         }
     }
 }
 
 /// Drives `blocks`; behind the first `cut` none comes for `periods` rough periods. Gives what was emitted by then too.
-fn run_late(blocks: &[Block], cut: usize, periods: usize, context: &PlannerContext) -> (usize, Collected) {
+fn run_late(
+    blocks: &[Block],
+    cut: usize,
+    periods: usize,
+    context: &PlannerContext,
+) -> (usize, Collected) {
     let mut planner = SmoothPlanner::new(&Options::default(), context).unwrap();
     let (mut collected, mut next, mut left, mut emitted) = (Collected::default(), 0, periods, 0);
     loop {
@@ -93,9 +120,15 @@ fn blocks_may_fail_to_come_behind_any_block_until_the_machine_rests() {
             assert_driven(&whole, &case.blocks, &case.points, &what);
             let rested = samples(&whole.segments[..emitted]);
             let (last, end) = (rested[rested.len() - 1], case.points[cut]);
-            assert!((0..3).all(|i| (last[i] - end[i]).abs() < 1e-9), "{what}: rests at {last:?}, not {end:?}");
+            assert!(
+                (0..3).all(|i| (last[i] - end[i]).abs() < 1e-9),
+                "{what}: rests at {last:?}, not {end:?}"
+            );
             let peaks = judge(&rested, &case.points[..=cut]);
-            assert!(peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01, "{what}: {peaks:?}");
+            assert!(
+                peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01,
+                "{what}: {peaks:?}"
+            );
         }
     }
 }
@@ -119,10 +152,21 @@ fn an_arc_of_too_many_chords_is_refused() {
     let check = |turns: f64| {
         let context = context(&[0.0; 3], 0.01);
         let planner = SmoothPlanner::new(&Options::default(), &context).unwrap();
-        let arc = tandem_rig::arc(&context.position, [0.0, 500.0], turns * std::f64::consts::TAU, 100.0);
+        let arc = tandem_rig::arc(
+            &context.position,
+            [0.0, 500.0],
+            turns * std::f64::consts::TAU,
+            100.0,
+        );
         planner.check(&tandem_rig::numbered(vec![arc])[0], None)
     };
-    assert!(check(100.0).is_ok(), "four hundred thousand chords of a millimetre");
+    assert!(
+        check(100.0).is_ok(),
+        "four hundred thousand chords of a millimetre"
+    );
     let refused = check(1000.0).unwrap_err().to_string();
-    assert_eq!(refused, "within its tolerance the path takes more than 500000 chords; nurbs drives it as it is");
+    assert_eq!(
+        refused,
+        "within its tolerance the path takes more than 500000 chords; nurbs drives it as it is"
+    );
 }

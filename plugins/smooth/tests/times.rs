@@ -8,7 +8,9 @@ use tandem_smooth::{Effort, Options};
 fn path(name: &str) -> String {
     let root = format!("{}/../..", env!("CARGO_MANIFEST_DIR"));
     match name {
-        "square" | "serpentine" | "raster" | "spiral" => format!("{root}/examples/programs/{name}.ngc"),
+        "square" | "serpentine" | "raster" | "spiral" => {
+            format!("{root}/examples/programs/{name}.ngc")
+        }
         _ => format!("{root}/tests/fixtures/cases/smooth_{name}.json"),
     }
 }
@@ -20,7 +22,10 @@ fn drive(name: &str, options: &Options) -> (Peaks, Effort) {
     let peaks = judge(&samples(&collected.segments), &points);
     let what = format!("{name} {options:?}: {peaks:?}");
     assert!(peaks.axis_speed <= 250.0 && peaks.speed <= feed, "{what}");
-    assert!(peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01, "{what}");
+    assert!(
+        peaks.acceleration <= 1000.0 * (1.0 + 1e-6) && peaks.jerk <= 20_000.0 * 1.01,
+        "{what}"
+    );
     assert!(peaks.deviation_mm.iter().all(|off| *off <= 0.01), "{what}");
     assert_eq!(collected.reports.len(), points.len() - 1, "{what}");
     (peaks, effort)
@@ -31,14 +36,21 @@ fn median_s(name: &str) -> f64 {
     let mut times = Vec::new();
     for grid_ms in [5.5, 6.0, 6.5] {
         for tolerance_share in [0.945, 0.955, 0.965] {
-            let options = Options { grid_ms, tolerance_share, ..Options::default() };
+            let options = Options {
+                grid_ms,
+                tolerance_share,
+                ..Options::default()
+            };
             let (peaks, effort) = drive(name, &options);
             assert_eq!(effort.stops, 0, "{name} {options:?}");
             times.push(peaks.time_s);
         }
     }
     times.sort_by(f64::total_cmp);
-    println!("{name}: {:.3} to {:.3} s, median {:.3} s", times[0], times[8], times[4]);
+    println!(
+        "{name}: {:.3} to {:.3} s, median {:.3} s",
+        times[0], times[8], times[4]
+    );
     times[4]
 }
 
@@ -61,6 +73,9 @@ fn times_are_near_the_best_known_whatever_the_settings() {
 fn cases_of_every_kind_keep_all_limits() {
     for name in ["rand2d", "rand3d", "noisy", "tiny", "fast"] {
         let (peaks, effort) = drive(name, &Options::default());
-        println!("{name}: {:.3} s, {} stops, {} windows refused", peaks.time_s, effort.stops, effort.rejected);
+        println!(
+            "{name}: {:.3} s, {} stops, {} windows refused",
+            peaks.time_s, effort.stops, effort.rejected
+        );
     }
 }

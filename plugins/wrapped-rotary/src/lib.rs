@@ -47,13 +47,22 @@ impl WrappedRotary {
     /// # Errors
     /// An axis that the machine does not have, or that turns by itself; a radius of nothing.
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
-        let found = context.axes.index(options.axis.to_ascii_uppercase()).filter(|axis| !context.axes.is_rotary(*axis));
+        let found = context
+            .axes
+            .index(options.axis.to_ascii_uppercase())
+            .filter(|axis| !context.axes.is_rotary(*axis));
         let Some(axis) = found else {
-            return Err(PluginError::of_option("axis", format!("the machine has no linear axis {}", options.axis)));
+            return Err(PluginError::of_option(
+                "axis",
+                format!("the machine has no linear axis {}", options.axis),
+            ));
         };
         let radius_mm = options.radius_mm;
         if !(1e-3..=1e6).contains(&radius_mm.abs()) {
-            return Err(PluginError::of_option("radius_mm", format!("{radius_mm}: must be 0.001 to 1000000")));
+            return Err(PluginError::of_option(
+                "radius_mm",
+                format!("{radius_mm}: must be 0.001 to 1000000"),
+            ));
         }
         Ok(Self { axis, radius_mm })
     }
@@ -90,7 +99,10 @@ mod tests {
         let map = made("axis = \"y\"\nradius_mm = 20").unwrap();
         let joints = map.to_joints(&AxisVector::from_slice(&[5.0, 20.0 * PI, 1.0]));
         assert_eq!(joints, AxisVector::from_slice(&[5.0, PI, 1.0]));
-        assert_eq!(map.to_axes(&joints), AxisVector::from_slice(&[5.0, 20.0 * PI, 1.0]));
+        assert_eq!(
+            map.to_axes(&joints),
+            AxisVector::from_slice(&[5.0, 20.0 * PI, 1.0])
+        );
     }
 
     #[test]

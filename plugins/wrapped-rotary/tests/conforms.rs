@@ -9,6 +9,9 @@ const OPTIONS: &str = "axis = \"y\"\nradius_mm = 30\n";
 
 #[test]
 fn it_conforms() {
-    let setup = Setup { options: OPTIONS.to_string(), ..Setup::default() };
+    let setup = Setup {
+        options: OPTIONS.to_string(),
+        ..Setup::default()
+    };
     judge(tandem_wrapped_rotary::PLUGIN, &setup).assert_conforms();
 }

@@ -56,8 +56,12 @@ impl<'a> Bound<'a> {
         judging: &'a tandem_oracle::Machine,
         filter_s: f64,
     ) -> Result<f64, String> {
-        let axes = (0..machine.axes.count())
-            .map(|axis| (axis_index(machine.axes.letter(axis)).unwrap_or_default(), machine.axes.is_rotary(axis)));
+        let axes = (0..machine.axes.count()).map(|axis| {
+            (
+                axis_index(machine.axes.letter(axis)).unwrap_or_default(),
+                machine.axes.is_rotary(axis),
+            )
+        });
         let mut bound = Self {
             machine: judging,
             axes: axes.collect(),
@@ -67,17 +71,28 @@ impl<'a> Bound<'a> {
             dwell_s: 0.0,
         };
         let mut program = tandem_gcode::Program::open(program).map_err(|e| e.to_string())?;
-        each_block(machine, &mut program, Switches::default(), &mut |block, curve| {
-            bound.add(block, curve);
-        })
+        each_block(
+            machine,
+            &mut program,
+            Switches::default(),
+            &mut |block, curve| {
+                bound.add(block, curve);
+            },
+        )
         .map_err(|e| e.to_string())?;
-        Ok(SLACK * bound.total_s + bound.dwell_s + bound.settling_s() + MORE_S + 20.0 * machine.rough_period_s)
+        Ok(SLACK * bound.total_s
+            + bound.dwell_s
+            + bound.settling_s()
+            + MORE_S
+            + 20.0 * machine.rough_period_s)
     }
 
     /// Time for slowing down and speeding up once more, s: what an operator may ask for last.
     fn settling_s(&self) -> f64 {
         let one = |axis: &Axis| {
-            let build_up_s = axis.max_jerk_mm_per_s3.map_or(0.0, |jerk| axis.max_acceleration_mm_per_s2 / jerk);
+            let build_up_s = axis
+                .max_jerk_mm_per_s3
+                .map_or(0.0, |jerk| axis.max_acceleration_mm_per_s2 / jerk);
             axis.max_speed_mm_per_s() / axis.max_acceleration_mm_per_s2 + 4.0 * build_up_s
         };
         4.0 * self.machine.axes.iter().map(one).fold(0.0, f64::max)
@@ -100,10 +115,13 @@ impl<'a> Bound<'a> {
                 (index, if rotary { by.to_degrees() } else { by })
             })
             .collect();
-        let overhead_s = self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
+        let overhead_s =
+            self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
         let moving_s = match block.kind {
             BlockKind::Arc => self.arc_s(block, &moved),
-            BlockKind::Nurbs => self.curve_s(block, curve.map_or(0, |curve| curve.control_points.len())),
+            BlockKind::Nurbs => {
+                self.curve_s(block, curve.map_or(0, |curve| curve.control_points.len()))
+            }
             _ => self.straight_s(block, &moved),
         };
         self.total_s += moving_s + overhead_s;
@@ -111,13 +129,30 @@ impl<'a> Bound<'a> {
 
     /// The axes and the joints, each with how far a block that moves the axes by `moved` moves it at most.
     fn lanes(&self, moved: &[(usize, f64)]) -> Vec<(Rates, f64)> {
-        let by = |index: usize| moved.iter().find(|(axis, _)| *axis == index).map_or(0.0, |(_, by)| *by);
-        let mut lanes: Vec<_> = self.machine.axes.iter().map(|axis| (rates(axis), by(axis.index))).collect();
+        let by = |index: usize| {
+            moved
+                .iter()
+                .find(|(axis, _)| *axis == index)
+                .map_or(0.0, |(_, by)| *by)
+        };
+        let mut lanes: Vec<_> = self
+            .machine
+            .axes
+            .iter()
+            .map(|axis| (rates(axis), by(axis.index)))
+            .collect();
         if let Joints::Known(joints) = &self.machine.joints {
             for joint in joints {
                 // A planner that looks at one axis at a time divides a joint's limits between its axes.
-                let reach: f64 = moved.iter().map(|(axis, by)| joint.weights[*axis].abs() * by).sum();
-                let pulled = joint.weights.iter().filter(|weight| **weight != 0.0).count() as f64;
+                let reach: f64 = moved
+                    .iter()
+                    .map(|(axis, by)| joint.weights[*axis].abs() * by)
+                    .sum();
+                let pulled = joint
+                    .weights
+                    .iter()
+                    .filter(|weight| **weight != 0.0)
+                    .count() as f64;
                 lanes.push((rates(&joint.limits), reach * pulled));
             }
         }
@@ -140,7 +175,10 @@ impl<'a> Bound<'a> {
         let (radius_mm, length) = (block.arc.radius_mm, block.length_mm);
         for axis in block.arc.plane {
             let index = self.axes[axis as usize].0;
-            reach.iter_mut().filter(|(axis, _)| *axis == index).for_each(|(_, by)| *by = length);
+            reach
+                .iter_mut()
+                .filter(|(axis, _)| *axis == index)
+                .for_each(|(_, by)| *by = length);
         }
         let mut limits = Along::of(feed(block));
         for (rates, by) in self.lanes(&reach) {
@@ -157,7 +195,11 @@ impl<'a> Bound<'a> {
     fn curve_s(&self, block: &Block, points: usize) -> f64 {
         let length = block.length_mm;
         let mut limits = Along::of(feed(block));
-        let every: Vec<(usize, f64)> = self.axes.iter().map(|(index, _)| (*index, length)).collect();
+        let every: Vec<(usize, f64)> = self
+            .axes
+            .iter()
+            .map(|(index, _)| (*index, length))
+            .collect();
         for (rates, by) in self.lanes(&every) {
             limits.lane(&rates, false, by / length);
         }
@@ -175,13 +217,19 @@ struct Along {
 
 impl Along {
     fn of(speed: f64) -> Self {
-        Self { speed, acceleration: f64::INFINITY, jerk: f64::INFINITY }
+        Self {
+            speed,
+            acceleration: f64::INFINITY,
+            jerk: f64::INFINITY,
+        }
     }
 
     /// A coordinate that moves by `share` for each unit along the block.
     fn lane(&mut self, rates: &Rates, rapid: bool, share: f64) {
         if share > 0.0 {
-            self.speed = self.speed.min(if rapid { rates.rapid } else { rates.feed } / share);
+            self.speed = self
+                .speed
+                .min(if rapid { rates.rapid } else { rates.feed } / share);
             self.acceleration = self.acceleration.min(rates.acceleration / share);
             self.jerk = self.jerk.min(rates.jerk / share);
         }

@@ -59,32 +59,47 @@ impl Tally {
         self.runs += 1;
         self.samples += report.samples;
         self.most_memory_mb = self.most_memory_mb.max(report.memory_mb);
-        let Report { planner, kind, why, .. } = report;
+        let Report {
+            planner, kind, why, ..
+        } = report;
         if report.is_failure() {
-            self.failed.push((seed, format!("{planner}: {kind}: {why}")));
+            self.failed
+                .push((seed, format!("{planner}: {kind}: {why}")));
         } else if kind == "refused" {
             self.refused.push((seed, format!("{planner}: {why}")));
         }
-        let count = self.counts.entry((planner.clone(), kind.clone())).or_default();
+        let count = self
+            .counts
+            .entry((planner.clone(), kind.clone()))
+            .or_default();
         *count += 1;
         *count
     }
 
     /// Whether nothing failed and hardly anything was refused.
     pub fn passed(&self) -> bool {
-        self.failed.is_empty() && self.refused.len() as u64 * 1000 <= REFUSED_PER_THOUSAND * self.runs.max(1000)
+        self.failed.is_empty()
+            && self.refused.len() as u64 * 1000 <= REFUSED_PER_THOUSAND * self.runs.max(1000)
     }
 
     /// Counts as a table: a row for each planner and kind.
     pub fn table(&self) -> String {
         let mut text = String::new();
         for ((planner, kind), count) in &self.counts {
-            writeln!(text, "{planner:22} {kind:16} {count:8}").expect("a text takes what is written");
+            writeln!(text, "{planner:22} {kind:16} {count:8}")
+                .expect("a text takes what is written");
         }
         for (seed, why) in &self.refused {
             writeln!(text, "refused: seed {seed}: {why}").expect("a text takes what is written");
         }
-        let Self { runs, samples, most_memory_mb, failed, refused, .. } = self;
+        let Self {
+            runs,
+            samples,
+            most_memory_mb,
+            failed,
+            refused,
+            ..
+        } = self;
         let (failed, refused) = (failed.len(), refused.len());
         let last = format!(
             "{runs} runs, {samples} samples, {failed} failed, {refused} refused, {most_memory_mb:.0} MB at most\n"
@@ -100,7 +115,9 @@ pub fn campaign(plan: &Plan, tell: &(dyn Fn(&str) + Sync)) -> Tally {
         for job in 0..plan.jobs.max(1) {
             let shared = &shared;
             scope.spawn(move || {
-                let folder = plan.out.join(format!("worker-{}-{job}", std::process::id()));
+                let folder = plan
+                    .out
+                    .join(format!("worker-{}-{job}", std::process::id()));
                 let mut worker = Worker::new(&plan.binary, &folder, plan.patience);
                 loop {
                     // In a statement of its own, so that the lock is not held for the run.
@@ -112,7 +129,9 @@ pub fn campaign(plan: &Plan, tell: &(dyn Fn(&str) + Sync)) -> Tally {
             });
         }
     });
-    let (_, mut tally) = shared.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (_, mut tally) = shared
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     tally.failed.sort();
     tally.refused.sort();
     tally
@@ -121,7 +140,9 @@ pub fn campaign(plan: &Plan, tell: &(dyn Fn(&str) + Sync)) -> Tally {
 type Shared = Mutex<(RangeInclusive<u64>, Tally)>;
 
 fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, (RangeInclusive<u64>, Tally)> {
-    shared.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    shared
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 fn one(plan: &Plan, seed: u64, worker: &mut Worker, shared: &Shared, tell: &(dyn Fn(&str) + Sync)) {
@@ -132,20 +153,47 @@ fn one(plan: &Plan, seed: u64, worker: &mut Worker, shared: &Shared, tell: &(dyn
         return;
     }
     let (smallest, last) = if count <= plan.minimised {
-        minimise(&mut |case| worker.run(case), &case, &report, plan.minimiser_runs)
+        minimise(
+            &mut |case| worker.run(case),
+            &case,
+            &report,
+            plan.minimiser_runs,
+        )
     } else {
         (case.clone(), report.clone())
     };
-    let folder = plan.out.join(format!("{}-{}-{seed}", report.planner.replace(' ', "-"), report.kind));
+    let folder = plan.out.join(format!(
+        "{}-{}-{seed}",
+        report.planner.replace(' ', "-"),
+        report.kind
+    ));
     let words = write(&folder, seed, plan.planner, &smallest, &last).unwrap_or_else(|e| e);
-    tell(&format!("seed {seed}: {}: {}: {}\n{words}", report.planner, report.kind, last.why));
+    tell(&format!(
+        "seed {seed}: {}: {}: {}\n{words}",
+        report.planner, report.kind, last.why
+    ));
 }
 
 /// Writes a failure; what to tell of it.
-fn write(folder: &Path, seed: u64, planner: Option<Planner>, case: &Case, report: &Report) -> Result<String, String> {
+fn write(
+    folder: &Path,
+    seed: u64,
+    planner: Option<Planner>,
+    case: &Case,
+    report: &Report,
+) -> Result<String, String> {
     case.write(folder)?;
-    let Report { planner: name, kind, why, size, samples, memory_mb } = report;
-    let asked = planner.map_or_else(String::new, |planner| format!(" --planner {}", planner.name()));
+    let Report {
+        planner: name,
+        kind,
+        why,
+        size,
+        samples,
+        memory_mb,
+    } = report;
+    let asked = planner.map_or_else(String::new, |planner| {
+        format!(" --planner {}", planner.name())
+    });
     let text = format!(
         "{name}: {kind}: {why}\nsize {size:e}, {samples} samples, {memory_mb:.0} MB\n\
          drawn again by: cargo run --release -p tandem-campaign -- --seeds {seed}..{seed}{asked}\n\
@@ -153,6 +201,7 @@ fn write(folder: &Path, seed: u64, planner: Option<Planner>, case: &Case, report
         folder.display(),
         Case::replay(folder)
     );
-    std::fs::write(folder.join("why.txt"), &text).map_err(|e| format!("{}: {e}", folder.display()))?;
+    std::fs::write(folder.join("why.txt"), &text)
+        .map_err(|e| format!("{}: {e}", folder.display()))?;
     Ok(format!("  {}\n", Case::replay(folder)))
 }

@@ -27,8 +27,16 @@ impl Case {
             let path = folder.join(name);
             std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
         };
-        let commands = if folder.join(FILES[2]).exists() { read(FILES[2])? } else { String::new() };
-        Ok(Self { program: read(FILES[0])?, machine: MachineText::parse(&read(FILES[1])?), commands })
+        let commands = if folder.join(FILES[2]).exists() {
+            read(FILES[2])?
+        } else {
+            String::new()
+        };
+        Ok(Self {
+            program: read(FILES[0])?,
+            machine: MachineText::parse(&read(FILES[1])?),
+            commands,
+        })
     }
 
     /// Writes the files to a folder, which is made where it is not there.
@@ -37,7 +45,11 @@ impl Case {
     /// The file that cannot be written, and why.
     pub fn write(&self, folder: &Path) -> Result<(), String> {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        for (name, text) in FILES.into_iter().zip([&self.program, &self.machine.text(), &self.commands]) {
+        for (name, text) in
+            FILES
+                .into_iter()
+                .zip([&self.program, &self.machine.text(), &self.commands])
+        {
             let path = folder.join(name);
             std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
         }
@@ -71,8 +83,14 @@ pub struct TableText {
 impl MachineText {
     /// Takes a file apart: a line is a head, a key, or left out.
     pub fn parse(text: &str) -> Self {
-        let mut machine = Self { tables: vec![TableText::default()] };
-        for line in text.lines().map(str::trim).filter(|line| !line.starts_with('#')) {
+        let mut machine = Self {
+            tables: vec![TableText::default()],
+        };
+        for line in text
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.starts_with('#'))
+        {
             if line.starts_with('[') {
                 machine.table(line);
             } else if let Some((key, value)) = line.split_once('=') {
@@ -84,7 +102,10 @@ impl MachineText {
 
     /// Begins a table.
     pub fn table(&mut self, head: &str) {
-        self.tables.push(TableText { head: head.to_string(), keys: vec![] });
+        self.tables.push(TableText {
+            head: head.to_string(),
+            keys: vec![],
+        });
     }
 
     /// Adds a key to the last table.
@@ -93,7 +114,9 @@ impl MachineText {
             self.tables.push(TableText::default());
         }
         let last = self.tables.len() - 1;
-        self.tables[last].keys.push((key.to_string(), value.to_string()));
+        self.tables[last]
+            .keys
+            .push((key.to_string(), value.to_string()));
     }
 
     /// The file.

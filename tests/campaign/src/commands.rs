@@ -9,8 +9,12 @@ use crate::machine::Drawn;
 /// Lines of a command file for a program that takes about `time_s`; mostly in the end everything is as it was.
 pub fn draw(random: &mut Random, machine: &Drawn, time_s: f64) -> String {
     let ticks = ((time_s / (machine.fine_ms / 1000.0)) as u64).max(10);
-    let mut operator =
-        Operator { random, most: machine.max_feed_ratio, fine_ms: machine.fine_ms, lines: String::new() };
+    let mut operator = Operator {
+        random,
+        most: machine.max_feed_ratio,
+        fine_ms: machine.fine_ms,
+        lines: String::new(),
+    };
     match operator.random.below(20) {
         0..=6 => return String::new(),
         7..=13 => operator.steps(ticks),
@@ -122,14 +126,23 @@ impl Operator<'_> {
     }
 
     fn last_tick(&self) -> u64 {
-        let last = self.lines.lines().last().and_then(|line| line.split(',').next());
+        let last = self
+            .lines
+            .lines()
+            .last()
+            .and_then(|line| line.split(',').next());
         last.and_then(|tick| tick.parse().ok()).unwrap_or_default()
     }
 
     /// Everything as it was, so that the program must come to its end.
     fn restore(mut self) -> String {
         let tick = self.last_tick() + 1 + self.random.below(50);
-        for command in ["feed-override,1", "rapid-override,1", "single-block,0", "resume"] {
+        for command in [
+            "feed-override,1",
+            "rapid-override,1",
+            "single-block,0",
+            "resume",
+        ] {
             self.give(tick, command);
         }
         self.lines

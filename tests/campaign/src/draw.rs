@@ -14,5 +14,9 @@ pub fn draw(seed: u64, planner: Option<Planner>) -> Case {
     let machine = machine::draw(&mut random, planner);
     let (program, time_s) = program::draw(&mut random, &machine);
     let commands = commands::draw(&mut random, &machine, time_s);
-    Case { program, machine: machine.text, commands }
+    Case {
+        program,
+        machine: machine.text,
+        commands,
+    }
 }

@@ -44,7 +44,10 @@ impl Planner {
 
     /// Of a name.
     pub fn named(name: &str) -> Option<Self> {
-        Self::SHARES.into_iter().map(|(planner, _)| planner).find(|planner| planner.name() == name)
+        Self::SHARES
+            .into_iter()
+            .map(|(planner, _)| planner)
+            .find(|planner| planner.name() == name)
     }
 
     /// Whether it asks for a jerk limit of every axis, and keeps it.
@@ -97,7 +100,11 @@ pub struct Surface {
 impl Surface {
     /// Whether the probe touches where the axis stands.
     pub fn touches(&self, position_mm: f64) -> bool {
-        if self.above { position_mm > self.at_mm } else { position_mm < self.at_mm }
+        if self.above {
+            position_mm > self.at_mm
+        } else {
+            position_mm < self.at_mm
+        }
     }
 }
 
@@ -122,7 +129,9 @@ pub struct Drawn {
 
 /// A number with four significant digits: what somebody would write.
 pub fn rounded(value: f64) -> f64 {
-    format!("{value:.3e}").parse().expect("what is written is a number")
+    format!("{value:.3e}")
+        .parse()
+        .expect("what is written is a number")
 }
 
 /// How the limits of one axis relate to those of the others.
@@ -154,7 +163,8 @@ impl Style {
         let rapid_of = [1.0, 1.0, 1.5, 4.0, 0.7][random.below(5) as usize];
         if self.odd {
             let [feed, acceleration, jerk] =
-                [(20.0, 200_000.0), (5.0, 50_000.0), (100.0, 1_000_000.0)].map(|(low, high)| random.length(low, high));
+                [(20.0, 200_000.0), (5.0, 50_000.0), (100.0, 1_000_000.0)]
+                    .map(|(low, high)| random.length(low, high));
             return [feed, feed * rapid_of, acceleration, jerk].map(rounded);
         }
         let mut near = |value: f64| value * random.length(1.0 / self.spread, self.spread);
@@ -168,14 +178,35 @@ impl Style {
 /// Draws a machine, with `planner` where one is asked for.
 pub fn draw(random: &mut Random, planner: Option<Planner>) -> Drawn {
     let planner = planner.unwrap_or_else(|| draw_planner(random));
-    let fines = [0.125, 0.2, 0.25, 0.37, 0.4, 0.5, 0.625, 0.8, 1.0, 1.0, 1.0, 1.25, 1.3, 1.6, 2.0];
-    let fine_ms = if random.below(8) == 0 { rounded(random.between(0.125, 2.0)) } else { random.pick(&fines) };
-    let per_rough = if random.below(4) == 0 { random.pick(&[1, 1, 2, 4, 8]) } else { 1 + random.below(25) };
+    let fines = [
+        0.125, 0.2, 0.25, 0.37, 0.4, 0.5, 0.625, 0.8, 1.0, 1.0, 1.0, 1.25, 1.3, 1.6, 2.0,
+    ];
+    let fine_ms = if random.below(8) == 0 {
+        rounded(random.between(0.125, 2.0))
+    } else {
+        random.pick(&fines)
+    };
+    let per_rough = if random.below(4) == 0 {
+        random.pick(&[1, 1, 2, 4, 8])
+    } else {
+        1 + random.below(25)
+    };
     let rough_ms = fine_ms * per_rough as f64;
-    let max_feed_ratio = if random.below(2) == 0 { 1.0 } else { (random.between(1.0, 2.0) * 100.0).round() / 100.0 };
+    let max_feed_ratio = if random.below(2) == 0 {
+        1.0
+    } else {
+        (random.between(1.0, 2.0) * 100.0).round() / 100.0
+    };
     let axes = draw_axes(random);
-    let mut drawn =
-        Drawn { text: MachineText::default(), axes, planner, fine_ms, rough_ms, max_feed_ratio, probe: None };
+    let mut drawn = Drawn {
+        text: MachineText::default(),
+        axes,
+        planner,
+        fine_ms,
+        rough_ms,
+        max_feed_ratio,
+        probe: None,
+    };
     drawn.text.key("format", 1);
     drawn.loops_and_motion(random);
     let jerk = planner.keeps_jerk() || random.below(2) == 0;
@@ -204,24 +235,53 @@ fn draw_axes(random: &mut Random) -> Vec<Axis> {
     let mut letters: Vec<char> = "XYZABCUVW".chars().collect();
     // X first where there are few, so that most machines have a plane.
     while letters.len() > count {
-        let last = if random.below(4) > 0 { letters.len() - 1 } else { random.below(letters.len() as u64) as usize };
-        letters.remove(if count <= 3 { last } else { last.max(random.below(3) as usize) });
+        let last = if random.below(4) > 0 {
+            letters.len() - 1
+        } else {
+            random.below(letters.len() as u64) as usize
+        };
+        letters.remove(if count <= 3 {
+            last
+        } else {
+            last.max(random.below(3) as usize)
+        });
     }
     let style = Style::draw(random);
     let wide = random.length(0.02, 2000.0);
-    letters.into_iter().map(|letter| draw_axis(random, letter, &style, wide)).collect()
+    letters
+        .into_iter()
+        .map(|letter| draw_axis(random, letter, &style, wide))
+        .collect()
 }
 
 fn draw_axis(random: &mut Random, letter: char, style: &Style, wide: f64) -> Axis {
     let rotary = ('A'..='C').contains(&letter) && random.below(5) > 0;
-    let wide = if rotary { random.length(0.5, 7200.0) } else { wide * random.length(0.3, 3.0) };
+    let wide = if rotary {
+        random.length(0.5, 7200.0)
+    } else {
+        wide * random.length(0.3, 3.0)
+    };
     let four = |value: f64| (value * 1e4).round() / 1e4;
     let any = random.unit();
     let share = random.pick(&[0.0, 0.5, 0.5, any]);
     let (low, high) = (0.0 - four(share * wide), four((1.0 - share) * wide + 0.001));
-    let start = if random.below(6) == 0 { four(random.between(low, high)).clamp(low, high) } else { 0.0 };
+    let start = if random.below(6) == 0 {
+        four(random.between(low, high)).clamp(low, high)
+    } else {
+        0.0
+    };
     let [feed, rapid, acceleration, jerk] = style.limits(random);
-    Axis { letter, rotary, low, high, start, feed, rapid, acceleration, jerk }
+    Axis {
+        letter,
+        rotary,
+        low,
+        high,
+        start,
+        feed,
+        rapid,
+        acceleration,
+        jerk,
+    }
 }
 
 fn write_axis(text: &mut MachineText, axis: &Axis, jerk: bool) {
@@ -230,7 +290,10 @@ fn write_axis(text: &mut MachineText, axis: &Axis, jerk: bool) {
     if axis.rotary {
         text.key("kind", "\"rotary\"");
     }
-    text.key(&format!("travel_{unit}"), format!("[{}, {}]", axis.low, axis.high));
+    text.key(
+        &format!("travel_{unit}"),
+        format!("[{}, {}]", axis.low, axis.high),
+    );
     if axis.start != 0.0 {
         text.key(&format!("start_{unit}"), axis.start);
     }
@@ -238,7 +301,10 @@ fn write_axis(text: &mut MachineText, axis: &Axis, jerk: bool) {
     if axis.rapid != axis.feed {
         text.key(&format!("max_rapid_{unit}_per_min"), axis.rapid);
     }
-    text.key(&format!("max_acceleration_{unit}_per_s2"), axis.acceleration);
+    text.key(
+        &format!("max_acceleration_{unit}_per_s2"),
+        axis.acceleration,
+    );
     if jerk {
         text.key(&format!("max_jerk_{unit}_per_s3"), axis.jerk);
     }

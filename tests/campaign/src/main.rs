@@ -72,8 +72,14 @@ enum Command {
 }
 
 fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
-    let number = |text: &str| text.trim_start_matches('=').parse::<u64>().map_err(|e| e.to_string());
-    let (first, last) = text.split_once("..").ok_or("seeds are written as 1..20000")?;
+    let number = |text: &str| {
+        text.trim_start_matches('=')
+            .parse::<u64>()
+            .map_err(|e| e.to_string())
+    };
+    let (first, last) = text
+        .split_once("..")
+        .ok_or("seeds are written as 1..20000")?;
     Ok(number(first)?..=number(last)?)
 }
 
@@ -97,7 +103,9 @@ fn main() -> ExitCode {
 fn act(arguments: Arguments) -> Result<bool, String> {
     let binary = std::env::current_exe().map_err(|e| e.to_string())?;
     let patience = Duration::from_secs(arguments.patience_s);
-    let spare = |name: &str| std::env::temp_dir().join(format!("tandem-campaign-{name}-{}", std::process::id()));
+    let spare = |name: &str| {
+        std::env::temp_dir().join(format!("tandem-campaign-{name}-{}", std::process::id()))
+    };
     match arguments.command {
         Some(Command::Worker) => serve().map(|()| true).map_err(|e| e.to_string()),
         Some(Command::Judge { folder }) => {
@@ -114,17 +122,41 @@ fn act(arguments: Arguments) -> Result<bool, String> {
             if !report.is_failure() {
                 return Err(format!("it does not fail: {report:?}"));
             }
-            let (smallest, report) = minimise(&mut |case| worker.run(case), &case, &report, arguments.minimiser_runs);
+            let (smallest, report) = minimise(
+                &mut |case| worker.run(case),
+                &case,
+                &report,
+                arguments.minimiser_runs,
+            );
             let _ = std::fs::remove_dir_all(work);
             smallest.write(&out)?;
             println!("{report:?}\n{}", Case::replay(&out));
             Ok(true)
         }
-        Some(Command::Draw { seed, out, planner }) => draw(seed, planner).write(&out).map(|()| true),
+        Some(Command::Draw { seed, out, planner }) => {
+            draw(seed, planner).write(&out).map(|()| true)
+        }
         None => {
-            let Arguments { seeds, planner, jobs, minimise, minimiser_runs, out, .. } = arguments;
+            let Arguments {
+                seeds,
+                planner,
+                jobs,
+                minimise,
+                minimiser_runs,
+                out,
+                ..
+            } = arguments;
             println!("seeds {} to {}, {jobs} jobs", seeds.start(), seeds.end());
-            let plan = Plan { seeds, planner, jobs, patience, minimised: minimise, minimiser_runs, binary, out };
+            let plan = Plan {
+                seeds,
+                planner,
+                jobs,
+                patience,
+                minimised: minimise,
+                minimiser_runs,
+                binary,
+                out,
+            };
             let tally = campaign(&plan, &|words| print!("{words}"));
             print!("{}", tally.table());
             Ok(tally.passed())

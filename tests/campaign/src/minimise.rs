@@ -17,8 +17,19 @@ pub struct Minimiser<'a> {
 }
 
 /// The smallest case found within `most` runs that fails as `case` does, and how it fails.
-pub fn minimise(run: &mut dyn FnMut(&Case) -> Report, case: &Case, report: &Report, most: u32) -> (Case, Report) {
-    let mut this = Minimiser { run, best: case.clone(), report: report.clone(), first_size: report.size, left: most };
+pub fn minimise(
+    run: &mut dyn FnMut(&Case) -> Report,
+    case: &Case,
+    report: &Report,
+    most: u32,
+) -> (Case, Report) {
+    let mut this = Minimiser {
+        run,
+        best: case.clone(),
+        report: report.clone(),
+        first_size: report.size,
+        left: most,
+    };
     loop {
         let before = this.best.clone();
         this.commands();
@@ -40,8 +51,10 @@ impl Minimiser<'_> {
         }
         self.left -= 1;
         let report = (self.run)(&case);
-        let far_enough = !self.first_size.is_finite() || report.size >= SIZE_SHARE * self.first_size;
-        let same = report.kind == self.report.kind && report.planner == self.report.planner && far_enough;
+        let far_enough =
+            !self.first_size.is_finite() || report.size >= SIZE_SHARE * self.first_size;
+        let same =
+            report.kind == self.report.kind && report.planner == self.report.planner && far_enough;
         if same {
             (self.best, self.report) = (case, report);
         }
@@ -62,7 +75,10 @@ impl Minimiser<'_> {
                     break;
                 }
                 let to = (from + chunk).min(lines.len());
-                *text = lines[..from].iter().chain(&lines[to..]).fold(String::new(), |text, line| text + line + "\n");
+                *text = lines[..from]
+                    .iter()
+                    .chain(&lines[to..])
+                    .fold(String::new(), |text, line| text + line + "\n");
                 if !self.attempt(case) {
                     from = to;
                 }
@@ -91,7 +107,10 @@ impl Minimiser<'_> {
             let named = format!("\"{lower}\"");
             case.machine.tables.retain(|table| {
                 let joint = table.head.starts_with("[joints.");
-                let moves = table.keys.iter().any(|(key, value)| key == "axis" && *value == named);
+                let moves = table
+                    .keys
+                    .iter()
+                    .any(|(key, value)| key == "axis" && *value == named);
                 table.head != format!("[axes.{lower}]") && !(joint && moves)
             });
             case.program = without_words(&case.program, letter);
@@ -107,7 +126,8 @@ impl Minimiser<'_> {
             let head = case.machine.tables.remove(index).head;
             // Kinematics go with their joints.
             if head == "[kinematics]" {
-                let of_it = |head: &str| head.starts_with("[kinematics") || head.starts_with("[joints.");
+                let of_it =
+                    |head: &str| head.starts_with("[kinematics") || head.starts_with("[joints.");
                 case.machine.tables.retain(|table| !of_it(&table.head));
             }
             if !self.attempt(case) {
@@ -130,11 +150,25 @@ impl Minimiser<'_> {
     /// A rounder number in the place of one value.
     fn rounder(&mut self, table: usize, key: usize) {
         let value = self.best.machine.tables[table].keys[key].1.clone();
-        let wide = (value.starts_with('[') && value.contains(',')).then(|| "[-1000, 1000]".to_string());
+        let wide =
+            (value.starts_with('[') && value.contains(',')).then(|| "[-1000, 1000]".to_string());
         let number = value.parse::<f64>().ok();
-        let digits = |digits: usize| number.map(|n| format!("{n:.digits$e}").parse::<f64>().map(|n| n.to_string()));
-        let rounded = [digits(0), digits(1), digits(2)].into_iter().flatten().flatten();
-        for simpler in wide.into_iter().chain(rounded).filter(|text| *text != value) {
+        let digits = |digits: usize| {
+            number.map(|n| {
+                format!("{n:.digits$e}")
+                    .parse::<f64>()
+                    .map(|n| n.to_string())
+            })
+        };
+        let rounded = [digits(0), digits(1), digits(2)]
+            .into_iter()
+            .flatten()
+            .flatten();
+        for simpler in wide
+            .into_iter()
+            .chain(rounded)
+            .filter(|text| *text != value)
+        {
             let mut case = self.best.clone();
             case.machine.tables[table].keys[key].1 = simpler;
             if self.attempt(case) {
@@ -147,7 +181,12 @@ impl Minimiser<'_> {
     fn words(&mut self) {
         let mut line = 0;
         while line < self.best.program.lines().count() && self.left > 0 {
-            let count = |case: &Case| case.program.lines().nth(line).map_or(0, |text| text.split(' ').count());
+            let count = |case: &Case| {
+                case.program
+                    .lines()
+                    .nth(line)
+                    .map_or(0, |text| text.split(' ').count())
+            };
             let mut word = 0;
             while word < count(&self.best) {
                 if !self.word(line, word, None) {
@@ -167,10 +206,17 @@ impl Minimiser<'_> {
         match digits {
             None => _ = words.remove(word),
             Some(digits) => {
-                let start = words[word].find(|c: char| c == '-' || c.is_ascii_digit()).unwrap_or(words[word].len());
+                let start = words[word]
+                    .find(|c: char| c == '-' || c.is_ascii_digit())
+                    .unwrap_or(words[word].len());
                 let (letters, number) = words[word].split_at(start);
-                let fewer = number.split('.').nth(1).is_some_and(|behind| behind.len() > digits);
-                let Some(number) = number.parse::<f64>().ok().filter(|_| fewer) else { return false };
+                let fewer = number
+                    .split('.')
+                    .nth(1)
+                    .is_some_and(|behind| behind.len() > digits);
+                let Some(number) = number.parse::<f64>().ok().filter(|_| fewer) else {
+                    return false;
+                };
                 words[word] = format!("{letters}{number:.digits$}");
             }
         }
@@ -182,7 +228,10 @@ impl Minimiser<'_> {
 
 fn without_words(program: &str, letter: char) -> String {
     let line = |line: &str| {
-        let kept: Vec<&str> = line.split(' ').filter(|word| !word.starts_with(letter)).collect();
+        let kept: Vec<&str> = line
+            .split(' ')
+            .filter(|word| !word.starts_with(letter))
+            .collect();
         kept.join(" ") + "\n"
     };
     program.lines().map(line).collect()

@@ -35,7 +35,11 @@ pub struct Program<'a> {
 /// A program and the time that it takes about, s.
 pub fn draw(random: &mut Random, machine: &Drawn) -> (String, f64) {
     let budget_s = MOST_SAMPLES * random.length(0.02, 1.0) * machine.fine_ms / 1000.0;
-    let widest = machine.axes.iter().map(|axis| axis.high - axis.low).fold(0.0, f64::max);
+    let widest = machine
+        .axes
+        .iter()
+        .map(|axis| axis.high - axis.low)
+        .fold(0.0, f64::max);
     let feed = 0.0;
     let mut program = Program {
         at: machine.axes.iter().map(|axis| axis.start).collect(),
@@ -100,26 +104,48 @@ impl Program<'_> {
     }
 
     fn axis(&self, letter: char) -> Option<usize> {
-        self.machine.axes.iter().position(|axis| axis.letter == letter && !axis.rotary)
+        self.machine
+            .axes
+            .iter()
+            .position(|axis| axis.letter == letter && !axis.rotary)
     }
 
     /// A number as it is written.
     fn written(&self, value: f64) -> f64 {
-        format!("{value:.*}", self.digits).parse().expect("what is written is a number")
+        format!("{value:.*}", self.digits)
+            .parse()
+            .expect("what is written is a number")
     }
 
     fn new_feed(&mut self) {
-        let fastest = self.machine.axes.iter().map(|axis| axis.feed).fold(0.0, f64::max);
-        let low = if self.random.below(4) == 0 { 1.0 } else { (fastest / 300.0).max(1.0) };
+        let fastest = self
+            .machine
+            .axes
+            .iter()
+            .map(|axis| axis.feed)
+            .fold(0.0, f64::max);
+        let low = if self.random.below(4) == 0 {
+            1.0
+        } else {
+            (fastest / 300.0).max(1.0)
+        };
         self.feed = crate::machine::rounded(self.random.length(low, (2.0 * fastest).max(2.0)));
         let feed = self.feed;
         self.line(&format!("F{feed}"));
     }
 
     fn tolerance(&mut self) {
-        let least_mm = if self.machine.planner == Planner::Smooth { 2e-4 } else { 1e-4 };
+        let least_mm = if self.machine.planner == Planner::Smooth {
+            2e-4
+        } else {
+            1e-4
+        };
         let mm = self.random.length(least_mm, 1.0);
-        let text = if self.random.below(3) == 0 { "G64".to_string() } else { format!("G64 P{:.4}", mm + 5e-5) };
+        let text = if self.random.below(3) == 0 {
+            "G64".to_string()
+        } else {
+            format!("G64 P{:.4}", mm + 5e-5)
+        };
         self.line(&text);
     }
 
@@ -133,14 +159,21 @@ impl Program<'_> {
 
     fn dwell(&mut self) {
         let most_s = self.left_s.min(0.5);
-        let dwell_s = if self.random.below(6) == 0 { 0.0 } else { self.random.length(1e-4, most_s.max(2e-4)) };
+        let dwell_s = if self.random.below(6) == 0 {
+            0.0
+        } else {
+            self.random.length(1e-4, most_s.max(2e-4))
+        };
         let text = format!("{dwell_s:.4}");
         self.left_s -= dwell_s;
         self.line(&format!("G4 P{text}"));
     }
 
     fn word(&mut self) {
-        let words = ["M3 S100", "M4 S50", "M5", "M7", "M8", "M9", "M62 P1", "M63 P1", "M64 P2", "M65 P2", "M1", "M0"];
+        let words = [
+            "M3 S100", "M4 S50", "M5", "M7", "M8", "M9", "M62 P1", "M63 P1", "M64 P2", "M65 P2",
+            "M1", "M0",
+        ];
         let word = self.random.pick(&words);
         self.line(word);
     }
@@ -158,7 +191,8 @@ impl Program<'_> {
                 let axis = self.random.below(self.at.len() as u64) as usize;
                 let (from, to) = (self.at[axis], self.place(axis, self.scale_mm));
                 let by = self.written(to - from);
-                let inside = (self.machine.axes[axis].low..=self.machine.axes[axis].high).contains(&(from + by));
+                let inside = (self.machine.axes[axis].low..=self.machine.axes[axis].high)
+                    .contains(&(from + by));
                 if inside && by != 0.0 && self.spend(&[(axis, by)], false) {
                     let letter = self.machine.axes[axis].letter;
                     self.line(&format!("G1 {letter}{by:.*}", self.digits));
@@ -187,7 +221,11 @@ impl Program<'_> {
     fn place(&mut self, axis: usize, reach: f64) -> f64 {
         let of = self.machine.axes[axis];
         if self.random.below(16) == 0 {
-            return if self.random.below(2) == 0 { of.low } else { of.high };
+            return if self.random.below(2) == 0 {
+                of.low
+            } else {
+                of.high
+            };
         }
         let reach = reach * self.random.pick(&[0.1, 1.0, 1.0, 1.0, 3.0]);
         let to = self.at[axis] + self.random.between(-reach, reach);
@@ -203,13 +241,25 @@ impl Program<'_> {
 
     /// Takes the time of a straight motion by so much; whether there is enough left.
     fn spend(&mut self, moved: &[(usize, f64)], rapid: bool) -> bool {
-        let linear = moved.iter().any(|(axis, by)| !self.machine.axes[*axis].rotary && *by != 0.0);
-        let counted = moved.iter().filter(|(axis, _)| self.machine.axes[*axis].rotary != linear);
+        let linear = moved
+            .iter()
+            .any(|(axis, by)| !self.machine.axes[*axis].rotary && *by != 0.0);
+        let counted = moved
+            .iter()
+            .filter(|(axis, _)| self.machine.axes[*axis].rotary != linear);
         let length = counted.map(|(_, by)| by * by).sum::<f64>().sqrt();
         if length == 0.0 {
             return false;
         }
-        let mut limits = [if rapid { f64::INFINITY } else { self.feed / 60.0 }, f64::INFINITY, f64::INFINITY];
+        let mut limits = [
+            if rapid {
+                f64::INFINITY
+            } else {
+                self.feed / 60.0
+            },
+            f64::INFINITY,
+            f64::INFINITY,
+        ];
         for (axis, by) in moved.iter().filter(|(_, by)| *by != 0.0) {
             let (of, share) = (&self.machine.axes[*axis], by.abs() / length);
             let speed = if rapid { of.rapid } else { of.feed } / 60.0;
@@ -225,10 +275,20 @@ impl Program<'_> {
         let mut limits = [self.feed / 60.0, f64::INFINITY, f64::INFINITY];
         for axis in self.machine.axes.iter().filter(|axis| !axis.rotary) {
             let lanes = [axis.feed / 60.0, axis.acceleration / 2.0, axis.jerk / 4.0];
-            limits.iter_mut().zip(lanes).for_each(|(limit, lane)| *limit = limit.min(lane));
+            limits
+                .iter_mut()
+                .zip(lanes)
+                .for_each(|(limit, lane)| *limit = limit.min(lane));
         }
-        let turning = (limits[1] * radius_mm).sqrt().min((limits[2] * radius_mm * radius_mm).cbrt());
-        self.take(rest_to_rest_s(length_mm, limits[0].min(turning), limits[1], limits[2]))
+        let turning = (limits[1] * radius_mm)
+            .sqrt()
+            .min((limits[2] * radius_mm * radius_mm).cbrt());
+        self.take(rest_to_rest_s(
+            length_mm,
+            limits[0].min(turning),
+            limits[1],
+            limits[2],
+        ))
     }
 
     fn take(&mut self, time_s: f64) -> bool {
@@ -241,7 +301,10 @@ impl Program<'_> {
 
     /// Writes a straight motion to `to`, if there is time for it.
     fn straight_to(&mut self, word: &str, to: &[(usize, f64)]) -> bool {
-        let moved: Vec<(usize, f64)> = to.iter().map(|(axis, place)| (*axis, place - self.at[*axis])).collect();
+        let moved: Vec<(usize, f64)> = to
+            .iter()
+            .map(|(axis, place)| (*axis, place - self.at[*axis]))
+            .collect();
         if !self.spend(&moved, word == "G0") {
             return false;
         }

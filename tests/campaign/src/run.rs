@@ -49,7 +49,9 @@ pub fn registry() -> Registry {
         tandem_sim::PLUGIN,
     ];
     for plugin in linked {
-        registry.register(plugin).expect("each plugin has a name of its own");
+        registry
+            .register(plugin)
+            .expect("each plugin has a name of its own");
     }
     registry
 }
@@ -64,7 +66,10 @@ pub fn run(case: &Case, folder: &Path, registry: &Registry) -> Report {
         Err(panic) => {
             let text = panic.downcast_ref::<String>().cloned();
             let text = text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
-            Report { planner, ..Report::failed("panic", text.unwrap_or_else(|| "without words".to_string())) }
+            Report {
+                planner,
+                ..Report::failed("panic", text.unwrap_or_else(|| "without words".to_string()))
+            }
         }
     }
 }
@@ -99,16 +104,21 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
     }
     let asked = Asked::of(case, &machine).map_err(wrong)?;
     let bound_s = Bound::of(&program, &machine, &judging, asked.filter_s).map_err(wrong)?;
-    let until_s = asked.last_tick as f64 * machine.fine_period_s + asked.stalled as f64 * machine.rough_period_s;
+    let until_s = asked.last_tick as f64 * machine.fine_period_s
+        + asked.stalled as f64 * machine.rough_period_s;
     let most_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MOST_SAMPLES);
     let parsed = tandem_gcode::Program::open(&program).map_err(|e| wrong(e.to_string()))?;
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());
     let run = prepared.map_err(|refusal| Box::new(refused(&refusal)))?;
     let mut kept = Kept::new(&machine, most_samples);
-    let driven = catch_unwind(AssertUnwindSafe(|| run.drive(Clock::Virtual, &asked.commands, &mut kept)));
+    let driven = catch_unwind(AssertUnwindSafe(|| {
+        run.drive(Clock::Virtual, &asked.commands, &mut kept)
+    }));
     let outcome = match driven {
-        Ok(outcome) => Some(outcome.map_err(|e| Box::new(Report::failed("refused-in-run", e.to_string())))?),
+        Ok(outcome) => {
+            Some(outcome.map_err(|e| Box::new(Report::failed("refused-in-run", e.to_string())))?)
+        }
         Err(panic) if panic.is::<TooLong>() => None,
         Err(panic) => resume_unwind(panic),
     };
@@ -119,15 +129,26 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
         most_samples,
         memory_mb: most_memory_mb(),
     };
-    Ok(Driven { ran, judging, asked })
+    Ok(Driven {
+        ran,
+        judging,
+        asked,
+    })
 }
 
 /// What was refused before anything moved: the place and the reason are part of it.
 fn refused(refusal: &HostError) -> Report {
-    let HostError::Check(report) = refusal else { return Report::failed("refused-machine", refusal.to_string()) };
+    let HostError::Check(report) = refusal else {
+        return Report::failed("refused-machine", refusal.to_string());
+    };
     let first = report.diagnostics.first();
-    let place = |d: &tandem_gcode::Diagnostic| format!("line {}:{}: {}", d.line, d.column, d.message);
-    Report { kind: "refused".to_string(), why: first.map_or_else(String::new, place), ..Report::default() }
+    let place =
+        |d: &tandem_gcode::Diagnostic| format!("line {}:{}: {}", d.line, d.column, d.message);
+    Report {
+        kind: "refused".to_string(),
+        why: first.map_or_else(String::new, place),
+        ..Report::default()
+    }
 }
 
 /// Ends a run from its observer.
@@ -143,26 +164,47 @@ struct Kept {
 
 impl Kept {
     fn new(machine: &Machine, most: usize) -> Self {
-        let axis = |axis| (axis_index(machine.axes.letter(axis)).unwrap_or_default(), machine.axes.is_rotary(axis));
+        let axis = |axis| {
+            (
+                axis_index(machine.axes.letter(axis)).unwrap_or_default(),
+                machine.axes.is_rotary(axis),
+            )
+        };
         let axes = (0..machine.axes.count()).map(axis).collect();
-        Self { rows: vec![], longest_step_mm: 0.0, axes, period_s: machine.fine_period_s, most }
+        Self {
+            rows: vec![],
+            longest_step_mm: 0.0,
+            axes,
+            period_s: machine.fine_period_s,
+            most,
+        }
     }
 }
 
 impl RunObserver for Kept {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
-        let mut row = Row { t_s: TraceCsv::t_s(sample.tick, self.period_s), line: sample.line, ..Row::default() };
+        let mut row = Row {
+            t_s: TraceCsv::t_s(sample.tick, self.period_s),
+            line: sample.line,
+            ..Row::default()
+        };
         for (from, &(to, rotary)) in self.axes.iter().enumerate() {
             let at = sample.command[from];
             row.command[to] = if rotary { at.to_degrees() } else { at };
         }
         // Where only rotary axes move, the feed is theirs.
         let moves = |axis: &(usize, bool)| {
-            !axis.1 && self.rows.last().is_some_and(|last| last.command[axis.0] != row.command[axis.0])
+            !axis.1
+                && self
+                    .rows
+                    .last()
+                    .is_some_and(|last| last.command[axis.0] != row.command[axis.0])
         };
         let turns = self.axes.iter().any(|axis| axis.1) && !self.axes.iter().any(moves);
         let step = sample.feed_mm_per_s * self.period_s;
-        self.longest_step_mm = self.longest_step_mm.max(if turns { step.to_degrees() } else { step });
+        self.longest_step_mm =
+            self.longest_step_mm
+                .max(if turns { step.to_degrees() } else { step });
         self.rows.push(row);
         if self.rows.len() > self.most {
             resume_unwind(Box::new(TooLong));
@@ -175,7 +217,8 @@ impl Ran {
     pub fn stands_still(&self, fine_period_s: f64) -> bool {
         let still = ((STILL_S / fine_period_s) as usize).min(self.rows.len());
         let end = &self.rows[self.rows.len() - still..];
-        end.windows(2).all(|pair| pair[0].command == pair[1].command)
+        end.windows(2)
+            .all(|pair| pair[0].command == pair[1].command)
     }
 }
 
@@ -188,6 +231,12 @@ fn forget_most_memory() {
 fn most_memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kilobytes = line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<f64>().ok());
+    let kilobytes = line.and_then(|rest| {
+        rest.trim()
+            .trim_end_matches("kB")
+            .trim()
+            .parse::<f64>()
+            .ok()
+    });
     kilobytes.map_or(0.0, |kb| kb / 1024.0)
 }

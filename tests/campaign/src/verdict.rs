@@ -40,7 +40,11 @@ pub struct Report {
 impl Report {
     /// A failure.
     pub fn failed(kind: &str, why: impl Into<String>) -> Self {
-        Self { kind: kind.to_string(), why: why.into(), ..Self::default() }
+        Self {
+            kind: kind.to_string(),
+            why: why.into(),
+            ..Self::default()
+        }
     }
 
     /// Whether it is one: neither clean nor refused with a reason.
@@ -52,10 +56,22 @@ impl Report {
 impl Case {
     /// The planner of the machine, with its form where it has several.
     pub fn planner(&self) -> String {
-        let Ok(table) = self.machine.text().parse::<Table>() else { return "unknown".to_string() };
-        let Some(planner) = table.get("planner") else { return "unknown".to_string() };
-        let option = |key: &str| planner.get("options").and_then(|options| options.get(key)?.as_str());
-        let name = planner.get("plugin").and_then(toml::Value::as_str).unwrap_or("unknown").to_string();
+        let Ok(table) = self.machine.text().parse::<Table>() else {
+            return "unknown".to_string();
+        };
+        let Some(planner) = table.get("planner") else {
+            return "unknown".to_string();
+        };
+        let option = |key: &str| {
+            planner
+                .get("options")
+                .and_then(|options| options.get(key)?.as_str())
+        };
+        let name = planner
+            .get("plugin")
+            .and_then(toml::Value::as_str)
+            .unwrap_or("unknown")
+            .to_string();
         match (name.as_str(), option("form"), option("limits")) {
             ("nurbs", form, _) => format!("nurbs {}", form.unwrap_or("scan")),
             ("block-overlap", _, limits) => format!("block-overlap {}", limits.unwrap_or("slow")),
@@ -103,21 +119,54 @@ impl Asked {
             timed.command.check(machine.motion.max_feed_ratio)?;
             commands.push(timed);
         }
-        if commands.windows(2).any(|pair: &[Timed]| pair[1].tick < pair[0].tick) {
+        if commands
+            .windows(2)
+            .any(|pair: &[Timed]| pair[1].tick < pair[0].tick)
+        {
             return Err("commands are not in order".to_string());
         }
-        let stalled = |timed: &Timed| if let Command::StallRough(periods) = timed.command { periods } else { 0 };
-        let ratio = |timed: &Timed| if let Command::FeedOverride(ratio) = timed.command { ratio } else { 1.0 };
-        let emergency = commands.iter().find(|timed| timed.command == Command::EmergencyStop).map(|timed| timed.tick);
-        let options: Table = case.machine.text().parse().map_err(|e: toml::de::Error| e.to_string())?;
+        let stalled = |timed: &Timed| {
+            if let Command::StallRough(periods) = timed.command {
+                periods
+            } else {
+                0
+            }
+        };
+        let ratio = |timed: &Timed| {
+            if let Command::FeedOverride(ratio) = timed.command {
+                ratio
+            } else {
+                1.0
+            }
+        };
+        let emergency = commands
+            .iter()
+            .find(|timed| timed.command == Command::EmergencyStop)
+            .map(|timed| timed.tick);
+        let options: Table = case
+            .machine
+            .text()
+            .parse()
+            .map_err(|e: toml::de::Error| e.to_string())?;
         let option = |key: &str| options.get("planner")?.get("options")?.get(key);
-        let constant_ms = option("time_constant_ms").and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
-        let settles = if option("filter").and_then(toml::Value::as_str) == Some("exponential") { 40.0 } else { 1.5 };
+        let constant_ms = option("time_constant_ms")
+            .and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
+        let settles = if option("filter").and_then(toml::Value::as_str) == Some("exponential") {
+            40.0
+        } else {
+            1.5
+        };
         let planner = Planner::named(&machine.planner.plugin);
-        let filter_ms =
-            if planner == Some(Planner::AfterInterpolation) { settles * constant_ms.unwrap_or(50.0) } else { 0.0 };
-        let slowest_s =
-            machine.limits.axes().iter().map(|a| a.feed_mm_per_s.max(a.rapid_mm_per_s) / a.acceleration_mm_per_s2);
+        let filter_ms = if planner == Some(Planner::AfterInterpolation) {
+            settles * constant_ms.unwrap_or(50.0)
+        } else {
+            0.0
+        };
+        let slowest_s = machine
+            .limits
+            .axes()
+            .iter()
+            .map(|a| a.feed_mm_per_s.max(a.rapid_mm_per_s) / a.acceleration_mm_per_s2);
         Ok(Self {
             planner,
             last_tick: commands.last().map_or(0, |timed| timed.tick),
@@ -135,7 +184,12 @@ impl Asked {
     }
 
     /// What the oracle is asked.
-    fn options(&self, judging: &tandem_oracle::Machine, trace: &Trace, longest_step_mm: f64) -> Options {
+    fn options(
+        &self,
+        judging: &tandem_oracle::Machine,
+        trace: &Trace,
+        longest_step_mm: f64,
+    ) -> Options {
         let mut options = Options::for_machine(judging);
         options.max_ratio = self.max_ratio;
         let on_the_path = |options: &mut Options| {
@@ -151,9 +205,12 @@ impl Asked {
             Some(Planner::BlockOverlap) => {
                 options.feed_window_s = Some(self.overlap_s);
                 // Its corners keep the tolerance; the chords between samples lie off the path besides.
-                options.vertex_tolerance_mm = Some(self.widest_tolerance_mm + longest_step_mm / 2.0);
+                options.vertex_tolerance_mm =
+                    Some(self.widest_tolerance_mm + longest_step_mm / 2.0);
                 if self.off_the_path {
-                    options.checks.retain(|check| ![Check::Path, Check::Vertices, Check::Feed].contains(check));
+                    options.checks.retain(|check| {
+                        ![Check::Path, Check::Vertices, Check::Feed].contains(check)
+                    });
                 }
             }
             Some(Planner::Smooth) => {}
@@ -167,15 +224,25 @@ impl Asked {
             }
         }
         options.ends_early = self.aborted || self.emergency.is_some();
-        options.path_until_s = self.emergency.map(|tick| (tick as f64 - 0.5) * self.fine_period_s);
+        options.path_until_s = self
+            .emergency
+            .map(|tick| (tick as f64 - 0.5) * self.fine_period_s);
         options
     }
 }
 
 /// The greatest number behind `word` in the program, or `or` where that is greater.
 fn greatest(case: &Case, word: &str, or: f64) -> f64 {
-    let words = case.program.lines().filter_map(|line| line.split(word).nth(1));
-    let number = |rest: &str| rest.split(|c: char| !c.is_ascii_digit() && c != '.').next()?.parse::<f64>().ok();
+    let words = case
+        .program
+        .lines()
+        .filter_map(|line| line.split(word).nth(1));
+    let number = |rest: &str| {
+        rest.split(|c: char| !c.is_ascii_digit() && c != '.')
+            .next()?
+            .parse::<f64>()
+            .ok()
+    };
     words.filter_map(number).fold(or, f64::max)
 }
 
@@ -189,7 +256,11 @@ fn longest_constant_s(case: &Case, machine: &Machine) -> f64 {
 
 fn longest_chord(trace: &Trace) -> f64 {
     let chord = |pair: &[tandem_oracle::Row]| {
-        let squares = pair[0].command.iter().zip(&pair[1].command).map(|(a, b)| (b - a).powi(2));
+        let squares = pair[0]
+            .command
+            .iter()
+            .zip(&pair[1].command)
+            .map(|(a, b)| (b - a).powi(2));
         squares.sum::<f64>().sqrt()
     };
     trace.rows.windows(2).map(chord).fold(0.0, f64::max)
@@ -200,10 +271,24 @@ pub fn judge(ran: &Ran, case: &Case, judging: &tandem_oracle::Machine, asked: &A
     let (samples, memory_mb) = (ran.rows.len() as u64, ran.memory_mb);
     let report = ended(ran, asked)
         .or_else(|| judged(ran, case, judging, asked))
-        .or_else(|| ran.outcome.as_ref().and_then(|outcome| counted(outcome, asked)))
-        .or_else(|| (memory_mb > MOST_MEMORY_MB).then(|| Report::failed("memory", format!("{memory_mb:.0} MB"))));
-    let clean = || Report { kind: "clean".to_string(), ..Report::default() };
-    Report { samples, memory_mb, ..report.unwrap_or_else(clean) }
+        .or_else(|| {
+            ran.outcome
+                .as_ref()
+                .and_then(|outcome| counted(outcome, asked))
+        })
+        .or_else(|| {
+            (memory_mb > MOST_MEMORY_MB)
+                .then(|| Report::failed("memory", format!("{memory_mb:.0} MB")))
+        });
+    let clean = || Report {
+        kind: "clean".to_string(),
+        ..Report::default()
+    };
+    Report {
+        samples,
+        memory_mb,
+        ..report.unwrap_or_else(clean)
+    }
 }
 
 /// What is wrong with how it ended.
@@ -212,7 +297,10 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
         let still = ran.stands_still(asked.fine_period_s);
         let time_s = ran.rows.len() as f64 * asked.fine_period_s;
         let line = ran.rows.last().map_or(0, |row| row.line);
-        let words = format!("after {time_s:.2} s ({} samples) it is on line {line}", ran.most_samples);
+        let words = format!(
+            "after {time_s:.2} s ({} samples) it is on line {line}",
+            ran.most_samples
+        );
         let kind = if still {
             "standstill"
         } else if ran.most_samples == MOST_SAMPLES {
@@ -226,9 +314,17 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
     match (&summary.fault, &summary.stopped) {
         (Some(fault), _) if asked.emergency.is_none() || !fault.contains("emergency") => {
             // The words of the host for a run in which program time passes no more.
-            let still = fault.contains("nothing has moved") || fault.contains("stands still though nothing stops it");
+            let still = fault.contains("nothing has moved")
+                || fault.contains("stands still though nothing stops it");
             let kind = if still { "standstill" } else { "fault" };
-            Some(Report::failed(if summary.guard_stops > 0 { "guard" } else { kind }, fault))
+            Some(Report::failed(
+                if summary.guard_stops > 0 {
+                    "guard"
+                } else {
+                    kind
+                },
+                fault,
+            ))
         }
         (None, Some(stopped)) if !asked.aborted => Some(Report::failed("standstill", stopped)),
         _ => None,
@@ -236,23 +332,52 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
 }
 
 /// The worst of what the oracle finds.
-fn judged(ran: &Ran, case: &Case, judging: &tandem_oracle::Machine, asked: &Asked) -> Option<Report> {
+fn judged(
+    ran: &Ran,
+    case: &Case,
+    judging: &tandem_oracle::Machine,
+    asked: &Asked,
+) -> Option<Report> {
     let axes = judging.axes.iter().map(|axis| axis.index).collect();
-    let degrees = judging.axes.iter().filter(|axis| axis.rotary).map(|axis| axis.index).collect();
-    let trace = Trace { axes, degrees, rows: ran.rows.clone(), not_finite: vec![] };
+    let degrees = judging
+        .axes
+        .iter()
+        .filter(|axis| axis.rotary)
+        .map(|axis| axis.index)
+        .collect();
+    let trace = Trace {
+        axes,
+        degrees,
+        rows: ran.rows.clone(),
+        not_finite: vec![],
+    };
     let options = asked.options(judging, &trace, ran.longest_step_mm);
     let verdict = tandem_oracle::judge(&trace, &case.program, judging, &options);
     let found = |kind: Kind| {
         let rounded = |finding: &Finding| kind == Kind::Travel && size(finding) < ROUNDED_MM;
-        let of_kind = verdict.findings.iter().filter(move |finding| finding.kind == kind && !rounded(finding));
+        let of_kind = verdict
+            .findings
+            .iter()
+            .filter(move |finding| finding.kind == kind && !rounded(finding));
         let worst = of_kind.clone().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let count = of_kind.count();
         let words = format!("{count} samples, the worst: {}", words(worst));
         let little = kind == Kind::Feed && size(worst) < LITTLE_FEED;
-        Some(Report { size: size(worst), ..Report::failed(if little { "feed-little" } else { name(kind) }, words) })
+        Some(Report {
+            size: size(worst),
+            ..Report::failed(if little { "feed-little" } else { name(kind) }, words)
+        })
     };
-    let reason = || verdict.not_judged.clone().map(|reason| Report::failed("not-judged", reason));
-    KINDS.into_iter().find_map(|(kind, _)| found(kind)).or_else(reason)
+    let reason = || {
+        verdict
+            .not_judged
+            .clone()
+            .map(|reason| Report::failed("not-judged", reason))
+    };
+    KINDS
+        .into_iter()
+        .find_map(|(kind, _)| found(kind))
+        .or_else(reason)
 }
 
 /// The kinds of the oracle, what harms most first.
@@ -273,7 +398,10 @@ const KINDS: [(Kind, &str); 13] = [
 ];
 
 fn name(kind: Kind) -> &'static str {
-    KINDS.into_iter().find(|(of, _)| *of == kind).map_or("other", |(_, name)| name)
+    KINDS
+        .into_iter()
+        .find(|(of, _)| *of == kind)
+        .map_or("other", |(_, name)| name)
 }
 
 /// How far beyond its limit: relative, or mm for travel.
@@ -287,8 +415,13 @@ fn size(finding: &Finding) -> f64 {
 }
 
 fn words(finding: &Finding) -> String {
-    let axis = finding.axis.map_or_else(String::new, |axis| format!(" of {}", tandem_oracle::LETTERS[axis]));
-    let joint = finding.joint.as_ref().map_or_else(String::new, |joint| format!(" (joint {joint})"));
+    let axis = finding.axis.map_or_else(String::new, |axis| {
+        format!(" of {}", tandem_oracle::LETTERS[axis])
+    });
+    let joint = finding
+        .joint
+        .as_ref()
+        .map_or_else(String::new, |joint| format!(" (joint {joint})"));
     format!(
         "sample {}, line {}: {}{axis}{joint} {:e} for {:e}",
         finding.sample,
@@ -310,6 +443,11 @@ fn counted(outcome: &Outcome, asked: &Asked) -> Option<Report> {
         ("starvation", summary.starvations, asked.stalled == 0),
         ("lost", summary.lost_samples, true),
     ];
-    let wrong = counts.into_iter().find(|(_, count, judged)| *judged && *count > 0);
-    wrong.map(|(kind, count, _)| Report { size: count as f64, ..Report::failed(kind, format!("{count} of them")) })
+    let wrong = counts
+        .into_iter()
+        .find(|(_, count, judged)| *judged && *count > 0);
+    wrong.map(|(kind, count, _)| Report {
+        size: count as f64,
+        ..Report::failed(kind, format!("{count} of them"))
+    })
 }

@@ -27,7 +27,13 @@ const MOST_WORDS: usize = 300;
 pub fn serve() -> std::io::Result<()> {
     // A panic is told in the report.
     std::panic::set_hook(Box::new(|_| ()));
-    let _ = setrlimit(Resource::As, Rlimit { current: Some(MOST_BYTES), maximum: Some(MOST_BYTES) });
+    let _ = setrlimit(
+        Resource::As,
+        Rlimit {
+            current: Some(MOST_BYTES),
+            maximum: Some(MOST_BYTES),
+        },
+    );
     let registry = registry();
     let mut out = std::io::stdout().lock();
     for line in std::io::stdin().lock().lines() {
@@ -43,7 +49,14 @@ pub fn serve() -> std::io::Result<()> {
 }
 
 fn written(report: &Report) -> String {
-    let Report { planner, kind, why, size, samples, memory_mb } = report;
+    let Report {
+        planner,
+        kind,
+        why,
+        size,
+        samples,
+        memory_mb,
+    } = report;
     let why = why.replace(['\n', '\t'], " ");
     format!("{planner}\t{kind}\t{size}\t{samples}\t{memory_mb}\t{why}")
 }
@@ -79,13 +92,20 @@ struct Process {
 impl Worker {
     /// A worker made of `binary`, which works in `folder` and gets at most `patience` for each run.
     pub fn new(binary: &Path, folder: &Path, patience: Duration) -> Self {
-        Self { binary: binary.to_owned(), folder: folder.to_owned(), patience, process: None }
+        Self {
+            binary: binary.to_owned(),
+            folder: folder.to_owned(),
+            patience,
+            process: None,
+        }
     }
 
     /// Drives a case. A worker that dies or does not answer is replaced, and its run has failed.
     pub fn run(&mut self, case: &Case) -> Report {
         let planner = case.planner();
-        let report = self.attempt(case).unwrap_or_else(|cause| Report::failed("no-worker", cause));
+        let report = self
+            .attempt(case)
+            .unwrap_or_else(|cause| Report::failed("no-worker", cause));
         Report { planner, ..report }
     }
 
@@ -103,11 +123,18 @@ impl Worker {
             }
             Err(RecvTimeoutError::Timeout) => {
                 process.end();
-                Ok(Report::failed("hang", format!("no answer within {} s", self.patience.as_secs())))
+                Ok(Report::failed(
+                    "hang",
+                    format!("no answer within {} s", self.patience.as_secs()),
+                ))
             }
             Err(RecvTimeoutError::Disconnected) => {
                 let (status, words) = process.end();
-                let kind = if words.contains("memory allocation") { "memory" } else { "abort" };
+                let kind = if words.contains("memory allocation") {
+                    "memory"
+                } else {
+                    "abort"
+                };
                 Ok(Report::failed(kind, format!("{status} {words}")))
             }
         }
@@ -125,18 +152,34 @@ impl Drop for Worker {
 impl Process {
     fn start(binary: &Path) -> Result<Self, String> {
         let mut command = Command::new(binary);
-        command.arg(WORKER).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|e| format!("{}: {e}", binary.display()))?;
+        command
+            .arg(WORKER)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut child = command
+            .spawn()
+            .map_err(|e| format!("{}: {e}", binary.display()))?;
         let taken = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(input), Some(output), Some(errors)) = taken else { return Err("a worker without pipes".to_string()) };
-        Ok(Self { child, input, lines: lines_of(output), errors: lines_of(errors) })
+        let (Some(input), Some(output), Some(errors)) = taken else {
+            return Err("a worker without pipes".to_string());
+        };
+        Ok(Self {
+            child,
+            input,
+            lines: lines_of(output),
+            errors: lines_of(errors),
+        })
     }
 
     /// Ends it; how it ended, and what it said.
     fn end(mut self) -> (String, String) {
         drop(self.input);
         let _ = self.child.kill();
-        let status = self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string());
+        let status = self
+            .child
+            .wait()
+            .map_or_else(|e| e.to_string(), |status| status.to_string());
         let words: Vec<String> = self.errors.iter().collect();
         (status, words.join(" ").chars().take(MOST_WORDS).collect())
     }

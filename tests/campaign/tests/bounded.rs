@@ -14,8 +14,14 @@ const SEEDS: std::ops::RangeInclusive<u64> = 1..=1500;
 fn random_machines_are_driven_within_their_limits() {
     let asked = std::env::var("TANDEM_SEEDS").ok();
     let range = asked.as_deref().and_then(|text| text.split_once(".."));
-    let seeds = range.map_or(SEEDS, |(first, last)| first.parse().expect("a seed")..=last.parse().expect("a seed"));
-    println!("seeds {} to {}, or TANDEM_SEEDS", seeds.start(), seeds.end());
+    let seeds = range.map_or(SEEDS, |(first, last)| {
+        first.parse().expect("a seed")..=last.parse().expect("a seed")
+    });
+    println!(
+        "seeds {} to {}, or TANDEM_SEEDS",
+        seeds.start(),
+        seeds.end()
+    );
     let out: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign");
     let plan = Plan {
         seeds,
@@ -29,5 +35,10 @@ fn random_machines_are_driven_within_their_limits() {
     };
     let tally = campaign(&plan, &|words| print!("{words}"));
     println!("{}", tally.table());
-    assert!(tally.passed(), "{} runs failed, {} programs were refused", tally.failed.len(), tally.refused.len());
+    assert!(
+        tally.passed(),
+        "{} runs failed, {} programs were refused",
+        tally.failed.len(),
+        tally.refused.len()
+    );
 }

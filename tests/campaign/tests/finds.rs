@@ -11,8 +11,8 @@ use tandem_campaign::worker::Worker;
 use tandem_host::Registry;
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext, PlannerDescription, Plugin,
-    PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext,
+    PlannerDescription, Plugin, PluginError, Segment, SegmentSink,
 };
 
 /// Changes what the look-ahead planner emits.
@@ -49,11 +49,23 @@ impl Planner for Bent {
     fn finish(&mut self) {
         self.inner.finish();
     }
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
-        let answer = self.inner.advance(duration_s, &mut BentSink(sink, self.bend))?;
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
+        let answer = self
+            .inner
+            .advance(duration_s, &mut BentSink(sink, self.bend))?;
         if self.endless && answer.done == 1 {
-            sink.segment(&Segment::rest(&AxisVector::from_slice(&[40.0, 3.0]), duration_s));
-            return Ok(Advanced { duration_s, done: 0 });
+            sink.segment(&Segment::rest(
+                &AxisVector::from_slice(&[40.0, 3.0]),
+                duration_s,
+            ));
+            return Ok(Advanced {
+                duration_s,
+                done: 0,
+            });
         }
         Ok(answer)
     }
@@ -62,25 +74,42 @@ impl Planner for Bent {
     }
 }
 
-fn bent(options: &Options, context: &PlannerContext, bend: fn(&mut Segment)) -> Result<Bent, PluginError> {
-    Ok(Bent { inner: LookAhead::new(options, context)?, bend, endless: false })
+fn bent(
+    options: &Options,
+    context: &PlannerContext,
+    bend: fn(&mut Segment),
+) -> Result<Bent, PluginError> {
+    Ok(Bent {
+        inner: LookAhead::new(options, context)?,
+        bend,
+        endless: false,
+    })
 }
 
 /// Every axis accelerates 1 % too hard.
 fn too_hard(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut context = *context;
-    context.limits.axes.iter_mut().for_each(|axis| axis.acceleration_mm_per_s2 *= 1.01);
+    context
+        .limits
+        .axes
+        .iter_mut()
+        .for_each(|axis| axis.acceleration_mm_per_s2 *= 1.01);
     bent(options, &context, |_| ())
 }
 
 /// Everything 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    bent(options, context, |segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01))
+    bent(options, context, |segment| {
+        segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01)
+    })
 }
 
 /// It rests at the end and never says so.
 fn endless(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    Ok(Bent { endless: true, ..bent(options, context, |_| ())? })
+    Ok(Bent {
+        endless: true,
+        ..bent(options, context, |_| ())?
+    })
 }
 
 const MACHINE: &str = "format = 1
@@ -138,9 +167,15 @@ fn what_keeps_everything_is_clean() {
 fn a_limit_exceeded_by_one_percent_is_found() {
     let defective = tandem_sdk::local_plugin!(planner "look-ahead" = too_hard);
     // With nothing asked for, so that the governor has no other reason to slow down.
-    let case = Case { commands: String::new(), ..case() };
+    let case = Case {
+        commands: String::new(),
+        ..case()
+    };
     let report = judged(&case, &registry_with(defective));
-    assert!(["governed", "acceleration", "violations"].contains(&report.kind.as_str()), "{report:?}");
+    assert!(
+        ["governed", "acceleration", "violations"].contains(&report.kind.as_str()),
+        "{report:?}"
+    );
 }
 
 #[test]
@@ -161,31 +196,53 @@ fn a_machine_that_never_arrives_is_found() {
 #[test]
 fn one_sample_that_was_moved_is_found() {
     let (case, folder) = (case(), tempfile::tempdir().unwrap());
-    let mut driven = drive(&case, folder.path(), &registry()).unwrap_or_else(|report| panic!("{report:?}"));
-    assert_eq!(judge(&driven.ran, &case, &driven.judging, &driven.asked).kind, "clean");
+    let mut driven =
+        drive(&case, folder.path(), &registry()).unwrap_or_else(|report| panic!("{report:?}"));
+    assert_eq!(
+        judge(&driven.ran, &case, &driven.judging, &driven.asked).kind,
+        "clean"
+    );
     let middle = driven.ran.rows.len() / 2;
     driven.ran.rows[middle].command[1] += 1e-4;
     let report = judge(&driven.ran, &case, &driven.judging, &driven.asked);
-    assert!(["acceleration", "speed-step", "path"].contains(&report.kind.as_str()), "{report:?}");
+    assert!(
+        ["acceleration", "speed-step", "path"].contains(&report.kind.as_str()),
+        "{report:?}"
+    );
     driven.ran.rows[middle].command[1] -= 1e-4;
     driven.ran.rows.truncate(middle);
     let report = judge(&driven.ran, &case, &driven.judging, &driven.asked);
-    assert!(report.is_failure(), "a record that ends in the middle: {report:?}");
+    assert!(
+        report.is_failure(),
+        "a record that ends in the middle: {report:?}"
+    );
 }
 
 #[test]
 fn a_failing_case_becomes_small() {
     let defective = tandem_sdk::local_plugin!(planner "look-ahead" = too_far);
     let (registry, folder) = (registry_with(defective), tempfile::tempdir().unwrap());
-    let program = "G21 G90\nF3000\nG4 P0.01\nG1 X10 Y3\nG1 X20.123 Y5\nG0 X0\nG1 X40\nG1 Y7\nM2\n".to_string();
+    let program = "G21 G90\nF3000\nG4 P0.01\nG1 X10 Y3\nG1 X20.123 Y5\nG0 X0\nG1 X40\nG1 Y7\nM2\n"
+        .to_string();
     let case = Case { program, ..case() };
     let mut again = |case: &Case| run(case, folder.path(), &registry);
     let first = again(&case);
     let (smallest, last) = minimise(&mut again, &case, &first, 400);
-    assert_eq!((first.kind.as_str(), last.kind.as_str()), ("travel", "travel"));
+    assert_eq!(
+        (first.kind.as_str(), last.kind.as_str()),
+        ("travel", "travel")
+    );
     assert!(smallest.commands.is_empty(), "{}", smallest.commands);
-    assert!(smallest.program.lines().count() <= 3, "{}", smallest.program);
-    assert!(!smallest.machine.text().contains("[axes.y]"), "{}", smallest.machine.text());
+    assert!(
+        smallest.program.lines().count() <= 3,
+        "{}",
+        smallest.program
+    );
+    assert!(
+        !smallest.machine.text().contains("[axes.y]"),
+        "{}",
+        smallest.machine.text()
+    );
 }
 
 #[test]
@@ -197,12 +254,26 @@ fn a_worker_that_dies_or_hangs_is_one_failed_run() {
         let mut mode = std::fs::metadata(&path).unwrap().permissions();
         std::os::unix::fs::PermissionsExt::set_mode(&mut mode, 0o755);
         std::fs::set_permissions(&path, mode).unwrap();
-        Worker::new(&path, &folder.path().join("work"), Duration::from_secs(patience_s)).run(&case())
+        Worker::new(
+            &path,
+            &folder.path().join("work"),
+            Duration::from_secs(patience_s),
+        )
+        .run(&case())
     };
     assert_eq!(worker("dies", "kill -ABRT $$", 60).kind, "abort");
-    assert_eq!(worker("asks", "echo 'memory allocation of 9 bytes failed' >&2; kill -ABRT $$", 60).kind, "memory");
+    assert_eq!(
+        worker(
+            "asks",
+            "echo 'memory allocation of 9 bytes failed' >&2; kill -ABRT $$",
+            60
+        )
+        .kind,
+        "memory"
+    );
     assert_eq!(worker("hangs", "exec sleep 600", 1).kind, "hang");
     let real = Path::new(env!("CARGO_BIN_EXE_tandem-campaign"));
-    let report = Worker::new(real, &folder.path().join("work"), Duration::from_mins(2)).run(&case());
+    let report =
+        Worker::new(real, &folder.path().join("work"), Duration::from_mins(2)).run(&case());
     assert_eq!(report.kind, "clean", "{report:?}");
 }

@@ -40,5 +40,4 @@ pub fn counts() -> bool {
 }
 
 /// Why allocations are not judged where the allocator does not count.
-pub const NOT_COUNTED: &str =
-    "a shared library allocates unseen; a test of the crate with CountingAllocator as its global allocator sees it";
+pub const NOT_COUNTED: &str = "a shared library allocates unseen; a test of the crate with CountingAllocator as its global allocator sees it";

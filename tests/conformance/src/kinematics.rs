@@ -16,11 +16,16 @@ const ROUND_TRIP_MM: f64 = 1e-9;
 pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     let axes = context(AxisVector::ZERO).axes;
     let open = |options: &str| plugin.kinematics(options, &KinematicsContext::new(axes));
-    let (Some(first), Ok(second)) = (crate::open(setup, report, open), open(&setup.options)) else { return };
+    let (Some(first), Ok(second)) = (crate::open(setup, report, open), open(&setup.options)) else {
+        return;
+    };
     report.judged("joints");
     let joints = first.joint_count(axes.count());
     if !(axes.count()..=MAX_AXES).contains(&joints) {
-        report.find("joints", format!("{joints} joints for {} axes", axes.count()));
+        report.find(
+            "joints",
+            format!("{joints} joints for {} axes", axes.count()),
+        );
     }
     let mut random = Random::new(setup.seed);
     let mut timings = [Timing::new("to_joints"), Timing::new("to_axes")];
@@ -32,17 +37,25 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     for _ in 0..PLACES {
         let place = AxisVector::from_slice(&[0; 3].map(|_| random.between(-REACH_MM, REACH_MM)));
         let before = heap::uses();
-        let found =
-            [round_trip(first.as_ref(), &place, &mut timings), differs(first.as_ref(), second.as_ref(), &place)];
+        let found = [
+            round_trip(first.as_ref(), &place, &mut timings),
+            differs(first.as_ref(), second.as_ref(), &place),
+        ];
         uses += heap::uses() - before;
         for (check, words) in checks.iter().zip(found) {
             if let Some(words) = words {
-                report.find(check, format!("at {:?}: {}", &place.0[..3], blamed(first.as_ref(), &words)));
+                report.find(
+                    check,
+                    format!("at {:?}: {}", &place.0[..3], blamed(first.as_ref(), &words)),
+                );
             }
         }
     }
     if let Err(error) = first.health() {
-        report.find("joints", format!("health of one that has not failed: {error}"));
+        report.find(
+            "joints",
+            format!("health of one that has not failed: {error}"),
+        );
     }
     judge_heap(uses, report);
     report.time(timings);
@@ -61,10 +74,16 @@ fn judge_heap(uses: u64, report: &mut Report) {
 
 /// What was found, with the plugin's own words where it has any.
 fn blamed(kinematics: &dyn Kinematics, words: &str) -> String {
-    kinematics.health().map_or_else(|error| format!("{words}: {error}"), |()| words.to_string())
+    kinematics
+        .health()
+        .map_or_else(|error| format!("{words}: {error}"), |()| words.to_string())
 }
 
-fn round_trip(kinematics: &dyn Kinematics, place: &AxisVector, timings: &mut [Timing; 2]) -> Option<String> {
+fn round_trip(
+    kinematics: &dyn Kinematics,
+    place: &AxisVector,
+    timings: &mut [Timing; 2],
+) -> Option<String> {
     let joints = timings[0].of(|| kinematics.to_joints(place));
     let back = timings[1].of(|| kinematics.to_axes(&joints));
     let off_mm = norm(&(back - *place));

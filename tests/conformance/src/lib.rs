@@ -58,7 +58,12 @@ pub struct Setup {
 impl Default for Setup {
     /// No options, seed 1, 10 programs, no metal.
     fn default() -> Self {
-        Self { options: String::new(), seed: 1, programs: 10, moves_metal: false }
+        Self {
+            options: String::new(),
+            seed: 1,
+            programs: 10,
+            moves_metal: false,
+        }
     }
 }
 
@@ -81,13 +86,22 @@ fn judge_description(plugin: Plugin, report: &mut Report) {
     report.judged(CHECK);
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     if plugin.name().is_empty() || !plugin.name().chars().all(plain) {
-        report.find(CHECK, format!("the name {:?} has other characters than a-z, 0-9 and -", plugin.name()));
+        report.find(
+            CHECK,
+            format!(
+                "the name {:?} has other characters than a-z, 0-9 and -",
+                plugin.name()
+            ),
+        );
     }
     match plugin.options() {
         Err(error) => report.find(CHECK, format!("options: {error}")),
         Ok(options) => {
             for option in options.iter().filter(|option| option.doc.is_empty()) {
-                report.find(CHECK, format!("the option {} has no documentation", option.key));
+                report.find(
+                    CHECK,
+                    format!("the option {} has no documentation", option.key),
+                );
             }
         }
     }
@@ -97,13 +111,22 @@ fn judge_description(plugin: Plugin, report: &mut Report) {
 const UNKNOWN_OPTION: &str = "no_plugin_has_this_option = 1\n";
 
 /// Opens a plugin with the setup's options, after it has refused an unknown one.
-fn open<T>(setup: &Setup, report: &mut Report, open: impl Fn(&str) -> Result<T, tandem_sdk::PluginError>) -> Option<T> {
+fn open<T>(
+    setup: &Setup,
+    report: &mut Report,
+    open: impl Fn(&str) -> Result<T, tandem_sdk::PluginError>,
+) -> Option<T> {
     const CHECK: &str = "options";
     report.judged(CHECK);
     match open(&format!("{UNKNOWN_OPTION}{}", setup.options)) {
-        Ok(_) => report.find(CHECK, "it takes an option that it does not know".to_string()),
+        Ok(_) => report.find(
+            CHECK,
+            "it takes an option that it does not know".to_string(),
+        ),
         Err(error) if error.is_panic() => report.find(CHECK, error.to_string()),
         Err(_) => {}
     }
-    open(&setup.options).map_err(|error| report.find(CHECK, format!("it does not open: {error}"))).ok()
+    open(&setup.options)
+        .map_err(|error| report.find(CHECK, format!("it does not open: {error}")))
+        .ok()
 }

@@ -28,12 +28,18 @@ pub fn samples(segments: &[Segment]) -> Vec<Sample> {
     let mut next_s = 0.0;
     for (index, segment) in segments.iter().enumerate() {
         while next_s < segment.duration_s {
-            samples.push(Sample { position: segment.position(next_s), segment: index });
+            samples.push(Sample {
+                position: segment.position(next_s),
+                segment: index,
+            });
             next_s += FINE_PERIOD_S;
         }
         next_s -= segment.duration_s;
         if segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
-            samples.push(Sample { position: segment.position(segment.duration_s), segment: index });
+            samples.push(Sample {
+                position: segment.position(segment.duration_s),
+                segment: index,
+            });
             next_s = FINE_PERIOD_S;
         }
     }
@@ -86,7 +92,11 @@ impl AxisJudge {
             return Some(format!("position {to} mm is outside the travel"));
         }
         let velocity = (to - from) / FINE_PERIOD_S;
-        let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
+        let most = if rapid {
+            limits.rapid_mm_per_s
+        } else {
+            limits.feed_mm_per_s
+        };
         if velocity.abs() > most * (1.0 + TOLERANCE) + 2.0 * ROUNDING_MM / FINE_PERIOD_S {
             return Some(format!("velocity {velocity:.6} mm/s, limit {most}"));
         }
@@ -98,13 +108,17 @@ impl AxisJudge {
             *bucket = (*bucket + sign * change - allowed).max(0.0);
             if *bucket > self.step_mm_per_s * (1.0 + TOLERANCE) + rounding {
                 let most = limits.acceleration_mm_per_s2;
-                return Some(format!("acceleration {acceleration:.3} mm/s² in a window already full, limit {most}"));
+                return Some(format!(
+                    "acceleration {acceleration:.3} mm/s² in a window already full, limit {most}"
+                ));
             }
         }
         let jerk = (acceleration - self.acceleration) / FINE_PERIOD_S;
-        let most = limits.jerk_mm_per_s3 * (1.0 + JERK_TOLERANCE) + 8.0 * ROUNDING_MM / FINE_PERIOD_S.powi(3);
+        let most = limits.jerk_mm_per_s3 * (1.0 + JERK_TOLERANCE)
+            + 8.0 * ROUNDING_MM / FINE_PERIOD_S.powi(3);
         (self.velocity, self.acceleration) = (velocity, acceleration);
-        (self.jerk && jerk.abs() > most).then(|| format!("jerk {jerk:.1} mm/s³, limit {}", limits.jerk_mm_per_s3))
+        (self.jerk && jerk.abs() > most)
+            .then(|| format!("jerk {jerk:.1} mm/s³, limit {}", limits.jerk_mm_per_s3))
     }
 }
 
@@ -115,7 +129,10 @@ mod tests {
 
     /// 1 s of constant acceleration in X, then the same back to rest.
     fn ramp(acceleration: f64) -> Vec<Segment> {
-        let (half, end) = (acceleration / 2.0, AxisVector::from_slice(&[acceleration * 0.01]));
+        let (half, end) = (
+            acceleration / 2.0,
+            AxisVector::from_slice(&[acceleration * 0.01]),
+        );
         let mut up = Segment::rest(&AxisVector::ZERO, 0.1);
         up.flags = SegmentFlags::BLOCK_BEGINS;
         up.coefficients[0][2] = half;
@@ -128,12 +145,23 @@ mod tests {
     fn one_percent_too_much_is_found() {
         let limits = context(AxisVector::ZERO).limits;
         let description = PlannerDescription::order_2();
-        let verdict = |segments: &[Segment]| judge(segments, &samples(segments), &limits, &description);
+        let verdict =
+            |segments: &[Segment]| judge(segments, &samples(segments), &limits, &description);
         assert_eq!(verdict(&ramp(1000.0)), None);
         let words = verdict(&ramp(1010.0)).unwrap();
-        assert!(words.contains("acceleration") && words.contains("axis 0"), "{words}");
-        let jerky = PlannerDescription { order: 3, ..description };
+        assert!(
+            words.contains("acceleration") && words.contains("axis 0"),
+            "{words}"
+        );
+        let jerky = PlannerDescription {
+            order: 3,
+            ..description
+        };
         let segments = ramp(900.0);
-        assert!(judge(&segments, &samples(&segments), &limits, &jerky).unwrap().contains("jerk"));
+        assert!(
+            judge(&segments, &samples(&segments), &limits, &jerky)
+                .unwrap()
+                .contains("jerk")
+        );
     }
 }

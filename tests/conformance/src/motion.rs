@@ -32,7 +32,11 @@ pub struct Timings {
 
 impl Default for Timings {
     fn default() -> Self {
-        Self { check: Timing::new("check"), accept: Timing::new("accept"), advance: Timing::new("advance") }
+        Self {
+            check: Timing::new("check"),
+            accept: Timing::new("accept"),
+            advance: Timing::new("advance"),
+        }
     }
 }
 
@@ -85,17 +89,26 @@ pub fn drive(
             finished = true;
         }
         let before = driven.segments.len();
-        let advanced = timings.advance.of(|| planner.advance(ROUGH_PERIOD_S, driven));
+        let advanced = timings
+            .advance
+            .of(|| planner.advance(ROUGH_PERIOD_S, driven));
         driven.heap_uses += heap::uses() - uses;
-        let advanced = advanced.map_err(|error| failed("advance", &blocks[next.min(blocks.len() - 1)], &error))?;
-        let emitted_s: f64 = driven.segments[before..].iter().map(|segment| segment.duration_s).sum();
+        let advanced = advanced
+            .map_err(|error| failed("advance", &blocks[next.min(blocks.len() - 1)], &error))?;
+        let emitted_s: f64 = driven.segments[before..]
+            .iter()
+            .map(|segment| segment.duration_s)
+            .sum();
         idle = if emitted_s > 0.0 { 0 } else { idle + 1 };
         expect(advanced.done != 0, advanced.duration_s, emitted_s)?;
         if advanced.done != 0 && finished {
             return Ok(());
         }
         if idle > IDLE_CALLS || driven.segments.len() > blocks.len() * SEGMENTS_PER_BLOCK {
-            return Err(Stuck { check: "progress", words: no_progress(next, blocks.len(), driven.segments.len()) });
+            return Err(Stuck {
+                check: "progress",
+                words: no_progress(next, blocks.len(), driven.segments.len()),
+            });
         }
     }
     Ok(())
@@ -109,17 +122,31 @@ fn expect(done: bool, said_s: f64, emitted_s: f64) -> Result<(), Stuck> {
         (true, true) => return Ok(()),
         (false, _) => format!("advance says {said_s} s and emits {emitted_s} s"),
         (_, false) => {
-            format!("advance emits {emitted_s} s of the {ROUGH_PERIOD_S} s it was asked for, and is not done")
+            format!(
+                "advance emits {emitted_s} s of the {ROUGH_PERIOD_S} s it was asked for, and is not done"
+            )
         }
     };
-    Err(Stuck { check: "progress", words })
+    Err(Stuck {
+        check: "progress",
+        words,
+    })
 }
 
 fn no_progress(taken: usize, blocks: usize, segments: usize) -> String {
-    format!("it has taken {taken} of {blocks} blocks, emitted {segments} segments, and does not come to an end")
+    format!(
+        "it has taken {taken} of {blocks} blocks, emitted {segments} segments, and does not come to an end"
+    )
 }
 
 fn failed(method: &str, block: &Block, error: &PluginError) -> Stuck {
-    let check = if error.is_panic() { "panics" } else { "lifecycle" };
-    Stuck { check, words: format!("{method}, block {}: {error}", block.index) }
+    let check = if error.is_panic() {
+        "panics"
+    } else {
+        "lifecycle"
+    };
+    Stuck {
+        check,
+        words: format!("{method}, block {}: {error}", block.index),
+    }
 }

@@ -6,7 +6,11 @@ use crate::report::Report;
 
 /// Blocks with one thing wrong, and what that is.
 fn blocks() -> Vec<(&'static str, Block)> {
-    let mut line = Block { kind: BlockKind::Line, feed_mm_per_s: 10.0, ..Block::at(AxisVector::ZERO) };
+    let mut line = Block {
+        kind: BlockKind::Line,
+        feed_mm_per_s: 10.0,
+        ..Block::at(AxisVector::ZERO)
+    };
     (line.end[0], line.length_mm) = (10.0, 10.0);
     let with = |change: &dyn Fn(&mut Block)| {
         let mut block = line;
@@ -14,14 +18,38 @@ fn blocks() -> Vec<(&'static str, Block)> {
         block
     };
     vec![
-        ("an end that is no number", with(&|block| block.end[1] = f64::NAN)),
-        ("a start at infinity", with(&|block| block.start[0] = f64::INFINITY)),
+        (
+            "an end that is no number",
+            with(&|block| block.end[1] = f64::NAN),
+        ),
+        (
+            "a start at infinity",
+            with(&|block| block.start[0] = f64::INFINITY),
+        ),
         ("a length of zero", with(&|block| block.length_mm = 0.0)),
-        ("a length that is no number", with(&|block| block.length_mm = f64::NAN)),
+        (
+            "a length that is no number",
+            with(&|block| block.length_mm = f64::NAN),
+        ),
         ("a feed of zero", with(&|block| block.feed_mm_per_s = 0.0)),
-        ("a feed that is no number", with(&|block| block.feed_mm_per_s = f64::NAN)),
-        ("a negative dwell", Block { dwell_s: -1.0, ..Block::at(AxisVector::ZERO) }),
-        ("a dwell that is no number", Block { dwell_s: f64::NAN, ..Block::at(AxisVector::ZERO) }),
+        (
+            "a feed that is no number",
+            with(&|block| block.feed_mm_per_s = f64::NAN),
+        ),
+        (
+            "a negative dwell",
+            Block {
+                dwell_s: -1.0,
+                ..Block::at(AxisVector::ZERO)
+            },
+        ),
+        (
+            "a dwell that is no number",
+            Block {
+                dwell_s: f64::NAN,
+                ..Block::at(AxisVector::ZERO)
+            },
+        ),
     ]
 }
 

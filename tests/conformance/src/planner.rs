@@ -16,7 +16,9 @@ const PATH_TOLERANCE_MM: f64 = 2e-6;
 
 /// Judges a planner.
 pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
-    let opened = crate::open(setup, report, |options| plugin.planner(options, &context(AxisVector::ZERO)));
+    let opened = crate::open(setup, report, |options| {
+        plugin.planner(options, &context(AxisVector::ZERO))
+    });
     let Some(planner) = opened else { return };
     let description = planner.describe();
     judge_description(&description, report);
@@ -24,7 +26,14 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     let mut timings = Timings::default();
     for number in 0..setup.programs {
         let seed = setup.seed.wrapping_add(number.wrapping_mul(0x1_0000_0001));
-        let mut judge = Judge { plugin, setup, report, description, timings: &mut timings, seed };
+        let mut judge = Judge {
+            plugin,
+            setup,
+            report,
+            description,
+            timings: &mut timings,
+            seed,
+        };
         if let Err(Stuck { check, words }) = judge.program() {
             report.find(check, format!("program seed {seed}: {words}"));
             break;
@@ -38,10 +47,20 @@ fn judge_description(description: &PlannerDescription, report: &mut Report) {
     const CHECK: &str = "self-description";
     report.judged(CHECK);
     if !(2..=3).contains(&description.order) {
-        report.find(CHECK, format!("order {} is neither 2 nor 3", description.order));
+        report.find(
+            CHECK,
+            format!("order {} is neither 2 nor 3", description.order),
+        );
     }
-    if description.speed_difference_mm_per_s.iter().any(|v| !v.is_finite() || *v < 0.0) {
-        report.find(CHECK, "the allowable speed difference is no number from 0".to_string());
+    if description
+        .speed_difference_mm_per_s
+        .iter()
+        .any(|v| !v.is_finite() || *v < 0.0)
+    {
+        report.find(
+            CHECK,
+            "the allowable speed difference is no number from 0".to_string(),
+        );
     }
 }
 
@@ -66,11 +85,20 @@ impl Judge<'_> {
         let takes = |block: &Block| timings.check.of(|| planner.check(block, None)).is_ok();
         let blocks = program::random(&mut random, AxisVector::ZERO, BLOCKS, takes);
         if blocks.is_empty() {
-            return Err(Stuck { check: "programs", words: "it takes no block of a whole program".to_string() });
+            return Err(Stuck {
+                check: "programs",
+                words: "it takes no block of a whole program".to_string(),
+            });
         }
         self.report.judged("programs");
         let mut driven = Driven::default();
-        drive(planner.as_mut(), &blocks, TO_THE_END, &mut driven, self.timings)?;
+        drive(
+            planner.as_mut(),
+            &blocks,
+            TO_THE_END,
+            &mut driven,
+            self.timings,
+        )?;
         self.judge_output(&blocks, &driven);
         self.judge_determinism(&blocks, &driven)?;
         self.judge_reset(planner.as_mut(), &blocks, &driven)
@@ -78,13 +106,17 @@ impl Judge<'_> {
 
     fn open(&self, position: AxisVector) -> Result<Box<dyn Planner>, Stuck> {
         let opened = self.plugin.planner(&self.setup.options, &context(position));
-        opened.map_err(|error| Stuck { check: "options", words: error.to_string() })
+        opened.map_err(|error| Stuck {
+            check: "options",
+            words: error.to_string(),
+        })
     }
 
     fn find(&mut self, check: &'static str, words: Option<String>) {
         self.report.judged(check);
         if let Some(words) = words {
-            self.report.find(check, format!("program seed {}: {words}", self.seed));
+            self.report
+                .find(check, format!("program seed {}: {words}", self.seed));
         }
     }
 
@@ -95,9 +127,15 @@ impl Judge<'_> {
         self.find("end points", missed(blocks, segments));
         let samples = limits::samples(segments);
         if self.description.breaks_limits != 0 {
-            self.report.skip("limits", "it declares that it breaks them");
+            self.report
+                .skip("limits", "it declares that it breaks them");
         } else {
-            let found = limits::judge(segments, &samples, &context(AxisVector::ZERO).limits, &self.description);
+            let found = limits::judge(
+                segments,
+                &samples,
+                &context(AxisVector::ZERO).limits,
+                &self.description,
+            );
             self.find("limits", found);
             self.find("feed", too_fast(blocks, segments, &samples));
         }
@@ -111,13 +149,24 @@ impl Judge<'_> {
     /// The same once more, without a `check` before: the same bits.
     fn judge_determinism(&mut self, blocks: &[Block], driven: &Driven) -> Result<(), Stuck> {
         let mut again = Driven::default();
-        drive(self.open(AxisVector::ZERO)?.as_mut(), blocks, TO_THE_END, &mut again, self.timings)?;
+        drive(
+            self.open(AxisVector::ZERO)?.as_mut(),
+            blocks,
+            TO_THE_END,
+            &mut again,
+            self.timings,
+        )?;
         self.find("determinism", different(&driven.segments, &again.segments));
         Ok(())
     }
 
     /// After a reset in mid-program a planner is as one just opened, and needs no more memory.
-    fn judge_reset(&mut self, planner: &mut dyn Planner, blocks: &[Block], driven: &Driven) -> Result<(), Stuck> {
+    fn judge_reset(
+        &mut self,
+        planner: &mut dyn Planner,
+        blocks: &[Block],
+        driven: &Driven,
+    ) -> Result<(), Stuck> {
         planner.reset(&AxisVector::ZERO);
         drive(planner, blocks, 20, &mut Driven::default(), self.timings)?;
         planner.reset(&AxisVector::ZERO);
@@ -126,7 +175,8 @@ impl Judge<'_> {
         self.find("reset", different(&driven.segments, &again.segments));
         if heap::counts() {
             let uses = again.heap_uses;
-            let used = (uses > 0).then(|| format!("{uses} uses of the heap in a program that it has driven before"));
+            let used = (uses > 0)
+                .then(|| format!("{uses} uses of the heap in a program that it has driven before"));
             self.find("allocation", used);
         } else {
             self.report.skip("allocation", heap::NOT_COUNTED);
@@ -139,18 +189,27 @@ impl Judge<'_> {
 fn unsound(segments: &[Segment]) -> Option<String> {
     let alone = segments.iter().find_map(|segment| {
         let coefficients = segment.coefficients.iter().chain([&segment.path]).flatten();
-        let finite = segment.duration_s.is_finite() && coefficients.into_iter().all(|c| c.is_finite());
+        let finite =
+            segment.duration_s.is_finite() && coefficients.into_iter().all(|c| c.is_finite());
         // Zero is for a plan whose end is always queued with it.
         let stops = segment.stop_deceleration_mm_per_s2 >= 0.0;
         match (finite && segment.duration_s >= 0.0, stops) {
-            (false, _) => Some(format!("block {}: a number that is not finite, or a negative duration", segment.block)),
-            (_, false) => {
-                Some(format!("block {}: the deceleration to stop with is negative, or no number", segment.block))
-            }
+            (false, _) => Some(format!(
+                "block {}: a number that is not finite, or a negative duration",
+                segment.block
+            )),
+            (_, false) => Some(format!(
+                "block {}: the deceleration to stop with is negative, or no number",
+                segment.block
+            )),
             _ => None,
         }
     });
-    alone.or_else(|| segments.windows(2).find_map(|pair| unjoined(&pair[0], &pair[1])))
+    alone.or_else(|| {
+        segments
+            .windows(2)
+            .find_map(|pair| unjoined(&pair[0], &pair[1]))
+    })
 }
 
 fn unjoined(before: &Segment, after: &Segment) -> Option<String> {
@@ -158,45 +217,78 @@ fn unjoined(before: &Segment, after: &Segment) -> Option<String> {
     let gap_mm = gap.0.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
     let path_gap_mm = (after.path_mm(0.0) - before.path_mm(before.duration_s)).abs();
     if gap_mm > 1e-6 || path_gap_mm > 1e-6 {
-        return Some(format!("block {}: a gap of {gap_mm:e} mm, of {path_gap_mm:e} mm along the path", after.block));
+        return Some(format!(
+            "block {}: a gap of {gap_mm:e} mm, of {path_gap_mm:e} mm along the path",
+            after.block
+        ));
     }
-    (after.block < before.block).then(|| format!("block {} comes after block {}", after.block, before.block))
+    (after.block < before.block)
+        .then(|| format!("block {} comes after block {}", after.block, before.block))
 }
 
 /// Each block is reported once, in order, before it moves.
 fn misreported(blocks: &[Block], driven: &Driven) -> Option<String> {
     let reported = driven.reports.iter().map(|report| report.block);
     if !reported.eq(blocks.iter().map(|block| block.index)) {
-        return Some(format!("{} reports of {} blocks, or out of order", driven.reports.len(), blocks.len()));
+        return Some(format!(
+            "{} reports of {} blocks, or out of order",
+            driven.reports.len(),
+            blocks.len()
+        ));
     }
-    let wrong =
-        driven.reports.iter().find(|report| !report.peak_feed_mm_per_s.is_finite() || !report.time_s.is_finite());
-    wrong.map(|report| format!("block {}: a report with a number that is not finite", report.block))
+    let wrong = driven
+        .reports
+        .iter()
+        .find(|report| !report.peak_feed_mm_per_s.is_finite() || !report.time_s.is_finite());
+    wrong.map(|report| {
+        format!(
+            "block {}: a report with a number that is not finite",
+            report.block
+        )
+    })
 }
 
 /// Where the program asks for rest, the plan rests on the programmed position, bit for bit.
 fn missed(blocks: &[Block], segments: &[Segment]) -> Option<String> {
     let rests = |block: &Block| {
-        let mut own = segments.iter().filter(|segment| segment.block == block.index);
-        own.any(|s| s.flags.contains(SegmentFlags::ENDS_AT_REST) && s.position(s.duration_s) == block.end)
+        let mut own = segments
+            .iter()
+            .filter(|segment| segment.block == block.index);
+        own.any(|s| {
+            s.flags.contains(SegmentFlags::ENDS_AT_REST) && s.position(s.duration_s) == block.end
+        })
     };
-    let asked = blocks.iter().enumerate().filter(|(index, block)| block.ends_at_rest() || index + 1 == blocks.len());
+    let asked = blocks
+        .iter()
+        .enumerate()
+        .filter(|(index, block)| block.ends_at_rest() || index + 1 == blocks.len());
     let missed = asked.map(|(_, block)| block).find(|block| !rests(block))?;
     let (index, kind, length_mm) = (missed.index, missed.kind, missed.length_mm);
-    Some(format!("block {index}, {kind:?} of {length_mm} mm: no rest on its end {:?}", &missed.end.0[..3]))
+    Some(format!(
+        "block {index}, {kind:?} of {length_mm} mm: no rest on its end {:?}",
+        &missed.end.0[..3]
+    ))
 }
 
 /// No faster between two samples than the highest feed that is programmed there, and that feed is one of the program's.
 fn too_fast(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> Option<String> {
-    let mut moving = segments.iter().filter(|segment| segment.path_mm(segment.duration_s) > segment.path_mm(0.0));
-    let too_high = |segment: &&Segment| segment.feed_mm_per_s > programmed(blocks, segment) * (1.0 + 1e-9);
+    let mut moving = segments
+        .iter()
+        .filter(|segment| segment.path_mm(segment.duration_s) > segment.path_mm(0.0));
+    let too_high =
+        |segment: &&Segment| segment.feed_mm_per_s > programmed(blocks, segment) * (1.0 + 1e-9);
     if let Some(segment) = moving.find(too_high) {
         let programmed = programmed(blocks, segment);
-        return Some(format!("block {}: {} mm/s, programmed {programmed}", segment.block, segment.feed_mm_per_s));
+        return Some(format!(
+            "block {}: {} mm/s, programmed {programmed}",
+            segment.block, segment.feed_mm_per_s
+        ));
     }
     samples.windows(2).find_map(|pair| {
         let speed = program::norm(&(pair[1].position - pair[0].position)) / FINE_PERIOD_S;
-        let feeds = segments[pair[0].segment..=pair[1].segment].iter().map(|segment| segment.feed_mm_per_s);
+        let feeds = segments[pair[0].segment..=pair[1].segment]
+            .iter()
+            .map(|segment| segment.feed_mm_per_s);
         let feed = feeds.fold(0.0, f64::max);
         let wrong = speed > feed * (1.0 + 1e-6) + 1e-9;
         let block = segments[pair[1].segment].block;
@@ -208,7 +300,8 @@ fn too_fast(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> Optio
 /// The highest feed of the blocks that may move in a segment: its own, and a few beside it where blocks overlap.
 fn programmed(blocks: &[Block], segment: &Segment) -> f64 {
     let index = segment.block as usize;
-    let near = blocks[index.saturating_sub(4).min(blocks.len())..blocks.len().min(index + 5)].iter();
+    let near =
+        blocks[index.saturating_sub(4).min(blocks.len())..blocks.len().min(index + 5)].iter();
     near.map(Block::command_feed_mm_per_s).fold(0.0, f64::max)
 }
 
@@ -222,16 +315,28 @@ fn off_the_path(blocks: &[Block], segments: &[Segment], samples: &[Sample]) -> O
         }
         // Blocks that overlap may be shorter than the tolerance.
         let near = blocks[index.saturating_sub(4)..blocks.len().min(index + 5)].iter();
-        let distance_mm = near.map(|block| program::distance_mm(block, &sample.position)).fold(own, f64::min);
+        let distance_mm = near
+            .map(|block| program::distance_mm(block, &sample.position))
+            .fold(own, f64::min);
         (distance_mm > corner_mm).then(|| format!("block {index}: {distance_mm} mm off the path"))
     })
 }
 
 fn different(one: &[Segment], other: &[Segment]) -> Option<String> {
-    let bits = |s: &Segment| (s.block, s.duration_s.to_bits(), s.coefficients.map(|c| c.map(f64::to_bits)));
+    let bits = |s: &Segment| {
+        (
+            s.block,
+            s.duration_s.to_bits(),
+            s.coefficients.map(|c| c.map(f64::to_bits)),
+        )
+    };
     let index = one.iter().zip(other).position(|(a, b)| bits(a) != bits(b));
     match index {
-        Some(index) => Some(format!("segment {index}, of block {}, comes out differently", one[index].block)),
-        None => (one.len() != other.len()).then(|| format!("{} segments, then {}", one.len(), other.len())),
+        Some(index) => Some(format!(
+            "segment {index}, of block {}, comes out differently",
+            one[index].block
+        )),
+        None => (one.len() != other.len())
+            .then(|| format!("{} segments, then {}", one.len(), other.len())),
     }
 }

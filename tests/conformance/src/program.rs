@@ -41,7 +41,11 @@ fn one(random: &mut Random, from: AxisVector, feed_mm_per_s: f64) -> Block {
     }
     match random.share() {
         share if share < 0.03 => {
-            block.dwell_s = if random.once_in(2) { 0.0 } else { random.magnitude(0.0001, 0.1) };
+            block.dwell_s = if random.once_in(2) {
+                0.0
+            } else {
+                random.magnitude(0.0001, 0.1)
+            };
         }
         share if share < 0.3 => arc(random, &mut block),
         share if share < 0.35 => {
@@ -60,7 +64,9 @@ fn line(random: &mut Random, block: &mut Block, kind: BlockKind) {
     let mut way = AxisVector::from_slice(&[0, 1, 2].map(|_| random.between(-1.0, 1.0)));
     if random.once_in(3) {
         let kept = [0, 1, 2][(random.share() * 3.0) as usize % 3];
-        way = AxisVector(std::array::from_fn(|axis| if axis == kept { way[axis] } else { 0.0 }));
+        way = AxisVector(std::array::from_fn(|axis| {
+            if axis == kept { way[axis] } else { 0.0 }
+        }));
     }
     way = way * (length_mm / norm(&way));
     for axis in 0..3 {
@@ -78,19 +84,38 @@ fn arc(random: &mut Random, block: &mut Block) {
     let start_angle_rad = random.between(-3.0, 3.0);
     let sweep_rad = random.between(0.1, 6.0) * if random.once_in(2) { 1.0 } else { -1.0 };
     let (sin, cos) = start_angle_rad.sin_cos();
-    let center_mm = [block.start[0] - radius_mm * cos, block.start[1] - radius_mm * sin];
-    if center_mm.iter().any(|center| center.abs() + radius_mm > REACH_MM) {
+    let center_mm = [
+        block.start[0] - radius_mm * cos,
+        block.start[1] - radius_mm * sin,
+    ];
+    if center_mm
+        .iter()
+        .any(|center| center.abs() + radius_mm > REACH_MM)
+    {
         return line(random, block, BlockKind::Line);
     }
     let (sin, cos) = (start_angle_rad + sweep_rad).sin_cos();
-    (block.end[0], block.end[1]) = (center_mm[0] + radius_mm * cos, center_mm[1] + radius_mm * sin);
-    let rise_mm = if random.once_in(4) { random.between(-3.0, 3.0) } else { 0.0 };
+    (block.end[0], block.end[1]) = (
+        center_mm[0] + radius_mm * cos,
+        center_mm[1] + radius_mm * sin,
+    );
+    let rise_mm = if random.once_in(4) {
+        random.between(-3.0, 3.0)
+    } else {
+        0.0
+    };
     if (block.start[2] + rise_mm).abs() < REACH_MM {
         block.end[2] += rise_mm;
     }
     block.kind = BlockKind::Arc;
     block.length_mm = (radius_mm * sweep_rad).hypot(block.end[2] - block.start[2]);
-    block.arc = ArcGeometry { plane: [0, 1], center_mm, radius_mm, start_angle_rad, sweep_rad };
+    block.arc = ArcGeometry {
+        plane: [0, 1],
+        center_mm,
+        radius_mm,
+        start_angle_rad,
+        sweep_rad,
+    };
 }
 
 /// Euclidean length, mm.
@@ -100,14 +125,22 @@ pub fn norm(vector: &AxisVector) -> f64 {
 
 /// Distance of a place from the path of a block, mm.
 pub fn distance_mm(block: &Block, place: &AxisVector) -> f64 {
-    if block.kind == BlockKind::Arc { from_arc(block, place) } else { from_line(block, place) }
+    if block.kind == BlockKind::Arc {
+        from_arc(block, place)
+    } else {
+        from_line(block, place)
+    }
 }
 
 fn from_line(block: &Block, place: &AxisVector) -> f64 {
     let (way, offset) = (block.end - block.start, *place - block.start);
     let square: f64 = way.0.iter().map(|v| v * v).sum();
     let along: f64 = way.0.iter().zip(offset.0).map(|(a, b)| a * b).sum();
-    let share = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
+    let share = if square > 0.0 {
+        (along / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     norm(&(offset - way * share))
 }
 
@@ -124,18 +157,28 @@ fn from_arc(block: &Block, place: &AxisVector) -> f64 {
         let across = (x - arc.radius_mm * cos).hypot(y - arc.radius_mm * sin);
         across.hypot(place[2] - block.start[2] - share * rise_mm)
     };
-    if rise_mm == 0.0 { distance(share) } else { distance(share).min(least(distance)) }
+    if rise_mm == 0.0 {
+        distance(share)
+    } else {
+        distance(share).min(least(distance))
+    }
 }
 
 /// The least value of `of` between 0 and 1, where it has few minima: the nearest place on a helix is not at the same angle.
 fn least(of: impl Fn(f64) -> f64) -> f64 {
     const PLACES: u32 = 64;
     let at = |place: u32| f64::from(place) / f64::from(PLACES);
-    let best = (0..=PLACES).min_by(|a, b| of(at(*a)).total_cmp(&of(at(*b)))).unwrap_or(0);
+    let best = (0..=PLACES)
+        .min_by(|a, b| of(at(*a)).total_cmp(&of(at(*b))))
+        .unwrap_or(0);
     let (mut from, mut to) = (at(best.saturating_sub(1)), at((best + 1).min(PLACES)));
     for _ in 0..40 {
         let (low, high) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
-        (from, to) = if of(low) < of(high) { (from, high) } else { (low, to) };
+        (from, to) = if of(low) < of(high) {
+            (from, high)
+        } else {
+            (low, to)
+        };
     }
     of(f64::midpoint(from, to))
 }
@@ -146,14 +189,39 @@ mod tests {
 
     #[test]
     fn beside_a_steep_helix_the_nearest_place_counts() {
-        let arc =
-            ArcGeometry { plane: [0, 1], center_mm: [0.0; 2], radius_mm: 0.5, start_angle_rad: -0.05, sweep_rad: 0.1 };
-        let at = |angle: f64, z: f64| AxisVector::from_slice(&[0.5 * angle.cos(), 0.5 * angle.sin(), z]);
-        let helix = Block { kind: BlockKind::Arc, end: at(0.05, 3.0), arc, ..Block::at(at(-0.05, 0.0)) };
-        let beside = |offset: [f64; 3]| distance_mm(&helix, &(at(0.0, 1.5) + AxisVector::from_slice(&offset)));
+        let arc = ArcGeometry {
+            plane: [0, 1],
+            center_mm: [0.0; 2],
+            radius_mm: 0.5,
+            start_angle_rad: -0.05,
+            sweep_rad: 0.1,
+        };
+        let at =
+            |angle: f64, z: f64| AxisVector::from_slice(&[0.5 * angle.cos(), 0.5 * angle.sin(), z]);
+        let helix = Block {
+            kind: BlockKind::Arc,
+            end: at(0.05, 3.0),
+            arc,
+            ..Block::at(at(-0.05, 0.0))
+        };
+        let beside = |offset: [f64; 3]| {
+            distance_mm(&helix, &(at(0.0, 1.5) + AxisVector::from_slice(&offset)))
+        };
         assert!(beside([0.0; 3]) < 1e-9);
-        assert!((beside([0.01, 0.0, 0.0]) - 0.01).abs() < 1e-6, "outwards: {}", beside([0.01, 0.0, 0.0]));
-        assert!((beside([0.0, 0.01, 0.0]) - 0.01).abs() < 1e-5, "across: {}", beside([0.0, 0.01, 0.0]));
-        assert!(beside([0.0, 0.0, 0.01]) < 2e-4, "along: {}", beside([0.0, 0.0, 0.01]));
+        assert!(
+            (beside([0.01, 0.0, 0.0]) - 0.01).abs() < 1e-6,
+            "outwards: {}",
+            beside([0.01, 0.0, 0.0])
+        );
+        assert!(
+            (beside([0.0, 0.01, 0.0]) - 0.01).abs() < 1e-5,
+            "across: {}",
+            beside([0.0, 0.01, 0.0])
+        );
+        assert!(
+            beside([0.0, 0.0, 0.01]) < 2e-4,
+            "along: {}",
+            beside([0.0, 0.0, 0.01])
+        );
     }
 }

@@ -32,7 +32,14 @@ pub struct Report {
 impl Report {
     /// An empty report.
     pub(crate) fn new(plugin: Plugin, seed: u64) -> Self {
-        Self { plugin, seed, judged: vec![], skipped: vec![], findings: vec![], timings: vec![] }
+        Self {
+            plugin,
+            seed,
+            judged: vec![],
+            skipped: vec![],
+            findings: vec![],
+            timings: vec![],
+        }
     }
 
     pub(crate) fn judged(&mut self, check: &'static str) {
@@ -49,7 +56,13 @@ impl Report {
 
     pub(crate) fn find(&mut self, check: &'static str, words: String) {
         self.judged(check);
-        if self.findings.iter().filter(|finding| finding.check == check).count() < MOST_FINDINGS {
+        if self
+            .findings
+            .iter()
+            .filter(|finding| finding.check == check)
+            .count()
+            < MOST_FINDINGS
+        {
             self.findings.push(Finding { check, words });
         }
     }
@@ -89,22 +102,47 @@ impl Report {
     /// The plugin does not conform.
     pub fn assert_conforms(&self) {
         println!("{self}");
-        assert!(self.conforms(), "{} does not conform:\n{self}", self.plugin.name());
+        assert!(
+            self.conforms(),
+            "{} does not conform:\n{self}",
+            self.plugin.name()
+        );
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plugin = &self.plugin;
-        writeln!(f, "{} {} {}, seed {}", plugin.kind().name(), plugin.name(), plugin.version(), self.seed)?;
+        writeln!(
+            f,
+            "{} {} {}, seed {}",
+            plugin.kind().name(),
+            plugin.name(),
+            plugin.version(),
+            self.seed
+        )?;
         for check in &self.judged {
-            let mut found = self.findings.iter().filter(|finding| finding.check == *check).peekable();
-            writeln!(f, "  {} {check}", if found.peek().is_none() { "ok    " } else { "FAILED" })?;
+            let mut found = self
+                .findings
+                .iter()
+                .filter(|finding| finding.check == *check)
+                .peekable();
+            writeln!(
+                f,
+                "  {} {check}",
+                if found.peek().is_none() {
+                    "ok    "
+                } else {
+                    "FAILED"
+                }
+            )?;
             found.try_for_each(|finding| writeln!(f, "         {}", finding.words))?;
         }
         for (check, why) in &self.skipped {
             writeln!(f, "  -      {check}: not judged: {why}")?;
         }
-        self.timings.iter().try_for_each(|timing| writeln!(f, "  {timing}"))
+        self.timings
+            .iter()
+            .try_for_each(|timing| writeln!(f, "  {timing}"))
     }
 }

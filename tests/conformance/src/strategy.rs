@@ -1,6 +1,9 @@
 //! Feed strategies: windows of a machine that cuts, rests and is hit.
 
-use tandem_sdk::{Answer, AxisVector, FeedStrategy, FineSample, MAX_SIGNALS, Plugin, Request, StrategyContext, Window};
+use tandem_sdk::{
+    Answer, AxisVector, FeedStrategy, FineSample, MAX_SIGNALS, Plugin, Request, StrategyContext,
+    Window,
+};
 
 use crate::machine::{FINE_PERIOD_S, ROUGH_PERIOD_S};
 use crate::random::Random;
@@ -17,16 +20,34 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     let mut timing = Timing::new("update");
     for max_feed_ratio in [1.0, 1.5] {
         let open = |options: &str| plugin.feed_strategy(options, &context(max_feed_ratio));
-        let (Some(mut first), Ok(mut second)) = (crate::open(setup, report, open), open(&setup.options)) else {
+        let (Some(mut first), Ok(mut second)) =
+            (crate::open(setup, report, open), open(&setup.options))
+        else {
             return;
         };
         judge_signals(first.as_ref(), report);
-        let Some(answers) = answers(first.as_mut(), setup.seed, report, &mut timing) else { return };
-        judge_answers(&answers, first.max_ratio_change_per_s(), max_feed_ratio, first.signals().len(), report);
-        let again = self::answers(second.as_mut(), setup.seed, report, &mut Timing::new("update"));
+        let Some(answers) = answers(first.as_mut(), setup.seed, report, &mut timing) else {
+            return;
+        };
+        judge_answers(
+            &answers,
+            first.max_ratio_change_per_s(),
+            max_feed_ratio,
+            first.signals().len(),
+            report,
+        );
+        let again = self::answers(
+            second.as_mut(),
+            setup.seed,
+            report,
+            &mut Timing::new("update"),
+        );
         report.judged("determinism");
         if again.is_none_or(|again| bits(&again) != bits(&answers)) {
-            report.find("determinism", "the same windows get other answers".to_string());
+            report.find(
+                "determinism",
+                "the same windows get other answers".to_string(),
+            );
         }
     }
     report.time([timing]);
@@ -47,12 +68,21 @@ fn judge_signals(strategy: &dyn FeedStrategy, report: &mut Report) {
     const CHECK: &str = "signals";
     report.judged(CHECK);
     let names = strategy.signals();
-    let plain = |name: &&str| name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    let plain = |name: &&str| {
+        name.chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+    };
     if let Some(name) = names.iter().find(|name| name.is_empty() || !plain(name)) {
-        report.find(CHECK, format!("{name:?} has other characters than a-z, 0-9 and _"));
+        report.find(
+            CHECK,
+            format!("{name:?} has other characters than a-z, 0-9 and _"),
+        );
     }
     if names.len() > MAX_SIGNALS {
-        report.find(CHECK, format!("{} names; {MAX_SIGNALS} are possible", names.len()));
+        report.find(
+            CHECK,
+            format!("{} names; {MAX_SIGNALS} are possible", names.len()),
+        );
     }
 }
 
@@ -74,7 +104,11 @@ fn answers(
         match answer {
             Ok(answer) => answers.push(answer),
             Err(error) => {
-                let check = if error.is_panic() { "panics" } else { "lifecycle" };
+                let check = if error.is_panic() {
+                    "panics"
+                } else {
+                    "lifecycle"
+                };
                 report.find(check, format!("update, period {period}: {error}"));
                 return None;
             }
@@ -82,7 +116,10 @@ fn answers(
         if !heap::counts() {
             report.skip("allocation", heap::NOT_COUNTED);
         } else if used > 0 && period > WARM {
-            report.find("allocation", format!("update uses the heap {used} times in period {period}"));
+            report.find(
+                "allocation",
+                format!("update uses the heap {used} times in period {period}"),
+            );
         } else {
             report.judged("allocation");
         }
@@ -91,7 +128,13 @@ fn answers(
 }
 
 /// In range, and no faster than it declares.
-fn judge_answers(answers: &[Answer], change_per_s: f64, most: f64, signals: usize, report: &mut Report) {
+fn judge_answers(
+    answers: &[Answer],
+    change_per_s: f64,
+    most: f64,
+    signals: usize,
+    report: &mut Report,
+) {
     const RANGE: &str = "ratio in range";
     const RATE: &str = "ratio changes as declared";
     const FINITE: &str = "signals are numbers";
@@ -103,20 +146,35 @@ fn judge_answers(answers: &[Answer], change_per_s: f64, most: f64, signals: usiz
     for (period, answer) in answers.iter().enumerate() {
         let ratio = answer.ratio;
         if !(0.0..=most).contains(&ratio) {
-            report.find(RANGE, format!("period {period}: {ratio}; 0 to {most} are possible"));
+            report.find(
+                RANGE,
+                format!("period {period}: {ratio}; 0 to {most} are possible"),
+            );
         }
         if (ratio - last).abs() > step {
-            report.find(RATE, format!("period {period}: from {last} to {ratio}; {step} in a period is declared"));
+            report.find(
+                RATE,
+                format!("period {period}: from {last} to {ratio}; {step} in a period is declared"),
+            );
         }
-        if answer.signals[..signals].iter().any(|value| !value.is_finite()) {
-            report.find(FINITE, format!("period {period}: {:?}", &answer.signals[..signals]));
+        if answer.signals[..signals]
+            .iter()
+            .any(|value| !value.is_finite())
+        {
+            report.find(
+                FINITE,
+                format!("period {period}: {:?}", &answer.signals[..signals]),
+            );
         }
         last = ratio;
     }
 }
 
 fn bits(answers: &[Answer]) -> Vec<(u64, [u64; MAX_SIGNALS], Request)> {
-    answers.iter().map(|a| (a.ratio.to_bits(), a.signals.map(f64::to_bits), a.request)).collect()
+    answers
+        .iter()
+        .map(|a| (a.ratio.to_bits(), a.signals.map(f64::to_bits), a.request))
+        .collect()
 }
 
 /// A machine that cuts on circles; its load wanders, and now and then it rests, runs idle or is hit.
@@ -137,7 +195,11 @@ impl Machine {
         if random.once_in(20) {
             self.load_a = random.magnitude(0.01, 100.0);
         }
-        self.hit_a = if random.once_in(100) { random.magnitude(10.0, 1e6) } else { 0.0 };
+        self.hit_a = if random.once_in(100) {
+            random.magnitude(10.0, 1e6)
+        } else {
+            0.0
+        };
         if period.is_multiple_of(500) {
             self.load_a = 0.0;
         }
@@ -157,7 +219,11 @@ impl Machine {
             command,
             position: command + AxisVector::from_slice(&[noise, noise]),
             speed: AxisVector::from_slice(&[-feed_mm_per_s * sin, feed_mm_per_s * cos]),
-            current_a: AxisVector::from_slice(&[self.load_a * (1.0 + noise) + self.hit_a, self.load_a, noise]),
+            current_a: AxisVector::from_slice(&[
+                self.load_a * (1.0 + noise) + self.hit_a,
+                self.load_a,
+                noise,
+            ]),
             feed_mm_per_s,
             programmed_feed_mm_per_s: 40.0,
             sigma: 1.0,

@@ -19,7 +19,11 @@ pub struct Timing {
 
 impl Timing {
     pub(crate) fn new(method: &'static str) -> Self {
-        Self { method, buckets: [0; BUCKETS], longest_ns: 0 }
+        Self {
+            method,
+            buckets: [0; BUCKETS],
+            longest_ns: 0,
+        }
     }
 
     /// Measures one call.
@@ -53,9 +57,20 @@ impl fmt::Display for Timing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (half, most) = (self.quantile_ns(0.5), self.quantile_ns(0.99));
         let (method, calls, longest) = (self.method, self.calls(), self.longest_ns);
-        write!(f, "{method:<16} {calls:>8} calls, half below {half} ns, 99 % below {most} ns, longest {longest} ns")?;
-        let Some(first) = self.buckets.iter().position(|count| *count > 0) else { return Ok(()) };
-        write!(f, "\n{:<16} {} from {} ns by powers of two", "", self.bars(first), (1u64 << first) / 2)
+        write!(
+            f,
+            "{method:<16} {calls:>8} calls, half below {half} ns, 99 % below {most} ns, longest {longest} ns"
+        )?;
+        let Some(first) = self.buckets.iter().position(|count| *count > 0) else {
+            return Ok(());
+        };
+        write!(
+            f,
+            "\n{:<16} {} from {} ns by powers of two",
+            "",
+            self.bars(first),
+            (1u64 << first) / 2
+        )
     }
 }
 
@@ -63,8 +78,16 @@ impl Timing {
     /// A bar for each bucket from `first` to the last one used, as high as its logarithm.
     fn bars(&self, first: usize) -> String {
         const HEIGHTS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-        let last = self.buckets.iter().rposition(|count| *count > 0).unwrap_or(first);
-        let most = self.buckets.iter().max().map_or(1.0, |most| (*most as f64).ln().max(1.0));
+        let last = self
+            .buckets
+            .iter()
+            .rposition(|count| *count > 0)
+            .unwrap_or(first);
+        let most = self
+            .buckets
+            .iter()
+            .max()
+            .map_or(1.0, |most| (*most as f64).ln().max(1.0));
         let bar = |count: &u64| match count {
             0 => '·',
             _ => HEIGHTS[((*count as f64).ln() / most * 7.0).round() as usize],
@@ -82,8 +105,20 @@ mod tests {
         let mut timing = Timing::new("x");
         timing.buckets[5] = 90;
         timing.buckets[10] = 10;
-        assert_eq!((timing.quantile_ns(0.5), timing.quantile_ns(0.99), timing.calls()), (32, 1024, 100));
+        assert_eq!(
+            (
+                timing.quantile_ns(0.5),
+                timing.quantile_ns(0.99),
+                timing.calls()
+            ),
+            (32, 1024, 100)
+        );
         timing.buckets[7] = 1;
-        assert!(timing.to_string().ends_with("\n                 █·▁··▅ from 16 ns by powers of two"), "{timing}");
+        assert!(
+            timing
+                .to_string()
+                .ends_with("\n                 █·▁··▅ from 16 ns by powers of two"),
+            "{timing}"
+        );
     }
 }

@@ -4,8 +4,9 @@
 
 use tandem_conformance::{CountingAllocator, Setup, judge};
 use tandem_sdk::{
-    Answer, Attached, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Feedback, Kinematics,
-    KinematicsContext, Plugin, PluginError, Setpoint, StrategyContext, Window, local_plugin,
+    Answer, Attached, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Feedback,
+    Kinematics, KinematicsContext, Plugin, PluginError, Setpoint, StrategyContext, Window,
+    local_plugin,
 };
 
 #[global_allocator]
@@ -26,11 +27,19 @@ struct Uses {
 
 impl Uses {
     fn new(options: &Options) -> Self {
-        Self { call: options.call, calls: 0.into() }
+        Self {
+            call: options.call,
+            calls: 0.into(),
+        }
     }
 
     fn now(&self) {
-        if self.calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1 == self.call {
+        if self
+            .calls
+            .fetch_add(1, std::sync::atomic::Ordering::Relaxed)
+            + 1
+            == self.call
+        {
             drop(std::hint::black_box(vec![1_u8; 10]));
         }
     }
@@ -49,7 +58,11 @@ impl Driver for Drives {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(self.2))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);
         self.0.now();
         Ok(())
@@ -82,18 +95,38 @@ impl Kinematics for Same {
 }
 
 fn assert_found(plugin: Plugin, call: u64) {
-    let judged = |call: u64| judge(plugin, &Setup { options: format!("call = {call}\n"), ..Setup::default() });
+    let judged = |call: u64| {
+        judge(
+            plugin,
+            &Setup {
+                options: format!("call = {call}\n"),
+                ..Setup::default()
+            },
+        )
+    };
     assert!(judged(0).conforms(), "{}", judged(0));
     let report = judged(call);
-    assert!(report.findings().iter().any(|finding| finding.check == "allocation"), "{report}");
+    assert!(
+        report
+            .findings()
+            .iter()
+            .any(|finding| finding.check == "allocation"),
+        "{report}"
+    );
 }
 
 #[test]
 fn one_use_of_the_heap_is_found() {
-    assert_found(local_plugin!(driver "drives" = |o: &Options| Ok(Drives(Uses::new(o), 0, AxisVector::ZERO))), 1500);
+    assert_found(
+        local_plugin!(driver "drives" = |o: &Options| Ok(Drives(Uses::new(o), 0, AxisVector::ZERO))),
+        1500,
+    );
     assert_found(
         local_plugin!(feed_strategy "feeds" = |o: &Options, _: &StrategyContext| Ok(Feeds(Uses::new(o)))),
         1500,
     );
-    assert_found(local_plugin!(kinematics "same" = |o: &Options, _: &KinematicsContext| Ok(Same(Uses::new(o)))), 50);
+    assert_found(
+        local_plugin!(kinematics "same" = |o: &Options, _: &KinematicsContext| Ok(Same(Uses::new(o)))),
+        50,
+    );
 }

@@ -4,8 +4,8 @@
 
 use tandem_conformance::{Setup, judge};
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, Plugin, PluginError,
-    Setpoint, Words, local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch,
+    Plugin, PluginError, Setpoint, Words, local_plugin,
 };
 
 tandem_sdk::options! {
@@ -53,7 +53,11 @@ impl Drives {
         self.is_faulty &= !(forgets || setpoint.reset != 0 && !self.is("ignores reset"));
         let goes_on = self.is("never lets go") && self.coming > 0;
         let most = if self.is("never comes up") { 4 } else { 5 };
-        self.coming = if setpoint.enable != 0 || goes_on { (self.coming + 1).min(most) } else { 0 };
+        self.coming = if setpoint.enable != 0 || goes_on {
+            (self.coming + 1).min(most)
+        } else {
+            0
+        };
         match self.coming {
             _ if self.is_faulty => JointState::Fault,
             0 => JointState::Disabled,
@@ -75,17 +79,30 @@ impl Drives {
         feedback.fault_code = [if state == JointState::Fault { 7 } else { 0 }; 8];
         feedback.latches[0] = Latch::default();
         let armed = setpoint.arm;
-        let edge = if self.is("latches unarmed") { (500, 2) } else { (500, armed.edge) };
+        let edge = if self.is("latches unarmed") {
+            (500, 2)
+        } else {
+            (500, armed.edge)
+        };
         if self.exchanges == edge.0 && edge.1 != 0 {
-            feedback.latches[0] =
-                Latch { input: 0, edge: edge.1, joints: 1, position: self.stands, ..Latch::default() };
+            feedback.latches[0] = Latch {
+                input: 0,
+                edge: edge.1,
+                joints: 1,
+                position: self.stands,
+                ..Latch::default()
+            };
         }
     }
 }
 
 impl Driver for Drives {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { enable_s: 0.1, disable_s: 0.1, ..DriverDescription::simulated() }
+        DriverDescription {
+            enable_s: 0.1,
+            disable_s: 0.1,
+            ..DriverDescription::simulated()
+        }
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
@@ -108,7 +125,11 @@ impl Driver for Drives {
         Ok(attached)
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.exchanges += 1;
         self.answer(setpoint, feedback);
         let unheard = UNHEARD.contains(&self.exchanges);
@@ -117,8 +138,11 @@ impl Driver for Drives {
             (feedback.position[1], feedback.speed[1]) = (self.last.position[1], self.last.speed[1]);
             feedback.state[1] = self.last.state[1];
         }
-        feedback.age_periods[1] =
-            if unheard && self.is("hides a lost joint") { self.last.age_periods[1] + 1 } else { 0 };
+        feedback.age_periods[1] = if unheard && self.is("hides a lost joint") {
+            self.last.age_periods[1] + 1
+        } else {
+            0
+        };
         self.last = *feedback;
         Ok(())
     }
@@ -130,20 +154,32 @@ impl Driver for Drives {
     }
 
     fn explain(&self, _joint: u32, code: u32) -> Words {
-        assert!(!self.is("does not know its codes") || code < 10, "code {code}?");
+        assert!(
+            !self.is("does not know its codes") || code < 10,
+            "code {code}?"
+        );
         Words::default()
     }
 }
 
 fn judged(plugin: Plugin, defect: &str) -> tandem_conformance::Report {
-    judge(plugin, &Setup { options: format!("defect = \"{defect}\"\n"), ..Setup::default() })
+    judge(
+        plugin,
+        &Setup {
+            options: format!("defect = \"{defect}\"\n"),
+            ..Setup::default()
+        },
+    )
 }
 
 #[test]
 fn each_broken_promise_is_found() {
     let plugin = local_plugin!(driver "drives" = Drives::open);
     let good = judged(plugin, "");
-    assert!(good.conforms() && good.checks().contains(&"reset of faults"), "{good}");
+    assert!(
+        good.conforms() && good.checks().contains(&"reset of faults"),
+        "{good}"
+    );
     let found = [
         ("stands nowhere", "where the joints stand"),
         ("is enabled unasked", "where the joints stand"),
@@ -160,6 +196,12 @@ fn each_broken_promise_is_found() {
     ];
     for (defect, check) in found {
         let report = judged(plugin, defect);
-        assert!(report.findings().iter().any(|finding| finding.check == check), "{defect}: {check}\n{report}");
+        assert!(
+            report
+                .findings()
+                .iter()
+                .any(|finding| finding.check == check),
+            "{defect}: {check}\n{report}"
+        );
     }
 }

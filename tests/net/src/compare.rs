@@ -48,18 +48,35 @@ impl Finding {
 ///
 /// # Errors
 /// A folder or a process.
-pub fn compare(case: &Case, binaries: &[PathBuf; 2], declared: &Declared, keep: &Path) -> Result<Finding, String> {
+pub fn compare(
+    case: &Case,
+    binaries: &[PathBuf; 2],
+    declared: &Declared,
+    keep: &Path,
+) -> Result<Finding, String> {
     let work = tempfile::tempdir().map_err(|e| e.to_string())?;
     let folders = ["old", "new"].map(|name| work.path().join(name));
     let old = run(case, &binaries[0], &folders[0])?;
     let new = run(case, &binaries[1], &folders[1])?;
-    let finding = Comparison { case, declared, new_binary: &binaries[1], old, new }.finding();
+    let finding = Comparison {
+        case,
+        declared,
+        new_binary: &binaries[1],
+        old,
+        new,
+    }
+    .finding();
     if !finding.differences.is_empty() {
-        let name: String = case.name.chars().map(|letter| if "/ =".contains(letter) { '-' } else { letter }).collect();
+        let name: String = case
+            .name
+            .chars()
+            .map(|letter| if "/ =".contains(letter) { '-' } else { letter })
+            .collect();
         let kept = keep.join(name);
         std::fs::create_dir_all(&kept).map_err(|e| e.to_string())?;
         for folder in &folders {
-            copy(folder, &kept.join(folder.file_name().unwrap_or_default())).map_err(|e| e.to_string())?;
+            copy(folder, &kept.join(folder.file_name().unwrap_or_default()))
+                .map_err(|e| e.to_string())?;
         }
     }
     Ok(finding)
@@ -86,13 +103,25 @@ struct Comparison<'a> {
 
 impl Comparison<'_> {
     fn finding(&self) -> Finding {
-        let planner = self.old.summary["planner"].as_str().unwrap_or_default().to_string();
-        let may_move_otherwise = SEARCHING.contains(&planner.as_str()) && self.old.trace != self.new.trace;
-        let mut finding = Finding { is_same: !may_move_otherwise, planner, ..Finding::default() };
+        let planner = self.old.summary["planner"]
+            .as_str()
+            .unwrap_or_default()
+            .to_string();
+        let may_move_otherwise =
+            SEARCHING.contains(&planner.as_str()) && self.old.trace != self.new.trace;
+        let mut finding = Finding {
+            is_same: !may_move_otherwise,
+            planner,
+            ..Finding::default()
+        };
         if self.old.status != self.new.status {
-            let [old, new] =
-                [&self.old, &self.new].map(|ran| ran.status.map_or("none".to_string(), |status| status.to_string()));
-            finding.differences.push(format!("exit status {old} -> {new}"));
+            let [old, new] = [&self.old, &self.new].map(|ran| {
+                ran.status
+                    .map_or("none".to_string(), |status| status.to_string())
+            });
+            finding
+                .differences
+                .push(format!("exit status {old} -> {new}"));
         }
         if may_move_otherwise {
             self.searched(&mut finding);
@@ -112,41 +141,76 @@ impl Comparison<'_> {
         if self.old.trace != self.new.trace {
             differences.push(format!("trace: {}", self.trace_difference()));
         }
-        let expected =
-            |(path, value): (String, String)| (self.declared.expected(&path), self.declared.expected(&value));
-        let old: Vec<_> = leaves(&self.old.summary).into_iter().map(expected).collect();
+        let expected = |(path, value): (String, String)| {
+            (
+                self.declared.expected(&path),
+                self.declared.expected(&value),
+            )
+        };
+        let old: Vec<_> = leaves(&self.old.summary)
+            .into_iter()
+            .map(expected)
+            .collect();
         let new = leaves(&self.new.summary);
         let shown = |leaves: &[(String, String)]| {
-            leaves.iter().flat_map(|(path, value)| [path, " = ", value, "\n"]).collect::<String>()
+            leaves
+                .iter()
+                .flat_map(|(path, value)| [path, " = ", value, "\n"])
+                .collect::<String>()
         };
         differences.extend(first_difference("summary", &shown(&old), &shown(&new)));
-        differences.extend(first_difference("blocks", &self.with_declared_head(&self.old.blocks), &self.new.blocks));
-        differences.extend(first_difference("events", &self.with_declared_head(&self.old.events), &self.new.events));
+        differences.extend(first_difference(
+            "blocks",
+            &self.with_declared_head(&self.old.blocks),
+            &self.new.blocks,
+        ));
+        differences.extend(first_difference(
+            "events",
+            &self.with_declared_head(&self.old.events),
+            &self.new.events,
+        ));
     }
 
     /// Another motion that keeps the same limits in the same time, and the same words without their numbers.
     fn searched(&self, finding: &mut Finding) {
         self.texts(&mut finding.differences, without_numbers);
         for count in COUNTS {
-            let [old, new] = [&self.old, &self.new].map(|ran| ran.summary[count].as_u64().unwrap_or_default());
+            let [old, new] =
+                [&self.old, &self.new].map(|ran| ran.summary[count].as_u64().unwrap_or_default());
             if new > old || (count == "blocks" && new != old) {
                 finding.differences.push(format!("{count} {old} -> {new}"));
             }
         }
-        if let Some(ratio) = self.time_ratio().filter(|ratio| *ratio > MAX_TIME_RATIO && self.old.status == Some(0)) {
-            finding.differences.push(format!("takes {ratio:.5} times as long"));
+        if let Some(ratio) = self
+            .time_ratio()
+            .filter(|ratio| *ratio > MAX_TIME_RATIO && self.old.status == Some(0))
+        {
+            finding
+                .differences
+                .push(format!("takes {ratio:.5} times as long"));
         }
-        let broken: Vec<Kind> = self.kinds(&self.new).difference(&self.kinds(&self.old)).copied().collect();
+        let broken: Vec<Kind> = self
+            .kinds(&self.new)
+            .difference(&self.kinds(&self.old))
+            .copied()
+            .collect();
         if !broken.is_empty() {
-            finding.differences.push(format!("the oracle finds broken by the new build only: {broken:?}"));
+            finding.differences.push(format!(
+                "the oracle finds broken by the new build only: {broken:?}"
+            ));
         }
     }
 
     fn texts(&self, differences: &mut Vec<String>, seen: impl Fn(&str) -> String) {
-        for (what, old, new) in
-            [("output", &self.old.output, &self.new.output), ("errors", &self.old.errors, &self.new.errors)]
-        {
-            differences.extend(first_difference(what, &seen(&self.declared.expected(old)), &seen(new)));
+        for (what, old, new) in [
+            ("output", &self.old.output, &self.new.output),
+            ("errors", &self.old.errors, &self.new.errors),
+        ] {
+            differences.extend(first_difference(
+                what,
+                &seen(&self.declared.expected(old)),
+                &seen(new),
+            ));
         }
     }
 
@@ -158,15 +222,25 @@ impl Comparison<'_> {
 
     fn time_ratio(&self) -> Option<f64> {
         let [old, new] = [&self.old, &self.new].map(|ran| ran.summary["motion_time_s"].as_f64());
-        new.zip(old).filter(|(_, old)| *old > 0.0).map(|(new, old)| new / old)
+        new.zip(old)
+            .filter(|(_, old)| *old > 0.0)
+            .map(|(new, old)| new / old)
     }
 
     /// What `tandem trace diff` says.
     fn trace_difference(&self) -> String {
         let [old, new] = [&self.old, &self.new].map(|ran| ran.folder.join(TRACE));
-        let said = Command::new(self.new_binary).args(["trace", "diff"]).args([old, new]).output();
-        let said = said.map(|said| String::from_utf8_lossy(&said.stdout).into_owned()).unwrap_or_default();
-        said.lines().take(MAX_LINES_SHOWN).collect::<Vec<_>>().join("; ")
+        let said = Command::new(self.new_binary)
+            .args(["trace", "diff"])
+            .args([old, new])
+            .output();
+        let said = said
+            .map(|said| String::from_utf8_lossy(&said.stdout).into_owned())
+            .unwrap_or_default();
+        said.lines()
+            .take(MAX_LINES_SHOWN)
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 
     /// What the oracle finds broken by a run. It is asked with the machine file as it is, whatever the case changes: only
@@ -190,7 +264,13 @@ impl Comparison<'_> {
         let mut options = Options::with_jerk();
         options.ends_early = ran.status != Some(0);
         let verdict = judge(&Trace::read(&csv).ok()?, &program, &machine, &options);
-        Some(verdict.findings.iter().map(|finding| finding.kind).collect())
+        Some(
+            verdict
+                .findings
+                .iter()
+                .map(|finding| finding.kind)
+                .collect(),
+        )
     }
 }
 
@@ -206,8 +286,14 @@ fn first_difference(what: &str, old: &str, new: &str) -> Option<String> {
             (Some(a), Some(b)) if a == b => number += 1,
             (None, None) => return Some(format!("{what}: the line ends differ")),
             (a, b) => {
-                let shown = |line: Option<&str>| line.map_or("nothing".to_string(), |line| format!("{line:?}"));
-                return Some(format!("{what}, line {number}: {} -> {}", shown(a), shown(b)));
+                let shown = |line: Option<&str>| {
+                    line.map_or("nothing".to_string(), |line| format!("{line:?}"))
+                };
+                return Some(format!(
+                    "{what}, line {number}: {} -> {}",
+                    shown(a),
+                    shown(b)
+                ));
             }
         }
     }

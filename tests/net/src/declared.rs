@@ -21,15 +21,32 @@ impl Declared {
     /// The file cannot be read, or a row has no `old` and `new`.
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let table: toml::Table = text.parse().map_err(|e| format!("{}: {e}", path.display()))?;
-        let rows = table.get("changed").and_then(toml::Value::as_array).map_or(&[][..], Vec::as_slice);
+        let table: toml::Table = text
+            .parse()
+            .map_err(|e| format!("{}: {e}", path.display()))?;
+        let rows = table
+            .get("changed")
+            .and_then(toml::Value::as_array)
+            .map_or(&[][..], Vec::as_slice);
         let row = |row: &toml::Value| {
-            let word = |key: &str| row.get(key).and_then(toml::Value::as_str).map(ToString::to_string);
-            let (old, new) =
-                word("old").zip(word("new")).ok_or("a row of the declared changes has no old or no new")?;
-            Ok(Row { old, new, met: AtomicBool::new(false) })
+            let word = |key: &str| {
+                row.get(key)
+                    .and_then(toml::Value::as_str)
+                    .map(ToString::to_string)
+            };
+            let (old, new) = word("old")
+                .zip(word("new"))
+                .ok_or("a row of the declared changes has no old or no new")?;
+            Ok(Row {
+                old,
+                new,
+                met: AtomicBool::new(false),
+            })
         };
-        rows.iter().map(row).collect::<Result<_, String>>().map(Self)
+        rows.iter()
+            .map(row)
+            .collect::<Result<_, String>>()
+            .map(Self)
     }
 
     /// A text of the old build as the new one is expected to say it.
@@ -46,6 +63,9 @@ impl Declared {
 
     /// The old texts that were met nowhere.
     pub fn unused(&self) -> impl Iterator<Item = &str> {
-        self.0.iter().filter(|row| !row.met.load(Ordering::Relaxed)).map(|row| row.old.as_str())
+        self.0
+            .iter()
+            .filter(|row| !row.met.load(Ordering::Relaxed))
+            .map(|row| row.old.as_str())
     }
 }

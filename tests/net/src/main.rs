@@ -63,8 +63,10 @@ fn main() -> ExitCode {
 /// Whether nothing differs.
 fn act(arguments: &Arguments) -> Result<bool, String> {
     let declared = Declared::read(&arguments.messages)?;
-    let binaries = [&arguments.old, &arguments.new]
-        .map(|path| path.canonicalize().map_err(|e| format!("{}: {e}", path.display())));
+    let binaries = [&arguments.old, &arguments.new].map(|path| {
+        path.canonicalize()
+            .map_err(|e| format!("{}: {e}", path.display()))
+    });
     let [old, new] = binaries;
     let binaries = [old?, new?];
     let mut cases = cases::all(&project(), arguments.cases.as_deref(), arguments.seeds)?;
@@ -97,19 +99,24 @@ fn compare_all(
     declared: &Declared,
 ) -> Result<Vec<Finding>, String> {
     let next = AtomicUsize::new(0);
-    let found: Mutex<Vec<Option<Result<Finding, String>>>> = Mutex::new(cases.iter().map(|_| None).collect());
+    let found: Mutex<Vec<Option<Result<Finding, String>>>> =
+        Mutex::new(cases.iter().map(|_| None).collect());
     std::thread::scope(|scope| {
         for _ in 0..arguments.jobs.max(1) {
             scope.spawn(|| {
                 while let Some((index, case)) = take(&next, cases) {
                     let finding = compare(case, binaries, declared, &arguments.keep);
-                    found.lock().expect("no comparison panics").as_mut_slice()[index] = Some(finding);
+                    found.lock().expect("no comparison panics").as_mut_slice()[index] =
+                        Some(finding);
                 }
             });
         }
     });
     let found = found.into_inner().expect("no comparison panics");
-    found.into_iter().map(|finding| finding.expect("every case is compared")).collect()
+    found
+        .into_iter()
+        .map(|finding| finding.expect("every case is compared"))
+        .collect()
 }
 
 fn take<'a>(next: &AtomicUsize, cases: &'a [Case]) -> Option<(usize, &'a Case)> {

@@ -3,8 +3,14 @@
 use serde_json::Value;
 
 /// Keys of the summary that depend on the computer and not on the run, and those below them.
-const OF_THE_COMPUTER: [&str; 6] =
-    ["wall_time_s", "planning_ns_per_block", "planning_us", "lateness_us", "exchange_us", "page_faults"];
+const OF_THE_COMPUTER: [&str; 6] = [
+    "wall_time_s",
+    "planning_ns_per_block",
+    "planning_us",
+    "lateness_us",
+    "exchange_us",
+    "page_faults",
+];
 /// Keys of the summary that say whether limits were kept and motion was disturbed.
 pub const COUNTS: [&str; 8] = [
     "limit_violations",
@@ -27,7 +33,10 @@ pub fn leaves(value: &Value) -> Vec<(String, String)> {
 fn collect(path: &str, value: &Value, found: &mut Vec<(String, String)>) {
     match value {
         Value::Object(map) => {
-            for (key, value) in map.iter().filter(|(key, _)| !OF_THE_COMPUTER.contains(&key.as_str())) {
+            for (key, value) in map
+                .iter()
+                .filter(|(key, _)| !OF_THE_COMPUTER.contains(&key.as_str()))
+            {
                 collect(&format!("{path}.{key}"), value, found);
             }
         }
@@ -62,13 +71,19 @@ mod tests {
 
     #[test]
     fn numbers_are_masked_and_words_are_not() {
-        assert_eq!(without_numbers("81 blocks, 170.237 mm in 2.775 s."), "# blocks, # mm in # s.");
+        assert_eq!(
+            without_numbers("81 blocks, 170.237 mm in 2.775 s."),
+            "# blocks, # mm in # s."
+        );
     }
 
     #[test]
     fn what_depends_on_the_computer_is_left_out() {
         let summary = serde_json::json!({"a": {"b": 1}, "planning_us": {"max": 3}, "c": [2, null]});
         let expected = [(".a.b", "1"), (".c.0", "2"), (".c.1", "null")];
-        assert_eq!(leaves(&summary), expected.map(|(path, value)| (path.to_string(), value.to_string())));
+        assert_eq!(
+            leaves(&summary),
+            expected.map(|(path, value)| (path.to_string(), value.to_string()))
+        );
     }
 }

@@ -50,21 +50,38 @@ pub fn run(case: &Case, binary: &Path, folder: &Path) -> Result<Ran, String> {
     for (name, bytes) in &case.files {
         std::fs::write(folder.join(name), bytes).map_err(wrong)?;
     }
-    let mut input =
-        File::options().read(true).write(true).create(true).truncate(true).open(folder.join("input")).map_err(wrong)?;
+    let mut input = File::options()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .open(folder.join("input"))
+        .map_err(wrong)?;
     input.write_all(case.input.as_bytes()).map_err(wrong)?;
     let create = |name: &str| File::create(folder.join(name)).map_err(wrong);
     let mut command = Command::new(binary);
     // Both say the same name of themselves in their help.
-    command.arg0("tandem").args(&case.arguments).current_dir(folder);
+    command
+        .arg0("tandem")
+        .args(&case.arguments)
+        .current_dir(folder);
     if case.arguments.first().is_some_and(|first| first == "run") {
         // A case may ask for these files itself.
-        let asked = [("--trace", TRACE), ("--blocks", BLOCKS), ("--events", EVENTS), ("--summary", SUMMARY)];
-        let free = asked.into_iter().filter(|(option, _)| case.arguments.iter().all(|argument| argument != option));
+        let asked = [
+            ("--trace", TRACE),
+            ("--blocks", BLOCKS),
+            ("--events", EVENTS),
+            ("--summary", SUMMARY),
+        ];
+        let free = asked
+            .into_iter()
+            .filter(|(option, _)| case.arguments.iter().all(|argument| argument != option));
         command.args(free.flat_map(|(option, name)| [option, name]));
     }
     command.stdin(File::open(folder.join("input")).map_err(wrong)?);
-    command.stdout(Stdio::from(create("stdout")?)).stderr(Stdio::from(create("stderr")?));
+    command
+        .stdout(Stdio::from(create("stdout")?))
+        .stderr(Stdio::from(create("stderr")?));
     let status = wait(&mut command).map_err(|e| format!("{}: {e}", binary.display()))?;
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap_or_default();
     let text = |name: &str| String::from_utf8_lossy(&bytes(name)).into_owned();

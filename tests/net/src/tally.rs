@@ -33,7 +33,10 @@ impl Tally {
         counts.differing += usize::from(!finding.differences.is_empty());
         counts.same += usize::from(finding.differences.is_empty() && finding.is_same);
         if let Some(ratio) = finding.time_ratio {
-            self.ratios.entry(finding.planner.clone()).or_default().push(ratio);
+            self.ratios
+                .entry(finding.planner.clone())
+                .or_default()
+                .push(ratio);
         }
     }
 
@@ -45,12 +48,22 @@ impl Tally {
 
     /// The table.
     pub fn text(&self) -> String {
-        let mut text = format!("{:<12}{:>8}{:>8}{:>12}{:>8}\n", "group", "cases", "same", "as allowed", "differ");
+        let mut text = format!(
+            "{:<12}{:>8}{:>8}{:>12}{:>8}\n",
+            "group", "cases", "same", "as allowed", "differ"
+        );
         for (group, counts) in &self.groups {
             let allowed = counts.cases - counts.same - counts.differing;
-            let Counts { cases, same, differing } = counts;
-            writeln!(text, "{group:<12}{cases:>8}{same:>8}{allowed:>12}{differing:>8}")
-                .expect("a text takes what is written");
+            let Counts {
+                cases,
+                same,
+                differing,
+            } = counts;
+            writeln!(
+                text,
+                "{group:<12}{cases:>8}{same:>8}{allowed:>12}{differing:>8}"
+            )
+            .expect("a text takes what is written");
         }
         for (planner, ratios) in &self.ratios {
             let most = ratios.iter().copied().fold(0.0, f64::max);

@@ -11,12 +11,18 @@ pub type Axes = Vec<usize>;
 
 /// Index of an axis letter, upper or lower case.
 pub fn axis_index(letter: char) -> Option<usize> {
-    LETTERS.iter().position(|known| known.eq_ignore_ascii_case(&letter))
+    LETTERS
+        .iter()
+        .position(|known| known.eq_ignore_ascii_case(&letter))
 }
 
 /// Index of an axis named by a single letter, as in a column or a table name.
 pub(crate) fn axis_of_name(name: &str) -> Option<usize> {
     let mut letters = name.chars();
     let letter = letters.next()?;
-    letters.next().is_none().then(|| axis_index(letter)).flatten()
+    letters
+        .next()
+        .is_none()
+        .then(|| axis_index(letter))
+        .flatten()
 }

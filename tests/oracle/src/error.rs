@@ -35,14 +35,25 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn open(file: &str, cause: impl Into<String>) -> Self {
-        Self::Open { file: file.into(), cause: cause.into() }
+        Self::Open {
+            file: file.into(),
+            cause: cause.into(),
+        }
     }
 
     pub(crate) fn line(file: &str, line: u64, cause: impl Into<String>) -> Self {
-        Self::Line { file: file.into(), line, cause: cause.into() }
+        Self::Line {
+            file: file.into(),
+            line,
+            cause: cause.into(),
+        }
     }
 
     pub(crate) fn key(file: &str, key: &str, cause: impl Into<String>) -> Self {
-        Self::Key { file: file.into(), key: key.into(), cause: cause.into() }
+        Self::Key {
+            file: file.into(),
+            key: key.into(),
+            cause: cause.into(),
+        }
     }
 }

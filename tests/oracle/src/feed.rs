@@ -42,7 +42,13 @@ pub fn judge_feed(
 ) {
     let lengths_mm = lengths_mm(elements);
     let slack_mm = 2.0 * followed.deviation_mm + AT_VERTEX_MM;
-    let judge = FeedJudge { elements, machine, options, lengths_mm, slack_mm };
+    let judge = FeedJudge {
+        elements,
+        machine,
+        options,
+        lengths_mm,
+        slack_mm,
+    };
     let window = options.feed_window_samples(machine);
     let last = followed.links.len() - 1;
     for sample in 1..=last {
@@ -53,7 +59,13 @@ pub fn judge_feed(
         let place = |sample: usize| followed.places[followed.links[sample]];
         let from = place((sample - 1).saturating_sub(window));
         let to = place((sample + window).min(last));
-        judge.judge(sample, &moved, &rows[sample].command, &judge.touched(from, to), report);
+        judge.judge(
+            sample,
+            &moved,
+            &rows[sample].command,
+            &judge.touched(from, to),
+            report,
+        );
     }
 }
 
@@ -63,7 +75,9 @@ impl FeedJudge<'_> {
         for element in &self.elements[self.range(from, to)] {
             match element.feed {
                 Feed::Rapid => touched.rapids = true,
-                Feed::PerSecond(feed) if element.moves_linear => raise(&mut touched.linear_mm_per_s, feed),
+                Feed::PerSecond(feed) if element.moves_linear => {
+                    raise(&mut touched.linear_mm_per_s, feed)
+                }
                 Feed::PerSecond(feed) => raise(&mut touched.rotary_deg_per_s, feed),
             }
         }
@@ -83,15 +97,32 @@ impl FeedJudge<'_> {
         first..=last
     }
 
-    fn judge(&self, sample: usize, moved: &Position, at: &Position, touched: &Touched, report: &mut Report) {
+    fn judge(
+        &self,
+        sample: usize,
+        moved: &Position,
+        at: &Position,
+        touched: &Touched,
+        report: &mut Report,
+    ) {
         let feed = match *touched {
             // Where a rapid and a feed meet, the limits of the axes alone hold.
-            Touched { rapids: true, linear_mm_per_s: None, rotary_deg_per_s: None } => {
+            Touched {
+                rapids: true,
+                linear_mm_per_s: None,
+                rotary_deg_per_s: None,
+            } => {
                 return self.judge_rapid(sample, moved, at, report);
             }
             Touched { rapids: true, .. } => return,
-            Touched { linear_mm_per_s: Some(feed), .. } => (feed, false),
-            Touched { rotary_deg_per_s: Some(feed), .. } => (feed, true),
+            Touched {
+                linear_mm_per_s: Some(feed),
+                ..
+            } => (feed, false),
+            Touched {
+                rotary_deg_per_s: Some(feed),
+                ..
+            } => (feed, true),
             Touched { .. } => return,
         };
         self.judge_path_speed(sample, moved, at, feed, report);
@@ -117,7 +148,12 @@ impl FeedJudge<'_> {
         (feed, rotary): (f64, bool),
         report: &mut Report,
     ) {
-        let counted = self.machine.axes.iter().filter(|axis| axis.rotary == rotary).map(|axis| axis.index);
+        let counted = self
+            .machine
+            .axes
+            .iter()
+            .filter(|axis| axis.rotary == rotary)
+            .map(|axis| axis.index);
         let (mut squared, mut magnitude_mm) = (0.0, 0.0_f64);
         for axis in counted {
             squared += moved[axis].powi(2);

@@ -35,7 +35,9 @@ pub struct Followed {
 pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed {
     let mut followed = Followed::chain(commands);
     let walker = Walker::new(&path.elements, options);
-    let Some(last) = followed.chain.last().copied() else { return followed };
+    let Some(last) = followed.chain.last().copied() else {
+        return followed;
+    };
     let Some((cap_mm, first)) = smallest_tolerance(&walker, &followed.chain) else {
         if let Some(places) = walker.any(&followed.chain) {
             followed.end = walker.end(places.last().copied().unwrap_or_default(), &last);
@@ -44,12 +46,22 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
         }
         let walk = walker.recovering(&followed.chain);
         followed.end = walker.end(walk.places.last().copied().unwrap_or_default(), &last);
-        followed.deviation_mm = walk.misses.iter().map(|&(_, off_mm)| off_mm).fold(0.0, f64::max);
+        followed.deviation_mm = walk
+            .misses
+            .iter()
+            .map(|&(_, off_mm)| off_mm)
+            .fold(0.0, f64::max);
         (followed.places, followed.misses) = (walk.places, walk.misses);
         return followed;
     };
     followed.end = walker.end(first.last().copied().unwrap_or_default(), &last);
-    let latest = latest(&path.elements, followed.end, &followed.chain, cap_mm, options);
+    let latest = latest(
+        &path.elements,
+        followed.end,
+        &followed.chain,
+        cap_mm,
+        options,
+    );
     followed.settle(&path.elements, &first, latest.as_deref().unwrap_or(&first));
     followed
 }
@@ -57,7 +69,11 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
 /// Between which places each link may be where all of the tolerance is used, as far as the path can be followed with so much;
 /// none where it cannot. The places that the smallest tolerance leaves may be those of another part of the path, where that has
 /// features smaller than the tolerance.
-pub fn ranges(elements: &[Element], followed: &Followed, options: &Options) -> Option<Vec<(Place, Place)>> {
+pub fn ranges(
+    elements: &[Element],
+    followed: &Followed,
+    options: &Options,
+) -> Option<Vec<(Place, Place)>> {
     let walker = Walker::new(elements, options);
     let Some((cap_mm, first)) = widest_tolerance(&walker, &followed.chain) else {
         return walker.any_ranges(&followed.chain);
@@ -77,7 +93,15 @@ impl Followed {
             links.push(chain.len() - 1);
         }
         let (places, misses) = (Vec::new(), Vec::new());
-        Self { chain, samples, links, places, misses, end: Place::default(), deviation_mm: 0.0 }
+        Self {
+            chain,
+            samples,
+            links,
+            places,
+            misses,
+            end: Place::default(),
+            deviation_mm: 0.0,
+        }
     }
 
     /// Takes the nearest place between the first and the last that a sample may have.
@@ -85,7 +109,12 @@ impl Followed {
         let mut before = Place::default();
         for ((sample, &first), &latest) in self.chain.iter().zip(first).zip(latest) {
             let low = if first > before { first } else { before };
-            let (place, off_mm) = nearest_between(elements, low, if latest > low { latest } else { low }, sample);
+            let (place, off_mm) = nearest_between(
+                elements,
+                low,
+                if latest > low { latest } else { low },
+                sample,
+            );
             self.deviation_mm = self.deviation_mm.max(off_mm);
             self.places.push(place);
             before = place;
@@ -95,7 +124,11 @@ impl Followed {
 
 /// The smallest tolerance with which the walk succeeds, and that walk; none where the allowed one is too small.
 fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
-    let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
+    let walk = |cap_mm| {
+        walker
+            .capped(cap_mm)
+            .strict(Place::default(), chain.iter().copied())
+    };
     let (mut high_mm, mut places) = widest_tolerance(walker, chain)?;
     let mut low_mm = SMALLEST_DEVIATION_MM;
     while high_mm > RESOLUTION * low_mm {
@@ -112,34 +145,83 @@ fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<P
 /// have left, until the next vertex is out of reach; one that keeps closer to the samples does not. Each of them that succeeds
 /// is a proof.
 fn widest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
-    let walk = |cap_mm| walker.capped(cap_mm).strict(Place::default(), chain.iter().copied());
+    let walk = |cap_mm| {
+        walker
+            .capped(cap_mm)
+            .strict(Place::default(), chain.iter().copied())
+    };
     let mut caps = (0..NARROWER).map(|times| walker.widest_mm() / f64::from(1u32 << times));
     caps.find_map(|cap_mm| Some((cap_mm, walk(cap_mm)?)))
 }
 
 /// The last places that samples may have: the first ones on the way back.
-fn latest(elements: &[Element], end: Place, chain: &[Position], cap_mm: f64, options: &Options) -> Option<Vec<Place>> {
-    let back: Vec<Element> = elements[..=end.element].iter().rev().map(reversed).collect();
-    let start = Place { element: 0, fraction: 1.0 - end.fraction };
-    let mut places = Walker::new(&back, options).capped(cap_mm).strict(start, chain.iter().rev().copied())?;
+fn latest(
+    elements: &[Element],
+    end: Place,
+    chain: &[Position],
+    cap_mm: f64,
+    options: &Options,
+) -> Option<Vec<Place>> {
+    let back: Vec<Element> = elements[..=end.element]
+        .iter()
+        .rev()
+        .map(reversed)
+        .collect();
+    let start = Place {
+        element: 0,
+        fraction: 1.0 - end.fraction,
+    };
+    let mut places = Walker::new(&back, options)
+        .capped(cap_mm)
+        .strict(start, chain.iter().rev().copied())?;
     for place in &mut places {
-        *place = Place { element: end.element - place.element, fraction: 1.0 - place.fraction };
+        *place = Place {
+            element: end.element - place.element,
+            fraction: 1.0 - place.fraction,
+        };
     }
     places.reverse();
     Some(places)
 }
 
 fn reversed(element: &Element) -> Element {
-    Element { shape: element.shape.reversed(), ..element.clone() }
+    Element {
+        shape: element.shape.reversed(),
+        ..element.clone()
+    }
 }
 
-fn nearest_between(elements: &[Element], low: Place, high: Place, sample: &Position) -> (Place, f64) {
+fn nearest_between(
+    elements: &[Element],
+    low: Place,
+    high: Place,
+    sample: &Position,
+) -> (Place, f64) {
     let mut best = (low, f64::INFINITY);
-    for (index, element) in elements.iter().enumerate().take(high.element + 1).skip(low.element) {
-        let from = if index == low.element { low.fraction } else { 0.0 };
-        let to = if index == high.element { high.fraction } else { 1.0 };
+    for (index, element) in elements
+        .iter()
+        .enumerate()
+        .take(high.element + 1)
+        .skip(low.element)
+    {
+        let from = if index == low.element {
+            low.fraction
+        } else {
+            0.0
+        };
+        let to = if index == high.element {
+            high.fraction
+        } else {
+            1.0
+        };
         if let Some((fraction, off_mm)) = element.shape.nearer(sample, (from, to), best.1) {
-            best = (Place { element: index, fraction }, off_mm);
+            best = (
+                Place {
+                    element: index,
+                    fraction,
+                },
+                off_mm,
+            );
         }
     }
     best

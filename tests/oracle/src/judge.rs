@@ -24,7 +24,16 @@ impl Report<'_> {
     pub fn add(&mut self, kind: Kind, sample: usize, axis: Option<usize>, value: f64, limit: f64) {
         let Row { t_s, line, .. } = self.rows[sample];
         let joint = self.joint.clone();
-        self.findings.push(Finding { kind, sample, t_s, line, axis, joint, value, limit });
+        self.findings.push(Finding {
+            kind,
+            sample,
+            t_s,
+            line,
+            axis,
+            joint,
+            value,
+            limit,
+        });
     }
 }
 
@@ -33,9 +42,18 @@ impl Report<'_> {
 /// Limits are judged even where the program cannot be read; the verdict is then a failure, or *not judged*.
 pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options) -> Verdict {
     if let Some(reason) = unfit(trace, machine, options) {
-        return Verdict { not_judged: Some(reason), ..Verdict::default() }.settle();
+        return Verdict {
+            not_judged: Some(reason),
+            ..Verdict::default()
+        }
+        .settle();
     }
-    let mut report = Report { rows: &trace.rows, findings: Vec::new(), maxima: Maxima::default(), joint: None };
+    let mut report = Report {
+        rows: &trace.rows,
+        findings: Vec::new(),
+        maxima: Maxima::default(),
+        joint: None,
+    };
     let mut not_judged = match &machine.joints {
         Joints::Unknown(reason) if limits_asked(options) => Some(format!("the joints: {reason}")),
         _ => None,
@@ -48,17 +66,35 @@ pub fn judge(trace: &Trace, program: &str, machine: &Machine, options: &Options)
             match program::read(program, machine, options, &trace.rows) {
                 Ok(path) => judge_program(&path, trace, machine, options, &mut report),
                 Err(unread) => {
-                    not_judged = Some(not_judged.map_or(unread.to_string(), |joints| format!("{joints}; {unread}")));
+                    not_judged = Some(
+                        not_judged
+                            .map_or(unread.to_string(), |joints| format!("{joints}; {unread}")),
+                    );
                 }
             }
         }
     }
-    let Report { findings, maxima, .. } = report;
-    Verdict { findings, not_judged, maxima, ..Verdict::default() }.settle()
+    let Report {
+        findings, maxima, ..
+    } = report;
+    Verdict {
+        findings,
+        not_judged,
+        maxima,
+        ..Verdict::default()
+    }
+    .settle()
 }
 
 fn limits_asked(options: &Options) -> bool {
-    [Check::Travel, Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().any(|check| options.asks(check))
+    [
+        Check::Travel,
+        Check::Velocity,
+        Check::Acceleration,
+        Check::Jerk,
+    ]
+    .into_iter()
+    .any(|check| options.asks(check))
 }
 
 /// Why a trace cannot be judged on a machine at all.
@@ -69,20 +105,38 @@ fn unfit(trace: &Trace, machine: &Machine, options: &Options) -> Option<String> 
     if !(machine.fine_period_s.is_finite() && machine.fine_period_s > 0.0) {
         return Some("the machine has no fine period".into());
     }
-    if let Some(axis) = machine.axes.iter().find(|axis| !trace.axes.contains(&axis.index)) {
+    if let Some(axis) = machine
+        .axes
+        .iter()
+        .find(|axis| !trace.axes.contains(&axis.index))
+    {
         return Some(format!("the trace has no axis {}", LETTERS[axis.index]));
     }
-    if let Some(&axis) = trace.axes.iter().find(|&&axis| machine.axis(axis).is_none()) {
+    if let Some(&axis) = trace
+        .axes
+        .iter()
+        .find(|&&axis| machine.axis(axis).is_none())
+    {
         return Some(format!("the machine has no axis {}", LETTERS[axis]));
     }
-    if let Some(axis) = machine.axes.iter().find(|axis| axis.rotary != trace.degrees.contains(&axis.index)) {
-        let (letter, unit) = (LETTERS[axis.index], if axis.rotary { "mm" } else { "degrees" });
+    if let Some(axis) = machine
+        .axes
+        .iter()
+        .find(|axis| axis.rotary != trace.degrees.contains(&axis.index))
+    {
+        let (letter, unit) = (
+            LETTERS[axis.index],
+            if axis.rotary { "mm" } else { "degrees" },
+        );
         return Some(format!("the trace has axis {letter} in {unit}"));
     }
     if options.checks.is_empty() {
         return Some("no judgement is asked for".into());
     }
-    let mut jerkless = machine.axes.iter().filter(|axis| axis.max_jerk_mm_per_s3.is_none());
+    let mut jerkless = machine
+        .axes
+        .iter()
+        .filter(|axis| axis.max_jerk_mm_per_s3.is_none());
     let jerkless = jerkless.next().filter(|_| options.asks(Check::Jerk))?;
     Some(format!("axis {} has no max_jerk", LETTERS[jerkless.index]))
 }
@@ -92,8 +146,18 @@ fn judge_finite(trace: &Trace, report: &mut Report) {
         if !row.t_s.is_finite() {
             report.add(Kind::NotFinite, index, None, row.t_s, f64::MAX);
         }
-        for &axis in trace.axes.iter().filter(|&&axis| !row.command[axis].is_finite()) {
-            report.add(Kind::NotFinite, index, Some(axis), row.command[axis], f64::MAX);
+        for &axis in trace
+            .axes
+            .iter()
+            .filter(|&&axis| !row.command[axis].is_finite())
+        {
+            report.add(
+                Kind::NotFinite,
+                index,
+                Some(axis),
+                row.command[axis],
+                f64::MAX,
+            );
         }
     }
     for &(row, _, value) in &trace.not_finite {
@@ -101,7 +165,13 @@ fn judge_finite(trace: &Trace, report: &mut Report) {
     }
 }
 
-fn judge_program(path: &Path, trace: &Trace, machine: &Machine, options: &Options, report: &mut Report) {
+fn judge_program(
+    path: &Path,
+    trace: &Trace,
+    machine: &Machine,
+    options: &Options,
+    report: &mut Report,
+) {
     if options.asks(Check::EndPoint) {
         judge_ends(path, &trace.rows, machine, options, report);
     }
@@ -124,25 +194,55 @@ fn judge_program(path: &Path, trace: &Trace, machine: &Machine, options: &Option
     }
 }
 
-fn judge_ends(path: &Path, rows: &[Row], machine: &Machine, options: &Options, report: &mut Report) {
+fn judge_ends(
+    path: &Path,
+    rows: &[Row],
+    machine: &Machine,
+    options: &Options,
+    report: &mut Report,
+) {
     let last = rows.len() - 1;
     let off_start = minus(&rows[0].command, &machine.start());
     let off_end = minus(&rows[last].command, &path.end);
     for axis in machine.axes.iter().map(|axis| axis.index) {
         if off_start[axis].abs() > options.end_tolerance_mm {
-            report.add(Kind::StartPoint, 0, Some(axis), off_start[axis], options.end_tolerance_mm);
+            report.add(
+                Kind::StartPoint,
+                0,
+                Some(axis),
+                off_start[axis],
+                options.end_tolerance_mm,
+            );
         }
         report.maxima.end_error_mm = report.maxima.end_error_mm.max(off_end[axis].abs());
         if off_end[axis].abs() > options.end_tolerance_mm && !options.ends_early {
-            report.add(Kind::EndPoint, last, Some(axis), off_end[axis], options.end_tolerance_mm);
+            report.add(
+                Kind::EndPoint,
+                last,
+                Some(axis),
+                off_end[axis],
+                options.end_tolerance_mm,
+            );
         }
     }
 }
 
 /// A program that moves nothing: neither may the samples.
-fn judge_standstill(path: &Path, commands: &[Position], machine: &Machine, options: &Options, report: &mut Report) {
-    let tolerance_mm = options.sample_tolerance_mm.unwrap_or(machine.path_tolerance_mm);
-    for (sample, command) in commands.iter().enumerate().filter(|_| path.elements.is_empty()) {
+fn judge_standstill(
+    path: &Path,
+    commands: &[Position],
+    machine: &Machine,
+    options: &Options,
+    report: &mut Report,
+) {
+    let tolerance_mm = options
+        .sample_tolerance_mm
+        .unwrap_or(machine.path_tolerance_mm);
+    for (sample, command) in commands
+        .iter()
+        .enumerate()
+        .filter(|_| path.elements.is_empty())
+    {
         let off_mm = distance(command, &path.end);
         report.maxima.sample_deviation_mm = report.maxima.sample_deviation_mm.max(off_mm);
         if off_mm > tolerance_mm && options.asks(Check::Path) {
@@ -151,18 +251,38 @@ fn judge_standstill(path: &Path, commands: &[Position], machine: &Machine, optio
     }
 }
 
-fn judge_path(path: &Path, followed: &Followed, machine: &Machine, options: &Options, report: &mut Report) {
+fn judge_path(
+    path: &Path,
+    followed: &Followed,
+    machine: &Machine,
+    options: &Options,
+    report: &mut Report,
+) {
     report.maxima.sample_deviation_mm = followed.deviation_mm;
     for &(link, off_mm) in &followed.misses {
         let tolerance_mm = path.elements[followed.places[link].element].tolerance_mm;
         let tolerance_mm = options.sample_tolerance_mm.unwrap_or(tolerance_mm);
-        report.add(Kind::PathDeviation, followed.samples[link], None, off_mm, tolerance_mm);
+        report.add(
+            Kind::PathDeviation,
+            followed.samples[link],
+            None,
+            off_mm,
+            tolerance_mm,
+        );
     }
     let lengths_mm = lengths_mm(&path.elements);
     let left_mm = lengths_mm[path.elements.len()] - length_to_mm(&lengths_mm, followed.end);
     if left_mm > 0.0 && !options.ends_early {
-        let tolerance_mm = options.sample_tolerance_mm.unwrap_or(machine.path_tolerance_mm);
-        report.add(Kind::NotCovered, followed.links.len() - 1, None, left_mm, tolerance_mm);
+        let tolerance_mm = options
+            .sample_tolerance_mm
+            .unwrap_or(machine.path_tolerance_mm);
+        report.add(
+            Kind::NotCovered,
+            followed.links.len() - 1,
+            None,
+            left_mm,
+            tolerance_mm,
+        );
     }
 }
 
@@ -175,7 +295,13 @@ fn judge_vertices(path: &Path, followed: &Followed, options: &Options, report: &
         };
         *most = most.max(vertex.off_mm);
         if vertex.off_mm > vertex.limit_mm {
-            report.add(Kind::VertexMissed, vertex.sample, None, vertex.off_mm, vertex.limit_mm);
+            report.add(
+                Kind::VertexMissed,
+                vertex.sample,
+                None,
+                vertex.off_mm,
+                vertex.limit_mm,
+            );
             if let Some(finding) = report.findings.last_mut() {
                 finding.line = vertex.line;
             }

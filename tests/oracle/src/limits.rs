@@ -19,25 +19,44 @@ pub fn judge_limits(rows: &[Row], machine: &Machine, options: &Options, report: 
         if options.asks(Check::Travel) {
             judge_travel(axis, &positions, report);
         }
-        let differences = AxisJudge::new(axis, machine, options, &positions).judge(&positions, options, report);
+        let differences =
+            AxisJudge::new(axis, machine, options, &positions).judge(&positions, options, report);
         report.maxima.axes.push(differences);
     }
-    let Joints::Known(joints) = &machine.joints else { return };
+    let Joints::Known(joints) = &machine.joints else {
+        return;
+    };
     for joint in joints {
         judge_joint(rows, joint, machine, options, report);
     }
 }
 
 /// The same of a joint, whose positions follow from those of the axes.
-fn judge_joint(rows: &[Row], joint: &Joint, machine: &Machine, options: &Options, report: &mut Report) {
-    let positions: Vec<f64> = rows.iter().map(|row| joint.position(&row.command)).collect();
+fn judge_joint(
+    rows: &[Row],
+    joint: &Joint,
+    machine: &Machine,
+    options: &Options,
+    report: &mut Report,
+) {
+    let positions: Vec<f64> = rows
+        .iter()
+        .map(|row| joint.position(&row.command))
+        .collect();
     report.joint = Some(joint.name.clone());
     if options.asks(Check::Travel) {
         judge_travel(&joint.limits, &positions, report);
     }
     let mut judge = AxisJudge::new(&joint.limits, machine, options, &positions);
     // It is as rounded as the axes that it is a sum of.
-    let sums = rows.iter().map(|row| joint.weights.iter().zip(row.command).map(|(w, at)| (w * at).abs()).sum());
+    let sums = rows.iter().map(|row| {
+        joint
+            .weights
+            .iter()
+            .zip(row.command)
+            .map(|(w, at)| (w * at).abs())
+            .sum()
+    });
     judge.rounding_mm_per_s = 2.0 * speed_rounding(sums.fold(0.0, f64::max), machine.fine_period_s);
     let differences = judge.judge(&positions, options, report);
     report.maxima.joints.push((joint.name.clone(), differences));
@@ -50,7 +69,8 @@ pub fn speed_rounding(magnitude_mm: f64, period_s: f64) -> f64 {
 }
 
 fn judge_period(rows: &[Row], period_s: f64, report: &mut Report) {
-    let off = |difference_s: f64, wanted_s: f64| (difference_s - wanted_s).abs() > TOLERANCE * period_s;
+    let off =
+        |difference_s: f64, wanted_s: f64| (difference_s - wanted_s).abs() > TOLERANCE * period_s;
     let whole_s = (rows[0].t_s / period_s).round() * period_s;
     // Homing moves no line of the program: a record behind it begins later, at a rest that no line has led to.
     let homed = rows[0].line == 0 && !off(rows[0].t_s, whole_s);
@@ -69,7 +89,9 @@ fn judge_travel(axis: &Axis, positions: &[f64], report: &mut Report) {
     let [low, high] = axis.travel_mm;
     // The end of travel itself may be programmed, also where it is zero: a position is as rounded as the greatest one that
     // it may be computed from.
-    let magnitude_mm = positions.iter().fold(0.0_f64, |most, position| most.max(position.abs()));
+    let magnitude_mm = positions
+        .iter()
+        .fold(0.0_f64, |most, position| most.max(position.abs()));
     let rounding = ROUNDED_ULPS * f64::EPSILON * magnitude_mm;
     for (index, &position) in positions.iter().enumerate() {
         if position < low - rounding {
@@ -93,14 +115,19 @@ struct AxisJudge<'a> {
 
 impl<'a> AxisJudge<'a> {
     fn new(axis: &'a Axis, machine: &Machine, options: &Options, positions: &[f64]) -> Self {
-        let magnitude_mm = positions.iter().fold(0.0_f64, |most, position| most.max(position.abs()));
+        let magnitude_mm = positions
+            .iter()
+            .fold(0.0_f64, |most, position| most.max(position.abs()));
         Self {
             axis,
             period_s: machine.fine_period_s,
             step_mm_per_s: options.speed_difference(machine, axis.rotary),
             rounding_mm_per_s: speed_rounding(magnitude_mm, machine.fine_period_s),
             buckets: [0.0; 2],
-            maxima: AxisMaxima { axis: axis.index, ..AxisMaxima::default() },
+            maxima: AxisMaxima {
+                axis: axis.index,
+                ..AxisMaxima::default()
+            },
         }
     }
 
@@ -132,7 +159,10 @@ impl<'a> AxisJudge<'a> {
     fn note(&mut self, speed: f64, change: f64, jerk: f64) {
         let most = |value: &mut f64, candidate: f64| *value = value.max(candidate.abs());
         most(&mut self.maxima.velocity_mm_per_s, speed);
-        most(&mut self.maxima.acceleration_mm_per_s2, change / self.period_s);
+        most(
+            &mut self.maxima.acceleration_mm_per_s2,
+            change / self.period_s,
+        );
         most(&mut self.maxima.jerk_mm_per_s3, jerk);
     }
 
@@ -166,12 +196,20 @@ impl<'a> AxisJudge<'a> {
             report.add(Kind::SpeedStep, sample, axis, level, self.step_mm_per_s);
         } else {
             let acceleration = change / self.period_s;
-            report.add(Kind::Acceleration, sample, axis, acceleration, self.axis.max_acceleration_mm_per_s2);
+            report.add(
+                Kind::Acceleration,
+                sample,
+                axis,
+                acceleration,
+                self.axis.max_acceleration_mm_per_s2,
+            );
         }
     }
 
     fn judge_jerk(&self, sample: usize, jerk: f64, report: &mut Report) {
-        let Some(limit) = self.axis.max_jerk_mm_per_s3 else { return };
+        let Some(limit) = self.axis.max_jerk_mm_per_s3 else {
+            return;
+        };
         let rounding = 4.0 * self.rounding_mm_per_s / self.period_s.powi(2);
         if jerk.abs() > limit * (1.0 + JERK_TOLERANCE) + rounding {
             report.add(Kind::Jerk, sample, Some(self.axis.index), jerk, limit);

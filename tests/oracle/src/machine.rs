@@ -86,15 +86,24 @@ impl Machine {
     }
 
     fn from_keys(keys: &Keys) -> Result<Self, Error> {
-        let difference = keys.number("motion.allowable_speed_difference_mm_per_min")?.unwrap_or(0.0);
-        let rotary_difference = keys.number("motion.allowable_speed_difference_deg_per_min")?.unwrap_or(difference);
-        let mut axes: Vec<Axis> =
-            keys.names("axes").iter().map(|name| Axis::from_keys(keys, name)).collect::<Result<_, _>>()?;
+        let difference = keys
+            .number("motion.allowable_speed_difference_mm_per_min")?
+            .unwrap_or(0.0);
+        let rotary_difference = keys
+            .number("motion.allowable_speed_difference_deg_per_min")?
+            .unwrap_or(difference);
+        let mut axes: Vec<Axis> = keys
+            .names("axes")
+            .iter()
+            .map(|name| Axis::from_keys(keys, name))
+            .collect::<Result<_, _>>()?;
         axes.sort_by_key(|axis| axis.index);
         let joints = Joints::read(keys, &axes)?;
         Ok(Self {
             fine_period_s: keys.need("loops.fine_period_ms")? / 1000.0,
-            planner: keys.text("planner.plugin").unwrap_or_else(|| DEFAULT_PLANNER.into()),
+            planner: keys
+                .text("planner.plugin")
+                .unwrap_or_else(|| DEFAULT_PLANNER.into()),
             speed_difference_mm_per_s: difference / 60.0,
             speed_difference_deg_per_s: rotary_difference / 60.0,
             path_tolerance_mm: keys.need("motion.path_tolerance_mm")?,
@@ -114,7 +123,9 @@ impl Axis {
     fn from_keys(keys: &Keys, name: &str) -> Result<Self, Error> {
         let table = format!("axes.{name}");
         let index = axis_of_name(name).ok_or_else(|| keys.error(&table, "no axis letter"))?;
-        let rotary = keys.text(&format!("{table}.kind")).is_some_and(|kind| kind == "rotary");
+        let rotary = keys
+            .text(&format!("{table}.kind"))
+            .is_some_and(|kind| kind == "rotary");
         let unit = if rotary { "deg" } else { "mm" };
         let key = |quantity: &str, per: &str| format!("{table}.{quantity}_{unit}{per}");
         let max_feed = keys.need(&key("max_feed", "_per_min"))?;
@@ -124,7 +135,10 @@ impl Axis {
             travel_mm: keys.range(&key("travel", ""))?,
             start_mm: keys.number(&key("start", ""))?.unwrap_or(0.0),
             max_feed_mm_per_s: max_feed / 60.0,
-            max_rapid_mm_per_s: keys.number(&key("max_rapid", "_per_min"))?.unwrap_or(max_feed) / 60.0,
+            max_rapid_mm_per_s: keys
+                .number(&key("max_rapid", "_per_min"))?
+                .unwrap_or(max_feed)
+                / 60.0,
             max_acceleration_mm_per_s2: keys.need(&key("max_acceleration", "_per_s2"))?,
             max_jerk_mm_per_s3: keys.number(&key("max_jerk", "_per_s3"))?,
         })

@@ -75,17 +75,28 @@ fn main() -> ExitCode {
         }
         Err(error) => {
             let _ = writeln!(std::io::stderr(), "oracle: {error}");
-            ExitCode::from(if matches!(error, Error::Open { .. }) { 2 } else { 3 })
+            ExitCode::from(if matches!(error, Error::Open { .. }) {
+                2
+            } else {
+                3
+            })
         }
     }
 }
 
 fn run(arguments: &Arguments) -> Result<Verdict, Error> {
     let trace = Trace::read(&arguments.trace)?;
-    let program = std::fs::read(&arguments.program)
-        .map_err(|cause| Error::Open { file: arguments.program.display().to_string(), cause: cause.to_string() })?;
+    let program = std::fs::read(&arguments.program).map_err(|cause| Error::Open {
+        file: arguments.program.display().to_string(),
+        cause: cause.to_string(),
+    })?;
     let machine = arguments.machine(Machine::read(&arguments.machine)?);
-    Ok(judge(&trace, &String::from_utf8_lossy(&program), &machine, &arguments.options()))
+    Ok(judge(
+        &trace,
+        &String::from_utf8_lossy(&program),
+        &machine,
+        &arguments.options(),
+    ))
 }
 
 impl Arguments {
@@ -100,12 +111,20 @@ impl Arguments {
     }
 
     fn options(&self) -> Options {
-        let mut options = if self.order == 3 { Options::with_jerk() } else { Options::default() };
+        let mut options = if self.order == 3 {
+            Options::with_jerk()
+        } else {
+            Options::default()
+        };
         let per_s = |per_min: f64| per_min / 60.0;
-        options.speed_difference_mm_per_s =
-            self.speed_difference_mm_per_min.map(per_s).or(options.speed_difference_mm_per_s);
-        options.speed_difference_deg_per_s =
-            self.speed_difference_deg_per_min.map(per_s).or(options.speed_difference_deg_per_s);
+        options.speed_difference_mm_per_s = self
+            .speed_difference_mm_per_min
+            .map(per_s)
+            .or(options.speed_difference_mm_per_s);
+        options.speed_difference_deg_per_s = self
+            .speed_difference_deg_per_min
+            .map(per_s)
+            .or(options.speed_difference_deg_per_s);
         Options {
             sample_tolerance_mm: self.sample_tolerance_mm,
             vertex_tolerance_mm: self.vertex_tolerance_mm,

@@ -62,7 +62,16 @@ impl Default for Options {
     fn default() -> Self {
         use Check::{Acceleration, EndPoint, Feed, Path, Period, Travel, Velocity, Vertices};
         Self {
-            checks: vec![Period, Travel, Velocity, Acceleration, Feed, Path, Vertices, EndPoint],
+            checks: vec![
+                Period,
+                Travel,
+                Velocity,
+                Acceleration,
+                Feed,
+                Path,
+                Vertices,
+                EndPoint,
+            ],
             speed_difference_mm_per_s: None,
             speed_difference_deg_per_s: None,
             sample_tolerance_mm: None,
@@ -92,13 +101,19 @@ impl Options {
 
     /// The default options with these judgements only.
     pub fn only(checks: &[Check]) -> Self {
-        Self { checks: checks.to_vec(), ..Self::default() }
+        Self {
+            checks: checks.to_vec(),
+            ..Self::default()
+        }
     }
 
     /// The default options for a planner that bounds jerk: no speed step anywhere, and jerk is judged.
     pub fn with_jerk() -> Self {
-        let mut options =
-            Self { speed_difference_mm_per_s: Some(0.0), speed_difference_deg_per_s: Some(0.0), ..Self::default() };
+        let mut options = Self {
+            speed_difference_mm_per_s: Some(0.0),
+            speed_difference_deg_per_s: Some(0.0),
+            ..Self::default()
+        };
         options.checks.push(Check::Jerk);
         options
     }
@@ -109,22 +124,34 @@ impl Options {
     }
 
     pub(crate) fn asks_program(&self) -> bool {
-        [Check::Feed, Check::Path, Check::Vertices, Check::EndPoint].into_iter().any(|check| self.asks(check))
+        [Check::Feed, Check::Path, Check::Vertices, Check::EndPoint]
+            .into_iter()
+            .any(|check| self.asks(check))
     }
 
     /// Speed step that an axis may make, mm/s or deg/s.
     pub(crate) fn speed_difference(&self, machine: &Machine, rotary: bool) -> f64 {
         let (asked, stated) = if rotary {
-            (self.speed_difference_deg_per_s, machine.speed_difference_deg_per_s)
+            (
+                self.speed_difference_deg_per_s,
+                machine.speed_difference_deg_per_s,
+            )
         } else {
-            (self.speed_difference_mm_per_s, machine.speed_difference_mm_per_s)
+            (
+                self.speed_difference_mm_per_s,
+                machine.speed_difference_mm_per_s,
+            )
         };
         asked.unwrap_or(if steps_speed(machine) { stated } else { 0.0 })
     }
 
     /// Samples before and after one in which another block may lend its feed.
     pub(crate) fn feed_window_samples(&self, machine: &Machine) -> usize {
-        let window_s = self.feed_window_s.unwrap_or(if steps_speed(machine) { 0.0 } else { machine.time_constant_s });
+        let window_s = self.feed_window_s.unwrap_or(if steps_speed(machine) {
+            0.0
+        } else {
+            machine.time_constant_s
+        });
         (window_s / machine.fine_period_s).ceil().max(0.0) as usize
     }
 }

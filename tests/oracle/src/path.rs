@@ -101,7 +101,12 @@ impl Shape {
     }
 
     /// The same, where it is nearer than `off_mm`.
-    pub fn nearer(&self, point: &Position, (low, high): (f64, f64), off_mm: f64) -> Option<(f64, f64)> {
+    pub fn nearer(
+        &self,
+        point: &Position,
+        (low, high): (f64, f64),
+        off_mm: f64,
+    ) -> Option<(f64, f64)> {
         if self.is_beyond(distance(&self.at(low), point), off_mm) {
             return None;
         }

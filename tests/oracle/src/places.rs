@@ -28,14 +28,20 @@ pub fn find(
     tolerance_mm: impl Fn(&Element) -> f64,
     reach_mm: f64,
 ) -> Option<Known> {
-    let mut known = Known { places: vec![(0, 0.0)], begins: vec![0] };
+    let mut known = Known {
+        places: vec![(0, 0.0)],
+        begins: vec![0],
+    };
     let mut looks = 0;
     for (index, sample) in samples.iter().enumerate() {
         let (from, to) = (known.begins[index], known.places.len());
         let previous = &samples[index.saturating_sub(1)];
         let (mut at, mut passes, mut element) = (from, false, known.places[from].0);
         while element < elements.len() && (passes || at < to) {
-            let here = known.places[at..to].first().copied().filter(|(of, _)| *of == element);
+            let here = known.places[at..to]
+                .first()
+                .copied()
+                .filter(|(of, _)| *of == element);
             at += usize::from(here.is_some());
             if !passes && here.is_none() {
                 element = known.places[at].0;
@@ -43,7 +49,9 @@ pub fn find(
             }
             let low = here.map_or(0.0, |(_, fraction)| if passes { 0.0 } else { fraction });
             let Element { shape, .. } = &elements[element];
-            if let Some(fraction) = shape.first_within(sample, tolerance_mm(&elements[element]), low) {
+            if let Some(fraction) =
+                shape.first_within(sample, tolerance_mm(&elements[element]), low)
+            {
                 known.places.push((element, fraction));
             }
             passes = distance_to_chord(&shape.at(1.0), previous, sample) <= reach_mm;
@@ -65,20 +73,32 @@ impl Known {
     pub fn nearest(&self, elements: &[Element], samples: &[Position], reach_mm: f64) -> Vec<Place> {
         let mut places: Vec<Place> = Vec::with_capacity(samples.len());
         for (index, sample) in samples.iter().enumerate().rev() {
-            let until = self.begins.get(index + 1).copied().unwrap_or(self.places.len());
+            let until = self
+                .begins
+                .get(index + 1)
+                .copied()
+                .unwrap_or(self.places.len());
             let behind = places.last().copied();
             let next = &samples[(index + 1).min(samples.len() - 1)];
-            let is_passed = |of: &usize| distance_to_chord(&elements[*of].shape.at(1.0), sample, next) <= reach_mm;
+            let is_passed = |of: &usize| {
+                distance_to_chord(&elements[*of].shape.at(1.0), sample, next) <= reach_mm
+            };
             let mut best = (Place::default(), f64::INFINITY);
             for &(element, first) in self.places[self.begins[index]..until].iter().rev() {
                 let last = match behind {
                     Some(behind) if element > behind.element => continue,
-                    Some(behind) if element == behind.element && first > behind.fraction => continue,
+                    Some(behind) if element == behind.element && first > behind.fraction => {
+                        continue;
+                    }
                     Some(behind) if element == behind.element => behind.fraction,
                     Some(behind) if !(element..behind.element).all(|of| is_passed(&of)) => break,
                     _ => 1.0,
                 };
-                if let Some((fraction, off_mm)) = elements[element].shape.nearer(sample, (first, last), best.1) {
+                if let Some((fraction, off_mm)) =
+                    elements[element]
+                        .shape
+                        .nearer(sample, (first, last), best.1)
+                {
                     best = (Place { element, fraction }, off_mm);
                 }
             }
@@ -89,11 +109,20 @@ impl Known {
     }
 
     /// The first element and the last on which each sample may be so that those behind it have places too.
-    pub fn ranges(&self, elements: &[Element], samples: &[Position], reach_mm: f64) -> Vec<(Place, Place)> {
+    pub fn ranges(
+        &self,
+        elements: &[Element],
+        samples: &[Position],
+        reach_mm: f64,
+    ) -> Vec<(Place, Place)> {
         let mut ranges = Vec::with_capacity(samples.len());
         let mut behind: Vec<usize> = Vec::new();
         for (index, sample) in samples.iter().enumerate().rev() {
-            let until = self.begins.get(index + 1).copied().unwrap_or(self.places.len());
+            let until = self
+                .begins
+                .get(index + 1)
+                .copied()
+                .unwrap_or(self.places.len());
             let here = &self.places[self.begins[index]..until];
             let next = &samples[(index + 1).min(samples.len() - 1)];
             let mut alive = Vec::new();
@@ -103,7 +132,8 @@ impl Known {
                 while of > element && of != usize::MAX {
                     goes_on |= behind.binary_search(&of).is_ok();
                     of -= 1;
-                    goes_on &= distance_to_chord(&elements[of].shape.at(1.0), sample, next) <= reach_mm;
+                    goes_on &=
+                        distance_to_chord(&elements[of].shape.at(1.0), sample, next) <= reach_mm;
                 }
                 let stays = behind.binary_search(&element).is_ok();
                 if index + 1 == samples.len() || stays || goes_on && of == element {
@@ -113,7 +143,10 @@ impl Known {
             alive.reverse();
             let place = |&(element, fraction): &(usize, f64)| Place { element, fraction };
             let first = alive.first().map(place).unwrap_or_default();
-            let last = alive.last().map_or(first, |(element, _)| Place { element: *element, fraction: 1.0 });
+            let last = alive.last().map_or(first, |(element, _)| Place {
+                element: *element,
+                fraction: 1.0,
+            });
             ranges.push((first, last));
             behind = alive.into_iter().map(|(element, _)| element).collect();
         }

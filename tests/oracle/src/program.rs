@@ -31,12 +31,20 @@ impl fmt::Display for Unread {
 
 /// Reads a program into the path of the machine's axes, from where the machine stands. Where a probe came to rest is
 /// read off the trace.
-pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -> Result<Path, Unread> {
+pub fn read(
+    program: &str,
+    machine: &Machine,
+    options: &Options,
+    rows: &[Row],
+) -> Result<Path, Unread> {
     let mut state = State::new(machine, rows);
     let program = program.strip_prefix('\u{feff}').unwrap_or(program);
     let mut percent = Percent::default();
     for (index, text) in program.lines().enumerate() {
-        let unread = |cause| Unread { line: index + 1, cause };
+        let unread = |cause| Unread {
+            line: index + 1,
+            cause,
+        };
         let text = match text.trim_start().strip_prefix('/') {
             Some(_) if options.block_delete => continue,
             Some(rest) => rest,
@@ -52,7 +60,10 @@ pub fn read(program: &str, machine: &Machine, options: &Options, rows: &[Row]) -
             break;
         }
     }
-    state.into_path().map_err(|cause| Unread { line: program.lines().count(), cause })
+    state.into_path().map_err(|cause| Unread {
+        line: program.lines().count(),
+        cause,
+    })
 }
 
 /// How far a program is between its percent signs.
@@ -89,7 +100,9 @@ impl Percent {
                 self.over = true;
                 Ok(Met::Nothing)
             }
-            _ if self.over => Err("text behind the % that ends a program that none had opened".into()),
+            _ if self.over => {
+                Err("text behind the % that ends a program that none had opened".into())
+            }
             _ => {
                 self.opened.get_or_insert(false);
                 Ok(Met::Words)

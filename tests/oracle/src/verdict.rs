@@ -131,10 +131,13 @@ impl Verdict {
     }
 
     pub(crate) fn settle(mut self) -> Self {
-        self.findings.sort_by_key(|finding| (finding.sample, finding.kind));
+        self.findings
+            .sort_by_key(|finding| (finding.sample, finding.kind));
         self.outcome = match &self.not_judged {
             _ if !self.findings.is_empty() => Outcome::Fail,
-            Some(reason) => Outcome::NotJudged { reason: reason.clone() },
+            Some(reason) => Outcome::NotJudged {
+                reason: reason.clone(),
+            },
             None => Outcome::Pass,
         };
         self

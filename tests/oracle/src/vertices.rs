@@ -37,11 +37,18 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
     let laid = Laid::new(elements, followed);
     let (mut link, mut ranges) = (0, None);
     // Samples far off the path belong to no vertex; they must not widen the search either.
-    let deviation_mm = if followed.misses.is_empty() { followed.deviation_mm } else { 0.0 };
+    let deviation_mm = if followed.misses.is_empty() {
+        followed.deviation_mm
+    } else {
+        0.0
+    };
     // A run that ended early may have come to rest just short of the end of its last piece.
     let last = elements.len().min(followed.end.element + 1) - 1;
     let passed = |index: usize| index < last || !options.ends_early || !elements[index].exact_stop;
-    let reached = elements.iter().enumerate().take_while(|&(index, _)| end_of(index) <= followed.end && passed(index));
+    let reached = elements
+        .iter()
+        .enumerate()
+        .take_while(|&(index, _)| end_of(index) <= followed.end && passed(index));
     let vertices = reached.filter_map(|(index, element)| {
         while link + 1 < followed.places.len() && followed.places[link + 1] <= end_of(index) {
             link += 1;
@@ -49,15 +56,27 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
         let limit_mm = limit_mm(elements, index, options);
         let mut off_mm = laid.distance_mm(index, link, 4.0 * (limit_mm + deviation_mm));
         if off_mm > limit_mm && followed.misses.is_empty() {
-            let ranges = ranges.get_or_insert_with(|| follow::ranges(elements, followed, options).unwrap_or_default());
+            let ranges = ranges.get_or_insert_with(|| {
+                follow::ranges(elements, followed, options).unwrap_or_default()
+            });
             // Where the path comes by again, a run that ended early may have ended the first time.
-            if options.ends_early && ranges.last().is_some_and(|(first, _)| *first < end_of(index)) {
+            if options.ends_early
+                && ranges
+                    .last()
+                    .is_some_and(|(first, _)| *first < end_of(index))
+            {
                 return None;
             }
             off_mm = off_mm.min(laid.distance_of_all_mm(index, ranges));
         }
         let (line, exact_stop) = (element.line, element.exact_stop);
-        Some(Vertex { line, sample: followed.samples[link], off_mm, limit_mm, exact_stop })
+        Some(Vertex {
+            line,
+            sample: followed.samples[link],
+            off_mm,
+            limit_mm,
+            exact_stop,
+        })
     });
     vertices.collect()
 }
@@ -78,7 +97,10 @@ pub fn length_to_mm(lengths_mm: &[f64], place: Place) -> f64 {
 }
 
 fn end_of(element: usize) -> Place {
-    Place { element, fraction: 1.0 }
+    Place {
+        element,
+        fraction: 1.0,
+    }
 }
 
 fn limit_mm(elements: &[Element], index: usize, options: &Options) -> f64 {
@@ -86,14 +108,25 @@ fn limit_mm(elements: &[Element], index: usize, options: &Options) -> f64 {
         return options.exact_stop_tolerance_mm;
     }
     let next = elements.get(index + 1).unwrap_or(&elements[index]);
-    options.vertex_tolerance_mm.unwrap_or_else(|| elements[index].tolerance_mm.max(next.tolerance_mm))
+    options
+        .vertex_tolerance_mm
+        .unwrap_or_else(|| elements[index].tolerance_mm.max(next.tolerance_mm))
 }
 
 impl<'a> Laid<'a> {
     fn new(elements: &'a [Element], followed: &'a Followed) -> Self {
         let lengths_mm = lengths_mm(elements);
-        let links_mm = followed.places.iter().map(|&place| length_to_mm(&lengths_mm, place)).collect();
-        Self { followed, elements, lengths_mm, links_mm }
+        let links_mm = followed
+            .places
+            .iter()
+            .map(|&place| length_to_mm(&lengths_mm, place))
+            .collect();
+        Self {
+            followed,
+            elements,
+            lengths_mm,
+            links_mm,
+        }
     }
 
     /// Distance of a vertex from the chords that belong to the path around it; `link` is the last one before it.
@@ -103,11 +136,20 @@ impl<'a> Laid<'a> {
         let at_mm = self.lengths_mm[vertex + 1];
         let chord = |from| self.chord_mm(from, &point, element.exact_stop);
         // Samples off the path wait where the walk lost them: all of these belong to the vertices around.
-        let (last_mm, next_mm) = (self.links_mm[link], self.links_mm.get(link + 1).map_or(at_mm, |&mm| mm.max(at_mm)));
-        let near_before =
-            (0..=link).rev().take_while(|&from| from == link || last_mm - self.links_mm[from + 1] <= span_mm);
-        let near_after = (link + 1..self.links_mm.len()).take_while(|&from| self.links_mm[from] - next_mm <= span_mm);
-        let near = near_before.take(SEARCHED_CHORDS).chain(near_after.take(SEARCHED_CHORDS));
+        let (last_mm, next_mm) = (
+            self.links_mm[link],
+            self.links_mm
+                .get(link + 1)
+                .map_or(at_mm, |&mm| mm.max(at_mm)),
+        );
+        let near_before = (0..=link)
+            .rev()
+            .take_while(|&from| from == link || last_mm - self.links_mm[from + 1] <= span_mm);
+        let near_after = (link + 1..self.links_mm.len())
+            .take_while(|&from| self.links_mm[from] - next_mm <= span_mm);
+        let near = near_before
+            .take(SEARCHED_CHORDS)
+            .chain(near_after.take(SEARCHED_CHORDS));
         near.map(chord).fold(f64::INFINITY, f64::min)
     }
 
@@ -115,9 +157,13 @@ impl<'a> Laid<'a> {
     fn distance_of_all_mm(&self, vertex: usize, ranges: &[(Place, Place)]) -> f64 {
         let element = &self.elements[vertex];
         let (point, end) = (element.shape.at(1.0), end_of(vertex));
-        let first = ranges.partition_point(|(_, last)| *last < end).saturating_sub(1);
+        let first = ranges
+            .partition_point(|(_, last)| *last < end)
+            .saturating_sub(1);
         let behind = ranges.partition_point(|(first, _)| *first <= end);
-        (first..behind).map(|from| self.chord_mm(from, &point, element.exact_stop)).fold(f64::INFINITY, f64::min)
+        (first..behind)
+            .map(|from| self.chord_mm(from, &point, element.exact_stop))
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn chord_mm(&self, from: usize, point: &Position, samples_only: bool) -> f64 {

@@ -54,15 +54,23 @@ impl<'a> Walker<'a> {
 
     /// The widest tolerance of any sample.
     pub fn widest_mm(&self) -> f64 {
-        self.sample_tolerance_mm.unwrap_or_else(|| widest(self.elements)).min(self.cap_mm)
+        self.sample_tolerance_mm
+            .unwrap_or_else(|| widest(self.elements))
+            .min(self.cap_mm)
     }
 
     /// The first places of all samples, if each has one.
-    pub fn strict(&self, from: Place, samples: impl Iterator<Item = Position>) -> Option<Vec<Place>> {
+    pub fn strict(
+        &self,
+        from: Place,
+        samples: impl Iterator<Item = Position>,
+    ) -> Option<Vec<Place>> {
         let mut places = Vec::with_capacity(samples.size_hint().0);
         let (mut place, mut previous) = (from, None);
         for sample in samples {
-            place = self.next(place, &previous.unwrap_or(sample), &sample).ok()?;
+            place = self
+                .next(place, &previous.unwrap_or(sample), &sample)
+                .ok()?;
             previous = Some(sample);
             places.push(place);
         }
@@ -71,21 +79,35 @@ impl<'a> Walker<'a> {
 
     /// A place of every sample, if there are any at all: not always the first ones, which may lead nowhere.
     pub fn any(&self, samples: &[Position]) -> Option<Vec<Place>> {
-        Some(self.known(samples)?.nearest(self.elements, samples, self.reach_mm))
+        Some(
+            self.known(samples)?
+                .nearest(self.elements, samples, self.reach_mm),
+        )
     }
 
     /// Between which places each sample may be then.
     pub fn any_ranges(&self, samples: &[Position]) -> Option<Vec<(Place, Place)>> {
-        Some(self.known(samples)?.ranges(self.elements, samples, self.reach_mm))
+        Some(
+            self.known(samples)?
+                .ranges(self.elements, samples, self.reach_mm),
+        )
     }
 
     fn known(&self, samples: &[Position]) -> Option<places::Known> {
-        places::find(self.elements, samples, |element| self.tolerance_mm(element), self.reach_mm)
+        places::find(
+            self.elements,
+            samples,
+            |element| self.tolerance_mm(element),
+            self.reach_mm,
+        )
     }
 
     /// The first places of all samples; where a sample has none, the walk waits until the samples come back.
     pub fn recovering(&self, samples: &[Position]) -> Walk {
-        let mut walk = Walk { places: Vec::with_capacity(samples.len()), misses: Vec::new() };
+        let mut walk = Walk {
+            places: Vec::with_capacity(samples.len()),
+            misses: Vec::new(),
+        };
         let mut place = Place::default();
         let (mut astray_mm, mut search_at_mm) = (0.0, f64::INFINITY);
         for (index, sample) in samples.iter().enumerate() {
@@ -115,14 +137,23 @@ impl<'a> Walker<'a> {
         let (mut best, mut best_mm, mut low) = (from, f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
             if let Some((fraction, off_mm)) = element.shape.nearer(sample, (low, 1.0), best_mm) {
-                (best, best_mm) = (Place { element: index, fraction }, off_mm);
+                (best, best_mm) = (
+                    Place {
+                        element: index,
+                        fraction,
+                    },
+                    off_mm,
+                );
             }
             let to_vertex_mm = distance(&element.shape.at(1.0), sample);
             if to_vertex_mm > self.reach_mm {
                 return best;
             }
             if index + 1 == self.elements.len() && to_vertex_mm <= self.tolerance_mm(element) {
-                return Place { element: index, fraction: 1.0 };
+                return Place {
+                    element: index,
+                    fraction: 1.0,
+                };
             }
             low = 0.0;
         }
@@ -130,11 +161,15 @@ impl<'a> Walker<'a> {
     }
 
     fn tolerance_mm(&self, element: &Element) -> f64 {
-        self.sample_tolerance_mm.unwrap_or(element.tolerance_mm).min(self.cap_mm)
+        self.sample_tolerance_mm
+            .unwrap_or(element.tolerance_mm)
+            .min(self.cap_mm)
     }
 
     fn next(&self, from: Place, previous: &Position, sample: &Position) -> Result<Place, f64> {
-        self.search(from, sample, |vertex| distance_to_chord(vertex, previous, sample) <= self.reach_mm)
+        self.search(from, sample, |vertex| {
+            distance_to_chord(vertex, previous, sample) <= self.reach_mm
+        })
     }
 
     fn ahead(&self, from: Place, astray_mm: f64, sample: &Position) -> Option<Place> {
@@ -157,10 +192,20 @@ impl<'a> Walker<'a> {
     ) -> Result<Place, f64> {
         let (mut nearest_mm, mut low) = (f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
-            if let Some(fraction) = element.shape.first_within(sample, self.tolerance_mm(element), low) {
-                return Ok(Place { element: index, fraction });
+            if let Some(fraction) =
+                element
+                    .shape
+                    .first_within(sample, self.tolerance_mm(element), low)
+            {
+                return Ok(Place {
+                    element: index,
+                    fraction,
+                });
             }
-            nearest_mm = element.shape.nearer(sample, (low, 1.0), nearest_mm).map_or(nearest_mm, |(_, off_mm)| off_mm);
+            nearest_mm = element
+                .shape
+                .nearer(sample, (low, 1.0), nearest_mm)
+                .map_or(nearest_mm, |(_, off_mm)| off_mm);
             if !may_pass(&element.shape.at(1.0)) {
                 break;
             }
@@ -171,5 +216,8 @@ impl<'a> Walker<'a> {
 }
 
 fn widest(elements: &[Element]) -> f64 {
-    elements.iter().map(|element| element.tolerance_mm).fold(0.0, f64::max)
+    elements
+        .iter()
+        .map(|element| element.tolerance_mm)
+        .fold(0.0, f64::max)
 }

@@ -8,7 +8,10 @@ use tandem_sdk::AxisVector;
 /// # Panics
 /// There is no such case, or it is no JSON.
 pub fn case(name: &str) -> Value {
-    let path = format!("{}/../fixtures/cases/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/../fixtures/cases/{name}.json",
+        env!("CARGO_MANIFEST_DIR")
+    );
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -17,7 +20,12 @@ pub fn case(name: &str) -> Value {
 /// # Panics
 /// It is something else.
 pub fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|number| number.as_f64().unwrap())
+        .collect()
 }
 
 /// A list of points.
@@ -25,7 +33,12 @@ pub fn numbers(value: &Value) -> Vec<f64> {
 /// # Panics
 /// It is something else.
 pub fn points(value: &Value) -> Vec<AxisVector> {
-    value.as_array().unwrap().iter().map(|point| AxisVector::from_slice(&numbers(point))).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|point| AxisVector::from_slice(&numbers(point)))
+        .collect()
 }
 
 /// Compares number by number.
@@ -35,6 +48,9 @@ pub fn points(value: &Value) -> Vec<AxisVector> {
 pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64) {
     assert_eq!(actual.len(), expected.len());
     for (index, (a, e)) in actual.iter().zip(expected).enumerate() {
-        assert!((a - e).abs() <= tolerance, "entry {index}: {a} instead of {e}");
+        assert!(
+            (a - e).abs() <= tolerance,
+            "entry {index}: {a} instead of {e}"
+        );
     }
 }

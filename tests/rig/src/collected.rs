@@ -17,7 +17,11 @@ impl SegmentSink for Collected {
     /// # Panics
     /// Its block is not reported yet.
     fn segment(&mut self, segment: &Segment) {
-        let known = self.reports.iter().rev().any(|report| report.block == segment.block);
+        let known = self
+            .reports
+            .iter()
+            .rev()
+            .any(|report| report.block == segment.block);
         assert!(known, "block {} moves before it is reported", segment.block);
         self.segments.push(*segment);
     }
@@ -44,8 +48,9 @@ impl Collected {
 
     /// Every segment with its start time, s.
     pub fn timed(&self) -> impl Iterator<Item = (f64, &Segment)> {
-        let start =
-            |clock_s: &mut f64, segment: &Segment| Some(std::mem::replace(clock_s, *clock_s + segment.duration_s));
+        let start = |clock_s: &mut f64, segment: &Segment| {
+            Some(std::mem::replace(clock_s, *clock_s + segment.duration_s))
+        };
         let starts = self.segments.iter().scan(0.0, start);
         starts.zip(&self.segments)
     }
@@ -53,9 +58,13 @@ impl Collected {
     /// The segment of program time `t_s`, and the time since its start, s: of two that meet there, the first; at last the
     /// end.
     pub fn place(&self, t_s: f64) -> (&Segment, f64) {
-        let inside = self.timed().find(|(start_s, segment)| t_s <= start_s + segment.duration_s);
+        let inside = self
+            .timed()
+            .find(|(start_s, segment)| t_s <= start_s + segment.duration_s);
         let last = self.segments.last().unwrap();
-        inside.map_or((last, last.duration_s), |(start_s, segment)| (segment, t_s - start_s))
+        inside.map_or((last, last.duration_s), |(start_s, segment)| {
+            (segment, t_s - start_s)
+        })
     }
 
     /// Position and velocity at program time `t_s`.
@@ -69,7 +78,8 @@ impl Collected {
         let (mut index, mut start_s) = (0, 0.0);
         let mut at = |tick: usize| {
             let t_s = tick as f64 * period_s;
-            while index + 1 < self.segments.len() && t_s > start_s + self.segments[index].duration_s {
+            while index + 1 < self.segments.len() && t_s > start_s + self.segments[index].duration_s
+            {
                 start_s += self.segments[index].duration_s;
                 index += 1;
             }
@@ -95,13 +105,23 @@ impl Collected {
 
     /// Program times at which the blocks start, s.
     pub fn starts_s(&self) -> Vec<f64> {
-        let sum = |at: &mut f64, report: &BlockReport| Some(std::mem::replace(at, *at + report.time_s));
+        let sum =
+            |at: &mut f64, report: &BlockReport| Some(std::mem::replace(at, *at + report.time_s));
         self.reports.iter().scan(0.0, sum).collect()
     }
 
     /// Start feeds of all blocks and the end feed of the last, mm/min.
     pub fn junction_feeds(&self) -> Vec<f64> {
-        let starts = self.reports.iter().map(|r| r.start_feed_mm_per_s * MM_PER_MIN);
-        starts.chain(self.reports.last().map(|r| r.end_feed_mm_per_s * MM_PER_MIN)).collect()
+        let starts = self
+            .reports
+            .iter()
+            .map(|r| r.start_feed_mm_per_s * MM_PER_MIN);
+        starts
+            .chain(
+                self.reports
+                    .last()
+                    .map(|r| r.end_feed_mm_per_s * MM_PER_MIN),
+            )
+            .collect()
     }
 }

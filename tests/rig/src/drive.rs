@@ -3,7 +3,9 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
-use tandem_sdk::{Accepted, Block, BlockReport, NurbsData, Planner, PluginError, Segment, SegmentSink};
+use tandem_sdk::{
+    Accepted, Block, BlockReport, NurbsData, Planner, PluginError, Segment, SegmentSink,
+};
 
 /// A block and its curve, where it is a NURBS.
 pub type Given = (Block, Option<Arc<NurbsData>>);
@@ -69,10 +71,18 @@ const MOST_CALLS: usize = 1_000_000;
 ///
 /// # Panics
 /// The planner refuses a block or does not come to an end.
-pub fn stream(planner: &mut dyn Planner, blocks: &[impl Offer], step_s: f64, sink: &mut dyn SegmentSink) {
+pub fn stream(
+    planner: &mut dyn Planner,
+    blocks: &[impl Offer],
+    step_s: f64,
+    sink: &mut dyn SegmentSink,
+) {
     let mut waiting = blocks.iter().peekable();
     for _ in 0..MOST_CALLS {
-        while waiting.next_if(|block| block.offer(planner).unwrap() == Accepted::Accepted).is_some() {}
+        while waiting
+            .next_if(|block| block.offer(planner).unwrap() == Accepted::Accepted)
+            .is_some()
+        {}
         if waiting.peek().is_none() {
             planner.finish();
         }

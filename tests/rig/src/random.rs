@@ -22,8 +22,15 @@ impl Random {
     /// # Panics
     /// The variable holds no number.
     pub fn from_the_clock() -> Self {
-        let clock = || std::time::UNIX_EPOCH.elapsed().unwrap_or_default().subsec_nanos().into();
-        let seed = std::env::var("TANDEM_SEED").map_or_else(|_| clock(), |seed| seed.parse().unwrap());
+        let clock = || {
+            std::time::UNIX_EPOCH
+                .elapsed()
+                .unwrap_or_default()
+                .subsec_nanos()
+                .into()
+        };
+        let seed =
+            std::env::var("TANDEM_SEED").map_or_else(|_| clock(), |seed| seed.parse().unwrap());
         println!("TANDEM_SEED={seed}");
         Self::new(seed)
     }

@@ -18,8 +18,12 @@ const MAX_CASES_PER_TEST: usize = 8;
 /// # Panics
 /// The folder cannot be written.
 pub fn record_case<'a>(arguments: impl IntoIterator<Item = &'a OsStr>, input: &str) {
-    let Some(cases) = std::env::var_os(CASES_VARIABLE).map(PathBuf::from) else { return };
-    let Some(folder) = next_folder(&cases) else { return };
+    let Some(cases) = std::env::var_os(CASES_VARIABLE).map(PathBuf::from) else {
+        return;
+    };
+    let Some(folder) = next_folder(&cases) else {
+        return;
+    };
     std::fs::create_dir_all(&folder).unwrap();
     let mut lines = String::new();
     for argument in arguments {
@@ -44,8 +48,14 @@ fn next_folder(cases: &Path) -> Option<PathBuf> {
 /// The argument as the case has it: a temporary file is copied to `folder` and named without a path.
 fn keep(argument: &OsStr, folder: &Path) -> OsString {
     let path = Path::new(argument);
-    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap();
-    let Some(name) = path.file_name().filter(|_| path.is_file() && !path.starts_with(project)) else {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .canonicalize()
+        .unwrap();
+    let Some(name) = path
+        .file_name()
+        .filter(|_| path.is_file() && !path.starts_with(project))
+    else {
         return argument.to_owned();
     };
     std::fs::copy(path, folder.join(name)).unwrap();

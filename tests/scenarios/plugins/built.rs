@@ -9,7 +9,10 @@ use crate::harness::{mill, root};
 
 /// The `target` folder of the workspace.
 fn target() -> &'static Path {
-    Path::new(env!("CARGO_BIN_EXE_tandem")).ancestors().nth(2).unwrap()
+    Path::new(env!("CARGO_BIN_EXE_tandem"))
+        .ancestors()
+        .nth(2)
+        .unwrap()
 }
 
 /// Where plugins outside the workspace are built, all with the same settings, so that they share what they depend on.
@@ -26,17 +29,25 @@ fn plain_cargo() -> Command {
 /// Cargo for plugins outside the workspace.
 pub fn cargo() -> Command {
     let mut cargo = plain_cargo();
-    cargo.env("CARGO_TARGET_DIR", third_party_target()).env("CARGO_INCREMENTAL", "0");
-    cargo.env("CARGO_PROFILE_DEV_DEBUG", "false").env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
+    cargo
+        .env("CARGO_TARGET_DIR", third_party_target())
+        .env("CARGO_INCREMENTAL", "0");
+    cargo
+        .env("CARGO_PROFILE_DEV_DEBUG", "false")
+        .env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
     cargo
 }
 
 /// Runs cargo, one at a time; what it prints goes into the failure.
 pub fn run(cargo: &mut Command) -> String {
     static ONE: Mutex<()> = Mutex::new(());
-    let _one = ONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let _one = ONE
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     let output = cargo.output().unwrap();
-    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    let text = [output.stdout, output.stderr]
+        .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+        .concat();
     assert!(output.status.success(), "{cargo:?}\n{text}");
     text
 }
@@ -50,7 +61,15 @@ pub fn third_party(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let manifest = root().join("tests/third-party/Cargo.toml");
-        run(cargo().args(["build", "--workspace", "--offline", "--locked", "--manifest-path"]).arg(manifest));
+        run(cargo()
+            .args([
+                "build",
+                "--workspace",
+                "--offline",
+                "--locked",
+                "--manifest-path",
+            ])
+            .arg(manifest));
         third_party_target().join("debug")
     });
     folder.join(file(name))
@@ -60,17 +79,27 @@ pub fn third_party(name: &str) -> PathBuf {
 /// built already.
 pub fn built_in(package: &str) -> PathBuf {
     let mut command = plain_cargo();
-    command.current_dir(root()).env("CARGO_TARGET_DIR", target()).args(["rustc", "--offline", "--locked", "--lib"]);
+    command
+        .current_dir(root())
+        .env("CARGO_TARGET_DIR", target())
+        .args(["rustc", "--offline", "--locked", "--lib"]);
     run(command.args(["--crate-type", "cdylib", "-p", package]));
     target().join("debug").join(file(package))
 }
 
 /// The mill's file without the table `section` and those below it.
 pub fn mill_without(section: &str) -> String {
-    let (text, table) = (std::fs::read_to_string(mill()).unwrap(), format!("[{section}"));
+    let (text, table) = (
+        std::fs::read_to_string(mill()).unwrap(),
+        format!("[{section}"),
+    );
     let mut inside = false;
     let kept = text.lines().filter(|line| {
-        inside = if line.starts_with('[') { line.starts_with(&table) } else { inside };
+        inside = if line.starts_with('[') {
+            line.starts_with(&table)
+        } else {
+            inside
+        };
         !inside
     });
     kept.flat_map(|line| [line, "\n"]).collect()

@@ -21,7 +21,12 @@ struct Mischief {
 
 impl Mischief {
     fn of(section: &'static str, misbehave: &'static str, method: &'static str, call: u32) -> Self {
-        Self { section, misbehave, method, call }
+        Self {
+            section,
+            misbehave,
+            method,
+            call,
+        }
     }
 
     fn settings(&self, library: &Path) -> Vec<(String, String)> {
@@ -31,7 +36,10 @@ impl Mischief {
             (key("options.misbehave"), self.misbehave.to_string()),
             (key("options.method"), self.method.to_string()),
             (key("options.call"), self.call.to_string()),
-            (key("options.curved"), (self.section == "kinematics").to_string()),
+            (
+                key("options.curved"),
+                (self.section == "kinematics").to_string(),
+            ),
         ]
     }
 
@@ -54,7 +62,10 @@ impl Mischief {
         if self.section != "kinematics" {
             return (settings, bench);
         }
-        settings.push(("joints.a.max_acceleration_mm_per_s2".to_string(), "5000".to_string()));
+        settings.push((
+            "joints.a.max_acceleration_mm_per_s2".to_string(),
+            "5000".to_string(),
+        ));
         let mut bench = bench.on(&root().join("examples/machines/corexy.toml"));
         bench.judging.joints = tandem_oracle::Machine::read(&mill()).unwrap().joints;
         (settings, bench)
@@ -63,7 +74,11 @@ impl Mischief {
     /// What the run, or its refusal, says.
     fn words(&self) -> String {
         match self.run() {
-            Err(HostError::Check(report)) => report.diagnostics.iter().map(|found| found.message.as_str()).collect(),
+            Err(HostError::Check(report)) => report
+                .diagnostics
+                .iter()
+                .map(|found| found.message.as_str())
+                .collect(),
             Err(refusal) => refusal.to_string(),
             Ok(ran) => ran.outcome.summary.fault.unwrap_or_default(),
         }
@@ -72,7 +87,11 @@ impl Mischief {
 
 impl std::fmt::Display for Mischief {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {} in call {} of {}", self.section, self.misbehave, self.call, self.method)
+        write!(
+            f,
+            "{}: {} in call {} of {}",
+            self.section, self.misbehave, self.call, self.method
+        )
     }
 }
 
@@ -115,9 +134,16 @@ fn a_panic_in_any_call_of_any_method_ends_in_a_fault_that_names_it() {
             for misbehave in ["panic", "panic-twice"] {
                 let mischief = Mischief::of(section, misbehave, method, *call);
                 let words = mischief.words();
-                let method = if *method == "new" { "its constructor" } else { method };
+                let method = if *method == "new" {
+                    "its constructor"
+                } else {
+                    method
+                };
                 assert!(words.contains("hostile"), "{mischief}: {words:?}");
-                assert!(words.contains(&format!("panicked in {method}")), "{mischief}: {words:?}");
+                assert!(
+                    words.contains(&format!("panicked in {method}")),
+                    "{mischief}: {words:?}"
+                );
             }
         }
     }
@@ -126,10 +152,20 @@ fn a_panic_in_any_call_of_any_method_ends_in_a_fault_that_names_it() {
 /// Methods that are called where no fault can come of it any more, or only after a stop: through the command.
 fn command(mischief: &Mischief, program: &str, commands: &str, more: &[&str]) -> Done {
     let settings = mischief.settings(&third_party("hostile"));
-    let settings: Vec<String> =
-        settings.iter().filter(|(key, _)| !key.ends_with("curved")).map(|(k, v)| format!("{k}={v}")).collect();
-    let arguments: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
-    Scenario::text(program).with(&arguments).with(more).commands(commands).run()
+    let settings: Vec<String> = settings
+        .iter()
+        .filter(|(key, _)| !key.ends_with("curved"))
+        .map(|(k, v)| format!("{k}={v}"))
+        .collect();
+    let arguments: Vec<&str> = settings
+        .iter()
+        .flat_map(|setting| ["--set", setting])
+        .collect();
+    Scenario::text(program)
+        .with(&arguments)
+        .with(more)
+        .commands(commands)
+        .run()
 }
 
 fn assert_within_limits_to_rest(done: &Done, mischief: &Mischief) {
@@ -146,37 +182,82 @@ fn a_panic_in_quick_stop_is_told_beside_the_fault() {
     let mischief = Mischief::of("driver", "panic", "quick_stop", 1);
     let done = command(&mischief, PROGRAM, "300,emergency-stop\n", &[]);
     assert_eq!(done.status(), 3, "{}", done.errors());
-    assert!(done.summary()["fault"].as_str().unwrap().contains("emergency stop"), "{}", done.summary()["fault"]);
-    assert!(done.errors().contains("hostile panicked in quick_stop"), "{}", done.errors());
+    assert!(
+        done.summary()["fault"]
+            .as_str()
+            .unwrap()
+            .contains("emergency stop"),
+        "{}",
+        done.summary()["fault"]
+    );
+    assert!(
+        done.errors().contains("hostile panicked in quick_stop"),
+        "{}",
+        done.errors()
+    );
     assert_within_limits_to_rest(&done, &mischief);
 }
 
 /// A run that is good so far has not ended well where the drives are not let go of.
 #[test]
 fn drives_that_are_not_let_go_of_are_a_fault() {
-    for (misbehave, words) in [("panic", "hostile panicked in stop"), ("fail", "it fails as it was told")] {
+    for (misbehave, words) in [
+        ("panic", "hostile panicked in stop"),
+        ("fail", "it fails as it was told"),
+    ] {
         let mischief = Mischief::of("driver", misbehave, "stop", 1);
         let done = command(&mischief, PROGRAM, "", &[]);
         assert_eq!(done.status(), 3, "{mischief}: {}", done.errors());
         let fault = done.summary()["fault"].as_str().unwrap().to_string();
-        assert!(fault.contains("not let go of") && fault.contains(words), "{mischief}: {fault}");
+        assert!(
+            fault.contains("not let go of") && fault.contains(words),
+            "{mischief}: {fault}"
+        );
         assert_within_limits_to_rest(&done, &mischief);
         let done = command(&mischief, PROGRAM, "300,emergency-stop\n", &[]);
-        assert!(done.summary()["fault"].as_str().unwrap().contains("emergency stop"), "{}", done.summary()["fault"]);
-        assert!(done.errors().contains(words), "{mischief}: {}", done.errors());
+        assert!(
+            done.summary()["fault"]
+                .as_str()
+                .unwrap()
+                .contains("emergency stop"),
+            "{}",
+            done.summary()["fault"]
+        );
+        assert!(
+            done.errors().contains(words),
+            "{mischief}: {}",
+            done.errors()
+        );
     }
 }
 
 #[test]
 fn a_panic_behind_the_end_is_told() {
-    for (section, method) in
-        [("driver", "drop"), ("planner", "drop"), ("feed_strategy", "drop"), ("kinematics", "drop")]
-    {
+    for (section, method) in [
+        ("driver", "drop"),
+        ("planner", "drop"),
+        ("feed_strategy", "drop"),
+        ("kinematics", "drop"),
+    ] {
         let mischief = Mischief::of(section, "panic", method, 1);
         let identity = ["--set", "joints={x={axis='x'},y={axis='y'},z={axis='z'}}"];
-        let done = command(&mischief, PROGRAM, "", if section == "kinematics" { &identity } else { &[] });
+        let done = command(
+            &mischief,
+            PROGRAM,
+            "",
+            if section == "kinematics" {
+                &identity
+            } else {
+                &[]
+            },
+        );
         assert_eq!(done.status(), 0, "{mischief}: {}", done.errors());
-        assert!(done.errors().contains(&format!("hostile panicked in {method}")), "{mischief}: {}", done.errors());
+        assert!(
+            done.errors()
+                .contains(&format!("hostile panicked in {method}")),
+            "{mischief}: {}",
+            done.errors()
+        );
         assert_within_limits_to_rest(&done, &mischief);
     }
 }
@@ -187,14 +268,23 @@ fn a_panic_in_a_thread_of_a_plugin_is_told() {
     let done = command(&mischief, PROGRAM, "", &[]);
     assert_eq!(done.status(), 0, "{}", done.errors());
     let words = "error: a thread of a plugin panicked (hostile/src/mischief.rs:";
-    assert!(done.errors().contains(words) && done.errors().contains("as it was told"), "{}", done.errors());
+    assert!(
+        done.errors().contains(words) && done.errors().contains("as it was told"),
+        "{}",
+        done.errors()
+    );
 }
 
 /// Nothing is driven, and what plugins say is told all the same.
 #[test]
 fn a_panic_before_a_refusal_is_told() {
     let mischief = Mischief::of("driver", "panic", "drop", 1);
-    let done = command(&mischief, PROGRAM, "", &["--set", "feed_strategy.plugin=none"]);
+    let done = command(
+        &mischief,
+        PROGRAM,
+        "",
+        &["--set", "feed_strategy.plugin=none"],
+    );
     assert_eq!(done.status(), 1, "{}", done.errors());
     for words in ["no feed strategy is called", "hostile panicked in drop"] {
         assert!(done.errors().contains(words), "{words}: {}", done.errors());
@@ -213,7 +303,11 @@ fn a_panic_in_reset_is_a_fault() {
         assert_eq!(done.status(), expected, "{mischief}: {}", done.errors());
         let named = done.errors().contains("hostile panicked in reset");
         assert_eq!(named, misbehave != "never", "{mischief}: {}", done.errors());
-        assert!(!done.errors().contains("thread '"), "the panic itself prints nothing: {}", done.errors());
+        assert!(
+            !done.errors().contains("thread '"),
+            "the panic itself prints nothing: {}",
+            done.errors()
+        );
         assert_within_limits_to_rest(&done, &mischief);
     }
 }
@@ -221,43 +315,73 @@ fn a_panic_in_reset_is_a_fault() {
 #[test]
 fn numbers_that_are_none_or_far_beyond_end_in_a_fault_that_names_it() {
     for (section, method, calls, words) in [
-        ("planner", "advance", [1, 2, 3], "advance emits a segment with a number that is not finite"),
+        (
+            "planner",
+            "advance",
+            [1, 2, 3],
+            "advance emits a segment with a number that is not finite",
+        ),
         ("feed_strategy", "update", [1, 2, 30], "update answers"),
         ("driver", "exchange", [1, 20, 500], "the feedback of axis"),
     ] {
         for call in calls {
             let mischief = Mischief::of(section, "not-a-number", method, call);
             let said = mischief.words();
-            assert!(said.contains(words) && said.contains("hostile"), "{mischief}: {said:?}");
+            assert!(
+                said.contains(words) && said.contains("hostile"),
+                "{mischief}: {said:?}"
+            );
         }
     }
     for call in [1, 2, 3] {
-        let ran = Mischief::of("planner", "beyond", "advance", call).run().unwrap();
+        let ran = Mischief::of("planner", "beyond", "advance", call)
+            .run()
+            .unwrap();
         let fault = ran.outcome.summary.fault.unwrap();
-        assert!(fault.contains("hostile") && fault.contains("guard"), "{fault}");
+        assert!(
+            fault.contains("hostile") && fault.contains("guard"),
+            "{fault}"
+        );
     }
-    for (method, words) in [("to_joints", "the position of joint 0 (a) is"), ("to_axes", "the position of axis X is")] {
+    for (method, words) in [
+        ("to_joints", "the position of joint 0 (a) is"),
+        ("to_axes", "the position of axis X is"),
+    ] {
         for call in [400, 1001] {
             let mischief = Mischief::of("kinematics", "not-a-number", method, call);
             let said = mischief.words();
-            assert!(said.contains(&format!("kinematics {}", third_party("hostile").display())), "{mischief}: {said:?}");
+            assert!(
+                said.contains(&format!("kinematics {}", third_party("hostile").display())),
+                "{mischief}: {said:?}"
+            );
             assert!(said.contains(words), "{mischief}: {said:?}");
         }
     }
     for call in [400, 1001] {
         let said = Mischief::of("kinematics", "beyond", "to_joints", call).words();
-        assert!(said.starts_with("guard: kinematics") && said.contains("asks for joint a position 1000000"), "{said}");
+        assert!(
+            said.starts_with("guard: kinematics")
+                && said.contains("asks for joint a position 1000000"),
+            "{said}"
+        );
     }
     // A ratio of a million is a wish: what is driven is the programmed feed.
-    assert_eq!(Mischief::of("feed_strategy", "beyond", "update", 5).words(), "");
+    assert_eq!(
+        Mischief::of("feed_strategy", "beyond", "update", 5).words(),
+        ""
+    );
 }
 
 #[test]
 fn a_number_that_stands_for_no_state_of_a_drive_ends_in_a_fault_that_names_it() {
     for call in [1, 20, 500] {
         let words = Mischief::of("driver", "foreign", "exchange", call).words();
-        let said = "its exchange gives 250 as the state of axis Z: 0 (disabled) to 6 (lost) are known";
-        assert!(words.contains("hostile") && words.contains(said), "{call}: {words:?}");
+        let said =
+            "its exchange gives 250 as the state of axis Z: 0 (disabled) to 6 (lost) are known";
+        assert!(
+            words.contains("hostile") && words.contains(said),
+            "{call}: {words:?}"
+        );
     }
 }
 
@@ -265,13 +389,22 @@ fn a_number_that_stands_for_no_state_of_a_drive_ends_in_a_fault_that_names_it() 
 fn output_without_end_ends() {
     for call in [1, 2] {
         let words = Mischief::of("planner", "endless", "advance", call).words();
-        assert!(words.contains("hostile") && words.contains("emits without end"), "{words}");
+        assert!(
+            words.contains("hostile") && words.contains("emits without end"),
+            "{words}"
+        );
     }
-    for (method, words) in [("advance", "gets on"), ("accept", "it is full, and advance emits nothing")] {
+    for (method, words) in [
+        ("advance", "gets on"),
+        ("accept", "it is full, and advance emits nothing"),
+    ] {
         for call in [1, 2] {
             let mischief = Mischief::of("planner", "dawdle", method, call);
             let said = mischief.words();
-            assert!(said.contains("hostile") && said.contains(words), "{mischief}: {said:?}");
+            assert!(
+                said.contains("hostile") && said.contains(words),
+                "{mischief}: {said:?}"
+            );
         }
     }
 }
@@ -279,25 +412,42 @@ fn output_without_end_ends() {
 #[test]
 fn the_wrong_order_and_failures_are_faults() {
     let words = Mischief::of("planner", "order", "advance", 2).words();
-    assert!(words.contains("hostile") && words.contains("a report of a block that it was not given"), "{words}");
-    for (section, method) in [("planner", "advance"), ("feed_strategy", "update"), ("driver", "exchange")] {
+    assert!(
+        words.contains("hostile") && words.contains("a report of a block that it was not given"),
+        "{words}"
+    );
+    for (section, method) in [
+        ("planner", "advance"),
+        ("feed_strategy", "update"),
+        ("driver", "exchange"),
+    ] {
         let words = Mischief::of(section, "fail", method, 3).words();
-        assert!(words.contains("hostile") && words.contains("it fails as it was told"), "{section}: {words}");
+        assert!(
+            words.contains("hostile") && words.contains("it fails as it was told"),
+            "{section}: {words}"
+        );
     }
 }
 
 fn check(mischief: &Mischief) -> (Option<i32>, String) {
     let library: PathBuf = third_party("hostile");
     let settings = mischief.settings(&library);
-    let options = settings.iter().filter_map(|(key, value)| Some((key.split_once(".options.")?.1, value)));
-    let options: Vec<String> = options.flat_map(|(key, value)| ["--set".into(), format!("{key}={value}")]).collect();
+    let options = settings
+        .iter()
+        .filter_map(|(key, value)| Some((key.split_once(".options.")?.1, value)));
+    let options: Vec<String> = options
+        .flat_map(|(key, value)| ["--set".into(), format!("{key}={value}")])
+        .collect();
     let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
         .args(["plugin", "check", "--programs", "3"])
         .arg(&library)
         .args(options)
         .output()
         .unwrap();
-    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&output.stdout).into_owned(),
+    )
 }
 
 #[test]
@@ -305,16 +455,41 @@ fn the_conformance_kit_finds_it_out() {
     let (status, out) = check(&Mischief::of("any", "never", "", 1));
     assert_eq!(status, Some(0), "{out}");
     let by_kind = [
-        ("planner", &["describe", "check", "accept", "finish", "advance", "reset"][..]),
-        ("feed strategy", &["signals", "max_ratio_change_per_s", "update"]),
-        ("driver", &["describe", "open", "start", "exchange", "quick_stop", "stop"]),
-        ("kinematics", &["joint_count", "to_joints", "to_axes", "health"]),
+        (
+            "planner",
+            &["describe", "check", "accept", "finish", "advance", "reset"][..],
+        ),
+        (
+            "feed strategy",
+            &["signals", "max_ratio_change_per_s", "update"],
+        ),
+        (
+            "driver",
+            &[
+                "describe",
+                "open",
+                "start",
+                "exchange",
+                "quick_stop",
+                "stop",
+            ],
+        ),
+        (
+            "kinematics",
+            &["joint_count", "to_joints", "to_axes", "health"],
+        ),
     ];
-    for (kind, method) in by_kind.iter().flat_map(|(kind, methods)| methods.iter().map(move |method| (kind, method))) {
+    for (kind, method) in by_kind
+        .iter()
+        .flat_map(|(kind, methods)| methods.iter().map(move |method| (kind, method)))
+    {
         let mischief = Mischief::of("any", "panic", method, 1);
         let (status, out) = check(&mischief);
         let words = format!("panicked in {method}");
-        assert!(status == Some(1) && out.contains(&words), "{kind}: {mischief}: {status:?}\n{out}");
+        assert!(
+            status == Some(1) && out.contains(&words),
+            "{kind}: {mischief}: {status:?}\n{out}"
+        );
     }
     for (misbehave, method, words) in [
         ("panic", "advance", "panicked in advance"),
@@ -331,8 +506,16 @@ fn the_conformance_kit_finds_it_out() {
         ("endless", "advance", "emits without end"),
         ("order", "advance", "FAILED reports"),
     ] {
-        let mischief = Mischief::of("any", misbehave, method, if method.ends_with("stop") { 1 } else { 7 });
+        let mischief = Mischief::of(
+            "any",
+            misbehave,
+            method,
+            if method.ends_with("stop") { 1 } else { 7 },
+        );
         let (status, out) = check(&mischief);
-        assert!(status == Some(1) && out.contains(words), "{mischief}: {status:?}\n{out}");
+        assert!(
+            status == Some(1) && out.contains(words),
+            "{mischief}: {status:?}\n{out}"
+        );
     }
 }

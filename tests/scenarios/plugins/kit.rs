@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use tandem_conformance::{Setup, judge};
 use tandem_sdk::{
-    Accepted, Advanced, Answer, Attached, AxisVector, Block, BlockReport, Curve, Driver, DriverContext,
-    DriverDescription, FeedStrategy, Feedback, JointState, Kinematics, KinematicsContext, Planner, PlannerContext,
-    PlannerDescription, Plugin, PluginError, Segment, SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window,
-    local_plugin,
+    Accepted, Advanced, Answer, Attached, AxisVector, Block, BlockReport, Curve, Driver,
+    DriverContext, DriverDescription, FeedStrategy, Feedback, JointState, Kinematics,
+    KinematicsContext, Planner, PlannerContext, PlannerDescription, Plugin, PluginError, Segment,
+    SegmentFlags, SegmentSink, Setpoint, StrategyContext, Window, local_plugin,
 };
 
 tandem_sdk::options! {
@@ -47,12 +47,17 @@ impl Plans {
         for axis in &mut context.limits.axes {
             axis.acceleration_mm_per_s2 *= if defect.is("acceleration") { 1.01 } else { 1.0 };
             let faster = if defect.is("velocity") { 1.01 } else { 1.0 };
-            (axis.feed_mm_per_s, axis.rapid_mm_per_s) = (axis.feed_mm_per_s * faster, axis.rapid_mm_per_s * faster);
+            (axis.feed_mm_per_s, axis.rapid_mm_per_s) =
+                (axis.feed_mm_per_s * faster, axis.rapid_mm_per_s * faster);
         }
         for joint in &mut context.limits.axes[3..] {
             joint.acceleration_mm_per_s2 *= if defect.is("joints") { 1.01 } else { 1.0 };
         }
-        Ok(Self { inner: tandem_look_ahead::PLUGIN.planner("", &context)?, defect, emitted: 0 })
+        Ok(Self {
+            inner: tandem_look_ahead::PLUGIN.planner("", &context)?,
+            defect,
+            emitted: 0,
+        })
     }
 }
 
@@ -93,16 +98,35 @@ impl Planner for Plans {
     }
     fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let faster = if self.defect.is("feed") { 1.01 } else { 1.0 };
-        self.inner.accept(&Block { feed_mm_per_s: faster * block.feed_mm_per_s, ..*block }, curve)
+        self.inner.accept(
+            &Block {
+                feed_mm_per_s: faster * block.feed_mm_per_s,
+                ..*block
+            },
+            curve,
+        )
     }
     fn finish(&mut self) {
         self.inner.finish();
     }
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
-        let wanted_s = if self.defect.is("short") { 0.9 * duration_s } else { duration_s };
-        let advanced = self.inner.advance(wanted_s, &mut Outlet(sink, &self.defect, &mut self.emitted))?;
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
+        let wanted_s = if self.defect.is("short") {
+            0.9 * duration_s
+        } else {
+            duration_s
+        };
+        let advanced = self
+            .inner
+            .advance(wanted_s, &mut Outlet(sink, &self.defect, &mut self.emitted))?;
         let more_s = if self.defect.is("boast") { 1e-3 } else { 0.0 };
-        Ok(Advanced { duration_s: advanced.duration_s + more_s, ..advanced })
+        Ok(Advanced {
+            duration_s: advanced.duration_s + more_s,
+            ..advanced
+        })
     }
     fn reset(&mut self, position: &AxisVector) {
         if !self.defect.is("forgetful") {
@@ -121,17 +145,32 @@ impl Feeds {
 
 impl FeedStrategy for Feeds {
     fn signals(&self) -> &'static [&'static str] {
-        if self.0.is("name") { &["Load A"] } else { &["load_a"] }
+        if self.0.is("name") {
+            &["Load A"]
+        } else {
+            &["load_a"]
+        }
     }
     fn max_ratio_change_per_s(&self) -> f64 {
         if self.0.is("fast") { 0.99 } else { 1.0 }
     }
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {
-        let load_a = window.samples().iter().fold(0.0, |most: f64, sample| most.max(sample.current_a[0]));
-        let wanted = if load_a > 1.0 { 0.5 } else { 1.0 + if self.0.is("high") { 1.0 } else { 0.0 } };
+        let load_a = window
+            .samples()
+            .iter()
+            .fold(0.0, |most: f64, sample| most.max(sample.current_a[0]));
+        let wanted = if load_a > 1.0 {
+            0.5
+        } else {
+            1.0 + if self.0.is("high") { 1.0 } else { 0.0 }
+        };
         self.1 += (wanted - self.1).clamp(-0.008, 0.008);
         let moody = if self.0.is("moody") { self.0.1 } else { 0.0 };
-        let signal = if self.0.is("signal") && load_a > 50.0 { f64::INFINITY } else { load_a + moody };
+        let signal = if self.0.is("signal") && load_a > 50.0 {
+            f64::INFINITY
+        } else {
+            load_a + moody
+        };
         Ok(Answer::of_ratio(self.1).with_signals(&[signal]))
     }
 }
@@ -155,9 +194,17 @@ impl Driver for Drives {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(self.2))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);
-        feedback.position[0] += if self.0.is("moody") { 1e-9 * self.0.1 } else { 0.0 };
+        feedback.position[0] += if self.0.is("moody") {
+            1e-9 * self.0.1
+        } else {
+            0.0
+        };
         if self.0.is("off") {
             feedback.state[self.1 - 1] = JointState::Disabled;
         }
@@ -183,11 +230,20 @@ impl Bends {
 
 impl Kinematics for Bends {
     fn joint_count(&self, axis_count: usize) -> usize {
-        if self.0.is("few") { axis_count - 1 } else { axis_count }
+        if self.0.is("few") {
+            axis_count - 1
+        } else {
+            axis_count
+        }
     }
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
         let mut joints = *axes;
-        joints[0] += axes[1] * axes[1] / 1000.0 + if self.0.is("moody") { 1e-10 * self.0.1 } else { 0.0 };
+        joints[0] += axes[1] * axes[1] / 1000.0
+            + if self.0.is("moody") {
+                1e-10 * self.0.1
+            } else {
+                0.0
+            };
         joints
     }
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
@@ -198,10 +254,26 @@ impl Kinematics for Bends {
 }
 
 fn assert_found(plugin: Plugin, defects: &[(&str, &str)]) {
-    assert!(judge(plugin, &Setup::default()).conforms(), "{}", judge(plugin, &Setup::default()));
+    assert!(
+        judge(plugin, &Setup::default()).conforms(),
+        "{}",
+        judge(plugin, &Setup::default())
+    );
     for (defect, check) in defects {
-        let report = judge(plugin, &Setup { options: format!("defect = \"{defect}\"\n"), ..Setup::default() });
-        assert!(report.findings().iter().any(|finding| finding.check == *check), "{defect}: {check}\n{report}");
+        let report = judge(
+            plugin,
+            &Setup {
+                options: format!("defect = \"{defect}\"\n"),
+                ..Setup::default()
+            },
+        );
+        assert!(
+            report
+                .findings()
+                .iter()
+                .any(|finding| finding.check == *check),
+            "{defect}: {check}\n{report}"
+        );
     }
 }
 
@@ -234,8 +306,16 @@ fn defects_of_strategies_drivers_and_kinematics_are_found() {
         ("moody", "determinism"),
     ];
     assert_found(local_plugin!(feed_strategy "feeds" = Feeds::open), &found);
-    let found = [("off", "enabling"), ("speed", "feedback"), ("moody", "determinism")];
+    let found = [
+        ("off", "enabling"),
+        ("speed", "feedback"),
+        ("moody", "determinism"),
+    ];
     assert_found(local_plugin!(driver "drives" = Drives::open), &found);
-    let found = [("few", "joints"), ("back", "there and back"), ("moody", "determinism")];
+    let found = [
+        ("few", "joints"),
+        ("back", "there and back"),
+        ("moody", "determinism"),
+    ];
     assert_found(local_plugin!(kinematics "bends" = Bends::open), &found);
 }

@@ -16,7 +16,9 @@ pub fn write(path: &Path, machine: &Machine, estimates: &[Estimate]) -> Result<(
         programs: estimates.iter().map(program).collect(),
     };
     let mut out = Output::create(path)?;
-    report.write(&mut out).map_err(|e| format!("{}: {e}", path.display()))?;
+    report
+        .write(&mut out)
+        .map_err(|e| format!("{}: {e}", path.display()))?;
     out.finish()
 }
 
@@ -30,14 +32,20 @@ fn program(estimate: &Estimate) -> EstimatedProgram {
         ("cutting", seconds(tally.cutting.time_s)),
         ("rapid", seconds(tally.rapid.time_s)),
         ("dwell", seconds(tally.dwell.time_s)),
-        ("blocks that reach their feed", format!("{long} of {}", long + short)),
+        (
+            "blocks that reach their feed",
+            format!("{long} of {}", long + short),
+        ),
     ];
-    let fields = tally.histogram.fields().map(|(length_mm, feed_mm_per_min, field)| EstimatedField {
-        length_mm,
-        feed_mm_per_min,
-        blocks: field.blocks,
-        time_s: field.time_s,
-    });
+    let fields = tally
+        .histogram
+        .fields()
+        .map(|(length_mm, feed_mm_per_min, field)| EstimatedField {
+            length_mm,
+            feed_mm_per_min,
+            blocks: field.blocks,
+            time_s: field.time_s,
+        });
     EstimatedProgram {
         name: estimate.program.clone(),
         facts: facts.map(|(name, value)| (name.to_string(), value)).into(),

@@ -10,7 +10,12 @@ pub fn table(estimates: &[Estimate]) -> String {
     if estimates.is_empty() {
         return String::new();
     }
-    let widest = estimates.iter().map(|e| e.program.chars().count()).max().unwrap_or(0).max(7);
+    let widest = estimates
+        .iter()
+        .map(|e| e.program.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(7);
     let mut text = format!(
         "{:widest$}  {:10} {:>11} {:>11} {:>6} {:>9} {:>11} {:>9} {:>9} {:>9} {:>9}\n",
         "program",
@@ -44,13 +49,21 @@ pub fn table(estimates: &[Estimate]) -> String {
         for (tool, part) in tally.tools.iter().filter(|_| tally.tools.len() > 1) {
             let percent = 100.0 * share(part.time_s, tally.all.time_s);
             let tool = format!("  tool {tool}: {percent:.1} %");
-            let _ = writeln!(text, "{tool:widest$}  {:10} {:11.3} {:11.3}", "", part.nominal_s, part.time_s);
+            let _ = writeln!(
+                text,
+                "{tool:widest$}  {:10} {:11.3} {:11.3}",
+                "", part.nominal_s, part.time_s
+            );
         }
     }
     if let [_, _, ..] = estimates {
         let sum = |of: &dyn Fn(&Estimate) -> f64| estimates.iter().map(of).sum::<f64>();
         let (nominal, estimated) = (sum(&|e| e.tally.all.nominal_s), sum(&|e| e.estimated_s));
-        let _ = writeln!(text, "{:widest$}  {:10} {nominal:11.3} {estimated:11.3}", "all", "");
+        let _ = writeln!(
+            text,
+            "{:widest$}  {:10} {nominal:11.3} {estimated:11.3}",
+            "all", ""
+        );
     }
     text
 }
@@ -75,9 +88,15 @@ fn object(estimate: &Estimate) -> Value {
         }
         value
     };
-    let tools: Vec<_> = tally.tools.iter().map(|(tool, p)| with(part(p), &[("tool", *tool)])).collect();
-    let lines: Vec<_> =
-        tally.lines().map(|(first, last, p)| with(part(p), &[("first_line", first), ("last_line", last)])).collect();
+    let tools: Vec<_> = tally
+        .tools
+        .iter()
+        .map(|(tool, p)| with(part(p), &[("tool", *tool)]))
+        .collect();
+    let lines: Vec<_> = tally
+        .lines()
+        .map(|(first, last, p)| with(part(p), &[("first_line", first), ("last_line", last)]))
+        .collect();
     json!({
         "program": estimate.program,
         "model": estimate.model,

@@ -38,7 +38,13 @@ enum Wait {
 impl Script {
     /// Nothing read yet.
     pub fn new(shared: Arc<Shared>, may_wait: bool) -> Self {
-        Self { shared, input: Input::default(), may_wait, lines: 0, wait: Wait::Nothing }
+        Self {
+            shared,
+            input: Input::default(),
+            may_wait,
+            lines: 0,
+            wait: Wait::Nothing,
+        }
     }
 
     /// After a fault: waits for the word that takes it back; `false` where it does not come.
@@ -59,7 +65,10 @@ impl Script {
                 Ok(Line::Reset) => return true,
                 Ok(Line::Quit) => return false,
                 Ok(Line::Nothing) => {}
-                _ => self.refuse(1, &format!("the machine is in fault; {} goes on", super::RESET)),
+                _ => self.refuse(
+                    1,
+                    &format!("the machine is in fault; {} goes on", super::RESET),
+                ),
             }
         }
     }
@@ -81,7 +90,8 @@ impl Script {
         match parse(text) {
             Ok(line) => {
                 let column = text.len() - text.trim_start().len() + 1;
-                self.carry_out(&line, jogs).unwrap_or_else(|why| self.refuse(column, &why));
+                self.carry_out(&line, jogs)
+                    .unwrap_or_else(|why| self.refuse(column, &why));
             }
             Err(wrong) => self.refuse(wrong.column, &wrong.why),
         }
@@ -91,7 +101,11 @@ impl Script {
         match line {
             Line::Jog(words) => {
                 jogs.ask(words.on(&jogs.machine().axes)?)?;
-                self.wait = if is_step(words) { Wait::Rest } else { Wait::Nothing };
+                self.wait = if is_step(words) {
+                    Wait::Rest
+                } else {
+                    Wait::Nothing
+                };
             }
             Line::Stop => {
                 jogs.let_go();
@@ -115,7 +129,8 @@ impl Script {
     }
 
     fn refuse(&self, column: usize, why: &str) {
-        self.shared.refuse(&format!("input:{}:{column}: error: {why}", self.lines));
+        self.shared
+            .refuse(&format!("input:{}:{column}: error: {why}", self.lines));
     }
 }
 
@@ -134,7 +149,10 @@ pub struct Inputs {
 impl Inputs {
     /// Nothing asked yet.
     pub fn new(shared: Arc<Shared>, script: Option<Script>) -> Self {
-        Self { shared, script: Arc::new(Mutex::new(script)) }
+        Self {
+            shared,
+            script: Arc::new(Mutex::new(script)),
+        }
     }
 
     /// After a fault: waits for the operator's word; `false` where the session is over.
@@ -164,7 +182,9 @@ impl JogInput for Inputs {
             return;
         }
         let mut script = self.script();
-        let Some(script) = script.as_mut().filter(|_| jogs.is_ready()) else { return };
+        let Some(script) = script.as_mut().filter(|_| jogs.is_ready()) else {
+            return;
+        };
         // What follows the word that ends the session is nobody's line.
         while script.is_due(jogs) && !self.shared.is_over() {
             script.wait = Wait::Nothing;
@@ -177,7 +197,9 @@ impl JogInput for Inputs {
     }
 
     fn is_waiting(&self) -> bool {
-        self.script().as_ref().is_some_and(|script| matches!(script.wait, Wait::Until(_)))
+        self.script()
+            .as_ref()
+            .is_some_and(|script| matches!(script.wait, Wait::Until(_)))
     }
 
     fn rested(&mut self, jogs: &JogController, rest: &JogRest) {

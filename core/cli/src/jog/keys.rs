@@ -16,7 +16,9 @@ const HELP: &str =
 /// Distances of the keys 1 to 5, mm or deg.
 const STEPS: [f64; 5] = [0.001, 0.01, 0.1, 1.0, 10.0];
 /// Feeds, mm/min or deg/min.
-const FEEDS: [f64; 12] = [10.0, 30.0, 60.0, 100.0, 300.0, 600.0, 1000.0, 1500.0, 3000.0, 6000.0, 10000.0, 15000.0];
+const FEEDS: [f64; 12] = [
+    10.0, 30.0, 60.0, 100.0, 300.0, 600.0, 1000.0, 1500.0, 3000.0, 6000.0, 10000.0, 15000.0,
+];
 /// The feed at the start, by its place.
 const FIRST_FEED: usize = 5;
 const ESCAPE: u8 = 27;
@@ -44,7 +46,12 @@ pub struct JogKeys {
 impl JogKeys {
     /// Continuous, at a moderate feed.
     pub fn new(shared: Arc<Shared>, jogs: Arc<JogController>) -> Self {
-        Self { shared, jogs, feed: FIRST_FEED, step: None }
+        Self {
+            shared,
+            jogs,
+            feed: FIRST_FEED,
+            step: None,
+        }
     }
 
     /// Says what the keys do.
@@ -74,7 +81,13 @@ impl JogKeys {
             b'r' => self.shared.reset.store(true, Relaxed),
             b'q' => self.shared.quit.store(true, Relaxed),
             b' ' | b'+' | b'=' | b'-' | b'e' | b'\r' | b'\n' | CTRL_C => self.command(byte),
-            _ if self.jogs.machine().axes.index(letter.to_ascii_uppercase()).is_some() => {
+            _ if self
+                .jogs
+                .machine()
+                .axes
+                .index(letter.to_ascii_uppercase())
+                .is_some() =>
+            {
                 self.jog(letter.to_ascii_lowercase(), letter.is_ascii_lowercase());
             }
             _ => self.jogs.let_go(),
@@ -82,7 +95,9 @@ impl JogKeys {
     }
 
     fn command(&self, key: u8) {
-        let Some((hub, stops)) = self.shared.hub() else { return };
+        let Some((hub, stops)) = self.shared.hub() else {
+            return;
+        };
         if let Some(words) = press(key, &hub, &stops) {
             self.shared.say(&words);
         }
@@ -93,8 +108,15 @@ impl JogKeys {
             None => ReachMessage::On { positive },
             Some(step) => ReachMessage::By(if positive { step } else { -step }),
         };
-        let words = JogMessage { axis, reach, feed_per_min: FEEDS[self.feed], degrees: None };
-        let asked = words.on(&self.jogs.machine().axes).and_then(|jog| self.jogs.ask(jog));
+        let words = JogMessage {
+            axis,
+            reach,
+            feed_per_min: FEEDS[self.feed],
+            degrees: None,
+        };
+        let asked = words
+            .on(&self.jogs.machine().axes)
+            .and_then(|jog| self.jogs.ask(jog));
         if let Err(why) = asked {
             self.shared.say(&why);
         }
@@ -111,8 +133,11 @@ impl JogKeys {
     }
 
     fn chosen(&self) -> String {
-        let step =
-            self.step.map_or("as long as the key is held".to_string(), |step| format!("steps of {step} mm or deg"));
+        let step = self
+            .step
+            .map_or("as long as the key is held".to_string(), |step| {
+                format!("steps of {step} mm or deg")
+            });
         format!("{step}, feed {} mm/min or deg/min", FEEDS[self.feed])
     }
 }
@@ -122,14 +147,22 @@ fn keys(bytes: &[u8]) -> Vec<Key> {
     let mut keys = vec![];
     let mut rest = bytes;
     while let Some((first, behind)) = rest.split_first() {
-        let sequence = behind.split_first().filter(|(next, _)| *first == ESCAPE && matches!(**next, b'[' | b'O'));
+        let sequence = behind
+            .split_first()
+            .filter(|(next, _)| *first == ESCAPE && matches!(**next, b'[' | b'O'));
         let Some((_, body)) = sequence else {
-            keys.push(if *first == ESCAPE { Key::Other } else { Key::Plain(*first) });
+            keys.push(if *first == ESCAPE {
+                Key::Other
+            } else {
+                Key::Plain(*first)
+            });
             rest = behind;
             continue;
         };
         // A sequence ends with a letter or a tilde.
-        let end = body.iter().position(|byte| byte.is_ascii_alphabetic() || *byte == b'~');
+        let end = body
+            .iter()
+            .position(|byte| byte.is_ascii_alphabetic() || *byte == b'~');
         let (name, behind) = body.split_at(end.map_or(body.len(), |end| end + 1));
         keys.push(named(name));
         rest = behind;
@@ -156,8 +189,18 @@ mod tests {
     #[test]
     fn keys_as_terminals_send_them() {
         assert_eq!(keys(b"xX"), [Key::Plain(b'x'), Key::Plain(b'X')]);
-        assert_eq!(keys(b"\x1b[C\x1b[D\x1bOA"), [Key::Jog('x', true), Key::Jog('x', false), Key::Jog('y', true)]);
-        assert_eq!(keys(b"\x1b[5~q\x1b[6~"), [Key::Jog('z', true), Key::Plain(b'q'), Key::Jog('z', false)]);
+        assert_eq!(
+            keys(b"\x1b[C\x1b[D\x1bOA"),
+            [
+                Key::Jog('x', true),
+                Key::Jog('x', false),
+                Key::Jog('y', true)
+            ]
+        );
+        assert_eq!(
+            keys(b"\x1b[5~q\x1b[6~"),
+            [Key::Jog('z', true), Key::Plain(b'q'), Key::Jog('z', false)]
+        );
         assert_eq!(keys(b"\x1b"), [Key::Other]);
         assert_eq!(keys(b"\x1b[15~x"), [Key::Other, Key::Plain(b'x')]);
         assert_eq!(keys(b"\x1b[1;2"), [Key::Other]);

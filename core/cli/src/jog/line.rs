@@ -46,13 +46,22 @@ pub fn parse(text: &str) -> Result<Line, Wrong> {
     let column = |word: &str| word.as_ptr() as usize - text.as_ptr() as usize + 1;
     let wrong = |column: usize, why: String| Wrong { column, why };
     let mut words = text.split_whitespace();
-    let Some(first) = words.next() else { return Ok(Line::Nothing) };
+    let Some(first) = words.next() else {
+        return Ok(Line::Nothing);
+    };
     let second = words.next();
     if let Some(more) = words.next() {
-        return Err(wrong(column(more), format!("{more:?} is one word too many")));
+        return Err(wrong(
+            column(more),
+            format!("{more:?} is one word too many"),
+        ));
     }
     let at = column(second.unwrap_or(first));
-    let lone = |line: Line| second.map_or(Ok(line), |more| Err(format!("{first} takes no value, not {more:?}")));
+    let lone = |line: Line| {
+        second.map_or(Ok(line), |more| {
+            Err(format!("{first} takes no value, not {more:?}"))
+        })
+    };
     let line = match first {
         "stop" => lone(Line::Stop),
         "where" => lone(Line::Where),
@@ -60,11 +69,18 @@ pub fn parse(text: &str) -> Result<Line, Wrong> {
         word if is_farewell(word) => lone(Line::Quit),
         "wait" => wait(second),
         _ => match motion(first) {
-            None => Command::parse(first, second).map(Line::Command).map_err(|why| unknown(first, why)),
+            None => Command::parse(first, second)
+                .map(Line::Command)
+                .map_err(|why| unknown(first, why)),
             Some(Err(why)) => return Err(wrong(column(first), why)),
-            Some(Ok((axis, reach))) => {
-                feed(second).map(|feed_per_min| Line::Jog(JogMessage { axis, reach, feed_per_min, degrees: None }))
-            }
+            Some(Ok((axis, reach))) => feed(second).map(|feed_per_min| {
+                Line::Jog(JogMessage {
+                    axis,
+                    reach,
+                    feed_per_min,
+                    degrees: None,
+                })
+            }),
         },
     };
     line.map_err(|why| wrong(at, why))
@@ -111,8 +127,13 @@ fn wait(word: Option<&str>) -> Result<Line, String> {
 
 /// A number without sign.
 fn number(word: &str) -> Result<f64, String> {
-    let digits = word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
-    word.parse().ok().filter(|_| digits).ok_or_else(|| format!("{word:?} is not a number without sign"))
+    let digits = word
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || byte == b'.');
+    word.parse()
+        .ok()
+        .filter(|_| digits)
+        .ok_or_else(|| format!("{word:?} is not a number without sign"))
 }
 
 #[cfg(test)]
@@ -120,14 +141,25 @@ mod tests {
     use super::*;
 
     fn jog(axis: char, reach: ReachMessage, feed_per_min: f64) -> Line {
-        Line::Jog(JogMessage { axis, reach, feed_per_min, degrees: None })
+        Line::Jog(JogMessage {
+            axis,
+            reach,
+            feed_per_min,
+            degrees: None,
+        })
     }
 
     #[test]
     fn every_line() {
         for (text, line) in [
-            ("x+ 600", jog('x', ReachMessage::On { positive: true }, 600.0)),
-            (" Y-  0.5 ", jog('Y', ReachMessage::On { positive: false }, 0.5)),
+            (
+                "x+ 600",
+                jog('x', ReachMessage::On { positive: true }, 600.0),
+            ),
+            (
+                " Y-  0.5 ",
+                jog('Y', ReachMessage::On { positive: false }, 0.5),
+            ),
             ("x+0.1 600", jog('x', ReachMessage::By(0.1), 600.0)),
             ("a-90 1800", jog('a', ReachMessage::By(-90.0), 1800.0)),
             ("stop", Line::Stop),
@@ -137,7 +169,10 @@ mod tests {
             ("quit", Line::Quit),
             (" EXIT ", Line::Quit),
             ("hold", Line::Command(Command::Hold)),
-            ("feed-override 0.5", Line::Command(Command::FeedOverride(0.5))),
+            (
+                "feed-override 0.5",
+                Line::Command(Command::FeedOverride(0.5)),
+            ),
             ("", Line::Nothing),
             ("   ", Line::Nothing),
         ] {
@@ -164,7 +199,10 @@ mod tests {
             ("ü+ 600", 5, "is no jog"),
         ] {
             let wrong = parse(text).expect_err(text);
-            assert!(wrong.column == column && wrong.why.contains(why), "{text}: {wrong:?}");
+            assert!(
+                wrong.column == column && wrong.why.contains(why),
+                "{text}: {wrong:?}"
+            );
         }
     }
 }

@@ -33,9 +33,17 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
     let registry = built_in::registry()?;
     let real_time = options.session.clock == args::Clock::Wall;
-    let shared = Arc::new(Shared::new(real_time && is_on_terminal(), machine.axes, machine.start));
+    let shared = Arc::new(Shared::new(
+        real_time && is_on_terminal(),
+        machine.axes,
+        machine.start,
+    ));
     let script = (!shared.keys).then(|| Script::new(Arc::clone(&shared), !real_time));
-    let clock = if real_time { Clock::Wall } else { Clock::Virtual };
+    let clock = if real_time {
+        Clock::Wall
+    } else {
+        Clock::Virtual
+    };
     let switches = Switches {
         home: options.session.home.then_some(HOMING),
         reset: options.session.reset,
@@ -44,8 +52,16 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         ..Switches::default()
     };
     let input = Inputs::new(Arc::clone(&shared), script);
-    let mut session = JogSession::new(machine.clone(), &registry, switches, Box::new(input.clone()))?;
-    let keyboard = shared.keys.then(|| take_keys(&shared, session.jogs())).transpose()?;
+    let mut session = JogSession::new(
+        machine.clone(),
+        &registry,
+        switches,
+        Box::new(input.clone()),
+    )?;
+    let keyboard = shared
+        .keys
+        .then(|| take_keys(&shared, session.jogs()))
+        .transpose()?;
     let mut sinks = Sinks::new(Arc::clone(&shared));
     let faulted = loop {
         let run = session.enable()?;
@@ -61,7 +77,10 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
             sinks.end(outcome.summary);
             break false;
         };
-        shared.say(&format!("fault: {fault}; {} goes on from here", if shared.keys { "r" } else { RESET }));
+        shared.say(&format!(
+            "fault: {fault}; {} goes on from here",
+            if shared.keys { "r" } else { RESET }
+        ));
         let goes_on = waits_for_reset(&input, &shared, real_time);
         sinks.end(outcome.summary);
         if !goes_on? {
@@ -69,10 +88,16 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         }
     };
     drop(keyboard);
-    let Sinks { trace, mut broken, .. } = sinks;
+    let Sinks {
+        trace, mut broken, ..
+    } = sinks;
     broken.note(trace.map_or(Ok(()), TraceSink::finish));
     broken.tell();
-    Ok(if faulted || broken.is_any() { FAULT } else { u8::from(shared.has_refused()) * REFUSED })
+    Ok(if faulted || broken.is_any() {
+        FAULT
+    } else {
+        u8::from(shared.has_refused()) * REFUSED
+    })
 }
 
 fn take_keys(shared: &Arc<Shared>, jogs: &Arc<JogController>) -> Result<Keyboard, String> {
@@ -84,7 +109,9 @@ fn take_keys(shared: &Arc<Shared>, jogs: &Arc<JogController>) -> Result<Keyboard
 /// Signals of the run that is over are gone: meanwhile others end the session.
 fn waits_for_reset(input: &Inputs, shared: &Shared, real_time: bool) -> Result<bool, String> {
     let hub = shared.hub().filter(|_| real_time && shared.keys);
-    let _signals = hub.map(|(hub, stops)| Signals::catch_with(hub, stops)).transpose()?;
+    let _signals = hub
+        .map(|(hub, stops)| Signals::catch_with(hub, stops))
+        .transpose()?;
     Ok(input.is_reset())
 }
 
@@ -125,8 +152,13 @@ impl Sinks {
         if let (None, Some(path)) = (&self.trace, &options.session.trace) {
             self.trace = Some(TraceSink::create(path, machine, "jogging", run, false)?);
         }
-        let hub = OperatorHub::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
-        let presence = Presence { real_time: options.session.clock == args::Clock::Wall, pause: false, keys: false };
+        let hub =
+            OperatorHub::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
+        let presence = Presence {
+            real_time: options.session.clock == args::Clock::Wall,
+            pause: false,
+            keys: false,
+        };
         let operator = Operator::at(Arc::new(hub), &options.session.operator, presence)?;
         self.shared.follow(&operator);
         self.operator = Some(operator);
@@ -168,12 +200,18 @@ impl RunObserver for Sinks {
 
     fn command(&mut self, command: &Timed) {
         if let Some(trace) = &mut self.trace {
-            self.broken.note(trace.command(&Timed { tick: self.first_tick + command.tick, ..*command }));
+            self.broken.note(trace.command(&Timed {
+                tick: self.first_tick + command.tick,
+                ..*command
+            }));
         }
     }
 
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
-        let sample = Sample { tick: self.first_tick + sample.tick, ..*sample };
+        let sample = Sample {
+            tick: self.first_tick + sample.tick,
+            ..*sample
+        };
         self.next_tick = sample.tick + 1;
         self.shared.sample(&sample);
         if let Some(operator) = &self.operator {

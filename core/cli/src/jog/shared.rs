@@ -35,7 +35,12 @@ struct Inner {
 impl Shared {
     /// Nothing said yet, at `position`.
     pub fn new(keys: bool, axes: Axes, position: AxisVector) -> Self {
-        let inner = Inner { position, hub: None, stops: Stops::default(), said: String::new() };
+        let inner = Inner {
+            position,
+            hub: None,
+            stops: Stops::default(),
+            said: String::new(),
+        };
         Self {
             keys,
             axes,
@@ -99,7 +104,9 @@ impl Shared {
                 self.say(&format!("{name} is at its travel limit, {limit}"));
             }
             // A key that is let go says no more than that.
-            JogEnd::Late if !self.keys => self.say(&format!("{name} stopped: the keep-alive was late")),
+            JogEnd::Late if !self.keys => {
+                self.say(&format!("{name} stopped: the keep-alive was late"))
+            }
             _ => self.inner().said.clear(),
         }
         if !self.keys {
@@ -119,14 +126,22 @@ impl Shared {
         if self.keys && sample.tick.is_multiple_of(100) {
             let feed = sample.feed_mm_per_s * 60.0;
             // A terminal that has gone away ends the session with its signal.
-            let _ = write!(stderr(), "\r\x1b[K{}  {}  F{feed:.0}", sample.state.name(), self.position(3));
+            let _ = write!(
+                stderr(),
+                "\r\x1b[K{}  {}  F{feed:.0}",
+                sample.state.name(),
+                self.position(3)
+            );
             let _ = stderr().flush();
         }
     }
 
     fn position(&self, digits: usize) -> String {
         let position = Position::new(&self.axes, &self.inner().position);
-        let each = position.values().iter().map(|(name, value)| format!("{name} {value:.digits$}"));
+        let each = position
+            .values()
+            .iter()
+            .map(|(name, value)| format!("{name} {value:.digits$}"));
         each.collect::<Vec<_>>().join("  ")
     }
 

@@ -30,25 +30,40 @@ impl Cyclictest {
                 continue;
             }
             let fields: Result<Vec<u64>, _> = line.split_whitespace().map(str::parse).collect();
-            let fields = fields.map_err(|_| format!(":{number}: not a latency with its counts: {line:?}"))?;
+            let fields = fields
+                .map_err(|_| format!(":{number}: not a latency with its counts: {line:?}"))?;
             lateness.record_many(fields[0] * 1000, fields[1..].iter().sum());
             end_us = fields[0] + 1;
         }
         let overflows = comment(text, "# Histogram Overflows:").iter().sum();
-        let latest_us = comment(text, "# Max Latencies:").into_iter().max().unwrap_or(0);
+        let latest_us = comment(text, "# Max Latencies:")
+            .into_iter()
+            .max()
+            .unwrap_or(0);
         if overflows > 0 {
             lateness.record_many(end_us * 1000, overflows - 1);
             lateness.record_many(latest_us.max(end_us) * 1000, 1);
         }
         let found = lateness.count() > 0;
-        found.then_some(Self { lateness, overflows }).ok_or(": no histogram of cyclictest (its option -h)".to_string())
+        found
+            .then_some(Self {
+                lateness,
+                overflows,
+            })
+            .ok_or(": no histogram of cyclictest (its option -h)".to_string())
     }
 }
 
 /// The numbers behind a comment.
 fn comment(text: &str, name: &str) -> Vec<u64> {
-    let behind = text.lines().find_map(|line| line.strip_prefix(name)).unwrap_or_default();
-    behind.split_whitespace().filter_map(|word| word.parse().ok()).collect()
+    let behind = text
+        .lines()
+        .find_map(|line| line.strip_prefix(name))
+        .unwrap_or_default();
+    behind
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect()
 }
 
 #[cfg(test)]
@@ -63,15 +78,24 @@ mod tests {
     #[test]
     fn all_threads_and_what_overflowed_are_counted() {
         let read = Cyclictest::parse(PRINTED).unwrap();
-        assert_eq!((read.lateness.count(), read.overflows, read.lateness.max_ns()), (103, 3, 113_000));
+        assert_eq!(
+            (
+                read.lateness.count(),
+                read.overflows,
+                read.lateness.max_ns()
+            ),
+            (103, 3, 113_000)
+        );
         assert!((2000..2100).contains(&read.lateness.percentile_ns(0.5)));
     }
 
     #[test]
     fn what_is_no_histogram_is_refused() {
-        for (text, words) in
-            [("", ": no histogram"), ("# Histogram\n", ": no histogram"), ("a\n1 x\n", ":2: not a latency")]
-        {
+        for (text, words) in [
+            ("", ": no histogram"),
+            ("# Histogram\n", ": no histogram"),
+            ("a\n1 x\n", ":2: not a latency"),
+        ] {
             let refusal = Cyclictest::parse(text).err().unwrap();
             assert!(refusal.starts_with(words), "{refusal}");
         }

@@ -32,9 +32,18 @@ pub fn latency(options: &args::Latency) -> Result<u8, Box<dyn Error>> {
     // A reader that has gone away (a closed pipe) is no reason to fail.
     let _ = std::io::stdout().write_all(text(&latency, options).as_bytes());
     // Read only now: so it may have measured in the same minutes.
-    let beside = options.cyclictest.as_ref().map(|path| Cyclictest::read(path)).transpose()?;
+    let beside = options
+        .cyclictest
+        .as_ref()
+        .map(|path| Cyclictest::read(path))
+        .transpose()?;
     if let Some(Cyclictest { lateness, .. }) = &beside {
-        let _ = writeln!(std::io::stdout(), "cyclictest: {} wake-ups, {}", lateness.count(), figures(lateness));
+        let _ = writeln!(
+            std::io::stdout(),
+            "cyclictest: {} wake-ups, {}",
+            lateness.count(),
+            figures(lateness)
+        );
     }
     if let Some(path) = &options.report {
         drawing::write(path, options, &latency, beside.as_ref())?;
@@ -50,7 +59,12 @@ fn text(latency: &Latency, options: &args::Latency) -> String {
     let mut text = "wake-up lateness, us      wake-ups\n".to_string();
     for row in &rows {
         let (from, below) = (row.from_ns as f64 / 1e3, row.below_ns as f64 / 1e3);
-        let _ = writeln!(text, "{from:9.1} to {below:9.1} {:10} {}", row.count, bar(row.count, most));
+        let _ = writeln!(
+            text,
+            "{from:9.1} to {below:9.1} {:10} {}",
+            row.count,
+            bar(row.count, most)
+        );
     }
     let _ = writeln!(text, "{}", figures(&timing.lateness));
     let (wake_ups, missed) = (timing.lateness.count(), timing.missed_periods);
@@ -67,7 +81,12 @@ fn text(latency: &Latency, options: &args::Latency) -> String {
 }
 
 fn figures(lateness: &Lateness) -> String {
-    let LatenessUs { p50, p99, p999, max } = LatenessUs::from(lateness);
+    let LatenessUs {
+        p50,
+        p99,
+        p999,
+        max,
+    } = LatenessUs::from(lateness);
     format!("p50 {p50:.1}, p99 {p99:.1}, p99.9 {p999:.1}, max {max:.1} us")
 }
 

@@ -40,7 +40,9 @@ impl Shared {
     /// Nothing said yet.
     pub fn new(real_time: bool, keys: bool) -> Self {
         if keys {
-            say!("a line of G-code is driven when it is complete; quit, exit or Ctrl-D ends the session");
+            say!(
+                "a line of G-code is driven when it is complete; quit, exit or Ctrl-D ends the session"
+            );
             Keyboard::explain();
         }
         Self {
@@ -86,7 +88,9 @@ impl Shared {
                 }
                 NextLine::Line(line) if line.trim().is_empty() => {}
                 NextLine::Line(_) => {
-                    self.refuse(&format!("the machine is in fault; {RESET} goes on, quit ends the session"));
+                    self.refuse(&format!(
+                        "the machine is in fault; {RESET} goes on, quit ends the session"
+                    ));
                 }
                 NextLine::Later => thread::sleep(LOOK),
                 NextLine::Over => return false,

@@ -34,18 +34,43 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
         pause_at_stops: attended,
         home: options.session.home.then_some(HOMING),
         reset: options.session.reset,
-        clock: Some(if real_time { Clock::Wall } else { Clock::Virtual }),
+        clock: Some(if real_time {
+            Clock::Wall
+        } else {
+            Clock::Virtual
+        }),
         ..Switches::default()
     };
     let shared = Arc::new(Shared::new(real_time, keys));
     let conversation = Conversation::new(Arc::clone(&shared), machine.axes);
-    let mut session = MdiSession::new(machine.clone(), &registry, switches, Box::new(conversation))?;
-    let clock = if real_time { Clock::Wall } else { Clock::Virtual };
-    let mut sinks =
-        Sinks { trace: None, operator: None, first_tick: 0, next_tick: 0, noted: vec![], broken: Broken::default() };
+    let mut session =
+        MdiSession::new(machine.clone(), &registry, switches, Box::new(conversation))?;
+    let clock = if real_time {
+        Clock::Wall
+    } else {
+        Clock::Virtual
+    };
+    let mut sinks = Sinks {
+        trace: None,
+        operator: None,
+        first_tick: 0,
+        next_tick: 0,
+        noted: vec![],
+        broken: Broken::default(),
+    };
     loop {
         let run = session.enable()?;
-        sinks.begin(options, &machine, &run, Presence { real_time, pause: false, keys: false }, &shared)?;
+        sinks.begin(
+            options,
+            &machine,
+            &run,
+            Presence {
+                real_time,
+                pause: false,
+                keys: false,
+            },
+            &shared,
+        )?;
         let outcome = run.drive(clock, &[], &mut sinks)?;
         shared.take_keys();
         sinks.begin_fault(&outcome.summary);
@@ -61,11 +86,16 @@ pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
             break;
         }
     }
-    let Sinks { trace, mut broken, .. } = sinks;
+    let Sinks {
+        trace, mut broken, ..
+    } = sinks;
     broken.note(trace.map_or(Ok(()), TraceSink::finish));
     broken.tell();
-    let status =
-        if shared.ended_in_fault() || broken.is_any() { FAULT } else { u8::from(shared.has_refused()) * REFUSED };
+    let status = if shared.ended_in_fault() || broken.is_any() {
+        FAULT
+    } else {
+        u8::from(shared.has_refused()) * REFUSED
+    };
     Ok(status)
 }
 
@@ -92,7 +122,13 @@ impl Sinks {
         shared: &Shared,
     ) -> Result<(), String> {
         if let (None, Some(path)) = (&self.trace, &options.session.trace) {
-            self.trace = Some(TraceSink::create(path, machine, "manual input", run, false)?);
+            self.trace = Some(TraceSink::create(
+                path,
+                machine,
+                "manual input",
+                run,
+                false,
+            )?);
         }
         let operator = Operator::begin(&options.session.operator, machine, run, presence)?;
         shared.follow(&operator);
@@ -128,7 +164,9 @@ impl RunObserver for Sinks {
     }
 
     fn program_stop(&mut self, line: u32) -> StopAnswer {
-        self.operator.as_mut().map_or(StopAnswer::GoOn, |operator| operator.program_stop(line))
+        self.operator
+            .as_mut()
+            .map_or(StopAnswer::GoOn, |operator| operator.program_stop(line))
     }
 
     fn is_attended(&self) -> bool {
@@ -143,12 +181,18 @@ impl RunObserver for Sinks {
 
     fn command(&mut self, command: &Timed) {
         if let Some(trace) = &mut self.trace {
-            self.broken.note(trace.command(&Timed { tick: self.first_tick + command.tick, ..*command }));
+            self.broken.note(trace.command(&Timed {
+                tick: self.first_tick + command.tick,
+                ..*command
+            }));
         }
     }
 
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
-        let sample = Sample { tick: self.first_tick + sample.tick, ..*sample };
+        let sample = Sample {
+            tick: self.first_tick + sample.tick,
+            ..*sample
+        };
         self.next_tick = sample.tick + 1;
         if let Some(operator) = &self.operator {
             operator.sample(&sample, 1.0);

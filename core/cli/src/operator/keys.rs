@@ -61,7 +61,11 @@ impl Keyboard {
         let over = Arc::new(AtomicBool::new(false));
         let seen = Arc::clone(&over);
         let thread = thread::spawn(move || listen(take, &seen));
-        Ok(Self { over, thread: Some(thread), _terminal: terminal })
+        Ok(Self {
+            over,
+            thread: Some(thread),
+            _terminal: terminal,
+        })
     }
 }
 
@@ -77,7 +81,10 @@ impl Drop for Keyboard {
 
 fn listen(mut take: impl FnMut(&[u8]), over: &AtomicBool) {
     let mut keys = [0; 16];
-    let timeout = Timespec { tv_sec: 0, tv_nsec: LOOK_NS };
+    let timeout = Timespec {
+        tv_sec: 0,
+        tv_nsec: LOOK_NS,
+    };
     while !over.load(Ordering::Acquire) {
         let input = stdio::stdin();
         let ready = poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&timeout));
@@ -85,7 +92,9 @@ fn listen(mut take: impl FnMut(&[u8]), over: &AtomicBool) {
             continue;
         }
         // No bytes: the terminal is gone, and its signal stops the machine.
-        let Ok(count @ 1..) = rustix::io::read(input, &mut keys) else { return };
+        let Ok(count @ 1..) = rustix::io::read(input, &mut keys) else {
+            return;
+        };
         take(&keys[..count]);
     }
 }
@@ -100,10 +109,14 @@ pub fn press(key: u8, hub: &OperatorHub, stops: &Stops) -> Option<String> {
         b'\r' | b'\n' => (Command::Resume, "on".to_string()),
         b'+' | b'=' => step(hub, STEP),
         b'-' => step(hub, -STEP),
-        b's' => (Command::SingleBlock(!on(&controls.single_block)), switched("single block", &controls.single_block)),
-        b'o' => {
-            (Command::OptionalStop(!on(&controls.optional_stop)), switched("optional stop", &controls.optional_stop))
-        }
+        b's' => (
+            Command::SingleBlock(!on(&controls.single_block)),
+            switched("single block", &controls.single_block),
+        ),
+        b'o' => (
+            Command::OptionalStop(!on(&controls.optional_stop)),
+            switched("optional stop", &controls.optional_stop),
+        ),
         b'q' => (Command::Abort, "abort: stopping on the path".to_string()),
         b'e' => (Command::EmergencyStop, "emergency stop".to_string()),
         CTRL_C => return Some(stops.ask(hub)),
@@ -113,7 +126,14 @@ pub fn press(key: u8, hub: &OperatorHub, stops: &Stops) -> Option<String> {
 }
 
 fn switched(what: &str, switch: &AtomicBool) -> String {
-    format!("{what} {}", if switch.load(Ordering::Relaxed) { "off" } else { "on" })
+    format!(
+        "{what} {}",
+        if switch.load(Ordering::Relaxed) {
+            "off"
+        } else {
+            "on"
+        }
+    )
 }
 
 /// The feed override a step on, within what the machine allows.
@@ -127,7 +147,10 @@ fn step(hub: &OperatorHub, by: f64) -> (Command, String) {
         0.0 => ": the least there is",
         _ => ": the most that motion.max_feed_ratio allows",
     };
-    (Command::FeedOverride(next), format!("feed override {:.0} %{bound}", next * 100.0))
+    (
+        Command::FeedOverride(next),
+        format!("feed override {:.0} %{bound}", next * 100.0),
+    )
 }
 
 #[cfg(test)]
@@ -138,15 +161,24 @@ mod tests {
     use tandem_machine::Machine;
 
     fn hub() -> OperatorHub {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
-        let machine = Machine::read(&path, &[("motion.max_feed_ratio".to_string(), "1.15".to_string())]).unwrap();
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let machine = Machine::read(
+            &path,
+            &[("motion.max_feed_ratio".to_string(), "1.15".to_string())],
+        )
+        .unwrap();
         OperatorHub::new(&machine, Arc::default(), Arc::default())
     }
 
     #[test]
     fn every_key() {
         let (hub, stops) = (hub(), Stops::default());
-        let type_in = |keys: &str| keys.bytes().filter_map(|key| press(key, &hub, &stops)).collect::<Vec<_>>();
+        let type_in = |keys: &str| {
+            keys.bytes()
+                .filter_map(|key| press(key, &hub, &stops))
+                .collect::<Vec<_>>()
+        };
         let controls = hub.controls();
         assert_eq!(type_in(" "), ["feed hold; space resumes"]);
         assert!(controls.hold.load(Relaxed));
@@ -171,7 +203,10 @@ mod tests {
         let (hub, stops) = (hub(), Stops::default());
         let said = |key: u8| press(key, &hub, &stops).unwrap();
         assert_eq!(said(b'+'), "feed override 110 %");
-        assert_eq!(said(b'+'), "feed override 115 %: the most that motion.max_feed_ratio allows");
+        assert_eq!(
+            said(b'+'),
+            "feed override 115 %: the most that motion.max_feed_ratio allows"
+        );
         assert_eq!(hub.controls().feed_override.load(), 1.15);
         assert_eq!(said(b'-'), "feed override 105 %");
         let down: Vec<String> = (0..12).map(|_| said(b'-')).collect();

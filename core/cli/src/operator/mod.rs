@@ -58,21 +58,51 @@ impl Operator {
     ///
     /// # Errors
     /// The socket, the token file or the terminal with the cause.
-    pub fn begin(options: &args::Operator, machine: &Machine, run: &Run, presence: Presence) -> Result<Self, String> {
-        Self::at(Arc::new(OperatorHub::new(machine, run.controls(), run.status())), options, presence)
+    pub fn begin(
+        options: &args::Operator,
+        machine: &Machine,
+        run: &Run,
+        presence: Presence,
+    ) -> Result<Self, String> {
+        Self::at(
+            Arc::new(OperatorHub::new(machine, run.controls(), run.status())),
+            options,
+            presence,
+        )
     }
 
     /// The same at a hub that is there.
     ///
     /// # Errors
     /// As [`Operator::begin`].
-    pub fn at(hub: Arc<OperatorHub>, options: &args::Operator, presence: Presence) -> Result<Self, String> {
-        let Presence { real_time, pause, keys } = presence;
+    pub fn at(
+        hub: Arc<OperatorHub>,
+        options: &args::Operator,
+        presence: Presence,
+    ) -> Result<Self, String> {
+        let Presence {
+            real_time,
+            pause,
+            keys,
+        } = presence;
         let server = serve(options, &hub)?;
-        let signals = real_time.then(|| Signals::catch(Arc::clone(&hub))).transpose()?;
+        let signals = real_time
+            .then(|| Signals::catch(Arc::clone(&hub)))
+            .transpose()?;
         let stops = signals.as_ref().map(Signals::stops);
-        let keyboard = stops.filter(|_| keys).map(|stops| Keyboard::begin(Arc::clone(&hub), stops)).transpose()?;
-        Ok(Self { hub, keyboard, signals, server, enter: Enter::default(), real_time, pause })
+        let keyboard = stops
+            .filter(|_| keys)
+            .map(|stops| Keyboard::begin(Arc::clone(&hub), stops))
+            .transpose()?;
+        Ok(Self {
+            hub,
+            keyboard,
+            signals,
+            server,
+            enter: Enter::default(),
+            real_time,
+            pause,
+        })
     }
 
     /// The hub, for keys that come and go.
@@ -141,7 +171,8 @@ impl Operator {
     pub fn end(&mut self, summary: &Summary) {
         self.keyboard = None;
         self.signals = None;
-        self.hub.end(summary.fault.as_deref(), summary.stopped.as_deref());
+        self.hub
+            .end(summary.fault.as_deref(), summary.stopped.as_deref());
         self.server = None;
     }
 
@@ -168,7 +199,11 @@ impl Operator {
 
 /// A line to standard error, over the progress where that is shown.
 pub fn tell(words: &str) {
-    let clear = if stderr().is_terminal() { "\r\x1b[K" } else { "" };
+    let clear = if stderr().is_terminal() {
+        "\r\x1b[K"
+    } else {
+        ""
+    };
     say!("{clear}{words}");
 }
 
@@ -177,8 +212,11 @@ fn serve(options: &args::Operator, hub: &Arc<OperatorHub>) -> Result<Option<Serv
     if options.is_nowhere() {
         return Ok(None);
     }
-    let listen =
-        Listen { unix: options.listen.clone(), tcp: options.listen_tcp, token_file: options.token_file.clone() };
+    let listen = Listen {
+        unix: options.listen.clone(),
+        tcp: options.listen_tcp,
+        token_file: options.token_file.clone(),
+    };
     let server = Server::start(Arc::clone(hub), &listen)?;
     if let Some(path) = &options.listen {
         say!("operators: {}", path.display());

@@ -33,7 +33,13 @@ const STOPS: [Signal; 13] = [
 const REAL_TIME: RangeInclusive<i32> = 34..=64;
 /// Signals that change nothing: those of the terminal would put the process to sleep while the machine moves, and what a
 /// write says that fails is enough.
-const IGNORED: [Signal; 5] = [Signal::TSTP, Signal::TTIN, Signal::TTOU, Signal::PIPE, Signal::XFSZ];
+const IGNORED: [Signal; 5] = [
+    Signal::TSTP,
+    Signal::TTIN,
+    Signal::TTOU,
+    Signal::PIPE,
+    Signal::XFSZ,
+];
 
 /// How to stop: the first time on the path, then at once.
 #[derive(Clone, Default)]
@@ -48,11 +54,15 @@ impl Stops {
     /// Asks once more.
     pub fn ask(&self, hub: &OperatorHub) -> String {
         let (command, words) = match self.0.fetch_add(1, Ordering::Relaxed) {
-            0 => (Command::Abort, "abort: stopping on the path; once more is an emergency stop"),
+            0 => (
+                Command::Abort,
+                "abort: stopping on the path; once more is an emergency stop",
+            ),
             _ => (Command::EmergencyStop, "emergency stop"),
         };
         // Stopping is never refused.
-        hub.give(command).map_or_else(|refusal| refusal, |_| words.to_string())
+        hub.give(command)
+            .map_or_else(|refusal| refusal, |_| words.to_string())
     }
 }
 
@@ -78,16 +88,22 @@ impl Signals {
     /// The system's words.
     pub fn catch_with(hub: Arc<OperatorHub>, stops: Stops) -> Result<Self, String> {
         let named = STOPS.iter().chain(&IGNORED).map(|signal| signal.as_raw());
-        let mut received = Received::new(named.chain(REAL_TIME)).map_err(|e| format!("signals: {e}"))?;
+        let mut received =
+            Received::new(named.chain(REAL_TIME)).map_err(|e| format!("signals: {e}"))?;
         let handle = received.handle();
         let asked = stops.clone();
         let thread = thread::spawn(move || {
-            let is_ignored = |signal: &i32| IGNORED.iter().any(|ignored| ignored.as_raw() == *signal);
+            let is_ignored =
+                |signal: &i32| IGNORED.iter().any(|ignored| ignored.as_raw() == *signal);
             for _ in received.forever().filter(|signal| !is_ignored(signal)) {
                 tell(&asked.ask(&hub));
             }
         });
-        Ok(Self { stops, handle, thread: Some(thread) })
+        Ok(Self {
+            stops,
+            handle,
+            thread: Some(thread),
+        })
     }
 
     /// The count that Ctrl-C on the keyboard shares.

@@ -6,12 +6,15 @@ use std::sync::{Mutex, PoisonError};
 use rustix::process::getpgrp;
 use rustix::stdio;
 use rustix::termios::{
-    InputModes, LocalModes, OptionalActions, SpecialCodeIndex, Termios, tcgetattr, tcgetpgrp, tcsetattr,
+    InputModes, LocalModes, OptionalActions, SpecialCodeIndex, Termios, tcgetattr, tcgetpgrp,
+    tcsetattr,
 };
 
 /// Whether keys can be taken: there is a terminal, and it is ours. To a program in the background it belongs to another.
 pub fn is_on_terminal() -> bool {
-    stdin().is_terminal() && stderr().is_terminal() && tcgetpgrp(stdio::stdin()).is_ok_and(|group| group == getpgrp())
+    stdin().is_terminal()
+        && stderr().is_terminal()
+        && tcgetpgrp(stdio::stdin()).is_ok_and(|group| group == getpgrp())
 }
 
 /// How the terminal was before it was taken, while it is.
@@ -38,11 +41,13 @@ impl RawTerminal {
         let before = tcgetattr(stdio::stdin()).map_err(|e| format!("the terminal: {e}"))?;
         let mut raw = before.clone();
         // Ctrl-C comes as a key; a machine in motion is not suspended with Ctrl-Z, nor its display with Ctrl-S.
-        raw.local_modes -= LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG | LocalModes::IEXTEN;
+        raw.local_modes -=
+            LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG | LocalModes::IEXTEN;
         raw.input_modes -= InputModes::IXON;
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
-        tcsetattr(stdio::stdin(), OptionalActions::Now, &raw).map_err(|e| format!("the terminal: {e}"))?;
+        tcsetattr(stdio::stdin(), OptionalActions::Now, &raw)
+            .map_err(|e| format!("the terminal: {e}"))?;
         *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
         Ok(Self(()))
     }

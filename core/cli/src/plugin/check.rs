@@ -9,8 +9,12 @@ use crate::REFUSED;
 
 /// Loads a shared library and judges all plugins in it.
 pub fn check(library: &Path, options: &[(String, String)], setup: &Setup) -> Result<u8, String> {
-    let plugins = tandem_host::load_plugins(library).map_err(|cause| format!("{}: {cause}", library.display()))?;
-    let setup = Setup { options: options_text(options)?, ..setup.clone() };
+    let plugins = tandem_host::load_plugins(library)
+        .map_err(|cause| format!("{}: {cause}", library.display()))?;
+    let setup = Setup {
+        options: options_text(options)?,
+        ..setup.clone()
+    };
     let mut status = 0;
     for plugin in plugins {
         let report = judge(plugin, &setup);
@@ -28,10 +32,16 @@ fn options_text(options: &[(String, String)]) -> Result<String, String> {
     let line = |(key, value): &(String, String)| {
         let line = format!("{key} = {value}\n");
         let readable = line.parse::<toml::Table>().is_ok();
-        if readable { line } else { format!("{key} = {}\n", toml::Value::String(value.clone())) }
+        if readable {
+            line
+        } else {
+            format!("{key} = {}\n", toml::Value::String(value.clone()))
+        }
     };
     let text: String = options.iter().map(line).collect();
-    text.parse::<toml::Table>().map(|_| text).map_err(|e| format!("--set: {e}"))
+    text.parse::<toml::Table>()
+        .map(|_| text)
+        .map_err(|e| format!("--set: {e}"))
 }
 
 #[cfg(test)]
@@ -41,7 +51,12 @@ mod tests {
     #[test]
     fn options_are_toml_or_text() {
         let pair = |key: &str, value: &str| (key.to_string(), value.to_string());
-        let text = options_text(&[pair("share", "0.5"), pair("file", "a b.csv"), pair("on", "true")]).unwrap();
+        let text = options_text(&[
+            pair("share", "0.5"),
+            pair("file", "a b.csv"),
+            pair("on", "true"),
+        ])
+        .unwrap();
         assert_eq!(text, "share = 0.5\nfile = \"a b.csv\"\non = true\n");
         assert!(options_text(&[pair("a b", "1")]).is_err());
     }

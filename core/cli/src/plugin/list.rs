@@ -13,18 +13,30 @@ pub fn list(libraries: &[PathBuf], verbose: bool) -> Result<u8, String> {
     let mut status = 0;
     let mut plugins = vec![];
     if libraries.is_empty() {
-        plugins.extend(built_in::registry()?.plugins().iter().map(|plugin| (*plugin, "built in".to_string())));
+        plugins.extend(
+            built_in::registry()?
+                .plugins()
+                .iter()
+                .map(|plugin| (*plugin, "built in".to_string())),
+        );
     }
     for path in libraries {
         match tandem_host::load_plugins(path) {
-            Ok(loaded) => plugins.extend(loaded.into_iter().map(|plugin| (plugin, path.display().to_string()))),
+            Ok(loaded) => plugins.extend(
+                loaded
+                    .into_iter()
+                    .map(|plugin| (plugin, path.display().to_string())),
+            ),
             Err(cause) => {
                 say!("{}: {cause}", path.display());
                 status = REFUSED;
             }
         }
     }
-    let text: String = plugins.iter().map(|(plugin, from)| described(*plugin, from, verbose)).collect();
+    let text: String = plugins
+        .iter()
+        .map(|(plugin, from)| described(*plugin, from, verbose))
+        .collect();
     // A reader that has gone away is no reason to fail.
     let _ = std::io::stdout().write_all(text.as_bytes());
     Ok(status)
@@ -37,7 +49,9 @@ fn described(plugin: Plugin, from: &str, verbose: bool) -> String {
         let _ = writeln!(text, "    {from}, plugin contract {ABI_VERSION}");
         match plugin.options() {
             Ok(options) if options.is_empty() => text += "    no options\n",
-            Ok(options) => options.iter().for_each(|option| text += &described_option(option)),
+            Ok(options) => options
+                .iter()
+                .for_each(|option| text += &described_option(option)),
             Err(cause) => {
                 let _ = writeln!(text, "    options: {cause}");
             }
@@ -48,7 +62,11 @@ fn described(plugin: Plugin, from: &str, verbose: bool) -> String {
 }
 
 fn described_option(option: &OptionDoc) -> String {
-    let default = if option.default.is_empty() { "not set" } else { &option.default };
+    let default = if option.default.is_empty() {
+        "not set"
+    } else {
+        &option.default
+    };
     let mut text = format!("    {} = {default}    # {}\n", option.key, option.values);
     for line in wrapped(&option.doc, 100) {
         let _ = writeln!(text, "        {line}");
@@ -60,7 +78,9 @@ fn described_option(option: &OptionDoc) -> String {
 fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
-        let line = lines.last_mut().unwrap_or_else(|| unreachable!("it begins with one"));
+        let line = lines
+            .last_mut()
+            .unwrap_or_else(|| unreachable!("it begins with one"));
         if line.is_empty() {
             line.push_str(word);
         } else if line.chars().count() + 1 + word.chars().count() <= columns {

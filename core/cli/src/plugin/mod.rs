@@ -12,8 +12,19 @@ use crate::args;
 pub fn plugin(command: &args::Plugin) -> Result<u8, Box<dyn std::error::Error>> {
     let done = match command {
         args::Plugin::New { name, kind, sdk } => new::new(name, *kind, sdk.as_deref()),
-        args::Plugin::Check { library, options, seed, programs, moves_metal } => {
-            let setup = Setup { seed: *seed, programs: *programs, moves_metal: *moves_metal, ..Setup::default() };
+        args::Plugin::Check {
+            library,
+            options,
+            seed,
+            programs,
+            moves_metal,
+        } => {
+            let setup = Setup {
+                seed: *seed,
+                programs: *programs,
+                moves_metal: *moves_metal,
+                ..Setup::default()
+            };
             check::check(library, options, &setup)
         }
         args::Plugin::List { libraries, verbose } => list::list(libraries, *verbose),

@@ -36,10 +36,14 @@ const TAKEN: &str = "\
 
 /// Makes a crate with a first plugin of `kind` in the folder `folder`; `sdk` is where Tandem's source is.
 pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
-    let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = folder
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(plain) {
-        let rule = "the name of a plugin has the characters a-z, 0-9 and - only, and begins with a letter";
+        let rule =
+            "the name of a plugin has the characters a-z, 0-9 and - only, and begins with a letter";
         return Err(format!("{}: {rule}", folder.display()));
     }
     if TAKEN.split_whitespace().any(|taken| taken == name) {
@@ -56,7 +60,10 @@ pub fn new(folder: &Path, kind: Kind, sdk: Option<&str>) -> Result<u8, String> {
         let text = filled(text, &name, kind, &source);
         write(&folder.join(file), &text)?;
     }
-    say!("{} is the plugin. What comes next:", folder.join("src/lib.rs").display());
+    say!(
+        "{} is the plugin. What comes next:",
+        folder.join("src/lib.rs").display()
+    );
     say!("  cd {}", folder.display());
     say!("  cargo test                # the conformance kit judges it");
     say!("  cargo build --release     # {}", library(&name));
@@ -90,8 +97,18 @@ fn files(kind: Kind) -> Vec<(&'static str, &'static str)> {
 /// way too.
 fn filled(text: &str, name: &str, kind: Kind, source: &Source) -> String {
     let (words, section, example, options) = match kind {
-        Kind::Planner => ("planner", "planner", "one-block", "acceleration_share = 0.8"),
-        Kind::FeedStrategy => ("feed strategy", "feed_strategy", "NAME", "most_current_a = 6"),
+        Kind::Planner => (
+            "planner",
+            "planner",
+            "one-block",
+            "acceleration_share = 0.8",
+        ),
+        Kind::FeedStrategy => (
+            "feed strategy",
+            "feed_strategy",
+            "NAME",
+            "most_current_a = 6",
+        ),
         Kind::Driver => ("driver", "driver", "NAME", "# this one has none"),
         Kind::Kinematics => ("kinematics", "kinematics", "core-xy", JOINTS),
     };
@@ -126,11 +143,22 @@ impl Source {
     fn find(stated: Option<&str>) -> Result<Self, String> {
         if let Some(place) = stated {
             let git = place.contains("://") || place.starts_with("git@");
-            return if git { Ok(Self::Git(place.to_string())) } else { Self::folder(Path::new(place)) };
+            return if git {
+                Ok(Self::Git(place.to_string()))
+            } else {
+                Self::folder(Path::new(place))
+            };
         }
         let built_from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let places = [std::env::current_dir().ok(), std::env::current_exe().ok(), Some(built_from)];
-        let found = places.into_iter().flatten().find_map(|place| place.ancestors().find_map(|p| Self::folder(p).ok()));
+        let places = [
+            std::env::current_dir().ok(),
+            std::env::current_exe().ok(),
+            Some(built_from),
+        ];
+        let found = places
+            .into_iter()
+            .flatten()
+            .find_map(|place| place.ancestors().find_map(|p| Self::folder(p).ok()));
         found.ok_or_else(|| {
             "the source of Tandem is not found: --sdk says where it is, as a folder or as the URL of a git repository"
                 .to_string()
@@ -138,17 +166,27 @@ impl Source {
     }
 
     fn folder(path: &Path) -> Result<Self, String> {
-        if !path.join("core/sdk/Cargo.toml").is_file() || !path.join("tests/conformance/Cargo.toml").is_file() {
-            return Err(format!("{}: is no checkout of Tandem: it has no core/sdk", path.display()));
+        if !path.join("core/sdk/Cargo.toml").is_file()
+            || !path.join("tests/conformance/Cargo.toml").is_file()
+        {
+            return Err(format!(
+                "{}: is no checkout of Tandem: it has no core/sdk",
+                path.display()
+            ));
         }
-        path.canonicalize().map(Self::Folder).map_err(|e| format!("{}: {e}", path.display()))
+        path.canonicalize()
+            .map(Self::Folder)
+            .map_err(|e| format!("{}: {e}", path.display()))
     }
 
     /// What a manifest says of a package in `folder` of the source.
     fn dependency(&self, folder: &str) -> String {
         let text = |value: &str| toml::Value::String(value.to_string()).to_string();
         match self {
-            Self::Folder(root) => format!("{{ path = {} }}", text(&root.join(folder).to_string_lossy())),
+            Self::Folder(root) => format!(
+                "{{ path = {} }}",
+                text(&root.join(folder).to_string_lossy())
+            ),
             Self::Git(url) => format!("{{ git = {} }}", text(url)),
         }
     }
@@ -161,29 +199,58 @@ mod tests {
     #[test]
     fn a_name_with_which_nothing_compiles_is_refused() {
         for name in ["fn", "test", "core", "tandem-sdk"] {
-            let refusal = new(&std::env::temp_dir().join("no-such-folder").join(name), Kind::Driver, None).unwrap_err();
-            assert!(refusal.ends_with("the name is Rust's or Tandem's"), "{refusal}");
+            let refusal = new(
+                &std::env::temp_dir().join("no-such-folder").join(name),
+                Kind::Driver,
+                None,
+            )
+            .unwrap_err();
+            assert!(
+                refusal.ends_with("the name is Rust's or Tandem's"),
+                "{refusal}"
+            );
         }
     }
 
     #[test]
     fn a_name_that_holds_that_of_an_example_stays() {
         let source = Source::Git("https://example.org/tandem.git".to_string());
-        for (kind, name) in
-            [(Kind::Planner, "core-xy-2"), (Kind::Planner, "one-block-2"), (Kind::Kinematics, "core-xy-2")]
-        {
-            let (_, text) = files(kind).into_iter().find(|(file, _)| *file == "src/lib.rs").unwrap();
+        for (kind, name) in [
+            (Kind::Planner, "core-xy-2"),
+            (Kind::Planner, "one-block-2"),
+            (Kind::Kinematics, "core-xy-2"),
+        ] {
+            let (_, text) = files(kind)
+                .into_iter()
+                .find(|(file, _)| *file == "src/lib.rs")
+                .unwrap();
             let text = filled(text, name, kind, &source);
-            assert!(text.contains(&format!(" \"{name}\" =")) && !text.contains("NAME"), "{text}");
+            assert!(
+                text.contains(&format!(" \"{name}\" =")) && !text.contains("NAME"),
+                "{text}"
+            );
         }
     }
 
     #[test]
     fn the_sdk_is_found_by_folder_or_by_url() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap();
-        assert_eq!(Source::find(root.to_str()), Ok(Source::Folder(root.clone())));
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../..")
+            .canonicalize()
+            .unwrap();
+        assert_eq!(
+            Source::find(root.to_str()),
+            Ok(Source::Folder(root.clone()))
+        );
         let git = Source::find(Some("https://example.org/tandem.git")).unwrap();
-        assert_eq!(git.dependency("core/sdk"), "{ git = \"https://example.org/tandem.git\" }");
-        assert!(Source::find(Some("/no/such/folder")).unwrap_err().contains("core/sdk"));
+        assert_eq!(
+            git.dependency("core/sdk"),
+            "{ git = \"https://example.org/tandem.git\" }"
+        );
+        assert!(
+            Source::find(Some("/no/such/folder"))
+                .unwrap_err()
+                .contains("core/sdk")
+        );
     }
 }

@@ -19,25 +19,59 @@ pub fn bench(path: &Path, calls: usize) -> Result<u8, Box<dyn Error>> {
     let script = script.map_err(|e| format!("{}: {e}", path.display()))?;
     let (_, cached_us) = timed(|| engine.compile(&bytes));
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)])?;
-    let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 };
-    let (policy, start_us) =
-        timed(|| Policy::new(script.clone(), vec![], Budget::default(), Bounds::default(), &facts));
+    let facts = Facts {
+        axes,
+        time_constant_s: 0.05,
+        path_tolerance_mm: 0.01,
+        rough_period_s: 0.008,
+    };
+    let (policy, start_us) = timed(|| {
+        Policy::new(
+            script.clone(),
+            vec![],
+            Budget::default(),
+            Bounds::default(),
+            &facts,
+        )
+    });
     let mut policy = policy.map_err(|e| format!("{}: {e}", path.display()))?;
-    writeln!(out, "compile {compile_us:.0} us, again from the cache {cached_us:.1} us, start {start_us:.0} us")?;
+    writeln!(
+        out,
+        "compile {compile_us:.0} us, again from the cache {cached_us:.1} us, start {start_us:.0} us"
+    )?;
     let window = sample::window();
     if script.tunes_blocks {
         let mut one = histogram(calls, |_| decide(&mut policy, &window[1..2]));
-        print(&mut out, "a window of 1 block", &mut one, policy.counters().most_window_fuel)?;
+        print(
+            &mut out,
+            "a window of 1 block",
+            &mut one,
+            policy.counters().most_window_fuel,
+        )?;
         let mut full = histogram(calls, |_| decide(&mut policy, &window));
-        print(&mut out, "a window of 64 blocks", &mut full, policy.counters().most_window_fuel)?;
+        print(
+            &mut out,
+            "a window of 64 blocks",
+            &mut full,
+            policy.counters().most_window_fuel,
+        )?;
     }
     if script.answers_periods {
         let mut periods = histogram(calls, |index| {
             policy.period(&sample::period(index as u64));
         });
-        print(&mut out, "a rough period", &mut periods, policy.counters().most_period_fuel)?;
+        print(
+            &mut out,
+            "a rough period",
+            &mut periods,
+            policy.counters().most_period_fuel,
+        )?;
     }
-    for note in policy.take_notes().iter().filter(|note| note.contains("strike")) {
+    for note in policy
+        .take_notes()
+        .iter()
+        .filter(|note| note.contains("strike"))
+    {
         writeln!(out, "{note}")?;
     }
     Ok(u8::from(policy.counters().troubles() > 0))
@@ -71,14 +105,22 @@ fn print(out: &mut impl Write, what: &str, times_ns: &mut [u64], fuel: u64) -> s
     times_ns.sort_unstable();
     let at = |share: f64| times_ns[((times_ns.len() - 1) as f64 * share) as usize];
     let (p50, p99, p999) = (at(0.5), at(0.99), at(0.999));
-    writeln!(out, "{what}: p50 {p50} ns, p99 {p99}, p99.9 {p999}, max {}; most fuel {fuel}", at(1.0))?;
+    writeln!(
+        out,
+        "{what}: p50 {p50} ns, p99 {p99}, p99.9 {p999}, max {}; most fuel {fuel}",
+        at(1.0)
+    )?;
     let mut bound_ns = 16;
     let mut rest = &times_ns[..];
     while !rest.is_empty() {
         let below = rest.partition_point(|time| *time < bound_ns);
         if below > 0 {
             let share = below as f64 / times_ns.len() as f64;
-            writeln!(out, "  below {bound_ns:>9} ns {below:>9} {}", "#".repeat((share * 50.0).ceil() as usize))?;
+            writeln!(
+                out,
+                "  below {bound_ns:>9} ns {below:>9} {}",
+                "#".repeat((share * 50.0).ceil() as usize)
+            )?;
         }
         rest = &rest[below..];
         bound_ns *= 2;

@@ -11,7 +11,11 @@ use tandem_policy::{Engine, Instance, Policy};
 use super::sample;
 
 /// Prints what a script is, and what it does to a sample, with the parameters and limits of `machine` where one is given.
-pub fn check(path: &Path, machine: Option<&Path>, overrides: &[(String, String)]) -> Result<u8, Box<dyn Error>> {
+pub fn check(
+    path: &Path,
+    machine: Option<&Path>,
+    overrides: &[(String, String)],
+) -> Result<u8, Box<dyn Error>> {
     let setup = match machine {
         Some(file) => {
             let script = ("policy.script".to_string(), path.display().to_string());
@@ -24,23 +28,53 @@ pub fn check(path: &Path, machine: Option<&Path>, overrides: &[(String, String)]
     let bytes = std::fs::read(path).map_err(|e| named(&e))?;
     let script = Engine::new()?.compile(&bytes).map_err(|e| named(&e))?;
     let instance = Instance::new(&script, &setup.budget, &setup.values).map_err(|e| named(&e))?;
-    let mut policy = Policy::new(script.clone(), setup.values, setup.budget, setup.bounds, &setup.facts)?;
+    let mut policy = Policy::new(
+        script.clone(),
+        setup.values,
+        setup.budget,
+        setup.bounds,
+        &setup.facts,
+    )?;
     for block in &sample::window() {
         policy.offer(block, None);
     }
     policy.decide(None);
-    let ratios: Vec<f64> = (0..125).filter_map(|index| policy.period(&sample::period(index))).collect();
+    let ratios: Vec<f64> = (0..125)
+        .filter_map(|index| policy.period(&sample::period(index)))
+        .collect();
     let mut out = std::io::stdout().lock();
     let has = |there: bool, what: &'static str| there.then_some(what);
-    let calls = [has(script.tunes_blocks, "on_blocks"), has(script.answers_periods, "on_period")];
-    let calls: Vec<_> = calls.into_iter().flatten().chain(has(script.keeps_state, "save and restore")).collect();
-    writeln!(out, "{}: {} bytes, ABI version {}", path.display(), bytes.len(), tandem_policy::abi::VERSION)?;
+    let calls = [
+        has(script.tunes_blocks, "on_blocks"),
+        has(script.answers_periods, "on_period"),
+    ];
+    let calls: Vec<_> = calls
+        .into_iter()
+        .flatten()
+        .chain(has(script.keeps_state, "save and restore"))
+        .collect();
+    writeln!(
+        out,
+        "{}: {} bytes, ABI version {}",
+        path.display(),
+        bytes.len(),
+        tandem_policy::abi::VERSION
+    )?;
     writeln!(out, "calls       {}", calls.join(", "))?;
-    writeln!(out, "memory      {} of {} pages", instance.memory_pages(), setup.budget.memory_pages)?;
+    writeln!(
+        out,
+        "memory      {} of {} pages",
+        instance.memory_pages(),
+        setup.budget.memory_pages
+    )?;
     parameters(&mut out, &instance)?;
     dry_run(&mut out, &policy, &ratios)?;
     let failed = policy.counters().troubles() > 0;
-    for note in policy.take_notes().iter().filter(|note| note.contains("strike")) {
+    for note in policy
+        .take_notes()
+        .iter()
+        .filter(|note| note.contains("strike"))
+    {
         writeln!(out, "{note}")?;
     }
     Ok(u8::from(failed))
@@ -52,23 +86,36 @@ fn parameters(out: &mut impl Write, instance: &Instance) -> std::io::Result<()> 
     }
     writeln!(out, "parameters")?;
     for parameter in instance.parameters() {
-        let tandem_policy::Parameter { name, description, lowest, highest, default } = parameter;
-        writeln!(out, "  {name} = {default}, from {lowest} to {highest}: {description}")?;
+        let tandem_policy::Parameter {
+            name,
+            description,
+            lowest,
+            highest,
+            default,
+        } = parameter;
+        writeln!(
+            out,
+            "  {name} = {default}, from {lowest} to {highest}: {description}"
+        )?;
     }
     Ok(())
 }
 
 fn dry_run(out: &mut impl Write, policy: &Policy, ratios: &[f64]) -> std::io::Result<()> {
     let counters = policy.counters();
-    let (tuned, limited) = (counters.time_constants + counters.tolerances + counters.feed_caps, counters.limited);
+    let (tuned, limited) = (
+        counters.time_constants + counters.tolerances + counters.feed_caps,
+        counters.limited,
+    );
     writeln!(
         out,
         "dry run     64 blocks: {} time constants, {} tolerances, {} feeds; {limited} requests limited; {} fuel",
         counters.time_constants, counters.tolerances, counters.feed_caps, counters.most_window_fuel
     )?;
-    if let (Some(least), Some(most)) =
-        (ratios.iter().copied().reduce(f64::min), ratios.iter().copied().reduce(f64::max))
-    {
+    if let (Some(least), Some(most)) = (
+        ratios.iter().copied().reduce(f64::min),
+        ratios.iter().copied().reduce(f64::max),
+    ) {
         writeln!(
             out,
             "            125 rough periods: feed ratio {least:.3} to {most:.3}; {} fuel",

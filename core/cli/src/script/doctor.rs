@@ -9,9 +9,21 @@ pub fn doctor() -> u8 {
     let here = Path::new(".");
     let both = toolchain::clang().zip(toolchain::wasm_ld());
     let rows = [
-        ("AssemblyScript", toolchain::asc(here).map(|asc| shown(&asc)), INSTALL_AS),
-        ("C", both.map(|(clang, ld)| format!("{}, {}", shown(&clang), shown(&ld))), INSTALL_C),
-        ("Rust", toolchain::cargo().map(|cargo| format!("{}, wasm32-unknown-unknown", shown(&cargo))), INSTALL_RUST),
+        (
+            "AssemblyScript",
+            toolchain::asc(here).map(|asc| shown(&asc)),
+            INSTALL_AS,
+        ),
+        (
+            "C",
+            both.map(|(clang, ld)| format!("{}, {}", shown(&clang), shown(&ld))),
+            INSTALL_C,
+        ),
+        (
+            "Rust",
+            toolchain::cargo().map(|cargo| format!("{}, wasm32-unknown-unknown", shown(&cargo))),
+            INSTALL_RUST,
+        ),
     ];
     let mut found = 0;
     for (language, tools, install) in rows {

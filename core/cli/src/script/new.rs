@@ -17,9 +17,19 @@ const MANIFEST: &str = include_str!("../../../../scripts/sdk/templates/Cargo.tom
 
 /// Makes the folder `name` with a first script and the SDK of its language.
 pub fn new(name: &Path, language: Language) -> Result<u8, String> {
-    let stem = name.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    if stem.is_empty() || !stem.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
-        return Err(format!("{}: the name of a script has letters, digits, - and _ only", name.display()));
+    let stem = name
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    if stem.is_empty()
+        || !stem
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+    {
+        return Err(format!(
+            "{}: the name of a script has letters, digits, - and _ only",
+            name.display()
+        ));
     }
     if name.exists() {
         return Err(format!("{}: is there already", name.display()));
@@ -31,7 +41,10 @@ pub fn new(name: &Path, language: Language) -> Result<u8, String> {
             ("tandem-policy.ts".to_string(), SDK_AS),
             ("tsconfig.json".to_string(), EDITOR_AS),
         ],
-        Language::C => vec![(format!("{stem}.c"), SCRIPT_C), ("tandem_policy.h".to_string(), SDK_C)],
+        Language::C => vec![
+            (format!("{stem}.c"), SCRIPT_C),
+            ("tandem_policy.h".to_string(), SDK_C),
+        ],
         Language::Rust => vec![
             ("Cargo.toml".to_string(), manifest.as_str()),
             ("src/lib.rs".to_string(), SCRIPT_RUST),
@@ -47,6 +60,10 @@ pub fn new(name: &Path, language: Language) -> Result<u8, String> {
     let rust = language == Language::Rust;
     let first = name.join(if rust { "src/lib.rs" } else { &files[0].0 });
     let source = if rust { name } else { &first };
-    say!("{} is the script; tandem script build {} makes the module", first.display(), source.display());
+    say!(
+        "{} is the script; tandem script build {} makes the module",
+        first.display(),
+        source.display()
+    );
     Ok(0)
 }

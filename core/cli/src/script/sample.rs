@@ -19,7 +19,11 @@ fn block(index: u64, start: AxisVector) -> Block {
     let length_mm = 0.5 + (index % 9) as f64;
     let end = start + AxisVector::from_slice(&[length_mm * angle.cos(), length_mm * angle.sin()]);
     let line = Block {
-        kind: if index == 0 { BlockKind::Rapid } else { BlockKind::Line },
+        kind: if index == 0 {
+            BlockKind::Rapid
+        } else {
+            BlockKind::Line
+        },
         index,
         line: index as u32 + 1,
         end,
@@ -29,7 +33,11 @@ fn block(index: u64, start: AxisVector) -> Block {
         spindle_rad_per_s: 500.0,
         ..Block::at(start)
     };
-    if index % 8 == 7 { half_turn(&line) } else { line }
+    if index % 8 == 7 {
+        half_turn(&line)
+    } else {
+        line
+    }
 }
 
 /// The half circle over the chord of `line`.
@@ -42,7 +50,12 @@ fn half_turn(line: &Block) -> Block {
         start_angle_rad: ray[1].atan2(ray[0]),
         sweep_rad: std::f64::consts::PI,
     };
-    Block { kind: BlockKind::Arc, arc, length_mm: std::f64::consts::PI * arc.radius_mm, ..*line }
+    Block {
+        kind: BlockKind::Arc,
+        arc,
+        length_mm: std::f64::consts::PI * arc.radius_mm,
+        ..*line
+    }
 }
 
 /// A rough period under a load that rises and falls with `index`.

@@ -23,7 +23,10 @@ pub fn state(command: &State) -> Result<u8, Box<dyn Error>> {
 /// The machine, and where its state lies.
 fn file(of: &Of) -> Result<(Machine, PathBuf), Box<dyn Error>> {
     let machine = Machine::read(&of.machine.path, &of.machine.overrides)?;
-    let path = of.state.clone().map_or_else(|| default_path(&machine.name), Ok)?;
+    let path = of
+        .state
+        .clone()
+        .map_or_else(|| default_path(&machine.name), Ok)?;
     Ok((machine, path))
 }
 
@@ -31,14 +34,24 @@ fn export(of: &Of, files: &Files) -> Result<u8, Box<dyn Error>> {
     let (machine, path) = file(of)?;
     let reader = Reader::open(&path)?;
     let state = reader.state()?;
-    let format = LinuxCnc { axes: reader.axes(), unit: files.unit.into() };
+    let format = LinuxCnc {
+        axes: reader.axes(),
+        unit: files.unit.into(),
+    };
     if let Some(variables) = &files.variables {
         write(variables, &format.variables(&state, &machine.home))?;
     }
     if let Some(tools) = &files.tools {
         write(tools, &format.tools(&state))?;
-        if state.tools.values().any(|tool| tool.to_program().offset != tool.offset || tool.wear_diameter_mm != 0.0) {
-            say!("{}: LinuxCNC has no place for wear: it is added to offsets and diameters", tools.display());
+        if state
+            .tools
+            .values()
+            .any(|tool| tool.to_program().offset != tool.offset || tool.wear_diameter_mm != 0.0)
+        {
+            say!(
+                "{}: LinuxCNC has no place for wear: it is added to offsets and diameters",
+                tools.display()
+            );
         }
     }
     Ok(0)
@@ -51,13 +64,21 @@ fn write(path: &Path, text: &str) -> Result<(), String> {
 fn import(of: &Of, files: &Files) -> Result<u8, Box<dyn Error>> {
     let (machine, path) = file(of)?;
     let store = Store::open(&path, Owner::of(&machine))?;
-    let mut state = if store.is_new() { LastingState::initial(&machine) } else { store.load().clone() };
-    let format = LinuxCnc { axes: &machine.axes, unit: files.unit.into() };
+    let mut state = if store.is_new() {
+        LastingState::initial(&machine)
+    } else {
+        store.load().clone()
+    };
+    let format = LinuxCnc {
+        axes: &machine.axes,
+        unit: files.unit.into(),
+    };
     let mut left = 0;
     let mut take = |path: &Path, read: &mut dyn FnMut(&str) -> Result<Vec<AtLine>, AtLine>| {
         let shown = path.display();
         let text = fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
-        let not_taken = read(&text).map_err(|at| format!("{shown}:{}: error: {}", at.line, at.why))?;
+        let not_taken =
+            read(&text).map_err(|at| format!("{shown}:{}: error: {}", at.line, at.why))?;
         for at in &not_taken {
             say!("{shown}:{}: warning: {}", at.line, at.why);
         }
@@ -65,7 +86,9 @@ fn import(of: &Of, files: &Files) -> Result<u8, Box<dyn Error>> {
         Ok::<_, String>(())
     };
     if let Some(variables) = &files.variables {
-        take(variables, &mut |text| format.read_variables(text, &mut state))?;
+        take(variables, &mut |text| {
+            format.read_variables(text, &mut state)
+        })?;
     }
     if let Some(tools) = &files.tools {
         take(tools, &mut |text| format.read_tools(text, &mut state))?;
@@ -73,6 +96,9 @@ fn import(of: &Of, files: &Files) -> Result<u8, Box<dyn Error>> {
     let (tools, parameters) = (state.tools.len(), state.parameters.len());
     store.commit(vec![Change::Whole(Box::new(state))])?;
     store.close()?;
-    say!("{}: {tools} tools, {parameters} parameters, {left} values not taken over", path.display());
+    say!(
+        "{}: {tools} tools, {parameters} parameters, {left} values not taken over",
+        path.display()
+    );
     Ok(0)
 }

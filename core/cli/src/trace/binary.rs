@@ -28,7 +28,13 @@ impl Binary {
     pub fn open(path: &Path) -> Result<Self, String> {
         let file = File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let reader = Reader::new(file).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { path: path.to_owned(), reader, places: 0, lost_records: 0, commands: vec![] })
+        Ok(Self {
+            path: path.to_owned(),
+            reader,
+            places: 0,
+            lost_records: 0,
+            commands: vec![],
+        })
     }
 
     /// What the trace is of.
@@ -47,7 +53,12 @@ impl Binary {
     /// The path with the byte and the system's words.
     pub fn next(&mut self) -> Result<Option<Record>, String> {
         loop {
-            match self.reader.next().transpose().map_err(|e| format!("{}: {e}", self.path.display()))? {
+            match self
+                .reader
+                .next()
+                .transpose()
+                .map_err(|e| format!("{}: {e}", self.path.display()))?
+            {
                 Some(Item::Damage(damage)) => self.tell(&damage),
                 Some(Item::Command(line)) => self.commands.push(line),
                 Some(Item::Record(record)) => return Ok(Some(record)),
@@ -65,7 +76,10 @@ impl Binary {
     pub fn verdict(&self) -> String {
         let damage = match self.places {
             0 => String::new(),
-            places => format!(", damaged in {places} places, at least {} records lost", self.lost_records),
+            places => format!(
+                ", damaged in {places} places, at least {} records lost",
+                self.lost_records
+            ),
         };
         match self.reader.ending() {
             Some(Ending::Truncated { byte }) => {
@@ -85,12 +99,21 @@ impl Binary {
     }
 
     fn tell(&mut self, damage: &Damage) {
-        let Damage { from, to, lost_records, cause } = damage;
+        let Damage {
+            from,
+            to,
+            lost_records,
+            cause,
+        } = damage;
         self.places += 1;
         self.lost_records += lost_records.unwrap_or(0);
         if self.places <= TOLD {
-            let lost = lost_records.map_or("the rest".to_string(), |count| format!("{count} records"));
-            say!("{}: bytes {from} to {to}: {cause}; {lost} lost", self.path.display());
+            let lost =
+                lost_records.map_or("the rest".to_string(), |count| format!("{count} records"));
+            say!(
+                "{}: bytes {from} to {to}: {cause}; {lost} lost",
+                self.path.display()
+            );
         }
     }
 }

@@ -67,19 +67,27 @@ impl Found {
     fn of(names: [Vec<String>; 2], commands_only: bool) -> Self {
         let names = names.map(|names| {
             let all = names.into_iter().enumerate();
-            all.filter(|(_, name)| !commands_only || name.contains("_cmd_")).collect::<Vec<_>>()
+            all.filter(|(_, name)| !commands_only || name.contains("_cmd_"))
+                .collect::<Vec<_>>()
         });
         let mut found = Self::default();
         for (place, name) in &names[0] {
             match names[1].iter().find(|(_, other)| other == name) {
                 Some((other, _)) => {
                     let (name, places) = (name.clone(), [*place, *other]);
-                    found.columns.push(Column { name, places, differing: 0, most: None });
+                    found.columns.push(Column {
+                        name,
+                        places,
+                        differing: 0,
+                        most: None,
+                    });
                 }
                 None => found.lone[0].push(name.clone()),
             }
         }
-        let lone = names[1].iter().filter(|(_, name)| !names[0].iter().any(|(_, other)| other == name));
+        let lone = names[1]
+            .iter()
+            .filter(|(_, name)| !names[0].iter().any(|(_, other)| other == name));
         found.lone[1].extend(lone.map(|(_, name)| name.clone()));
         found
     }
@@ -103,11 +111,14 @@ impl Found {
         }
         self.count += 1;
         for column in &mut self.columns {
-            let [left, right] = [(a, 0), (b, 1)].map(|(row, trace)| &row.cells[column.places[trace]]);
+            let [left, right] =
+                [(a, 0), (b, 1)].map(|(row, trace)| &row.cells[column.places[trace]]);
             let (by, words) = match (left, right) {
                 (Cell::Number(a), Cell::Number(b)) if same(*a, *b, bits) => continue,
                 (Cell::Word(a), Cell::Word(b)) if a == b => continue,
-                (Cell::Number(a), Cell::Number(b)) => (Some((a - b).abs()), [a, b].map(|v| format!("{v:.16e}"))),
+                (Cell::Number(a), Cell::Number(b)) => {
+                    (Some((a - b).abs()), [a, b].map(|v| format!("{v:.16e}")))
+                }
                 _ => (None, [left, right].map(Cell::shown)),
             };
             column.differing += 1;
@@ -120,7 +131,9 @@ impl Found {
             }
             let [a_value, b_value] = words;
             let name = &column.name;
-            self.first.get_or_insert_with(|| format!("{}: {name}: {a_value} in A, {b_value} in B", at(a)));
+            self.first.get_or_insert_with(|| {
+                format!("{}: {name}: {a_value} in A, {b_value} in B", at(a))
+            });
         }
         true
     }
@@ -137,9 +150,17 @@ impl Found {
                 None => String::new(),
             };
             // A string takes all.
-            let _ = writeln!(text, "{}: {} of {count} samples differ{by}", column.name, column.differing);
+            let _ = writeln!(
+                text,
+                "{}: {} of {count} samples differ{by}",
+                column.name, column.differing
+            );
         }
-        for (trace, lone) in ["A", "B"].iter().zip(&self.lone).filter(|(_, lone)| !lone.is_empty()) {
+        for (trace, lone) in ["A", "B"]
+            .iter()
+            .zip(&self.lone)
+            .filter(|(_, lone)| !lone.is_empty())
+        {
             let _ = writeln!(text, "only in {trace}: {}", lone.join(", "));
         }
         text
@@ -156,11 +177,18 @@ impl Cell {
 }
 
 fn same(a: f64, b: f64, bits: bool) -> bool {
-    if bits { a.to_bits() == b.to_bits() } else { a == b || a.is_nan() && b.is_nan() }
+    if bits {
+        a.to_bits() == b.to_bits()
+    } else {
+        a == b || a.is_nan() && b.is_nan()
+    }
 }
 
 fn at(row: &Row) -> String {
-    row.tick.map_or_else(|| format!("t_s {}", row.t_s), |tick| format!("tick {tick} (t_s {})", row.t_s))
+    row.tick.map_or_else(
+        || format!("t_s {}", row.t_s),
+        |tick| format!("tick {tick} (t_s {})", row.t_s),
+    )
 }
 
 #[cfg(test)]
@@ -169,7 +197,11 @@ mod tests {
 
     fn row(x: f64, state: &'static str) -> Row {
         let cells = vec![Cell::Number(1.0), Cell::Number(x), Cell::Word(state.into())];
-        Row { tick: Some(7), t_s: 0.007, cells }
+        Row {
+            tick: Some(7),
+            t_s: 0.007,
+            cells,
+        }
     }
 
     fn compared(a: &Row, b: &Row, bits: bool) -> Found {
@@ -181,7 +213,9 @@ mod tests {
 
     #[test]
     fn one_bit_is_a_difference_and_the_sign_of_zero_only_where_bits_are_known() {
-        let differ = |a: f64, b: f64, bits| !compared(&row(a, "running"), &row(b, "running"), bits).is_same();
+        let differ = |a: f64, b: f64, bits| {
+            !compared(&row(a, "running"), &row(b, "running"), bits).is_same()
+        };
         assert!(!differ(2.0, 2.0, true) && !differ(f64::NAN, f64::NAN, true));
         assert!(!differ(0.0, -0.0, false) && differ(0.0, -0.0, true));
         let next = f64::from_bits(2.0_f64.to_bits() ^ 1);
@@ -195,12 +229,22 @@ mod tests {
     #[test]
     fn columns_are_compared_by_name_and_lone_ones_are_named() {
         let names = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
-        let (a, b) = (names(&["line", "x_cmd_mm", "sig_load"]), names(&["x_cmd_mm", "line", "ratio"]));
+        let (a, b) = (
+            names(&["line", "x_cmd_mm", "sig_load"]),
+            names(&["x_cmd_mm", "line", "ratio"]),
+        );
         let mut found = Found::of([a.clone(), b.clone()], false);
-        let cells = |values: [f64; 3]| Row { tick: Some(0), t_s: 0.0, cells: values.map(Cell::Number).to_vec() };
+        let cells = |values: [f64; 3]| Row {
+            tick: Some(0),
+            t_s: 0.0,
+            cells: values.map(Cell::Number).to_vec(),
+        };
         assert!(found.rows(&cells([3.0, 5.0, 1.0]), &cells([5.0, 3.0, 2.0]), true));
         assert!(!found.is_same());
-        assert_eq!(found.text(), "the same 1 samples in 2 columns\nonly in A: sig_load\nonly in B: ratio\n");
+        assert_eq!(
+            found.text(),
+            "the same 1 samples in 2 columns\nonly in A: sig_load\nonly in B: ratio\n"
+        );
         assert!(Found::of([a, b], true).is_same(), "command samples alone");
     }
 }

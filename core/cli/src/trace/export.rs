@@ -21,7 +21,13 @@ pub fn export(trace: &Path, csv: &Path, commands: Option<&Path>) -> Result<u8, B
     let mut trace = Binary::open(trace)?;
     let header = trace.header();
     let signals: Vec<&str> = header.signals.iter().map(String::as_str).collect();
-    let mut csv = TraceCsv::of_axes(csv, header.axes, header.fine_period_s, &signals, has_switched(trace.format()))?;
+    let mut csv = TraceCsv::of_axes(
+        csv,
+        header.axes,
+        header.fine_period_s,
+        &signals,
+        has_switched(trace.format()),
+    )?;
     let count = signals.len();
     while let Some(record) = trace.next()? {
         csv.sample(&record.sample, &record.signals[..count])?;

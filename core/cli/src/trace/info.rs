@@ -18,7 +18,9 @@ pub fn info(path: &Path) -> Result<u8, Box<dyn Error>> {
     while let Some(record) = trace.next()? {
         totals.sample(&record.sample);
     }
-    let bytes = std::fs::metadata(path).map_err(|e| format!("{}: {e}", path.display()))?.len();
+    let bytes = std::fs::metadata(path)
+        .map_err(|e| format!("{}: {e}", path.display()))?
+        .len();
     let mut out = io::stdout().lock();
     // A reader that has gone away (a closed pipe) is no reason to fail.
     let _ = print_header(&mut out, path, &trace)
@@ -30,18 +32,48 @@ pub fn info(path: &Path) -> Result<u8, Box<dyn Error>> {
 
 fn print_commands(out: &mut impl Write, commands: &[String]) -> io::Result<()> {
     writeln!(out, "commands     {}", commands.len())?;
-    commands.iter().try_for_each(|line| writeln!(out, "  {line}"))
+    commands
+        .iter()
+        .try_for_each(|line| writeln!(out, "  {line}"))
 }
 
 fn print_header(out: &mut impl Write, path: &Path, trace: &Binary) -> io::Result<()> {
-    let Header { fine_period_s, axes, machine, program, planner, dry_run, signals } = trace.header();
-    let kind = |axis| if axes.is_rotary(axis) { "rotary" } else { "linear" };
-    let axes: Vec<_> = (0..axes.count()).map(|axis| format!("{} {}", axes.letter(axis), kind(axis))).collect();
-    let signals = if signals.is_empty() { "none".to_string() } else { signals.join(", ") };
+    let Header {
+        fine_period_s,
+        axes,
+        machine,
+        program,
+        planner,
+        dry_run,
+        signals,
+    } = trace.header();
+    let kind = |axis| {
+        if axes.is_rotary(axis) {
+            "rotary"
+        } else {
+            "linear"
+        }
+    };
+    let axes: Vec<_> = (0..axes.count())
+        .map(|axis| format!("{} {}", axes.letter(axis), kind(axis)))
+        .collect();
+    let signals = if signals.is_empty() {
+        "none".to_string()
+    } else {
+        signals.join(", ")
+    };
     writeln!(out, "{}: trace, format {}", path.display(), trace.format())?;
     let dry = if *dry_run { " (dry run)" } else { "" };
-    writeln!(out, "program      {program}{dry}\nmachine      {machine}\nplanner      {planner}")?;
-    writeln!(out, "axes         {}\nfine period  {} ms\nsignals      {signals}", axes.join(", "), fine_period_s * 1e3)
+    writeln!(
+        out,
+        "program      {program}{dry}\nmachine      {machine}\nplanner      {planner}"
+    )?;
+    writeln!(
+        out,
+        "axes         {}\nfine period  {} ms\nsignals      {signals}",
+        axes.join(", "),
+        fine_period_s * 1e3
+    )
 }
 
 /// What the samples amount to.
@@ -60,16 +92,30 @@ struct Totals {
 impl Totals {
     fn new(fine_period_s: f64) -> Self {
         let (last, peaks) = (Sample::default(), [AxisVector::ZERO; 3]);
-        Self { fine_period_s, records: 0, first_tick: 0, last, velocity: None, peaks, peak_feed_mm_per_s: 0.0 }
+        Self {
+            fine_period_s,
+            records: 0,
+            first_tick: 0,
+            last,
+            velocity: None,
+            peaks,
+            peak_feed_mm_per_s: 0.0,
+        }
     }
 
     fn sample(&mut self, sample: &Sample) {
         let per_s = 1.0 / self.fine_period_s;
         let follows = self.records > 0 && self.last.tick.checked_add(1) == Some(sample.tick);
         let velocity = follows.then(|| (sample.command - self.last.command) * per_s);
-        let acceleration = velocity.zip(self.velocity).map(|(now, before)| (now - before) * per_s);
+        let acceleration = velocity
+            .zip(self.velocity)
+            .map(|(now, before)| (now - before) * per_s);
         let distance = Some(sample.command - sample.feedback);
-        for (peak, value) in self.peaks.iter_mut().zip([velocity, acceleration, distance]) {
+        for (peak, value) in self
+            .peaks
+            .iter_mut()
+            .zip([velocity, acceleration, distance])
+        {
             for axis in 0..MAX_AXES {
                 peak[axis] = value.map_or(0.0, |value| value[axis].abs()).max(peak[axis]);
             }
@@ -86,17 +132,36 @@ impl Totals {
         if self.records == 0 {
             return writeln!(out, "records      0 in {bytes} bytes");
         }
-        let Sample { tick, line, state, .. } = self.last;
+        let Sample {
+            tick, line, state, ..
+        } = self.last;
         let each = bytes as f64 / self.records as f64;
         let duration_s = TraceCsv::t_s(tick.saturating_sub(self.first_tick), self.fine_period_s);
-        writeln!(out, "records      {} in {bytes} bytes ({each:.1} each)", self.records)?;
-        writeln!(out, "duration     {duration_s} s, ticks {} to {tick}", self.first_tick)?;
+        writeln!(
+            out,
+            "records      {} in {bytes} bytes ({each:.1} each)",
+            self.records
+        )?;
+        writeln!(
+            out,
+            "duration     {duration_s} s, ticks {} to {tick}",
+            self.first_tick
+        )?;
         writeln!(out, "last         {}, line {line}", state.name())?;
         for axis in 0..header.axes.count() {
             let is_rotary = header.axes.is_rotary(axis);
-            let shown = self.peaks.map(|peak| if is_rotary { peak[axis].to_degrees() } else { peak[axis] });
+            let shown = self.peaks.map(|peak| {
+                if is_rotary {
+                    peak[axis].to_degrees()
+                } else {
+                    peak[axis]
+                }
+            });
             let [velocity, acceleration, distance] = shown;
-            let (letter, unit) = (header.axes.letter(axis), if is_rotary { "deg" } else { "mm" });
+            let (letter, unit) = (
+                header.axes.letter(axis),
+                if is_rotary { "deg" } else { "mm" },
+            );
             writeln!(
                 out,
                 "peak {letter}       {velocity:.3} {unit}/s, {acceleration:.1} {unit}/s², feedback off by {distance:.6} {unit}"

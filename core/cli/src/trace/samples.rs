@@ -50,7 +50,9 @@ impl Samples {
     pub fn open(path: &Path) -> Result<Self, String> {
         let file = File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let mut start = vec![];
-        file.take(MAGIC.len() as u64).read_to_end(&mut start).map_err(|e| format!("{}: {e}", path.display()))?;
+        file.take(MAGIC.len() as u64)
+            .read_to_end(&mut start)
+            .map_err(|e| format!("{}: {e}", path.display()))?;
         if is_binary_name(path) || start == MAGIC {
             return Ok(Self::Binary(Box::new(Binary::open(path)?)));
         }
@@ -75,10 +77,18 @@ impl Samples {
                     (true, true) => "deg",
                     (true, false) => "rad",
                 };
-                let mut names: Vec<String> =
-                    ["block", "line"][usize::from(shown)..].iter().map(|n| (*n).into()).collect();
+                let mut names: Vec<String> = ["block", "line"][usize::from(shown)..]
+                    .iter()
+                    .map(|n| (*n).into())
+                    .collect();
                 for kind in ["cmd", "fb"] {
-                    let name = |axis| format!("{}_{kind}_{}", axes.letter(axis).to_ascii_lowercase(), unit(axis));
+                    let name = |axis| {
+                        format!(
+                            "{}_{kind}_{}",
+                            axes.letter(axis).to_ascii_lowercase(),
+                            unit(axis)
+                        )
+                    };
                     names.extend((0..axes.count()).map(name));
                 }
                 names.extend(["feed_mm_s", "sigma", "state", "ratio"].map(String::from));
@@ -115,10 +125,20 @@ impl Samples {
 fn row(binary: &Binary, record: &Record, shown: bool) -> Row {
     let header = binary.header();
     let (axes, sample) = (header.axes, &record.sample);
-    let mut numbers = if shown { vec![] } else { vec![sample.block as f64] };
+    let mut numbers = if shown {
+        vec![]
+    } else {
+        vec![sample.block as f64]
+    };
     numbers.push(f64::from(sample.line));
     for position in [&sample.command, &sample.feedback] {
-        let value = |axis| if axes.is_rotary(axis) && shown { position[axis].to_degrees() } else { position[axis] };
+        let value = |axis| {
+            if axes.is_rotary(axis) && shown {
+                position[axis].to_degrees()
+            } else {
+                position[axis]
+            }
+        };
         numbers.extend((0..axes.count()).map(value));
     }
     numbers.extend([sample.feed_mm_per_s, sample.sigma]);
@@ -128,11 +148,25 @@ fn row(binary: &Binary, record: &Record, shown: bool) -> Row {
     if has_switched(binary.format()) {
         let switched = &sample.switched;
         cells.push(Cell::Number(rpm(switched.spindle_rad_per_s)));
-        cells.extend([Cell::Word(switched.coolant().into()), Cell::Word(outputs_word(switched).into())]);
-        cells.push(Cell::Number(sample.phase_ns.map_or(f64::NAN, |ns| ns as f64)));
+        cells.extend([
+            Cell::Word(switched.coolant().into()),
+            Cell::Word(outputs_word(switched).into()),
+        ]);
+        cells.push(Cell::Number(
+            sample.phase_ns.map_or(f64::NAN, |ns| ns as f64),
+        ));
     }
-    cells.extend(record.signals[..header.signals.len()].iter().copied().map(Cell::Number));
-    Row { tick: Some(sample.tick), t_s: TraceCsv::t_s(sample.tick, header.fine_period_s), cells }
+    cells.extend(
+        record.signals[..header.signals.len()]
+            .iter()
+            .copied()
+            .map(Cell::Number),
+    );
+    Row {
+        tick: Some(sample.tick),
+        t_s: TraceCsv::t_s(sample.tick, header.fine_period_s),
+        cells,
+    }
 }
 
 /// A trace CSV.
@@ -154,20 +188,33 @@ impl Csv {
         let mut reader = csv::Reader::from_path(path).map_err(say)?;
         let head = reader.headers().map_err(say)?;
         let time = head.iter().position(|name| name == "t_s");
-        let time = time.ok_or_else(|| format!("{}: no trace: it has no column t_s", path.display()))?;
+        let time =
+            time.ok_or_else(|| format!("{}: no trace: it has no column t_s", path.display()))?;
         let others = head.iter().enumerate().filter(|(index, _)| *index != time);
-        let columns = others.map(|(index, name)| (name.to_string(), index)).collect();
+        let columns = others
+            .map(|(index, name)| (name.to_string(), index))
+            .collect();
         let rows = reader.into_records();
-        Ok(Self { path: path.to_owned(), rows, time, columns, last_t_s: None, period_s: None })
+        Ok(Self {
+            path: path.to_owned(),
+            rows,
+            time,
+            columns,
+            last_t_s: None,
+            period_s: None,
+        })
     }
 
     fn next(&mut self) -> Result<Option<Row>, String> {
-        let Some(row) = self.rows.next() else { return Ok(None) };
+        let Some(row) = self.rows.next() else {
+            return Ok(None);
+        };
         let row = row.map_err(|e| format!("{}: {e}", self.path.display()))?;
         let number = |index: usize| {
             let text = &row[index];
             let line = row.position().map_or(0, csv::Position::line);
-            text.parse::<f64>().map_err(|_| format!("{}:{line}: {text:?} is no number", self.path.display()))
+            text.parse::<f64>()
+                .map_err(|_| format!("{}:{line}: {text:?} is no number", self.path.display()))
         };
         let cell = |(name, index): &(String, usize)| {
             if WORDS.contains(&name.as_str()) {
@@ -178,9 +225,16 @@ impl Csv {
         };
         let t_s = number(self.time)?;
         let cells = self.columns.iter().map(cell).collect::<Result<_, _>>()?;
-        self.period_s = self.period_s.or_else(|| self.last_t_s.map(|last_t_s| t_s - last_t_s));
+        self.period_s = self
+            .period_s
+            .or_else(|| self.last_t_s.map(|last_t_s| t_s - last_t_s));
         self.last_t_s = Some(t_s);
-        let tick = if t_s == 0.0 { Some(0) } else { self.period_s.map(|period_s| (t_s / period_s).round() as u64) };
+        let tick = if t_s == 0.0 {
+            Some(0)
+        } else {
+            self.period_s
+                .map(|period_s| (t_s / period_s).round() as u64)
+        };
         Ok(Some(Row { tick, t_s, cells }))
     }
 }

@@ -26,7 +26,13 @@ impl TraceSink {
     ///
     /// # Errors
     /// The path with the system's words.
-    pub fn create(path: &Path, machine: &Machine, program: &str, run: &Run, dry_run: bool) -> Result<Self, String> {
+    pub fn create(
+        path: &Path,
+        machine: &Machine,
+        program: &str,
+        run: &Run,
+        dry_run: bool,
+    ) -> Result<Self, String> {
         let signals = run.signals();
         let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
         if !is_binary_name(path) {
@@ -41,8 +47,12 @@ impl TraceSink {
             dry_run,
             signals: signals.iter().map(ToString::to_string).collect(),
         };
-        let writer = Writer::new(Output::create(path)?, &header).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self::Binary { writer: Box::new(writer), failed: false })
+        let writer = Writer::new(Output::create(path)?, &header)
+            .map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Self::Binary {
+            writer: Box::new(writer),
+            failed: false,
+        })
     }
 
     /// Adds a sample. After an error all further ones are left out.
@@ -67,10 +77,15 @@ impl TraceSink {
     pub fn command(&mut self, command: &Timed) -> Result<(), RecordError> {
         match self {
             Self::Csv(_) | Self::Binary { failed: true, .. } => Ok(()),
-            Self::Binary { writer, failed } => writer.command(&command.to_string()).map_err(|error| {
-                *failed = true;
-                RecordError { tick: Some(command.tick), ..RecordError::of("trace", writer.out(), error) }
-            }),
+            Self::Binary { writer, failed } => {
+                writer.command(&command.to_string()).map_err(|error| {
+                    *failed = true;
+                    RecordError {
+                        tick: Some(command.tick),
+                        ..RecordError::of("trace", writer.out(), error)
+                    }
+                })
+            }
         }
     }
 
@@ -92,5 +107,6 @@ impl TraceSink {
 
 /// Whether a file's name is that of a binary trace.
 pub fn is_binary_name(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ttr"))
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("ttr"))
 }

@@ -56,7 +56,9 @@ impl Cursor {
         let skip = number.saturating_sub(self.taken) as usize;
         let wanted = self.entries.slots().min(skip + most);
         let mut at = self.taken + skip.min(wanted) as u64;
-        let Ok(chunk) = self.entries.read_chunk(wanted) else { return at };
+        let Ok(chunk) = self.entries.read_chunk(wanted) else {
+            return at;
+        };
         let (first, second) = chunk.as_slices();
         let behind = skip.saturating_sub(first.len());
         for part in [first.get(skip..), second.get(behind..)] {
@@ -84,7 +86,11 @@ impl Cursor {
 
     /// First to third derivative of the path coordinate here by program time, mm/s and so on.
     pub fn path_derivatives(&self) -> [f64; 3] {
-        if self.resting { [0.0; 3] } else { derivatives(&self.segment.path, self.local_s) }
+        if self.resting {
+            [0.0; 3]
+        } else {
+            derivatives(&self.segment.path, self.local_s)
+        }
     }
 
     /// Collects the points of the coming period, and a grid beyond it.
@@ -107,12 +113,19 @@ impl Cursor {
         }
         let next = self.taken;
         self.walk(next, Points::SEGMENTS, |queued| {
-            let Queued::Segment { segment, .. } = queued else { return true };
+            let Queued::Segment { segment, .. } = queued else {
+                return true;
+            };
             if start_s < period_s {
                 if outlook.is_full() {
                     return false;
                 }
-                outlook.stretch(segment, 0.0, segment.duration_s.min(period_s - start_s), start_s);
+                outlook.stretch(
+                    segment,
+                    0.0,
+                    segment.duration_s.min(period_s - start_s),
+                    start_s,
+                );
             }
             while grid_s <= start_s + segment.duration_s && grid_s <= outlook.horizon_s {
                 outlook.point(segment, grid_s - start_s, grid_s);
@@ -126,7 +139,11 @@ impl Cursor {
     /// Shows the plan from here on to `look`, as far as it is queued.
     pub fn on_course<T>(&mut self, axes: (usize, u32), look: impl FnOnce(Place<'_>) -> T) -> T {
         let wanted = self.entries.slots().min(ON_COURSE);
-        let local_s = if self.resting { self.segment.duration_s } else { self.local_s };
+        let local_s = if self.resting {
+            self.segment.duration_s
+        } else {
+            self.local_s
+        };
         match self.entries.read_chunk(wanted) {
             Ok(chunk) => {
                 let (first, second) = chunk.as_slices();
@@ -139,6 +156,8 @@ impl Cursor {
 
 /// Whether the tool may cut in it: a motion at a feed that waits for no input.
 pub fn is_cut(segment: &Segment) -> bool {
-    let moves = segment.path[1..].iter().any(|coefficient| *coefficient != 0.0);
+    let moves = segment.path[1..]
+        .iter()
+        .any(|coefficient| *coefficient != 0.0);
     moves && !segment.flags.contains(SegmentFlags::RAPID) && segment.stop_on.edge == Edge::None
 }

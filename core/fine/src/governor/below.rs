@@ -90,7 +90,8 @@ impl AheadOf<'_> {
         {
             self.place.go(self.step_s);
             let speed = self.place.look_at_motion(&mut next.motion)?;
-            (next.step_s, next.most) = (self.step_s, self.ratio * self.place.feed_mm_per_s() / speed);
+            (next.step_s, next.most) =
+                (self.step_s, self.ratio * self.place.feed_mm_per_s() / speed);
             self.step_s *= FARTHER;
             self.count += 1;
         }
@@ -123,8 +124,12 @@ impl Curve {
     /// The rise `below_mm_per_s` below the limit, mm/s², and how fast it changes with that, 1/s. Above it is negative.
     fn rise(&self, below_mm_per_s: f64) -> (f64, f64) {
         let (reserve, way) = (self.reserve_s, below_mm_per_s.abs());
-        let rise = 2.0 * way / (reserve + (reserve * reserve + 2.0 * way / self.jerk_mm_per_s3).sqrt());
-        (rise.copysign(below_mm_per_s), 1.0 / (reserve + rise / self.jerk_mm_per_s3))
+        let rise =
+            2.0 * way / (reserve + (reserve * reserve + 2.0 * way / self.jerk_mm_per_s3).sqrt());
+        (
+            rise.copysign(below_mm_per_s),
+            1.0 / (reserve + rise / self.jerk_mm_per_s3),
+        )
     }
 }
 
@@ -144,29 +149,44 @@ impl Governor {
             return -self.rate_per_s / h;
         }
         let free = self.small(self.freely(aim.sigma, outlook), outlook);
-        let below = if aim.speed_mm_per_s.is_finite() { self.below(aim, free, here, outlook) } else { free };
-        self.in_time(aim, below, here, outlook).max(-MOST_CHANGE / (h * h))
+        let below = if aim.speed_mm_per_s.is_finite() {
+            self.below(aim, free, here, outlook)
+        } else {
+            free
+        };
+        self.in_time(aim, below, here, outlook)
+            .max(-MOST_CHANGE / (h * h))
     }
 
     /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve or below it, and its mean
     /// below the limit.
     fn below(&self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, limit) = (self.period_s, AIMED * aim.speed_mm_per_s);
-        let Some(from) = here.place.pace() else { return most };
-        let jerk = outlook.path_jerk_mm_per_s3.min(limit * MOST_CHANGE / (h * h));
-        let curve = Curve { jerk_mm_per_s3: SHARE * outlook.share * jerk, reserve_s: RESERVE * h };
+        let Some(from) = here.place.pace() else {
+            return most;
+        };
+        let jerk = outlook
+            .path_jerk_mm_per_s3
+            .min(limit * MOST_CHANGE / (h * h));
+        let curve = Curve {
+            jerk_mm_per_s3: SHARE * outlook.share * jerk,
+            reserve_s: RESERVE * h,
+        };
         let is_below = here.sigma * from.speed <= aim.speed_mm_per_s;
         let mut change = most;
         for _ in 0..ROUNDS {
             let mut way = *here;
             way.pass(change, h);
-            let Some(to) = way.place.pace().filter(|to| to.speed > 0.0) else { break };
+            let Some(to) = way.place.pace().filter(|to| to.speed > 0.0) else {
+                break;
+            };
             let speed = way.sigma * to.speed;
             let rise = way.sigma * way.sigma * to.rise + to.speed * way.rate_per_s;
             let (allowed, per_s) = curve.rise(limit - speed);
             let mut over = (rise - allowed) / (to.speed * h * (1.0 + per_s * h / 2.0));
             if is_below {
-                let mean_over = (from.way_to_mm(&to) / h - aim.speed_mm_per_s) * 6.0 / (to.speed * h * h);
+                let mean_over =
+                    (from.way_to_mm(&to) / h - aim.speed_mm_per_s) * 6.0 / (to.speed * h * h);
                 let end_over = (speed - limit) * 2.0 / (to.speed * h * h);
                 over = over.max(mean_over).max(end_over);
             }
@@ -183,7 +203,13 @@ impl Governor {
     fn in_time(&mut self, aim: &Aim, most: f64, here: &Way<'_>, outlook: &Outlook) -> f64 {
         let (h, sigma) = (self.period_s, here.sigma);
         let (seen, step_s) = (std::mem::take(&mut self.ahead), h * sigma.max(SLOWEST));
-        let mut ahead = AheadOf { seen, count: 0, place: here.place, step_s, ratio: aim.ratio };
+        let mut ahead = AheadOf {
+            seen,
+            count: 0,
+            place: here.place,
+            step_s,
+            ratio: aim.ratio,
+        };
         ahead.place.go(h * sigma);
         let mut change = most;
         for _ in 0..TRIES {
@@ -215,11 +241,14 @@ impl Governor {
             if sigma <= 0.0 {
                 break;
             }
-            let Some(place) = ahead.get(number) else { break };
+            let Some(place) = ahead.get(number) else {
+                break;
+            };
             let real_s = place.step_s / sigma;
             let least = self.least(sigma, rate, &place.motion, outlook);
             // What the limits leave at either end of the way counts on all of it.
-            let slower = (rate + real_s * least.0.max(before.0)).max(least.1.max(before.1).min(0.0));
+            let slower =
+                (rate + real_s * least.0.max(before.0)).max(least.1.max(before.1).min(0.0));
             sigma += real_s * f64::midpoint(rate, slower);
             time_s += real_s;
             (rate, before) = (slower, least);
@@ -238,11 +267,22 @@ impl Governor {
             let velocity = motion.velocity[axis];
             let turned = sigma * motion.acceleration[axis];
             let planned = sigma * sigma * sigma * motion.jerk[axis];
-            changes.keep(planned + 3.0 * turned * rate_per_s, velocity, (LEFT * jerk_limit).max(planned.abs()));
+            changes.keep(
+                planned + 3.0 * turned * rate_per_s,
+                velocity,
+                (LEFT * jerk_limit).max(planned.abs()),
+            );
             let planned = sigma * turned;
-            rate = rate.max(lowest(planned, velocity, (LEFT * acceleration_limit).max(planned.abs())));
+            rate = rate.max(lowest(
+                planned,
+                velocity,
+                (LEFT * acceleration_limit).max(planned.abs()),
+            ));
         }
-        (changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)), rate)
+        (
+            changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)),
+            rate,
+        )
     }
 }
 
@@ -251,7 +291,11 @@ fn lowest(constant: f64, slope: f64, most: f64) -> f64 {
     if slope.abs() < f64::MIN_POSITIVE {
         return f64::NEG_INFINITY;
     }
-    (if slope > 0.0 { -most - constant } else { most - constant }) / slope
+    (if slope > 0.0 {
+        -most - constant
+    } else {
+        most - constant
+    }) / slope
 }
 
 #[cfg(test)]
@@ -263,7 +307,11 @@ mod tests {
     use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment};
 
     /// X is slower than Y.
-    fn limits(acceleration_mm_per_s2: f64, slower: f64, jerk_mm_per_s3: f64) -> [AxisLimits; MAX_AXES] {
+    fn limits(
+        acceleration_mm_per_s2: f64,
+        slower: f64,
+        jerk_mm_per_s3: f64,
+    ) -> [AxisLimits; MAX_AXES] {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,

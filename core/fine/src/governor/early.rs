@@ -44,7 +44,18 @@ pub(super) struct Early {
 impl Early {
     /// Nothing is known ahead. `points` for one piece. Allocates.
     pub(super) fn new(points: Points) -> Self {
-        Self { nodes: vec![Node { offset_s: 0.0, w: MOST }; PIECES + 1].into_boxed_slice(), count: 0, points }
+        Self {
+            nodes: vec![
+                Node {
+                    offset_s: 0.0,
+                    w: MOST
+                };
+                PIECES + 1
+            ]
+            .into_boxed_slice(),
+            count: 0,
+            points,
+        }
     }
 
     /// The highest rate `offset_s` of program time from here; 1 where nothing is known.
@@ -69,7 +80,11 @@ impl Governor {
             let piece_s = place.stretch_s((LONGER * offset_s).max(self.period_s));
             if piece_s > 0.0 {
                 pieces[count] = Some((segment, from_s, piece_s));
-                least = least.min(highest(segment, from_s, ratio)).min(highest(segment, from_s + piece_s, ratio));
+                least = least.min(highest(segment, from_s, ratio)).min(highest(
+                    segment,
+                    from_s + piece_s,
+                    ratio,
+                ));
                 self.early.nodes[count] = Node { offset_s, w: MOST };
                 (count, offset_s) = (count + 1, offset_s + piece_s);
                 self.early.nodes[count] = Node { offset_s, w: MOST };
@@ -88,7 +103,9 @@ impl Governor {
     fn lay_out(&mut self, pieces: &[Option<(&Segment, f64, f64)>], ratio: f64) {
         let mut w = MOST;
         for (number, piece) in pieces.iter().enumerate().rev() {
-            let Some((segment, from_s, piece_s)) = *piece else { continue };
+            let Some((segment, from_s, piece_s)) = *piece else {
+                continue;
+            };
             w = w.min(highest(segment, from_s + piece_s, ratio));
             self.early.nodes[number + 1].w = w;
             self.early.points.clear();
@@ -126,15 +143,24 @@ impl Governor {
 fn least_of_axis(point: &Point, axis: usize, w: f64, limit: f64) -> f64 {
     let planned = 2.0 * w * point.acceleration[axis] * point.velocity[axis].signum();
     let speed = point.velocity[axis].abs();
-    if speed > 0.0 { -((LEFT * limit).max(planned.abs()) + planned) / speed } else { f64::NEG_INFINITY }
+    if speed > 0.0 {
+        -((LEFT * limit).max(planned.abs()) + planned) / speed
+    } else {
+        f64::NEG_INFINITY
+    }
 }
 
 /// w at which the path speed is `ratio` of the programmed feed at local time `t_s` of `segment`, and no more than the greatest.
 fn highest(segment: &Segment, t_s: f64, ratio: f64) -> f64 {
     let speed = segment.path_speed_mm_per_s(t_s);
     let allowed = ratio * segment.feed_mm_per_s;
-    let free = segment.flags.contains(tandem_sdk::SegmentFlags::RAPID) || speed * (1.0 - TOLERANCE) <= allowed;
-    if free { MOST } else { (allowed / speed).powi(2) / 2.0 }
+    let free = segment.flags.contains(tandem_sdk::SegmentFlags::RAPID)
+        || speed * (1.0 - TOLERANCE) <= allowed;
+    if free {
+        MOST
+    } else {
+        (allowed / speed).powi(2) / 2.0
+    }
 }
 
 #[cfg(test)]

@@ -53,7 +53,10 @@ pub(super) struct Interval {
 }
 
 impl Interval {
-    pub(super) const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+    pub(super) const ALL: Self = Self {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
 
     /// Keeps `|constant + slope·x| ≤ most`.
     pub(super) fn keep(&mut self, constant: f64, slope: f64, most: f64) {
@@ -81,25 +84,50 @@ impl Interval {
 
     /// The value nearest to `wanted`; of an empty interval its middle.
     pub(super) fn nearest(&self, wanted: f64) -> f64 {
-        if self.is_empty() { f64::midpoint(self.low, self.high) } else { wanted.clamp(self.low, self.high) }
+        if self.is_empty() {
+            f64::midpoint(self.low, self.high)
+        } else {
+            wanted.clamp(self.low, self.high)
+        }
     }
 }
 
 impl Governor {
     /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is, `recent` what of
     /// its steps the next samples show.
-    pub fn smooth(&mut self, aim: &Aim, outlook: &Outlook, place: Place<'_>, recent: Recent) -> Chosen {
-        let here = Way { sigma: self.sigma, rate_per_s: self.rate_per_s, place, recent };
+    pub fn smooth(
+        &mut self,
+        aim: &Aim,
+        outlook: &Outlook,
+        place: Place<'_>,
+        recent: Recent,
+    ) -> Chosen {
+        let here = Way {
+            sigma: self.sigma,
+            rate_per_s: self.rate_per_s,
+            place,
+            recent,
+        };
         let wanted = if aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite() {
             self.wanted_below(aim, outlook, &here)
         } else {
-            self.small(self.wanted(aim, outlook).min(self.wanted_by_slowest(aim, outlook, &place)), outlook)
+            self.small(
+                self.wanted(aim, outlook)
+                    .min(self.wanted_by_slowest(aim, outlook, &place)),
+                outlook,
+            )
         };
         if wanted == 0.0 && self.rate_per_s == 0.0 {
-            return Chosen { delta_s: self.sigma * self.period_s, relaxed: false };
+            return Chosen {
+                delta_s: self.sigma * self.period_s,
+                relaxed: false,
+            };
         }
         let chosen = match self.steadied(wanted, here, outlook) {
-            Some(change) => Chosen { delta_s: self.pass(change), relaxed: false },
+            Some(change) => Chosen {
+                delta_s: self.pass(change),
+                relaxed: false,
+            },
             None => self.go_on(outlook, &self.reserve(&here)),
         };
         self.settle(aim, outlook);
@@ -109,14 +137,22 @@ impl Governor {
     /// Goes on the way that was begun, at whose end σ is constant.
     fn go_on(&mut self, outlook: &Outlook, reserve: &Steps) -> Chosen {
         if self.rate_per_s == 0.0 {
-            return Chosen { delta_s: self.pass(0.0), relaxed: false };
+            return Chosen {
+                delta_s: self.pass(0.0),
+                relaxed: false,
+            };
         }
-        let Some((change, last)) = self.begun.next() else { return self.relaxed(outlook, reserve) };
+        let Some((change, last)) = self.begun.next() else {
+            return self.relaxed(outlook, reserve);
+        };
         let delta_s = self.pass(change);
         if last {
             self.rate_per_s = 0.0;
         }
-        Chosen { delta_s, relaxed: false }
+        Chosen {
+            delta_s,
+            relaxed: false,
+        }
     }
 
     /// Makes σ constant as soon as velocity and acceleration allow it, with no more jerk than that takes.
@@ -134,29 +170,48 @@ impl Governor {
             self.jerks(outlook, reserve, excess, &mut least);
         }
         let steady = -self.rate_per_s / self.period_s;
-        let chosen = if least.is_empty() { firm.nearest(steady) } else { least.nearest(steady) };
+        let chosen = if least.is_empty() {
+            firm.nearest(steady)
+        } else {
+            least.nearest(steady)
+        };
         let chosen = firm.nearest(self.landing(chosen));
         let before = self.rate_per_s;
         let delta_s = self.pass(chosen);
         // Where σ has met an end of its range, σ̇ ended there and not as chosen.
         let change = (self.rate_per_s - before) / self.period_s;
-        Chosen { delta_s, relaxed: all.is_empty() || !all.contains(change) }
+        Chosen {
+            delta_s,
+            relaxed: all.is_empty() || !all.contains(change),
+        }
     }
 
     /// `chosen`, or the σ̈ that is needed to come to the end of the range with σ constant, evenly from here on.
     fn landing(&self, chosen: f64) -> f64 {
         let (h, rate) = (self.period_s, self.rate_per_s);
-        let room = if rate > 0.0 { 1.0 - self.sigma } else { self.sigma };
+        let room = if rate > 0.0 {
+            1.0 - self.sigma
+        } else {
+            self.sigma
+        };
         let periods = (2.0 * room / (h * rate.abs())).floor().max(1.0);
         let even = -rate / (periods * h);
-        if rate > 0.0 { chosen.min(even) } else { chosen.max(even) }
+        if rate > 0.0 {
+            chosen.min(even)
+        } else {
+            chosen.max(even)
+        }
     }
 
     /// Ends an approach: what rounding leaves of it is far below what a period may change.
     fn settle(&mut self, aim: &Aim, outlook: &Outlook) {
         let h = self.period_s;
         let most = SNAP * outlook.rate_change_per_s2.min(1.0 / (h * h)) * h;
-        let target = if aim.speed_mm_per_s == 0.0 { 0.0 } else { aim.sigma };
+        let target = if aim.speed_mm_per_s == 0.0 {
+            0.0
+        } else {
+            aim.sigma
+        };
         if (self.sigma - target).abs() < most * h && self.rate_per_s.abs() < most {
             (self.sigma, self.rate_per_s) = (target, 0.0);
         }
@@ -167,8 +222,11 @@ impl Governor {
         let h = self.period_s;
         let [speed, acceleration, jerk] = aim.path;
         let most = MARGIN * outlook.rate_change_per_s2;
-        let free =
-            if most.is_finite() { self.approach(self.sigma - aim.sigma, outlook.share * most, most) } else { 0.0 };
+        let free = if most.is_finite() {
+            self.approach(self.sigma - aim.sigma, outlook.share * most, most)
+        } else {
+            0.0
+        };
         let (sigma, rate) = (self.sigma, self.rate_per_s);
         let along = sigma * sigma * acceleration + speed * rate;
         let path_jerk = outlook.path_jerk_to_rest(sigma, sigma * speed, along);
@@ -180,11 +238,21 @@ impl Governor {
         if over == 0.0 && along == 0.0 {
             return free.min(0.0);
         }
-        let asked = to_rest(over - h * along / 2.0, along, outlook.share * path_jerk, 4.0 * path_jerk, h);
+        let asked = to_rest(
+            over - h * along / 2.0,
+            along,
+            outlook.share * path_jerk,
+            4.0 * path_jerk,
+            h,
+        );
         let planned = sigma * (sigma * sigma * jerk + 3.0 * acceleration * rate);
         let capped = (asked - planned) / speed;
         // At its bound the law of the rate only says that its aim is far.
-        if free < most { free.min(capped) } else { capped }
+        if free < most {
+            free.min(capped)
+        } else {
+            capped
+        }
     }
 
     /// The same to rest soonest, by the axis that alone would need longest, where that is clearly longer than what the path
@@ -207,8 +275,13 @@ impl Governor {
             let axis_s = stop_s(fast, changing, most, MARGIN * jerk);
             if axis_s > longest_s && velocity != 0.0 {
                 let planned = sigma * sigma * sigma * motion.jerk[axis] + 3.0 * turning * rate;
-                let asked =
-                    to_rest(fast - h * changing / 2.0, changing, outlook.share * MARGIN * jerk, 4.0 * MARGIN * jerk, h);
+                let asked = to_rest(
+                    fast - h * changing / 2.0,
+                    changing,
+                    outlook.share * MARGIN * jerk,
+                    4.0 * MARGIN * jerk,
+                    h,
+                );
                 (longest_s, wanted) = (axis_s, (asked - planned) / velocity);
             }
         }
@@ -218,7 +291,11 @@ impl Governor {
     /// `wanted` in small steps: where next to nothing moves the limits leave more; to come in they are there.
     pub(super) fn small(&self, wanted: f64, outlook: &Outlook) -> f64 {
         let small = outlook.most_change_per_s2;
-        let (down, up) = if self.rate_per_s < 0.0 { (small, 4.0 * small) } else { (4.0 * small, small) };
+        let (down, up) = if self.rate_per_s < 0.0 {
+            (small, 4.0 * small)
+        } else {
+            (4.0 * small, small)
+        };
         wanted.clamp(-down, up)
     }
 
@@ -236,7 +313,13 @@ impl Governor {
         if off == 0.0 && self.rate_per_s == 0.0 {
             return 0.0;
         }
-        to_rest(off - self.period_s * self.rate_per_s / 2.0, self.rate_per_s, gentle, most, self.period_s)
+        to_rest(
+            off - self.period_s * self.rate_per_s / 2.0,
+            self.rate_per_s,
+            gentle,
+            most,
+            self.period_s,
+        )
     }
 
     /// Acceleration at the points of the period, at the rate with which it ends.
@@ -248,7 +331,11 @@ impl Governor {
                 let planned = end * end * point.acceleration[axis];
                 let left = MARGIN * limit - reserve.acceleration_mm_per_s2(axis, end, h);
                 let most = left.max(planned.abs());
-                interval.keep(planned + point.velocity[axis] * self.rate_per_s, point.velocity[axis] * h, most);
+                interval.keep(
+                    planned + point.velocity[axis] * self.rate_per_s,
+                    point.velocity[axis] * h,
+                    most,
+                );
             }
         }
     }
@@ -264,7 +351,11 @@ impl Governor {
                 let turning = 3.0 * point.acceleration[axis] * sigma;
                 let left = MARGIN * limit - reserve.jerk_mm_per_s3(axis, sigma, h);
                 let most = left.max(planned.abs() + LEFT * limit) + excess * limit;
-                interval.keep(planned + turning * rate, point.velocity[axis] + turning * part * h, most);
+                interval.keep(
+                    planned + turning * rate,
+                    point.velocity[axis] + turning * part * h,
+                    most,
+                );
             }
         }
     }

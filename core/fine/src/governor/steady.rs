@@ -33,7 +33,11 @@ pub(super) struct Steadying {
 impl Steadying {
     /// A way without periods, with room for the longest.
     pub(super) fn new() -> Self {
-        Self { changes_per_s2: vec![0.0; MOST_PERIODS as usize].into_boxed_slice(), count: 0, passed: 0 }
+        Self {
+            changes_per_s2: vec![0.0; MOST_PERIODS as usize].into_boxed_slice(),
+            count: 0,
+            passed: 0,
+        }
     }
 
     /// Forgets the way: σ is constant.
@@ -87,7 +91,12 @@ impl Way<'_> {
 impl Governor {
     /// The σ̈ nearest to `wanted` from which σ can be made constant within the limits, with the way that does it in
     /// `self.begun`; `None` where none is found.
-    pub(super) fn steadied(&mut self, wanted: f64, here: Way<'_>, outlook: &Outlook) -> Option<f64> {
+    pub(super) fn steadied(
+        &mut self,
+        wanted: f64,
+        here: Way<'_>,
+        outlook: &Outlook,
+    ) -> Option<f64> {
         let h = self.period_s;
         let range = self.range(&here, outlook)?;
         let mut tries = |change: f64| {
@@ -129,7 +138,9 @@ impl Governor {
                 return true;
             }
             // What is not queued yet could be anything.
-            let Some(range) = self.range(&way, outlook).filter(|_| way.place.is_known()) else { return false };
+            let Some(range) = self.range(&way, outlook).filter(|_| way.place.is_known()) else {
+                return false;
+            };
             let steady = -way.rate_per_s / h;
             let change = range.nearest(steady);
             self.tried.push(change);
@@ -154,12 +165,24 @@ impl Governor {
             let stretch_s = place.stretch_s(left_s);
             for end_s in [left_s - stretch_s / 2.0, left_s - stretch_s] {
                 place.advance(stretch_s / 2.0);
-                self.keep_at(way, 1.0 - end_s / whole_s, &place.motion(), bounds, &mut interval);
+                self.keep_at(
+                    way,
+                    1.0 - end_s / whole_s,
+                    &place.motion(),
+                    bounds,
+                    &mut interval,
+                );
             }
             left_s -= stretch_s;
             if left_s > NONE_S {
                 place.step();
-                self.keep_at(way, 1.0 - left_s / whole_s, &place.motion(), bounds, &mut interval);
+                self.keep_at(
+                    way,
+                    1.0 - left_s / whole_s,
+                    &place.motion(),
+                    bounds,
+                    &mut interval,
+                );
             }
         }
         if whole_s <= NONE_S {
@@ -196,9 +219,14 @@ impl Governor {
             let turning = 3.0 * motion.acceleration[axis] * sigma;
             let left = JERK_MARGIN * jerk_limit - reserve.jerk_mm_per_s3(axis, sigma, h);
             let most = left.max(planned.abs() + LEFT * jerk_limit);
-            keep.keep(planned + turning * rate, velocity + turning * part * h, most);
+            keep.keep(
+                planned + turning * rate,
+                velocity + turning * part * h,
+                most,
+            );
             let planned = square * motion.acceleration[axis];
-            let left = ACCELERATION_MARGIN * acceleration_limit - reserve.acceleration_mm_per_s2(axis, sigma, h);
+            let left = ACCELERATION_MARGIN * acceleration_limit
+                - reserve.acceleration_mm_per_s2(axis, sigma, h);
             let most = left.max(planned.abs());
             keep.keep(planned + velocity * rate, velocity * part * h, most);
         }

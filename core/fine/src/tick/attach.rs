@@ -39,24 +39,53 @@ pub(super) struct Attach {
 impl Attach {
     /// Joints where the driver says they stand.
     pub(super) fn new(config: &FineConfig) -> Self {
-        let stage = if config.reset_drives { Stage::Resetting } else { Stage::Enabling };
-        Self { stage, told: false, periods: 0, held: 0, joints: config.attached.position }
+        let stage = if config.reset_drives {
+            Stage::Resetting
+        } else {
+            Stage::Enabling
+        };
+        Self {
+            stage,
+            told: false,
+            periods: 0,
+            held: 0,
+            joints: config.attached.position,
+        }
     }
 
     /// Once more, from where the joints stand now.
     pub(super) fn again(joints: AxisVector) -> Self {
-        Self { stage: Stage::Resetting, told: false, periods: 0, held: 0, joints }
+        Self {
+            stage: Stage::Resetting,
+            told: false,
+            periods: 0,
+            held: 0,
+            joints,
+        }
     }
 
     /// Once more, from where the joints stand now; their faults are reset first where that `resets`.
     pub(super) fn anew(joints: AxisVector, resets: bool) -> Self {
-        let stage = if resets { Stage::Resetting } else { Stage::Enabling };
-        Self { stage, ..Self::again(joints) }
+        let stage = if resets {
+            Stage::Resetting
+        } else {
+            Stage::Enabling
+        };
+        Self {
+            stage,
+            ..Self::again(joints)
+        }
     }
 
     /// All joints hold at `joints` already.
     pub(super) fn held(joints: AxisVector) -> Self {
-        Self { stage: Stage::Done, told: true, periods: 0, held: u32::MAX, joints }
+        Self {
+            stage: Stage::Done,
+            told: true,
+            periods: 0,
+            held: u32::MAX,
+            joints,
+        }
     }
 
     /// Whether all joints hold.
@@ -96,7 +125,9 @@ impl FineLoop {
             Stage::Resetting if !states[..self.joints].contains(&JointState::Fault) => {
                 self.attach.stage = Stage::Enabling;
             }
-            Stage::Enabling if self.attach.held.count_ones() as usize == self.joints => self.stand_there(),
+            Stage::Enabling if self.attach.held.count_ones() as usize == self.joints => {
+                self.stand_there()
+            }
             _ => self.watch_time(&states),
         }
     }
@@ -106,9 +137,15 @@ impl FineLoop {
         if self.attach.periods < self.config.enable_periods {
             return;
         }
-        let late = states[..self.joints].iter().position(|state| *state != JointState::Enabled);
+        let late = states[..self.joints]
+            .iter()
+            .position(|state| *state != JointState::Enabled);
         let joint = late.unwrap_or_default();
-        self.fail(FaultKind::NotEnabled { joint, state: states[joint], code: self.feedback.fault_code[joint] });
+        self.fail(FaultKind::NotEnabled {
+            joint,
+            state: states[joint],
+            code: self.feedback.fault_code[joint],
+        });
     }
 
     /// The operator aborts before the joints hold: they are not told to any more, and nothing follows.

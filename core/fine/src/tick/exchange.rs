@@ -15,7 +15,11 @@ impl FineLoop {
     /// Gives whether all joints hold behind it.
     pub(super) fn exchange(&mut self, axes: &AxisVector) -> bool {
         self.set_joints(axes);
-        self.setpoint.tick = if self.beats_on { self.setpoint.tick + 1 } else { self.tick };
+        self.setpoint.tick = if self.beats_on {
+            self.setpoint.tick + 1
+        } else {
+            self.tick
+        };
         self.setpoint.arm = self.arm;
         // Where axes are homed, joints are axes.
         self.setpoint.limited = self.outputs.unhomed & self.config.homing_limits;
@@ -25,7 +29,8 @@ impl FineLoop {
         let failed = self.ask_driver();
         self.hear_roles(failed);
         self.hear_spindle();
-        let unreadable = last.replace_wrong_ones(&mut self.feedback, self.measured.last(), self.joints);
+        let unreadable =
+            last.replace_wrong_ones(&mut self.feedback, self.measured.last(), self.joints);
         self.remember();
         // What is true nearly always is looked at first.
         let all_hold = answer::all_hold(&self.feedback, self.joints);
@@ -44,17 +49,31 @@ impl FineLoop {
     #[inline(never)]
     fn fault_of_answer(&self, failed: bool, unreadable: Option<FaultKind>) -> Option<FaultKind> {
         // From the first motion on the drives hold, at rest too: what let go has moved.
-        let moving = matches!(self.phase, Phase::Following | Phase::Parted | Phase::HandedOver(_));
+        let moving = matches!(
+            self.phase,
+            Phase::Following | Phase::Parted | Phase::HandedOver(_)
+        );
         let own = self.handed_over();
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
         let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
         let resets = self.is_resetting();
-        let reported = || answer::reported(&self.feedback, self.joints, moving, own).filter(|_| !resets && !letting_go);
+        let reported = || {
+            answer::reported(&self.feedback, self.joints, moving, own)
+                .filter(|_| !resets && !letting_go)
+        };
         let far = || {
             let sent = (self.sent.as_ref()?, &self.config.attached.delay_periods);
-            answer::following(&self.feedback, sent, self.joints, &self.config.max_following_error_mm, own)
+            answer::following(
+                &self.feedback,
+                sent,
+                self.joints,
+                &self.config.max_following_error_mm,
+                own,
+            )
         };
-        fault.or_else(reported).or_else(|| far().filter(|_| holding && !letting_go))
+        fault
+            .or_else(reported)
+            .or_else(|| far().filter(|_| holding && !letting_go))
     }
 
     /// Tells the setpoint where the joints are to be, and how they move.
@@ -69,7 +88,8 @@ impl FineLoop {
         if let Some(joints) = still {
             // They are told to be where they stand: that is no motion, though the numbers may change.
             self.setpoint.position = joints;
-            (self.setpoint.velocity, self.setpoint.acceleration) = (AxisVector::ZERO, AxisVector::ZERO);
+            (self.setpoint.velocity, self.setpoint.acceleration) =
+                (AxisVector::ZERO, AxisVector::ZERO);
             return;
         }
         self.setpoint.homing = 0;
@@ -87,7 +107,10 @@ impl FineLoop {
             sent.push(&self.setpoint.position);
         }
         self.measured.push(&self.feedback.position);
-        let is_old = self.feedback.age_periods[..self.joints].iter().fold(0, |any, age| any | age) > 0;
+        let is_old = self.feedback.age_periods[..self.joints]
+            .iter()
+            .fold(0, |any, age| any | age)
+            > 0;
         self.counters.old_feedback_periods += u64::from(is_old);
     }
 
@@ -108,9 +131,15 @@ impl FineLoop {
             return Input::DrivesOn;
         }
         let own = self.handed_over();
-        let holds = |joint: usize| own >> joint & 1 == 1 || self.feedback.state[joint] == JointState::Enabled;
+        let holds = |joint: usize| {
+            own >> joint & 1 == 1 || self.feedback.state[joint] == JointState::Enabled
+        };
         let on = (0..self.joints).all(holds);
-        if on { Input::DrivesOn } else { Input::DrivesOff }
+        if on {
+            Input::DrivesOn
+        } else {
+            Input::DrivesOff
+        }
     }
 
     pub(super) fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
@@ -154,7 +183,8 @@ impl FineLoop {
 
     /// What is on when the loop begins: a session goes on as the run before it has left the machine. Host, before the first tick.
     pub fn begin_switched(&mut self, switched: &Switched) {
-        (self.outputs.bits, self.outputs.spindle_rad_per_s) = (switched.outputs, switched.spindle_rad_per_s);
+        (self.outputs.bits, self.outputs.spindle_rad_per_s) =
+            (switched.outputs, switched.spindle_rad_per_s);
         self.outputs.by = switched.by;
     }
 
@@ -172,7 +202,12 @@ impl FineLoop {
         let switched = self.switched();
         if switched != self.left.switched {
             let segment = self.cursor.segment();
-            self.left = Left { tick: self.tick, block: segment.block, line: segment.line, switched };
+            self.left = Left {
+                tick: self.tick,
+                block: segment.block,
+                line: segment.line,
+                switched,
+            };
         }
     }
 
@@ -180,18 +215,33 @@ impl FineLoop {
         let status = &self.status;
         status.tick.store(self.tick, Relaxed);
         status.program_time_s.store(self.cursor.program_time_s());
-        status.feed_mm_per_s.store(self.governor.sigma() * self.cursor.path_speed_mm_per_s());
+        status
+            .feed_mm_per_s
+            .store(self.governor.sigma() * self.cursor.path_speed_mm_per_s());
         status.line.store(self.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
-        status.spindle.waits.store(self.spin_up.waits && self.fault.is_none(), Relaxed);
-        status.spindle.told_rad_per_s.store(self.setpoint.spindle_rad_per_s);
-        status.spindle.turns_rad_per_s.store(self.feedback.spindle_rad_per_s);
+        status
+            .spindle
+            .waits
+            .store(self.spin_up.waits && self.fault.is_none(), Relaxed);
+        status
+            .spindle
+            .told_rad_per_s
+            .store(self.setpoint.spindle_rad_per_s);
+        status
+            .spindle
+            .turns_rad_per_s
+            .store(self.feedback.spindle_rad_per_s);
         for (joint, status) in status.joints.iter().enumerate().take(self.joints) {
             status.store(self.feedback.state[joint], self.feedback.fault_code[joint]);
         }
-        status.enabling.store(!self.attach.is_done() && self.fault.is_none(), Relaxed);
-        status.idle.store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
+        status
+            .enabling
+            .store(!self.attach.is_done() && self.fault.is_none(), Relaxed);
+        status
+            .idle
+            .store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
         self.report_counts();
     }
 
@@ -199,8 +249,12 @@ impl FineLoop {
         let (counts, counted) = (&self.status.counts, &self.counters);
         counts.samples.store(counted.samples, Relaxed);
         counts.guard_stops.store(counted.guard_stops, Relaxed);
-        counts.limit_violations.store(counted.limit_violations, Relaxed);
-        counts.governed_samples.store(counted.governed_samples, Relaxed);
+        counts
+            .limit_violations
+            .store(counted.limit_violations, Relaxed);
+        counts
+            .governed_samples
+            .store(counted.governed_samples, Relaxed);
         counts.starvations.store(counted.starvations, Relaxed);
         counts.late_ratios.store(counted.late_ratios, Relaxed);
         counts.missed_periods.store(counted.missed_periods, Relaxed);

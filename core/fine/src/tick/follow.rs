@@ -36,13 +36,23 @@ impl FineLoop {
         }
         self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
-            self.governor.jump(if ask == Ask::Run { self.most_rate() } else { 0.0 });
+            self.governor.jump(if ask == Ask::Run {
+                self.most_rate()
+            } else {
+                0.0
+            });
         }
-        if self.governor.sigma() == 0.0 && ask == Ask::Hold && self.controls.soft_fault.load(Relaxed) {
+        if self.governor.sigma() == 0.0
+            && ask == Ask::Hold
+            && self.controls.soft_fault.load(Relaxed)
+        {
             self.fail(FaultKind::Soft);
             return (*self.guard.position(), Input::Trip);
         }
-        if let Some(stop) = self.stop.filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting()) {
+        if let Some(stop) = self
+            .stop
+            .filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting())
+        {
             return (self.stand(), self.part(stop));
         }
         if ask == Ask::Run
@@ -57,7 +67,9 @@ impl FineLoop {
         let waits = self.waits();
         let reached = self.cursor.advance(delta_s, |queued| {
             let event = match queued {
-                Queued::Segment { segment, .. } => return self.spin_up.is_awaited() && is_cut(segment),
+                Queued::Segment { segment, .. } => {
+                    return self.spin_up.is_awaited() && is_cut(segment);
+                }
                 Queued::Event(event) => event,
             };
             let told_rad_per_s = self.outputs.spindle_rad_per_s;
@@ -66,7 +78,10 @@ impl FineLoop {
                 self.spin_up = SpinUp::begin();
             }
             // At home one sample rests, so that a record begins with it.
-            let homing = matches!(event.kind, EventKind::Correct | EventKind::Homed | EventKind::HomeByDrive);
+            let homing = matches!(
+                event.kind,
+                EventKind::Correct | EventKind::Homed | EventKind::HomeByDrive
+            );
             self.outputs.stop_requested || homing
         });
         self.watch_progress(ask, reached);
@@ -109,7 +124,10 @@ impl FineLoop {
     /// Which words wait for the operator now.
     fn waits(&self) -> Waits {
         let optional = self.given.optional_stop && !self.config.dry_run;
-        Waits { program: self.config.pause_at_stops && !self.config.dry_run, optional }
+        Waits {
+            program: self.config.pause_at_stops && !self.config.dry_run,
+            optional,
+        }
     }
 
     /// What is asked of the rate of program time, before ratios.
@@ -140,7 +158,11 @@ impl FineLoop {
     /// and the rate that the rough loop has found for what the ring holds counts instead.
     fn watch_queue(&mut self) {
         let served = self.depth.served.load(Acquire);
-        self.unserved = if served == self.served { self.unserved + 1 } else { 0 };
+        self.unserved = if served == self.served {
+            self.unserved + 1
+        } else {
+            0
+        };
         self.served = served;
         let wall_s = self.depth.wall_s.load();
         if self.starved {
@@ -151,10 +173,12 @@ impl FineLoop {
         let deceleration = self.depth.stop_deceleration_mm_per_s2.load();
         // The declared deceleration is kept within the governor's margin and from the next period on.
         let ramp_s = self.depth.stop_ramp_s.load() / STOP_JERK_SHARE;
-        let stop_s = (speed / deceleration).min(self.governor.sigma() * self.depth.stop_s.load()) / STOP_SHARE;
+        let stop_s = (speed / deceleration).min(self.governor.sigma() * self.depth.stop_s.load())
+            / STOP_SHARE;
         let stop_s = stop_s + ramp_s + 3.0 * self.config.period_s;
         let unserved_s = f64::from(self.unserved) * self.config.period_s;
-        let deep_as_can_be = self.depth.full.load(Acquire) && unserved_s <= self.depth.served_for_s.load();
+        let deep_as_can_be =
+            self.depth.full.load(Acquire) && unserved_s <= self.depth.served_for_s.load();
         if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s && !deep_as_can_be {
             self.starved = true;
             self.counters.starvations += 1;

@@ -47,8 +47,13 @@ impl FineLoop {
     /// Chooses the rate for this period; gives the program time that passes, s.
     pub(super) fn govern(&mut self, ask: Ask) -> f64 {
         // While slowing down no more program time passes than at the present rate: what lies beyond does not count.
-        let most = if ask == Ask::Run || self.config.order >= 3 { 1.0 } else { self.governor.sigma() };
-        self.cursor.scan(most * self.config.period_s, &mut self.points);
+        let most = if ask == Ask::Run || self.config.order >= 3 {
+            1.0
+        } else {
+            self.governor.sigma()
+        };
+        self.cursor
+            .scan(most * self.config.period_s, &mut self.points);
         let ratios = self.ratios_in_force();
         self.ask_for_rate((ratios.feed / self.config.max_feed_ratio).min(ratios.rapid));
         let below = ratios.feed < self.config.max_feed_ratio;
@@ -57,10 +62,19 @@ impl FineLoop {
                 self.recovering = false;
                 return self.covered(self.config.period_s);
             }
-            self.cursor.look_out(self.config.period_s, &mut self.outlook);
+            self.cursor
+                .look_out(self.config.period_s, &mut self.outlook);
         }
-        let end_mm = if ask == Ask::Run { self.line_end() } else { None };
-        let way_speed = if ask == Ask::Run { self.speed_for_places(&ratios, end_mm) } else { 0.0 };
+        let end_mm = if ask == Ask::Run {
+            self.line_end()
+        } else {
+            None
+        };
+        let way_speed = if ask == Ask::Run {
+            self.speed_for_places(&ratios, end_mm)
+        } else {
+            0.0
+        };
         let delta_s = if self.config.order >= 3 {
             self.govern_smooth(ask, &ratios, way_speed)
         } else {
@@ -85,7 +99,11 @@ impl FineLoop {
 
     /// As much of `delta_s` as lies within what was looked at.
     fn covered(&self, delta_s: f64) -> f64 {
-        delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() { f64::MAX } else { 0.0 }))
+        delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() {
+            f64::MAX
+        } else {
+            0.0
+        }))
     }
 
     /// The highest rate that the queue allows.
@@ -110,10 +128,18 @@ impl FineLoop {
         if ask == Ask::Run {
             self.look_at_feeds(ratios);
         }
-        let wanted = if ask == Ask::Run { self.ratio_target(ratios, way_speed_mm_per_s) } else { 0.0 };
+        let wanted = if ask == Ask::Run {
+            self.ratio_target(ratios, way_speed_mm_per_s)
+        } else {
+            0.0
+        };
         let target = wanted.min(limit);
         let unchanged = target == self.governor.sigma();
-        let sigma = if unchanged { target } else { self.governor.choose(target, &self.points) };
+        let sigma = if unchanged {
+            target
+        } else {
+            self.governor.choose(target, &self.points)
+        };
         // Where the limits stand against the feed, or the plan changes too much in the period, it is looked at more closely.
         let moves = self.governor.sigma() > 0.0 && !self.cursor.is_resting();
         if ask == Ask::Run && moves && !self.is_feed_kept(sigma, ratios) {
@@ -124,10 +150,17 @@ impl FineLoop {
 
     /// Notes from which rates ratio × programmed feed can be kept ahead.
     fn look_at_feeds(&mut self, ratios: &Ratios) {
-        let Self { cursor, governor, config, .. } = self;
+        let Self {
+            cursor,
+            governor,
+            config,
+            ..
+        } = self;
         governor.look_no_more();
         if ratios.feed < config.max_feed_ratio {
-            cursor.on_course((config.lane_count(), config.linear), |place| governor.look_ahead(place, ratios.feed));
+            cursor.on_course((config.lane_count(), config.linear), |place| {
+                governor.look_ahead(place, ratios.feed)
+            });
         }
     }
 
@@ -137,8 +170,10 @@ impl FineLoop {
             return true;
         }
         let mean = f64::midpoint(self.governor.sigma(), sigma);
-        let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, f64::INFINITY);
-        sigma <= asked.at_end * (1.0 + FEED_TOLERANCE) && mean <= asked.mean * (1.0 + FEED_TOLERANCE)
+        let asked =
+            self.asked_of_period(self.governor.program_time_s(sigma), ratios, f64::INFINITY);
+        sigma <= asked.at_end * (1.0 + FEED_TOLERANCE)
+            && mean <= asked.mean * (1.0 + FEED_TOLERANCE)
     }
 
     /// Limits of jerk too: σ̈ is constant in the period.
@@ -147,27 +182,53 @@ impl FineLoop {
             self.begin_below(ratios);
         }
         let path = self.cursor.path_derivatives();
-        let ahead = self.cursor.ahead(self.governor.sigma() * self.config.period_s);
+        let ahead = self
+            .cursor
+            .ahead(self.governor.sigma() * self.config.period_s);
         let limit = self.plan_limit().min(self.most_rate());
         self.ask_for_rate(limit);
-        let run = if ahead.rapid { ratios.rapid.min(limit) } else { limit };
-        let ratio = if ratios.feed < self.config.max_feed_ratio { ratios.feed } else { f64::INFINITY };
+        let run = if ahead.rapid {
+            ratios.rapid.min(limit)
+        } else {
+            limit
+        };
+        let ratio = if ratios.feed < self.config.max_feed_ratio {
+            ratios.feed
+        } else {
+            f64::INFINITY
+        };
         let feed = if ahead.rapid || ratio.is_infinite() {
             f64::INFINITY
         } else {
             // What was driven before a rest counts no more.
-            let here = if self.cursor.is_resting() { f64::INFINITY } else { self.cursor.segment().feed_mm_per_s };
+            let here = if self.cursor.is_resting() {
+                f64::INFINITY
+            } else {
+                self.cursor.segment().feed_mm_per_s
+            };
             ratio * ahead.feed_mm_per_s.min(here)
         };
         let aim = match ask {
-            Ask::Run => Aim { sigma: run, speed_mm_per_s: feed.min(way_speed_mm_per_s), ratio, path },
+            Ask::Run => Aim {
+                sigma: run,
+                speed_mm_per_s: feed.min(way_speed_mm_per_s),
+                ratio,
+                path,
+            },
             // Where the plan stands still, its path says nothing.
-            _ => Aim { sigma: if path[0] > 0.0 { run } else { 0.0 }, speed_mm_per_s: 0.0, ratio, path },
+            _ => Aim {
+                sigma: if path[0] > 0.0 { run } else { 0.0 },
+                speed_mm_per_s: 0.0,
+                ratio,
+                path,
+            },
         };
         let (governor, outlook) = (&mut self.governor, &self.outlook);
         let recent = self.cursor.recent_steps();
         let lanes = (self.config.lane_count(), self.config.linear);
-        let chosen = self.cursor.on_course(lanes, |place| governor.smooth(&aim, outlook, place, recent));
+        let chosen = self
+            .cursor
+            .on_course(lanes, |place| governor.smooth(&aim, outlook, place, recent));
         if chosen.relaxed {
             self.guard.relax_jerk();
         }
@@ -194,7 +255,9 @@ impl FineLoop {
         let (mut rate, mut from_mm) = (f64::INFINITY, self.cursor.path_mm());
         for period in 1..=BEGINNING {
             let ahead = self.cursor.ahead(f64::from(period) * delta_s);
-            let fastest = ahead.speed_mm_per_s.max((ahead.path_mm - from_mm) / delta_s);
+            let fastest = ahead
+                .speed_mm_per_s
+                .max((ahead.path_mm - from_mm) / delta_s);
             from_mm = ahead.path_mm;
             if !ahead.rapid && ratios.feed < self.config.max_feed_ratio {
                 rate = rate.min(ratios.feed * ahead.feed_mm_per_s / fastest);
@@ -204,8 +267,18 @@ impl FineLoop {
     }
 
     fn ratios_in_force(&self) -> Ratios {
-        let operator = |value: f64| if self.outputs.override_permitted { value } else { 1.0 };
-        let adaptive = if self.outputs.adaptive_permitted { self.ratio } else { 1.0 };
+        let operator = |value: f64| {
+            if self.outputs.override_permitted {
+                value
+            } else {
+                1.0
+            }
+        };
+        let adaptive = if self.outputs.adaptive_permitted {
+            self.ratio
+        } else {
+            1.0
+        };
         Ratios {
             feed: operator(self.given.feed_override) * adaptive,
             rapid: operator(self.given.rapid_override).min(1.0),
@@ -226,11 +299,20 @@ impl FineLoop {
         let mut sigma = from;
         // The plan at the end of the period depends on the rate sought: three rounds settle it.
         for _ in 0..3 {
-            let asked = self.asked_of_period(self.governor.program_time_s(sigma), ratios, way_speed_mm_per_s);
+            let asked = self.asked_of_period(
+                self.governor.program_time_s(sigma),
+                ratios,
+                way_speed_mm_per_s,
+            );
             let steady = asked.at_end.min(asked.mean);
             // From above, an end that makes the mean right lies as far below: the next period would begin in a dip.
             let above = speed_mm_per_s > (1.0 + ABOVE) * asked.allowed_mm_per_s;
-            let next = if above { steady } else { asked.at_end.min(2.0 * asked.mean - from) }.clamp(0.0, 1.0);
+            let next = if above {
+                steady
+            } else {
+                asked.at_end.min(2.0 * asked.mean - from)
+            }
+            .clamp(0.0, 1.0);
             if next == sigma {
                 break;
             }
@@ -250,14 +332,19 @@ impl FineLoop {
         // The faster the plan is left, the lower the rate it leaves: their geometric mean is the answer where speed grows
         // with time, and halves what is wrong with it in each round where it grows with the square of time.
         for round in 0..2 * REST_ROUNDS {
-            let asked = self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
+            let asked =
+                self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
             let next = asked.at_end.min(asked.mean);
             if next == sigma || round + 1 == 2 * REST_ROUNDS {
                 break;
             }
             // Where the period goes on over a corner neither is so, and what is found last must not be too fast.
             let settles = !asked.rapid && round < REST_ROUNDS;
-            sigma = if settles { (sigma * next).sqrt() } else { sigma.min(next) };
+            sigma = if settles {
+                (sigma * next).sqrt()
+            } else {
+                sigma.min(next)
+            };
         }
         self.governor.jump(sigma);
         sigma
@@ -268,18 +355,37 @@ impl FineLoop {
         let from_mm = self.cursor.path_mm();
         let ahead = self.cursor.ahead(delta_s);
         let keeps = ratios.feed >= self.config.max_feed_ratio;
-        let allowed_mm_per_s = if keeps { f64::INFINITY } else { ratios.feed * ahead.most_feed_mm_per_s };
-        let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s).min(self.governor.rate_in_time(delta_s));
+        let allowed_mm_per_s = if keeps {
+            f64::INFINITY
+        } else {
+            ratios.feed * ahead.most_feed_mm_per_s
+        };
+        let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s)
+            .min(self.governor.rate_in_time(delta_s));
         if ahead.rapid {
             let at_end = ratios.rapid.min(of_places);
-            return Asked { at_end, mean: f64::INFINITY, allowed_mm_per_s, rapid: true };
+            return Asked {
+                at_end,
+                mean: f64::INFINITY,
+                allowed_mm_per_s,
+                rapid: true,
+            };
         }
         if keeps {
             // The plan itself does.
-            return Asked { at_end: of_places, mean: f64::INFINITY, allowed_mm_per_s, rapid: false };
+            return Asked {
+                at_end: of_places,
+                mean: f64::INFINITY,
+                allowed_mm_per_s,
+                rapid: false,
+            };
         }
         let way_mm = ahead.path_mm - from_mm - ROUNDED_SHARE * ahead.path_mm;
-        let mean_mm_per_s = if delta_s > 0.0 { way_mm / delta_s } else { ahead.speed_mm_per_s };
+        let mean_mm_per_s = if delta_s > 0.0 {
+            way_mm / delta_s
+        } else {
+            ahead.speed_mm_per_s
+        };
         Asked {
             at_end: within(ratios.feed * ahead.feed_mm_per_s, ahead.speed_mm_per_s).min(of_places),
             mean: within(allowed_mm_per_s, mean_mm_per_s),
@@ -298,14 +404,19 @@ impl FineLoop {
             return at_end;
         }
         let along = self.along();
-        let stop_s = along.speed_mm_per_s / along.most_mm_per_s2 + self.outlook.horizon_s + 4.0 * self.config.period_s;
+        let stop_s = along.speed_mm_per_s / along.most_mm_per_s2
+            + self.outlook.horizon_s
+            + 4.0 * self.config.period_s;
         let until_s = self.cursor.program_time_s() + stop_s;
         self.preview.extend(&mut self.cursor, until_s);
         let marks = self.preview.marks();
         let met = |mark: &Mark| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
         let mut least = (at_end, f64::INFINITY);
         for mark in marks {
-            least = (least.0.min(self.speed_towards(mark.path_mm, met(mark))), least.1.min(met(mark)));
+            least = (
+                least.0.min(self.speed_towards(mark.path_mm, met(mark))),
+                least.1.min(met(mark)),
+            );
         }
         let planned_mm_per_s = self.cursor.path_speed_mm_per_s();
         if least.1 < planned_mm_per_s {
@@ -324,8 +435,13 @@ impl FineLoop {
         if self.config.order < 3 {
             return along.speed_towards(left_mm, end_mm_per_s, period_s);
         }
-        let soon_mm = 2.0 * period_s * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
-        let later = Along { speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s), ..along };
+        let soon_mm = 2.0
+            * period_s
+            * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
+        let later = Along {
+            speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s),
+            ..along
+        };
         // So near there is no way to get faster again: the place would be passed.
         let waits = left_mm > LINE_END_MM && later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
         if waits { f64::INFINITY } else { end_mm_per_s }
@@ -337,7 +453,8 @@ impl FineLoop {
         let sigma = self.governor.sigma();
         Along {
             speed_mm_per_s: sigma * speed,
-            acceleration_mm_per_s2: sigma * sigma * acceleration + speed * self.governor.rate_per_s(),
+            acceleration_mm_per_s2: sigma * sigma * acceleration
+                + speed * self.governor.rate_per_s(),
             most_mm_per_s2: STOP_SHARE * self.depth.stop_deceleration_mm_per_s2.load(),
             jerk_mm_per_s3: JERK_SHARE * self.outlook.path_jerk_mm_per_s3,
         }
@@ -346,7 +463,9 @@ impl FineLoop {
     /// Takes the ratios that are due.
     pub(super) fn take_ratio(&mut self) {
         loop {
-            let Some(next) = self.next_ratio.take().or_else(|| self.ratios.pop().ok()) else { return };
+            let Some(next) = self.next_ratio.take().or_else(|| self.ratios.pop().ok()) else {
+                return;
+            };
             if next.tick > self.tick {
                 self.next_ratio = Some(next);
                 return;
@@ -359,7 +478,11 @@ impl FineLoop {
 
 /// The rate at which a planned speed is at most `allowed`; 1 where it is anyway, to the rounding of a long path.
 pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
-    if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed { allowed / planned_mm_per_s } else { 1.0 }
+    if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed {
+        allowed / planned_mm_per_s
+    } else {
+        1.0
+    }
 }
 
 /// Relative tolerance on the feed.

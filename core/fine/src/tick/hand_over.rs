@@ -32,14 +32,25 @@ pub(super) struct HandOver {
 impl FineLoop {
     /// At a rest: hands the joint over that an event has named.
     pub(super) fn begin_hand_over(&mut self) -> Option<Input> {
-        let (joint, within_s) = self.outputs.hand_over.filter(|_| self.cursor.is_resting())?;
+        let (joint, within_s) = self
+            .outputs
+            .hand_over
+            .filter(|_| self.cursor.is_resting())?;
         self.outputs.hand_over = None;
         if joint >= self.joints {
             return None;
         }
         let begun = self.feedback.homed >> joint & 1 == 0;
         let (periods, given_up, told, held) = (0, false, false, false);
-        self.phase = Phase::HandedOver(HandOver { joint, within_s, periods, begun, given_up, told, held });
+        self.phase = Phase::HandedOver(HandOver {
+            joint,
+            within_s,
+            periods,
+            begun,
+            given_up,
+            told,
+            held,
+        });
         Some(Input::Run)
     }
 
@@ -57,7 +68,11 @@ impl FineLoop {
         hand.given_up |= self.given.abort || self.is_jog_let_go();
         if is_new && state == JointState::Enabled && (homed || hand.given_up) {
             self.take_back(hand.joint);
-            return self.part(if hand.given_up { Stop::abort() } else { Stop::of(RestCause::Corrected) });
+            return self.part(if hand.given_up {
+                Stop::abort()
+            } else {
+                Stop::of(RestCause::Corrected)
+            });
         }
         // Holds and doors interrupt the drive's own motion; it begins anew when they are over.
         let held = self.given.hold || self.given.program_hold;
@@ -65,8 +80,17 @@ impl FineLoop {
         hand.periods += u64::from(!held);
         self.setpoint.homing = if hand.told { bit } else { 0 };
         if hand.periods as f64 * self.config.period_s > hand.within_s {
-            let (joint, within_s, code) = (hand.joint, hand.within_s, self.feedback.fault_code[hand.joint]);
-            self.fail(FaultKind::NotHomed { joint, state, code, within_s });
+            let (joint, within_s, code) = (
+                hand.joint,
+                hand.within_s,
+                self.feedback.fault_code[hand.joint],
+            );
+            self.fail(FaultKind::NotHomed {
+                joint,
+                state,
+                code,
+                within_s,
+            });
             return Input::Trip;
         }
         if self.controls.soft_fault.load(Relaxed) {
@@ -88,7 +112,11 @@ impl FineLoop {
 
     /// Joints in their drives' hands, a bit each.
     pub(super) fn handed_over(&self) -> u32 {
-        if let Phase::HandedOver(hand) = &self.phase { 1 << hand.joint } else { 0 }
+        if let Phase::HandedOver(hand) = &self.phase {
+            1 << hand.joint
+        } else {
+            0
+        }
     }
 
     /// What the joints are told: the one in its drive's hands is where it is, and that is no motion of the plan. Where its drive
@@ -99,7 +127,11 @@ impl FineLoop {
             let joint = hand.joint;
             let holds = !hand.told && self.feedback.state[joint] == JointState::Enabled;
             let stays = holds && hand.held;
-            joints[joint] = if stays { self.setpoint.position[joint] } else { self.feedback.position[joint] };
+            joints[joint] = if stays {
+                self.setpoint.position[joint]
+            } else {
+                self.feedback.position[joint]
+            };
             hand.held = holds;
         }
         joints

@@ -44,7 +44,9 @@ impl FineLoop {
     #[inline(never)]
     fn joints_by(&self, kinematics: &dyn Kinematics, position: &AxisVector) -> AxisVector {
         let joints = match self.config.joints {
-            Joints::Curved { axes } => AxisVector::from_slice(&position.0[axes..self.config.lane_count()]),
+            Joints::Curved { axes } => {
+                AxisVector::from_slice(&position.0[axes..self.config.lane_count()])
+            }
             _ => kinematics.to_joints(&self.config.axes_alone(position)),
         };
         joints + self.offset
@@ -62,7 +64,11 @@ impl FineLoop {
     #[inline(never)]
     fn add_curved(&mut self, axes: usize, position: &mut AxisVector) {
         *position = self.config.axes_alone(position);
-        let asked = self.kinematics.as_ref().filter(|_| self.lead == Lead::Axes).map(|k| k.to_joints(position));
+        let asked = self
+            .kinematics
+            .as_ref()
+            .filter(|_| self.lead == Lead::Axes)
+            .map(|k| k.to_joints(position));
         let joints = match asked {
             Some(joints) if self.accepts(axes, position, &joints) => joints,
             _ => self.slower(axes),
@@ -80,7 +86,9 @@ impl FineLoop {
         if let Some(joint) = (0..self.joints).find(|joint| !joints[*joint].is_finite()) {
             self.lead = Lead::Nothing;
             self.lose_way(FaultKind::Kinematics { joint });
-        } else if self.fault.is_some() && !(0..self.joints).all(|j| self.can_follow(axes + j, joints[j])) {
+        } else if self.fault.is_some()
+            && !(0..self.joints).all(|j| self.can_follow(axes + j, joints[j]))
+        {
             self.lead = Lead::Nothing;
         }
         self.lead == Lead::Axes
@@ -91,17 +99,24 @@ impl FineLoop {
         let (limits, period_s) = (&self.config.limits.axes[entry], self.config.period_s);
         let before = self.guard.velocity()[entry];
         let velocity = (next - self.guard.position()[entry]) / period_s;
-        let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s).max(before.abs());
+        let fastest = limits
+            .feed_mm_per_s
+            .max(limits.rapid_mm_per_s)
+            .max(before.abs());
         let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
         let within = |value: f64, most: f64| value.abs() <= most * (1.0 + ROUNDING) + rounding;
-        within(velocity, fastest) && within(velocity - before, limits.acceleration_mm_per_s2 * period_s)
+        within(velocity, fastest)
+            && within(velocity - before, limits.acceleration_mm_per_s2 * period_s)
     }
 
     /// The joints a period later, each with less speed by its limit.
     fn slower(&self, axes: usize) -> AxisVector {
         let (period_s, mut joints) = (self.config.period_s, AxisVector::ZERO);
         for joint in 0..self.joints {
-            let (entry, most) = (axes + joint, self.config.limits.axes[axes + joint].acceleration_mm_per_s2);
+            let (entry, most) = (
+                axes + joint,
+                self.config.limits.axes[axes + joint].acceleration_mm_per_s2,
+            );
             let speed = self.guard.velocity()[entry];
             let slower = speed.signum() * (speed.abs() - most * period_s).max(0.0);
             joints[joint] = self.guard.position()[entry] + slower * period_s;
@@ -112,7 +127,10 @@ impl FineLoop {
     /// Whether the joints rest when the axes do: they may have been slowing down on their own.
     pub(super) fn joints_rest(&self) -> bool {
         let first = self.config.axis_count();
-        self.lead == Lead::Axes || self.guard.velocity().0[first..].iter().all(|speed| *speed == 0.0)
+        self.lead == Lead::Axes
+            || self.guard.velocity().0[first..]
+                .iter()
+                .all(|speed| *speed == 0.0)
     }
 
     /// Whether the joints came to rest each on its own, away from where the axes were to be. Host.
@@ -124,12 +142,18 @@ impl FineLoop {
     #[inline]
     pub(super) fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
         let joints = *joints - self.offset;
-        if self.kinematics.is_none() { joints } else { self.axes_by(&joints) }
+        if self.kinematics.is_none() {
+            joints
+        } else {
+            self.axes_by(&joints)
+        }
     }
 
     #[inline(never)]
     fn axes_by(&mut self, joints: &AxisVector) -> AxisVector {
-        let Some(kinematics) = &self.kinematics else { return *joints };
+        let Some(kinematics) = &self.kinematics else {
+            return *joints;
+        };
         let axes = kinematics.to_axes(joints);
         if let Some(axis) = (0..self.config.axis_count()).find(|axis| !axes[*axis].is_finite()) {
             self.lose_way(FaultKind::WayBack { axis });
@@ -143,7 +167,11 @@ impl FineLoop {
     /// came to rest on their own, it is what the kinematics make of them, if that leads back. Host.
     pub fn sent(&self) -> AxisVector {
         let axes = self.config.axes_alone(self.guard.position());
-        let Some(kinematics) = self.kinematics.as_ref().filter(|_| self.joints_went_alone()) else {
+        let Some(kinematics) = self
+            .kinematics
+            .as_ref()
+            .filter(|_| self.joints_went_alone())
+        else {
             return axes + self.offset;
         };
         let joints = self.joints_of(self.guard.position());
@@ -156,7 +184,12 @@ impl FineLoop {
     /// Faults the machine; the plugin's own words about it are kept for the host.
     #[cold]
     fn lose_way(&mut self, kind: FaultKind) {
-        if let Some(Err(error)) = self.kinematics.as_ref().filter(|_| self.fault.is_none()).map(|k| k.health()) {
+        if let Some(Err(error)) = self
+            .kinematics
+            .as_ref()
+            .filter(|_| self.fault.is_none())
+            .map(|k| k.health())
+        {
             self.plugin_error.get_or_insert(error);
         }
         self.fail(kind);

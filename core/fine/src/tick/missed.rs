@@ -27,7 +27,9 @@ pub(super) struct Missed {
 impl Missed {
     /// Nothing missed. Host; allocates.
     pub(super) fn new(config: &FineConfig) -> Self {
-        let window = (WINDOW_S / config.period_s).round().clamp(1.0, MOST_WINDOW_PERIODS);
+        let window = (WINDOW_S / config.period_s)
+            .round()
+            .clamp(1.0, MOST_WINDOW_PERIODS);
         // A share that was written as a decimal number is not to lose a period by its last bit.
         let most = (config.missed.share * window * (1.0 + 4.0 * f64::EPSILON)).floor();
         let remembered = if most < window { most as usize + 1 } else { 0 };
@@ -46,12 +48,24 @@ impl Missed {
         self.in_a_row = self.in_a_row.saturating_add(periods);
         if self.in_a_row > self.most_in_a_row {
             let (missed, most) = (self.in_a_row, self.most_in_a_row);
-            return Some(FaultKind::MissedPeriods { missed, most, of_last: None });
+            return Some(FaultKind::MissedPeriods {
+                missed,
+                most,
+                of_last: None,
+            });
         }
         // More than are remembered at once are too many anyway.
-        let too_many = (first..first + periods.min(self.last.len() as u64)).any(|period| self.remember(period));
-        let (missed, most) = (self.last.len() as u64, (self.last.len() as u64).saturating_sub(1));
-        too_many.then_some(FaultKind::MissedPeriods { missed, most, of_last: Some(self.window_periods) })
+        let too_many = (first..first + periods.min(self.last.len() as u64))
+            .any(|period| self.remember(period));
+        let (missed, most) = (
+            self.last.len() as u64,
+            (self.last.len() as u64).saturating_sub(1),
+        );
+        too_many.then_some(FaultKind::MissedPeriods {
+            missed,
+            most,
+            of_last: Some(self.window_periods),
+        })
     }
 
     /// Whether those remembered with `period` lie in one window.
@@ -59,7 +73,9 @@ impl Missed {
         self.last[self.next] = period;
         self.next = (self.next + 1) % self.last.len();
         // What was never missed stands for a time that has not come.
-        period.checked_sub(self.last[self.next]).is_some_and(|passed| passed < self.window_periods)
+        period
+            .checked_sub(self.last[self.next])
+            .is_some_and(|passed| passed < self.window_periods)
     }
 }
 

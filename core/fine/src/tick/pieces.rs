@@ -25,7 +25,11 @@ impl Laid {
         let mean = f64::midpoint(self.sigma, sigma);
         let needed_s = piece_s / mean;
         if needed_s < self.left_s {
-            *self = Self { sigma, left_s: self.left_s - needed_s, passed_s: self.passed_s + piece_s };
+            *self = Self {
+                sigma,
+                left_s: self.left_s - needed_s,
+                passed_s: self.passed_s + piece_s,
+            };
             return;
         }
         let end = self.sigma + (sigma - self.sigma) * (self.left_s / time_s).min(1.0);
@@ -37,18 +41,46 @@ impl Laid {
 impl FineLoop {
     /// Lays the period out segment by segment, at no rate above `limit`; takes the rate at its end and gives the program time
     /// that passes, s.
-    pub(super) fn govern_in_pieces(&mut self, ratios: &Ratios, way_speed_mm_per_s: f64, limit: f64) -> f64 {
-        let Self { cursor, points, governor, config, .. } = self;
+    pub(super) fn govern_in_pieces(
+        &mut self,
+        ratios: &Ratios,
+        way_speed_mm_per_s: f64,
+        limit: f64,
+    ) -> f64 {
+        let Self {
+            cursor,
+            points,
+            governor,
+            config,
+            ..
+        } = self;
         let covered_s = points.covered_s;
-        let mut laid = Laid { sigma: governor.sigma(), left_s: config.period_s, passed_s: 0.0 };
+        let mut laid = Laid {
+            sigma: governor.sigma(),
+            left_s: config.period_s,
+            passed_s: 0.0,
+        };
         cursor.pieces(|segment, from_s| {
             let whole_s = segment.duration_s - from_s;
             let piece_s = whole_s.min(laid.sigma * laid.left_s);
             if piece_s > 0.0 {
-                let target = piece_target(segment, from_s, piece_s, laid.sigma, ratios, way_speed_mm_per_s);
-                let target = target.min(governor.rate_in_time(laid.passed_s + piece_s)).min(limit);
+                let target = piece_target(
+                    segment,
+                    from_s,
+                    piece_s,
+                    laid.sigma,
+                    ratios,
+                    way_speed_mm_per_s,
+                );
+                let target = target
+                    .min(governor.rate_in_time(laid.passed_s + piece_s))
+                    .min(limit);
                 points.clear();
-                points.add(segment, from_s, whole_s.min(laid.sigma.max(target) * laid.left_s));
+                points.add(
+                    segment,
+                    from_s,
+                    whole_s.min(laid.sigma.max(target) * laid.left_s),
+                );
                 let shortest_s = laid.left_s.min(whole_s / laid.sigma.max(target));
                 let sigma = governor.choose_within(laid.sigma, target, points, shortest_s);
                 laid.pass(whole_s, sigma, shortest_s);
@@ -62,9 +94,19 @@ impl FineLoop {
 }
 
 /// The rate at the end of a piece of `segment` at which neither that end nor the mean exceed what is asked for.
-fn piece_target(segment: &Segment, from_s: f64, piece_s: f64, sigma: f64, ratios: &Ratios, places: f64) -> f64 {
+fn piece_target(
+    segment: &Segment,
+    from_s: f64,
+    piece_s: f64,
+    sigma: f64,
+    ratios: &Ratios,
+    places: f64,
+) -> f64 {
     let to_s = from_s + piece_s;
-    let (before, behind) = (segment.path_speed_mm_per_s(from_s), segment.path_speed_mm_per_s(to_s));
+    let (before, behind) = (
+        segment.path_speed_mm_per_s(from_s),
+        segment.path_speed_mm_per_s(to_s),
+    );
     let of_places = within(places, behind);
     if segment.flags.contains(SegmentFlags::RAPID) {
         return ratios.rapid.min(of_places);
@@ -73,5 +115,9 @@ fn piece_target(segment: &Segment, from_s: f64, piece_s: f64, sigma: f64, ratios
     let at_end = within(allowed, behind).min(of_places);
     let way_mm = segment.path_mm(to_s) - segment.path_mm(from_s);
     let is_below = sigma * before <= allowed * (1.0 + FEED_TOLERANCE);
-    if is_below && way_mm > 0.0 { at_end.min((2.0 * allowed * piece_s / way_mm - sigma).max(0.0)) } else { at_end }
+    if is_below && way_mm > 0.0 {
+        at_end.min((2.0 * allowed * piece_s / way_mm - sigma).max(0.0))
+    } else {
+        at_end
+    }
 }

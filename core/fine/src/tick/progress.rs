@@ -34,12 +34,27 @@ pub(super) struct Progress {
 impl Progress {
     /// A window that has just begun. Host.
     pub(super) fn new(config: &FineConfig) -> Self {
-        let longest_s = config.limits.axes[..config.lane_count()].iter().fold(0.0, |most: f64, axis| {
-            let build_up_s = if config.order >= 3 { axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3 } else { 0.0 };
-            most.max(axis.feed_mm_per_s.max(axis.rapid_mm_per_s) / axis.acceleration_mm_per_s2 + build_up_s)
-        });
+        let longest_s =
+            config.limits.axes[..config.lane_count()]
+                .iter()
+                .fold(0.0, |most: f64, axis| {
+                    let build_up_s = if config.order >= 3 {
+                        axis.acceleration_mm_per_s2 / axis.jerk_mm_per_s3
+                    } else {
+                        0.0
+                    };
+                    most.max(
+                        axis.feed_mm_per_s.max(axis.rapid_mm_per_s) / axis.acceleration_mm_per_s2
+                            + build_up_s,
+                    )
+                });
         let most_periods = (WINDOW * longest_s / config.period_s + FIRST_PERIODS).ceil() as u64;
-        Self { most_periods, periods: 0, from_s: 0.0, asked: 1.0 }
+        Self {
+            most_periods,
+            periods: 0,
+            from_s: 0.0,
+            asked: 1.0,
+        }
     }
 
     fn begin(&mut self, now_s: f64) {
@@ -55,9 +70,20 @@ impl FineLoop {
 
     /// Whether an override or a ratio is as good as 0: what passes then is in the rounding of a day.
     fn stands_by_ratio(&self) -> bool {
-        let (operator, adaptive) = (self.outputs.override_permitted, self.outputs.adaptive_permitted);
-        let feed = if operator { self.given.feed_override } else { 1.0 } * if adaptive { self.ratio } else { 1.0 };
-        let rapid = if operator { self.given.rapid_override } else { 1.0 };
+        let (operator, adaptive) = (
+            self.outputs.override_permitted,
+            self.outputs.adaptive_permitted,
+        );
+        let feed = if operator {
+            self.given.feed_override
+        } else {
+            1.0
+        } * if adaptive { self.ratio } else { 1.0 };
+        let rapid = if operator {
+            self.given.rapid_override
+        } else {
+            1.0
+        };
         feed.min(rapid) < NO_RATE
     }
 
@@ -71,13 +97,21 @@ impl FineLoop {
         let grown_s = now_s - self.progress.from_s;
         let least_s = self.progress.asked * self.config.period_s;
         // What is true nearly always is looked at first.
-        if grown_s > least_s || ask != Ask::Run || self.stands_by_ratio() || self.has_nothing_to_do(reached) {
+        if grown_s > least_s
+            || ask != Ask::Run
+            || self.stands_by_ratio()
+            || self.has_nothing_to_do(reached)
+        {
             self.progress.begin(now_s);
             return;
         }
         self.progress.periods += 1;
         if self.progress.periods > self.progress.most_periods {
-            self.fail(FaultKind::NoProgress { periods: self.progress.periods, grown_s, asked: self.progress.asked });
+            self.fail(FaultKind::NoProgress {
+                periods: self.progress.periods,
+                grown_s,
+                asked: self.progress.asked,
+            });
         }
     }
 }

@@ -41,7 +41,13 @@ impl FineLoop {
         }
         self.release.periods += 1;
         let holds = |state: &JointState| {
-            [JointState::Enabling, JointState::Enabled, JointState::Homing, JointState::QuickStop].contains(state)
+            [
+                JointState::Enabling,
+                JointState::Enabled,
+                JointState::Homing,
+                JointState::QuickStop,
+            ]
+            .contains(state)
         };
         let closed = failed || !self.feedback.state[..self.joints].iter().any(holds);
         self.release.is_over |= closed || self.release.periods >= self.config.disable_periods;

@@ -29,7 +29,10 @@ pub(super) struct Stop {
 
 impl Stop {
     pub(super) fn abort() -> Self {
-        Self { cause: RestCause::Abort, latch: None }
+        Self {
+            cause: RestCause::Abort,
+            latch: None,
+        }
     }
 
     pub(super) fn of(cause: RestCause) -> Self {
@@ -37,7 +40,10 @@ impl Stop {
     }
 
     pub(super) fn attached() -> Self {
-        Self { cause: RestCause::Attached, latch: None }
+        Self {
+            cause: RestCause::Attached,
+            latch: None,
+        }
     }
 }
 
@@ -52,9 +58,15 @@ impl FineLoop {
         } else if let Some(by) = self.outputs.correction.filter(|_| self.cursor.is_resting()) {
             self.outputs.correction = None;
             self.correct(&by);
-            self.stop = Some(Stop { cause: RestCause::Corrected, latch: None });
+            self.stop = Some(Stop {
+                cause: RestCause::Corrected,
+                latch: None,
+            });
         } else if self.cursor.is_resting() && self.cursor.segment().stop_on.edge != Edge::None {
-            self.stop.get_or_insert(Stop { cause: RestCause::Missed, latch: None });
+            self.stop.get_or_insert(Stop {
+                cause: RestCause::Missed,
+                latch: None,
+            });
         }
     }
 
@@ -94,18 +106,32 @@ impl FineLoop {
     /// Behind a move: a motion that waits for an edge may have begun.
     pub(super) fn begin_edge(&mut self) {
         if self.edge.begin(self.cursor.segment(), &self.feedback) {
-            self.stop.get_or_insert(Stop { cause: RestCause::Already, latch: None });
+            self.stop.get_or_insert(Stop {
+                cause: RestCause::Already,
+                latch: None,
+            });
         }
     }
 
     /// Behind an exchange: the edge may have come.
     pub(super) fn watch_edge(&mut self) {
         let stop_on = &self.cursor.segment().stop_on;
-        if stop_on.edge == Edge::None || self.stop.is_some() || !matches!(self.phase, Phase::Following) {
+        if stop_on.edge == Edge::None
+            || self.stop.is_some()
+            || !matches!(self.phase, Phase::Following)
+        {
             return;
         }
-        if let Some(latch) = self.edge.find(stop_on, &self.feedback, &self.measured, self.config.period_s) {
-            self.stop = Some(Stop { cause: RestCause::Edge, latch: Some(latch) });
+        if let Some(latch) = self.edge.find(
+            stop_on,
+            &self.feedback,
+            &self.measured,
+            self.config.period_s,
+        ) {
+            self.stop = Some(Stop {
+                cause: RestCause::Edge,
+                latch: Some(latch),
+            });
         }
     }
 
@@ -157,7 +183,8 @@ impl FineLoop {
         if self.given.abort {
             return self.part(Stop::abort());
         }
-        let enough = self.depth.is_of(self.cursor.epoch()) && self.depth.may_start(self.cursor.program_time_s());
+        let enough = self.depth.is_of(self.cursor.epoch())
+            && self.depth.may_start(self.cursor.program_time_s());
         if self.cursor.drop_older() && enough && self.state == MachineState::Standstill {
             self.phase = Phase::Following;
         }

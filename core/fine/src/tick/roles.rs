@@ -55,17 +55,30 @@ impl FineLoop {
     /// Inputs that are a fault.
     fn obey_stops(&mut self, tripped: &Tripped) {
         let roles = &self.config.roles;
-        let moves = matches!(self.phase, Phase::Following) && self.setpoint.velocity != AxisVector::ZERO;
+        let moves =
+            matches!(self.phase, Phase::Following) && self.setpoint.velocity != AxisVector::ZERO;
         let homes = self.outputs.unhomed != 0;
         if !moves {
             let may_leave = homes || roles.may_leave_limits;
-            self.roles.stood_on = if may_leave { tripped.all & !tripped.old } else { 0 };
+            self.roles.stood_on = if may_leave {
+                tripped.all & !tripped.old
+            } else {
+                0
+            };
         }
         self.roles.stood_on &= tripped.all & !tripped.old;
         let holds = self.attach.is_done() && (!self.outputs.ended || self.stays_enabled());
         let sought = if homes { roles.home_switches } else { 0 };
-        let limits = if moves { roles.limit & !self.roles.stood_on & !sought } else { 0 };
-        let awaited = if moves { roles.awaited & self.awaited() & tripped.old } else { 0 };
+        let limits = if moves {
+            roles.limit & !self.roles.stood_on & !sought
+        } else {
+            0
+        };
+        let awaited = if moves {
+            roles.awaited & self.awaited() & tripped.old
+        } else {
+            0
+        };
         let ready = if holds { roles.drives_ready } else { 0 };
         for (those, role) in [
             (roles.emergency_stop, InputFault::EmergencyStop),
@@ -73,7 +86,9 @@ impl FineLoop {
             (limits, InputFault::Limit),
             (awaited, InputFault::Awaited),
         ] {
-            let Some((input, old)) = tripped.first(those) else { continue };
+            let Some((input, old)) = tripped.first(those) else {
+                continue;
+            };
             self.fail(FaultKind::Input { role, input, old });
             // What the operator's switches off, it does too, whatever has been a fault before.
             self.given.emergency_stop |= role == InputFault::EmergencyStop;
@@ -83,13 +98,20 @@ impl FineLoop {
     /// The input that the motion waits for, as a mask.
     fn awaited(&self) -> u64 {
         let stop_on = &self.cursor.segment().stop_on;
-        if stop_on.edge == Edge::None { 0 } else { 1 << stop_on.input.min(63) }
+        if stop_on.edge == Edge::None {
+            0
+        } else {
+            1 << stop_on.input.min(63)
+        }
     }
 
     /// Inputs that hold the machine until they are released and the operator resumes.
     fn obey_holds(&mut self, tripped: &Tripped) {
         let roles = &self.config.roles;
-        let (door, hold) = (tripped.all & roles.door != 0, tripped.all & roles.feed_hold != 0);
+        let (door, hold) = (
+            tripped.all & roles.door != 0,
+            tripped.all & roles.feed_hold != 0,
+        );
         self.roles.hold |= hold;
         if door || hold {
             self.controls.hold.store(true, Relaxed);
@@ -114,7 +136,11 @@ impl FineLoop {
 
     /// What the spindle is told: nothing, where a door is open.
     pub(super) fn spindle_rad_per_s(&self) -> f64 {
-        if self.roles.door { 0.0 } else { self.outputs.spindle_rad_per_s }
+        if self.roles.door {
+            0.0
+        } else {
+            self.outputs.spindle_rad_per_s
+        }
     }
 
     /// Which hold it is that the machine rests by.

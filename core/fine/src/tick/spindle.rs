@@ -18,7 +18,10 @@ pub(super) struct SpinUp {
 impl SpinUp {
     /// The spindle is told a speed from this period on.
     pub(super) fn begin() -> Self {
-        Self { exchanges: Some(0), waits: false }
+        Self {
+            exchanges: Some(0),
+            waits: false,
+        }
     }
 
     /// Whether the spindle may not be at its speed.
@@ -30,7 +33,9 @@ impl SpinUp {
 impl FineLoop {
     /// Behind an exchange: the spindle may have come to its speed, or is told to stand, which nothing waits for.
     pub(super) fn hear_spindle(&mut self) {
-        let Some(exchanges) = self.spin_up.exchanges else { return };
+        let Some(exchanges) = self.spin_up.exchanges else {
+            return;
+        };
         self.spin_up.exchanges = Some(exchanges + 1);
         let is_there = self.has_answered() && self.feedback.spindle_at_speed != 0;
         if is_there || self.setpoint.spindle_rad_per_s == 0.0 {
@@ -41,8 +46,13 @@ impl FineLoop {
     /// Whether what the driver says of the spindle is of the speed that it was told last. A spindle has no delay of its own: that
     /// of the slowest joint is its.
     fn has_answered(&self) -> bool {
-        let delay = self.config.attached.delay_periods[..self.joints].iter().max().map_or(0, |most| u64::from(*most));
-        self.spin_up.exchanges.is_none_or(|exchanges| exchanges >= ANSWERED + delay)
+        let delay = self.config.attached.delay_periods[..self.joints]
+            .iter()
+            .max()
+            .map_or(0, |most| u64::from(*most));
+        self.spin_up
+            .exchanges
+            .is_none_or(|exchanges| exchanges >= ANSWERED + delay)
     }
 
     /// Whether the motion of this period waits for the spindle: a cut does, from its start or in its midst. As long as the driver

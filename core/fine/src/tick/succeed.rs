@@ -47,7 +47,8 @@ impl FineLoop {
         std::mem::swap(&mut self.measured, &mut last.measured);
         self.beats_on = last.setpoint.tick > 0;
         (self.offset, self.axes) = (last.offset, last.axes);
-        (self.outputs.bits, self.outputs.spindle_rad_per_s) = (last.outputs.bits, last.outputs.spindle_rad_per_s);
+        (self.outputs.bits, self.outputs.spindle_rad_per_s) =
+            (last.outputs.bits, last.outputs.spindle_rad_per_s);
         self.outputs.by = last.outputs.by;
         self.spin_up = last.spin_up;
         if self.outputs.ended {
@@ -76,7 +77,10 @@ impl FineLoop {
     pub fn job_end(&self) -> JobEnd {
         JobEnd {
             counters: self.counters,
-            left: Left { switched: self.switched(), ..self.left },
+            left: Left {
+                switched: self.switched(),
+                ..self.left
+            },
             position: self.config.axes_alone(self.guard.position()),
         }
     }

@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event, EventKind, Feedback,
-    JointState, Kinematics, Limits, PluginError, Segment, SegmentFlags, Setpoint, StopOn,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event,
+    EventKind, Feedback, JointState, Kinematics, Limits, PluginError, Segment, SegmentFlags,
+    Setpoint, StopOn,
 };
 
 /// Fine period, s.
@@ -44,14 +45,26 @@ impl Driver for Echo {
         Ok(Attached::default())
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         feedback.position = setpoint.position;
         feedback.speed = setpoint.velocity;
         if self.spoiled.load(Relaxed) {
             feedback.position[0] = f64::NAN;
         }
-        feedback.state.fill(if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled });
-        if self.failing.load(Relaxed) { Err(PluginError::fixed("the drives are lost")) } else { Ok(()) }
+        feedback.state.fill(if setpoint.enable == 0 {
+            JointState::Disabled
+        } else {
+            JointState::Enabled
+        });
+        if self.failing.load(Relaxed) {
+            Err(PluginError::fixed("the drives are lost"))
+        } else {
+            Ok(())
+        }
     }
 
     fn quick_stop(&mut self) {
@@ -90,7 +103,12 @@ impl Bench {
 
     /// Three axes and as many joints behind them, as `kinematics` give them.
     pub fn with_curved(kinematics: Box<dyn Kinematics>) -> Self {
-        Self::of(GuardMode::Stop, Joints::Curved { axes: 3 }, (6, 1.0), Some(kinematics))
+        Self::of(
+            GuardMode::Stop,
+            Joints::Curved { axes: 3 },
+            (6, 1.0),
+            Some(kinematics),
+        )
     }
 
     fn of(
@@ -115,9 +133,15 @@ impl Bench {
             kept_outputs: 1 << KEPT_OUTPUT,
             ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 6][..entries]).unwrap())
         };
-        let (rough, end, host) = bridge(Sizes { segments: 64, samples: 64 });
+        let (rough, end, host) = bridge(Sizes {
+            segments: 64,
+            samples: 64,
+        });
         let failing = Arc::new(AtomicBool::new(false));
-        let (spoiled, quick_stops) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+        let (spoiled, quick_stops) = (
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(AtomicU64::new(0)),
+        );
         let driver = Echo {
             failing: Arc::clone(&failing),
             spoiled: Arc::clone(&spoiled),
@@ -167,7 +191,12 @@ impl Bench {
 
     /// Queues the way from rest to the feed.
     pub fn accelerate(&mut self) {
-        self.piece(0.0, PLANNED_MM_PER_S2, FEED_MM_PER_S / PLANNED_MM_PER_S2, false);
+        self.piece(
+            0.0,
+            PLANNED_MM_PER_S2,
+            FEED_MM_PER_S / PLANNED_MM_PER_S2,
+            false,
+        );
     }
 
     /// Queues motion at the feed.
@@ -183,18 +212,29 @@ impl Bench {
     /// Queues the way from rest to a speed and back, with all that the axis has.
     pub fn peak(&mut self, peak_mm_per_s: f64) {
         self.piece(0.0, MOST_MM_PER_S2, peak_mm_per_s / MOST_MM_PER_S2, false);
-        self.piece(peak_mm_per_s, -MOST_MM_PER_S2, peak_mm_per_s / MOST_MM_PER_S2, true);
+        self.piece(
+            peak_mm_per_s,
+            -MOST_MM_PER_S2,
+            peak_mm_per_s / MOST_MM_PER_S2,
+            true,
+        );
     }
 
     /// Queues the way from the feed to rest.
     pub fn brake(&mut self) {
-        self.piece(FEED_MM_PER_S, -PLANNED_MM_PER_S2, FEED_MM_PER_S / PLANNED_MM_PER_S2, true);
+        self.piece(
+            FEED_MM_PER_S,
+            -PLANNED_MM_PER_S2,
+            FEED_MM_PER_S / PLANNED_MM_PER_S2,
+            true,
+        );
     }
 
     /// Takes the report of a rest, and queues in the next epoch from there.
     pub fn go_on(&mut self) {
         let rest = self.rough.rests.pop().expect("a rest");
-        (self.epoch, self.queued_s, self.x_mm) = (rest.epoch + 1, rest.program_time_s, rest.position[0]);
+        (self.epoch, self.queued_s, self.x_mm) =
+            (rest.epoch + 1, rest.program_time_s, rest.position[0]);
         self.rough.depth.begin(self.epoch, self.queued_s);
     }
 
@@ -205,30 +245,63 @@ impl Bench {
 
     /// What is queued from here on waits for an input that never comes.
     pub fn probe(&mut self) {
-        self.stop_on = StopOn { input: 5, edge: Edge::Rising, miss_is_fault: 1 };
+        self.stop_on = StopOn {
+            input: 5,
+            edge: Edge::Rising,
+            miss_is_fault: 1,
+        };
     }
 
     /// Queues an event.
     pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
-        let event = Event { program_time_s: self.queued_s, epoch: self.epoch, ..Event::new(kind, 1, 0, index, value) };
+        let event = Event {
+            program_time_s: self.queued_s,
+            epoch: self.epoch,
+            ..Event::new(kind, 1, 0, index, value)
+        };
         self.rough.segments.push(Queued::Event(event)).unwrap();
     }
 
-    fn piece(&mut self, speed_mm_per_s: f64, acceleration_mm_per_s2: f64, duration_s: f64, last: bool) {
+    fn piece(
+        &mut self,
+        speed_mm_per_s: f64,
+        acceleration_mm_per_s2: f64,
+        duration_s: f64,
+        last: bool,
+    ) {
         let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
-        let motion = [self.x_mm, speed_mm_per_s, acceleration_mm_per_s2 / 2.0, 0.0, 0.0, 0.0];
+        let motion = [
+            self.x_mm,
+            speed_mm_per_s,
+            acceleration_mm_per_s2 / 2.0,
+            0.0,
+            0.0,
+            0.0,
+        ];
         (segment.coefficients[0], segment.path) = (motion, motion);
-        segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
+        segment.flags = if last {
+            SegmentFlags::ENDS_AT_REST
+        } else {
+            SegmentFlags::default()
+        };
         segment.epoch = self.epoch;
         segment.stop_on = self.stop_on;
         segment.feed_mm_per_s = FEED_MM_PER_S;
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
-        self.rough.segments.push(Queued::Segment { start_s: self.queued_s, segment }).unwrap();
+        self.rough
+            .segments
+            .push(Queued::Segment {
+                start_s: self.queued_s,
+                segment,
+            })
+            .unwrap();
         self.x_mm = segment.position(duration_s)[0];
         self.queued_s += duration_s;
         let depth = &self.rough.depth;
         depth.stop_deceleration_mm_per_s2.store(PLANNED_MM_PER_S2);
-        depth.wall_s.store(if last { f64::INFINITY } else { self.queued_s });
+        depth
+            .wall_s
+            .store(if last { f64::INFINITY } else { self.queued_s });
         depth.required_s.store(if last { 0.0 } else { 0.2 });
     }
 }

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use tandem_fine::{FaultKind, FineConfig, FineLoop};
 use tandem_rings::{HostEnd, MachineState, Queued, Rest, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Event, EventKind, JointState, Kinematics, Limits, MAX_AXES, Segment,
-    SegmentFlags, Setpoint, StopOn,
+    Attached, AxisLimits, AxisVector, Event, EventKind, JointState, Kinematics, Limits, MAX_AXES,
+    Segment, SegmentFlags, Setpoint, StopOn,
 };
 
 #[allow(unused_imports)] // each test needs some of it
@@ -65,14 +65,41 @@ impl Bench {
     }
 
     /// The same with kinematics.
-    pub fn with(config: &FineConfig, script: Script, kinematics: Option<Box<dyn Kinematics>>) -> Self {
-        let attached = Attached { position: script.position, ..config.attached };
+    pub fn with(
+        config: &FineConfig,
+        script: Script,
+        kinematics: Option<Box<dyn Kinematics>>,
+    ) -> Self {
+        let attached = Attached {
+            position: script.position,
+            ..config.attached
+        };
         let script = Arc::new(Mutex::new(script));
-        let (rough, end, host) = bridge(Sizes { segments: 64, samples: 1 << 14 });
+        let (rough, end, host) = bridge(Sizes {
+            segments: 64,
+            samples: 1 << 14,
+        });
         let drives = Box::new(Drives(Arc::clone(&script)));
-        let mut fine = FineLoop::new(&FineConfig { attached, ..*config }, end, drives, kinematics);
+        let mut fine = FineLoop::new(
+            &FineConfig {
+                attached,
+                ..*config
+            },
+            end,
+            drives,
+            kinematics,
+        );
         fine.reset();
-        Self { fine, rough, host, script, epoch: 0, position: AxisVector::ZERO, start_s: 0.0, rapid: false }
+        Self {
+            fine,
+            rough,
+            host,
+            script,
+            epoch: 0,
+            position: AxisVector::ZERO,
+            start_s: 0.0,
+            rapid: false,
+        }
     }
 
     pub fn script(&self) -> MutexGuard<'_, Script> {
@@ -101,7 +128,8 @@ impl Bench {
         for _ in 0..most {
             self.fine.tick();
             if let Ok(rest) = self.rough.rests.pop() {
-                (self.epoch, self.start_s, self.position) = (rest.epoch + 1, rest.program_time_s, rest.position);
+                (self.epoch, self.start_s, self.position) =
+                    (rest.epoch + 1, rest.program_time_s, rest.position);
                 self.rough.depth.begin(self.epoch, self.start_s);
                 return Some(rest);
             }
@@ -113,16 +141,34 @@ impl Bench {
     pub fn piece(&mut self, motion: [AxisVector; 2], duration_s: f64, last: bool, stop_on: StopOn) {
         let mut segment = Segment::rest(&self.position, duration_s);
         for (axis, coefficients) in segment.coefficients.iter_mut().enumerate() {
-            *coefficients = [self.position[axis], motion[0][axis], motion[1][axis], 0.0, 0.0, 0.0];
+            *coefficients = [
+                self.position[axis],
+                motion[0][axis],
+                motion[1][axis],
+                0.0,
+                0.0,
+                0.0,
+            ];
         }
         segment.path = segment.coefficients[0];
-        segment.flags = if last { SegmentFlags::ENDS_AT_REST } else { SegmentFlags::default() };
+        segment.flags = if last {
+            SegmentFlags::ENDS_AT_REST
+        } else {
+            SegmentFlags::default()
+        };
         if self.rapid {
             segment.flags = segment.flags.with(SegmentFlags::RAPID);
         }
-        (segment.epoch, segment.feed_mm_per_s, segment.stop_on) = (self.epoch, FEED_MM_PER_S, stop_on);
+        (segment.epoch, segment.feed_mm_per_s, segment.stop_on) =
+            (self.epoch, FEED_MM_PER_S, stop_on);
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;
-        self.rough.segments.push(Queued::Segment { start_s: self.start_s, segment }).unwrap();
+        self.rough
+            .segments
+            .push(Queued::Segment {
+                start_s: self.start_s,
+                segment,
+            })
+            .unwrap();
         self.position = segment.position(duration_s);
         self.start_s += duration_s;
         self.go();
@@ -135,7 +181,10 @@ impl Bench {
             vector[axis] = amount;
             vector
         };
-        let (speed, half) = (along(PLANNED_MM_PER_S2 * ramp_s), along(PLANNED_MM_PER_S2 / 2.0));
+        let (speed, half) = (
+            along(PLANNED_MM_PER_S2 * ramp_s),
+            along(PLANNED_MM_PER_S2 / 2.0),
+        );
         self.piece([AxisVector::ZERO, half], ramp_s, false, stop_on);
         if cruise_s > 0.0 {
             self.piece([speed, AxisVector::ZERO], cruise_s, false, stop_on);
@@ -145,14 +194,21 @@ impl Bench {
 
     pub fn queue_event(&mut self, kind: EventKind, index: i32, value: f64) {
         let event = Event::new(kind, 1, 0, index, value);
-        let event = Event { program_time_s: self.start_s, epoch: self.epoch, ..event };
+        let event = Event {
+            program_time_s: self.start_s,
+            epoch: self.epoch,
+            ..event
+        };
         self.rough.segments.push(Queued::Event(event)).unwrap();
         self.go();
     }
 
     /// Everything that is needed is queued.
     fn go(&self) {
-        self.rough.depth.stop_deceleration_mm_per_s2.store(PLANNED_MM_PER_S2);
+        self.rough
+            .depth
+            .stop_deceleration_mm_per_s2
+            .store(PLANNED_MM_PER_S2);
         self.rough.depth.wall_s.store(f64::INFINITY);
         self.rough.depth.required_s.store(0.0);
     }
@@ -163,18 +219,28 @@ impl Bench {
         let script = self.script();
         let mut held = [None; MAX_AXES];
         for (index, (setpoint, before)) in script.told.iter().enumerate() {
-            let all = before.state[..script.joints].iter().all(|state| *state == JointState::Enabled);
+            let all = before.state[..script.joints]
+                .iter()
+                .all(|state| *state == JointState::Enabled);
             for (joint, held) in held.iter_mut().enumerate().take(script.joints) {
                 let at = setpoint.position[joint];
-                let own = setpoint.homing >> joint & 1 == 1 || before.state[joint] == JointState::Homing;
+                let own =
+                    setpoint.homing >> joint & 1 == 1 || before.state[joint] == JointState::Homing;
                 if before.state[joint] == JointState::Enabled && setpoint.enable != 0 && !own {
                     let stays = held.unwrap_or(script.told[index - 1].0.position[joint]);
                     let homed = index > 0 && script.told[index - 1].0.homing >> joint & 1 == 1;
-                    assert!(all || homed || at == stays, "exchange {index}: joint {joint} moved before all held");
+                    assert!(
+                        all || homed || at == stays,
+                        "exchange {index}: joint {joint} moved before all held"
+                    );
                     *held = Some(stays).filter(|_| !all);
                 } else {
                     *held = None;
-                    let known = if index == 0 { at } else { before.position[joint] };
+                    let known = if index == 0 {
+                        at
+                    } else {
+                        before.position[joint]
+                    };
                     assert!(
                         (at - known).abs() <= count_mm,
                         "exchange {index}: joint {joint} was told {at}, stood at {known}"

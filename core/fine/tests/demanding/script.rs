@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use rtrb::Consumer;
 use tandem_rings::Rest;
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Edge, Feedback, JointState, Latch, MAX_AXES,
-    PluginError, Setpoint,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Edge, Feedback, JointState,
+    Latch, MAX_AXES, PluginError, Setpoint,
 };
 
 use super::PERIOD_S;
@@ -145,14 +145,22 @@ impl Script {
         } else {
             (self.enabled_for, self.disabled_for) = (self.enabled_for + 1, 0);
         }
-        let before = self.told.iter().nth_back(1).map_or(0.0, |(told, _)| told.spindle_rad_per_s);
+        let before = self
+            .told
+            .iter()
+            .nth_back(1)
+            .map_or(0.0, |(told, _)| told.spindle_rad_per_s);
         let speed = setpoint.spindle_rad_per_s;
         self.spun_for = match speed {
             0.0 => 0,
             _ if speed == before => self.spun_for + 1,
             _ => 1,
         };
-        self.homing_for = if setpoint.homing == 0 { 0 } else { self.homing_for + 1 };
+        self.homing_for = if setpoint.homing == 0 {
+            0
+        } else {
+            self.homing_for + 1
+        };
         if self.homing_for == self.homing_lag + 1 {
             self.homed &= !setpoint.homing;
         }
@@ -176,7 +184,11 @@ impl Script {
         let homes = setpoint.homing >> joint & 1 == 1;
         let begun = homes && self.homing_for > self.homing_lag;
         let own = begun && self.homed >> joint & 1 == 0 && state == JointState::Enabled;
-        feedback.fault_code[joint] = if state == JointState::Fault { FAULT_CODE } else { 0 };
+        feedback.fault_code[joint] = if state == JointState::Fault {
+            FAULT_CODE
+        } else {
+            0
+        };
         if own && self.homing_for - self.homing_lag > self.homing_takes && !self.never_homes {
             self.homed |= 1 << joint;
             self.position[joint] = self.homed_at_mm;
@@ -188,7 +200,11 @@ impl Script {
         } else if state != JointState::Enabled {
             self.position[joint] -= self.sag_mm[joint];
         }
-        if own && self.homing_fails_after.is_some_and(|after| self.homing_for > after) {
+        if own
+            && self
+                .homing_fails_after
+                .is_some_and(|after| self.homing_for > after)
+        {
             (state, feedback.fault_code[joint]) = (JointState::Fault, HOMING_CODE);
         }
         feedback.state[joint] = state;
@@ -201,7 +217,14 @@ impl Script {
             return Latch::default();
         }
         let (input, edge) = (setpoint.arm.input, setpoint.arm.edge);
-        Latch { input, edge, joints: 1, before_s: PERIOD_S / 2.0, position: self.position, ..Latch::default() }
+        Latch {
+            input,
+            edge,
+            joints: 1,
+            before_s: PERIOD_S / 2.0,
+            position: self.position,
+            ..Latch::default()
+        }
     }
 }
 
@@ -218,7 +241,11 @@ impl Driver for Drives {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(self.0.lock().unwrap().position))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         let mut script = self.0.lock().unwrap();
         script.told.push((*setpoint, *feedback));
         if let Some(rests) = &mut script.rests {
@@ -235,7 +262,11 @@ impl Driver for Drives {
         for joint in 0..script.joints {
             script.drive(joint, setpoint, feedback);
         }
-        let begun = if script.homing_for > script.homing_lag { setpoint.homing } else { 0 };
+        let begun = if script.homing_for > script.homing_lag {
+            setpoint.homing
+        } else {
+            0
+        };
         script.was_homed &= !begun;
         feedback.homed = script.homed | script.was_homed;
         let position = script.position;
@@ -247,7 +278,10 @@ impl Driver for Drives {
         feedback.latches[0] = script.latch(setpoint);
         let turns = setpoint.spindle_rad_per_s == 0.0 || script.spun_for > script.spin_up;
         feedback.spindle_at_speed = u32::from(turns);
-        (feedback.has_phase, feedback.phase_ns) = (u32::from(script.phase_ns.is_some()), script.phase_ns.unwrap_or(5));
+        (feedback.has_phase, feedback.phase_ns) = (
+            u32::from(script.phase_ns.is_some()),
+            script.phase_ns.unwrap_or(5),
+        );
         feedback.age_periods = [script.late; MAX_AXES];
         Ok(())
     }

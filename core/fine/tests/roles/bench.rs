@@ -33,8 +33,14 @@ pub enum Role {
     Probe,
 }
 
-pub const ROLES: [Role; 6] =
-    [Role::EmergencyStop, Role::DrivesReady, Role::Door, Role::FeedHold, Role::Limit, Role::Probe];
+pub const ROLES: [Role; 6] = [
+    Role::EmergencyStop,
+    Role::DrivesReady,
+    Role::Door,
+    Role::FeedHold,
+    Role::Limit,
+    Role::Probe,
+];
 
 /// What the machine does when an input trips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,19 +100,32 @@ impl DerefMut for Bench {
 }
 
 pub fn config(roles: Roles, unhomed: u32) -> FineConfig {
-    FineConfig { unhomed, roles, at_speed_within_s: AT_SPEED_WITHIN_S, ..demanding::config(JOINTS) }
+    FineConfig {
+        unhomed,
+        roles,
+        at_speed_within_s: AT_SPEED_WITHIN_S,
+        ..demanding::config(JOINTS)
+    }
 }
 
 /// Drives that need their time, and these levels of the inputs.
 pub fn script(inputs: u64) -> Script {
     let (joints, spin_up) = (JOINTS, SPIN_UP);
-    Script { inputs, spin_up, enable_after: [ENABLE - 1; tandem_sdk::MAX_AXES], ..Script::new(joints) }
+    Script {
+        inputs,
+        spin_up,
+        enable_after: [ENABLE - 1; tandem_sdk::MAX_AXES],
+        ..Script::new(joints)
+    }
 }
 
 impl Bench {
     /// A machine whose `input` has `role`; `closed` is its normal level.
     pub fn new(role: Role, doing: Doing, input: u32, closed: bool) -> Self {
-        let mut roles = Roles { may_leave_limits: doing == Doing::Jogging, ..Roles::default() };
+        let mut roles = Roles {
+            may_leave_limits: doing == Doing::Jogging,
+            ..Roles::default()
+        };
         let bit = 1 << input;
         match role {
             Role::EmergencyStop => roles.emergency_stop = bit,
@@ -120,12 +139,20 @@ impl Bench {
         roles.max_age_periods[input as usize] = MAX_AGE;
         let inputs = if closed { bit } else { 0 };
         let config = config(roles, u32::from(doing == Doing::Homing));
-        Self { machine: demanding::Bench::new(&config, script(inputs)), closed, input }
+        Self {
+            machine: demanding::Bench::new(&config, script(inputs)),
+            closed,
+            input,
+        }
     }
 
     /// The same machine whose inputs have these roles.
     pub fn with_roles(roles: Roles, unhomed: u32, input: u32, inputs: u64) -> Self {
-        Self { machine: demanding::Bench::new(&config(roles, unhomed), script(inputs)), closed: inputs != 0, input }
+        Self {
+            machine: demanding::Bench::new(&config(roles, unhomed), script(inputs)),
+            closed: inputs != 0,
+            input,
+        }
     }
 
     /// Ticks until all joints hold.
@@ -162,7 +189,10 @@ impl Bench {
         }
         self.queue_spindle();
         // The spindle turns by then, and what waits for it has begun.
-        let (some, no_edge) = (u64::from(SPIN_UP) + 10 + random.below(1200), StopOn::default());
+        let (some, no_edge) = (
+            u64::from(SPIN_UP) + 10 + random.below(1200),
+            StopOn::default(),
+        );
         match doing {
             Doing::Dwelling => {
                 self.piece([AxisVector::ZERO; 2], 2.0, true, no_edge);
@@ -176,7 +206,11 @@ impl Bench {
                 assert_eq!(self.told().homing, 1);
                 return;
             }
-            Doing::Probing => self.queue_move(StopOn { input: PROBE, edge: Edge::Rising, miss_is_fault: 0 }),
+            Doing::Probing => self.queue_move(StopOn {
+                input: PROBE,
+                edge: Edge::Rising,
+                miss_is_fault: 0,
+            }),
             _ => self.queue_move(no_edge),
         }
         match doing {
@@ -199,7 +233,11 @@ impl Bench {
     pub fn trip(&mut self, old: bool) {
         let input = self.input;
         let mut script = self.script();
-        if old { script.input_age[input as usize] = MAX_AGE + 1 } else { script.inputs ^= 1 << input }
+        if old {
+            script.input_age[input as usize] = MAX_AGE + 1
+        } else {
+            script.inputs ^= 1 << input
+        }
     }
 
     pub fn release(&mut self) {
@@ -218,7 +256,10 @@ impl Bench {
     pub fn assert_limits(&self) {
         for (told, _) in &self.script().told {
             let most = ACCELERATION_MM_PER_S2 * (1.0 + 1e-6) + 1e-6;
-            assert!(told.velocity[0].abs() <= FEED_MM_PER_S * (1.0 + 1e-6), "{told:?}");
+            assert!(
+                told.velocity[0].abs() <= FEED_MM_PER_S * (1.0 + 1e-6),
+                "{told:?}"
+            );
             assert!(told.acceleration[0].abs() <= most, "{told:?}");
         }
     }
@@ -228,7 +269,10 @@ impl Bench {
         self.ticks(2);
         assert_eq!(self.fault(), Some(kind));
         self.ticks(400);
-        assert_eq!((self.fault(), self.state(), self.told().enable), (Some(kind), MachineState::Fault, 0));
+        assert_eq!(
+            (self.fault(), self.state(), self.told().enable),
+            (Some(kind), MachineState::Fault, 0)
+        );
         assert!(self.fine.is_over());
     }
 }

@@ -9,7 +9,10 @@ mod spindle;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use bench::{ALL, AT_SPEED_WITHIN_S, Bench, Doing, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP, SPINDLE_RAD_PER_S};
+use bench::{
+    ALL, AT_SPEED_WITHIN_S, Bench, Doing, ENABLE, MAX_AGE, PROBE, ROLES, Role, SPIN_UP,
+    SPINDLE_RAD_PER_S,
+};
 use demanding::FAULT_CODE;
 use tandem_fine::{FaultKind, InputFault, Roles};
 use tandem_rig::Random;
@@ -24,13 +27,21 @@ fn each(mut judge: impl FnMut(Bench, Doing, bool, &mut Random), of: Role) {
             for _ in 0..12 {
                 seed += 1;
                 let mut random = Random::new(seed);
-                let input = if of == Role::Probe { PROBE } else { 8 + random.below(56) as u32 };
+                let input = if of == Role::Probe {
+                    PROBE
+                } else {
+                    8 + random.below(56) as u32
+                };
                 // A probe is waited for as it rises.
                 let closed = of != Role::Probe && random.below(2) == 0;
                 let mut bench = Bench::new(of, doing, input, closed);
                 bench.begin(doing, &mut random);
                 let before = bench.fault();
-                assert_eq!(before.is_some(), doing == Doing::Ramping, "{doing:?} seed {seed}");
+                assert_eq!(
+                    before.is_some(),
+                    doing == Doing::Ramping,
+                    "{doing:?} seed {seed}"
+                );
                 bench.trip(old);
                 judge(bench, doing, old, &mut random);
             }
@@ -38,23 +49,42 @@ fn each(mut judge: impl FnMut(Bench, Doing, bool, &mut Random), of: Role) {
     }
 }
 
-const DRIVE_FAULT: FaultKind = FaultKind::Drive { joint: 0, code: FAULT_CODE };
+const DRIVE_FAULT: FaultKind = FaultKind::Drive {
+    joint: 0,
+    code: FAULT_CODE,
+};
 
 #[test]
 fn an_emergency_stop_is_one_in_every_state() {
     each(
         |mut bench, doing, old, _| {
-            let kind = FaultKind::Input { role: InputFault::EmergencyStop, input: bench.input, old };
+            let kind = FaultKind::Input {
+                role: InputFault::EmergencyStop,
+                input: bench.input,
+                old,
+            };
             bench.ticks(2);
-            assert_eq!(bench.told().spindle_rad_per_s, 0.0, "at once, whatever moves still");
-            bench.assert_ends_by(if doing == Doing::Ramping { DRIVE_FAULT } else { kind });
+            assert_eq!(
+                bench.told().spindle_rad_per_s,
+                0.0,
+                "at once, whatever moves still"
+            );
+            bench.assert_ends_by(if doing == Doing::Ramping {
+                DRIVE_FAULT
+            } else {
+                kind
+            });
             bench.assert_limits();
             // It is pressed still: the drives are not told to hold once more.
             bench.script().fault = None;
             bench.fine.reset();
             let from = bench.script().told.len();
             bench.assert_ends_by(kind);
-            assert!(bench.script().told[from..].iter().all(|(told, _)| told.enable == 0));
+            assert!(
+                bench.script().told[from..]
+                    .iter()
+                    .all(|(told, _)| told.enable == 0)
+            );
             bench.release();
             bench.fine.reset();
             bench.ticks(2 * ENABLE);
@@ -70,7 +100,11 @@ fn drives_are_not_enabled_before_an_emergency_stop_that_is_pressed_was_heard_of(
     for old in [false, true] {
         let mut bench = Bench::new(Role::EmergencyStop, Doing::Enabling, 9, true);
         bench.trip(old);
-        bench.assert_ends_by(FaultKind::Input { role: InputFault::EmergencyStop, input: 9, old });
+        bench.assert_ends_by(FaultKind::Input {
+            role: InputFault::EmergencyStop,
+            input: 9,
+            old,
+        });
         assert!(bench.script().told.iter().all(|(told, _)| told.enable == 0));
     }
 }
@@ -91,15 +125,26 @@ fn an_input_that_was_never_heard_of_is_not_called_tripped() {
 fn drives_that_are_not_ready_are_a_fault_where_they_hold() {
     each(
         |mut bench, doing, old, _| {
-            let kind = FaultKind::Input { role: InputFault::DrivesReady, input: bench.input, old };
+            let kind = FaultKind::Input {
+                role: InputFault::DrivesReady,
+                input: bench.input,
+                old,
+            };
             if doing == Doing::Enabling {
                 while bench.fine.is_attaching() {
                     bench.ticks(1);
                 }
                 let enabled_for = bench.script().enabled_for;
-                assert!(enabled_for >= ENABLE, "a contactor may close while they are enabled: {enabled_for}");
+                assert!(
+                    enabled_for >= ENABLE,
+                    "a contactor may close while they are enabled: {enabled_for}"
+                );
             }
-            bench.assert_ends_by(if doing == Doing::Ramping { DRIVE_FAULT } else { kind });
+            bench.assert_ends_by(if doing == Doing::Ramping {
+                DRIVE_FAULT
+            } else {
+                kind
+            });
             bench.assert_limits();
         },
         Role::DrivesReady,
@@ -119,15 +164,25 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     bench.ticks(2);
     let controls = Arc::clone(&bench.host.controls);
     assert!(controls.hold.load(Relaxed));
-    assert_eq!(bench.told().spindle_rad_per_s == 0.0, door || [Doing::Enabling, Doing::Waiting].contains(&doing));
+    assert_eq!(
+        bench.told().spindle_rad_per_s == 0.0,
+        door || [Doing::Enabling, Doing::Waiting].contains(&doing)
+    );
     if [Doing::Enabling, Doing::Waiting].contains(&doing) {
         bench.queue_spindle();
         bench.queue_move(StopOn::default());
     }
     bench.come_to_rest();
     let at = bench.told().position;
-    assert_eq!(bench.told().homing, 0, "a drive that homes its joint is interrupted");
-    assert_eq!((bench.fault(), bench.state()), (None, MachineState::Holding));
+    assert_eq!(
+        bench.told().homing,
+        0,
+        "a drive that homes its joint is interrupted"
+    );
+    assert_eq!(
+        (bench.fault(), bench.state()),
+        (None, MachineState::Holding)
+    );
     // Neither a resume before it is released nor the release alone lets anything move.
     for _ in 0..3 {
         controls.hold.store(false, Relaxed);
@@ -135,10 +190,18 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     }
     bench.release();
     bench.ticks(random.below(50) + 1);
-    assert_eq!((bench.told().position, controls.hold.load(Relaxed)), (at, true));
+    assert_eq!(
+        (bench.told().position, controls.hold.load(Relaxed)),
+        (at, true)
+    );
     while let Ok(sample) = bench.host.samples.pop() {
-        let cause = if door { StopCause::Door } else { StopCause::HoldInput };
-        let known = [cause, StopCause::None, StopCause::Spindle].contains(&sample.cause) || doing == Doing::Holding;
+        let cause = if door {
+            StopCause::Door
+        } else {
+            StopCause::HoldInput
+        };
+        let known = [cause, StopCause::None, StopCause::Spindle].contains(&sample.cause)
+            || doing == Doing::Holding;
         assert!(known, "{:?} at {}", sample.cause, sample.tick);
     }
     let from = bench.script().told.len();
@@ -146,15 +209,25 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     bench.ticks(2500);
     assert_eq!(bench.fault(), None);
     let script = bench.script();
-    let moved = script.told[from..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO);
-    let turned = script.told[from..].iter().position(|(told, _)| told.spindle_rad_per_s != 0.0);
-    assert_eq!(moved.is_some(), ![Doing::Dwelling, Doing::AtRest, Doing::HandedOver].contains(&doing));
+    let moved = script.told[from..]
+        .iter()
+        .position(|(told, _)| told.velocity != AxisVector::ZERO);
+    let turned = script.told[from..]
+        .iter()
+        .position(|(told, _)| told.spindle_rad_per_s != 0.0);
+    assert_eq!(
+        moved.is_some(),
+        ![Doing::Dwelling, Doing::AtRest, Doing::HandedOver].contains(&doing)
+    );
     let homed = script.told[from..].iter().any(|(told, _)| told.homing != 0);
     assert_eq!(homed, doing == Doing::HandedOver, "its drive begins anew");
     // Probing cuts nothing, and waits for no spindle.
     let waits = door && ![Doing::Enabling, Doing::Waiting, Doing::Probing].contains(&doing);
     if let (Some(moved), true) = (moved, waits) {
-        assert!(moved - turned.unwrap() >= SPIN_UP as usize, "{turned:?} {moved}");
+        assert!(
+            moved - turned.unwrap() >= SPIN_UP as usize,
+            "{turned:?} {moved}"
+        );
     }
     drop(script);
     bench.assert_limits();
@@ -162,19 +235,29 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
 
 #[test]
 fn a_door_holds_and_stops_the_spindle_until_it_is_closed_and_resumed() {
-    each(|bench, doing, _, random| holds(bench, doing, true, random), Role::Door);
+    each(
+        |bench, doing, _, random| holds(bench, doing, true, random),
+        Role::Door,
+    );
 }
 
 #[test]
 fn a_feed_hold_input_holds_until_it_is_released_and_resumed() {
-    each(|bench, doing, _, random| holds(bench, doing, false, random), Role::FeedHold);
+    each(
+        |bench, doing, _, random| holds(bench, doing, false, random),
+        Role::FeedHold,
+    );
 }
 
 #[test]
 fn a_limit_is_a_fault_in_motion() {
     each(
         |mut bench, doing, old, _| {
-            let kind = FaultKind::Input { role: InputFault::Limit, input: bench.input, old };
+            let kind = FaultKind::Input {
+                role: InputFault::Limit,
+                input: bench.input,
+                old,
+            };
             if doing == Doing::Ramping {
                 return bench.assert_ends_by(DRIVE_FAULT);
             }
@@ -210,14 +293,23 @@ fn an_axis_that_stands_on_its_limit_may_leave_it_by_hand_and_while_it_is_homed()
             bench.queue_move(StopOn::default());
             bench.ticks(300);
             let may = doing != Doing::Running && !old;
-            assert_eq!(bench.fault().is_none(), may, "{doing:?} {old}: {:?}", bench.fault());
+            assert_eq!(
+                bench.fault().is_none(),
+                may,
+                "{doing:?} {old}: {:?}",
+                bench.fault()
+            );
             if may {
                 bench.release();
                 bench.ticks(10);
                 assert_eq!(bench.fault(), None);
                 // Once it is released, the next one counts.
                 bench.trip(false);
-                bench.assert_ends_by(FaultKind::Input { role: InputFault::Limit, input: 9, old: false });
+                bench.assert_ends_by(FaultKind::Input {
+                    role: InputFault::Limit,
+                    input: 9,
+                    old: false,
+                });
             }
         }
     }
@@ -226,7 +318,12 @@ fn an_axis_that_stands_on_its_limit_may_leave_it_by_hand_and_while_it_is_homed()
 #[test]
 fn a_limit_that_is_a_home_switch_is_none_while_axes_are_homed() {
     for homed in [false, true] {
-        let roles = Roles { limit: 1 << 9, home_switches: 1 << 9, normally_closed: 1 << 9, ..Roles::default() };
+        let roles = Roles {
+            limit: 1 << 9,
+            home_switches: 1 << 9,
+            normally_closed: 1 << 9,
+            ..Roles::default()
+        };
         let mut bench = Bench::with_roles(roles, u32::from(!homed), 9, 1 << 9);
         bench.attach();
         bench.queue_move(StopOn::default());
@@ -242,12 +339,19 @@ fn a_switch_that_motion_waits_for_and_does_not_hear_of_is_a_fault() {
     each(
         |mut bench, doing, old, _| match (doing, old) {
             (Doing::Probing, true) => {
-                bench.assert_ends_by(FaultKind::Input { role: InputFault::Awaited, input: PROBE, old: true });
+                bench.assert_ends_by(FaultKind::Input {
+                    role: InputFault::Awaited,
+                    input: PROBE,
+                    old: true,
+                });
                 bench.assert_limits();
             }
             (Doing::Probing, false) => {
                 bench.come_to_rest();
-                assert_eq!(bench.rough.rests.pop().map(|rest| rest.cause), Ok(RestCause::Edge));
+                assert_eq!(
+                    bench.rough.rests.pop().map(|rest| rest.cause),
+                    Ok(RestCause::Edge)
+                );
             }
             _ => {
                 let before = bench.fault();
@@ -267,7 +371,11 @@ fn an_input_that_is_old_but_not_too_old_asks_for_nothing() {
         bench.attach();
         bench.queue_move(StopOn::default());
         bench.ticks(1500);
-        assert_eq!((bench.fault(), bench.state()), (None, MachineState::Standstill), "{role:?}");
+        assert_eq!(
+            (bench.fault(), bench.state()),
+            (None, MachineState::Standstill),
+            "{role:?}"
+        );
     }
 }
 
@@ -285,7 +393,11 @@ fn a_spindle_that_does_not_turn_again_behind_a_door_is_a_fault() {
         bench.fine.tick();
     }
     let (told_rad_per_s, turns_rad_per_s) = (SPINDLE_RAD_PER_S, 0.0);
-    let slow = FaultKind::SpindleSlow { within_s: AT_SPEED_WITHIN_S, told_rad_per_s, turns_rad_per_s };
+    let slow = FaultKind::SpindleSlow {
+        within_s: AT_SPEED_WITHIN_S,
+        told_rad_per_s,
+        turns_rad_per_s,
+    };
     assert_eq!(bench.fault(), Some(slow));
 }
 
@@ -299,7 +411,10 @@ fn samples_say_what_of_them_is_old() {
     bench.script().input_age[9] = 1;
     bench.ticks(1);
     let old = bench.host.samples.pop().unwrap();
-    assert_eq!((old.inputs, old.old_inputs, old.age_periods), (1 << 9, 1 << 9, [0; MAX_AXES]));
+    assert_eq!(
+        (old.inputs, old.old_inputs, old.age_periods),
+        (1 << 9, 1 << 9, [0; MAX_AXES])
+    );
     bench.script().input_age[9] = 0;
     bench.ticks(1);
     assert_eq!(bench.host.samples.pop().unwrap().old_inputs, 0);

@@ -34,8 +34,15 @@ fn bench(role: Role, spin_up: u32) -> Bench {
 /// Setpoints from the one that turned the spindle to the first that moved behind it, and the first that moved.
 fn waited(bench: &demanding::Bench) -> (usize, AxisVector) {
     let told = &bench.script().told;
-    let turned = told.iter().position(|(told, _)| told.spindle_rad_per_s != 0.0).unwrap();
-    let moved = turned + told[turned..].iter().position(|(told, _)| told.velocity != AxisVector::ZERO).unwrap();
+    let turned = told
+        .iter()
+        .position(|(told, _)| told.spindle_rad_per_s != 0.0)
+        .unwrap();
+    let moved = turned
+        + told[turned..]
+            .iter()
+            .position(|(told, _)| told.velocity != AxisVector::ZERO)
+            .unwrap();
     (moved - turned, told[moved].0.position)
 }
 
@@ -46,7 +53,10 @@ fn samples(bench: &mut Bench) -> Vec<Sample> {
 /// Ends at rest where the queue ends, within limits.
 fn assert_ends_well(bench: &mut Bench) {
     bench.ticks(MOVE + 100);
-    assert_eq!((bench.fault(), bench.state()), (None, MachineState::Standstill));
+    assert_eq!(
+        (bench.fault(), bench.state()),
+        (None, MachineState::Standstill)
+    );
     assert!((bench.told().position[0] - bench.position[0]).abs() < 1e-9);
     bench.assert_limits();
 }
@@ -62,8 +72,15 @@ fn a_cut_begins_when_the_spindle_turns_and_not_before() {
         bench.queue_move(StopOn::default());
         bench.ticks(u64::from(spin_up) + 20);
         // The exchange behind which it turns, and the next period moves.
-        assert_eq!(waited(&bench).0, (spin_up as usize + 1).max(ANSWERED), "seed {seed}, {spin_up}");
-        let waits = samples(&mut bench).iter().filter(|sample| sample.cause == StopCause::Spindle).count();
+        assert_eq!(
+            waited(&bench).0,
+            (spin_up as usize + 1).max(ANSWERED),
+            "seed {seed}, {spin_up}"
+        );
+        let waits = samples(&mut bench)
+            .iter()
+            .filter(|sample| sample.cause == StopCause::Spindle)
+            .count();
         assert_eq!(
             waits,
             (spin_up as usize).saturating_sub(1),
@@ -89,21 +106,46 @@ fn a_cut_waits_until_the_drives_with_their_delay_have_answered_to_the_new_speed(
         attached.delay_periods[random.below(2) as usize] = delay as u32;
         // The positions of these drives are not late, which would be judged.
         let max_following_error_mm = AxisVector([f64::INFINITY; MAX_AXES]);
-        let config = FineConfig { attached, max_following_error_mm, ..bench::config(Roles::default(), 0) };
-        let mut bench = demanding::Bench::new(&config, Script { spin_up, ..bench::script(0) });
-        assert_eq!(bench.rest(100).map(|rest| rest.cause), Some(RestCause::Attached));
+        let config = FineConfig {
+            attached,
+            max_following_error_mm,
+            ..bench::config(Roles::default(), 0)
+        };
+        let mut bench = demanding::Bench::new(
+            &config,
+            Script {
+                spin_up,
+                ..bench::script(0)
+            },
+        );
+        assert_eq!(
+            bench.rest(100).map(|rest| rest.cause),
+            Some(RestCause::Attached)
+        );
         bench.queue_event(EventKind::Spindle, 0, SPINDLE_RAD_PER_S);
         bench.queue(0, 0.2, 1.0, StopOn::default());
         bench.ticks(30);
         let expected = (spin_up as usize + 1).max(ANSWERED + delay);
-        assert_eq!(waited(&bench).0, expected, "seed {seed}: delay {delay}, turns behind {spin_up}");
+        assert_eq!(
+            waited(&bench).0,
+            expected,
+            "seed {seed}: delay {delay}, turns behind {spin_up}"
+        );
         bench.ticks(MOVE + 100);
         // What is to stand is waited for by nothing.
         bench.queue_event(EventKind::Spindle, 0, 0.0);
         bench.queue(0, 0.2, 1.0, StopOn::default());
         bench.ticks(2);
-        assert_eq!((bench.fault(), bench.told().spindle_rad_per_s), (None, 0.0), "seed {seed}");
-        assert_ne!(bench.told().velocity, AxisVector::ZERO, "seed {seed}: delay {delay}");
+        assert_eq!(
+            (bench.fault(), bench.told().spindle_rad_per_s),
+            (None, 0.0),
+            "seed {seed}"
+        );
+        assert_ne!(
+            bench.told().velocity,
+            AxisVector::ZERO,
+            "seed {seed}: delay {delay}"
+        );
     }
 }
 
@@ -125,7 +167,10 @@ fn rapids_and_dwells_go_on_and_the_cut_behind_them_waits() {
         assert_eq!(bench.told().position[0], at_mm, "seed {seed}");
         assert!(bench.host.status.spindle.waits.load(Relaxed));
         assert_eq!(
-            (bench.state(), bench.host.status.spindle.told_rad_per_s.load()),
+            (
+                bench.state(),
+                bench.host.status.spindle.told_rad_per_s.load()
+            ),
             (MachineState::Holding, SPINDLE_RAD_PER_S)
         );
         bench.ticks(2000);
@@ -141,7 +186,12 @@ fn a_speed_that_changes_in_a_cut_stops_it_on_its_path_where_the_spindle_needs_ti
         let mut bench = bench(Role::FeedHold, spin_up);
         let none = StopOn::default();
         bench.piece(along_x(0.0, 250.0), 0.2, false, none);
-        bench.piece(along_x(100.0, 0.0), 0.3 + 0.001 * random.below(200) as f64, false, none);
+        bench.piece(
+            along_x(100.0, 0.0),
+            0.3 + 0.001 * random.below(200) as f64,
+            false,
+            none,
+        );
         bench.queue_speed(SPINDLE_RAD_PER_S);
         let place_mm = bench.position[0];
         bench.piece(along_x(100.0, 0.0), 1.0, false, none);
@@ -168,7 +218,11 @@ fn a_spindle_that_does_not_come_is_a_fault_in_time_and_only_where_a_cut_waits() 
     assert_eq!(waits.fault(), None);
     waits.ticks(2);
     let (within_s, told_rad_per_s) = (AT_SPEED_WITHIN_S, SPINDLE_RAD_PER_S);
-    waits.assert_ends_by(FaultKind::SpindleSlow { within_s, told_rad_per_s, turns_rad_per_s: 0.0 });
+    waits.assert_ends_by(FaultKind::SpindleSlow {
+        within_s,
+        told_rad_per_s,
+        turns_rad_per_s: 0.0,
+    });
     assert_eq!(waits.told().spindle_rad_per_s, 0.0);
     waits.assert_limits();
     // Nothing cuts: nobody waits, and a program that ends so is a good one.
@@ -177,7 +231,10 @@ fn a_spindle_that_does_not_come_is_a_fault_in_time_and_only_where_a_cut_waits() 
     idles.rapid = true;
     idles.queue_move(StopOn::default());
     idles.ticks(3 * limit);
-    assert_eq!((idles.fault(), idles.state()), (None, MachineState::Standstill));
+    assert_eq!(
+        (idles.fault(), idles.state()),
+        (None, MachineState::Standstill)
+    );
 }
 
 #[test]
@@ -193,7 +250,10 @@ fn hold_abort_emergency_stop_and_door_act_while_the_spindle_is_awaited() {
             0 => {
                 controls.hold.store(true, Relaxed);
                 bench.ticks(300);
-                assert_eq!((bench.told().velocity, bench.state()), (AxisVector::ZERO, MachineState::Holding));
+                assert_eq!(
+                    (bench.told().velocity, bench.state()),
+                    (AxisVector::ZERO, MachineState::Holding)
+                );
                 controls.hold.store(false, Relaxed);
                 bench.ticks(1);
                 assert_ne!(bench.told().velocity, AxisVector::ZERO, "it turns by now");
@@ -201,10 +261,16 @@ fn hold_abort_emergency_stop_and_door_act_while_the_spindle_is_awaited() {
             1 => {
                 controls.abort.store(true, Relaxed);
                 bench.ticks(2);
-                assert_eq!(bench.rough.rests.pop().map(|rest| rest.cause), Ok(RestCause::Abort));
+                assert_eq!(
+                    bench.rough.rests.pop().map(|rest| rest.cause),
+                    Ok(RestCause::Abort)
+                );
                 assert_eq!(bench.told().spindle_rad_per_s, 0.0);
                 bench.ticks(300);
-                assert_eq!((bench.fault(), bench.told().velocity), (None, AxisVector::ZERO));
+                assert_eq!(
+                    (bench.fault(), bench.told().velocity),
+                    (None, AxisVector::ZERO)
+                );
                 continue;
             }
             2 => {
@@ -224,13 +290,23 @@ fn hold_abort_emergency_stop_and_door_act_while_the_spindle_is_awaited() {
                 let from = bench.script().told.len();
                 bench.ticks(u64::from(SPIN_UP) + 20);
                 let told = bench.script().told.split_off(from);
-                let moved = told.iter().position(|(told, _)| told.velocity != AxisVector::ZERO);
-                assert_eq!(moved, Some(SPIN_UP as usize + 1), "seed {seed}: it starts from nothing");
+                let moved = told
+                    .iter()
+                    .position(|(told, _)| told.velocity != AxisVector::ZERO);
+                assert_eq!(
+                    moved,
+                    Some(SPIN_UP as usize + 1),
+                    "seed {seed}: it starts from nothing"
+                );
             }
         }
         assert_ends_well(&mut bench);
     }
-    let kind = FaultKind::Input { role: InputFault::EmergencyStop, input: 9, old: false };
+    let kind = FaultKind::Input {
+        role: InputFault::EmergencyStop,
+        input: 9,
+        old: false,
+    };
     let mut pressed = bench(Role::EmergencyStop, SPIN_UP);
     pressed.queue_spindle();
     pressed.queue_move(StopOn::default());

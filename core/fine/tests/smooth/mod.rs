@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_fine::{FineConfig, FineLoop};
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Limits, MAX_AXES,
-    PluginError, Segment, SegmentFlags, Setpoint,
+    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback,
+    JointState, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint,
 };
 
 pub const PERIOD_S: f64 = 1e-3;
@@ -18,7 +18,11 @@ pub struct Kept {
     pub jerk: f64,
 }
 
-pub const LIMITS: Kept = Kept { speed: 250.0, acceleration: 1000.0, jerk: 20_000.0 };
+pub const LIMITS: Kept = Kept {
+    speed: 250.0,
+    acceleration: 1000.0,
+    jerk: 20_000.0,
+};
 
 /// Pieces of constant path jerk: jerk and duration.
 type Pieces = Vec<(f64, f64)>;
@@ -29,8 +33,16 @@ pub fn profile(length: f64, feed: f64, acceleration: f64, jerk: f64) -> Pieces {
     let held_s = feed / (ramp_s * jerk) - ramp_s;
     let cruise_s = length / feed - (2.0 * ramp_s + held_s);
     assert!(cruise_s >= 0.0, "too short");
-    [(jerk, ramp_s), (0.0, held_s), (-jerk, ramp_s), (0.0, cruise_s), (-jerk, ramp_s), (0.0, held_s), (jerk, ramp_s)]
-        .to_vec()
+    [
+        (jerk, ramp_s),
+        (0.0, held_s),
+        (-jerk, ramp_s),
+        (0.0, cruise_s),
+        (-jerk, ramp_s),
+        (0.0, held_s),
+        (jerk, ramp_s),
+    ]
+    .to_vec()
 }
 
 /// A path and the motion along it.
@@ -42,7 +54,11 @@ pub struct Plan {
 
 impl Plan {
     pub fn new(pieces: Pieces, feed: f64, path: impl Fn(f64) -> [f64; 2] + 'static) -> Self {
-        Self { pieces, feed, path: Box::new(path) }
+        Self {
+            pieces,
+            feed,
+            path: Box::new(path),
+        }
     }
 
     pub fn feed(&self) -> f64 {
@@ -89,7 +105,10 @@ impl Plan {
                 at
             })
             .collect();
-        let mut cuts: Vec<f64> = (1..(at / 4e-3) as u32).map(|n| f64::from(n) * 4e-3).chain(ends).collect();
+        let mut cuts: Vec<f64> = (1..(at / 4e-3) as u32)
+            .map(|n| f64::from(n) * 4e-3)
+            .chain(ends)
+            .collect();
         cuts.sort_by(f64::total_cmp);
         cuts.dedup_by(|a, b| *a - *b < 1e-7);
         cuts
@@ -116,8 +135,19 @@ fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
     let p = to[0] - from[0] - h * (c1 + h * c2);
     let v = (to[1] - c1 - 2.0 * c2 * h) * h;
     let a = (to[2] - from[2]) * h * h;
-    let (c3, c4, c5) = (10.0 * p - 4.0 * v + a / 2.0, -15.0 * p + 7.0 * v - a, 6.0 * p - 3.0 * v + a / 2.0);
-    [from[0], c1, c2, c3 / h.powi(3), c4 / h.powi(4), c5 / h.powi(5)]
+    let (c3, c4, c5) = (
+        10.0 * p - 4.0 * v + a / 2.0,
+        -15.0 * p + 7.0 * v - a,
+        6.0 * p - 3.0 * v + a / 2.0,
+    );
+    [
+        from[0],
+        c1,
+        c2,
+        c3 / h.powi(3),
+        c4 / h.powi(4),
+        c5 / h.powi(5),
+    ]
 }
 
 struct Echo;
@@ -132,9 +162,17 @@ impl Driver for Echo {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::default())
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
-        feedback.state = [if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled }; MAX_AXES];
+        feedback.state = [if setpoint.enable == 0 {
+            JointState::Disabled
+        } else {
+            JointState::Enabled
+        }; MAX_AXES];
         Ok(())
     }
     fn quick_stop(&mut self) {}
@@ -176,28 +214,52 @@ impl Machine {
             jerk_mm_per_s3: LIMITS.jerk,
             speed_difference_mm_per_s: 0.0,
         };
-        let config =
-            FineConfig { order: 3, max_feed_ratio, ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 2]).unwrap()) };
-        let (mut rough, end, host) = bridge(Sizes { segments: 4096, samples: 4096 });
+        let config = FineConfig {
+            order: 3,
+            max_feed_ratio,
+            ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 2]).unwrap())
+        };
+        let (mut rough, end, host) = bridge(Sizes {
+            segments: 4096,
+            samples: 4096,
+        });
         let mut from = 0.0;
         let cuts = plan.cuts();
         for &to in &cuts {
             let mut segment = plan.segment(from, to);
             segment.feed_mm_per_s /= max_feed_ratio;
-            rough.segments.push(Queued::Segment { start_s: from, segment }).unwrap();
+            rough
+                .segments
+                .push(Queued::Segment {
+                    start_s: from,
+                    segment,
+                })
+                .unwrap();
             from = to;
         }
         let end_mm = (plan.path)(plan.along(from)[0]);
         let mut rest = Segment::rest(&AxisVector::from_slice(&end_mm), 0.0);
         rest.order = 3;
         rest.path[0] = plan.along(from)[0];
-        rough.segments.push(Queued::Segment { start_s: from, segment: rest }).unwrap();
+        rough
+            .segments
+            .push(Queued::Segment {
+                start_s: from,
+                segment: rest,
+            })
+            .unwrap();
         rough.depth.stop_deceleration_mm_per_s2.store(500.0);
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
         let mut fine = FineLoop::new(&config, end, Box::new(Echo), None);
         fine.reset();
-        let mut this = Self { fine, host, _rough: rough, sent: vec![], end_mm };
+        let mut this = Self {
+            fine,
+            host,
+            _rough: rough,
+            sent: vec![],
+            end_mm,
+        };
         while this.sent.is_empty() {
             this.run(1);
         }
@@ -271,7 +333,9 @@ impl Machine {
     }
 
     fn moves(&self) -> bool {
-        let [.., before, last] = self.sent.as_slice() else { return true };
+        let [.., before, last] = self.sent.as_slice() else {
+            return true;
+        };
         before != last
     }
 
@@ -280,7 +344,11 @@ impl Machine {
         while self.sent.last() != Some(&self.end_mm) {
             self.run(1);
             patience += 1;
-            assert!(patience < 100_000, "it does not arrive: {:?}", self.sent.last());
+            assert!(
+                patience < 100_000,
+                "it does not arrive: {:?}",
+                self.sent.last()
+            );
         }
         self.run(4);
         self.done()
@@ -302,7 +370,11 @@ impl Done {
     /// Speed, acceleration and jerk as differences are within the limits.
     pub fn assert_limits(&self, what: &str) {
         let [speed, acceleration, jerk] = self.worst();
-        assert!(speed.0 < 1.0 + 1e-6 && acceleration.0 < 1.0 + 1e-6 && jerk.0 < 1.01, "{what}: {:?}", self.worst());
+        assert!(
+            speed.0 < 1.0 + 1e-6 && acceleration.0 < 1.0 + 1e-6 && jerk.0 < 1.01,
+            "{what}: {:?}",
+            self.worst()
+        );
     }
 
     /// The largest share of each limit that was used, and where.
@@ -313,9 +385,11 @@ impl Done {
             let v = differences(&at);
             let a = differences(&v);
             let j = differences(&a);
-            for (worst, (values, limit)) in
-                worst.iter_mut().zip([(v, LIMITS.speed), (a, LIMITS.acceleration), (j, LIMITS.jerk)])
-            {
+            for (worst, (values, limit)) in worst.iter_mut().zip([
+                (v, LIMITS.speed),
+                (a, LIMITS.acceleration),
+                (j, LIMITS.jerk),
+            ]) {
                 for (tick, value) in values.iter().enumerate() {
                     if value.abs() / limit > worst.0 {
                         *worst = (value.abs() / limit, tick);
@@ -328,9 +402,14 @@ impl Done {
 }
 
 fn speeds(sent: &[[f64; 2]]) -> Vec<f64> {
-    sent.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]) / PERIOD_S).collect()
+    sent.windows(2)
+        .map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]) / PERIOD_S)
+        .collect()
 }
 
 fn differences(values: &[f64]) -> Vec<f64> {
-    values.windows(2).map(|w| (w[1] - w[0]) / PERIOD_S).collect()
+    values
+        .windows(2)
+        .map(|w| (w[1] - w[0]) / PERIOD_S)
+        .collect()
 }

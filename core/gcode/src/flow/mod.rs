@@ -102,7 +102,11 @@ impl Execution {
     /// # Errors
     /// A file cannot be read, or has changed since the first pass.
     #[inline]
-    pub fn step(&mut self, program: &mut Program, out: &mut Vec<Item>) -> Result<Step, ProgramError> {
+    pub fn step(
+        &mut self,
+        program: &mut Program,
+        out: &mut Vec<Item>,
+    ) -> Result<Step, ProgramError> {
         match self.sources.next(program)? {
             Next::Line(range) => self.last = range,
             Next::Bad(diagnostic) => return Ok(Step::Wrong(self.called(diagnostic))),
@@ -124,11 +128,19 @@ impl Execution {
         if self.pass == Pass::Second && out.len() > items {
             self.steps = 0;
         }
-        Ok(done.map_or_else(|diagnostic| Step::Wrong(self.called(diagnostic)), |()| Step::Line))
+        Ok(done.map_or_else(
+            |diagnostic| Step::Wrong(self.called(diagnostic)),
+            |()| Step::Line,
+        ))
     }
 
     #[cold]
-    fn o_word_line(&mut self, program: &mut Program, at: usize, out: &mut Vec<Item>) -> Result<Step, ProgramError> {
+    fn o_word_line(
+        &mut self,
+        program: &mut Program,
+        at: usize,
+        out: &mut Vec<Item>,
+    ) -> Result<Step, ProgramError> {
         let lines = &self.sources.current().lines;
         let number = lines.number;
         if self.sources.current().outline.is_none() {
@@ -138,7 +150,8 @@ impl Execution {
                 return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
             }
             let which = self.sources.current;
-            self.sources.index(program, which, self.interpreter.config())?;
+            self.sources
+                .index(program, which, self.interpreter.config())?;
         }
         if let Some(wrong) = self.sources.outline().wrong(number) {
             return Ok(Step::Stuck(self.called(wrong.clone())));
@@ -151,7 +164,10 @@ impl Execution {
             self.obey(program, index, &text, out)
         } else {
             let done = self.interpreter.line(number, &text, out);
-            Ok(done.map_or_else(|diagnostic| Step::Wrong(self.called(diagnostic)), |()| Step::Line))
+            Ok(done.map_or_else(
+                |diagnostic| Step::Wrong(self.called(diagnostic)),
+                |()| Step::Line,
+            ))
         };
         self.text = text;
         step
@@ -167,20 +183,28 @@ impl Execution {
     ) -> Result<Step, ProgramError> {
         let entry = self.sources.outline().entry(index).clone();
         self.interpreter.begin_o_word(entry.number);
-        let jumps = matches!(entry.word.keyword, Keyword::Sub | Keyword::Else | Keyword::ElseIf | Keyword::Do);
+        let jumps = matches!(
+            entry.word.keyword,
+            Keyword::Sub | Keyword::Else | Keyword::ElseIf | Keyword::Do
+        );
         if !jumps && let Err(fault) = self.read_values(&entry, text) {
             let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
             self.leave_block(program, &entry)?;
             return Ok(Step::Wrong(self.called(diagnostic)));
         }
-        let decides = !matches!(entry.word.keyword, Keyword::Call | Keyword::Return | Keyword::EndSub);
+        let decides = !matches!(
+            entry.word.keyword,
+            Keyword::Call | Keyword::Return | Keyword::EndSub
+        );
         if decides && self.assumes() {
             return Ok(self.open(&entry, text));
         }
         match entry.word.keyword {
             Keyword::Call => return self.call(program, &entry, text),
             Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text, out),
-            Keyword::Sub | Keyword::Else | Keyword::ElseIf => self.jump_behind(program, entry.close)?,
+            Keyword::Sub | Keyword::Else | Keyword::ElseIf => {
+                self.jump_behind(program, entry.close)?
+            }
             Keyword::If => return self.choose(program, index),
             Keyword::While if entry.open != index => self.end_do(program, &entry)?,
             Keyword::While if !self.truth() => self.jump_behind(program, entry.close)?,
@@ -205,7 +229,9 @@ impl Execution {
     fn read_values(&mut self, entry: &Entry, text: &[u8]) -> Result<(), Fault> {
         let at = usize::from(entry.word.values_at);
         let (min, max) = entry.word.keyword.values();
-        self.interpreter.context().bracketed(text, at, max, &mut self.values)?;
+        self.interpreter
+            .context()
+            .bracketed(text, at, max, &mut self.values)?;
         if self.values.len() < min {
             let message = format!("{} needs a value in brackets", entry.word.keyword.name());
             return Err(Fault::new(Span::new(0, at), "value-missing", message));
@@ -228,7 +254,10 @@ impl Execution {
         let span = Span::new(0, text.len());
         let fault = Fault::new(span, "branch-open", message);
         let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
-        Step::Open(Diagnostic { severity: Severity::Warning, ..self.called(diagnostic) })
+        Step::Open(Diagnostic {
+            severity: Severity::Warning,
+            ..self.called(diagnostic)
+        })
     }
 
     /// `if`, and the branches after it whose turn it is.
@@ -236,14 +265,20 @@ impl Execution {
         if self.truth() {
             return Ok(Step::Line);
         }
-        let next = self.sources.outline().entry(self.sources.outline().entry(index).next).clone();
+        let next = self
+            .sources
+            .outline()
+            .entry(self.sources.outline().entry(index).next)
+            .clone();
         if next.word.keyword != Keyword::ElseIf {
             self.jump(program, next.after)?;
             return Ok(Step::Line);
         }
         let at = self.sources.outline().find(next.number).unwrap_or(index);
         self.jump(program, next.before)?;
-        let Next::Line(range) = self.sources.next(program)? else { return Ok(Step::Line) };
+        let Next::Line(range) = self.sources.next(program)? else {
+            return Ok(Step::Line);
+        };
         let line = self.sources.current().lines.text(&range).to_vec();
         self.interpreter.begin_o_word(next.number);
         if let Err(fault) = self.read_values(&next, &line) {
@@ -268,11 +303,23 @@ impl Execution {
     }
 
     fn end_do(&mut self, program: &mut Program, entry: &Entry) -> Result<(), ProgramError> {
-        if self.truth() { self.go_back(program, entry.open, false) } else { Ok(()) }
+        if self.truth() {
+            self.go_back(program, entry.open, false)
+        } else {
+            Ok(())
+        }
     }
 
-    fn begin_repeat(&mut self, program: &mut Program, index: usize, close: usize) -> Result<(), ProgramError> {
-        let count = self.values.first().map_or(0.0, |value| value.number.round_ties_even());
+    fn begin_repeat(
+        &mut self,
+        program: &mut Program,
+        index: usize,
+        close: usize,
+    ) -> Result<(), ProgramError> {
+        let count = self
+            .values
+            .first()
+            .map_or(0.0, |value| value.number.round_ties_even());
         if count < 1.0 {
             return self.jump_behind(program, close);
         }
@@ -283,16 +330,26 @@ impl Execution {
 
     fn end_repeat(&mut self, program: &mut Program, entry: &Entry) -> Result<(), ProgramError> {
         self.leave_repeats(entry.open + 1);
-        if self.repeats.turn(entry.open) { self.go_back(program, entry.open, false) } else { Ok(()) }
+        if self.repeats.turn(entry.open) {
+            self.go_back(program, entry.open, false)
+        } else {
+            Ok(())
+        }
     }
 
     /// Forgets the repeats of this call that begin at the O-word `from` or behind it.
     fn leave_repeats(&mut self, from: usize) {
-        self.repeats.leave(from, self.frames.last().map_or(0, |frame| frame.repeats));
+        self.repeats
+            .leave(from, self.frames.last().map_or(0, |frame| frame.repeats));
     }
 
     /// A loop goes on: at its first line, or with the test before it.
-    fn go_back(&mut self, program: &mut Program, open: usize, with_test: bool) -> Result<(), ProgramError> {
+    fn go_back(
+        &mut self,
+        program: &mut Program,
+        open: usize,
+        with_test: bool,
+    ) -> Result<(), ProgramError> {
         self.last_loop = Some((self.sources.current, open));
         let entry = self.sources.outline().entry(open);
         let mark = if with_test { entry.before } else { entry.after };
@@ -308,32 +365,59 @@ impl Execution {
         self.sources.seek(program, mark)
     }
 
-    fn call(&mut self, program: &mut Program, entry: &Entry, text: &[u8]) -> Result<Step, ProgramError> {
+    fn call(
+        &mut self,
+        program: &mut Program,
+        entry: &Entry,
+        text: &[u8],
+    ) -> Result<Step, ProgramError> {
         let label = match &entry.word.label {
             Label::Fixed(label) => label.clone(),
             Label::Computed(at) => {
-                match self.interpreter.context().assumed_value(&mut Scanner::new(text, usize::from(*at))) {
-                    Ok(value) if value.assumed && self.pass == Pass::First => return Ok(self.open(entry, text)),
+                match self
+                    .interpreter
+                    .context()
+                    .assumed_value(&mut Scanner::new(text, usize::from(*at)))
+                {
+                    Ok(value) if value.assumed && self.pass == Pass::First => {
+                        return Ok(self.open(entry, text));
+                    }
                     Ok(value) => format!("{}", value.number.round()).into(),
                     Err(fault) => {
-                        let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+                        let diagnostic =
+                            Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
                         return Ok(Step::Wrong(self.called(diagnostic)));
                     }
                 }
             }
         };
         let refuse = |this: &Self, why: String| {
-            let fault = Fault::new(Span::new(0, usize::from(entry.word.values_at)), "o-word", why);
-            this.called(Diagnostic::new(this.interpreter.file(), entry.number, text, fault))
+            let fault = Fault::new(
+                Span::new(0, usize::from(entry.word.values_at)),
+                "o-word",
+                why,
+            );
+            this.called(Diagnostic::new(
+                this.interpreter.file(),
+                entry.number,
+                text,
+                fault,
+            ))
         };
         if self.frames.len() == MAX_CALLS {
-            let why = format!("calls lie {MAX_CALLS} deep within each other: a subroutine calls itself without end");
+            let why = format!(
+                "calls lie {MAX_CALLS} deep within each other: a subroutine calls itself without end"
+            );
             return Ok(Step::Stuck(refuse(self, why)));
         }
-        let (target, sub) = match self.sources.find_sub(program, &label, self.interpreter.config())? {
-            Ok(found) => found,
-            Err(why) => return Ok(Step::Wrong(refuse(self, why))),
-        };
+        let (target, sub) =
+            match self
+                .sources
+                .find_sub(program, &label, self.interpreter.config())?
+            {
+                Ok(found) => found,
+                Err(why) => return Ok(Step::Wrong(refuse(self, why))),
+            };
         let called = self.sources.get(target).outline.as_ref();
         let wrong = called.and_then(|outline| outline.wrong(outline.entry(sub).number));
         if let Some(wrong) = wrong {
@@ -341,7 +425,13 @@ impl Execution {
         }
         let after = self.sources.current().lines.mark();
         let (call_line, repeats) = (entry.number, self.repeats.len());
-        self.frames.push(Frame { file: self.sources.current, after, call_line, sub, repeats });
+        self.frames.push(Frame {
+            file: self.sources.current,
+            after,
+            call_line,
+            sub,
+            repeats,
+        });
         self.interpreter.enter_sub(&self.values);
         self.switch_to(program, target);
         let start = self.sources.outline().entry(sub).after;
@@ -359,11 +449,16 @@ impl Execution {
     ) -> Result<Step, ProgramError> {
         let Some(frame) = self.frames.pop() else {
             let why = format!("{} without a call", entry.word.keyword.name());
-            let fault = Fault::new(Span::new(0, usize::from(entry.word.values_at)), "o-word", why);
+            let fault = Fault::new(
+                Span::new(0, usize::from(entry.word.values_at)),
+                "o-word",
+                why,
+            );
             let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
             return Ok(Step::Stuck(diagnostic));
         };
-        self.interpreter.leave_sub(self.values.first().copied(), out);
+        self.interpreter
+            .leave_sub(self.values.first().copied(), out);
         self.repeats.truncate(frame.repeats);
         self.switch_to(program, frame.file);
         self.jump(program, frame.after)?;
@@ -375,20 +470,38 @@ impl Execution {
         self.sources.current = which;
         self.interpreter.set_file(&file(program, which).name);
         let in_program = self.frames.iter().rev().find(|frame| frame.file == 0);
-        self.interpreter.reported_line = in_program.filter(|_| which != 0).map(|frame| frame.call_line);
+        self.interpreter.reported_line = in_program
+            .filter(|_| which != 0)
+            .map(|frame| frame.call_line);
     }
 
     /// Adds to a message who called the subroutine in which it arises.
     fn called(&self, mut diagnostic: Diagnostic) -> Diagnostic {
         use std::fmt::Write as _;
         for (depth, frame) in self.frames.iter().enumerate().rev().take(MAX_CALLERS_SHOWN) {
-            let which = self.frames.get(depth + 1).map_or(self.sources.current, |inner| inner.file);
-            let name = self.sources.get(which).outline.as_ref().map(|outline| outline.shown(frame.sub));
+            let which = self
+                .frames
+                .get(depth + 1)
+                .map_or(self.sources.current, |inner| inner.file);
+            let name = self
+                .sources
+                .get(which)
+                .outline
+                .as_ref()
+                .map(|outline| outline.shown(frame.sub));
             let name = name.unwrap_or_default().replace(" sub", "");
-            let _ = write!(diagnostic.message, "; in {name}, called from line {}", frame.call_line);
+            let _ = write!(
+                diagnostic.message,
+                "; in {name}, called from line {}",
+                frame.call_line
+            );
         }
         if self.frames.len() > MAX_CALLERS_SHOWN {
-            let _ = write!(diagnostic.message, "; and {} callers before", self.frames.len() - MAX_CALLERS_SHOWN);
+            let _ = write!(
+                diagnostic.message,
+                "; and {} callers before",
+                self.frames.len() - MAX_CALLERS_SHOWN
+            );
         }
         diagnostic
     }
@@ -396,16 +509,30 @@ impl Execution {
     /// The program has executed too many lines.
     fn endless(&self) -> Diagnostic {
         let steps = self.interpreter.config().max_steps;
-        let since = if self.pass == Pass::Second { " without an item" } else { "" };
+        let since = if self.pass == Pass::Second {
+            " without an item"
+        } else {
+            ""
+        };
         let whose = self.last_loop.and_then(|(which, open)| {
             let outline = self.sources.get(which).outline.as_ref()?;
-            Some(format!("{} of line {} goes on", outline.shown(open), outline.entry(open).number))
+            Some(format!(
+                "{} of line {} goes on",
+                outline.shown(open),
+                outline.entry(open).number
+            ))
         });
         let whose = whose.unwrap_or_else(|| "the program goes on".into());
-        let message = format!("{whose} after {steps} lines{since} ([program] max_steps): it may never end");
+        let message =
+            format!("{whose} after {steps} lines{since} ([program] max_steps): it may never end");
         let number = self.sources.current().lines.number;
         let text = self.text();
         let fault = Fault::new(Span::new(0, text.len()), "endless", message);
-        self.called(Diagnostic::new(self.interpreter.file(), number, text, fault))
+        self.called(Diagnostic::new(
+            self.interpreter.file(),
+            number,
+            text,
+            fault,
+        ))
     }
 }

@@ -46,7 +46,10 @@ impl Keyword {
     ];
 
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, keyword)| *keyword == self).map_or("", |(name, _)| name)
+        Self::ALL
+            .iter()
+            .find(|(_, keyword)| *keyword == self)
+            .map_or("", |(name, _)| name)
     }
 
     /// The fewest and the most `[values]` behind it.
@@ -108,19 +111,40 @@ impl OWord {
             return Ok(None);
         }
         let start = scanner.at();
-        let word: String = scanner.rest().iter().map_while(|b| b.is_ascii_alphabetic().then_some(*b as char)).collect();
+        let word: String = scanner
+            .rest()
+            .iter()
+            .map_while(|b| b.is_ascii_alphabetic().then_some(*b as char))
+            .collect();
         scanner.advance(word.len());
-        let keyword = Keyword::ALL.iter().find(|(name, _)| name.eq_ignore_ascii_case(&word));
+        let keyword = Keyword::ALL
+            .iter()
+            .find(|(name, _)| name.eq_ignore_ascii_case(&word));
         let Some((_, keyword)) = keyword else {
             let names: Vec<_> = Keyword::ALL.iter().map(|(name, _)| *name).collect();
-            let message = format!("what the O-word does is missing here: one of {}", names.join(", "));
-            let span = if word.is_empty() { scanner.here() } else { scanner.since(start) };
+            let message = format!(
+                "what the O-word does is missing here: one of {}",
+                names.join(", ")
+            );
+            let span = if word.is_empty() {
+                scanner.here()
+            } else {
+                scanner.since(start)
+            };
             return Err(Fault::new(span, "o-word", message));
         };
         if matches!(label, Label::Computed(_)) && *keyword != Keyword::Call {
-            return Err(Fault::new(scanner.since(at), "o-word", "only a call may have a computed number"));
+            return Err(Fault::new(
+                scanner.since(at),
+                "o-word",
+                "only a call may have a computed number",
+            ));
         }
-        Ok(Some(Self { label, keyword: *keyword, values_at: scanner.at() as u16 }))
+        Ok(Some(Self {
+            label,
+            keyword: *keyword,
+            values_at: scanner.at() as u16,
+        }))
     }
 }
 
@@ -128,14 +152,29 @@ fn label(scanner: &mut Scanner) -> Checked<Label> {
     let start = scanner.at();
     match scanner.peek() {
         b'0'..=b'9' => {
-            let digits = scanner.rest().iter().take_while(|b| b.is_ascii_digit()).count();
-            let number: String = scanner.rest()[..digits].iter().map(|b| *b as char).collect();
+            let digits = scanner
+                .rest()
+                .iter()
+                .take_while(|b| b.is_ascii_digit())
+                .count();
+            let number: String = scanner.rest()[..digits]
+                .iter()
+                .map(|b| *b as char)
+                .collect();
             scanner.advance(digits);
             let number = number.trim_start_matches('0');
-            Ok(Label::Fixed(if number.is_empty() { "0".into() } else { number.into() }))
+            Ok(Label::Fixed(if number.is_empty() {
+                "0".into()
+            } else {
+                number.into()
+            }))
         }
         b'<' => {
-            let length = scanner.rest().iter().position(|b| *b == b'>').unwrap_or(scanner.rest().len());
+            let length = scanner
+                .rest()
+                .iter()
+                .position(|b| *b == b'>')
+                .unwrap_or(scanner.rest().len());
             let name: String = String::from_utf8_lossy(&scanner.rest()[1..length.max(1)])
                 .chars()
                 .filter(|c| !c.is_whitespace())
@@ -143,9 +182,14 @@ fn label(scanner: &mut Scanner) -> Checked<Label> {
                 .collect();
             scanner.advance(length + 1);
             let forbidden = |c: char| matches!(c, '/' | '\\' | '\0') || c.is_control();
-            if name.is_empty() || name.len() > MAX_NAME || name.contains(forbidden) || name.starts_with('.') {
-                let message =
-                    format!("the name of a subroutine is 1 to {MAX_NAME} characters between < and >, without /");
+            if name.is_empty()
+                || name.len() > MAX_NAME
+                || name.contains(forbidden)
+                || name.starts_with('.')
+            {
+                let message = format!(
+                    "the name of a subroutine is 1 to {MAX_NAME} characters between < and >, without /"
+                );
                 return Err(Fault::new(scanner.since(start), "o-word", message));
             }
             Ok(Label::Fixed(name.into()))
@@ -154,7 +198,11 @@ fn label(scanner: &mut Scanner) -> Checked<Label> {
             skip_value(scanner);
             Ok(Label::Computed(start as u16))
         }
-        _ => Err(Fault::new(scanner.here(), "o-word", "an O-word needs a number or a <name>")),
+        _ => Err(Fault::new(
+            scanner.here(),
+            "o-word",
+            "an O-word needs a number or a <name>",
+        )),
     }
 }
 
@@ -183,15 +231,29 @@ mod tests {
     fn o_words_are_found_and_read() {
         let read = |text: &str| {
             let at = find(text.as_bytes(), false)?;
-            OWord::read(text.as_bytes(), at).unwrap().map(|word| (word.label, word.keyword, word.values_at))
+            OWord::read(text.as_bytes(), at)
+                .unwrap()
+                .map(|word| (word.label, word.keyword, word.values_at))
         };
         let fixed = |label: &str| Label::Fixed(label.into());
         assert_eq!(read("o100 sub"), Some((fixed("100"), Keyword::Sub, 8)));
         assert_eq!(read("N5 / O1"), None, "a number is no O-word with a label");
-        assert_eq!(read(" N5 O < My Sub > CALL [1]"), Some((fixed("mysub"), Keyword::Call, 21)));
-        assert_eq!(read("/o01endwhile (x)"), Some((fixed("1"), Keyword::EndWhile, 12)));
-        assert_eq!(read("o[#1 + 5] call [2]"), Some((Label::Computed(1), Keyword::Call, 14)));
-        assert_eq!(read("o#<n> call"), Some((Label::Computed(1), Keyword::Call, 10)));
+        assert_eq!(
+            read(" N5 O < My Sub > CALL [1]"),
+            Some((fixed("mysub"), Keyword::Call, 21))
+        );
+        assert_eq!(
+            read("/o01endwhile (x)"),
+            Some((fixed("1"), Keyword::EndWhile, 12))
+        );
+        assert_eq!(
+            read("o[#1 + 5] call [2]"),
+            Some((Label::Computed(1), Keyword::Call, 14))
+        );
+        assert_eq!(
+            read("o#<n> call"),
+            Some((Label::Computed(1), Keyword::Call, 10))
+        );
         assert_eq!(read("O1234 (program)"), None);
         assert!(find(b"G1 O5", false).is_none() && find(b"/o1 if [1]", true).is_none());
         for wrong in ["o<> sub", "o<../x> call", "o5 jump", "o sub", "o[5] sub"] {

@@ -40,7 +40,11 @@ pub(crate) struct Outline {
 
 impl Outline {
     /// Reads all of `lines`, which then stand at their end.
-    pub fn read(program: &mut Program, lines: &mut Lines, block_delete: bool) -> Result<Self, ProgramError> {
+    pub fn read(
+        program: &mut Program,
+        lines: &mut Lines,
+        block_delete: bool,
+    ) -> Result<Self, ProgramError> {
         let mut outline = Self::default();
         let mut open = Vec::new();
         lines.seek(program, Mark::START)?;
@@ -53,24 +57,39 @@ impl Outline {
             };
             let number = lines.number;
             let text = lines.text(&range);
-            let Some(at) = o_word::find(text, block_delete) else { continue };
+            let Some(at) = o_word::find(text, block_delete) else {
+                continue;
+            };
             let added = match OWord::read(text, at) {
                 Ok(None) => continue,
                 Ok(Some(word)) => {
-                    let entry = Entry { number, word, before, after: lines.mark(), open: 0, close: 0, next: 0 };
+                    let entry = Entry {
+                        number,
+                        word,
+                        before,
+                        after: lines.mark(),
+                        open: 0,
+                        close: 0,
+                        next: 0,
+                    };
                     outline.add(entry, &mut open)
                 }
                 Err(fault) => Err(fault),
             };
             if let Err(fault) = added {
-                outline.wrong.insert(number, Diagnostic::new(&program.name, number, text, fault));
+                outline
+                    .wrong
+                    .insert(number, Diagnostic::new(&program.name, number, text, fault));
             }
         }
         open.append(&mut outline.given_up);
         for opened in open {
             let fault = outline.fault(opened, "it is opened and never closed");
             let number = outline.entries[opened].number;
-            outline.wrong.entry(number).or_insert_with(|| Diagnostic::new(&program.name, number, b"", fault));
+            outline
+                .wrong
+                .entry(number)
+                .or_insert_with(|| Diagnostic::new(&program.name, number, b"", fault));
         }
         Ok(outline)
     }
@@ -82,7 +101,9 @@ impl Outline {
 
     /// The O-word of line `number`; none where it is wrong.
     pub fn find(&self, number: u32) -> Option<usize> {
-        self.entries.binary_search_by_key(&number, |entry| entry.number).ok()
+        self.entries
+            .binary_search_by_key(&number, |entry| entry.number)
+            .ok()
     }
 
     pub fn entry(&self, index: usize) -> &Entry {
@@ -114,7 +135,12 @@ impl Outline {
         }
         let keyword = entry.word.keyword;
         let label = entry.word.label.clone();
-        self.entries.push(Entry { open: index, close: index, next: index, ..entry });
+        self.entries.push(Entry {
+            open: index,
+            close: index,
+            next: index,
+            ..entry
+        });
         match keyword {
             Keyword::Sub => self.open_sub(index, &label, open),
             Keyword::While if self.top(open, &label, &[Keyword::Do]).is_some() => {
@@ -130,25 +156,37 @@ impl Outline {
             Keyword::EndSub => self.end(index, &label, &[Keyword::Sub], open),
             Keyword::EndWhile => self.end(index, &label, &[Keyword::While], open),
             Keyword::EndRepeat => self.end(index, &label, &[Keyword::Repeat], open),
-            Keyword::Break | Keyword::Continue => {
-                self.inside(index, &label, &[Keyword::While, Keyword::Do, Keyword::Repeat], open)
-            }
+            Keyword::Break | Keyword::Continue => self.inside(
+                index,
+                &label,
+                &[Keyword::While, Keyword::Do, Keyword::Repeat],
+                open,
+            ),
             Keyword::Return => self.return_from(index, open),
             Keyword::Call => Ok(()),
         }
     }
 
     fn open_sub(&mut self, index: usize, label: &Label, open: &mut Vec<usize>) -> Checked<()> {
-        let outer = open.iter().find(|outer| self.entries[**outer].word.keyword == Keyword::Sub).copied();
+        let outer = open
+            .iter()
+            .find(|outer| self.entries[**outer].word.keyword == Keyword::Sub)
+            .copied();
         open.push(index);
         if let Some(outer) = outer {
-            return Err(self.fault(index, &format!("a subroutine lies within another, {}", self.placed(outer))));
+            return Err(self.fault(
+                index,
+                &format!("a subroutine lies within another, {}", self.placed(outer)),
+            ));
         }
-        let Label::Fixed(label) = label else { return Ok(()) };
+        let Label::Fixed(label) = label else {
+            return Ok(());
+        };
         match self.subs.insert(label.clone(), index) {
-            Some(before) => {
-                Err(self.fault(index, &format!("the subroutine is there already: {}", self.placed(before))))
-            }
+            Some(before) => Err(self.fault(
+                index,
+                &format!("the subroutine is there already: {}", self.placed(before)),
+            )),
             None => Ok(()),
         }
     }
@@ -156,21 +194,35 @@ impl Outline {
     /// The block that was opened last, if it has this label and one of these keywords.
     fn top(&self, open: &[usize], label: &Label, keywords: &[Keyword]) -> Option<usize> {
         let entry = &self.entries[*open.last()?];
-        (keywords.contains(&entry.word.keyword) && entry.word.label == *label).then_some(*open.last()?)
+        (keywords.contains(&entry.word.keyword) && entry.word.label == *label)
+            .then_some(*open.last()?)
     }
 
-    fn end(&mut self, index: usize, label: &Label, keywords: &[Keyword], open: &mut Vec<usize>) -> Checked<()> {
+    fn end(
+        &mut self,
+        index: usize,
+        label: &Label,
+        keywords: &[Keyword],
+        open: &mut Vec<usize>,
+    ) -> Checked<()> {
         if self.top(open, label, keywords).is_some() {
             self.close(index, open);
             return Ok(());
         }
         // Gives up what lies within the block that this closes, so that one mistake is one message.
-        let opener = |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
+        let opener =
+            |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
         let fault = match open.last() {
-            Some(other) => self.fault(index, &format!("it closes nothing here: open is {}", self.placed(*other))),
+            Some(other) => self.fault(
+                index,
+                &format!("it closes nothing here: open is {}", self.placed(*other)),
+            ),
             None => self.fault(index, "it closes nothing: no block is open"),
         };
-        if let Some(place) = open.iter().rposition(|opened| opener(&self.entries[*opened])) {
+        if let Some(place) = open
+            .iter()
+            .rposition(|opened| opener(&self.entries[*opened]))
+        {
             self.given_up.extend(open.drain(place..));
         }
         Err(fault)
@@ -186,9 +238,9 @@ impl Outline {
             }
         }
         // The last branch of an if goes on at its end.
-        let last = (opened..index)
-            .rev()
-            .find(|inside| self.entries[*inside].open == opened && is_branch(&self.entries[*inside]));
+        let last = (opened..index).rev().find(|inside| {
+            self.entries[*inside].open == opened && is_branch(&self.entries[*inside])
+        });
         if let Some(last) = last {
             self.entries[last].next = index;
         }
@@ -199,21 +251,41 @@ impl Outline {
             return Err(self.fault(index, "it belongs to no if that is open here"));
         };
         self.entries[index].open = opened;
-        let before = (opened..index).rev().find(|inside| self.entries[*inside].open == opened).unwrap_or(opened);
+        let before = (opened..index)
+            .rev()
+            .find(|inside| self.entries[*inside].open == opened)
+            .unwrap_or(opened);
         if self.entries[before].word.keyword == Keyword::Else {
-            return Err(self.fault(index, &format!("nothing but endif may follow else, {}", self.placed(before))));
+            return Err(self.fault(
+                index,
+                &format!("nothing but endif may follow else, {}", self.placed(before)),
+            ));
         }
         self.entries[before].next = index;
         Ok(())
     }
 
     /// `break` and `continue` belong to a block around them.
-    fn inside(&mut self, index: usize, label: &Label, keywords: &[Keyword], open: &[usize]) -> Checked<()> {
-        let belongs = |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
-        let around = open.iter().rev().find(|opened| belongs(&self.entries[**opened])).copied();
+    fn inside(
+        &mut self,
+        index: usize,
+        label: &Label,
+        keywords: &[Keyword],
+        open: &[usize],
+    ) -> Checked<()> {
+        let belongs =
+            |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
+        let around = open
+            .iter()
+            .rev()
+            .find(|opened| belongs(&self.entries[**opened]))
+            .copied();
         let Some(around) = around else {
             let names: Vec<_> = keywords.iter().map(|keyword| keyword.name()).collect();
-            return Err(self.fault(index, &format!("it stands in no {} with this label", names.join(" or "))));
+            return Err(self.fault(
+                index,
+                &format!("it stands in no {} with this label", names.join(" or ")),
+            ));
         };
         self.entries[index].open = around;
         Ok(())
@@ -221,22 +293,39 @@ impl Outline {
 
     /// `return` leaves the subroutine around it, whatever its label.
     fn return_from(&mut self, index: usize, open: &[usize]) -> Checked<()> {
-        let around = open.iter().rev().find(|opened| self.entries[**opened].word.keyword == Keyword::Sub).copied();
-        let Some(around) = around else { return Err(self.fault(index, "it stands in no sub")) };
+        let around = open
+            .iter()
+            .rev()
+            .find(|opened| self.entries[**opened].word.keyword == Keyword::Sub)
+            .copied();
+        let Some(around) = around else {
+            return Err(self.fault(index, "it stands in no sub"));
+        };
         self.entries[index].open = around;
         Ok(())
     }
 
     fn fault(&self, index: usize, why: &str) -> Fault {
         let end = usize::from(self.entries[index].word.values_at);
-        Fault::new(Span::new(0, end), "o-word", format!("{}: {why}", self.shown(index)))
+        Fault::new(
+            Span::new(0, end),
+            "o-word",
+            format!("{}: {why}", self.shown(index)),
+        )
     }
 
     fn placed(&self, index: usize) -> String {
-        format!("{} of line {}", self.shown(index), self.entries[index].number)
+        format!(
+            "{} of line {}",
+            self.shown(index),
+            self.entries[index].number
+        )
     }
 }
 
 fn is_branch(entry: &Entry) -> bool {
-    matches!(entry.word.keyword, Keyword::If | Keyword::ElseIf | Keyword::Else)
+    matches!(
+        entry.word.keyword,
+        Keyword::If | Keyword::ElseIf | Keyword::Else
+    )
 }

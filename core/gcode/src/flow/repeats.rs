@@ -34,7 +34,9 @@ impl Repeats {
 
     /// A turn of the loop at entry `open` ends; whether another begins.
     pub fn turn(&mut self, open: usize) -> bool {
-        let Some(repeat) = self.0.last_mut().filter(|repeat| repeat.open == open) else { return false };
+        let Some(repeat) = self.0.last_mut().filter(|repeat| repeat.open == open) else {
+            return false;
+        };
         repeat.left -= 1;
         if repeat.left == 0 {
             self.0.pop();

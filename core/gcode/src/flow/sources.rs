@@ -27,8 +27,15 @@ pub(super) struct Sources {
 
 impl Sources {
     pub fn new(program: &mut Program, pass: Pass) -> Self {
-        let own = Source { lines: Lines::new(program, pass), outline: None };
-        Self { pass, list: vec![own], current: 0 }
+        let own = Source {
+            lines: Lines::new(program, pass),
+            outline: None,
+        };
+        Self {
+            pass,
+            list: vec![own],
+            current: 0,
+        }
     }
 
     #[inline]
@@ -48,22 +55,34 @@ impl Sources {
     /// The next line of the current file.
     #[inline]
     pub fn next(&mut self, program: &mut Program) -> Result<Next, ProgramError> {
-        self.list[self.current].lines.next(file(program, self.current))
+        self.list[self.current]
+            .lines
+            .next(file(program, self.current))
     }
 
     /// Goes on behind `mark` of the current file.
     pub fn seek(&mut self, program: &mut Program, mark: Mark) -> Result<(), ProgramError> {
-        self.list[self.current].lines.seek(file(program, self.current), mark)
+        self.list[self.current]
+            .lines
+            .seek(file(program, self.current), mark)
     }
 
     /// The O-words of the current file; none before they have been indexed.
     pub fn outline(&self) -> &Outline {
         static NONE: std::sync::OnceLock<Outline> = std::sync::OnceLock::new();
-        self.current().outline.as_ref().unwrap_or_else(|| NONE.get_or_init(Outline::default))
+        self.current()
+            .outline
+            .as_ref()
+            .unwrap_or_else(|| NONE.get_or_init(Outline::default))
     }
 
     /// Finds the O-words of a file, whose lines then stand where they stood.
-    pub fn index(&mut self, program: &mut Program, which: usize, config: &Config) -> Result<(), ProgramError> {
+    pub fn index(
+        &mut self,
+        program: &mut Program,
+        which: usize,
+        config: &Config,
+    ) -> Result<(), ProgramError> {
         let source = &mut self.list[which];
         let file = file(program, which);
         let mark = source.lines.mark();
@@ -80,27 +99,46 @@ impl Sources {
         config: &Config,
     ) -> Result<Result<(usize, usize), String>, ProgramError> {
         for which in [self.current, 0] {
-            if let Some(sub) = self.list[which].outline.as_ref().and_then(|outline| outline.sub(label)) {
+            if let Some(sub) = self.list[which]
+                .outline
+                .as_ref()
+                .and_then(|outline| outline.sub(label))
+            {
                 return Ok(Ok((which, sub)));
             }
         }
-        let known = program.subroutines.iter().position(|(name, _)| name == label);
+        let known = program
+            .subroutines
+            .iter()
+            .position(|(name, _)| name == label);
         let place = match known.map_or_else(|| open_file(program, label, config), Ok) {
             Ok(place) => place,
             Err(why) => return Ok(Err(why)),
         };
         while self.list.len() <= place + 1 {
             let index = self.list.len();
-            let pass = if known.is_some() { self.pass } else { Pass::First };
+            let pass = if known.is_some() {
+                self.pass
+            } else {
+                Pass::First
+            };
             let lines = Lines::new(file(program, index), pass);
-            self.list.push(Source { lines, outline: None });
+            self.list.push(Source {
+                lines,
+                outline: None,
+            });
         }
         if self.list[place + 1].outline.is_none() {
             self.index(program, place + 1, config)?;
         }
-        let found = self.list[place + 1].outline.as_ref().and_then(|outline| outline.sub(label));
+        let found = self.list[place + 1]
+            .outline
+            .as_ref()
+            .and_then(|outline| outline.sub(label));
         let name = Arc::clone(&program.subroutines[place].1.name);
-        Ok(found.map(|sub| (place + 1, sub)).ok_or_else(|| format!("{name} holds no subroutine o<{label}>")))
+        Ok(found
+            .map(|sub| (place + 1, sub))
+            .ok_or_else(|| format!("{name} holds no subroutine o<{label}>")))
     }
 }
 
@@ -115,18 +153,29 @@ pub(super) fn file(program: &mut Program, which: usize) -> &mut Program {
 /// Opens the file of a subroutine; its place among them.
 fn open_file(program: &mut Program, label: &str, config: &Config) -> Result<usize, String> {
     if program.subroutines.len() == MAX_FILES {
-        return Err(format!("the program calls subroutines of more than {MAX_FILES} files"));
+        return Err(format!(
+            "the program calls subroutines of more than {MAX_FILES} files"
+        ));
     }
     let folders = &config.subroutine_path;
     let name = format!("{label}.ngc");
-    let Some(path) = folders.iter().map(|folder| folder.join(&name)).find(|path| path.is_file()) else {
-        let shown: Vec<_> = folders.iter().map(|folder| folder.display().to_string()).collect();
+    let Some(path) = folders
+        .iter()
+        .map(|folder| folder.join(&name))
+        .find(|path| path.is_file())
+    else {
+        let shown: Vec<_> = folders
+            .iter()
+            .map(|folder| folder.display().to_string())
+            .collect();
         let elsewhere = if shown.is_empty() {
             "the machine file has no [program] subroutine_path for files of subroutines".to_owned()
         } else {
             format!("no file {name} lies in {}", shown.join(" or "))
         };
-        return Err(format!("there is no subroutine with this label in this file, and {elsewhere}"));
+        return Err(format!(
+            "there is no subroutine with this label in this file, and {elsewhere}"
+        ));
     };
     let opened = Program::open(&path).map_err(|error| error.to_string())?;
     program.subroutines.push((label.to_owned(), opened));

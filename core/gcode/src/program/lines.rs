@@ -44,7 +44,11 @@ pub(crate) struct Mark {
 
 impl Mark {
     /// The place before the first line.
-    pub const START: Self = Self { chunk: 0, at: 0, number: 0 };
+    pub const START: Self = Self {
+        chunk: 0,
+        at: 0,
+        number: 0,
+    };
 }
 
 /// A chunk of whole lines that has been read.
@@ -76,12 +80,21 @@ impl Lines {
         if pass == Pass::First {
             program.chunks = Some(Vec::new());
         }
-        Self { pass, held: Vec::new(), room: 1, at: 0, number: 0, skipping: false }
+        Self {
+            pass,
+            held: Vec::new(),
+            room: 1,
+            at: 0,
+            number: 0,
+            skipping: false,
+        }
     }
 
     /// The text of a line.
     pub fn text(&self, line: &std::ops::Range<usize>) -> &[u8] {
-        self.held.last().map_or(&[], |chunk| &chunk.text[line.clone()])
+        self.held
+            .last()
+            .map_or(&[], |chunk| &chunk.text[line.clone()])
     }
 
     /// Where the chunk that is read ends.
@@ -91,7 +104,11 @@ impl Lines {
 
     /// The place before the next line.
     pub fn mark(&self) -> Mark {
-        Mark { chunk: self.held.last().map_or(0, |chunk| chunk.index), at: self.at, number: self.number }
+        Mark {
+            chunk: self.held.last().map_or(0, |chunk| chunk.index),
+            at: self.at,
+            number: self.number,
+        }
     }
 
     /// Goes on behind `mark`.
@@ -100,7 +117,11 @@ impl Lines {
     /// As [`Lines::next`].
     pub fn seek(&mut self, program: &mut Program, mark: Mark) -> Result<(), ProgramError> {
         self.room = MAX_HELD;
-        if self.held.last().is_none_or(|chunk| chunk.index != mark.chunk) {
+        if self
+            .held
+            .last()
+            .is_none_or(|chunk| chunk.index != mark.chunk)
+        {
             self.load(program, mark.chunk)?;
         }
         let begins = mark == Mark::START && self.text(&(0..self.end())).starts_with(BOM);
@@ -137,7 +158,9 @@ impl Lines {
     }
 
     fn too_long(&self, program: &Program, range: &std::ops::Range<usize>) -> Diagnostic {
-        let why = format!("the line is longer than {MAX_LINE_BYTES} bytes: this is hardly a part program");
+        let why = format!(
+            "the line is longer than {MAX_LINE_BYTES} bytes: this is hardly a part program"
+        );
         let fault = Fault::new(Span::new(0, 1), "line-long", why);
         Diagnostic::new(&program.name, self.number, self.text(range), fault)
     }
@@ -150,8 +173,15 @@ impl Lines {
             None => 0,
         };
         self.load(program, index)?;
-        let chunk = self.held.last().map_or(&[][..], |chunk| &chunk.text[..chunk.end]);
-        self.at = if index == 0 && chunk.starts_with(BOM) { BOM.len() } else { 0 };
+        let chunk = self
+            .held
+            .last()
+            .map_or(&[][..], |chunk| &chunk.text[..chunk.end]);
+        self.at = if index == 0 && chunk.starts_with(BOM) {
+            BOM.len()
+        } else {
+            0
+        };
         Ok(!chunk.is_empty())
     }
 
@@ -162,16 +192,33 @@ impl Lines {
             self.held.push(chunk);
             return Ok(());
         }
-        let text = if self.held.len() < self.room { vec![0; CHUNK] } else { self.held.remove(0).text };
+        let text = if self.held.len() < self.room {
+            vec![0; CHUNK]
+        } else {
+            self.held.remove(0).text
+        };
         let offset = match index.checked_sub(1) {
-            Some(before) => program.chunks.as_ref().and_then(|chunks| chunks.get(before)).map_or(0, |c| c.end),
+            Some(before) => program
+                .chunks
+                .as_ref()
+                .and_then(|chunks| chunks.get(before))
+                .map_or(0, |c| c.end),
             None => 0,
         };
-        let mut chunk = Chunk { index, text, end: 0, last: false };
+        let mut chunk = Chunk {
+            index,
+            text,
+            end: 0,
+            last: false,
+        };
         let filled = program.read_at(offset, &mut chunk.text)?;
         chunk.last = filled < CHUNK;
         let newline = chunk.text[..filled].iter().rposition(|b| *b == b'\n');
-        chunk.end = if chunk.last { filled } else { newline.map_or(filled, |newline| newline + 1) };
+        chunk.end = if chunk.last {
+            filled
+        } else {
+            newline.map_or(filled, |newline| newline + 1)
+        };
         let new = self.compare(program, &chunk, offset)?;
         if new {
             self.refuse_binary(program, &chunk)?;
@@ -182,7 +229,12 @@ impl Lines {
 
     /// Keeps the hash of a chunk that has not been read before, or refuses one that is not what was read then. Whether it
     /// is new.
-    fn compare(&self, program: &mut Program, chunk: &Chunk, offset: u64) -> Result<bool, ProgramError> {
+    fn compare(
+        &self,
+        program: &mut Program,
+        chunk: &Chunk,
+        offset: u64,
+    ) -> Result<bool, ProgramError> {
         let mut hasher = DefaultHasher::new();
         hasher.write(&chunk.text[..chunk.end]);
         let hash = hasher.finish();
@@ -190,14 +242,21 @@ impl Lines {
         match known.get(chunk.index) {
             Some(before) if before.hash == hash => Ok(false),
             None if self.pass == Pass::First => {
-                known.push(KnownChunk { end: offset + chunk.end as u64, hash });
+                known.push(KnownChunk {
+                    end: offset + chunk.end as u64,
+                    hash,
+                });
                 Ok(true)
             }
             _ => {
                 let lines = chunk.text[..chunk.end].split(|b| *b == b'\n').count() as u32;
                 let name = Arc::clone(&program.name);
                 let (first_line, last_line) = (self.number + 1, self.number + lines);
-                Err(ProgramError::Changed { name, first_line, last_line })
+                Err(ProgramError::Changed {
+                    name,
+                    first_line,
+                    last_line,
+                })
             }
         }
     }
@@ -210,15 +269,30 @@ impl Lines {
             return Ok(());
         }
         // Ctrl-Z ends the text of old systems; the line reader meets it only behind the end of the program.
-        let is_binary = |b: &u8| *b < b' ' && !matches!(b, b'\t' | b'\n' | b'\r' | 0x1a) || *b == 0x7f;
-        let Some(at) = chunk.iter().position(is_binary) else { return Ok(()) };
-        let start = chunk[..at].iter().rposition(|b| *b == b'\n').map_or(0, |newline| newline + 1);
-        let length = chunk[start..].iter().position(|b| *b == b'\n').unwrap_or(chunk.len() - start);
+        let is_binary =
+            |b: &u8| *b < b' ' && !matches!(b, b'\t' | b'\n' | b'\r' | 0x1a) || *b == 0x7f;
+        let Some(at) = chunk.iter().position(is_binary) else {
+            return Ok(());
+        };
+        let start = chunk[..at]
+            .iter()
+            .rposition(|b| *b == b'\n')
+            .map_or(0, |newline| newline + 1);
+        let length = chunk[start..]
+            .iter()
+            .position(|b| *b == b'\n')
+            .unwrap_or(chunk.len() - start);
         let lines_before = chunk[..start].split(|b| *b == b'\n').count() as u32 - 1;
         let line = self.number + u32::from(!self.skipping) + lines_before;
-        let hint =
-            if chunk.starts_with(b"\xff\xfe") || chunk.starts_with(b"\xfe\xff") { " (UTF-16 text?)" } else { "" };
-        let why = format!("this is not a part program: it holds the byte 0x{:02x}{hint}", chunk[at]);
+        let hint = if chunk.starts_with(b"\xff\xfe") || chunk.starts_with(b"\xfe\xff") {
+            " (UTF-16 text?)"
+        } else {
+            ""
+        };
+        let why = format!(
+            "this is not a part program: it holds the byte 0x{:02x}{hint}",
+            chunk[at]
+        );
         let fault = Fault::new(Span::new(at - start, at - start + 1), "binary", why);
         let text = &chunk[start..start + length.min(MAX_LINE_BYTES).max(at - start)];
         Err(Diagnostic::new(&program.name, line, text, fault).into())
@@ -232,6 +306,10 @@ fn piece(chunk: &Chunk, at: usize) -> (std::ops::Range<usize>, usize, bool) {
     let newline = chunk.text[at..chunk.end].iter().position(|b| *b == b'\n');
     let to = newline.map_or(chunk.end, |length| at + length);
     let after = (to + 1).min(chunk.end);
-    let length = if chunk.text[at..to].ends_with(b"\r") { to - 1 } else { to };
+    let length = if chunk.text[at..to].ends_with(b"\r") {
+        to - 1
+    } else {
+        to
+    };
     (at..length, after, newline.is_some() || chunk.last)
 }

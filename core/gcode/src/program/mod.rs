@@ -24,7 +24,9 @@ pub enum ProgramError {
         error: io::Error,
     },
     /// The file is not what the first pass read.
-    #[error("{name}: the file has changed since it was checked, between the lines {first_line} and {last_line}")]
+    #[error(
+        "{name}: the file has changed since it was checked, between the lines {first_line} and {last_line}"
+    )]
     Changed {
         /// Name of the program.
         name: Arc<str>,
@@ -73,7 +75,10 @@ impl Program {
     /// The file cannot be opened or read, or is a directory.
     pub fn open(path: &Path) -> Result<Self, ProgramError> {
         let name: Arc<str> = path.display().to_string().into();
-        let io = |error| ProgramError::Io { name: Arc::clone(&name), error };
+        let io = |error| ProgramError::Io {
+            name: Arc::clone(&name),
+            error,
+        };
         let file = File::open(path).map_err(io)?;
         let kind = file.metadata().map_err(io)?.file_type();
         if kind.is_dir() {
@@ -82,7 +87,12 @@ impl Program {
         if !kind.is_file() {
             return Self::spool(&name, file);
         }
-        Ok(Self { name, file, chunks: None, subroutines: Vec::new() })
+        Ok(Self {
+            name,
+            file,
+            chunks: None,
+            subroutines: Vec::new(),
+        })
     }
 
     /// Copies `reader` to an unnamed temporary file; `name` is for messages.
@@ -91,10 +101,18 @@ impl Program {
     /// Reading or writing fails.
     pub fn spool(name: &str, mut reader: impl Read) -> Result<Self, ProgramError> {
         let name: Arc<str> = name.into();
-        let io = |error| ProgramError::Io { name: Arc::clone(&name), error };
+        let io = |error| ProgramError::Io {
+            name: Arc::clone(&name),
+            error,
+        };
         let mut file = tempfile::tempfile().map_err(io)?;
         io::copy(&mut reader, &mut file).map_err(io)?;
-        Ok(Self { name, file, chunks: None, subroutines: Vec::new() })
+        Ok(Self {
+            name,
+            file,
+            chunks: None,
+            subroutines: Vec::new(),
+        })
     }
 
     /// The name of the program, as it was opened.
@@ -104,7 +122,10 @@ impl Program {
 
     /// Reads from byte `offset` on until `text` is full or the file ends; how many bytes that were.
     pub(crate) fn read_at(&mut self, offset: u64, text: &mut [u8]) -> Result<usize, ProgramError> {
-        let io = |error| ProgramError::Io { name: Arc::clone(&self.name), error };
+        let io = |error| ProgramError::Io {
+            name: Arc::clone(&self.name),
+            error,
+        };
         self.file.seek(SeekFrom::Start(offset)).map_err(io)?;
         let mut filled = 0;
         while filled < text.len() {
@@ -112,7 +133,12 @@ impl Program {
                 Ok(0) => break,
                 Ok(count) => filled += count,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(ProgramError::Io { name: Arc::clone(&self.name), error }),
+                Err(error) => {
+                    return Err(ProgramError::Io {
+                        name: Arc::clone(&self.name),
+                        error,
+                    });
+                }
             }
         }
         Ok(filled)

@@ -100,8 +100,19 @@ impl Coordinates {
     /// that of G59.3, which then has no offset of G92.
     pub fn without_tool(&self, machine: &AxisVector, fixture: bool) -> AxisVector {
         let zero = AxisVector::ZERO;
-        let base = Self { tool: zero, ..self.clone() };
-        let base = if fixture { Self { active: SYSTEMS - 1, g92: zero, ..base } } else { base };
+        let base = Self {
+            tool: zero,
+            ..self.clone()
+        };
+        let base = if fixture {
+            Self {
+                active: SYSTEMS - 1,
+                g92: zero,
+                ..base
+            }
+        } else {
+            base
+        };
         base.summed_up().to_program(machine)
     }
 
@@ -118,7 +129,11 @@ impl Coordinates {
     /// Moves the origin of `system` so that the point `machine`, which has certain coordinates there, gets others: those of
     /// `wanted`, which are given for the axes where it is a number.
     pub fn shift_origin(&mut self, system: usize, machine: &AxisVector, wanted: &[Option<f64>]) {
-        let other = Self { active: system, ..self.clone() }.summed_up();
+        let other = Self {
+            active: system,
+            ..self.clone()
+        }
+        .summed_up();
         let current = other.to_program(machine);
         let mut shift = AxisVector::ZERO;
         for (axis, value) in wanted.iter().enumerate() {
@@ -194,7 +209,11 @@ impl Coordinates {
 
     /// Says what lasts of them.
     pub fn tell(&self, lasting: &mut Lasting) {
-        (lasting.origins, lasting.rotations_rad, lasting.active_system) = (self.origins, self.rotations, self.active);
+        (
+            lasting.origins,
+            lasting.rotations_rad,
+            lasting.active_system,
+        ) = (self.origins, self.rotations, self.active);
         (lasting.g92, lasting.g92_stored) = (self.g92, self.g92_stored);
         (lasting.reference, lasting.tool_offset) = (self.reference, self.tool);
     }

@@ -34,7 +34,12 @@ pub(crate) struct Letters {
 
 impl Letters {
     pub fn new(axes: &Axes) -> Self {
-        let mut this = Self { names: [0; MAX_AXES], rotary: [false; MAX_AXES], count: axes.count(), mask: 0 };
+        let mut this = Self {
+            names: [0; MAX_AXES],
+            rotary: [false; MAX_AXES],
+            count: axes.count(),
+            mask: 0,
+        };
         for axis in 0..axes.count() {
             this.names[axis] = axes.letter(axis) as u8;
             this.rotary[axis] = axes.is_rotary(axis);
@@ -70,7 +75,10 @@ impl Letters {
 
     /// The letters for messages: `X Y Z`.
     pub fn list(&self) -> String {
-        let letters: Vec<_> = self.names[..self.count].iter().map(|l| (*l as char).to_string()).collect();
+        let letters: Vec<_> = self.names[..self.count]
+            .iter()
+            .map(|l| (*l as char).to_string())
+            .collect();
         letters.join(" ")
     }
 }

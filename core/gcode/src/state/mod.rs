@@ -84,7 +84,11 @@ impl State {
 
     pub fn new(config: &Config) -> Self {
         let letters = letters::Letters::new(&config.axes);
-        let linear = |letter| letters.axis(letter).filter(|axis| !letters.is_rotary(*axis));
+        let linear = |letter| {
+            letters
+                .axis(letter)
+                .filter(|axis| !letters.is_rotary(*axis))
+        };
         let plane = linear(b'X').zip(linear(b'Y')).map(|(x, y)| [x, y]);
         Self {
             line: 0,
@@ -122,7 +126,11 @@ impl State {
     #[inline]
     pub fn blank_block(&self) -> Block {
         Block {
-            path_mode: if self.modes.exact_stop { PathMode::ExactStop } else { PathMode::Continuous },
+            path_mode: if self.modes.exact_stop {
+                PathMode::ExactStop
+            } else {
+                PathMode::Continuous
+            },
             line: self.line,
             index: self.path.next_index,
             time_constant_s: self.modes.time_constant_s,

@@ -113,13 +113,18 @@ impl Parameters {
         let mut numbered = [Value::default(); LOCAL];
         numbered[..arguments.len()].copy_from_slice(arguments);
         numbered.swap_with_slice(&mut self.numbered[1..=LOCAL]);
-        self.callers.push(Caller { numbered, local: std::mem::take(&mut self.local) });
+        self.callers.push(Caller {
+            numbered,
+            local: std::mem::take(&mut self.local),
+        });
     }
 
     /// A subroutine ends, and returns a value or none.
     pub fn leave(&mut self, value: Option<Value>) {
         self.returned = value;
-        let Some(caller) = self.callers.pop() else { return };
+        let Some(caller) = self.callers.pop() else {
+            return;
+        };
         self.names -= self.local.len();
         self.numbered[1..=LOCAL].copy_from_slice(&caller.numbered);
         self.local = caller.local;
@@ -127,11 +132,17 @@ impl Parameters {
 
     /// What the calls say of themselves: `#<_value>`, `#<_value_returned>`, `#<_call_level>`.
     fn of_calls(&self, name: &[u8]) -> Option<Value> {
-        let value = |number: f64| Value { number, assumed: self.returned.is_some_and(|value| value.assumed) };
+        let value = |number: f64| Value {
+            number,
+            assumed: self.returned.is_some_and(|value| value.assumed),
+        };
         match name {
             b"_value" => Some(value(self.returned.map_or(0.0, |value| value.number))),
             b"_value_returned" => Some(value(f64::from(u8::from(self.returned.is_some())))),
-            b"_call_level" => Some(Value { number: self.callers.len() as f64, assumed: false }),
+            b"_call_level" => Some(Value {
+                number: self.callers.len() as f64,
+                assumed: false,
+            }),
             _ => None,
         }
     }
@@ -139,21 +150,34 @@ impl Parameters {
     /// The value of parameter `number`, which lies within 1 to [`LAST`]; zero where it was never set.
     pub fn numbered(&self, number: usize, state: &State, letters: &Letters) -> Value {
         let kept = predefined(number, state, letters);
-        let kept = kept.map(|value| Value { number: value, assumed: is_assumed(number, state, letters) });
+        let kept = kept.map(|value| Value {
+            number: value,
+            assumed: is_assumed(number, state, letters),
+        });
         kept.unwrap_or(self.numbered[number])
     }
 
     /// The value of the parameter called `name` (lower case, without blanks).
     pub fn named(&self, name: &[u8], state: &State, letters: &Letters) -> Option<Value> {
         let own = || {
-            Value { number: predefined_name(name, state, letters)?, assumed: is_position_assumed(name, state, letters) }
-                .into()
+            Value {
+                number: predefined_name(name, state, letters)?,
+                assumed: is_position_assumed(name, state, letters),
+            }
+            .into()
         };
-        self.names_of(name).get(name).copied().or_else(|| self.of_calls(name)).or_else(own)
+        self.names_of(name)
+            .get(name)
+            .copied()
+            .or_else(|| self.of_calls(name))
+            .or_else(own)
     }
 
     pub fn set_numbered(&mut self, number: usize, value: f64, assumed: bool) {
-        self.numbered[number] = Value { number: value, assumed };
+        self.numbered[number] = Value {
+            number: value,
+            assumed,
+        };
         if let Some(log) = &mut self.log
             && LASTING.iter().any(|range| range.contains(&number))
         {
@@ -167,7 +191,11 @@ impl Parameters {
     }
 
     fn names_of(&self, name: &[u8]) -> &Names {
-        if name.starts_with(b"_") { &self.global } else { &self.local }
+        if name.starts_with(b"_") {
+            &self.global
+        } else {
+            &self.local
+        }
     }
 
     /// Sets a named parameter; false where there are too many.
@@ -175,8 +203,15 @@ impl Parameters {
         if let Some(log) = self.log.as_mut().filter(|_| name.starts_with(b"_")) {
             log.push(Written::Named(name.into(), value));
         }
-        let value = Value { number: value, assumed };
-        let names = if name.starts_with(b"_") { &mut self.global } else { &mut self.local };
+        let value = Value {
+            number: value,
+            assumed,
+        };
+        let names = if name.starts_with(b"_") {
+            &mut self.global
+        } else {
+            &mut self.local
+        };
         if let Some(slot) = names.get_mut(name) {
             *slot = value;
         } else if self.names < MAX_NAMED {
@@ -223,7 +258,12 @@ fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
         5399 => Some(state.outputs.answer),
         5400 => Some(f64::from(state.tools.in_spindle)),
         5401..=5409 => fixed(coordinates.tool(), number - 5401),
-        5410 => Some(state.tools.find(state.tools.in_spindle).map_or(0.0, |tool| tool.diameter_mm)),
+        5410 => Some(
+            state
+                .tools
+                .find(state.tools.in_spindle)
+                .map_or(0.0, |tool| tool.diameter_mm),
+        ),
         5420..=5428 => Some(position(state, letters, number - 5420)),
         _ => None,
     }
@@ -231,7 +271,12 @@ fn predefined(number: usize, state: &State, letters: &Letters) -> Option<f64> {
 
 /// Whether what the interpreter keeps as parameter `number` follows from an assumed answer.
 fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
-    let axis = |nth: usize| AXIS_LETTERS.as_bytes().get(nth).and_then(|letter| letters.axis(*letter));
+    let axis = |nth: usize| {
+        AXIS_LETTERS
+            .as_bytes()
+            .get(nth)
+            .and_then(|letter| letters.axis(*letter))
+    };
     let of = |mask: u32, nth: usize| axis(nth).is_some_and(|axis| mask >> axis & 1 != 0);
     let (offsets, position) = (state.coordinates.assumed, state.path.assumed);
     match number {
@@ -245,7 +290,9 @@ fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
 }
 
 fn is_position_assumed(name: &[u8], state: &State, letters: &Letters) -> bool {
-    let ([b'_', letter] | [b'_', b'a', b'b', b's', b'_', letter]) = name else { return false };
+    let ([b'_', letter] | [b'_', b'a', b'b', b's', b'_', letter]) = name else {
+        return false;
+    };
     let axis = letters.axis(letter.to_ascii_uppercase());
     axis.is_some_and(|axis| (state.coordinates.assumed | state.path.assumed) >> axis & 1 != 0)
 }
@@ -260,13 +307,21 @@ fn in_mm(letters: &Letters, nth: usize, value: impl Fn(usize) -> f64) -> f64 {
 }
 
 fn position(state: &State, letters: &Letters, nth: usize) -> f64 {
-    letters.axis(AXIS_LETTERS.as_bytes()[nth]).map_or(0.0, |axis| state.program_position(letters, axis))
+    letters
+        .axis(AXIS_LETTERS.as_bytes()[nth])
+        .map_or(0.0, |axis| state.program_position(letters, axis))
 }
 
 /// The pocket of a tool; −1 for no tool.
 fn pocket(state: &State, tool: Option<u32>) -> f64 {
     let Some(number) = tool else { return -1.0 };
-    f64::from(state.tools.find(number).and_then(|tool| tool.pocket).unwrap_or(0))
+    f64::from(
+        state
+            .tools
+            .find(number)
+            .and_then(|tool| tool.pocket)
+            .unwrap_or(0),
+    )
 }
 
 /// Named values that the interpreter keeps itself.
@@ -307,9 +362,13 @@ pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> 
         b"_current_pocket" => pocket(state, Some(state.tools.in_spindle)),
         b"_selected_pocket" => pocket(state, state.tools.selected),
         [b'_', b'a', b'b', b's', b'_', letter] => {
-            let letter = AXIS_LETTERS.bytes().find(|l| *l == letter.to_ascii_uppercase())?;
+            let letter = AXIS_LETTERS
+                .bytes()
+                .find(|l| *l == letter.to_ascii_uppercase())?;
             let axis = letters.axis(letter);
-            axis.map_or(0.0, |axis| state.path.position[axis] / state.modes.scale(letters, axis))
+            axis.map_or(0.0, |axis| {
+                state.path.position[axis] / state.modes.scale(letters, axis)
+            })
         }
         b"_metric" => flag(state.modes.unit_mm == 1.0),
         b"_imperial" => flag(state.modes.unit_mm != 1.0),

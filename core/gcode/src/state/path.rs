@@ -68,6 +68,12 @@ impl Path {
     #[inline]
     pub fn block_end(&self) -> AxisVector {
         let (from, to) = (&self.last_end, &self.position);
-        AxisVector(std::array::from_fn(|i| if (to[i] - from[i]).abs() < NO_MOVE { from[i] } else { to[i] }))
+        AxisVector(std::array::from_fn(|i| {
+            if (to[i] - from[i]).abs() < NO_MOVE {
+                from[i]
+            } else {
+                to[i]
+            }
+        }))
     }
 }

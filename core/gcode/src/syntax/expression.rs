@@ -38,18 +38,31 @@ impl Context<'_> {
     /// Anything that is not a value, or has none.
     #[inline]
     pub fn value(&self, scanner: &mut Scanner) -> Checked<f64> {
-        if number::starts_here(scanner) { number::read(scanner) } else { self.deep_value(scanner, 0) }
+        if number::starts_here(scanner) {
+            number::read(scanner)
+        } else {
+            self.deep_value(scanner, 0)
+        }
     }
 
     /// The value at the cursor, and whether it follows from what the first pass has assumed.
     pub fn assumed_value(&self, scanner: &mut Scanner) -> Checked<Value> {
         self.reads_assumed.set(false);
         let number = self.value(scanner)?;
-        Ok(Value { number, assumed: self.reads_assumed.get() })
+        Ok(Value {
+            number,
+            assumed: self.reads_assumed.get(),
+        })
     }
 
     /// The `[values]` from byte `at` of `text` to its end, at most `max` of them.
-    pub fn bracketed(&self, text: &[u8], at: usize, max: usize, values: &mut Vec<Value>) -> Checked<()> {
+    pub fn bracketed(
+        &self,
+        text: &[u8],
+        at: usize,
+        max: usize,
+        values: &mut Vec<Value>,
+    ) -> Checked<()> {
         values.clear();
         let mut scanner = Scanner::new(text, at);
         loop {
@@ -58,8 +71,16 @@ impl Context<'_> {
                 return Ok(());
             }
             if scanner.peek() != b'[' || values.len() == max {
-                let more = if max == 0 { "nothing may" } else { "only values in brackets may" };
-                return Err(Fault::new(scanner.here(), "o-word", format!("{more} follow here")));
+                let more = if max == 0 {
+                    "nothing may"
+                } else {
+                    "only values in brackets may"
+                };
+                return Err(Fault::new(
+                    scanner.here(),
+                    "o-word",
+                    format!("{more} follow here"),
+                ));
             }
             values.push(self.assumed_value(&mut scanner)?);
         }
@@ -68,7 +89,11 @@ impl Context<'_> {
     fn deep_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         scanner.skip_blanks();
         if depth > MAX_DEPTH {
-            return Err(Fault::new(scanner.here(), "nesting", "the expression is nested too deeply (32 levels)"));
+            return Err(Fault::new(
+                scanner.here(),
+                "nesting",
+                "the expression is nested too deeply (32 levels)",
+            ));
         }
         if number::starts_here(scanner) {
             return number::read(scanner);
@@ -93,9 +118,16 @@ impl Context<'_> {
         }
         let value = self.operation(scanner, depth + 1, 1)?;
         if !scanner.take(b']') {
-            let what =
-                if scanner.at_end() { "the [ is not closed: ] is missing" } else { "an operator or ] is missing" };
-            let span = if scanner.at_end() { scanner.since(start) } else { scanner.here() };
+            let what = if scanner.at_end() {
+                "the [ is not closed: ] is missing"
+            } else {
+                "an operator or ] is missing"
+            };
+            let span = if scanner.at_end() {
+                scanner.since(start)
+            } else {
+                scanner.here()
+            };
             return Err(Fault::new(span, "bracket", what));
         }
         Ok(value)
@@ -111,7 +143,9 @@ impl Context<'_> {
             }
             scanner.advance(length);
             let right = self.operation(scanner, depth, operator.strength() + 1)?;
-            left = operator.apply(left, right).map_err(|why| Fault::new(scanner.since(start), "arithmetic", why))?;
+            left = operator
+                .apply(left, right)
+                .map_err(|why| Fault::new(scanner.since(start), "arithmetic", why))?;
         }
         Ok(left)
     }
@@ -126,7 +160,11 @@ impl Context<'_> {
         }
         scanner.advance(length);
         let Some(function) = function else {
-            return if name == b"ATAN" { self.arc_tangent(scanner, depth) } else { self.exists(scanner, depth) };
+            return if name == b"ATAN" {
+                self.arc_tangent(scanner, depth)
+            } else {
+                self.exists(scanner, depth)
+            };
         };
         let argument = self.bracket(scanner, depth)?;
         function(argument).map_err(|why| Fault::new(scanner.since(start), "arithmetic", why))
@@ -135,7 +173,11 @@ impl Context<'_> {
     fn arc_tangent(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         let y = self.bracket(scanner, depth)?;
         if !scanner.take(b'/') {
-            return Err(Fault::new(scanner.here(), "bracket", "ATAN has two arguments: ATAN[y]/[x]"));
+            return Err(Fault::new(
+                scanner.here(),
+                "bracket",
+                "ATAN has two arguments: ATAN[y]/[x]",
+            ));
         }
         scanner.skip_blanks();
         let x = self.bracket(scanner, depth)?;
@@ -147,13 +189,18 @@ impl Context<'_> {
         let opened = scanner.take(b'[');
         scanner.skip_blanks();
         if !opened || scanner.peek() != b'#' {
-            return Err(Fault::new(scanner.here(), "bracket", "EXISTS takes a parameter: EXISTS[#<name>]"));
+            return Err(Fault::new(
+                scanner.here(),
+                "bracket",
+                "EXISTS takes a parameter: EXISTS[#<name>]",
+            ));
         }
         let known = match self.parameter(scanner, depth) {
             Ok(Parameter::Numbered(_)) => true,
-            Ok(Parameter::Named(name, length)) => {
-                self.parameters.named(&name[..length], self.state, self.letters).is_some()
-            }
+            Ok(Parameter::Named(name, length)) => self
+                .parameters
+                .named(&name[..length], self.state, self.letters)
+                .is_some(),
             Err(fault) if fault.code == "parameter-number" => false,
             Err(fault) => return Err(fault),
         };
@@ -166,13 +213,17 @@ impl Context<'_> {
     fn parameter_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         let start = scanner.at();
         let value = match self.parameter(scanner, depth)? {
-            Parameter::Numbered(number) => Ok(self.parameters.numbered(number, self.state, self.letters)),
+            Parameter::Numbered(number) => {
+                Ok(self.parameters.numbered(number, self.state, self.letters))
+            }
             Parameter::Named(name, length) => {
                 let name = &name[..length];
-                self.parameters.named(name, self.state, self.letters).ok_or_else(|| {
-                    let message = unset(name);
-                    Fault::new(scanner.since(start), "parameter-unset", message)
-                })
+                self.parameters
+                    .named(name, self.state, self.letters)
+                    .ok_or_else(|| {
+                        let message = unset(name);
+                        Fault::new(scanner.since(start), "parameter-unset", message)
+                    })
             }
         }?;
         if value.assumed {
@@ -192,9 +243,15 @@ impl Context<'_> {
         let number = self.deep_value(scanner, depth + 1)?;
         let rounded = number.round();
         if (number - rounded).abs() > 1e-4 || !(1.0..=LAST as f64).contains(&rounded) {
-            let message =
-                format!("there is no parameter #{}: the numbers go from 1 to {LAST}", crate::fault::show(number));
-            return Err(Fault::new(scanner.since(start), "parameter-number", message));
+            let message = format!(
+                "there is no parameter #{}: the numbers go from 1 to {LAST}",
+                crate::fault::show(number)
+            );
+            return Err(Fault::new(
+                scanner.since(start),
+                "parameter-number",
+                message,
+            ));
         }
         Ok(Parameter::Numbered(rounded as usize))
     }
@@ -206,10 +263,14 @@ fn unset(name: &[u8]) -> String {
     let shown = String::from_utf8_lossy(name);
     match name {
         [b'_', b'i', b'n', b'i', b'[', ..] => {
-            format!("parameter #<{shown}> would read LinuxCNC's INI file, and there is none: assign the value itself")
+            format!(
+                "parameter #<{shown}> would read LinuxCNC's INI file, and there is none: assign the value itself"
+            )
         }
         [b'_', b'h', b'a', b'l', b'[', ..] => {
-            format!("parameter #<{shown}> would read a HAL pin, and there is no HAL: M66 reads inputs")
+            format!(
+                "parameter #<{shown}> would read a HAL pin, and there is no HAL: M66 reads inputs"
+            )
         }
         _ => format!("parameter #<{shown}> has never been set"),
     }
@@ -231,7 +292,9 @@ fn next_operator(scanner: &mut Scanner) -> Option<(Operator, usize)> {
 /// The longest operator at the cursor: a function may follow it without a blank.
 fn named_operator(scanner: &Scanner) -> Option<(Operator, usize)> {
     let (name, length) = scanner.name();
-    (2..=length.min(3)).rev().find_map(|length| Some((Operator::called(&name[..length])?, length)))
+    (2..=length.min(3))
+        .rev()
+        .find_map(|length| Some((Operator::called(&name[..length])?, length)))
 }
 
 /// Reads `<name>`: blanks and case do not count.
@@ -255,17 +318,30 @@ fn name(scanner: &mut Scanner) -> Checked<Parameter> {
 
 #[cold]
 fn missing(span: Span) -> Fault {
-    Fault::new(span, "value-missing", "a number, [expression], #parameter or function must follow")
+    Fault::new(
+        span,
+        "value-missing",
+        "a number, [expression], #parameter or function must follow",
+    )
 }
 
 #[cold]
 fn no_function(span: Span, name: &[u8]) -> Fault {
     let name = String::from_utf8_lossy(name);
     match &*name {
-        "NAN" | "INF" | "INFINITY" => {
-            Fault::new(span, "not-finite", format!("{name} is not a number that can be driven"))
-        }
+        "NAN" | "INF" | "INFINITY" => Fault::new(
+            span,
+            "not-finite",
+            format!("{name} is not a number that can be driven"),
+        ),
         _ if name.len() < 2 => missing(span),
-        _ => Fault::new(span, "function", format!("no function is called {name}; there are {}", function::NAMES)),
+        _ => Fault::new(
+            span,
+            "function",
+            format!(
+                "no function is called {name}; there are {}",
+                function::NAMES
+            ),
+        ),
     }
 }

@@ -82,7 +82,11 @@ impl Operator {
 }
 
 fn finite(value: f64) -> Result<f64, &'static str> {
-    if value.is_finite() { Ok(value) } else { Err("the result is too large to be a number") }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err("the result is too large to be a number")
+    }
 }
 
 /// A function of one value. ATAN (two values) and EXISTS are read by the expression itself.
@@ -101,15 +105,31 @@ pub(crate) fn called(name: &[u8]) -> Option<Function> {
         b"EXP" => |x| finite(x.exp()),
         b"FIX" => |x| Ok(x.floor()),
         b"FUP" => |x| Ok(x.ceil()),
-        b"LN" => |x| if x > 0.0 { Ok(x.ln()) } else { Err("LN needs a positive number") },
+        b"LN" => |x| {
+            if x > 0.0 {
+                Ok(x.ln())
+            } else {
+                Err("LN needs a positive number")
+            }
+        },
         b"ROUND" => |x| Ok(x.round()),
         b"SIN" => |x| Ok(x.to_radians().sin()),
-        b"SQRT" => |x| if x >= 0.0 { Ok(x.sqrt()) } else { Err("SQRT needs a number that is not negative") },
+        b"SQRT" => |x| {
+            if x >= 0.0 {
+                Ok(x.sqrt())
+            } else {
+                Err("SQRT needs a number that is not negative")
+            }
+        },
         b"TAN" => |x| Ok(x.to_radians().tan()),
         _ => return None,
     })
 }
 
 fn within_one(x: f64) -> Result<f64, &'static str> {
-    if (-1.0..=1.0).contains(&x) { Ok(x) } else { Err("ACOS and ASIN need a number from -1 to 1") }
+    if (-1.0..=1.0).contains(&x) {
+        Ok(x)
+    } else {
+        Err("ACOS and ASIN need a number from -1 to 1")
+    }
 }

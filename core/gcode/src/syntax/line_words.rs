@@ -71,7 +71,10 @@ impl Polar {
         let (radius, angle) = if absolute {
             (self.radius.unwrap_or(radius), given.unwrap_or(angle))
         } else {
-            (radius + self.radius.unwrap_or(0.0), angle + given.unwrap_or(0.0))
+            (
+                radius + self.radius.unwrap_or(0.0),
+                angle + given.unwrap_or(0.0),
+            )
         };
         [radius * angle.cos(), radius * angle.sin()]
     }
@@ -115,11 +118,22 @@ impl LineWords {
     /// Adds `@` or `^`.
     #[cold]
     pub fn add_polar(&mut self, byte: u8, value: f64, span: Span) -> Checked<()> {
-        let polar = self.polar.get_or_insert(Polar { span, ..Polar::default() });
-        let place = if byte == b'@' { &mut polar.radius } else { &mut polar.angle_deg };
+        let polar = self.polar.get_or_insert(Polar {
+            span,
+            ..Polar::default()
+        });
+        let place = if byte == b'@' {
+            &mut polar.radius
+        } else {
+            &mut polar.angle_deg
+        };
         match place.replace(value) {
             None => Ok(()),
-            Some(_) => Err(Fault::new(span, "word-twice", format!("{} stands in this line twice", byte as char))),
+            Some(_) => Err(Fault::new(
+                span,
+                "word-twice",
+                format!("{} stands in this line twice", byte as char),
+            )),
         }
     }
 
@@ -166,7 +180,11 @@ impl LineWords {
     #[cold]
     pub fn exponent(&self, letter: u8) -> &'static str {
         let behind = |other: u8| self.has(other) && self.span(other).end == self.span(letter).start;
-        if letter == b'E' && (b'A'..=b'Z').any(behind) { "; numbers have no exponent" } else { "" }
+        if letter == b'E' && (b'A'..=b'Z').any(behind) {
+            "; numbers have no exponent"
+        } else {
+            ""
+        }
     }
 
     /// The place of the first (leftmost) letter of `mask`.
@@ -176,16 +194,30 @@ impl LineWords {
             return None;
         }
         let letters = (b'A'..=b'Z').filter(|l| present >> index(*l) & 1 != 0);
-        letters.map(|l| (l, self.span(l))).min_by_key(|(_, span)| span.start)
+        letters
+            .map(|l| (l, self.span(l)))
+            .min_by_key(|(_, span)| span.start)
     }
 
     /// The word `letter` as a whole number of `range`; `None` where the line lacks it.
-    pub fn integer(&self, letter: u8, range: std::ops::RangeInclusive<u32>) -> Checked<Option<u32>> {
-        let Some(value) = self.get(letter) else { return Ok(None) };
+    pub fn integer(
+        &self,
+        letter: u8,
+        range: std::ops::RangeInclusive<u32>,
+    ) -> Checked<Option<u32>> {
+        let Some(value) = self.get(letter) else {
+            return Ok(None);
+        };
         let rounded = value.round();
-        if (value - rounded).abs() > 1e-4 || !(f64::from(*range.start())..=f64::from(*range.end())).contains(&rounded) {
+        if (value - rounded).abs() > 1e-4
+            || !(f64::from(*range.start())..=f64::from(*range.end())).contains(&rounded)
+        {
             let name = letter as char;
-            let message = format!("{name} must be a whole number from {} to {}", range.start(), range.end());
+            let message = format!(
+                "{name} must be a whole number from {} to {}",
+                range.start(),
+                range.end()
+            );
             return Err(self.fault(letter, "word-range", message));
         }
         Ok(Some(rounded as u32))
@@ -194,9 +226,11 @@ impl LineWords {
     /// The word `letter` where it must not be negative; `None` where the line lacks it.
     pub fn not_negative(&self, letter: u8) -> Checked<Option<f64>> {
         match self.get(letter) {
-            Some(value) if value < 0.0 => {
-                Err(self.fault(letter, "word-range", format!("{} must not be negative", letter as char)))
-            }
+            Some(value) if value < 0.0 => Err(self.fault(
+                letter,
+                "word-range",
+                format!("{} must not be negative", letter as char),
+            )),
             other => Ok(other),
         }
     }

@@ -7,8 +7,9 @@ use crate::fault::{Checked, Fault};
 const MAX_LENGTH: usize = 64;
 /// Digits that always fit a 53-bit mantissa, so that the quotient by an exact power of ten is correctly rounded.
 const EXACT_DIGITS: usize = 15;
-const POWERS_OF_TEN: [f64; EXACT_DIGITS + 1] =
-    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+const POWERS_OF_TEN: [f64; EXACT_DIGITS + 1] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+];
 
 /// Whether a number begins at the cursor.
 #[inline]
@@ -42,10 +43,17 @@ pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
     }
     if whole + fraction > EXACT_DIGITS {
         // The bytes are ASCII digits, a sign and a point, which `parse` always understands.
-        return Ok(std::str::from_utf8(&text[..length]).ok().and_then(|t| t.parse().ok()).unwrap_or(f64::NAN));
+        return Ok(std::str::from_utf8(&text[..length])
+            .ok()
+            .and_then(|t| t.parse().ok())
+            .unwrap_or(f64::NAN));
     }
     let magnitude = mantissa as f64 / POWERS_OF_TEN[fraction];
-    Ok(if text[0] == b'-' { -magnitude } else { magnitude })
+    Ok(if text[0] == b'-' {
+        -magnitude
+    } else {
+        magnitude
+    })
 }
 
 /// The digits at the start of `text`, set behind `mantissa` (which wraps where they are too many), and how many they are.
@@ -69,9 +77,17 @@ fn refuse(scanner: &Scanner, start: usize, digits: usize, length: usize) -> Faul
         let message = format!("the number has {length} characters, {MAX_LENGTH} are allowed");
         Fault::new(scanner.since(start), "number-long", message)
     } else if digits == 0 {
-        Fault::new(scanner.since(start), "number", "a number needs at least one digit")
+        Fault::new(
+            scanner.since(start),
+            "number",
+            "a number needs at least one digit",
+        )
     } else {
-        Fault::new(scanner.here(), "number", "a number has one decimal point only")
+        Fault::new(
+            scanner.here(),
+            "number",
+            "a number has one decimal point only",
+        )
     }
 }
 
@@ -89,12 +105,22 @@ mod tests {
 
     #[test]
     fn forms_of_a_number() {
-        for (text, value) in [("1", 1.0), ("-.5", -0.5), ("+3.", 3.0), ("007.2500", 7.25), ("0", 0.0)] {
+        for (text, value) in [
+            ("1", 1.0),
+            ("-.5", -0.5),
+            ("+3.", 3.0),
+            ("007.2500", 7.25),
+            ("0", 0.0),
+        ] {
             assert_eq!(number(text), Ok(value), "{text}");
         }
         assert!(number(".").unwrap_err().contains("digit"));
         assert!(number("1.2.3").unwrap_err().contains("one decimal point"));
-        assert!(number(&"1".repeat(65)).unwrap_err().contains("65 characters"));
+        assert!(
+            number(&"1".repeat(65))
+                .unwrap_err()
+                .contains("65 characters")
+        );
     }
 
     proptest! {

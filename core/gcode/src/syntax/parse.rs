@@ -13,7 +13,12 @@ const MAX_VALUE: f64 = 1e9;
 ///
 /// # Errors
 /// The first thing that is no word; the words before it have been read.
-pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut LineWords) -> Checked<()> {
+pub(crate) fn parse(
+    text: &[u8],
+    from: usize,
+    context: &Context,
+    words: &mut LineWords,
+) -> Checked<()> {
     let mut scanner = Scanner::new(text, from);
     loop {
         scanner.skip_ignorable()?;
@@ -21,14 +26,21 @@ pub(crate) fn parse(text: &[u8], from: usize, context: &Context, words: &mut Lin
             _ if scanner.at_end() => return Ok(()),
             byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
             b'#' => assignment(&mut scanner, context, words)?,
-            letter @ (b'a'..=b'z' | b'A'..=b'Z') => word(letter.to_ascii_uppercase(), &mut scanner, context, words)?,
+            letter @ (b'a'..=b'z' | b'A'..=b'Z') => {
+                word(letter.to_ascii_uppercase(), &mut scanner, context, words)?
+            }
             other => return Err(unexpected(other, scanner.here())),
         }
     }
 }
 
 #[inline]
-fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
+fn word(
+    letter: u8,
+    scanner: &mut Scanner,
+    context: &Context,
+    words: &mut LineWords,
+) -> Checked<()> {
     let start = scanner.at();
     if letter == b'T' && starts_time_constant(scanner) {
         return time_constant(scanner, context, words);
@@ -41,7 +53,11 @@ fn word(letter: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWo
     };
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(Fault::new(span, "word-range", format!("{} is too large a number", letter as char)));
+        return Err(Fault::new(
+            span,
+            "word-range",
+            format!("{} is too large a number", letter as char),
+        ));
     }
     match letter {
         b'G' => words.g.push(code('G', value, span)?),
@@ -57,10 +73,16 @@ fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWor
     let start = scanner.at();
     scanner.advance(1);
     scanner.skip_blanks();
-    let value = context.value(scanner).map_err(|fault| in_word(byte, start, fault))?;
+    let value = context
+        .value(scanner)
+        .map_err(|fault| in_word(byte, start, fault))?;
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(Fault::new(span, "word-range", format!("{} is too large a number", byte as char)));
+        return Err(Fault::new(
+            span,
+            "word-range",
+            format!("{} is too large a number", byte as char),
+        ));
     }
     words.add_polar(byte, value, span)
 }
@@ -76,7 +98,11 @@ fn in_word(letter: u8, start: usize, fault: Fault) -> Fault {
         return fault;
     }
     let span = Span::new(start, start + 1);
-    Fault::new(span, fault.code, format!("{} has no value: {}", letter as char, fault.message))
+    Fault::new(
+        span,
+        fault.code,
+        format!("{} has no value: {}", letter as char, fault.message),
+    )
 }
 
 fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
@@ -85,13 +111,22 @@ fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
         let message = format!("{letter}{} is not known", crate::fault::show(value));
         return Err(Fault::new(span, "unknown-code", message));
     }
-    Ok(Code { tenths: tenths as u16, span })
+    Ok(Code {
+        tenths: tenths as u16,
+        span,
+    })
 }
 
-pub(crate) const O_WORDS: &str = "an O-word stands in a line of its own of a program; manual input has none";
+pub(crate) const O_WORDS: &str =
+    "an O-word stands in a line of its own of a program; manual input has none";
 
 /// `O1234` alone is the number of a program and harmless; with a word after it, it is flow control.
-fn program_number(scanner: &mut Scanner, start: usize, value: f64, words: &mut LineWords) -> Checked<()> {
+fn program_number(
+    scanner: &mut Scanner,
+    start: usize,
+    value: f64,
+    words: &mut LineWords,
+) -> Checked<()> {
     scanner.skip_ignorable()?;
     if scanner.at_end() {
         return words.add(b'O', value, scanner.since(start));
@@ -105,7 +140,12 @@ fn starts_time_constant(scanner: &Scanner) -> bool {
     if scanner.peek_at(1) != b'A' {
         return false;
     }
-    let blanks = scanner.rest().iter().skip(2).take_while(|b| matches!(b, b' ' | b'\t')).count();
+    let blanks = scanner
+        .rest()
+        .iter()
+        .skip(2)
+        .take_while(|b| matches!(b, b' ' | b'\t'))
+        .count();
     !scanner.peek_at(2 + blanks).is_ascii_alphabetic()
 }
 
@@ -117,11 +157,19 @@ fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut LineWords
         if fault.code != "value-missing" {
             return fault;
         }
-        Fault::new(Span::new(start, start + 2), fault.code, format!("TA has no value: {}", fault.message))
+        Fault::new(
+            Span::new(start, start + 2),
+            fault.code,
+            format!("TA has no value: {}", fault.message),
+        )
     })?;
     let span = scanner.since(start);
     if words.time_constant.is_some() {
-        return Err(Fault::new(span, "word-twice", "TA stands in this line twice"));
+        return Err(Fault::new(
+            span,
+            "word-twice",
+            "TA stands in this line twice",
+        ));
     }
     words.time_constant = Some((value, span));
     Ok(())
@@ -142,7 +190,11 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
     if let Target::Numbered(number) = target
         && let Some(why) = read_only(number)
     {
-        return Err(Fault::new(span, "read-only", format!("parameter #{number} cannot be assigned: {why}")));
+        return Err(Fault::new(
+            span,
+            "read-only",
+            format!("parameter #{number} cannot be assigned: {why}"),
+        ));
     }
     if let Target::Named(range) = &target
         && predefined_name(&words.names[range.clone()], context.state, context.letters).is_some()
@@ -154,12 +206,20 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
         ));
     }
     if !scanner.take(b'=') {
-        return Err(Fault::new(span, "assignment", "a parameter stands here for a word; an assignment needs ="));
+        return Err(Fault::new(
+            span,
+            "assignment",
+            "a parameter stands here for a word; an assignment needs =",
+        ));
     }
     scanner.skip_blanks();
     let value = context.value(scanner);
     // Where the value is at fault, zero stands in, so that later lines are not blamed for a parameter never set.
-    words.assignments.push(Assignment { target, value: *value.as_ref().unwrap_or(&0.0), span });
+    words.assignments.push(Assignment {
+        target,
+        value: *value.as_ref().unwrap_or(&0.0),
+        span,
+    });
     value.map(|_| ())
 }
 

@@ -30,7 +30,11 @@ impl<'t> Scanner<'t> {
 
     /// The byte `ahead` of the next one, upper case.
     pub fn peek_at(&self, ahead: usize) -> u8 {
-        self.text.get(self.at + ahead).copied().unwrap_or(0).to_ascii_uppercase()
+        self.text
+            .get(self.at + ahead)
+            .copied()
+            .unwrap_or(0)
+            .to_ascii_uppercase()
     }
 
     pub fn at_end(&self) -> bool {
@@ -112,7 +116,12 @@ impl<'t> Scanner<'t> {
 
     /// The next character (all bytes of it, so that it can be shown).
     pub fn here(&self) -> Span {
-        let tail = self.rest().iter().skip(1).take_while(|b| **b & 0xc0 == 0x80).count();
+        let tail = self
+            .rest()
+            .iter()
+            .skip(1)
+            .take_while(|b| **b & 0xc0 == 0x80)
+            .count();
         Span::new(self.at, (self.at + 1 + tail).min(self.text.len()))
     }
 }

@@ -39,7 +39,12 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
     let (start, end) = (line.state.path.last_end, line.state.path.block_end());
     let turns = line.words.integer(b'P', 1..=MAX_TURNS)?.unwrap_or(1);
     let pick = |v: &AxisVector| plane.map(|axis| v[axis]);
-    let ends = Ends { start: pick(&start), end: pick(&end), clockwise, turns };
+    let ends = Ends {
+        start: pick(&start),
+        end: pick(&end),
+        clockwise,
+        turns,
+    };
     if plane.iter().any(|axis| uncertain >> axis & 1 != 0) {
         line.state.path.last_end = line.state.path.position;
         return Ok(());
@@ -59,26 +64,56 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
 /// The arc with radius compensation: it begins where the programmed path has come to.
 #[cold]
 fn beside_arc(line: &mut Line, ends: Ends, plane: [usize; 2]) -> Checked<()> {
-    let ends = Ends { start: line.state.compensation.begins(ends.start), ..ends };
+    let ends = Ends {
+        start: line.state.compensation.begins(ends.start),
+        ..ends
+    };
     let parts = circle(line, &ends, plane)?;
     compensation::bent(line, &ends, &parts, plane)
 }
 
 /// One block a part; the axes outside the plane move in proportion to the swept angle.
-fn push_arcs(line: &mut Line, all: &Parts, plane: [usize; 2], end: AxisVector, helix: &AxisVector) -> Checked<()> {
+fn push_arcs(
+    line: &mut Line,
+    all: &Parts,
+    plane: [usize; 2],
+    end: AxisVector,
+    helix: &AxisVector,
+) -> Checked<()> {
     let parts = all.as_slice();
-    let along = if line.moves_linear(helix) { line.config.axes.path_length(helix) } else { 0.0 };
+    let along = if line.moves_linear(helix) {
+        line.config.axes.path_length(helix)
+    } else {
+        0.0
+    };
     let swept: f64 = parts.iter().map(|part| part.arc.sweep_rad).sum();
-    let feed_mm_per_s = line.feed(parts.iter().map(|part| length_of(part, along, swept)).sum(), true)?;
-    let block = Block { end, feed_mm_per_s, ..line.state.blank_block() };
+    let feed_mm_per_s = line.feed(
+        parts.iter().map(|part| length_of(part, along, swept)).sum(),
+        true,
+    )?;
+    let block = Block {
+        end,
+        feed_mm_per_s,
+        ..line.state.blank_block()
+    };
     push_parts(line, all, plane, &block, helix);
     Ok(())
 }
 
 /// One block a part of an arc that is otherwise as `whole`.
-pub(super) fn push_parts(line: &mut Line, parts: &Parts, plane: [usize; 2], whole: &Block, helix: &AxisVector) {
+pub(super) fn push_parts(
+    line: &mut Line,
+    parts: &Parts,
+    plane: [usize; 2],
+    whole: &Block,
+    helix: &AxisVector,
+) {
     let parts = parts.as_slice();
-    let along = if line.moves_linear(helix) { line.config.axes.path_length(helix) } else { 0.0 };
+    let along = if line.moves_linear(helix) {
+        line.config.axes.path_length(helix)
+    } else {
+        0.0
+    };
     let swept: f64 = parts.iter().map(|part| part.arc.sweep_rad).sum();
     let mut start = whole.start;
     for (n, part) in parts.iter().enumerate() {
@@ -88,9 +123,19 @@ pub(super) fn push_parts(line: &mut Line, parts: &Parts, plane: [usize; 2], whol
             end[plane[0]] = part.end[0];
             end[plane[1]] = part.end[1];
         }
-        let arc = ArcGeometry { plane: plane.map(|axis| axis as u32), ..part.arc };
+        let arc = ArcGeometry {
+            plane: plane.map(|axis| axis as u32),
+            ..part.arc
+        };
         let length_mm = length_of(part, along, swept);
-        line.emit(Block { kind: BlockKind::Arc, arc, length_mm, start, end, ..*whole });
+        line.emit(Block {
+            kind: BlockKind::Arc,
+            arc,
+            length_mm,
+            start,
+            end,
+            ..*whole
+        });
         start = end;
     }
 }
@@ -104,27 +149,45 @@ pub(super) fn plane(line: &Line) -> Checked<[usize; 2]> {
     let letters = line.state.modes.plane.letters();
     let axes = letters.map(|letter| line.letters.axis(letter));
     match axes {
-        [Some(a), Some(b)] if !line.letters.is_rotary(a) && !line.letters.is_rotary(b) => Ok([a, b]),
+        [Some(a), Some(b)] if !line.letters.is_rotary(a) && !line.letters.is_rotary(b) => {
+            Ok([a, b])
+        }
         _ => {
             let [a, b] = letters.map(char::from);
-            let message =
-                format!("an arc in the plane {a}{b} needs two linear axes; this machine has {}", line.letters.list());
+            let message = format!(
+                "an arc in the plane {a}{b} needs two linear axes; this machine has {}",
+                line.letters.list()
+            );
             Err(line.motion_fault("axis", message))
         }
     }
 }
 
 fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
-    let letters = line.state.modes.plane.letters().map(|letter| letter - b'X' + b'I');
+    let letters = line
+        .state
+        .modes
+        .plane
+        .letters()
+        .map(|letter| letter - b'X' + b'I');
     if let Some(foreign) = (b'I'..=b'K').find(|l| line.words.has(*l) && !letters.contains(l)) {
         let [a, b] = letters.map(char::from);
-        let message = format!("{} is no centre in this plane: {a} and {b} are (G17, G18, G19 choose)", foreign as char);
+        let message = format!(
+            "{} is no centre in this plane: {a} and {b} are (G17, G18, G19 choose)",
+            foreign as char
+        );
         return Err(line.words.fault(foreign, "arc-centre", message));
     }
     let given = letters.map(|letter| line.words.get(letter));
     let arc = match (line.words.get(b'R'), given) {
         (Some(radius), [None, None]) => ends.of_radius(radius * line.state.modes.unit_mm),
-        (Some(_), _) => return Err(line.words.fault(b'R', "arc-centre", "an arc has either R or I J K, not both")),
+        (Some(_), _) => {
+            return Err(line.words.fault(
+                b'R',
+                "arc-centre",
+                "an arc has either R or I J K, not both",
+            ));
+        }
         (None, [None, None]) => return Err(no_center(line, letters)),
         (None, given) => ends.about(center(line, ends, plane, given)?),
     };
@@ -132,7 +195,12 @@ fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
 }
 
 /// The centre in machine coordinates.
-fn center(line: &Line, ends: &Ends, plane: [usize; 2], given: [Option<f64>; 2]) -> Checked<[f64; 2]> {
+fn center(
+    line: &Line,
+    ends: &Ends,
+    plane: [usize; 2],
+    given: [Option<f64>; 2],
+) -> Checked<[f64; 2]> {
     let unit = line.state.modes.unit_mm;
     let coordinates = &line.state.coordinates;
     if coordinates.is_rotated() && line.state.modes.plane != Plane::Xy {
@@ -148,7 +216,10 @@ fn center(line: &Line, ends: &Ends, plane: [usize; 2], given: [Option<f64>; 2]) 
         return Ok(std::array::from_fn(|i| ends.start[i] + from[plane[i]]));
     }
     let [Some(a), Some(b)] = given else {
-        return Err(line.motion_fault("arc-centre", "with G90.1 an arc needs both coordinates of its centre"));
+        return Err(line.motion_fault(
+            "arc-centre",
+            "with G90.1 an arc needs both coordinates of its centre",
+        ));
     };
     from[plane[0]] = a * unit;
     from[plane[1]] = b * unit;
@@ -158,24 +229,42 @@ fn center(line: &Line, ends: &Ends, plane: [usize; 2], given: [Option<f64>; 2]) 
 
 fn no_center(line: &Line, letters: [u8; 2]) -> Fault {
     let [a, b] = letters.map(char::from);
-    line.motion_fault("arc-centre", format!("the arc has no centre ({a} {b}) and no radius (R)"))
+    line.motion_fault(
+        "arc-centre",
+        format!("the arc has no centre ({a} {b}) and no radius (R)"),
+    )
 }
 
 /// A fault at the words of the circle.
 fn arc_fault(line: &Line, letters: [u8; 2], code: &'static str, message: String) -> Fault {
-    let spans = [letters[0], letters[1], b'R'].into_iter().filter(|l| line.words.has(*l)).map(|l| line.words.span(l));
-    let span = spans.reduce(|a, b| Span { start: a.start.min(b.start), end: a.end.max(b.end) });
+    let spans = [letters[0], letters[1], b'R']
+        .into_iter()
+        .filter(|l| line.words.has(*l))
+        .map(|l| line.words.span(l));
+    let span = spans.reduce(|a, b| Span {
+        start: a.start.min(b.start),
+        end: a.end.max(b.end),
+    });
     Fault::new(span.unwrap_or_default(), code, message)
 }
 
-fn check_arc_travel(line: &Line, plane: [usize; 2], parts: &Parts, helix: &AxisVector) -> Checked<()> {
+fn check_arc_travel(
+    line: &Line,
+    plane: [usize; 2],
+    parts: &Parts,
+    helix: &AxisVector,
+) -> Checked<()> {
     for part in parts.as_slice() {
         for (axis, (low, high)) in plane.into_iter().zip(extent(part)) {
             line.check_travel(axis, low, high)?;
         }
     }
     for axis in (0..line.letters.count()).filter(|axis| helix[*axis] != 0.0) {
-        line.check_travel(axis, line.state.path.position[axis], line.state.path.position[axis])?;
+        line.check_travel(
+            axis,
+            line.state.path.position[axis],
+            line.state.path.position[axis],
+        )?;
     }
     Ok(())
 }
@@ -187,24 +276,41 @@ mod tests {
     #[test]
     fn helices_in_every_plane() {
         let helix = last("F60 G17 G2 X10 I5 Z4 A90 P2");
-        assert_eq!((helix.arc.plane, short(helix.arc.sweep_rad.to_degrees())), ([0, 1], "-540".into()));
+        assert_eq!(
+            (helix.arc.plane, short(helix.arc.sweep_rad.to_degrees())),
+            ([0, 1], "-540".into())
+        );
         assert!((helix.length_mm - (5.0 * helix.arc.sweep_rad).hypot(4.0)).abs() < 1e-12);
         // Seen from +Y, G3 turns from Z to X.
         let quarter = last("F60 G18 G0 Z10\nG3 X10 Z0 K-10");
-        assert_eq!((quarter.arc.plane, short(quarter.arc.sweep_rad.to_degrees())), ([2, 0], "90".into()));
+        assert_eq!(
+            (quarter.arc.plane, short(quarter.arc.sweep_rad.to_degrees())),
+            ([2, 0], "90".into())
+        );
         let quarter = last("F60 G19 G0 Y10\nG3 Y0 Z10 R10");
-        assert_eq!((quarter.arc.plane, short(quarter.arc.sweep_rad.to_degrees())), ([1, 2], "90".into()));
+        assert_eq!(
+            (quarter.arc.plane, short(quarter.arc.sweep_rad.to_degrees())),
+            ([1, 2], "90".into())
+        );
         let turning = last("F60 G2 I5 A360");
         assert_eq!(short(turning.length_mm), short(10.0 * std::f64::consts::PI));
     }
 
     #[test]
     fn a_nearly_closed_helix_is_one_path_in_two_blocks() {
-        let [first, second] = blocks("F60 G0 X10\nG2 X10.001 Y0.2 Z8 I-10")[1..] else { panic!("two arcs") };
+        let [first, second] = blocks("F60 G0 X10\nG2 X10.001 Y0.2 Z8 I-10")[1..] else {
+            panic!("two arcs")
+        };
         let swept = first.arc.sweep_rad + second.arc.sweep_rad;
         assert!((first.end[2] - 8.0 * first.arc.sweep_rad / swept).abs() < 1e-9);
-        assert_eq!((first.end, second.end[0], second.end[1], second.end[2]), (second.start, 10.001, 0.2, 8.0));
+        assert_eq!(
+            (first.end, second.end[0], second.end[1], second.end[2]),
+            (second.start, 10.001, 0.2, 8.0)
+        );
         assert!((first.length_mm + second.length_mm - (10.0 * swept).hypot(8.0)).abs() < 0.01);
-        assert_eq!((first.line, second.line, first.feed_mm_per_s), (2, 2, second.feed_mm_per_s));
+        assert_eq!(
+            (first.line, second.line, first.feed_mm_per_s),
+            (2, 2, second.feed_mm_per_s)
+        );
     }
 }

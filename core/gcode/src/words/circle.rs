@@ -45,7 +45,10 @@ pub(crate) struct Parts {
 
 impl Parts {
     fn one(part: Part) -> Self {
-        Self { parts: [part, Part::default()], count: 1 }
+        Self {
+            parts: [part, Part::default()],
+            count: 1,
+        }
     }
 
     pub fn as_slice(&self) -> &[Part] {
@@ -80,7 +83,10 @@ impl Ends {
         }
         self.halves(center, radii).ok_or_else(|| {
             let off = show(tolerance(radii[0].max(radii[1])));
-            let why = format!("{}; no circle through both ends stays within {off} mm of it", unequal(radii));
+            let why = format!(
+                "{}; no circle through both ends stays within {off} mm of it",
+                unequal(radii)
+            );
             ("arc-radius", why)
         })
     }
@@ -89,7 +95,10 @@ impl Ends {
         let radii = [distance(self.start, center), distance(self.end, center)];
         let largest = radii[0].max(radii[1]);
         if largest < SAME_POINT_MM {
-            return Err(("arc-radius", "the radius of the arc is zero: its centre lies on its start".into()));
+            return Err((
+                "arc-radius",
+                "the radius of the arc is zero: its centre lies on its start".into(),
+            ));
         }
         if (radii[0] - radii[1]).abs() > tolerance(largest) {
             return Err(("arc-radius", unequal(radii)));
@@ -101,7 +110,8 @@ impl Ends {
     fn near(&self, center: Point, chord: f64, radii: [f64; 2]) -> Option<Part> {
         let part = self.part(self.onto_bisector(center, chord));
         let turned = (part.arc.sweep_rad - self.part(center).arc.sweep_rad).abs();
-        let near = deviation(&part.arc, center, radii) <= tolerance(radii[0].max(radii[1])) && turned <= SWEEP_CHANGE;
+        let near = deviation(&part.arc, center, radii) <= tolerance(radii[0].max(radii[1]))
+            && turned <= SWEEP_CHANGE;
         near.then_some(part)
     }
 
@@ -116,24 +126,48 @@ impl Ends {
         let radius = f64::midpoint(radii[0], radii[1]);
         let middle = [0, 1].map(|axis| center[axis] - from_end[axis] * radius);
         let turns = (before.abs() / TAU).floor() as u32 + 1;
-        let ends = [Self { end: middle, turns, ..*self }, Self { start: middle, turns: 1, ..*self }];
+        let ends = [
+            Self {
+                end: middle,
+                turns,
+                ..*self
+            },
+            Self {
+                start: middle,
+                turns: 1,
+                ..*self
+            },
+        ];
         let [first, last] = ends.map(|ends| {
             let chord = distance(ends.start, ends.end);
-            if chord < SAME_POINT_MM { None } else { ends.near(center, chord, ends.radii(center).ok()?) }
+            if chord < SAME_POINT_MM {
+                None
+            } else {
+                ends.near(center, chord, ends.radii(center).ok()?)
+            }
         });
-        Some(Parts { parts: [first?, last?], count: 2 })
+        Some(Parts {
+            parts: [first?, last?],
+            count: 2,
+        })
     }
 
     fn onto_bisector(&self, center: Point, chord: f64) -> Point {
         let (middle, normal) = self.bisector(chord);
         let height = (center[0] - middle[0]) * normal[0] + (center[1] - middle[1]) * normal[1];
-        [middle[0] + height * normal[0], middle[1] + height * normal[1]]
+        [
+            middle[0] + height * normal[0],
+            middle[1] + height * normal[1],
+        ]
     }
 
     /// Middle of the chord, and the unit normal to its left.
     fn bisector(&self, chord: f64) -> (Point, Point) {
         let (s, e) = (self.start, self.end);
-        ([f64::midpoint(s[0], e[0]), f64::midpoint(s[1], e[1])], [(s[1] - e[1]) / chord, (e[0] - s[0]) / chord])
+        (
+            [f64::midpoint(s[0], e[0]), f64::midpoint(s[1], e[1])],
+            [(s[1] - e[1]) / chord, (e[0] - s[0]) / chord],
+        )
     }
 
     /// The arc of `radius`: the short one, or for a negative radius the long one.
@@ -146,22 +180,38 @@ impl Ends {
         let half = chord / 2.0;
         if half - radius.abs() > tolerance(radius.abs()) {
             let (r, d) = (show(radius.abs()), show(chord));
-            let why = format!("the radius {r} mm is too small: the ends of the arc are {d} mm apart");
+            let why =
+                format!("the radius {r} mm is too small: the ends of the arc are {d} mm apart");
             return Err(("arc-radius", why));
         }
         let height = (radius * radius - half * half).max(0.0).sqrt();
-        let height = if self.clockwise == (radius > 0.0) { -height } else { height };
+        let height = if self.clockwise == (radius > 0.0) {
+            -height
+        } else {
+            height
+        };
         let (middle, normal) = self.bisector(chord);
-        let center = [middle[0] + height * normal[0], middle[1] + height * normal[1]];
+        let center = [
+            middle[0] + height * normal[0],
+            middle[1] + height * normal[1],
+        ];
         Ok(Parts::one(self.part(center)))
     }
 
     fn part(&self, center: Point) -> Part {
         let angle = |p: Point| (p[1] - center[1]).atan2(p[0] - center[0]);
         let start_angle = angle(self.start);
-        let turn = if self.clockwise { start_angle - angle(self.end) } else { angle(self.end) - start_angle };
+        let turn = if self.clockwise {
+            start_angle - angle(self.end)
+        } else {
+            angle(self.end) - start_angle
+        };
         let same = distance(self.start, self.end) < SAME_POINT_MM;
-        let turn = if same || turn == 0.0 { TAU } else { turn.rem_euclid(TAU) };
+        let turn = if same || turn == 0.0 {
+            TAU
+        } else {
+            turn.rem_euclid(TAU)
+        };
         let sweep = turn + TAU * f64::from(self.turns - 1);
         let arc = ArcGeometry {
             plane: [0, 1],
@@ -170,7 +220,11 @@ impl Ends {
             start_angle_rad: start_angle,
             sweep_rad: if self.clockwise { -sweep } else { sweep },
         };
-        Part { arc, start: self.start, end: self.end }
+        Part {
+            arc,
+            start: self.start,
+            end: self.end,
+        }
     }
 }
 
@@ -183,9 +237,17 @@ fn unequal(radii: [f64; 2]) -> String {
 fn deviation(arc: &ArcGeometry, center: Point, radii: [f64; 2]) -> f64 {
     let shift = distance(arc.center_mm, center);
     let towards = (arc.center_mm[1] - center[1]).atan2(arc.center_mm[0] - center[0]);
-    let farthest = if contains(arc, towards) { arc.radius_mm + shift - radii[0].max(radii[1]) } else { 0.0 };
+    let farthest = if contains(arc, towards) {
+        arc.radius_mm + shift - radii[0].max(radii[1])
+    } else {
+        0.0
+    };
     let nearest = (arc.radius_mm - shift).abs();
-    let nearest = if contains(arc, towards + PI) { radii[0].min(radii[1]) - nearest } else { 0.0 };
+    let nearest = if contains(arc, towards + PI) {
+        radii[0].min(radii[1]) - nearest
+    } else {
+        0.0
+    };
     farthest.max(nearest)
 }
 
@@ -201,9 +263,17 @@ pub(crate) fn extent(part: &Part) -> [(f64, f64); 2] {
     std::array::from_fn(|axis| {
         let high_angle = axis as f64 * PI / 2.0;
         let (a, b) = (part.start[axis], part.end[axis]);
-        let reach =
-            |angle, sign: f64, end| if contains(arc, angle) { arc.center_mm[axis] + sign * arc.radius_mm } else { end };
-        (reach(high_angle + PI, -1.0, a.min(b)), reach(high_angle, 1.0, a.max(b)))
+        let reach = |angle, sign: f64, end| {
+            if contains(arc, angle) {
+                arc.center_mm[axis] + sign * arc.radius_mm
+            } else {
+                end
+            }
+        };
+        (
+            reach(high_angle + PI, -1.0, a.min(b)),
+            reach(high_angle, 1.0, a.max(b)),
+        )
     })
 }
 

@@ -7,9 +7,30 @@ use crate::fault::Checked;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M7", Group::Mist, "", "mist coolant on", Action::Act(mist_on), "M7"),
-    Word::new("M8", Group::Flood, "", "flood coolant on", Action::Act(flood_on), "M8"),
-    Word::new("M9", Group::CoolantOff, "", "coolant off", Action::Act(off), "M9"),
+    Word::new(
+        "M7",
+        Group::Mist,
+        "",
+        "mist coolant on",
+        Action::Act(mist_on),
+        "M7",
+    ),
+    Word::new(
+        "M8",
+        Group::Flood,
+        "",
+        "flood coolant on",
+        Action::Act(flood_on),
+        "M8",
+    ),
+    Word::new(
+        "M9",
+        Group::CoolantOff,
+        "",
+        "coolant off",
+        Action::Act(off),
+        "M9",
+    ),
 ];
 
 /// What flows.
@@ -64,7 +85,13 @@ mod tests {
     fn only_what_changes_is_switched() {
         assert_items(
             "M7 M8\nM8\nM9",
-            &["1: Mist 0 1 before 0", "1: Flood 0 1 before 0", "3: Mist 0 0 before 0", "3: Flood 0 0 before 0", "End"],
+            &[
+                "1: Mist 0 1 before 0",
+                "1: Flood 0 1 before 0",
+                "3: Mist 0 0 before 0",
+                "3: Flood 0 0 before 0",
+                "End",
+            ],
         );
     }
 }

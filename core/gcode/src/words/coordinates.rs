@@ -26,13 +26,62 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(set_local_offset),
         "G52 X5",
     ),
-    Word::new("G53", Group::NonModal, "", "machine coordinates, in this line", Action::Act(nothing), "G53 G0 X1"),
-    Word::new("G54", Group::CoordinateSystem, "", "coordinate system 1", Action::Act(|line| select(line, 0)), "G54"),
-    Word::new("G55", Group::CoordinateSystem, "", "coordinate system 2", Action::Act(|line| select(line, 1)), "G55"),
-    Word::new("G56", Group::CoordinateSystem, "", "coordinate system 3", Action::Act(|line| select(line, 2)), "G56"),
-    Word::new("G57", Group::CoordinateSystem, "", "coordinate system 4", Action::Act(|line| select(line, 3)), "G57"),
-    Word::new("G58", Group::CoordinateSystem, "", "coordinate system 5", Action::Act(|line| select(line, 4)), "G58"),
-    Word::new("G59", Group::CoordinateSystem, "", "coordinate system 6", Action::Act(|line| select(line, 5)), "G59"),
+    Word::new(
+        "G53",
+        Group::NonModal,
+        "",
+        "machine coordinates, in this line",
+        Action::Act(nothing),
+        "G53 G0 X1",
+    ),
+    Word::new(
+        "G54",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 1",
+        Action::Act(|line| select(line, 0)),
+        "G54",
+    ),
+    Word::new(
+        "G55",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 2",
+        Action::Act(|line| select(line, 1)),
+        "G55",
+    ),
+    Word::new(
+        "G56",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 3",
+        Action::Act(|line| select(line, 2)),
+        "G56",
+    ),
+    Word::new(
+        "G57",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 4",
+        Action::Act(|line| select(line, 3)),
+        "G57",
+    ),
+    Word::new(
+        "G58",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 5",
+        Action::Act(|line| select(line, 4)),
+        "G58",
+    ),
+    Word::new(
+        "G59",
+        Group::CoordinateSystem,
+        "",
+        "coordinate system 6",
+        Action::Act(|line| select(line, 5)),
+        "G59",
+    ),
     Word::new(
         "G59.1",
         Group::CoordinateSystem,
@@ -65,9 +114,30 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(set_position_offset),
         "G92 X0",
     ),
-    Word::new("G92.1", Group::NonModal, "", "clear the offsets of G92", Action::Act(clear_g92), "G92.1"),
-    Word::new("G92.2", Group::NonModal, "", "suspend the offsets of G92", Action::Act(suspend_g92), "G92.2"),
-    Word::new("G92.3", Group::NonModal, "", "restore the offsets of G92", Action::Act(restore_g92), "G92.3"),
+    Word::new(
+        "G92.1",
+        Group::NonModal,
+        "",
+        "clear the offsets of G92",
+        Action::Act(clear_g92),
+        "G92.1",
+    ),
+    Word::new(
+        "G92.2",
+        Group::NonModal,
+        "",
+        "suspend the offsets of G92",
+        Action::Act(suspend_g92),
+        "G92.2",
+    ),
+    Word::new(
+        "G92.3",
+        Group::NonModal,
+        "",
+        "restore the offsets of G92",
+        Action::Act(restore_g92),
+        "G92.3",
+    ),
     Word::new(
         "G28",
         Group::NonModal,
@@ -125,7 +195,11 @@ fn restore_g92(line: &mut Line) -> Checked<()> {
 /// G92: the offset that gives the current position the named coordinates.
 fn set_position_offset(line: &mut Line) -> Checked<()> {
     if line.words.present & AXIS_MASK == 0 {
-        return Err(line.orders.fault(Group::NonModal, "axis-missing", "G92 needs at least one axis word"));
+        return Err(line.orders.fault(
+            Group::NonModal,
+            "axis-missing",
+            "G92 needs at least one axis word",
+        ));
     }
     let coordinates = &line.state.coordinates;
     let at = coordinates.to_program(&line.state.path.position);
@@ -152,8 +226,17 @@ fn set_local_offset(line: &mut Line) -> Checked<()> {
 fn assume_offsets(line: &mut Line, from_position: bool) {
     let named = line.letters.axes_of(line.words.present & AXIS_MASK);
     let coordinates = &mut line.state.coordinates;
-    let of_position = if from_position { line.state.path.assumed | coordinates.assumed } else { 0 };
-    coordinates.assumed |= named & if line.reads_assumed.get() { u32::MAX } else { of_position };
+    let of_position = if from_position {
+        line.state.path.assumed | coordinates.assumed
+    } else {
+        0
+    };
+    coordinates.assumed |= named
+        & if line.reads_assumed.get() {
+            u32::MAX
+        } else {
+            of_position
+        };
 }
 
 /// G10.
@@ -165,10 +248,16 @@ fn set_data(line: &mut Line) -> Checked<()> {
         Some(2) => set_system(line),
         Some(20) => set_system_here(line),
         Some(other) => {
-            let message = format!("G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are");
+            let message = format!(
+                "G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are"
+            );
             Err(line.words.fault(b'L', "refused", message))
         }
-        None => Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs L: 1, 2, 10, 11 or 20")),
+        None => Err(line.orders.fault(
+            Group::NonModal,
+            "word-missing",
+            "G10 needs L: 1, 2, 10, 11 or 20",
+        )),
     }
 }
 
@@ -189,13 +278,21 @@ fn set_system(line: &mut Line) -> Checked<()> {
     let system = system(line)?;
     let mut origin = *line.state.coordinates.origin(system);
     for (axis, value) in line.named_axes() {
-        origin[axis] = if line.state.modes.absolute { value } else { origin[axis] + value };
+        origin[axis] = if line.state.modes.absolute {
+            value
+        } else {
+            origin[axis] + value
+        };
     }
     if let Some(degrees) = line.words.get(b'R') {
         if degrees != 0.0 && !line.state.coordinates.can_rotate() {
-            return Err(line.words.fault(b'R', "axis", "a rotation needs the linear axes X and Y"));
+            return Err(line
+                .words
+                .fault(b'R', "axis", "a rotation needs the linear axes X and Y"));
         }
-        line.state.coordinates.set_rotation(system, degrees.to_radians());
+        line.state
+            .coordinates
+            .set_rotation(system, degrees.to_radians());
     }
     assume_offsets(line, false);
     line.state.coordinates.set_origin(system, origin);
@@ -206,12 +303,18 @@ fn set_system(line: &mut Line) -> Checked<()> {
 fn set_system_here(line: &mut Line) -> Checked<()> {
     let system = system(line)?;
     if line.words.has(b'R') {
-        return Err(line.words.fault(b'R', "unused-word", "G10 L20 takes no R: L2 sets the rotation"));
+        return Err(line.words.fault(
+            b'R',
+            "unused-word",
+            "G10 L20 takes no R: L2 sets the rotation",
+        ));
     }
     let wanted = wanted(line);
     assume_offsets(line, true);
     let position = line.state.path.position;
-    line.state.coordinates.shift_origin(system, &position, &wanted);
+    line.state
+        .coordinates
+        .shift_origin(system, &position, &wanted);
     Ok(())
 }
 
@@ -238,27 +341,59 @@ enum ToolOrigin {
 /// G10 L1, L10, L11: a row of the tool table, for this run only. It acts with the next G43.
 fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
     let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
-        return Err(line.orders.fault(Group::NonModal, "word-missing", "G10 needs P, the number of the tool"));
+        return Err(line.orders.fault(
+            Group::NonModal,
+            "word-missing",
+            "G10 needs P, the number of the tool",
+        ));
     };
-    let zero = Tool { number, pocket: None, offset: AxisVector::ZERO, diameter_mm: 0.0 };
+    let zero = Tool {
+        number,
+        pocket: None,
+        offset: AxisVector::ZERO,
+        diameter_mm: 0.0,
+    };
     // Without a table every tool has a row of zeros, where lengths of zero are safe at all.
-    let without_table = || (line.config.tools.is_empty() && line.config.zero_length_without_table).then_some(zero);
-    let Some(mut tool) = line.state.tools.find(number).copied().or_else(without_table) else {
-        return Err(line.words.fault(b'P', "tool", format!("the tool table has no tool {number}")));
+    let without_table =
+        || (line.config.tools.is_empty() && line.config.zero_length_without_table).then_some(zero);
+    let Some(mut tool) = line
+        .state
+        .tools
+        .find(number)
+        .copied()
+        .or_else(without_table)
+    else {
+        return Err(line
+            .words
+            .fault(b'P', "tool", format!("the tool table has no tool {number}")));
     };
     let at = match from {
         ToolOrigin::Value => AxisVector::ZERO,
-        ToolOrigin::Position => line.state.coordinates.without_tool(&line.state.path.position, false),
-        ToolOrigin::Fixture => line.state.coordinates.without_tool(&line.state.path.position, true),
+        ToolOrigin::Position => line
+            .state
+            .coordinates
+            .without_tool(&line.state.path.position, false),
+        ToolOrigin::Fixture => line
+            .state
+            .coordinates
+            .without_tool(&line.state.path.position, true),
     };
     for (axis, value) in line.named_axes() {
-        tool.offset[axis] = if from == ToolOrigin::Value { value } else { at[axis] - value };
+        tool.offset[axis] = if from == ToolOrigin::Value {
+            value
+        } else {
+            at[axis] - value
+        };
     }
     assume_offsets(line, from != ToolOrigin::Value);
     if let Some(radius) = line.words.not_negative(b'R')? {
         tool.diameter_mm = 2.0 * radius * line.state.modes.unit_mm;
     }
-    if line.state.tools.set(tool) { Ok(()) } else { Err(line.words.fault(b'P', "tool", "the tool table is full")) }
+    if line.state.tools.set(tool) {
+        Ok(())
+    } else {
+        Err(line.words.fault(b'P', "tool", "the tool table is full"))
+    }
 }
 
 /// G28.1 and G30.1.
@@ -288,45 +423,98 @@ mod tests {
     #[test]
     fn offsets_add_up() {
         assert_eq!(ends("G10 L2 P1 X10 Y20\nG0 X1 Y1"), [["11", "21", "0"]]);
-        assert_eq!(ends("G0 X50\nG10 L20 P1 X0\nG0 X1"), [["50", "0", "0"], ["51", "0", "0"]]);
-        assert_eq!(ends("G10 L2 P9 X5\nG59.3 G0 X1\nG54 X1"), [["6", "0", "0"], ["1", "0", "0"]]);
-        assert_eq!(ends("G91 G10 L2 P1 X5\nG10 L2 P0 X5\nG90 G0 X0"), [["10", "0", "0"]]);
+        assert_eq!(
+            ends("G0 X50\nG10 L20 P1 X0\nG0 X1"),
+            [["50", "0", "0"], ["51", "0", "0"]]
+        );
+        assert_eq!(
+            ends("G10 L2 P9 X5\nG59.3 G0 X1\nG54 X1"),
+            [["6", "0", "0"], ["1", "0", "0"]]
+        );
+        assert_eq!(
+            ends("G91 G10 L2 P1 X5\nG10 L2 P0 X5\nG90 G0 X0"),
+            [["10", "0", "0"]]
+        );
         assert_eq!(
             ends("G0 X10\nG92 X0 Y5\nX1 Y6\nG92.2\nX1\nG92.3\nX1\nG92.1\nX2")[1..],
-            [["11", "1", "0"], ["1", "1", "0"], ["11", "1", "0"], ["2", "1", "0"]]
+            [
+                ["11", "1", "0"],
+                ["1", "1", "0"],
+                ["11", "1", "0"],
+                ["2", "1", "0"]
+            ]
         );
-        assert_eq!(ends("G10 L2 P1 X10\nG92 X5\nG53 G0 X7\nX0"), [["7", "0", "0"], ["-5", "0", "0"]]);
-        assert_eq!(ends("G52 X5\nG0 X1\nG52 X0 Y2\nG0 X1 Y0"), [["6", "0", "0"], ["1", "2", "0"]]);
+        assert_eq!(
+            ends("G10 L2 P1 X10\nG92 X5\nG53 G0 X7\nX0"),
+            [["7", "0", "0"], ["-5", "0", "0"]]
+        );
+        assert_eq!(
+            ends("G52 X5\nG0 X1\nG52 X0 Y2\nG0 X1 Y0"),
+            [["6", "0", "0"], ["1", "2", "0"]]
+        );
         // L20 leaves G92 and the tool out of the origin: the current position is what it says.
-        assert_eq!(ends("G43 H1 G0 Z5\nG92 X3\nG10 L20 P1 X1 Z2\nG0 X2 Z4")[1..], [["1", "0", "27"]]);
-        assert_eq!(short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]), "25");
+        assert_eq!(
+            ends("G43 H1 G0 Z5\nG92 X3\nG10 L20 P1 X1 Z2\nG0 X2 Z4")[1..],
+            [["1", "0", "27"]]
+        );
+        assert_eq!(
+            short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]),
+            "25"
+        );
         assert_eq!(ends("G10 L1 P2 Z3 R4\nG43 H2 G0 Z#5410"), [["0", "0", "3"]]);
     }
 
     #[test]
     fn reference_positions() {
-        assert_eq!(ends("G0 X5 Y5 Z5\nG28.1\nG0 X9 Y9 Z9\nG28 Z20")[2..], [["9", "9", "20"], ["9", "9", "5"]]);
-        assert_eq!(ends("G0 X5 Y5 Z5\nG30.1\nG0 X9\nG30")[2..], [["5", "5", "5"]]);
+        assert_eq!(
+            ends("G0 X5 Y5 Z5\nG28.1\nG0 X9 Y9 Z9\nG28 Z20")[2..],
+            [["9", "9", "20"], ["9", "9", "5"]]
+        );
+        assert_eq!(
+            ends("G0 X5 Y5 Z5\nG30.1\nG0 X9\nG30")[2..],
+            [["5", "5", "5"]]
+        );
         assert_eq!(ends("G0 X5 Z5\nG91 G28 Z0")[1..], [["5", "0", "0"]]);
         // A motion word beside G28 only sets the mode.
-        assert_eq!(ends("F60 G0 X5 Z5\nG1 G91 G28 Z0\nX1")[1..], [["5", "0", "0"], ["6", "0", "0"]]);
+        assert_eq!(
+            ends("F60 G0 X5 Z5\nG1 G91 G28 Z0\nX1")[1..],
+            [["5", "0", "0"], ["6", "0", "0"]]
+        );
     }
 
     #[test]
     fn a_rotated_system_turns_moves_arcs_and_offsets() {
-        assert_eq!(ends("G10 L2 P1 X10 R90\nG0 X5\nY2")[..], [["0", "5", "0"], ["8", "5", "0"]]);
+        assert_eq!(
+            ends("G10 L2 P1 X10 R90\nG0 X5\nY2")[..],
+            [["0", "5", "0"], ["8", "5", "0"]]
+        );
         assert_eq!(ends("G10 L2 P1 R90\nG91 G0 X5\nX1")[1], ["0", "6", "0"]);
         // The offset of G92 lies before the rotation, machine coordinates after it.
-        assert_eq!(ends("G10 L2 P1 R90\nG92 X-3\nG0 X2\nG53 X1"), [["0", "5", "0"], ["1", "5", "0"]]);
-        assert_eq!(ends("G10 L2 P1 R90\nG0 X5\nG10 L20 P1 X1 Y1\nG0 X0 Y0")[1], ["1", "4", "0"]);
+        assert_eq!(
+            ends("G10 L2 P1 R90\nG92 X-3\nG0 X2\nG53 X1"),
+            [["0", "5", "0"], ["1", "5", "0"]]
+        );
+        assert_eq!(
+            ends("G10 L2 P1 R90\nG0 X5\nG10 L20 P1 X1 Y1\nG0 X0 Y0")[1],
+            ["1", "4", "0"]
+        );
         let arc = last("F60 G10 L2 P1 R90\nG2 X2 I1");
-        assert_eq!(arc.arc.center_mm.map(short), ["0".to_owned(), "1".to_owned()]);
+        assert_eq!(
+            arc.arc.center_mm.map(short),
+            ["0".to_owned(), "1".to_owned()]
+        );
         assert_eq!(short(last("G10 L2 P1 R30\nG0 X#5230").end[0]), "25.981");
     }
 
     #[test]
     fn a_tool_is_measured_where_it_stands() {
-        assert_eq!(ends("G53 G0 Z30\nG10 L10 P1 Z3\nG43 H1\nG0 Z4")[1], ["0", "0", "31"]);
-        assert_eq!(ends("G10 L2 P9 Z5\nG53 G0 Z30\nG10 L11 P1 Z3\nG43 H1\nG0 Z1")[1], ["0", "0", "23"]);
+        assert_eq!(
+            ends("G53 G0 Z30\nG10 L10 P1 Z3\nG43 H1\nG0 Z4")[1],
+            ["0", "0", "31"]
+        );
+        assert_eq!(
+            ends("G10 L2 P9 Z5\nG53 G0 Z30\nG10 L11 P1 Z3\nG43 H1\nG0 Z1")[1],
+            ["0", "0", "23"]
+        );
     }
 }

@@ -23,7 +23,9 @@ pub(super) const WORDS: &[Word] = &[
         Group::Motion,
         LETTERS_P,
         "left-hand tapping with a floating chuck: P dwell",
-        Action::Move(Shape::Cycle, |line| cycle(line, Kind::Tapping { direction: -1 })),
+        Action::Move(Shape::Cycle, |line| {
+            cycle(line, Kind::Tapping { direction: -1 })
+        }),
         "M4\nG74 X1 Z-3 R1",
     ),
     Word::new(
@@ -55,7 +57,9 @@ pub(super) const WORDS: &[Word] = &[
         Group::Motion,
         LETTERS_P,
         "tapping with a floating chuck: P dwell",
-        Action::Move(Shape::Cycle, |line| cycle(line, Kind::Tapping { direction: 1 })),
+        Action::Move(Shape::Cycle, |line| {
+            cycle(line, Kind::Tapping { direction: 1 })
+        }),
         "M3\nG84 X1 Z-3 R1",
     ),
     Word::new(
@@ -138,7 +142,10 @@ impl Kind {
     }
 
     fn needs_dwell(self) -> bool {
-        matches!(self, Self::DrillingDwell | Self::BoringStop | Self::BoringByHand | Self::BoringDwell)
+        matches!(
+            self,
+            Self::DrillingDwell | Self::BoringStop | Self::BoringByHand | Self::BoringDwell
+        )
     }
 }
 
@@ -239,7 +246,11 @@ fn axes(letters: &Letters, plane: [u8; 2]) -> Option<(usize, [usize; 2])> {
     let normal = b"XYZ".iter().find(|letter| !plane.contains(letter))?;
     let [normal, a, b] = [*normal, plane[0], plane[1]].map(|letter| letters.axis(letter));
     let found = (normal?, [a?, b?]);
-    (!b"XYZ".iter().filter_map(|letter| letters.axis(*letter)).any(|axis| letters.is_rotary(axis))).then_some(found)
+    (!b"XYZ"
+        .iter()
+        .filter_map(|letter| letters.axis(*letter))
+        .any(|axis| letters.is_rotary(axis)))
+    .then_some(found)
 }
 
 /// What the line says of its holes; `at` is where it begins.
@@ -250,7 +261,10 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let sticky = sticky(line, kind, line.letters.letter(normal))?;
     let unit_mm = line.state.modes.unit_mm;
     let initial_mm = *line.state.cycles.initial_mm.get_or_insert(at[normal]);
-    let (r_mm, depth_mm) = (sticky.r_mm.unwrap_or_default(), sticky.depth_mm.unwrap_or_default());
+    let (r_mm, depth_mm) = (
+        sticky.r_mm.unwrap_or_default(),
+        sticky.depth_mm.unwrap_or_default(),
+    );
     // With G91 R is measured from where the first of the cycles began, and the bottom from R.
     let absolute = line.state.modes.absolute;
     let r_mm = if absolute { r_mm } else { initial_mm + r_mm };
@@ -258,18 +272,47 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     if r_mm < bottom_mm {
         return Err(line.motion_fault("cycle", "R lies below the bottom of the hole"));
     }
-    let named = plane.map(|axis| line.words.get(line.letters.letter(axis)).unwrap_or_default() * unit_mm);
-    let step = if line.state.modes.absolute { [0.0; 2] } else { named };
+    let named = plane.map(|axis| {
+        line.words
+            .get(line.letters.letter(axis))
+            .unwrap_or_default()
+            * unit_mm
+    });
+    let step = if line.state.modes.absolute {
+        [0.0; 2]
+    } else {
+        named
+    };
     let count = line.words.integer(b'L', 1..=10_000)?.unwrap_or(1);
-    let clear_mm = if line.state.cycles.to_initial { initial_mm.max(r_mm) } else { r_mm };
+    let clear_mm = if line.state.cycles.to_initial {
+        initial_mm.max(r_mm)
+    } else {
+        r_mm
+    };
     let peck_mm = sticky.peck_mm.unwrap_or_default();
     let dwell_s = sticky.dwell_s.unwrap_or_default();
-    let moves = f64::from(count) * if kind.pecks() { (r_mm - bottom_mm) / peck_mm * 3.0 } else { 8.0 };
+    let moves = f64::from(count)
+        * if kind.pecks() {
+            (r_mm - bottom_mm) / peck_mm * 3.0
+        } else {
+            8.0
+        };
     if moves > MAX_MOVES {
         let message = format!("this line would make {moves:.0} moves, {MAX_MOVES:.0} are allowed");
         return Err(line.motion_fault("cycle", message));
     }
-    Ok(Holes { kind, normal, plane, step, count, r_mm, bottom_mm, peck_mm, dwell_s, clear_mm })
+    Ok(Holes {
+        kind,
+        normal,
+        plane,
+        step,
+        count,
+        r_mm,
+        bottom_mm,
+        peck_mm,
+        dwell_s,
+        clear_mm,
+    })
 }
 
 /// The words of the line, and those that earlier lines of the same cycle have left.
@@ -284,21 +327,36 @@ fn sticky(line: &mut Line, kind: Kind, normal: u8) -> Checked<Sticky> {
         dwell_s: line.words.not_negative(b'P')?.or(left.dwell_s),
     };
     let missing = |what: &str| -> Fault {
-        line.motion_fault("word-missing", format!("{} needs {what}", line.orders.motion_code()))
+        line.motion_fault(
+            "word-missing",
+            format!("{} needs {what}", line.orders.motion_code()),
+        )
     };
     let bottom = format!("{}, the bottom of the hole", normal as char);
     for (lacks, what) in [
-        (sticky.r_mm.is_none(), "R, the level from which the feed begins"),
+        (
+            sticky.r_mm.is_none(),
+            "R, the level from which the feed begins",
+        ),
         (sticky.depth_mm.is_none(), &bottom),
-        (kind.needs_dwell() && sticky.dwell_s.is_none(), "P, the dwell in seconds"),
-        (kind.pecks() && sticky.peck_mm.is_none(), "Q, the depth of a peck"),
+        (
+            kind.needs_dwell() && sticky.dwell_s.is_none(),
+            "P, the dwell in seconds",
+        ),
+        (
+            kind.pecks() && sticky.peck_mm.is_none(),
+            "Q, the depth of a peck",
+        ),
     ] {
         if lacks {
             return Err(missing(what));
         }
     }
     if kind.pecks() && sticky.peck_mm.is_some_and(|peck| peck <= 0.0) {
-        return Err(line.motion_fault("word-range", "Q, the depth of a peck, must be greater than zero"));
+        return Err(line.motion_fault(
+            "word-range",
+            "Q, the depth of a peck, must be greater than zero",
+        ));
     }
     line.state.cycles.sticky = sticky;
     Ok(sticky)
@@ -311,7 +369,13 @@ fn go(line: &mut Line, kind: BlockKind, to: &AxisVector) -> Checked<()> {
 }
 
 /// A move along the hole to `level_mm`.
-fn plunge(line: &mut Line, kind: BlockKind, at: &mut AxisVector, normal: usize, level_mm: f64) -> Checked<()> {
+fn plunge(
+    line: &mut Line,
+    kind: BlockKind,
+    at: &mut AxisVector,
+    normal: usize,
+    level_mm: f64,
+) -> Checked<()> {
     at[normal] = level_mm;
     go(line, kind, at)
 }
@@ -323,7 +387,10 @@ fn drill(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
     }
     for _ in 0..holes.count {
         for (axis, step) in holes.plane.into_iter().zip(holes.step) {
-            let named = line.words.get(line.letters.letter(axis)).filter(|_| line.state.modes.absolute);
+            let named = line
+                .words
+                .get(line.letters.letter(axis))
+                .filter(|_| line.state.modes.absolute);
             at[axis] = named.map_or(at[axis] + step, |value| value * line.state.modes.unit_mm);
         }
         if let (Some(polar), Some([x, y])) = (line.words.polar, line.state.coordinates.plane()) {
@@ -381,7 +448,13 @@ fn pecks(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
         if holes.kind == Kind::Pecking {
             plunge(line, BlockKind::Rapid, at, holes.normal, holes.r_mm)?;
         }
-        plunge(line, BlockKind::Rapid, at, holes.normal, depth + PECK_CLEARANCE_MM)?;
+        plunge(
+            line,
+            BlockKind::Rapid,
+            at,
+            holes.normal,
+            depth + PECK_CLEARANCE_MM,
+        )?;
         depth -= holes.peck_mm;
     }
     Ok(())
@@ -391,8 +464,15 @@ fn pecks(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
 /// thread: they are off meanwhile.
 fn tap(line: &mut Line, holes: &Holes, at: &mut AxisVector, direction: i8) -> Checked<()> {
     if line.state.spindle.direction != direction {
-        let way = if direction > 0 { "clockwise (M3)" } else { "counter-clockwise (M4)" };
-        let message = format!("{} needs the spindle to turn {way}", line.orders.motion_code());
+        let way = if direction > 0 {
+            "clockwise (M3)"
+        } else {
+            "counter-clockwise (M4)"
+        };
+        let message = format!(
+            "{} needs the spindle to turn {way}",
+            line.orders.motion_code()
+        );
         return Err(line.motion_fault("cycle", message));
     }
     let permits = line.state.permits;

@@ -4,11 +4,23 @@ use super::{Action, Group, Word};
 use crate::fault::Checked;
 use crate::line::Line;
 
-pub(super) const WORDS: &[Word] =
-    &[Word::new("G4", Group::NonModal, "P", "dwell of P seconds", Action::Act(dwell), "G4 P0.5")];
+pub(super) const WORDS: &[Word] = &[Word::new(
+    "G4",
+    Group::NonModal,
+    "P",
+    "dwell of P seconds",
+    Action::Act(dwell),
+    "G4 P0.5",
+)];
 
 fn dwell(line: &mut Line) -> Checked<()> {
-    let missing = || line.orders.fault(Group::NonModal, "word-missing", "G4 needs P, the dwell in seconds");
+    let missing = || {
+        line.orders.fault(
+            Group::NonModal,
+            "word-missing",
+            "G4 needs P, the dwell in seconds",
+        )
+    };
     let dwell_s = line.words.not_negative(b'P')?.ok_or_else(missing)?;
     line.dwell(dwell_s);
     Ok(())
@@ -20,6 +32,13 @@ mod tests {
 
     #[test]
     fn a_dwell_is_a_block_at_rest() {
-        assert_items("G0 X1\nG4 P1.5", &["1: Rapid 0 to 1 0 0 0", "2: Dwell 1 to 1 0 0 0 for 1.5", "End"]);
+        assert_items(
+            "G0 X1\nG4 P1.5",
+            &[
+                "1: Rapid 0 to 1 0 0 0",
+                "2: Dwell 1 to 1 0 0 0 for 1.5",
+                "End",
+            ],
+        );
     }
 }

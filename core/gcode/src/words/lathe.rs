@@ -15,7 +15,14 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(|line| diameter(line, true)),
         "G7",
     ),
-    Word::new("G8", Group::LatheDiameter, "", "X words are radii", Action::Act(|line| diameter(line, false)), "G8"),
+    Word::new(
+        "G8",
+        Group::LatheDiameter,
+        "",
+        "X words are radii",
+        Action::Act(|line| diameter(line, false)),
+        "G8",
+    ),
 ];
 
 /// Within one block of a cut the radius changes by no more than this ratio, and with it the speed of the spindle: 5 %, what
@@ -38,14 +45,22 @@ pub(crate) fn straight_at_surface_speed(line: &mut Line, kind: BlockKind) -> Che
     let slowest = line.state.spindle.radius_at_most_mm();
     let [from, to] = radii.map(|radius| radius.max(slowest).max(f64::MIN_POSITIVE));
     let ratio = (from / to).max(to / from);
-    let parts = if kind == BlockKind::Line && slowest > 0.0 { (ratio.ln() / RADIUS_RATIO.ln()).ceil() } else { 1.0 };
+    let parts = if kind == BlockKind::Line && slowest > 0.0 {
+        (ratio.ln() / RADIUS_RATIO.ln()).ceil()
+    } else {
+        1.0
+    };
     let parts = parts.clamp(1.0, MAX_PARTS) as u32;
     let target = line.state.path.position;
     let mut inner = radii[0];
     for part in 1..=parts {
         // Equal ratios of the radius: where it shrinks, the parts become shorter.
         let radius = from * (to / from).powf(f64::from(part) / f64::from(parts));
-        let share = if part == parts { 1.0 } else { ((radius - radii[0]) / (radii[1] - radii[0])).clamp(0.0, 1.0) };
+        let share = if part == parts {
+            1.0
+        } else {
+            ((radius - radii[0]) / (radii[1] - radii[0])).clamp(0.0, 1.0)
+        };
         let at: AxisVector = start + (end - start) * share;
         let outer = spindle::radius_mm(line, &at);
         spindle::follow_radius(line, outer.max(inner));
@@ -64,13 +79,24 @@ mod tests {
     fn x_is_a_diameter_where_it_is_said() {
         assert_eq!(
             ends("G7 G0 X10\nG91 X4\nG8 X4\nG90 G0 X1"),
-            [["5", "0", "0"], ["7", "0", "0"], ["11", "0", "0"], ["1", "0", "0"]]
+            [
+                ["5", "0", "0"],
+                ["7", "0", "0"],
+                ["11", "0", "0"],
+                ["1", "0", "0"]
+            ]
         );
         // Parameters, I, J and K are radii.
         assert_eq!(ends("G7 G0 X10\nG0 Y#5420 Z#<_x>")[1], ["5", "5", "5"]);
         let arc = blocks("F60 G18 G7 G0 X10\nG2 X20 Z5 I5");
-        assert_eq!((arc[1].end[0], arc[1].arc.center_mm.map(short)), (10.0, ["0".into(), "10".into()]));
-        assert_eq!(ends("G7 G0 X10\nG92 X20\nG0 X10\nG10 L2 P1 X4"), [["5", "0", "0"], ["0", "0", "0"]]);
+        assert_eq!(
+            (arc[1].end[0], arc[1].arc.center_mm.map(short)),
+            (10.0, ["0".into(), "10".into()])
+        );
+        assert_eq!(
+            ends("G7 G0 X10\nG92 X20\nG0 X10\nG10 L2 P1 X4"),
+            [["5", "0", "0"], ["0", "0", "0"]]
+        );
     }
 
     #[test]
@@ -99,11 +125,20 @@ mod tests {
                 speed * block.start[0] <= 100_000.0 / 60.0 + 1e-6
                     && speed <= 1000.0 * std::f64::consts::PI / 30.0 + 1e-9
             );
-            assert!(speed * block.start[0] > 0.9 * 100_000.0 / 60.0 || block.start[0] < 17.0, "{block:?}");
+            assert!(
+                speed * block.start[0] > 0.9 * 100_000.0 / 60.0 || block.start[0] < 17.0,
+                "{block:?}"
+            );
             assert!((block.feed_mm_per_s - 0.2 * speed / std::f64::consts::TAU).abs() < 1e-9);
         }
         assert_eq!(cut.last().unwrap().end[0], 0.0);
-        assert!(shown(&facing).iter().filter(|item| item.starts_with("3: Spindle")).count() > 20);
+        assert!(
+            shown(&facing)
+                .iter()
+                .filter(|item| item.starts_with("3: Spindle"))
+                .count()
+                > 20
+        );
     }
 
     #[test]

@@ -4,7 +4,10 @@
 //! the reference table of the documentation share; its functions are what the words do; its tests show it.
 //! `docs/adding-a-word.md` says how to add one.
 
-#![allow(clippy::unnecessary_wraps, reason = "all functions of words have one signature, and some cannot fail")]
+#![allow(
+    clippy::unnecessary_wraps,
+    reason = "all functions of words have one signature, and some cannot fail"
+)]
 
 pub(crate) mod arc;
 pub(crate) mod circle;
@@ -174,11 +177,26 @@ impl Word {
         example: &'static str,
     ) -> Self {
         let (letter, tenths) = (code.as_bytes()[0], tenths(code));
-        Self { code, letter, tenths, group, meaning, takes, mask: mask(takes), action, example }
+        Self {
+            code,
+            letter,
+            tenths,
+            group,
+            meaning,
+            takes,
+            mask: mask(takes),
+            action,
+            example,
+        }
     }
 
     /// The row of a word that is refused.
-    pub const fn refused(code: &'static str, group: Group, meaning: &'static str, why: &'static str) -> Self {
+    pub const fn refused(
+        code: &'static str,
+        group: Group,
+        meaning: &'static str,
+        why: &'static str,
+    ) -> Self {
         Self::new(code, group, "", meaning, Action::Refuse(why), code)
     }
 
@@ -243,7 +261,10 @@ const fn index(letter: u8) -> [(u8, u8); SPAN] {
         while row < SUBJECTS[subject].len() {
             let word = &SUBJECTS[subject][row];
             if word.letter == letter {
-                assert!(index[word.tenths as usize].0 == NO_ROW.0, "a word has two rows");
+                assert!(
+                    index[word.tenths as usize].0 == NO_ROW.0,
+                    "a word has two rows"
+                );
                 index[word.tenths as usize] = (subject as u8, row as u8);
             }
             row += 1;
@@ -280,14 +301,26 @@ pub(crate) fn written(letter: char, tenths: u16) -> String {
 
 /// The reference of every G and M word, a Markdown table.
 pub fn docs() -> String {
-    let mut text = String::from("| word | what it does | group | takes | example | |\n|---|---|---|---|---|---|\n");
+    let mut text = String::from(
+        "| word | what it does | group | takes | example | |\n|---|---|---|---|---|---|\n",
+    );
     for word in all() {
         let support = match word.action {
             Action::Refuse(why) => format!("refused: {why}"),
             _ => "works".to_owned(),
         };
-        let takes = word.takes.chars().map(String::from).collect::<Vec<_>>().join(" ");
-        let example = word.example.lines().map(|line| format!("`{line}`")).collect::<Vec<_>>().join("<br>");
+        let takes = word
+            .takes
+            .chars()
+            .map(String::from)
+            .collect::<Vec<_>>()
+            .join(" ");
+        let example = word
+            .example
+            .lines()
+            .map(|line| format!("`{line}`"))
+            .collect::<Vec<_>>()
+            .join("<br>");
         let _ = writeln!(
             text,
             "| {} | {} | {} | {takes} | {example} | {support} |",
@@ -312,7 +345,11 @@ mod tests {
     #[test]
     fn every_row_is_found_by_its_number() {
         for word in all() {
-            assert!(std::ptr::eq(find(word.letter, word.tenths).unwrap(), word), "{}", word.code);
+            assert!(
+                std::ptr::eq(find(word.letter, word.tenths).unwrap(), word),
+                "{}",
+                word.code
+            );
             assert_eq!(written(word.letter as char, word.tenths), word.code);
         }
         assert!(find(b'G', 9990).is_none() && find(b'G', 9).is_none());
@@ -326,8 +363,13 @@ mod tests {
             let (_, errors) = run_on(mill(), &format!("F100 S100\n{}", word.example));
             match word.action {
                 Action::Refuse(why) => {
-                    let error = errors.first().unwrap_or_else(|| panic!("{} is not refused", word.code));
-                    assert!(error.code == "refused" && error.message.contains(why), "{error}");
+                    let error = errors
+                        .first()
+                        .unwrap_or_else(|| panic!("{} is not refused", word.code));
+                    assert!(
+                        error.code == "refused" && error.message.contains(why),
+                        "{error}"
+                    );
                     assert!(error.message.starts_with(word.code), "{error}");
                 }
                 _ => assert!(errors.is_empty(), "{}: {}", word.code, errors[0]),
@@ -338,7 +380,10 @@ mod tests {
     #[test]
     fn the_reference_says_what_is_refused_and_why() {
         let docs = docs();
-        assert!(docs.contains("| G61.1 | exact stop | path control |  | `G61.1` | works |"), "{docs}");
+        assert!(
+            docs.contains("| G61.1 | exact stop | path control |  | `G61.1` | works |"),
+            "{docs}"
+        );
         assert!(docs.contains("| G41 |") && docs.contains("refused: "));
     }
 }

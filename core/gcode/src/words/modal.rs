@@ -11,9 +11,30 @@ use crate::fault::Checked;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M70", Group::ModalState, "", "save the modal state of this call", Action::Act(save), "M70"),
-    Word::new("M71", Group::ModalState, "", "forget the saved modal state", Action::Act(forget), "M70\nM71"),
-    Word::new("M72", Group::ModalState, "", "restore the saved modal state", Action::Act(restore), "M70\nG91\nM72"),
+    Word::new(
+        "M70",
+        Group::ModalState,
+        "",
+        "save the modal state of this call",
+        Action::Act(save),
+        "M70",
+    ),
+    Word::new(
+        "M71",
+        Group::ModalState,
+        "",
+        "forget the saved modal state",
+        Action::Act(forget),
+        "M70\nM71",
+    ),
+    Word::new(
+        "M72",
+        Group::ModalState,
+        "",
+        "restore the saved modal state",
+        Action::Act(restore),
+        "M70\nG91\nM72",
+    ),
     Word::new(
         "M73",
         Group::ModalState,
@@ -65,7 +86,11 @@ impl SavedStates {
 
 /// A subroutine ends: what M73 has saved in it is restored.
 pub(crate) fn leave(line: &mut Line) {
-    if let Some(Level { saved: Some(saved), at_end: true }) = line.state.saved.calls.pop() {
+    if let Some(Level {
+        saved: Some(saved),
+        at_end: true,
+    }) = line.state.saved.calls.pop()
+    {
         put_back(line, &saved);
     }
 }
@@ -82,7 +107,10 @@ fn save(line: &mut Line) -> Checked<()> {
         coolant: state.coolant,
         permits: state.permits,
     };
-    *line.state.saved.level() = Level { saved: Some(Box::new(saved)), at_end: false };
+    *line.state.saved.level() = Level {
+        saved: Some(Box::new(saved)),
+        at_end: false,
+    };
     Ok(())
 }
 
@@ -145,9 +173,15 @@ mod tests {
                 "End",
             ],
         );
-        assert_eq!(ends("G10 L2 P2 X9\nM70\nG20 G55 G43 H1\nM72\nG0 X1 Z1"), [["1", "0", "1"]]);
+        assert_eq!(
+            ends("G10 L2 P2 X9\nM70\nG20 G55 G43 H1\nM72\nG0 X1 Z1"),
+            [["1", "0", "1"]]
+        );
         // The length of a tool that is no longer in the spindle stays out.
-        assert_eq!(ends("T1 M6 G43\nM70\nT2 M6 G43\nM72\nG0 Z0"), [["0", "0", "25"]]);
+        assert_eq!(
+            ends("T1 M6 G43\nM70\nT2 M6 G43\nM72\nG0 Z0"),
+            [["0", "0", "25"]]
+        );
     }
 
     #[test]

@@ -9,10 +9,38 @@ use crate::line::Line;
 use crate::state::letters::Letters;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("G20", Group::Units, "", "inches", Action::Act(inches), "G20"),
-    Word::new("G21", Group::Units, "", "millimetres", Action::Act(millimetres), "G21"),
-    Word::new("G93", Group::FeedMode, "", "inverse time: a line takes 1/F minutes", Action::Act(inverse_time), "G93"),
-    Word::new("G94", Group::FeedMode, "", "feed a minute; F is forgotten", Action::Act(feed_per_minute), "G94"),
+    Word::new(
+        "G20",
+        Group::Units,
+        "",
+        "inches",
+        Action::Act(inches),
+        "G20",
+    ),
+    Word::new(
+        "G21",
+        Group::Units,
+        "",
+        "millimetres",
+        Action::Act(millimetres),
+        "G21",
+    ),
+    Word::new(
+        "G93",
+        Group::FeedMode,
+        "",
+        "inverse time: a line takes 1/F minutes",
+        Action::Act(inverse_time),
+        "G93",
+    ),
+    Word::new(
+        "G94",
+        Group::FeedMode,
+        "",
+        "feed a minute; F is forgotten",
+        Action::Act(feed_per_minute),
+        "G94",
+    ),
     Word::new(
         "G95",
         Group::FeedMode,
@@ -21,12 +49,54 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(feed_per_revolution),
         "G95 F0.1",
     ),
-    Word::new("G17", Group::Plane, "", "arcs in the plane XY", Action::Act(plane_xy), "G17"),
-    Word::new("G18", Group::Plane, "", "arcs in the plane ZX", Action::Act(plane_zx), "G18"),
-    Word::new("G19", Group::Plane, "", "arcs in the plane YZ", Action::Act(plane_yz), "G19"),
-    Word::new("G90", Group::Distance, "", "absolute coordinates", Action::Act(absolute), "G90"),
-    Word::new("G91", Group::Distance, "", "incremental coordinates", Action::Act(incremental), "G91"),
-    Word::new("G90.1", Group::ArcDistance, "", "I J K absolute", Action::Act(arc_absolute), "G90.1"),
+    Word::new(
+        "G17",
+        Group::Plane,
+        "",
+        "arcs in the plane XY",
+        Action::Act(plane_xy),
+        "G17",
+    ),
+    Word::new(
+        "G18",
+        Group::Plane,
+        "",
+        "arcs in the plane ZX",
+        Action::Act(plane_zx),
+        "G18",
+    ),
+    Word::new(
+        "G19",
+        Group::Plane,
+        "",
+        "arcs in the plane YZ",
+        Action::Act(plane_yz),
+        "G19",
+    ),
+    Word::new(
+        "G90",
+        Group::Distance,
+        "",
+        "absolute coordinates",
+        Action::Act(absolute),
+        "G90",
+    ),
+    Word::new(
+        "G91",
+        Group::Distance,
+        "",
+        "incremental coordinates",
+        Action::Act(incremental),
+        "G91",
+    ),
+    Word::new(
+        "G90.1",
+        Group::ArcDistance,
+        "",
+        "I J K absolute",
+        Action::Act(arc_absolute),
+        "G90.1",
+    ),
     Word::new(
         "G91.1",
         Group::ArcDistance,
@@ -43,7 +113,14 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(exact_stop),
         "G61",
     ),
-    Word::new("G61.1", Group::PathControl, "", "exact stop", Action::Act(exact_stop), "G61.1"),
+    Word::new(
+        "G61.1",
+        Group::PathControl,
+        "",
+        "exact stop",
+        Action::Act(exact_stop),
+        "G61.1",
+    ),
     Word::new(
         "G64",
         Group::PathControl,
@@ -52,9 +129,30 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(continuous),
         "G64 P0.05",
     ),
-    Word::new("G15", Group::Polar, "", "polar coordinates off (nothing to do)", Action::Act(nothing), "G15"),
-    Word::new("G50", Group::Scaling, "", "scaling off (nothing to do)", Action::Act(nothing), "G50"),
-    Word::new("G69", Group::Rotation, "", "rotation off (nothing to do)", Action::Act(nothing), "G69"),
+    Word::new(
+        "G15",
+        Group::Polar,
+        "",
+        "polar coordinates off (nothing to do)",
+        Action::Act(nothing),
+        "G15",
+    ),
+    Word::new(
+        "G50",
+        Group::Scaling,
+        "",
+        "scaling off (nothing to do)",
+        Action::Act(nothing),
+        "G50",
+    ),
+    Word::new(
+        "G69",
+        Group::Rotation,
+        "",
+        "rotation off (nothing to do)",
+        Action::Act(nothing),
+        "G69",
+    ),
 ];
 
 /// Millimetres an inch.
@@ -122,7 +220,10 @@ pub(crate) struct Feed {
 
 /// The modes.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(clippy::struct_excessive_bools, reason = "modes that are independent of each other in the language")]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "modes that are independent of each other in the language"
+)]
 pub(crate) struct Modes {
     pub plane: Plane,
     /// Millimetres a program unit of length.
@@ -158,27 +259,53 @@ impl Default for Modes {
 impl Modes {
     /// Whether these are the same; what the machine decides is a number that is none, and the same as itself.
     pub fn is_as(&self, other: &Self) -> bool {
-        let bits = |modes: &Self| [modes.tolerance_mm.to_bits(), modes.time_constant_s.to_bits()];
-        let rest = Self { tolerance_mm: 0.0, time_constant_s: 0.0, ..self.clone() };
-        bits(self) == bits(other) && rest == Self { tolerance_mm: 0.0, time_constant_s: 0.0, ..other.clone() }
+        let bits = |modes: &Self| {
+            [
+                modes.tolerance_mm.to_bits(),
+                modes.time_constant_s.to_bits(),
+            ]
+        };
+        let rest = Self {
+            tolerance_mm: 0.0,
+            time_constant_s: 0.0,
+            ..self.clone()
+        };
+        bits(self) == bits(other)
+            && rest
+                == Self {
+                    tolerance_mm: 0.0,
+                    time_constant_s: 0.0,
+                    ..other.clone()
+                }
     }
 
     /// Inner units (mm, rad) a program unit (mm or inch, degree) of `axis`.
     #[inline]
     pub fn scale(&self, letters: &Letters, axis: usize) -> f64 {
-        if letters.is_rotary(axis) { PI / 180.0 } else { self.unit_mm }
+        if letters.is_rotary(axis) {
+            PI / 180.0
+        } else {
+            self.unit_mm
+        }
     }
 
     /// The same for an axis word: X may be a diameter.
     #[inline]
     pub fn word_scale(&self, letters: &Letters, axis: usize) -> f64 {
         let scale = self.scale(letters, axis);
-        if self.diameter && letters.letter(axis) == b'X' { 0.5 * scale } else { scale }
+        if self.diameter && letters.letter(axis) == b'X' {
+            0.5 * scale
+        } else {
+            scale
+        }
     }
 
     /// Each word of the feed mode forgets F, as in LinuxCNC, also where the mode stays.
     fn set_feed_mode(&mut self, mode: FeedMode) {
-        self.feed = Feed { mode, ..Feed::default() };
+        self.feed = Feed {
+            mode,
+            ..Feed::default()
+        };
     }
 
     /// F. With G93 it holds for its line only, which reads it itself.
@@ -287,7 +414,9 @@ pub(crate) fn feed(line: &mut Line) -> Checked<()> {
 pub(crate) fn time_constant(line: &mut Line) -> Checked<()> {
     if let Some((value_ms, span)) = line.words.time_constant {
         let why = refuse_time_constant(value_ms, line.config);
-        why.map_or(Ok(()), |message| Err(Fault::new(span, "time-constant", message)))?;
+        why.map_or(Ok(()), |message| {
+            Err(Fault::new(span, "time-constant", message))
+        })?;
         line.state.modes.time_constant_s = value_ms / 1000.0;
     }
     Ok(())
@@ -301,7 +430,9 @@ fn refuse_time_constant(value_ms: f64, config: &Config) -> Option<String> {
     // The limits are in ms in the machine file too; a nanosecond is the rounding on the way.
     let beyond = value_ms < min_s * 1e3 - 1e-6 || value_ms > max_s * 1e3 + 1e-6;
     let [min, max, asked] = [min_s * 1e3, max_s * 1e3, value_ms].map(show);
-    beyond.then(|| format!("TA {asked} is beyond the time constants of this machine, {min} to {max} ms"))
+    beyond.then(|| {
+        format!("TA {asked} is beyond the time constants of this machine, {min} to {max} ms")
+    })
 }
 
 #[cfg(test)]
@@ -311,37 +442,72 @@ mod tests {
     #[test]
     fn the_time_constant_goes_with_its_block_and_the_following() {
         let all = blocks("F600\nG1 X1\nTA 20 X2\nX3\nTA[2*5]\nG4 P0\nTA7.5\nX4");
-        let shown: Vec<_> = all.iter().map(|b| short(b.time_constant_s * 1000.0)).collect();
+        let shown: Vec<_> = all
+            .iter()
+            .map(|b| short(b.time_constant_s * 1000.0))
+            .collect();
         assert_eq!(shown, ["NaN", "20", "20", "10", "7.5"]);
     }
 
     #[test]
     fn path_control_is_attached() {
-        let all = blocks("F600\nG1 X1\nG64 P0.05 Q1\nX2\nG61\nX3\nG64\nX4\nG61.1\nX5\nG20 G64 P0.001\nX0.2");
-        let modes: Vec<_> =
-            all.iter().map(|b| (b.path_mode == tandem_sdk::PathMode::ExactStop, short(b.path_tolerance_mm))).collect();
-        let expected =
-            [(false, "NaN"), (false, "0.05"), (true, "NaN"), (false, "NaN"), (true, "NaN"), (false, "0.025")];
+        let all = blocks(
+            "F600\nG1 X1\nG64 P0.05 Q1\nX2\nG61\nX3\nG64\nX4\nG61.1\nX5\nG20 G64 P0.001\nX0.2",
+        );
+        let modes: Vec<_> = all
+            .iter()
+            .map(|b| {
+                (
+                    b.path_mode == tandem_sdk::PathMode::ExactStop,
+                    short(b.path_tolerance_mm),
+                )
+            })
+            .collect();
+        let expected = [
+            (false, "NaN"),
+            (false, "0.05"),
+            (true, "NaN"),
+            (false, "NaN"),
+            (true, "NaN"),
+            (false, "0.025"),
+        ];
         assert!(last("G64 P0 G0 X1").path_tolerance_mm.is_nan());
-        assert_eq!(modes, expected.map(|(exact, tolerance)| (exact, tolerance.to_owned())));
+        assert_eq!(
+            modes,
+            expected.map(|(exact, tolerance)| (exact, tolerance.to_owned()))
+        );
     }
 
     #[test]
     fn units_and_distance_modes() {
         let block = last("G20 G91 G1 X1 A90 F10\nX1");
-        assert_eq!((short(block.end[0]), short(block.end[3])), ("50.8".into(), "1.571".into()));
+        assert_eq!(
+            (short(block.end[0]), short(block.end[3])),
+            ("50.8".into(), "1.571".into())
+        );
         assert_eq!(short(block.feed_mm_per_s), "4.233");
         let turning = last("F360 G1 A180");
-        assert_eq!((short(turning.length_mm), short(turning.feed_mm_per_s)), ("3.142".into(), "0.105".into()));
+        assert_eq!(
+            (short(turning.length_mm), short(turning.feed_mm_per_s)),
+            ("3.142".into(), "0.105".into())
+        );
         let both = last("F600 G1 A90 X3 Y4");
         assert_eq!((both.length_mm, both.feed_mm_per_s), (5.0, 10.0));
     }
 
     #[test]
     fn inverse_time_gives_the_duration() {
-        for program in ["G93 G1 X10 F30", "G93 G1 A90 F30", "G93 G2 X10 I5 F30", "G93 G3 I5 Z3 A720 F30"] {
+        for program in [
+            "G93 G1 X10 F30",
+            "G93 G1 A90 F30",
+            "G93 G2 X10 I5 F30",
+            "G93 G3 I5 Z3 A720 F30",
+        ] {
             let block = last(program);
-            assert!((block.length_mm / block.feed_mm_per_s - 2.0).abs() < 1e-12, "{program}");
+            assert!(
+                (block.length_mm / block.feed_mm_per_s - 2.0).abs() < 1e-12,
+                "{program}"
+            );
         }
     }
 }

@@ -7,7 +7,14 @@ use crate::fault::Checked;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("G0", Group::Motion, "XYZABCUVW", "rapid", Action::Move(Shape::Straight, rapid), "G0 X1"),
+    Word::new(
+        "G0",
+        Group::Motion,
+        "XYZABCUVW",
+        "rapid",
+        Action::Move(Shape::Straight, rapid),
+        "G0 X1",
+    ),
     Word::new(
         "G1",
         Group::Motion,
@@ -83,7 +90,13 @@ pub(super) fn line_to(line: &mut Line, kind: BlockKind) -> Checked<()> {
             line.check_travel(axis, end[axis], end[axis])?;
         }
     }
-    let block = Block { kind, end, length_mm, feed_mm_per_s, ..line.state.blank_block() };
+    let block = Block {
+        kind,
+        end,
+        length_mm,
+        feed_mm_per_s,
+        ..line.state.blank_block()
+    };
     line.push(block);
     Ok(())
 }
@@ -96,7 +109,10 @@ mod tests {
     fn no_motion_no_block() {
         assert_items("F60 G1\nG1 X0 Y0\nG0 X0\nG91 X0\nG64 G17", &["End"]);
         // The rounding of offsets is no motion either.
-        assert_eq!(blocks("G10 L2 P1 X0.1\nG92 Y1\nG0 X0.2\nG53 X0.3\nX0.2").len(), 1);
+        assert_eq!(
+            blocks("G10 L2 P1 X0.1\nG92 Y1\nG0 X0.2\nG53 X0.3\nX0.2").len(),
+            1
+        );
     }
 
     #[test]
@@ -123,8 +139,18 @@ mod tests {
         );
         assert_eq!(ends("G20 G0 @1 ^90")[0], ["0", "25.4", "0"]);
         assert_eq!(ends("G10 L2 P1 X5 R90\nG0 @10 ^90")[0], ["-5", "0", "0"]);
-        assert_eq!(ends("G0 X10\nG91 G81 Z-1 R1 ^90 L2 F60\nG80")[6], ["-10", "0", "0"]);
-        for wrong in ["G0 @1 X2", "G53 G0 @1", "G92 @1", "G1 F60 @1 @2", "@1", "F60 G5 @1 I1 J1 P1 Q1"] {
+        assert_eq!(
+            ends("G0 X10\nG91 G81 Z-1 R1 ^90 L2 F60\nG80")[6],
+            ["-10", "0", "0"]
+        );
+        for wrong in [
+            "G0 @1 X2",
+            "G53 G0 @1",
+            "G92 @1",
+            "G1 F60 @1 @2",
+            "@1",
+            "F60 G5 @1 I1 J1 P1 Q1",
+        ] {
             let (_, errors) = run_on(mill(), wrong);
             assert!(!errors.is_empty(), "{wrong}");
         }

@@ -24,7 +24,12 @@ pub(crate) struct Orders {
 impl Orders {
     pub fn new() -> Self {
         let filler = (&super::motion::WORDS[0], Span::default());
-        Self { present: 0, words: [filler; GROUPS], motion: None, axes_taken: false }
+        Self {
+            present: 0,
+            words: [filler; GROUPS],
+            motion: None,
+            axes_taken: false,
+        }
     }
 
     /// Forgets the words of the line before.
@@ -88,7 +93,13 @@ impl Orders {
     }
 
     #[inline]
-    fn sort_kind(&mut self, letter: u8, codes: &[Code], words: &LineWords, claims: &mut Claims) -> Checked<()> {
+    fn sort_kind(
+        &mut self,
+        letter: u8,
+        codes: &[Code],
+        words: &LineWords,
+        claims: &mut Claims,
+    ) -> Checked<()> {
         let mut result = Ok(());
         for code in codes {
             let added = self.add(letter, *code, words, claims);
@@ -97,8 +108,16 @@ impl Orders {
         result
     }
 
-    fn add(&mut self, letter: u8, code: Code, words: &LineWords, claims: &mut Claims) -> Checked<()> {
-        let Some(word) = super::find(letter, code.tenths) else { return Err(unknown(letter as char, code)) };
+    fn add(
+        &mut self,
+        letter: u8,
+        code: Code,
+        words: &LineWords,
+        claims: &mut Claims,
+    ) -> Checked<()> {
+        let Some(word) = super::find(letter, code.tenths) else {
+            return Err(unknown(letter as char, code));
+        };
         if let Action::Refuse(why) = word.action {
             self.axes_taken |= word.group == Group::NonModal;
             if word.group == Group::Motion {
@@ -125,16 +144,23 @@ impl Orders {
         letters: &Letters,
     ) -> Checked<()> {
         let takes_axes = |word: &&'static Word| word.mask & AXIS_MASK != 0;
-        let taker = self.get(Group::NonModal).filter(takes_axes).or(self.get(Group::ToolLength).filter(takes_axes));
+        let taker = self
+            .get(Group::NonModal)
+            .filter(takes_axes)
+            .or(self.get(Group::ToolLength).filter(takes_axes));
         let has_axes = words.named() != 0;
         self.axes_taken |= taker.is_some_and(|word| word.group == Group::NonModal || has_axes);
-        let refused = self.motion.filter(|motion| matches!(motion, MotionMode::Refused));
+        let refused = self
+            .motion
+            .filter(|motion| matches!(motion, MotionMode::Refused));
         let word = self.get(Group::Motion);
         if word.is_some_and(|word| word.shape().is_none()) {
             return Err(self.fault(Group::Motion, "nurbs", super::curve::NONE_OPEN));
         }
         if self.axes_taken {
-            words.polar.map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
+            words
+                .polar
+                .map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
             return self.check_taken(word, taker, words);
         }
         let motion = word.map(MotionMode::Word).or(refused).unwrap_or(modal);
@@ -166,12 +192,17 @@ impl Orders {
         taker: Option<&'static Word>,
         words: &LineWords,
     ) -> Checked<()> {
-        let Some((motion, taker)) = motion.zip(taker) else { return Ok(()) };
+        let Some((motion, taker)) = motion.zip(taker) else {
+            return Ok(());
+        };
         let probes = motion.shape() == Some(Shape::Probe);
         let has_axes = words.present & AXIS_MASK != 0;
         let only_sets_mode = matches!(taker.tenths, 280 | 300);
         if probes || has_axes && !only_sets_mode {
-            let message = format!("the axis words belong to {}, not to a motion: split the line", taker.code);
+            let message = format!(
+                "the axis words belong to {}, not to a motion: split the line",
+                taker.code
+            );
             return Err(self.fault(Group::Motion, "conflict", message));
         }
         Ok(())
@@ -184,7 +215,9 @@ fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
     if words.named() != 0 {
         return true;
     }
-    let MotionMode::Word(word) = motion else { return false };
+    let MotionMode::Word(word) = motion else {
+        return false;
+    };
     match word.shape() {
         Some(Shape::Arc) => stands || words.present & ARC_LETTERS != 0,
         Some(Shape::Probe | Shape::Curve | Shape::Cycle) => stands,
@@ -194,16 +227,29 @@ fn begins(motion: MotionMode, words: &LineWords, stands: bool) -> bool {
 
 /// `@` and `^` stand for X and Y of a motion.
 #[cold]
-fn check_polar(polar: &Polar, motion: MotionMode, words: &LineWords, letters: &Letters) -> Checked<()> {
+fn check_polar(
+    polar: &Polar,
+    motion: MotionMode,
+    words: &LineWords,
+    letters: &Letters,
+) -> Checked<()> {
     let bends = matches!(motion, MotionMode::Word(word) if word.shape() == Some(Shape::Curve));
     if bends || words.present & mask("XY") != 0 {
         return Err(polar_misplaced(polar));
     }
-    let linear = |letter: u8| letters.axis(letter).is_some_and(|axis| !letters.is_rotary(axis));
+    let linear = |letter: u8| {
+        letters
+            .axis(letter)
+            .is_some_and(|axis| !letters.is_rotary(axis))
+    };
     if linear(b'X') && linear(b'Y') {
         return Ok(());
     }
-    Err(Fault::new(polar.span, "axis", "polar coordinates (@ and ^) need the linear axes X and Y"))
+    Err(Fault::new(
+        polar.span,
+        "axis",
+        "polar coordinates (@ and ^) need the linear axes X and Y",
+    ))
 }
 
 #[cold]
@@ -220,7 +266,12 @@ fn conflict(word: &Word, other: &Word, span: Span) -> Fault {
     } else if word.tenths == other.tenths {
         format!("{} stands in this line twice", word.code)
     } else {
-        format!("{} and {} exclude each other in a line (group: {})", word.code, other.code, word.group.name())
+        format!(
+            "{} and {} exclude each other in a line (group: {})",
+            word.code,
+            other.code,
+            word.group.name()
+        )
     };
     Fault::new(span, "conflict", message)
 }
@@ -237,9 +288,14 @@ impl Claims {
     fn add(&mut self, word: &Word, words: &LineWords) -> Checked<()> {
         let both = self.letters & word.mask & words.present & !AXIS_MASK;
         self.letters |= word.mask;
-        let Some((shared, span)) = words.first_of(both) else { return Ok(()) };
+        let Some((shared, span)) = words.first_of(both) else {
+            return Ok(());
+        };
         let word = word.code;
-        let message = format!("{word} takes {}, but so does another word of this line: split it", shared as char);
+        let message = format!(
+            "{word} takes {}, but so does another word of this line: split it",
+            shared as char
+        );
         Err(Fault::new(span, "ambiguous", message))
     }
 }
@@ -252,8 +308,15 @@ fn unknown(letter: char, code: Code) -> Fault {
 
 #[cold]
 fn no_motion(words: &LineWords) -> Fault {
-    let span = words.first_of(AXIS_MASK).map(|(_, span)| span).unwrap_or_default();
-    Fault::new(span, "motion-missing", "no motion mode is in force: G0, G1, G2 or G3 is missing")
+    let span = words
+        .first_of(AXIS_MASK)
+        .map(|(_, span)| span)
+        .unwrap_or_default();
+    Fault::new(
+        span,
+        "motion-missing",
+        "no motion mode is in force: G0, G1, G2 or G3 is missing",
+    )
 }
 
 /// The first word that the machine or the line has no use for.
@@ -268,21 +331,42 @@ fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> Fault {
     }
     let takers = takers(letter);
     if takers.is_empty() {
-        return Fault::new(span, "unknown-word", format!("the word {name} is not known"));
+        return Fault::new(
+            span,
+            "unknown-word",
+            format!("the word {name} is not known"),
+        );
     }
     let exponent = words.exponent(letter);
-    Fault::new(span, "unused-word", format!("nothing in this line takes the word {name} ({takers} would){exponent}"))
+    Fault::new(
+        span,
+        "unused-word",
+        format!("nothing in this line takes the word {name} ({takers} would){exponent}"),
+    )
 }
 
 /// An axis that the machine lacks.
 #[cold]
 pub(crate) fn no_axis(letter: u8, span: Span, letters: &Letters) -> Fault {
-    Fault::new(span, "axis", format!("this machine has no axis {}; it has {}", letter as char, letters.list()))
+    Fault::new(
+        span,
+        "axis",
+        format!(
+            "this machine has no axis {}; it has {}",
+            letter as char,
+            letters.list()
+        ),
+    )
 }
 
 /// The supported words that take `letter`.
 fn takers(letter: u8) -> String {
     let takes = |word: &&&Word| word.takes.as_bytes().contains(&letter);
     let words = super::all();
-    words.iter().filter(takes).map(|word| word.code).collect::<Vec<_>>().join(", ")
+    words
+        .iter()
+        .filter(takes)
+        .map(|word| word.code)
+        .collect::<Vec<_>>()
+        .join(", ")
 }

@@ -8,10 +8,38 @@ use crate::item::{Input, InputMode, InputWait, Item};
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M62", Group::InputOutput, "P", "digital output P on, with the motion", WITH_MOTION_ON, "M62 P1"),
-    Word::new("M63", Group::InputOutput, "P", "digital output P off, with the motion", WITH_MOTION_OFF, "M63 P1"),
-    Word::new("M64", Group::InputOutput, "P", "digital output P on, at rest", AT_REST_ON, "M64 P1"),
-    Word::new("M65", Group::InputOutput, "P", "digital output P off, at rest", AT_REST_OFF, "M65 P1"),
+    Word::new(
+        "M62",
+        Group::InputOutput,
+        "P",
+        "digital output P on, with the motion",
+        WITH_MOTION_ON,
+        "M62 P1",
+    ),
+    Word::new(
+        "M63",
+        Group::InputOutput,
+        "P",
+        "digital output P off, with the motion",
+        WITH_MOTION_OFF,
+        "M63 P1",
+    ),
+    Word::new(
+        "M64",
+        Group::InputOutput,
+        "P",
+        "digital output P on, at rest",
+        AT_REST_ON,
+        "M64 P1",
+    ),
+    Word::new(
+        "M65",
+        Group::InputOutput,
+        "P",
+        "digital output P off, at rest",
+        AT_REST_OFF,
+        "M65 P1",
+    ),
     Word::new(
         "M66",
         Group::InputOutput,
@@ -81,8 +109,17 @@ impl Outputs {
 /// M64 and M65 do not wait for motion: the machine is at rest when they switch, as in LinuxCNC, whose queue has run empty
 /// by then.
 fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
-    let missing = || line.orders.fault(Group::InputOutput, "word-missing", "P, the number of the output, is missing");
-    let number = line.words.integer(b'P', 0..=MAX_OUTPUT)?.ok_or_else(missing)?;
+    let missing = || {
+        line.orders.fault(
+            Group::InputOutput,
+            "word-missing",
+            "P, the number of the output, is missing",
+        )
+    };
+    let number = line
+        .words
+        .integer(b'P', 0..=MAX_OUTPUT)?
+        .ok_or_else(missing)?;
     if let Some(refusal) = line.config.outputs.refusal("output", number) {
         return Err(line.words.fault(b'P', "output", refusal));
     }
@@ -98,9 +135,19 @@ fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
 /// M67 and M68.
 fn set_analog(line: &mut Line, at_rest: bool) -> Checked<()> {
     let missing = |what| line.orders.fault(Group::InputOutput, "word-missing", what);
-    let number = line.words.integer(b'E', 0..=63)?.ok_or_else(|| missing("E, the number of the output, is missing"))?;
-    let value = line.words.get(b'Q').ok_or_else(|| missing("Q, the value of the output, is missing"))?;
-    if let Some(refusal) = line.config.analog_outputs.refusal("analogue output", number) {
+    let number = line
+        .words
+        .integer(b'E', 0..=63)?
+        .ok_or_else(|| missing("E, the number of the output, is missing"))?;
+    let value = line
+        .words
+        .get(b'Q')
+        .ok_or_else(|| missing("Q, the value of the output, is missing"))?;
+    if let Some(refusal) = line
+        .config
+        .analog_outputs
+        .refusal("analogue output", number)
+    {
         return Err(line.words.fault(b'E', "output", refusal));
     }
     if at_rest {
@@ -111,7 +158,10 @@ fn set_analog(line: &mut Line, at_rest: bool) -> Checked<()> {
 }
 
 fn wait(line: &mut Line) -> Checked<()> {
-    let input = match (line.words.integer(b'P', 0..=63)?, line.words.integer(b'E', 0..=63)?) {
+    let input = match (
+        line.words.integer(b'P', 0..=63)?,
+        line.words.integer(b'E', 0..=63)?,
+    ) {
         (Some(number), None) => match line.config.inputs.refusal("input", number) {
             Some(refusal) => return Err(line.words.fault(b'P', "input", refusal)),
             None => Input::Digital(number),
@@ -121,10 +171,16 @@ fn wait(line: &mut Line) -> Checked<()> {
             None => Input::Analog(number),
         },
         (Some(_), Some(_)) => {
-            return Err(wait_fault(line, "M66 takes either P, a digital input, or E, an analogue one"));
+            return Err(wait_fault(
+                line,
+                "M66 takes either P, a digital input, or E, an analogue one",
+            ));
         }
         (None, None) => {
-            return Err(wait_fault(line, "M66 needs P, the number of a digital input, or E, an analogue one"));
+            return Err(wait_fault(
+                line,
+                "M66 needs P, the number of a digital input, or E, an analogue one",
+            ));
         }
     };
     let mode = match line.words.integer(b'L', 0..=4)? {
@@ -136,14 +192,26 @@ fn wait(line: &mut Line) -> Checked<()> {
     };
     let timeout_s = line.words.not_negative(b'Q')?.unwrap_or(0.0);
     if mode != InputMode::Immediate && matches!(input, Input::Analog(_)) {
-        return Err(wait_fault(line, "an analogue input (E) is read at once: M66 E goes with L0 only"));
+        return Err(wait_fault(
+            line,
+            "an analogue input (E) is read at once: M66 E goes with L0 only",
+        ));
     }
     if mode != InputMode::Immediate && timeout_s == 0.0 {
-        return Err(wait_fault(line, "M66 needs Q, the longest wait in seconds, greater than zero"));
+        return Err(wait_fault(
+            line,
+            "M66 needs Q, the longest wait in seconds, greater than zero",
+        ));
     }
     line.rest();
     let (number, before_block) = (line.state.line, line.state.path.next_index);
-    line.out.push(Item::Wait(InputWait { line: number, before_block, input, mode, timeout_s }));
+    line.out.push(Item::Wait(InputWait {
+        line: number,
+        before_block,
+        input,
+        mode,
+        timeout_s,
+    }));
     Ok(())
 }
 
@@ -208,7 +276,13 @@ mod tests {
                 "End",
             ],
         );
-        for wrong in ["M67 E1", "M68 Q1", "M66 P1 E1", "M66 E1 L1 Q2", "M67 E64 Q1"] {
+        for wrong in [
+            "M67 E1",
+            "M68 Q1",
+            "M66 P1 E1",
+            "M66 E1 L1 Q2",
+            "M67 E64 Q1",
+        ] {
             assert_eq!(messages(wrong).len(), 1, "{wrong}");
         }
         let mut config = mill();
@@ -217,7 +291,10 @@ mod tests {
         let shown: Vec<_> = errors.iter().map(|e| &*e.message).collect();
         assert_eq!(
             shown,
-            ["no driver has analogue output 1; there is none", "no driver has analogue input 1; there is none"]
+            [
+                "no driver has analogue output 1; there is none",
+                "no driver has analogue input 1; there is none"
+            ]
         );
     }
 }

@@ -7,12 +7,54 @@ use crate::fault::Checked;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M48", Group::Override, "", "feed and spindle overrides on", Action::Act(both_on), "M48"),
-    Word::new("M49", Group::Override, "", "feed and spindle overrides off", Action::Act(both_off), "M49"),
-    Word::new("M50", Group::Override, "P", "feed override on (P1) or off (P0)", by_p(FEED), "M50 P0"),
-    Word::new("M51", Group::Override, "P", "spindle override on (P1) or off (P0)", by_p(SPINDLE), "M51 P0"),
-    Word::new("M52", Group::Override, "P", "adaptive feed on (P1) or off (P0)", by_p(ADAPTIVE), "M52 P1"),
-    Word::new("M53", Group::Override, "P", "feed hold permitted (P1) or not (P0)", by_p(HOLD), "M53 P0"),
+    Word::new(
+        "M48",
+        Group::Override,
+        "",
+        "feed and spindle overrides on",
+        Action::Act(both_on),
+        "M48",
+    ),
+    Word::new(
+        "M49",
+        Group::Override,
+        "",
+        "feed and spindle overrides off",
+        Action::Act(both_off),
+        "M49",
+    ),
+    Word::new(
+        "M50",
+        Group::Override,
+        "P",
+        "feed override on (P1) or off (P0)",
+        by_p(FEED),
+        "M50 P0",
+    ),
+    Word::new(
+        "M51",
+        Group::Override,
+        "P",
+        "spindle override on (P1) or off (P0)",
+        by_p(SPINDLE),
+        "M51 P0",
+    ),
+    Word::new(
+        "M52",
+        Group::Override,
+        "P",
+        "adaptive feed on (P1) or off (P0)",
+        by_p(ADAPTIVE),
+        "M52 P1",
+    ),
+    Word::new(
+        "M53",
+        Group::Override,
+        "P",
+        "feed hold permitted (P1) or not (P0)",
+        by_p(HOLD),
+        "M53 P0",
+    ),
 ];
 
 pub(super) const FEED: usize = 0;
@@ -20,8 +62,12 @@ pub(super) const SPINDLE: usize = 1;
 const ADAPTIVE: usize = 2;
 const HOLD: usize = 3;
 /// The events of the four permissions.
-const EVENTS: [EventKind; 4] =
-    [EventKind::FeedOverride, EventKind::SpindleOverride, EventKind::AdaptiveFeed, EventKind::FeedHold];
+const EVENTS: [EventKind; 4] = [
+    EventKind::FeedOverride,
+    EventKind::SpindleOverride,
+    EventKind::AdaptiveFeed,
+    EventKind::FeedHold,
+];
 
 /// What is permitted: feed override, spindle override, adaptive feed, feed hold.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -26,7 +26,15 @@ pub(super) const WORDS: &[Word] = &[
         Group::Motion,
         "XYZABCUVW",
         "straight line until the probe touches; an error where it does not",
-        Action::Move(Shape::Probe, |line| probe(line, Probe { must: true, ..TOWARDS })),
+        Action::Move(Shape::Probe, |line| {
+            probe(
+                line,
+                Probe {
+                    must: true,
+                    ..TOWARDS
+                },
+            )
+        }),
         "G38.2 Z-5",
     ),
     Word::new(
@@ -42,7 +50,9 @@ pub(super) const WORDS: &[Word] = &[
         Group::Motion,
         "XYZABCUVW",
         "straight line until the probe lets go; an error where it does not",
-        Action::Move(Shape::Probe, |line| probe(line, Probe { must: true, ..AWAY })),
+        Action::Move(Shape::Probe, |line| {
+            probe(line, Probe { must: true, ..AWAY })
+        }),
         "G38.4 Z5",
     ),
     Word::new(
@@ -69,8 +79,14 @@ struct Probe {
     must: bool,
 }
 
-const TOWARDS: Probe = Probe { away: false, must: false };
-const AWAY: Probe = Probe { away: true, must: false };
+const TOWARDS: Probe = Probe {
+    away: false,
+    must: false,
+};
+const AWAY: Probe = Probe {
+    away: true,
+    must: false,
+};
 
 /// Rest, and the block that an edge ends.
 fn probe(line: &mut Line, probe: Probe) -> Checked<()> {
@@ -91,7 +107,14 @@ fn probe(line: &mut Line, probe: Probe) -> Checked<()> {
     }
     line.rest();
     let blank = line.state.blank_block();
-    line.push(Block { kind: BlockKind::Line, end, length_mm, feed_mm_per_s, stop_on, ..blank });
+    line.push(Block {
+        kind: BlockKind::Line,
+        end,
+        length_mm,
+        feed_mm_per_s,
+        stop_on,
+        ..blank
+    });
     line.state.path.at_rest = true;
     Ok(())
 }
@@ -101,22 +124,39 @@ fn stop_on(line: &Line, probe: Probe, word: &str) -> Checked<StopOn> {
         let message = format!("{word}: this machine has no probe: its file has no [probe]");
         return Err(line.motion_fault("refused", message));
     };
-    let edge = if probe.away == wired.inverted { Edge::Rising } else { Edge::Falling };
-    Ok(StopOn { input: wired.input, edge, miss_is_fault: u32::from(probe.must) })
+    let edge = if probe.away == wired.inverted {
+        Edge::Rising
+    } else {
+        Edge::Falling
+    };
+    Ok(StopOn {
+        input: wired.input,
+        edge,
+        miss_is_fault: u32::from(probe.must),
+    })
 }
 
 /// What a probe does not go with.
 fn refuse_company(line: &Line, word: &str) -> Checked<()> {
     line.refuse_machine_coordinates()?;
-    if line.orders.get(Group::InputOutput).is_some_and(|other| other.tenths == 660) {
+    if line
+        .orders
+        .get(Group::InputOutput)
+        .is_some_and(|other| other.tenths == 660)
+    {
         let message = format!("{word} and M66 each wait for an input: split the line");
         return Err(line.motion_fault("conflict", message));
     }
     if line.words.named() == 0 {
-        return Err(line.motion_fault("axis-missing", format!("{word} needs at least one axis word")));
+        return Err(line.motion_fault(
+            "axis-missing",
+            format!("{word} needs at least one axis word"),
+        ));
     }
     if line.state.modes.feed.mode == FeedMode::InverseTime {
-        let message = format!("{word} does not go with G93: where it ends is not known, so its time is not either");
+        let message = format!(
+            "{word} does not go with G93: where it ends is not known, so its time is not either"
+        );
         return Err(line.motion_fault("conflict", message));
     }
     Ok(())
@@ -124,23 +164,47 @@ fn refuse_company(line: &Line, word: &str) -> Checked<()> {
 
 /// What became of the probe. #5061 to #5069 get the touched position in program coordinates and units, the programmed end
 /// where nothing touched; #5070 says which. The program goes on from where the machine rests.
-pub(crate) fn provide(state: &mut State, parameters: &mut Parameters, letters: &Letters, result: &ProbeResult) {
+pub(crate) fn provide(
+    state: &mut State,
+    parameters: &mut Parameters,
+    letters: &Letters,
+    result: &ProbeResult,
+) {
     let touched: AxisVector = result.touched.unwrap_or(state.path.position);
     let touched = state.coordinates.to_program(&touched);
     for (nth, letter) in AXIS_LETTERS.bytes().enumerate() {
-        let value = letters.axis(letter).map_or(0.0, |axis| touched[axis] / state.modes.scale(letters, axis));
+        let value = letters
+            .axis(letter)
+            .map_or(0.0, |axis| touched[axis] / state.modes.scale(letters, axis));
         parameters.set_numbered(TOUCHED + nth, value, false);
     }
-    parameters.set_numbered(SUCCESS, f64::from(u8::from(result.touched.is_some())), false);
+    parameters.set_numbered(
+        SUCCESS,
+        f64::from(u8::from(result.touched.is_some())),
+        false,
+    );
     state.path.set(result.rest);
 }
 
 /// The first pass: the probe is taken to touch at its end, and what follows from that to be unknown. `named` are the axes
 /// of its line.
-pub(crate) fn assume(state: &mut State, parameters: &mut Parameters, letters: &Letters, named: u32) {
+pub(crate) fn assume(
+    state: &mut State,
+    parameters: &mut Parameters,
+    letters: &Letters,
+    named: u32,
+) {
     let end = state.path.position;
     let assumed = state.path.assumed | named;
-    provide(state, parameters, letters, &ProbeResult { touched: Some(end), rest: end });
+    provide(
+        state,
+        parameters,
+        letters,
+        &ProbeResult {
+            touched: Some(end),
+            rest: end,
+        },
+    );
     (TOUCHED..=SUCCESS).for_each(|number| parameters.assume(number));
     state.path.assumed = assumed;
 }

@@ -9,9 +9,30 @@ use crate::fault::Checked;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M3", Group::Spindle, "", "spindle clockwise", Action::Act(|line| turn(line, 1)), "S100 M3"),
-    Word::new("M4", Group::Spindle, "", "spindle counter-clockwise", Action::Act(|line| turn(line, -1)), "S100 M4"),
-    Word::new("M5", Group::Spindle, "", "spindle stop", Action::Act(|line| turn(line, 0)), "M5"),
+    Word::new(
+        "M3",
+        Group::Spindle,
+        "",
+        "spindle clockwise",
+        Action::Act(|line| turn(line, 1)),
+        "S100 M3",
+    ),
+    Word::new(
+        "M4",
+        Group::Spindle,
+        "",
+        "spindle counter-clockwise",
+        Action::Act(|line| turn(line, -1)),
+        "S100 M4",
+    ),
+    Word::new(
+        "M5",
+        Group::Spindle,
+        "",
+        "spindle stop",
+        Action::Act(|line| turn(line, 0)),
+        "M5",
+    ),
     Word::new(
         "M19",
         Group::Spindle,
@@ -28,7 +49,14 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(surface_speed),
         "G96 D2000 S100",
     ),
-    Word::new("G97", Group::SpindleMode, "", "S is in revolutions a minute", Action::Act(revolutions), "G97 S100"),
+    Word::new(
+        "G97",
+        Group::SpindleMode,
+        "",
+        "S is in revolutions a minute",
+        Action::Act(revolutions),
+        "G97 S100",
+    ),
 ];
 
 /// Speed and direction of the spindle.
@@ -61,15 +89,25 @@ impl Spindle {
 
     /// Up to this radius the spindle turns as fast as it may; 0 where nothing limits it.
     pub fn radius_at_most_mm(self) -> f64 {
-        self.surface.map_or(0.0, |surface| surface.mm_per_s / surface.max_rad_per_s)
+        self.surface
+            .map_or(0.0, |surface| surface.mm_per_s / surface.max_rad_per_s)
     }
 
     /// The spindle as G96 asks for at a radius.
     fn at_radius(self, radius_mm: f64) -> Self {
-        let Some(surface) = self.surface else { return self };
+        let Some(surface) = self.surface else {
+            return self;
+        };
         let speed_rad_per_s = (surface.mm_per_s / radius_mm).min(surface.max_rad_per_s);
         // In the centre no speed is the right one, if nothing limits it.
-        if speed_rad_per_s.is_finite() { Self { speed_rad_per_s, ..self } } else { self }
+        if speed_rad_per_s.is_finite() {
+            Self {
+                speed_rad_per_s,
+                ..self
+            }
+        } else {
+            self
+        }
     }
 
     /// Reads a new S, which stands in a program with units of `unit_mm`.
@@ -77,22 +115,46 @@ impl Spindle {
         match &mut self.surface {
             None => self.speed_rad_per_s = s * PI / 30.0,
             // Metres, or feet of 12 inches, a minute.
-            Some(surface) => surface.mm_per_s = s * if unit_mm == 1.0 { 1000.0 } else { 12.0 * unit_mm } / 60.0,
+            Some(surface) => {
+                surface.mm_per_s = s * if unit_mm == 1.0 {
+                    1000.0
+                } else {
+                    12.0 * unit_mm
+                } / 60.0
+            }
         }
     }
 }
 
 /// G96. Without D only the machine limits the speed, as in LinuxCNC.
 fn surface_speed(line: &mut Line) -> Checked<()> {
-    if line.letters.axis(b'X').is_none_or(|axis| line.letters.is_rotary(axis)) {
-        return Err(line.orders.fault(Group::SpindleMode, "axis", "G96 needs the linear axis X, the radius"));
+    if line
+        .letters
+        .axis(b'X')
+        .is_none_or(|axis| line.letters.is_rotary(axis))
+    {
+        return Err(line.orders.fault(
+            Group::SpindleMode,
+            "axis",
+            "G96 needs the linear axis X, the radius",
+        ));
     }
     if !line.words.has(b'S') {
-        return Err(line.orders.fault(Group::SpindleMode, "word-missing", "G96 needs S, the speed of the surface"));
+        return Err(line.orders.fault(
+            Group::SpindleMode,
+            "word-missing",
+            "G96 needs S, the speed of the surface",
+        ));
     }
-    let max_rad_per_s = line.words.not_negative(b'D')?.map_or(f64::INFINITY, |rpm| rpm * PI / 30.0);
+    let max_rad_per_s = line
+        .words
+        .not_negative(b'D')?
+        .map_or(f64::INFINITY, |rpm| rpm * PI / 30.0);
     // S itself is read next.
-    line.state.spindle.surface = Some(Surface { mm_per_s: 0.0, max_rad_per_s });
+    line.state.spindle.surface = Some(Surface {
+        mm_per_s: 0.0,
+        max_rad_per_s,
+    });
     Ok(())
 }
 
@@ -104,7 +166,9 @@ fn revolutions(line: &mut Line) -> Checked<()> {
 
 /// The radius at `position`, machine coordinates: the distance of X from its zero, in the system in force.
 pub(super) fn radius_mm(line: &Line, position: &AxisVector) -> f64 {
-    line.letters.axis(b'X').map_or(0.0, |x| line.state.coordinates.to_program(position)[x].abs())
+    line.letters.axis(b'X').map_or(0.0, |x| {
+        line.state.coordinates.to_program(position)[x].abs()
+    })
 }
 
 /// The spindle turns as G96 asks at a radius.
@@ -116,14 +180,22 @@ pub(super) fn follow_radius(line: &mut Line, radius_mm: f64) {
 /// M19: rest, and the spindle is turned to an angle and held there.
 fn orient(line: &mut Line) -> Checked<()> {
     let missing = |message: &str| line.orders.fault(Group::Spindle, "word-missing", message);
-    let degrees = line.words.get(b'R').ok_or_else(|| missing("M19 needs R, the angle in degrees"))?;
+    let degrees = line
+        .words
+        .get(b'R')
+        .ok_or_else(|| missing("M19 needs R, the angle in degrees"))?;
     if !(0.0..360.0).contains(&degrees) {
-        return Err(line.words.fault(b'R', "word-range", "R, the angle of the spindle, is 0 to less than 360 degrees"));
+        return Err(line.words.fault(
+            b'R',
+            "word-range",
+            "R, the angle of the spindle, is 0 to less than 360 degrees",
+        ));
     }
     line.words.integer(b'P', 0..=2)?;
     line.words.not_negative(b'Q')?;
     if !line.config.orients_spindle {
-        let message = "M19 (oriented spindle stop): no driver of this machine turns the spindle to an angle";
+        let message =
+            "M19 (oriented spindle stop): no driver of this machine turns the spindle to an angle";
         return Err(line.orders.fault(Group::Spindle, "refused", message));
     }
     turn(line, 0)?;
@@ -139,7 +211,10 @@ pub(crate) fn speed(line: &mut Line) -> Checked<()> {
 
 /// A change of direction needs rest, a change of speed does not.
 pub(super) fn turn(line: &mut Line, direction: i8) -> Checked<()> {
-    let mut spindle = Spindle { direction, ..line.state.spindle };
+    let mut spindle = Spindle {
+        direction,
+        ..line.state.spindle
+    };
     if let Some(speed) = line.words.not_negative(b'S')? {
         spindle.set_speed(speed, line.state.modes.unit_mm);
     }
@@ -213,7 +288,10 @@ mod tests {
         for wrong in ["M19", "M19 R360", "M19 R1 P3"] {
             assert_eq!(messages(wrong).len(), 1, "{wrong}");
         }
-        let config = crate::Config { orients_spindle: false, ..mill() };
+        let config = crate::Config {
+            orients_spindle: false,
+            ..mill()
+        };
         assert_eq!(run_on(config, "M19 R1").1[0].code, "refused");
     }
 }

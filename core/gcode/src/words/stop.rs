@@ -8,10 +8,38 @@ use crate::item::Item;
 use crate::line::Line;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M0", Group::Stop, "", "stop until the operator resumes", Action::Act(stop), "M0"),
-    Word::new("M1", Group::Stop, "", "stop where the optional stop is on", Action::Act(optional_stop), "M1"),
-    Word::new("M2", Group::Stop, "", "end of the program", Action::Act(program_end), "M2"),
-    Word::new("M30", Group::Stop, "", "end of the program", Action::Act(program_end), "M30"),
+    Word::new(
+        "M0",
+        Group::Stop,
+        "",
+        "stop until the operator resumes",
+        Action::Act(stop),
+        "M0",
+    ),
+    Word::new(
+        "M1",
+        Group::Stop,
+        "",
+        "stop where the optional stop is on",
+        Action::Act(optional_stop),
+        "M1",
+    ),
+    Word::new(
+        "M2",
+        Group::Stop,
+        "",
+        "end of the program",
+        Action::Act(program_end),
+        "M2",
+    ),
+    Word::new(
+        "M30",
+        Group::Stop,
+        "",
+        "end of the program",
+        Action::Act(program_end),
+        "M30",
+    ),
 ];
 
 fn stop(line: &mut Line) -> Checked<()> {
@@ -54,7 +82,10 @@ mod tests {
     #[test]
     fn nothing_follows_the_end() {
         assert_items("M2\nG0 X1", &["1: ProgramEnd 0 0 before 0", "End"]);
-        assert_items("%\nG0 X1\n%\nG41 nonsense", &["2: Rapid 0 to 1 0 0 0", "End"]);
+        assert_items(
+            "%\nG0 X1\n%\nG41 nonsense",
+            &["2: Rapid 0 to 1 0 0 0", "End"],
+        );
         assert_items("", &["End"]);
     }
 }

@@ -8,8 +8,22 @@ use crate::line::Line;
 use crate::state::letters::AXIS_MASK;
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("M6", Group::ToolChange, "", "change to the tool selected by T", Action::Act(change), "T1 M6"),
-    Word::new("G43", Group::ToolLength, "H", "tool length offset of tool H", Action::Act(length), "G43 H1"),
+    Word::new(
+        "M6",
+        Group::ToolChange,
+        "",
+        "change to the tool selected by T",
+        Action::Act(change),
+        "T1 M6",
+    ),
+    Word::new(
+        "G43",
+        Group::ToolLength,
+        "H",
+        "tool length offset of tool H",
+        Action::Act(length),
+        "G43 H1",
+    ),
     Word::new(
         "G43.1",
         Group::ToolLength,
@@ -34,7 +48,14 @@ pub(super) const WORDS: &[Word] = &[
         Action::Act(set_number),
         "M61 Q2",
     ),
-    Word::new("G49", Group::ToolLength, "", "tool length offset off", Action::Act(no_length), "G49"),
+    Word::new(
+        "G49",
+        Group::ToolLength,
+        "",
+        "tool length offset off",
+        Action::Act(no_length),
+        "G49",
+    ),
 ];
 
 /// Highest tool number.
@@ -42,9 +63,13 @@ pub(super) const MAX_TOOL: u32 = 99_999;
 
 /// The word T.
 pub(crate) fn select(line: &mut Line) -> Checked<()> {
-    let Some(number) = line.words.integer(b'T', 0..=MAX_TOOL)? else { return Ok(()) };
+    let Some(number) = line.words.integer(b'T', 0..=MAX_TOOL)? else {
+        return Ok(());
+    };
     if number != 0 && !line.config.tools.is_empty() && line.state.tools.find(number).is_none() {
-        return Err(line.words.fault(b'T', "tool", format!("the tool table has no tool {number}")));
+        return Err(line
+            .words
+            .fault(b'T', "tool", format!("the tool table has no tool {number}")));
     }
     if line.state.tools.selected != Some(number) {
         line.state.tools.selected = Some(number);
@@ -68,7 +93,10 @@ fn change(line: &mut Line) -> Checked<()> {
 
 /// A later change of the tool or of its row acts with the next G43.
 fn length(line: &mut Line) -> Checked<()> {
-    let number = line.words.integer(b'H', 0..=MAX_TOOL)?.unwrap_or(line.state.tools.in_spindle);
+    let number = line
+        .words
+        .integer(b'H', 0..=MAX_TOOL)?
+        .unwrap_or(line.state.tools.in_spindle);
     let offset = offset_of(line, number)?;
     line.state.coordinates.set_tool(offset);
     Ok(())
@@ -81,7 +109,9 @@ fn offset_of(line: &mut Line, number: u32) -> Checked<AxisVector> {
     }
     let without_table = line.config.tools.is_empty() && line.config.zero_length_without_table;
     if number != 0 && !without_table {
-        return Err(line.orders.fault(Group::ToolLength, "tool", no_tool(line, number)));
+        return Err(line
+            .orders
+            .fault(Group::ToolLength, "tool", no_tool(line, number)));
     }
     if number != 0 {
         line.state.tools.assumed_zero.get_or_insert(line.state.line);
@@ -96,7 +126,9 @@ pub(super) fn diameter_of(line: &mut Line, number: u32) -> Checked<f64> {
     }
     let without_table = line.config.tools.is_empty() && line.config.zero_length_without_table;
     if number != 0 && !without_table {
-        return Err(line.orders.fault(Group::CutterRadius, "tool", no_tool(line, number)));
+        return Err(line
+            .orders
+            .fault(Group::CutterRadius, "tool", no_tool(line, number)));
     }
     if number != 0 {
         line.state.tools.assumed_zero.get_or_insert(line.state.line);
@@ -126,7 +158,11 @@ fn with_words(line: &Line, add: bool) -> AxisVector {
 
 fn length_from_words(line: &mut Line) -> Checked<()> {
     if line.words.present & AXIS_MASK == 0 {
-        return Err(line.orders.fault(Group::ToolLength, "axis-missing", "G43.1 needs at least one axis word"));
+        return Err(line.orders.fault(
+            Group::ToolLength,
+            "axis-missing",
+            "G43.1 needs at least one axis word",
+        ));
     }
     let offset = with_words(line, false);
     line.state.coordinates.set_tool(offset);
@@ -134,12 +170,17 @@ fn length_from_words(line: &mut Line) -> Checked<()> {
 }
 
 fn more_length(line: &mut Line) -> Checked<()> {
-    let offset = match (line.words.integer(b'H', 0..=MAX_TOOL)?, line.words.present & AXIS_MASK != 0) {
+    let offset = match (
+        line.words.integer(b'H', 0..=MAX_TOOL)?,
+        line.words.present & AXIS_MASK != 0,
+    ) {
         (Some(number), false) => *line.state.coordinates.tool() + offset_of(line, number)?,
         (None, true) => with_words(line, true),
         _ => {
             let message = "G43.2 needs either H, a tool, or axis words";
-            return Err(line.orders.fault(Group::ToolLength, "word-missing", message));
+            return Err(line
+                .orders
+                .fault(Group::ToolLength, "word-missing", message));
         }
     };
     line.state.coordinates.set_tool(offset);
@@ -148,10 +189,21 @@ fn more_length(line: &mut Line) -> Checked<()> {
 
 /// M61.
 fn set_number(line: &mut Line) -> Checked<()> {
-    let missing = || line.orders.fault(Group::ToolChange, "word-missing", "M61 needs Q, the number of the tool");
-    let number = line.words.integer(b'Q', 0..=MAX_TOOL)?.ok_or_else(missing)?;
+    let missing = || {
+        line.orders.fault(
+            Group::ToolChange,
+            "word-missing",
+            "M61 needs Q, the number of the tool",
+        )
+    };
+    let number = line
+        .words
+        .integer(b'Q', 0..=MAX_TOOL)?
+        .ok_or_else(missing)?;
     if number != 0 && !line.config.tools.is_empty() && line.state.tools.find(number).is_none() {
-        return Err(line.words.fault(b'Q', "tool", format!("the tool table has no tool {number}")));
+        return Err(line
+            .words
+            .fault(b'Q', "tool", format!("the tool table has no tool {number}")));
     }
     line.state.tools.in_spindle = number;
     Ok(())
@@ -190,7 +242,12 @@ mod tests {
     fn the_length_of_the_tool_is_an_offset() {
         assert_eq!(
             ends("G43 H1 G0 Z0\nG49 Z1\nT2 M6\nG43 Z0"),
-            [["0", "0", "20"], ["0", "0", "1"], ["0", "0", "1"], ["0", "0", "25"]]
+            [
+                ["0", "0", "20"],
+                ["0", "0", "1"],
+                ["0", "0", "1"],
+                ["0", "0", "25"]
+            ]
         );
         assert_eq!(
             ends("G43 H1\nG43.2 H2\nG0 Z1\nG43.2 X3\nG0 X0\nG43.1 Z5\nG0 Z0")[..],
@@ -204,13 +261,25 @@ mod tests {
         let mut config = mill();
         config.tools.clear();
         let (_, errors) = run_on(config.clone(), "T5 M6\nG43 H5 G0 Z1");
-        assert_eq!((errors.len(), errors[0].line, errors[0].code), (1, 2, "tool"));
-        assert!(errors[0].message.contains("without_table = \"zero\""), "{}", errors[0].message);
+        assert_eq!(
+            (errors.len(), errors[0].line, errors[0].code),
+            (1, 2, "tool")
+        );
+        assert!(
+            errors[0].message.contains("without_table = \"zero\""),
+            "{}",
+            errors[0].message
+        );
         config.zero_length_without_table = true;
         let (items, errors) = run_on(config.clone(), "T5 M6\nG43 H5 G0 Z1\nG43 H6\nZ2");
         assert!(errors.is_empty());
-        assert!(shown(&items).iter().any(|item| item == "2: Rapid 0 to 0 0 1 0"));
-        let mut program = crate::Program::spool("t.ngc", &b"T5 M6\nG43 H5 G0 Z1\nG43 H6"[..]).unwrap();
+        assert!(
+            shown(&items)
+                .iter()
+                .any(|item| item == "2: Rapid 0 to 0 0 1 0")
+        );
+        let mut program =
+            crate::Program::spool("t.ngc", &b"T5 M6\nG43 H5 G0 Z1\nG43 H6"[..]).unwrap();
         let report = crate::check(&mut program, &config, &mut |_, _| Ok(())).unwrap();
         let notes: Vec<_> = report.warnings.iter().map(|w| (w.line, w.code)).collect();
         assert_eq!(notes, [(2, "tool-length")], "one note a run");

@@ -27,15 +27,22 @@ fn command(line: &mut Line) -> Checked<()> {
         .find(|code| TENTHS.contains(&code.tenths))
         .map_or(FIRST_USER_COMMAND, |c| u32::from(c.tenths / 10));
     if !line.config.user_commands.contains(&code) {
-        let message =
-            format!("M{code}: the machine file lists no such command ([user_commands] M{code} = \"program\")");
+        let message = format!(
+            "M{code}: the machine file lists no such command ([user_commands] M{code} = \"program\")"
+        );
         return Err(line.orders.fault(Group::User, "refused", message));
     }
     line.rest();
     let [p, q] = [b'P', b'Q'].map(|letter| line.words.get(letter));
     line.event(EventKind::UserCommand, code, p.unwrap_or(-1.0));
     let (number, before_block) = (line.state.line, line.state.path.next_index);
-    line.out.push(Item::Command(UserCommand { line: number, before_block, number: code, p, q }));
+    line.out.push(Item::Command(UserCommand {
+        line: number,
+        before_block,
+        number: code,
+        p,
+        q,
+    }));
     Ok(())
 }
 
@@ -61,7 +68,10 @@ mod tests {
 
     #[test]
     fn another_command_is_refused() {
-        assert!(messages("M102")[0].starts_with("1:1 [refused] M102: the machine file lists no such command"));
+        assert!(
+            messages("M102")[0]
+                .starts_with("1:1 [refused] M102: the machine file lists no such command")
+        );
         assert!(messages("M101 M199")[0].starts_with("1:6 [conflict]"));
         assert!(messages("M101.5")[0].starts_with("1:1 [unknown-code] M101.5"));
         assert!(messages("M101 R1")[0].contains("takes the word R"));

@@ -15,10 +15,18 @@ pub fn mill() -> Config {
     config.travel_mm[1] = (-250.0, 250.0);
     config.travel_mm[2] = (-100.0, 100.0);
     config.user_commands = vec![100, 101, 199];
-    config.probe = Some(ProbeInput { input: 7, inverted: false });
+    config.probe = Some(ProbeInput {
+        input: 7,
+        inverted: false,
+    });
     for (number, length) in [(1, 20.0), (2, 25.0)] {
         let offset = AxisVector::from_slice(&[0.0, 0.0, length]);
-        config.tools.push(Tool { number, pocket: Some(number), offset, diameter_mm: 6.0 });
+        config.tools.push(Tool {
+            number,
+            pocket: Some(number),
+            offset,
+            diameter_mm: 6.0,
+        });
     }
     config
 }
@@ -39,7 +47,10 @@ pub fn run_on(config: Config, text: &str) -> (Vec<Item>, Vec<Diagnostic>) {
         errors.extend(interpreter.line(number, line.as_bytes(), &mut items).err());
         if let Some(Item::Block(block, _)) = items.last().filter(|item| item.is_probe()) {
             let touched = (block.start + block.end) * 0.5;
-            interpreter.provide_probe(&ProbeResult { touched: Some(touched), rest: touched });
+            interpreter.provide_probe(&ProbeResult {
+                touched: Some(touched),
+                rest: touched,
+            });
         }
     }
     errors.extend(interpreter.finish(&mut items).err());
@@ -52,7 +63,13 @@ pub fn blocks(text: &str) -> Vec<Block> {
 }
 
 pub fn only_blocks(items: &[Item]) -> Vec<Block> {
-    let block = |item: &Item| if let Item::Block(block, _) = item { Some(*block) } else { None };
+    let block = |item: &Item| {
+        if let Item::Block(block, _) = item {
+            Some(*block)
+        } else {
+            None
+        }
+    };
     items.iter().filter_map(block).collect()
 }
 
@@ -63,7 +80,10 @@ pub fn assert_items(program: &str, expected: &[&str]) {
 
 /// The ends of all blocks in X, Y, Z.
 pub fn ends(program: &str) -> Vec<[String; 3]> {
-    blocks(program).iter().map(|b| [b.end[0], b.end[1], b.end[2]].map(short)).collect()
+    blocks(program)
+        .iter()
+        .map(|b| [b.end[0], b.end[1], b.end[2]].map(short))
+        .collect()
 }
 
 /// The last block of a program.
@@ -74,7 +94,10 @@ pub fn last(program: &str) -> Block {
 /// The messages of a program, without the excerpts.
 pub fn messages(text: &str) -> Vec<String> {
     let (_, errors) = run_on(mill(), text);
-    errors.iter().map(|e| format!("{}:{} [{}] {}", e.line, e.column, e.code, e.message)).collect()
+    errors
+        .iter()
+        .map(|e| format!("{}:{} [{}] {}", e.line, e.column, e.code, e.message))
+        .collect()
 }
 
 /// One short line per item.
@@ -86,45 +109,95 @@ fn show(item: &Item) -> String {
     match item {
         Item::Block(block, None) => show_block(block),
         Item::Block(block, Some(curve)) => show_curve(block, curve),
-        Item::Event(e) => format!("{}: {:?} {} {} before {}", e.line, e.kind, e.index, short(e.value), e.before_block),
+        Item::Event(e) => format!(
+            "{}: {:?} {} {} before {}",
+            e.line,
+            e.kind,
+            e.index,
+            short(e.value),
+            e.before_block
+        ),
         Item::Wait(w) => {
             let (input, mode) = (w.input, w.mode);
-            format!("{}: Wait {input:?} {mode:?} {} before {}", w.line, short(w.timeout_s), w.before_block)
+            format!(
+                "{}: Wait {input:?} {mode:?} {} before {}",
+                w.line,
+                short(w.timeout_s),
+                w.before_block
+            )
         }
-        Item::Command(c) => format!("{}: Command {} {:?} {:?} before {}", c.line, c.number, c.p, c.q, c.before_block),
+        Item::Command(c) => format!(
+            "{}: Command {} {:?} {:?} before {}",
+            c.line, c.number, c.p, c.q, c.before_block
+        ),
         Item::End => "End".into(),
     }
 }
 
 fn show_curve(block: &Block, data: &NurbsData) -> String {
-    let numbers = |values: &[f64]| values.iter().map(|v| short(*v)).collect::<Vec<_>>().join(" ");
-    let points: Vec<_> = data.control_points.iter().map(|p| numbers(&p.0[..3])).collect();
+    let numbers = |values: &[f64]| {
+        values
+            .iter()
+            .map(|v| short(*v))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let points: Vec<_> = data
+        .control_points
+        .iter()
+        .map(|p| numbers(&p.0[..3]))
+        .collect();
     let block = show_block(block);
     let (degree, weights, knots) = (data.degree, numbers(&data.weights), numbers(&data.knots));
-    format!("{block} degree {degree} points {} weights {weights} knots {knots}", points.join(", "))
+    format!(
+        "{block} degree {degree} points {} weights {weights} knots {knots}",
+        points.join(", ")
+    )
 }
 
 fn show_block(block: &Block) -> String {
     let end: Vec<_> = block.end.0[..4].iter().map(|v| short(*v)).collect();
-    let mut text = format!("{}: {:?} {} to {}", block.line, block.kind, block.index, end.join(" "));
+    let mut text = format!(
+        "{}: {:?} {} to {}",
+        block.line,
+        block.kind,
+        block.index,
+        end.join(" ")
+    );
     let how = match block.kind {
         BlockKind::Dwell => format!(" for {}", short(block.dwell_s)),
         BlockKind::Rapid => String::new(),
-        _ => format!(" length {} feed {}", short(block.length_mm), short(block.feed_mm_per_s)),
+        _ => format!(
+            " length {} feed {}",
+            short(block.length_mm),
+            short(block.feed_mm_per_s)
+        ),
     };
     text += &how;
     if block.kind == BlockKind::Arc {
         let (arc, [a, b]) = (&block.arc, block.arc.center_mm.map(short));
         let (radius, sweep) = (short(arc.radius_mm), short(arc.sweep_rad.to_degrees()));
-        text += &[" about ", &a, " ", &b, " radius ", &radius, " sweep ", &sweep].concat();
+        text += &[
+            " about ", &a, " ", &b, " radius ", &radius, " sweep ", &sweep,
+        ]
+        .concat();
     }
     if block.path_mode == PathMode::ExactStop {
         text += " exact";
     }
     let stop_on = &block.stop_on;
     if stop_on.edge != Edge::None {
-        let fault = if stop_on.miss_is_fault == 1 { " or fault" } else { "" };
-        text += &[" until ", &format!("{:?} {}", stop_on.edge, stop_on.input), fault].concat();
+        let fault = if stop_on.miss_is_fault == 1 {
+            " or fault"
+        } else {
+            ""
+        };
+        text += &[
+            " until ",
+            &format!("{:?} {}", stop_on.edge, stop_on.input),
+            fault,
+        ]
+        .concat();
     }
     text
 }

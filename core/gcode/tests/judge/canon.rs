@@ -23,9 +23,15 @@ impl Tables {
     /// Tools by number, length and diameter, mm.
     pub fn of_tools(tools: &[(u32, f64, f64)]) -> Self {
         let row = |(number, length, diameter): &(u32, f64, f64)| {
-            format!("T{number} P{number} Z{:.12} D{:.12}\n", length / INCH_MM, diameter / INCH_MM)
+            format!(
+                "T{number} P{number} Z{:.12} D{:.12}\n",
+                length / INCH_MM,
+                diameter / INCH_MM
+            )
         };
-        Self { tools: tools.iter().map(row).collect() }
+        Self {
+            tools: tools.iter().map(row).collect(),
+        }
     }
 }
 
@@ -60,32 +66,57 @@ impl Machine {
         let end = place(numbers[0], numbers[1]);
         let center = place(numbers[2], numbers[3]);
         // The order of this interpreter's planes: XY, YZ, ZX.
-        Move::Arc(end, [center[axes[0]] - end[axes[0]], center[axes[1]] - end[axes[1]]])
+        Move::Arc(
+            end,
+            [
+                center[axes[0]] - end[axes[0]],
+                center[axes[1]] - end[axes[1]],
+            ],
+        )
     }
 }
 
 /// What the judge says of a program.
 /// What it writes, it writes in `folder`.
-pub fn judged(judge: &Path, program: &Path, folder: &Path, tables: &Tables) -> Result<Vec<Move>, String> {
+pub fn judged(
+    judge: &Path,
+    program: &Path,
+    folder: &Path,
+    tables: &Tables,
+) -> Result<Vec<Move>, String> {
     let tools = folder.join("tools.tbl");
     let variables = folder.join("variables.var");
     std::fs::write(&tools, &tables.tools).unwrap();
     std::fs::write(&variables, "").unwrap();
     let mut command = Command::new(judge);
-    command.arg("-t").arg(&tools).arg("-v").arg(&variables).arg("-g").arg(program);
+    command
+        .arg("-t")
+        .arg(&tools)
+        .arg("-v")
+        .arg(&variables)
+        .arg("-g")
+        .arg(program);
     // Its tool table is a file in the home folder, which runs side by side would share.
     // Files of subroutines are looked up where it stands.
     let stands = program.parent().unwrap_or(folder);
-    command.env("HOME", folder).current_dir(stands).stdin(Stdio::null());
+    command
+        .env("HOME", folder)
+        .current_dir(stands)
+        .stdin(Stdio::null());
     let [calls, messages] = ["calls.txt", "messages.txt"].map(|name| folder.join(name));
-    command.stdout(File::create(&calls).unwrap()).stderr(File::create(&messages).unwrap());
+    command
+        .stdout(File::create(&calls).unwrap())
+        .stderr(File::create(&messages).unwrap());
     let mut running = command.spawn().map_err(|e| e.to_string())?;
     for waited_ms in (0..).step_by(10) {
         if running.try_wait().map_err(|e| e.to_string())?.is_some() {
             break;
         }
         if waited_ms > GIVE_UP_MS {
-            running.kill().and_then(|()| running.wait()).map_err(|e| e.to_string())?;
+            running
+                .kill()
+                .and_then(|()| running.wait())
+                .map_err(|e| e.to_string())?;
             return Err(NEVER_ENDS.to_owned());
         }
         std::thread::sleep(Duration::from_millis(10));
@@ -101,13 +132,26 @@ pub fn judged(judge: &Path, program: &Path, folder: &Path, tables: &Tables) -> R
 }
 
 fn read(text: &str) -> Vec<Move> {
-    let mut machine = Machine { unit_mm: 1.0, ..Machine::default() };
+    let mut machine = Machine {
+        unit_mm: 1.0,
+        ..Machine::default()
+    };
     let mut moves = Vec::new();
     for line in text.lines() {
-        let Some(call) = line.split_whitespace().nth(2) else { continue };
-        let Some((name, _)) = call.split_once('(') else { continue };
-        let inside = line.split_once('(').map_or("", |(_, inside)| inside).trim_end_matches(')');
-        let numbers: Vec<f64> = inside.split([',', ' ']).filter_map(|n| n.parse().ok()).collect();
+        let Some(call) = line.split_whitespace().nth(2) else {
+            continue;
+        };
+        let Some((name, _)) = call.split_once('(') else {
+            continue;
+        };
+        let inside = line
+            .split_once('(')
+            .map_or("", |(_, inside)| inside)
+            .trim_end_matches(')');
+        let numbers: Vec<f64> = inside
+            .split([',', ' '])
+            .filter_map(|n| n.parse().ok())
+            .collect();
         match name {
             "STRAIGHT_TRAVERSE" => moves.push(Move::Rapid(machine.position(&numbers))),
             "STRAIGHT_FEED" => moves.push(Move::Line(machine.position(&numbers))),
@@ -117,9 +161,14 @@ fn read(text: &str) -> Vec<Move> {
             "SET_G92_OFFSET" => machine.g92 = [numbers[0], numbers[1], numbers[2]],
             "SET_XY_ROTATION" => machine.rotation_deg = numbers[0],
             "USE_TOOL_LENGTH_OFFSET" => machine.tool = [numbers[0], numbers[1], numbers[2]],
-            "USE_LENGTH_UNITS" => machine.unit_mm = if inside.contains("INCHES") { 25.4 } else { 1.0 },
+            "USE_LENGTH_UNITS" => {
+                machine.unit_mm = if inside.contains("INCHES") { 25.4 } else { 1.0 }
+            }
             "SELECT_PLANE" => {
-                machine.plane = ["XY", "YZ", "XZ"].iter().position(|plane| inside.contains(plane)).unwrap_or(0);
+                machine.plane = ["XY", "YZ", "XZ"]
+                    .iter()
+                    .position(|plane| inside.contains(plane))
+                    .unwrap_or(0);
             }
             _ => {}
         }

@@ -46,7 +46,9 @@ pub fn moving(moves: Vec<Move>) -> Vec<Move> {
     let mut kept = Vec::new();
     for step in moves {
         let still = match &step {
-            Move::Rapid(end) | Move::Line(end) => end.iter().zip(&at).all(|(a, b)| (a - b).abs() < SAME_MM),
+            Move::Rapid(end) | Move::Line(end) => {
+                end.iter().zip(&at).all(|(a, b)| (a - b).abs() < SAME_MM)
+            }
             Move::Arc(..) => false,
             Move::Dwell(seconds) => *seconds == 0.0,
         };
@@ -79,19 +81,35 @@ pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
         for item in items.drain(..) {
             match item {
                 Item::Block(block, _) if item_is_probe(&block) => {
-                    stream.provide_probe(&ProbeResult { touched: Some(block.end), rest: block.end });
-                    return Ok(Driven { moves: moving(moves), whole: false });
+                    stream.provide_probe(&ProbeResult {
+                        touched: Some(block.end),
+                        rest: block.end,
+                    });
+                    return Ok(Driven {
+                        moves: moving(moves),
+                        whole: false,
+                    });
                 }
                 Item::Wait(_) | Item::Command(_) | Item::Block(_, Some(_)) => {
-                    return Ok(Driven { moves: moving(moves), whole: false });
+                    return Ok(Driven {
+                        moves: moving(moves),
+                        whole: false,
+                    });
                 }
                 Item::Block(block, None) => moves.push(step(&block)),
                 Item::Event(_) | Item::End => {}
             }
         }
     }
-    assert_eq!(moves.len() as u64, report.blocks, "both passes make the same blocks");
-    Ok(Driven { moves: moving(moves), whole: true })
+    assert_eq!(
+        moves.len() as u64,
+        report.blocks,
+        "both passes make the same blocks"
+    );
+    Ok(Driven {
+        moves: moving(moves),
+        whole: true,
+    })
 }
 
 fn item_is_probe(block: &tandem_sdk::Block) -> bool {
@@ -105,7 +123,13 @@ fn step(block: &tandem_sdk::Block) -> Move {
         BlockKind::Dwell => Move::Dwell(block.dwell_s),
         BlockKind::Arc => {
             let [a, b] = block.arc.plane.map(|axis| axis as usize);
-            Move::Arc(end, [block.arc.center_mm[0] - end[a], block.arc.center_mm[1] - end[b]])
+            Move::Arc(
+                end,
+                [
+                    block.arc.center_mm[0] - end[a],
+                    block.arc.center_mm[1] - end[b],
+                ],
+            )
         }
         _ => Move::Line(end),
     }
@@ -113,9 +137,20 @@ fn step(block: &tandem_sdk::Block) -> Move {
 
 /// The first move in which the two part, in words; `None` where they say the same as far as it can be compared.
 pub fn parting(mine: &Driven, theirs: &[Move]) -> Option<String> {
-    let same = mine.moves.iter().zip(theirs).take_while(|(a, b)| a.is_like(b)).count();
+    let same = mine
+        .moves
+        .iter()
+        .zip(theirs)
+        .take_while(|(a, b)| a.is_like(b))
+        .count();
     let all = same == mine.moves.len() && (same == theirs.len() || !mine.whole);
-    (!all).then(|| format!("move {same}: here {:?}, judge {:?}", mine.moves.get(same), theirs.get(same)))
+    (!all).then(|| {
+        format!(
+            "move {same}: here {:?}, judge {:?}",
+            mine.moves.get(same),
+            theirs.get(same)
+        )
+    })
 }
 
 /// The judge: named by `RS274`, or on the path.
@@ -124,5 +159,7 @@ pub fn judge() -> Option<PathBuf> {
         return Some(path.into());
     }
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).map(|folder| folder.join("rs274")).find(|file| file.is_file())
+    std::env::split_paths(&path)
+        .map(|folder| folder.join("rs274"))
+        .find(|file| file.is_file())
 }

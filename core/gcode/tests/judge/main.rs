@@ -25,7 +25,12 @@ fn machine(folder: &Path) -> Config {
     config.subroutine_path.push(folder.to_path_buf());
     for (number, length, diameter_mm) in TOOLS {
         let offset = AxisVector::from_slice(&[0.0, 0.0, length]);
-        config.tools.push(tandem_gcode::Tool { number, pocket: Some(number), offset, diameter_mm });
+        config.tools.push(tandem_gcode::Tool {
+            number,
+            pocket: Some(number),
+            offset,
+            diameter_mm,
+        });
     }
     config
 }
@@ -50,12 +55,18 @@ fn difference(text: &str, judge: &Path, folder: &Path) -> Option<String> {
 
 fn judge_all(kind: &str, count: u64, least_tenths: u64, program: fn(u64) -> String) {
     let Some(judge) = judge() else {
-        println!("skipped: rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none");
+        println!(
+            "skipped: rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none"
+        );
         return;
     };
     let folder = std::env::temp_dir().join(format!("tandem-judge-{kind}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let number = |name| {
+        std::env::var(name)
+            .ok()
+            .and_then(|text| text.parse::<u64>().ok())
+    };
     let seeds = match number("JUDGE_SEED") {
         Some(seed) => seed..seed + 1,
         None => 0..number("JUDGE_PROGRAMS").unwrap_or(count),
@@ -66,11 +77,17 @@ fn judge_all(kind: &str, count: u64, least_tenths: u64, program: fn(u64) -> Stri
         let text = program(seed);
         match difference(&text, &judge, &folder) {
             Some(why) => wrong.push(format!("JUDGE_SEED={seed}: {why}\n{text}")),
-            None => taken += u64::from(ours(&folder.join("program.ngc"), &machine(&folder)).is_ok()),
+            None => {
+                taken += u64::from(ours(&folder.join("program.ngc"), &machine(&folder)).is_ok())
+            }
         }
     }
     let _ = std::fs::remove_dir_all(&folder);
-    println!("{kind}: {taken} of {} the same, {} differ", seeds.end - seeds.start, wrong.len());
+    println!(
+        "{kind}: {taken} of {} the same, {} differ",
+        seeds.end - seeds.start,
+        wrong.len()
+    );
     assert!(
         wrong.is_empty(),
         "{} differ:\n{}",
@@ -78,7 +95,10 @@ fn judge_all(kind: &str, count: u64, least_tenths: u64, program: fn(u64) -> Stri
         wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n")
     );
     let enough = taken * 10 >= (seeds.end - seeds.start) * least_tenths;
-    assert!(enough, "{least_tenths} of ten of these programs are valid, {taken} were taken");
+    assert!(
+        enough,
+        "{least_tenths} of ten of these programs are valid, {taken} were taken"
+    );
 }
 
 #[test]

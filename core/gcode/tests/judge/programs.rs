@@ -20,7 +20,14 @@ struct Writer {
 impl Writer {
     fn new(seed: u64, statements: u32) -> Self {
         let text = "G21 G90 G94 G17 F600\nG64\n".to_owned();
-        Self { random: Random::new(seed), text, label: 1000, left: statements, subs: 0, in_sub: false }
+        Self {
+            random: Random::new(seed),
+            text,
+            label: 1000,
+            left: statements,
+            subs: 0,
+            in_sub: false,
+        }
     }
 
     fn line(&mut self, text: &str) {
@@ -83,7 +90,16 @@ impl Writer {
                 self.line(&format!("{target} = [[{value}] MOD 13]"));
             }
             5 => {
-                let text = self.random.pick(&["G91", "G90", "G90", "G90", "(a comment)", "", "G4 P0.25", "N77"]);
+                let text = self.random.pick(&[
+                    "G91",
+                    "G90",
+                    "G90",
+                    "G90",
+                    "(a comment)",
+                    "",
+                    "G4 P0.25",
+                    "N77",
+                ]);
                 self.line(text);
             }
             6 | 7 => self.branch(depth),
@@ -94,8 +110,11 @@ impl Writer {
                 let (label, condition, value) = (self.label(), self.condition(), self.value());
                 let sub = self.subs + 1;
                 self.line(&format!("o{label} if {condition}"));
-                let end =
-                    if self.below(2) == 0 { format!("o{sub} return") } else { format!("o{sub} return [{value}]") };
+                let end = if self.below(2) == 0 {
+                    format!("o{sub} return")
+                } else {
+                    format!("o{sub} return [{value}]")
+                };
                 self.line(&end);
                 self.line(&format!("o{label} endif"));
             }
@@ -104,8 +123,16 @@ impl Writer {
     }
 
     fn motion(&mut self) {
-        let (word, x, y) = (self.random.pick(&["G0", "G1", ""]), self.value(), self.value());
-        let z = if self.below(3) == 0 { format!(" Z{}", self.value()) } else { String::new() };
+        let (word, x, y) = (
+            self.random.pick(&["G0", "G1", ""]),
+            self.value(),
+            self.value(),
+        );
+        let z = if self.below(3) == 0 {
+            format!(" Z{}", self.value())
+        } else {
+            String::new()
+        };
         self.line(&format!("{word} X{x} Y{y}{z}"));
     }
 
@@ -130,14 +157,18 @@ impl Writer {
         if self.below(3) == 0 {
             let (inner, condition) = (self.label(), self.condition());
             let how = self.random.pick(&["break", "continue"]);
-            self.line(&format!("o{inner} if {condition}\no{label} {how}\no{inner} endif"));
+            self.line(&format!(
+                "o{inner} if {condition}\no{label} {how}\no{inner} endif"
+            ));
         }
     }
 
     fn while_loop(&mut self, depth: u32) {
         let label = self.label();
         let turns = 1 + self.below(4);
-        self.line(&format!("#<turn{label}> = 0\no{label} while [#<turn{label}> LT {turns}]"));
+        self.line(&format!(
+            "#<turn{label}> = 0\no{label} while [#<turn{label}> LT {turns}]"
+        ));
         self.line(&format!("#<turn{label}> = [#<turn{label}> + 1]"));
         self.statements(depth + 1);
         self.leave(label);
@@ -147,7 +178,9 @@ impl Writer {
 
     fn repeat(&mut self, depth: u32) {
         let label = self.label();
-        let turns = self.random.pick(&["0", "1", "2", "3", "2.6", "-1", "#31 MOD 4"]);
+        let turns = self
+            .random
+            .pick(&["0", "1", "2", "3", "2.6", "-1", "#31 MOD 4"]);
         self.line(&format!("o{label} repeat [{turns}]"));
         // No `return`: the judge keeps the count of a repeat that is left so for the next call.
         let in_sub = std::mem::replace(&mut self.in_sub, false);
@@ -161,7 +194,9 @@ impl Writer {
             return self.motion();
         }
         let sub = 1 + self.below(u64::from(self.subs));
-        let arguments: Vec<_> = (0..self.below(4)).map(|_| format!("[{}]", self.value())).collect();
+        let arguments: Vec<_> = (0..self.below(4))
+            .map(|_| format!("[{}]", self.value()))
+            .collect();
         self.line(&format!("o{sub} call {}", arguments.join(" ")));
     }
 }
@@ -178,8 +213,11 @@ pub fn with_o_words(seed: u64) -> String {
         writer.statements(1);
         writer.in_sub = false;
         let value = writer.value();
-        let end =
-            if writer.below(2) == 0 { format!("o{number} endsub [{value}]") } else { format!("o{number} endsub") };
+        let end = if writer.below(2) == 0 {
+            format!("o{number} endsub [{value}]")
+        } else {
+            format!("o{number} endsub")
+        };
         writer.line(&end);
         writer.subs = number;
     }
@@ -195,10 +233,14 @@ pub fn with_o_words(seed: u64) -> String {
 /// Canned cycles in three planes, absolute and incremental, in mm and inches, with offsets.
 pub fn with_cycles(seed: u64) -> String {
     let mut writer = Writer::new(seed, 0);
-    let start = writer.random.pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Z-2", "G43 H2", "G20"]);
+    let start = writer
+        .random
+        .pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Z-2", "G43 H2", "G20"]);
     writer.line(&format!("{start}\nF90 S500 M3"));
     for _ in 0..2 + writer.below(4) {
-        let modes = writer.random.pick(&["G17", "G18", "G19", "G17 G98", "G17 G99"]);
+        let modes = writer
+            .random
+            .pick(&["G17", "G18", "G19", "G17 G98", "G17 G99"]);
         let distance = writer.random.pick(&["G90", "G91"]);
         let normal = match &modes[..3] {
             "G18" => 'Y',
@@ -207,7 +249,8 @@ pub fn with_cycles(seed: u64) -> String {
         };
         let high = writer.below(12);
         writer.line(
-            &format!("{modes} G90 G0 X1 Y2 Z3 {distance}\nG90 G0 {normal}{high} {distance}").replace("G90 G0", "G0"),
+            &format!("{modes} G90 G0 X1 Y2 Z3 {distance}\nG90 G0 {normal}{high} {distance}")
+                .replace("G90 G0", "G0"),
         );
         cycle_lines(&mut writer, normal, distance == "G91", high);
     }
@@ -218,7 +261,10 @@ pub fn with_cycles(seed: u64) -> String {
 /// One cycle, and lines that repeat it.
 fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool, high: u64) {
     // The judge taps along the wrong axes in G18 and G19, and takes the dwell of another cycle for a tap without P.
-    let word = match writer.random.pick(&["G73", "G81", "G82", "G83", "G84", "G85", "G86", "G89"]) {
+    let word = match writer
+        .random
+        .pick(&["G73", "G81", "G82", "G83", "G84", "G85", "G86", "G89"])
+    {
         "G84" if normal != 'Z' => "G81",
         word => word,
     };
@@ -251,7 +297,11 @@ fn cycle_lines(writer: &mut Writer, normal: char, incremental: bool, high: u64) 
     // The same cycle goes on in the other distance mode, from the same level: where that is another, the judge goes to it and
     // to the next hole at once.
     if writer.below(3) == 0 && !incremental {
-        let (at, bottom, r) = (place(writer), -1 - writer.below(3).cast_signed(), r - high.cast_signed());
+        let (at, bottom, r) = (
+            place(writer),
+            -1 - writer.below(3).cast_signed(),
+            r - high.cast_signed(),
+        );
         writer.line(&format!("G91 {word}{at} {normal}{bottom} R{r}{more}"));
         let polar = writer.random.pick(&["@3 ^30", "^45", "@2"]);
         if normal == 'Z' {
@@ -275,13 +325,17 @@ pub fn with_offsets(seed: u64) -> String {
             // After a rotation the judge forgets the offset of G92 in where it stands, which distances then begin from.
             4 if seed.is_multiple_of(2) => format!("G92 X{x} Z{z}"),
             5 => writer.random.pick(&["G92.1", "G92.2", "G92.3"]).to_owned(),
-            6 => writer.random.pick(&["G54", "G55", "G56", "G59", "G59.1", "G59.3"]).to_owned(),
+            6 => writer
+                .random
+                .pick(&["G54", "G55", "G56", "G59", "G59.1", "G59.3"])
+                .to_owned(),
             7 => format!("G10 L1 P{tool} Z{z}"),
             8 => format!("G10 L10 P{tool} Z{z}"),
             9 => format!("G10 L11 P{tool} Z{z}"),
             10 => writer.random.pick(&["G43 H1", "G43 H2", "G49"]).to_owned(),
             11 => format!("G90 G53 G0 X{x} Y{y}"),
-            12 => format!("G90 G17 G3 X{x} Y{y} I[{x} - #5420] J[{y} - #5421 + 0]").replace(&format!("X{x} Y{y} "), ""),
+            12 => format!("G90 G17 G3 X{x} Y{y} I[{x} - #5420] J[{y} - #5421 + 0]")
+                .replace(&format!("X{x} Y{y} "), ""),
             13 if seed % 2 == 1 => writer.random.pick(&["G90", "G91"]).to_owned(),
             14 if seed.is_multiple_of(2) => format!("G52 X{x} Y{y}"),
             15 => format!("G43.1 Z{z}"),
@@ -301,13 +355,22 @@ pub fn with_compensation(seed: u64) -> String {
     let mut writer = Writer::new(seed, 0);
     let zx = writer.below(4) == 0;
     let (a, b, across) = if zx { ('Z', 'X', 'Y') } else { ('X', 'Y', 'Z') };
-    let start = writer.random.pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Y-2", "G54"]);
+    let start = writer
+        .random
+        .pick(&["G54", "G10 L2 P1 X2 Y-1 Z3", "G92 X1 Y-2", "G54"]);
     writer.line(&format!("{}\n{start}", if zx { "G18" } else { "G17" }));
     if !zx && writer.below(3) == 0 {
         writer.line("G10 L2 P1 R30");
     }
     for _ in 0..2 {
-        let word = writer.random.pick(&["G41.1 D2", "G42.1 D2", "G41 D1", "G42 D2", "G41.1 D6", "G42.1 D0.5"]);
+        let word = writer.random.pick(&[
+            "G41.1 D2",
+            "G42.1 D2",
+            "G41 D1",
+            "G42 D2",
+            "G41.1 D6",
+            "G42.1 D0.5",
+        ]);
         writer.line(&format!("G0 X0 Y0 Z0\n{word}\nG1 {a}20 {b}5"));
         let mut at = [20.0, 5.0];
         for _ in 0..2 + writer.below(6) {
@@ -338,9 +401,15 @@ fn contour_move(writer: &mut Writer, at: [f64; 2], [a, b]: [char; 2]) -> [f64; 2
     }
     // The centre lies on the line that halves the chord.
     let share = writer.random.pick(&[0.0, 0.5, -0.5, 1.0]);
-    let center = [step[0] / 2.0 - share * step[1], step[1] / 2.0 + share * step[0]];
+    let center = [
+        step[0] / 2.0 - share * step[1],
+        step[1] / 2.0 + share * step[0],
+    ];
     let word = writer.random.pick(&["G2", "G3"]);
     let [i, j] = if a == 'Z' { ['K', 'I'] } else { ['I', 'J'] };
-    writer.line(&format!("{word} {a}{:.4} {b}{:.4} {i}{:.4} {j}{:.4}", end[0], end[1], center[0], center[1]));
+    writer.line(&format!(
+        "{word} {a}{:.4} {b}{:.4} {i}{:.4} {j}{:.4}",
+        end[0], end[1], center[0], center[1]
+    ));
     end
 }

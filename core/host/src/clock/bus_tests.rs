@@ -19,7 +19,10 @@ struct Random(u64);
 impl Random {
     /// From 0 up to `below`.
     fn below(&mut self, below: i64) -> i64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         ((i128::from(self.0 >> 11) * i128::from(below)) >> 53) as i64
     }
 }
@@ -39,7 +42,11 @@ struct Computer {
 
 impl Computer {
     fn stall_ns(&self, stalls: &[(i64, i64)], number: i64) -> i64 {
-        stalls.iter().filter(|(at, _)| *at == number).map(|(_, periods)| periods * self.period_ns).sum()
+        stalls
+            .iter()
+            .filter(|(at, _)| *at == number)
+            .map(|(_, periods)| periods * self.period_ns)
+            .sum()
     }
 }
 
@@ -61,7 +68,8 @@ impl PeriodClock for Clock {
         let woken_ns = self.now.get().max(deadline_ns)
             + self.random.below(self.computer.jitter_ns + 1)
             + self.computer.stall_ns(&self.computer.asleep, self.sleeps);
-        self.latest_ns.set(self.latest_ns.get().max(woken_ns - deadline_ns));
+        self.latest_ns
+            .set(self.latest_ns.get().max(woken_ns - deadline_ns));
         self.now.set(woken_ns);
     }
 }
@@ -97,10 +105,15 @@ impl Body for Bus {
     fn period(&mut self) {
         self.exchanges += 1;
         let worked_ns = self.random.below(self.computer.work_ns + 1)
-            + self.computer.stall_ns(&self.computer.at_work, self.exchanges);
+            + self
+                .computer
+                .stall_ns(&self.computer.at_work, self.exchanges);
         self.now.set(self.now.get() + worked_ns);
         let passed = (self.now.get() as f64 - self.first_ns) / self.period_ns;
-        let (pulse, in_step) = (passed.floor() as i64, passed * self.period_ns > self.lock_s * 1e9);
+        let (pulse, in_step) = (
+            passed.floor() as i64,
+            passed * self.period_ns > self.lock_s * 1e9,
+        );
         self.phase_ns = ((passed - passed.floor() - 0.5) * self.period_ns).round() as i64;
         if self.exchanges > 1 {
             let empty = (pulse - self.pulse - 1).max(0);
@@ -156,19 +169,32 @@ impl Rig {
             empty_in_step: 0,
             furthest_ns: 0,
         };
-        Self { clock, bus, latest_ns }
+        Self {
+            clock,
+            bus,
+            latest_ns,
+        }
     }
 
     fn run(mut self) -> (Bus, Timing, i64) {
         let mut timing = Timing::default();
-        run(&mut self.clock, self.bus.computer.period_ns, &mut self.bus, &mut timing);
+        run(
+            &mut self.clock,
+            self.bus.computer.period_ns,
+            &mut self.bus,
+            &mut timing,
+        );
         (self.bus, timing, self.latest_ns.get())
     }
 }
 
 /// 1 ms, and up to 100 µs late.
 fn jittering() -> Computer {
-    Computer { period_ns: 1_000_000, jitter_ns: 100_000, ..Computer::default() }
+    Computer {
+        period_ns: 1_000_000,
+        jitter_ns: 100_000,
+        ..Computer::default()
+    }
 }
 
 #[test]
@@ -176,7 +202,11 @@ fn a_loop_that_runs_free_leaves_pulses_without_a_setpoint() {
     let mut rig = Rig::new(&jittering(), 70.0, 1);
     rig.bus.tells_every = 0;
     let (bus, timing, _) = rig.run();
-    assert!((1000..4000).contains(&bus.empty), "{} of {PULSES}", bus.empty);
+    assert!(
+        (1000..4000).contains(&bus.empty),
+        "{} of {PULSES}",
+        bus.empty
+    );
     assert_eq!(timing.missed_periods, 0, "the computer kept every period");
 }
 
@@ -195,20 +225,40 @@ fn a_loop_that_is_steered_leaves_none() {
 
 #[test]
 fn where_the_exchange_jitters_behind_the_wake_up_too() {
-    let computer = Computer { work_ns: 100_000, ..jittering() };
+    let computer = Computer {
+        work_ns: 100_000,
+        ..jittering()
+    };
     for ppm in [-100.0, 100.0] {
         let (bus, timing, _) = Rig::new(&computer, ppm, 5).run();
-        assert_eq!((bus.empty_in_step, timing.missed_periods), (0, 0), "{ppm} ppm: furthest {} ns", bus.furthest_ns);
-        assert!(bus.furthest_ns < 200_000, "{ppm} ppm: furthest {} ns", bus.furthest_ns);
+        assert_eq!(
+            (bus.empty_in_step, timing.missed_periods),
+            (0, 0),
+            "{ppm} ppm: furthest {} ns",
+            bus.furthest_ns
+        );
+        assert!(
+            bus.furthest_ns < 200_000,
+            "{ppm} ppm: furthest {} ns",
+            bus.furthest_ns
+        );
     }
 }
 
 #[test]
 fn with_other_periods_and_a_phase_that_is_seldom_told() {
-    for (period_ns, jitter_ns, tells_every) in
-        [(500_000, 100_000, 1), (4_000_000, 100_000, 1), (125_000, 20_000, 1), (1_000_000, 100_000, 7)]
-    {
-        let computer = Computer { period_ns, jitter_ns, work_ns: jitter_ns, ..Computer::default() };
+    for (period_ns, jitter_ns, tells_every) in [
+        (500_000, 100_000, 1),
+        (4_000_000, 100_000, 1),
+        (125_000, 20_000, 1),
+        (1_000_000, 100_000, 7),
+    ] {
+        let computer = Computer {
+            period_ns,
+            jitter_ns,
+            work_ns: jitter_ns,
+            ..Computer::default()
+        };
         for ppm in [-100.0, 100.0] {
             let mut rig = Rig::new(&computer, ppm, 9);
             rig.bus.tells_every = tells_every;
@@ -223,13 +273,32 @@ fn with_other_periods_and_a_phase_that_is_seldom_told() {
 
 #[test]
 fn half_and_twice_the_gains_hold_it_as_well() {
-    let computer = Computer { work_ns: 100_000, ..jittering() };
+    let computer = Computer {
+        work_ns: 100_000,
+        ..jittering()
+    };
     for (times, ppm) in [(0.5, 100.0), (0.5, -100.0), (2.0, 100.0), (2.0, -100.0)] {
-        let Rig { mut clock, mut bus, .. } = Rig::new(&computer, ppm, 3);
+        let Rig {
+            mut clock, mut bus, ..
+        } = Rig::new(&computer, ppm, 3);
         let steering = PhaseSteering::new(computer.period_ns).with_gains(times);
-        steered(&mut clock, computer.period_ns, &mut bus, &mut Timing::default(), steering);
-        assert_eq!(bus.empty_in_step, 0, "{times} times the gains: furthest {} ns", bus.furthest_ns);
-        assert!(bus.furthest_ns < 220_000, "{times} times the gains: furthest {} ns", bus.furthest_ns);
+        steered(
+            &mut clock,
+            computer.period_ns,
+            &mut bus,
+            &mut Timing::default(),
+            steering,
+        );
+        assert_eq!(
+            bus.empty_in_step, 0,
+            "{times} times the gains: furthest {} ns",
+            bus.furthest_ns
+        );
+        assert!(
+            bus.furthest_ns < 220_000,
+            "{times} times the gains: furthest {} ns",
+            bus.furthest_ns
+        );
     }
 }
 
@@ -239,18 +308,45 @@ fn what_stalls_is_counted_exactly_while_steered() {
     for seed in 0..8 {
         let mut random = Random(seed + 77);
         let mut stalls = |count: i64| -> Vec<(i64, i64)> {
-            (1..=count).map(|stall| (1000 * stall + random.below(400), 1 + random.below(20))).collect()
+            (1..=count)
+                .map(|stall| (1000 * stall + random.below(400), 1 + random.below(20)))
+                .collect()
         };
-        let computer = Computer { asleep: stalls(100), ..jittering() };
+        let computer = Computer {
+            asleep: stalls(100),
+            ..jittering()
+        };
         // Those at work come in other periods than those asleep.
-        let at_work = stalls(100).into_iter().map(|(at, periods)| (at + 500, periods)).collect();
-        let computer = Computer { at_work, ..computer };
+        let at_work = stalls(100)
+            .into_iter()
+            .map(|(at, periods)| (at + 500, periods))
+            .collect();
+        let computer = Computer {
+            at_work,
+            ..computer
+        };
         let ppm = random.below(201) as f64 - 100.0;
-        let injected: i64 = computer.asleep.iter().chain(&computer.at_work).map(|(_, periods)| periods).sum();
+        let injected: i64 = computer
+            .asleep
+            .iter()
+            .chain(&computer.at_work)
+            .map(|(_, periods)| periods)
+            .sum();
         let (bus, timing, latest_ns) = Rig::new(&computer, ppm, seed).run();
-        assert_eq!(timing.missed_periods, injected.unsigned_abs(), "seed {seed}, {ppm} ppm");
-        assert_eq!(bus.empty_in_step, injected, "seed {seed}, {ppm} ppm: furthest {} ns", bus.furthest_ns);
+        assert_eq!(
+            timing.missed_periods,
+            injected.unsigned_abs(),
+            "seed {seed}, {ppm} ppm"
+        );
+        assert_eq!(
+            bus.empty_in_step, injected,
+            "seed {seed}, {ppm} ppm: furthest {} ns",
+            bus.furthest_ns
+        );
         assert_eq!(timing.overruns, computer.at_work.len() as u64);
-        assert_eq!((timing.lateness.count(), timing.lateness.max_ns()), (bus.exchanges as u64, latest_ns as u64));
+        assert_eq!(
+            (timing.lateness.count(), timing.lateness.max_ns()),
+            (bus.exchanges as u64, latest_ns as u64)
+        );
     }
 }

@@ -6,7 +6,9 @@ use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_recorder::ExchangeUs;
-use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words,
+};
 
 use crate::clock::wall_clock::now_ns;
 
@@ -23,7 +25,10 @@ impl ExchangeTimes {
     /// What was measured.
     pub fn read(&self) -> ExchangeUs {
         let max = self.longest_ns.load(Relaxed) as f64 / 1e3;
-        ExchangeUs { max, longer_than_period: self.longer_than_period.load(Relaxed) }
+        ExchangeUs {
+            max,
+            longer_than_period: self.longer_than_period.load(Relaxed),
+        }
     }
 }
 
@@ -38,7 +43,12 @@ pub struct Timed {
 impl Timed {
     /// `driver`, whose exchange has `fine_period_s`.
     pub fn new(driver: Box<dyn Driver>, fine_period_s: f64, times: Arc<ExchangeTimes>) -> Self {
-        Self { driver, times, period_ns: (fine_period_s * 1e9).round() as u64, is_stopped: false }
+        Self {
+            driver,
+            times,
+            period_ns: (fine_period_s * 1e9).round() as u64,
+            is_stopped: false,
+        }
     }
 }
 
@@ -64,7 +74,11 @@ impl Driver for Timed {
         self.driver.send(setpoint);
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         if !self.times.measures.load(Relaxed) {
             return self.driver.exchange(setpoint, feedback);
         }
@@ -72,7 +86,9 @@ impl Driver for Timed {
         let answer = self.driver.exchange(setpoint, feedback);
         let took_ns = (now_ns() - began_ns).unsigned_abs();
         self.times.longest_ns.fetch_max(took_ns, Relaxed);
-        self.times.longer_than_period.fetch_add(u64::from(took_ns > self.period_ns), Relaxed);
+        self.times
+            .longer_than_period
+            .fetch_add(u64::from(took_ns > self.period_ns), Relaxed);
         answer
     }
 

@@ -33,7 +33,11 @@ pub fn measure_latency(period: Duration, periods: u64) -> Result<Latency, HostEr
         thread::sleep(Duration::from_millis(20));
     }
     let timed = thread.join()?;
-    Ok(Latency { timing: timed.timing, page_faults: timed.page_faults, notes })
+    Ok(Latency {
+        timing: timed.timing,
+        page_faults: timed.page_faults,
+        notes,
+    })
 }
 
 struct Empty {

@@ -57,8 +57,19 @@ pub struct Timing {
 ///
 /// Where the body knows the phase of its exchange, the next deadline is steered by it ([`PhaseSteering`]), and everything
 /// is counted against the deadlines as they are then. What the wake-up was late is known and is no phase of the deadline.
-pub fn run(clock: &mut impl PeriodClock, period_ns: i64, body: &mut impl Body, timing: &mut Timing) {
-    steered(clock, period_ns, body, timing, PhaseSteering::new(period_ns));
+pub fn run(
+    clock: &mut impl PeriodClock,
+    period_ns: i64,
+    body: &mut impl Body,
+    timing: &mut Timing,
+) {
+    steered(
+        clock,
+        period_ns,
+        body,
+        timing,
+        PhaseSteering::new(period_ns),
+    );
 }
 
 fn steered(
@@ -86,9 +97,15 @@ fn steered(
         // After the last sample there is nothing to miss.
         if worked_over > 0 && !body.is_over() {
             timing.missed_periods += worked_over.unsigned_abs();
-            body.missed(worked_over.unsigned_abs(), (slept_over + worked_over).unsigned_abs());
+            body.missed(
+                worked_over.unsigned_abs(),
+                (slept_over + worked_over).unsigned_abs(),
+            );
         }
-        let phase_ns = body.phase_ns().filter(|_| worked_over == 0).map(|ns| ns.saturating_sub(late_ns));
+        let phase_ns = body
+            .phase_ns()
+            .filter(|_| worked_over == 0)
+            .map(|ns| ns.saturating_sub(late_ns));
         deadline_ns += (worked_over + 1) * period_ns - steering.sooner_ns(phase_ns);
     }
 }

@@ -29,8 +29,14 @@ impl PeriodClock for Scripted {
 
     fn sleep_until(&mut self, deadline_ns: i64) {
         self.sleeps += 1;
-        let stalled: i64 = self.stalls.iter().filter(|(at, _)| *at == self.sleeps).map(|(_, ns)| ns).sum();
-        self.now.set(self.now.get().max(deadline_ns) + 3_000 + stalled);
+        let stalled: i64 = self
+            .stalls
+            .iter()
+            .filter(|(at, _)| *at == self.sleeps)
+            .map(|(_, ns)| ns)
+            .sum();
+        self.now
+            .set(self.now.get().max(deadline_ns) + 3_000 + stalled);
     }
 }
 
@@ -50,7 +56,12 @@ impl Body for Working {
 
     fn period(&mut self) {
         let number = self.samples_ns.borrow().len() + 1;
-        let stalled: i64 = self.stalls.iter().filter(|(at, _)| *at == number).map(|(_, ns)| ns).sum();
+        let stalled: i64 = self
+            .stalls
+            .iter()
+            .filter(|(at, _)| *at == number)
+            .map(|(_, ns)| ns)
+            .sum();
         self.now.set(self.now.get() + 100_000 + stalled);
         self.samples_ns.borrow_mut().push(self.now.get());
     }
@@ -63,10 +74,19 @@ impl Body for Working {
 /// 200 samples with stalls while asleep and at work; what was counted, the periods in a row, and when samples were done.
 fn stalled(asleep: &[(usize, i64)], at_work: &[(usize, i64)]) -> (Timing, Vec<u64>, Vec<i64>) {
     let now = Now::default();
-    let mut clock = Scripted { now: Rc::clone(&now), sleeps: 0, stalls: asleep.to_vec() };
+    let mut clock = Scripted {
+        now: Rc::clone(&now),
+        sleeps: 0,
+        stalls: asleep.to_vec(),
+    };
     let samples_ns = Rc::default();
-    let mut body =
-        Working { now, stalls: at_work.to_vec(), samples_ns: Rc::clone(&samples_ns), in_a_row: vec![], until: 200 };
+    let mut body = Working {
+        now,
+        stalls: at_work.to_vec(),
+        samples_ns: Rc::clone(&samples_ns),
+        in_a_row: vec![],
+        until: 200,
+    };
     let mut timing = Timing::default();
     run(&mut clock, PERIOD_NS, &mut body, &mut timing);
     let samples_ns = samples_ns.borrow().clone();
@@ -76,16 +96,29 @@ fn stalled(asleep: &[(usize, i64)], at_work: &[(usize, i64)]) -> (Timing, Vec<u6
 /// Never two samples in one period, and every period without one counted.
 fn assert_each_period_counts(timing: &Timing, samples_ns: &[i64]) {
     let periods: Vec<i64> = samples_ns.iter().map(|ns| ns / PERIOD_NS).collect();
-    assert!(periods.windows(2).all(|pair| pair[0] < pair[1]), "two samples in one period");
+    assert!(
+        periods.windows(2).all(|pair| pair[0] < pair[1]),
+        "two samples in one period"
+    );
     let passed = periods[periods.len() - 1] - periods[0] + 1;
-    assert_eq!(passed.unsigned_abs(), samples_ns.len() as u64 + timing.missed_periods);
+    assert_eq!(
+        passed.unsigned_abs(),
+        samples_ns.len() as u64 + timing.missed_periods
+    );
     assert_eq!(timing.lateness.count(), samples_ns.len() as u64);
 }
 
 #[test]
 fn nothing_is_missed_where_nothing_stalls() {
     let (timing, in_a_row, samples_ns) = stalled(&[], &[]);
-    assert_eq!((timing.overruns, timing.missed_periods, timing.lateness.max_ns()), (0, 0, 3_000));
+    assert_eq!(
+        (
+            timing.overruns,
+            timing.missed_periods,
+            timing.lateness.max_ns()
+        ),
+        (0, 0, 3_000)
+    );
     assert!(in_a_row.is_empty());
     assert_each_period_counts(&timing, &samples_ns);
 }
@@ -96,12 +129,18 @@ fn counters_equal_the_stalls_injected() {
         let stall = [(20, periods * PERIOD_NS)];
         let counted = periods.unsigned_abs();
         let (asleep, in_a_row, samples_ns) = stalled(&stall, &[]);
-        assert_eq!((asleep.overruns, asleep.missed_periods, in_a_row), (0, counted, vec![counted]));
+        assert_eq!(
+            (asleep.overruns, asleep.missed_periods, in_a_row),
+            (0, counted, vec![counted])
+        );
         assert_eq!(asleep.lateness.max_ns(), counted * 1_000_000 + 3_000);
         assert_each_period_counts(&asleep, &samples_ns);
 
         let (at_work, in_a_row, samples_ns) = stalled(&[], &stall);
-        assert_eq!((at_work.overruns, at_work.missed_periods, in_a_row), (1, counted, vec![counted]));
+        assert_eq!(
+            (at_work.overruns, at_work.missed_periods, in_a_row),
+            (1, counted, vec![counted])
+        );
         assert_each_period_counts(&at_work, &samples_ns);
     }
 }
@@ -109,14 +148,20 @@ fn counters_equal_the_stalls_injected() {
 #[test]
 fn a_stall_within_the_period_costs_nothing() {
     let (timing, in_a_row, samples_ns) = stalled(&[(20, 800_000)], &[(30, 800_000)]);
-    assert_eq!((timing.overruns, timing.missed_periods, in_a_row), (0, 0, vec![]));
+    assert_eq!(
+        (timing.overruns, timing.missed_periods, in_a_row),
+        (0, 0, vec![])
+    );
     assert_each_period_counts(&timing, &samples_ns);
 }
 
 #[test]
 fn asleep_and_then_at_work_is_one_row() {
     let (timing, in_a_row, samples_ns) = stalled(&[(20, 2 * PERIOD_NS)], &[(20, PERIOD_NS)]);
-    assert_eq!((timing.overruns, timing.missed_periods, in_a_row), (1, 3, vec![2, 3]));
+    assert_eq!(
+        (timing.overruns, timing.missed_periods, in_a_row),
+        (1, 3, vec![2, 3])
+    );
     assert_each_period_counts(&timing, &samples_ns);
 }
 
@@ -125,18 +170,27 @@ fn every_mixture_of_stalls_is_counted() {
     // A fixed sequence of numbers that repeats late: no run differs from another.
     let mut state = 1_u64;
     let mut next = |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) % below
     };
     for _ in 0..200 {
-        let mut some = || (0..8).map(|_| (next(200) as usize + 1, next(5_000_000).cast_signed())).collect::<Vec<_>>();
+        let mut some = || {
+            (0..8)
+                .map(|_| (next(200) as usize + 1, next(5_000_000).cast_signed()))
+                .collect::<Vec<_>>()
+        };
         let (asleep, mut at_work) = (some(), some());
         // What follows the last sample is not missed.
         at_work.retain(|(at, _)| *at != 200);
         let (timing, _, samples_ns) = stalled(&asleep, &at_work);
         // Periods are counted from the first deadline on.
         let before_first = (samples_ns[0] / PERIOD_NS - 1).unsigned_abs();
-        let counted = Timing { missed_periods: timing.missed_periods - before_first, ..timing };
+        let counted = Timing {
+            missed_periods: timing.missed_periods - before_first,
+            ..timing
+        };
         assert_each_period_counts(&counted, &samples_ns);
     }
 }
@@ -153,9 +207,18 @@ fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
         speed_difference_mm_per_s: 0.0,
     };
     let config = FineConfig::new(0.001, Limits::new(&[axis; 3]).unwrap());
-    let (mut rough, end, host) = bridge(Sizes { segments: 16, samples: 1 << 17 });
+    let (mut rough, end, host) = bridge(Sizes {
+        segments: 16,
+        samples: 1 << 17,
+    });
     if moves {
-        rough.segments.push(Queued::Segment { start_s: 0.0, segment: cruise() }).unwrap();
+        rough
+            .segments
+            .push(Queued::Segment {
+                start_s: 0.0,
+                segment: cruise(),
+            })
+            .unwrap();
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
     }
@@ -198,7 +261,11 @@ impl Body for AtMost {
 /// 1 s of a fine loop with these stalls asleep.
 fn second_of(moves: bool, stalls: Vec<(usize, i64)>) -> FineLoop {
     let (fine, _rough, _host) = fine_loop(moves);
-    let mut clock = Scripted { now: Now::default(), sleeps: 0, stalls };
+    let mut clock = Scripted {
+        now: Now::default(),
+        sleeps: 0,
+        stalls,
+    };
     let mut body = AtMost(FineBody { fine, watch: None }, 900);
     run(&mut clock, PERIOD_NS, &mut body, &mut Timing::default());
     body.0.fine
@@ -210,10 +277,21 @@ fn more_missed_periods_in_a_row_than_allowed_are_a_fault_in_motion() {
         let missed = periods.unsigned_abs();
         for moves in [true, false] {
             let fine = second_of(moves, vec![(20, periods * PERIOD_NS)]);
-            let fault = FaultKind::MissedPeriods { missed, most: 2, of_last: None };
-            assert_eq!(fine.fault().map(|f| f.kind), (moves && faults).then_some(fault), "{periods} periods");
+            let fault = FaultKind::MissedPeriods {
+                missed,
+                most: 2,
+                of_last: None,
+            };
+            assert_eq!(
+                fine.fault().map(|f| f.kind),
+                (moves && faults).then_some(fault),
+                "{periods} periods"
+            );
             let counted = fine.counters();
-            assert_eq!((counted.missed_periods, counted.missed_in_motion), (missed, if moves { missed } else { 0 }));
+            assert_eq!(
+                (counted.missed_periods, counted.missed_in_motion),
+                (missed, if moves { missed } else { 0 })
+            );
         }
     }
 }
@@ -223,11 +301,29 @@ fn a_stall_in_every_fiftieth_period_is_a_fault_at_the_eleventh_and_never_two_in_
     let stalls = |count: usize| (1..=count).map(|stall| (50 * stall, PERIOD_NS)).collect();
     for (count, faults) in [(10, false), (11, true), (17, true)] {
         let fine = second_of(true, stalls(count));
-        let fault = FaultKind::MissedPeriods { missed: 11, most: 10, of_last: Some(1000) };
-        assert_eq!(fine.fault().map(|f| f.kind), faults.then_some(fault), "{count} stalls");
+        let fault = FaultKind::MissedPeriods {
+            missed: 11,
+            most: 10,
+            of_last: Some(1000),
+        };
+        assert_eq!(
+            fine.fault().map(|f| f.kind),
+            faults.then_some(fault),
+            "{count} stalls"
+        );
         // The eleventh ends it: the way to rest takes two periods.
         let seen = if faults { 11 } else { count as u64 };
-        assert_eq!((fine.counters().missed_periods, fine.counters().missed_in_motion), (seen, seen));
-        assert_eq!(second_of(false, stalls(count)).fault(), None, "nothing moves");
+        assert_eq!(
+            (
+                fine.counters().missed_periods,
+                fine.counters().missed_in_motion
+            ),
+            (seen, seen)
+        );
+        assert_eq!(
+            second_of(false, stalls(count)).fault(),
+            None,
+            "nothing moves"
+        );
     }
 }

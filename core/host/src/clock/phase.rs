@@ -60,7 +60,9 @@ impl PhaseSteering {
     /// By how much the next deadline comes sooner than a period after this one, which was `phase_ns` later than the bus wants
     /// it. Where that is not told, the drift that is known is made up for. Fine thread; does not allocate.
     pub fn sooner_ns(&mut self, phase_ns: Option<i64>) -> i64 {
-        let phase_ns = phase_ns.map_or(0.0, |ns| (ns as f64).clamp(-self.most_phase_ns, self.most_phase_ns));
+        let phase_ns = phase_ns.map_or(0.0, |ns| {
+            (ns as f64).clamp(-self.most_phase_ns, self.most_phase_ns)
+        });
         let wanted_ns = self.proportional * phase_ns + self.drift_ns;
         let shift_ns = wanted_ns.clamp(-self.most_shift_ns, self.most_shift_ns);
         if shift_ns == wanted_ns {
@@ -76,7 +78,11 @@ impl PhaseSteering {
     /// Other gains, for tests of how far they are from where the loop would not hold.
     #[cfg(test)]
     pub fn with_gains(self, times: f64) -> Self {
-        Self { proportional: self.proportional * times, integral: self.integral * times, ..self }
+        Self {
+            proportional: self.proportional * times,
+            integral: self.integral * times,
+            ..self
+        }
     }
 }
 

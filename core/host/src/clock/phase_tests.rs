@@ -30,18 +30,28 @@ fn the_drift_that_is_known_goes_on_where_the_phase_is_not_told() {
     for _ in 0..1000 {
         phase_ns += 70 - steering.sooner_ns(None);
     }
-    assert!(phase_ns.abs() < 2000, "{phase_ns} ns after a second without word");
+    assert!(
+        phase_ns.abs() < 2000,
+        "{phase_ns} ns after a second without word"
+    );
 }
 
 /// Long periods would make the loop swing; a phase of more than half a period is nearer to the next exchange.
 #[test]
 fn a_correction_is_a_quarter_of_the_deviation_at_most_and_the_deviation_half_a_period() {
     for (period_ns, correction_ns) in [(1_000_000, 625), (4_000_000, 2500), (20_000_000, 2500)] {
-        assert_eq!(PhaseSteering::new(period_ns).sooner_ns(Some(10_000)), correction_ns, "{period_ns} ns");
+        assert_eq!(
+            PhaseSteering::new(period_ns).sooner_ns(Some(10_000)),
+            correction_ns,
+            "{period_ns} ns"
+        );
     }
     let half = PhaseSteering::new(PERIOD_NS).sooner_ns(Some(PERIOD_NS / 2));
     assert_eq!(half, PERIOD_NS / 32);
-    assert_eq!(PhaseSteering::new(PERIOD_NS).sooner_ns(Some(10 * PERIOD_NS)), half);
+    assert_eq!(
+        PhaseSteering::new(PERIOD_NS).sooner_ns(Some(10 * PERIOD_NS)),
+        half
+    );
 }
 
 /// The way to the first lock is no drift of the clocks.

@@ -1,5 +1,8 @@
 //! What Linux grants to a thread with deadlines: each best-effort, with a note on what was not granted.
-#![allow(unsafe_code, reason = "priority and page faults of a thread have no safe binding")]
+#![allow(
+    unsafe_code,
+    reason = "priority and page faults of a thread have no safe binding"
+)]
 
 use std::fs::File;
 use std::hint::black_box;
@@ -9,7 +12,8 @@ use std::num::NonZeroU64;
 use rustix::mm::{MlockAllFlags, mlockall, munlockall};
 use rustix::process::{Resource, getrlimit};
 use rustix::thread::{
-    CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity, set_current_timer_slack,
+    CapabilitySet, CpuSet, capabilities, sched_getaffinity, sched_setaffinity,
+    set_current_timer_slack,
 };
 use tandem_machine::FineThread;
 use tandem_recorder::PageFaults;
@@ -29,7 +33,10 @@ pub struct ProcessGrants {
 impl ProcessGrants {
     /// Asks for everything. Host, before the fine thread starts.
     pub fn acquire(notes: &mut Vec<String>) -> Self {
-        Self { _memory: MemoryLock::acquire(notes), _awake: stay_awake(notes) }
+        Self {
+            _memory: MemoryLock::acquire(notes),
+            _awake: stay_awake(notes),
+        }
     }
 }
 
@@ -38,7 +45,13 @@ fn stay_awake(notes: &mut Vec<String>) -> Option<File> {
     let file = File::options().write(true).open(WAKE_UP_TIME);
     // The kernel reads an i32: the wake-up time that is bearable, us.
     let asked = file.and_then(|mut file| file.write_all(&0_i32.to_ne_bytes()).map(|()| file));
-    asked.map_err(|e| notes.push(format!("{WAKE_UP_TIME} ({e}): an idle core may be slow to wake"))).ok()
+    asked
+        .map_err(|e| {
+            notes.push(format!(
+                "{WAKE_UP_TIME} ({e}): an idle core may be slow to wake"
+            ))
+        })
+        .ok()
 }
 
 /// Memory stays locked while this lives.
@@ -60,9 +73,13 @@ impl MemoryLock {
         }
         let result = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
         if let Err(error) = result {
-            notes.push(format!("memory is not locked ({error}): a page may fault in the fine loop"));
+            notes.push(format!(
+                "memory is not locked ({error}): a page may fault in the fine loop"
+            ));
         }
-        Self { locked: result.is_ok() }
+        Self {
+            locked: result.is_ok(),
+        }
     }
 }
 
@@ -78,7 +95,8 @@ impl Drop for MemoryLock {
 /// Under a finite limit a lock on future memory turns a later allocation, anywhere in the process, into a failure.
 fn may_lock_all() -> bool {
     let limit = getrlimit(Resource::Memlock).current;
-    limit.is_none() || capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK))
+    limit.is_none()
+        || capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK))
 }
 
 /// Makes the calling thread one with deadlines. Fine thread, before its first period; may allocate.
@@ -97,10 +115,22 @@ pub fn prepare_thread(thread: FineThread, notes: &mut Vec<String>) {
 }
 
 fn set_priority(priority: u32) -> Result<(), std::io::Error> {
-    let parameters = libc::sched_param { sched_priority: priority.cast_signed() };
+    let parameters = libc::sched_param {
+        sched_priority: priority.cast_signed(),
+    };
     // SAFETY: the handle is the calling thread's, the parameters outlive the call.
-    let status = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &raw const parameters) };
-    if status == 0 { Ok(()) } else { Err(std::io::Error::from_raw_os_error(status)) }
+    let status = unsafe {
+        libc::pthread_setschedparam(
+            libc::pthread_self(),
+            libc::SCHED_FIFO,
+            &raw const parameters,
+        )
+    };
+    if status == 0 {
+        Ok(())
+    } else {
+        Err(std::io::Error::from_raw_os_error(status))
+    }
 }
 
 /// To `core`, or else to the last core that the process may use: the first one gets most interrupts. Only with a
@@ -108,14 +138,18 @@ fn set_priority(priority: u32) -> Result<(), std::io::Error> {
 fn pin(core: Option<u32>, notes: &mut Vec<String>) {
     let result = sched_getaffinity(None).and_then(|allowed| {
         let last = || (0..CpuSet::MAX_CPU).rfind(|core| allowed.is_set(*core));
-        let Some(chosen) = core.map(|core| core as usize).or_else(last) else { return Ok(()) };
+        let Some(chosen) = core.map(|core| core as usize).or_else(last) else {
+            return Ok(());
+        };
         let mut only = CpuSet::new();
         only.set(chosen);
         sched_setaffinity(None, &only)
     });
     if let Err(error) = result {
         let which = core.map_or("a core".to_string(), |core| format!("core {core}"));
-        notes.push(format!("the fine loop is not pinned to {which} ({error}): it may be moved while it runs"));
+        notes.push(format!(
+            "the fine loop is not pinned to {which} ({error}): it may be moved while it runs"
+        ));
     }
 }
 
@@ -137,5 +171,8 @@ pub fn page_faults_of_this_thread() -> PageFaults {
     // SAFETY: the pointer is to a structure of the right type that outlives the call.
     let status = unsafe { libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage) };
     debug_assert_eq!(status, 0, "the arguments are constants that Linux knows");
-    PageFaults { major: usage.ru_majflt.unsigned_abs(), minor: usage.ru_minflt.unsigned_abs() }
+    PageFaults {
+        major: usage.ru_majflt.unsigned_abs(),
+        minor: usage.ru_minflt.unsigned_abs(),
+    }
 }

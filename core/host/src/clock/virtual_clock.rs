@@ -16,10 +16,18 @@ use crate::soft::soft_loop::SoftLoop;
 const PATIENCE_S: f64 = 60.0;
 
 /// Drives the run to its end. `commands` are in order of their ticks.
-pub fn drive(soft_loop: &mut SoftLoop<'_>, fine: &mut FineLoop, fine_per_rough: u32, commands: &[Timed]) {
+pub fn drive(
+    soft_loop: &mut SoftLoop<'_>,
+    fine: &mut FineLoop,
+    fine_per_rough: u32,
+    commands: &[Timed],
+) {
     let patience = (PATIENCE_S / soft_loop.period_s()).round() as u64;
     let mut progress = Progress::default();
-    let mut commands = Commands { all: commands.iter().peekable(), stalled: 0 };
+    let mut commands = Commands {
+        all: commands.iter().peekable(),
+        stalled: 0,
+    };
     let mut tick = 0;
     while fine.is_attaching() {
         // The operator's stops act before the joints hold too.
@@ -56,7 +64,9 @@ pub fn drive(soft_loop: &mut SoftLoop<'_>, fine: &mut FineLoop, fine_per_rough: 
         let stuck_ticks = progress.ticks_without(soft_loop.host.status.program_time_s.load(), tick);
         if stuck_ticks > 0 && soft_loop.is_attended() {
             // Somebody at a keyboard lives in real time.
-            thread::sleep(Duration::from_secs_f64(soft_loop.period_s() * f64::from(fine_per_rough)));
+            thread::sleep(Duration::from_secs_f64(
+                soft_loop.period_s() * f64::from(fine_per_rough),
+            ));
         } else if commands.all.peek().is_none() && stuck_ticks > patience {
             soft_loop.give_up();
         }

@@ -68,7 +68,11 @@ pub fn drive(
     let timed = thread.join()?;
     soft_loop.drain();
     soft_loop.take_rests();
-    Ok(Ended { body: timed.body.fine, timing: timed.timing, page_faults: timed.page_faults })
+    Ok(Ended {
+        body: timed.body.fine,
+        timing: timed.timing,
+        page_faults: timed.page_faults,
+    })
 }
 
 /// Fills the queue before the first fine period, so that its first tick is the first tick on either clock.
@@ -131,9 +135,15 @@ impl<B: Body + Send + 'static> TimedThread<B> {
         };
         let builder = thread::Builder::new().name("tandem-fine".to_string());
         let handle = builder.spawn(work);
-        let handle = handle.map_err(|e| HostError::System(format!("the fine thread cannot be started: {e}")))?;
+        let handle = handle
+            .map_err(|e| HostError::System(format!("the fine thread cannot be started: {e}")))?;
         notes.extend(receiver.recv().unwrap_or_default());
-        Ok(Self { notes, over, handle, _grants: grants })
+        Ok(Self {
+            notes,
+            over,
+            handle,
+            _grants: grants,
+        })
     }
 
     /// Whether the last period is over.
@@ -143,7 +153,9 @@ impl<B: Body + Send + 'static> TimedThread<B> {
 
     /// Waits for the last period.
     pub fn join(self) -> Result<Ended<B>, HostError> {
-        self.handle.join().map_err(|_| HostError::System("the fine loop panicked".to_string()))
+        self.handle
+            .join()
+            .map_err(|_| HostError::System("the fine loop panicked".to_string()))
     }
 }
 
@@ -156,7 +168,12 @@ impl Drop for AtEnd {
 }
 
 /// The life of the thread. What allocates lies before and after [`run`].
-fn live<B: Body>(mut body: B, period_ns: i64, asks: FineThread, notes: &SyncSender<Vec<String>>) -> Ended<B> {
+fn live<B: Body>(
+    mut body: B,
+    period_ns: i64,
+    asks: FineThread,
+    notes: &SyncSender<Vec<String>>,
+) -> Ended<B> {
     let mut not_granted = vec![];
     prepare_thread(asks, &mut not_granted);
     let mut timing = Timing::default();
@@ -170,7 +187,11 @@ fn live<B: Body>(mut body: B, period_ns: i64, asks: FineThread, notes: &SyncSend
     run(&mut clock, period_ns, &mut body, &mut timing);
     drop(runs);
     let page_faults = page_faults_of_this_thread().since(before);
-    Ended { body, timing, page_faults }
+    Ended {
+        body,
+        timing,
+        page_faults,
+    }
 }
 
 /// The computer's monotonic clock.
@@ -182,7 +203,10 @@ impl PeriodClock for Monotonic {
     }
 
     fn sleep_until(&mut self, deadline_ns: i64) {
-        let deadline = Timespec { tv_sec: deadline_ns / NS_PER_S, tv_nsec: deadline_ns % NS_PER_S };
+        let deadline = Timespec {
+            tv_sec: deadline_ns / NS_PER_S,
+            tv_nsec: deadline_ns % NS_PER_S,
+        };
         // A signal ends the sleep early: then the rest of it follows.
         while clock_nanosleep_absolute(ClockId::Monotonic, &deadline).is_err() {}
     }

@@ -1,6 +1,8 @@
 //! Stand-in drives with inputs that nothing trips.
 
-use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words,
+};
 
 /// Drives whose inputs in `levels` are 1 whatever they say.
 pub struct AtRest {
@@ -30,7 +32,11 @@ impl Driver for AtRest {
         self.driver.send(setpoint);
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         let exchanged = self.driver.exchange(setpoint, feedback);
         feedback.inputs |= self.levels;
         exchanged

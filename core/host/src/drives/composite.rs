@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES, MAX_LATCHES,
-    PluginError, Setpoint, Words,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES,
+    MAX_LATCHES, PluginError, Setpoint, Words,
 };
 
 use super::share::Share;
@@ -19,7 +19,10 @@ struct Joints {
 
 impl Joints {
     fn of(share: &Share) -> Self {
-        let mut this = Self { machine: [0; MAX_AXES], count: 0 };
+        let mut this = Self {
+            machine: [0; MAX_AXES],
+            count: 0,
+        };
         for (machine, (_, joint)) in this.machine.iter_mut().zip(share.joints.pairs()) {
             *machine = joint as u8;
             this.count += 1;
@@ -30,7 +33,11 @@ impl Joints {
     /// The driver's and the machine's number of each, both below [`MAX_AXES`].
     #[inline]
     fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.machine.iter().take(self.count).enumerate().map(|(own, machine)| (own, usize::from(*machine) % MAX_AXES))
+        self.machine
+            .iter()
+            .take(self.count)
+            .enumerate()
+            .map(|(own, machine)| (own, usize::from(*machine) % MAX_AXES))
     }
 }
 
@@ -112,7 +119,8 @@ impl Part {
         whole.inputs |= share.inputs.to_machine(own.inputs);
         for run in share.inputs.runs() {
             let (to, from, count) = (run.machine as usize, run.own as usize, run.count as usize);
-            whole.input_age_periods[to..to + count].copy_from_slice(&own.input_age_periods[from..from + count]);
+            whole.input_age_periods[to..to + count]
+                .copy_from_slice(&own.input_age_periods[from..from + count]);
         }
         for (own, number) in own.analog.iter().zip(&share.analog) {
             whole.analog[*number] = *own;
@@ -125,7 +133,10 @@ impl Part {
         if own.has_phase != 0 {
             (whole.has_phase, whole.phase_ns) = (1, own.phase_ns);
         }
-        let caught = own.latches.iter().fold(0, |edges, latch| edges | latch.edge);
+        let caught = own
+            .latches
+            .iter()
+            .fold(0, |edges, latch| edges | latch.edge);
         if caught | own.homed | u32::from(self.has_failed) != 0 {
             self.give_news(whole, latches);
         }
@@ -139,16 +150,27 @@ impl Part {
             self.give_latch(own, whole, latches);
         }
         if self.has_failed {
-            self.share.joints.pairs().for_each(|(_, joint)| whole.state[joint] = JointState::Lost);
+            self.share
+                .joints
+                .pairs()
+                .for_each(|(_, joint)| whole.state[joint] = JointState::Lost);
             whole.spindle_at_speed &= u32::from(!self.share.spindle);
         }
     }
 
     fn give_latch(&self, own: &Latch, whole: &mut Feedback, latches: &mut usize) {
-        let Some(input) = self.share.inputs.machine(own.input) else { return };
-        let Some(latch) = whole.latches.get_mut(*latches) else { return };
+        let Some(input) = self.share.inputs.machine(own.input) else {
+            return;
+        };
+        let Some(latch) = whole.latches.get_mut(*latches) else {
+            return;
+        };
         let joints = self.share.joints.to_machine(u64::from(own.joints)) as u32;
-        *latch = Latch { input, joints, ..*own };
+        *latch = Latch {
+            input,
+            joints,
+            ..*own
+        };
         for (i, joint) in self.share.joints.pairs() {
             latch.position[joint] = own.position[i];
         }
@@ -159,8 +181,14 @@ impl Part {
     /// from then on its joints are lost, and those of the others are waited for.
     #[cold]
     fn is_first_failure(&mut self) -> bool {
-        self.feedback.age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
-        self.feedback.input_age_periods.iter_mut().for_each(|age| *age = age.saturating_add(1));
+        self.feedback
+            .age_periods
+            .iter_mut()
+            .for_each(|age| *age = age.saturating_add(1));
+        self.feedback
+            .input_age_periods
+            .iter_mut()
+            .for_each(|age| *age = age.saturating_add(1));
         self.feedback.latches = [Latch::default(); MAX_LATCHES];
         !std::mem::replace(&mut self.has_failed, true)
     }
@@ -183,14 +211,22 @@ pub struct Composite {
 impl Composite {
     /// `parts`, which describe themselves together as `description`; the number of the first that fails goes to `failed`.
     pub fn new(parts: Vec<Part>, description: DriverDescription, failed: Arc<AtomicUsize>) -> Self {
-        Self { parts, description, failed, latches: 0, failure: None }
+        Self {
+            parts,
+            description,
+            failed,
+            latches: 0,
+            failure: None,
+        }
     }
 
     /// Begins the exchanges of all, so that they wait for their answers together. That of the first comes next, and sends by
     /// itself.
     #[inline]
     fn send_all(&mut self, setpoint: &Setpoint) {
-        let Some((first, others)) = self.parts.split_first_mut() else { return };
+        let Some((first, others)) = self.parts.split_first_mut() else {
+            return;
+        };
         let orders = has_orders(setpoint);
         for part in others {
             part.take(setpoint, orders);
@@ -214,16 +250,23 @@ impl Driver for Composite {
     }
 
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
-        self.parts.iter().try_for_each(|part| named(part.driver.check(&part.share.context(context)), &part.title))
+        self.parts.iter().try_for_each(|part| {
+            named(part.driver.check(&part.share.context(context)), &part.title)
+        })
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        let open = |part: &mut Part| named(part.driver.open(&part.share.context(context)), &part.title);
+        let open =
+            |part: &mut Part| named(part.driver.open(&part.share.context(context)), &part.title);
         self.parts.iter_mut().try_for_each(open)
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        let mut attached = Attached { known: 0, homed: 0, ..Attached::default() };
+        let mut attached = Attached {
+            known: 0,
+            homed: 0,
+            ..Attached::default()
+        };
         for index in 0..self.parts.len() {
             let part = &mut self.parts[index];
             part.has_failed = false;
@@ -231,7 +274,10 @@ impl Driver for Composite {
                 Ok(own) => part.share.add_to(&mut attached, &own),
                 Err(error) => {
                     // Why it could not start is told; what those that had started say when they stop would hide it.
-                    self.parts[..index].iter_mut().rev().for_each(|part| _ = part.driver.stop());
+                    self.parts[..index]
+                        .iter_mut()
+                        .rev()
+                        .for_each(|part| _ = part.driver.stop());
                     return Err(error);
                 }
             }
@@ -239,7 +285,11 @@ impl Driver for Composite {
         Ok(attached)
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.send_all(setpoint);
         self.forget(feedback);
         for (index, part) in self.parts.iter_mut().enumerate() {
@@ -253,11 +303,17 @@ impl Driver for Composite {
             part.give(feedback, &mut self.latches);
         }
         // An answer that was a place of its own all along would be copied to where it goes in every period.
-        if self.failure.is_some() { self.failure.take().map_or(Ok(()), Err) } else { Ok(()) }
+        if self.failure.is_some() {
+            self.failure.take().map_or(Ok(()), Err)
+        } else {
+            Ok(())
+        }
     }
 
     fn quick_stop(&mut self) {
-        self.parts.iter_mut().for_each(|part| part.driver.quick_stop());
+        self.parts
+            .iter_mut()
+            .for_each(|part| part.driver.quick_stop());
     }
 
     fn stop(&mut self) -> Result<(), PluginError> {

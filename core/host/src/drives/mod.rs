@@ -38,11 +38,20 @@ impl Drives {
     ///
     /// # Errors
     /// One is not there, refuses its options, or names a joint that is none; two pace the loop.
-    pub fn of(machine: &Machine, registry: &Registry, joints: &JointSpace) -> Result<Self, HostError> {
-        let all: Vec<UnopenedDriver> =
-            machine.drivers.iter().map(|choice| made(machine, registry, joints, choice)).collect::<Result<_, _>>()?;
+    pub fn of(
+        machine: &Machine,
+        registry: &Registry,
+        joints: &JointSpace,
+    ) -> Result<Self, HostError> {
+        let all: Vec<UnopenedDriver> = machine
+            .drivers
+            .iter()
+            .map(|choice| made(machine, registry, joints, choice))
+            .collect::<Result<_, _>>()?;
         let mut entries = all.iter().map(entry);
-        let first = entries.next().ok_or_else(|| refusal(machine, "drivers", "a machine has at least one driver"))?;
+        let first = entries
+            .next()
+            .ok_or_else(|| refusal(machine, "drivers", "a machine has at least one driver"))?;
         let roster = Roster::new(first, entries.collect());
         if let [first, second, ..] = &roster.with_phase()[..] {
             let cause = format!(
@@ -55,7 +64,10 @@ impl Drives {
         for made in all {
             drives.push(made.behind_slots(machine, &mut roster)?);
         }
-        Ok(Self { all: drives, roster })
+        Ok(Self {
+            all: drives,
+            roster,
+        })
     }
 
     /// Who is who.
@@ -71,8 +83,11 @@ impl Drives {
         let whole = driver_context(machine, joints);
         let known = joints.health(&whole.start_position);
         known.map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))?;
-        let check =
-            |made: &UnopenedDriver| made.driver.check(&made.context(&whole)).map_err(|e| made.refuses(machine, &e));
+        let check = |made: &UnopenedDriver| {
+            made.driver
+                .check(&made.context(&whole))
+                .map_err(|e| made.refuses(machine, &e))
+        };
         self.all.iter().try_for_each(check)
     }
 
@@ -81,20 +96,37 @@ impl Drives {
     ///
     /// # Errors
     /// Why the drives cannot be reached, with the place of their driver in the machine file.
-    pub fn open(&mut self, machine: &Machine, joints: &JointSpace, real_time: bool) -> Result<Attached, HostError> {
-        let whole = DriverContext { real_time: u32::from(real_time), ..driver_context(machine, joints) };
+    pub fn open(
+        &mut self,
+        machine: &Machine,
+        joints: &JointSpace,
+        real_time: bool,
+    ) -> Result<Attached, HostError> {
+        let whole = DriverContext {
+            real_time: u32::from(real_time),
+            ..driver_context(machine, joints)
+        };
         for made in &mut self.all {
             let context = made.context(&whole);
-            made.driver.open(&context).map_err(|e| made.refuses(machine, &e))?;
+            made.driver
+                .open(&context)
+                .map_err(|e| made.refuses(machine, &e))?;
         }
-        let mut attached = Attached { known: 0, homed: 0, ..Attached::default() };
+        let mut attached = Attached {
+            known: 0,
+            homed: 0,
+            ..Attached::default()
+        };
         for index in 0..self.all.len() {
             let started = self.all[index].driver.start();
             match started {
                 Ok(own) => self.all[index].add_to(&mut attached, &own),
                 Err(error) => {
                     // Why it could not start is told; what those that had started say when they stop would hide it.
-                    self.all[..index].iter_mut().rev().for_each(|made| _ = made.driver.stop());
+                    self.all[..index]
+                        .iter_mut()
+                        .rev()
+                        .for_each(|made| _ = made.driver.stop());
                     return Err(self.all[index].refuses(machine, &error));
                 }
             }
@@ -117,7 +149,10 @@ impl Drives {
     /// What a code of the drive of `joint` means. Host; may allocate.
     pub fn explain(&self, joint: usize, code: u32) -> Words {
         let of = |made: &UnopenedDriver| match &made.share {
-            Some(share) => share.joints.own(joint as u32).map(|own| made.driver.explain(own, code)),
+            Some(share) => share
+                .joints
+                .own(joint as u32)
+                .map(|own| made.driver.explain(own, code)),
             None => Some(made.driver.explain(joint as u32, code)),
         };
         self.all.iter().find_map(of).unwrap_or_default()
@@ -143,7 +178,10 @@ impl Drives {
 ///
 /// # Errors
 /// What refuses a run too.
-pub fn attached_driver(machine: &Machine, registry: &Registry) -> Result<(Box<dyn Driver>, Attached), HostError> {
+pub fn attached_driver(
+    machine: &Machine,
+    registry: &Registry,
+) -> Result<(Box<dyn Driver>, Attached), HostError> {
     let joints = JointSpace::of(machine, registry)?;
     let mut drives = Drives::of(machine, registry, &joints)?;
     let attached = drives.open(machine, &joints, false)?;
@@ -157,21 +195,39 @@ fn made(
     choice: &DriverChoice,
 ) -> Result<UnopenedDriver, HostError> {
     let section = choice.section();
-    let driver = registry.driver(&choice.choice).map_err(|e| e.at(machine, &section))?;
+    let driver = registry
+        .driver(&choice.choice)
+        .map_err(|e| e.at(machine, &section))?;
     let share = match &choice.owns {
         Some(owned) => {
-            let names: Vec<_> = (0..joints.count()).map(|joint| joints.name(joint)).collect();
+            let names: Vec<_> = (0..joints.count())
+                .map(|joint| joints.name(joint))
+                .collect();
             let none = |name: String| {
-                let cause = format!("no joint is called \"{name}\"; the machine has {}", names.join(", "));
+                let cause = format!(
+                    "no joint is called \"{name}\"; the machine has {}",
+                    names.join(", ")
+                );
                 refusal(machine, &format!("{section}.joints"), cause)
             };
             Some(Share::of(owned, &names).map_err(none)?)
         }
         None => None,
     };
-    let levels = share.as_ref().map_or(choice.inputs_at_rest, |share| share.inputs.to_own(choice.inputs_at_rest));
-    let driver = if levels == 0 { driver } else { Box::new(AtRest { driver, levels }) };
-    Ok(UnopenedDriver { driver, title: choice.title(), section, share })
+    let levels = share.as_ref().map_or(choice.inputs_at_rest, |share| {
+        share.inputs.to_own(choice.inputs_at_rest)
+    });
+    let driver = if levels == 0 {
+        driver
+    } else {
+        Box::new(AtRest { driver, levels })
+    };
+    Ok(UnopenedDriver {
+        driver,
+        title: choice.title(),
+        section,
+        share,
+    })
 }
 
 fn entry(made: &UnopenedDriver) -> Entry {
@@ -179,14 +235,19 @@ fn entry(made: &UnopenedDriver) -> Entry {
         title: made.title.clone(),
         section: made.section.clone(),
         description: made.driver.describe(),
-        joints: made.share.as_ref().map(|share| share.joints.pairs().map(|(_, joint)| joint).collect()),
+        joints: made
+            .share
+            .as_ref()
+            .map(|share| share.joints.pairs().map(|(_, joint)| joint).collect()),
         spindle: made.share.as_ref().is_none_or(|share| share.spindle),
     }
 }
 
 impl UnopenedDriver {
     fn context(&self, whole: &DriverContext) -> DriverContext {
-        self.share.as_ref().map_or(*whole, |share| share.context(whole))
+        self.share
+            .as_ref()
+            .map_or(*whole, |share| share.context(whole))
     }
 
     /// Adds what this driver said of its joints to what all have said.
@@ -203,14 +264,23 @@ impl UnopenedDriver {
         if self.driver.describe().slow == 0 {
             return Ok(self);
         }
-        if self.share.as_ref().is_none_or(|share| !share.joints.runs().is_empty()) {
-            let cause =
-                format!("driver {} takes longer than a fine period to answer: it can move no joint", self.title);
+        if self
+            .share
+            .as_ref()
+            .is_none_or(|share| !share.joints.runs().is_empty())
+        {
+            let cause = format!(
+                "driver {} takes longer than a fine period to answer: it can move no joint",
+                self.title
+            );
             return Err(refusal(machine, &self.section, cause));
         }
         let slow = Slow::new(self.driver, machine.spindle.at_speed_within_s);
         roster.slow.push(slow.switch());
-        Ok(Self { driver: Box::new(slow), ..self })
+        Ok(Self {
+            driver: Box::new(slow),
+            ..self
+        })
     }
 
     fn refuses(&self, machine: &Machine, error: &PluginError) -> HostError {
@@ -231,14 +301,24 @@ pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
     }
     let bit = |input: u32| 1_u64 << input.min(63);
     context.inputs = machine.probe.map_or(0, |probe| bit(probe.input));
-    context.inputs |=
-        machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |mask, switch| mask | bit(switch.input));
+    context.inputs |= machine
+        .homing
+        .iter()
+        .filter_map(AxisHoming::switch)
+        .fold(0, |mask, switch| mask | bit(switch.input));
     for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
         context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
-        context.joints[homing.axis].homing_torque_percent = homing.max_torque_percent.unwrap_or(f64::INFINITY);
+        context.joints[homing.axis].homing_torque_percent =
+            homing.max_torque_percent.unwrap_or(f64::INFINITY);
     }
-    context.inputs |= machine.inputs.iter().fold(0, |mask, named| mask | bit(named.input));
-    context.analog = machine.analog.iter().fold(0, |mask, analog| mask | 1 << analog.input);
+    context.inputs |= machine
+        .inputs
+        .iter()
+        .fold(0, |mask, named| mask | bit(named.input));
+    context.analog = machine
+        .analog
+        .iter()
+        .fold(0, |mask, analog| mask | 1 << analog.input);
     context.outputs = u64::MAX;
     context.spindle = 1;
     context

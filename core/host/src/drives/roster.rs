@@ -37,13 +37,27 @@ pub struct Roster {
 impl Roster {
     /// `first` and `others`.
     pub(super) fn new(first: Entry, others: Vec<Entry>) -> Self {
-        Self { first, others, failed: Arc::default(), slow: vec![] }
+        Self {
+            first,
+            others,
+            failed: Arc::default(),
+            slow: vec![],
+        }
     }
 
     /// One driver that has the whole machine and describes itself so, without a name.
     pub fn of_one(description: DriverDescription) -> Self {
         let (title, section) = ("driver".to_string(), "driver".to_string());
-        Self::new(Entry { title, section, description, joints: None, spindle: true }, vec![])
+        Self::new(
+            Entry {
+                title,
+                section,
+                description,
+                joints: None,
+                spindle: true,
+            },
+            vec![],
+        )
     }
 
     /// Each of them.
@@ -58,40 +72,54 @@ impl Roster {
 
     /// The driver that moves `joint`.
     pub fn of_joint(&self, joint: usize) -> &Entry {
-        let moves = |entry: &&Entry| entry.joints.as_ref().is_none_or(|joints| joints.contains(&joint));
+        let moves = |entry: &&Entry| {
+            entry
+                .joints
+                .as_ref()
+                .is_none_or(|joints| joints.contains(&joint))
+        };
         self.all().find(moves).unwrap_or(&self.first)
     }
 
     /// The driver that turns the spindle.
     pub fn of_spindle(&self) -> &Entry {
-        self.all().find(|entry| entry.spindle).unwrap_or(&self.first)
+        self.all()
+            .find(|entry| entry.spindle)
+            .unwrap_or(&self.first)
     }
 
     /// The driver whose exchange failed first; asked only where one did.
     pub fn failed(&self) -> &Entry {
-        self.all().nth(self.failed.load(Relaxed)).unwrap_or(&self.first)
+        self.all()
+            .nth(self.failed.load(Relaxed))
+            .unwrap_or(&self.first)
     }
 
     /// What people call them all.
     pub fn titles(&self) -> String {
-        self.all().map(|entry| entry.title.as_str()).collect::<Vec<_>>().join(", ")
+        self.all()
+            .map(|entry| entry.title.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     /// The drivers as one: simulated where all are, and with the longest times of any.
     pub fn describe(&self) -> DriverDescription {
-        self.others.iter().fold(self.first.description, |all, entry| {
-            let one = entry.description;
-            DriverDescription {
-                simulated: all.simulated.min(one.simulated),
-                watches_following: all.watches_following.min(one.watches_following),
-                slow: all.slow.max(one.slow),
-                hexadecimal_codes: all.hexadecimal_codes.min(one.hexadecimal_codes),
-                gives_phase: all.gives_phase.max(one.gives_phase),
-                enable_s: all.enable_s.max(one.enable_s),
-                disable_s: all.disable_s.max(one.disable_s),
-                ..all
-            }
-        })
+        self.others
+            .iter()
+            .fold(self.first.description, |all, entry| {
+                let one = entry.description;
+                DriverDescription {
+                    simulated: all.simulated.min(one.simulated),
+                    watches_following: all.watches_following.min(one.watches_following),
+                    slow: all.slow.max(one.slow),
+                    hexadecimal_codes: all.hexadecimal_codes.min(one.hexadecimal_codes),
+                    gives_phase: all.gives_phase.max(one.gives_phase),
+                    enable_s: all.enable_s.max(one.enable_s),
+                    disable_s: all.disable_s.max(one.disable_s),
+                    ..all
+                }
+            })
     }
 
     /// Gives slow drivers their threads: on the wall clock nobody waits for them. Host; allocates.
@@ -104,6 +132,8 @@ impl Roster {
 
     /// Those whose feedback paces the loop.
     pub fn with_phase(&self) -> Vec<&Entry> {
-        self.all().filter(|entry| entry.description.gives_phase != 0).collect()
+        self.all()
+            .filter(|entry| entry.description.gives_phase != 0)
+            .collect()
     }
 }

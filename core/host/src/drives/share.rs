@@ -18,9 +18,17 @@ pub struct Share {
 impl Share {
     /// What `owned` says, on a machine whose joints are called `names`. Where it names a joint that is none: that name.
     pub fn of(owned: &Owned, names: &[&str]) -> Result<Self, String> {
-        let number = |name: &String| names.iter().position(|other| other == name).map(|joint| joint as u32);
-        let joints: Result<Vec<u32>, String> =
-            owned.joints.iter().map(|name| number(name).ok_or_else(|| name.clone())).collect();
+        let number = |name: &String| {
+            names
+                .iter()
+                .position(|other| other == name)
+                .map(|joint| joint as u32)
+        };
+        let joints: Result<Vec<u32>, String> = owned
+            .joints
+            .iter()
+            .map(|name| number(name).ok_or_else(|| name.clone()))
+            .collect();
         if let Some(beyond) = owned.joints.get(MAX_AXES) {
             return Err(beyond.clone());
         }
@@ -45,7 +53,12 @@ impl Share {
         context.inputs = self.inputs.to_own(whole.inputs);
         context.outputs = self.outputs.to_own(whole.outputs);
         let is_wanted = |(_, number): &(usize, &usize)| whole.analog >> **number & 1 == 1;
-        context.analog = self.analog.iter().enumerate().filter(is_wanted).fold(0, |mask, (own, _)| mask | 1 << own);
+        context.analog = self
+            .analog
+            .iter()
+            .enumerate()
+            .filter(is_wanted)
+            .fold(0, |mask, (own, _)| mask | 1 << own);
         context.spindle = u32::from(self.spindle);
         context
     }
@@ -65,8 +78,15 @@ impl Share {
     /// What the driver is to catch: nothing where the input is not its. Any loop; does not allocate.
     #[inline]
     pub fn own_arm(&self, arm: Arm) -> Arm {
-        let input = if arm.edge == 0 { None } else { self.inputs.own(arm.input) };
-        input.map_or(Arm::default(), |input| Arm { input, edge: arm.edge })
+        let input = if arm.edge == 0 {
+            None
+        } else {
+            self.inputs.own(arm.input)
+        };
+        input.map_or(Arm::default(), |input| Arm {
+            input,
+            edge: arm.edge,
+        })
     }
 }
 
@@ -95,9 +115,16 @@ impl Numbers {
     pub fn of(numbers: &[u32]) -> Self {
         let mut runs: Vec<Run> = vec![];
         for (own, machine) in (0..).zip(numbers.iter().copied()) {
-            match runs.last_mut().filter(|run| run.machine + run.count == machine) {
+            match runs
+                .last_mut()
+                .filter(|run| run.machine + run.count == machine)
+            {
                 Some(run) => run.count += 1,
-                None => runs.push(Run { machine, own, count: 1 }),
+                None => runs.push(Run {
+                    machine,
+                    own,
+                    count: 1,
+                }),
             }
         }
         Self(runs)
@@ -111,30 +138,42 @@ impl Numbers {
 
     /// Each of them as the driver and as the machine numbers it, in the driver's order. Does not allocate.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.0.iter().flat_map(|run| (0..run.count).map(|i| ((run.own + i) as usize, (run.machine + i) as usize)))
+        self.0.iter().flat_map(|run| {
+            (0..run.count).map(|i| ((run.own + i) as usize, (run.machine + i) as usize))
+        })
     }
 
     /// Bits of the machine as the driver numbers them. Any loop; does not allocate.
     #[inline]
     pub fn to_own(&self, bits: u64) -> u64 {
-        self.0.iter().fold(0, |own, run| own | (bits >> run.machine & run.mask()) << run.own)
+        self.0.iter().fold(0, |own, run| {
+            own | (bits >> run.machine & run.mask()) << run.own
+        })
     }
 
     /// Bits of the driver as the machine numbers them. Any loop; does not allocate.
     #[inline]
     pub fn to_machine(&self, own: u64) -> u64 {
-        self.0.iter().fold(0, |bits, run| bits | (own >> run.own & run.mask()) << run.machine)
+        self.0.iter().fold(0, |bits, run| {
+            bits | (own >> run.own & run.mask()) << run.machine
+        })
     }
 
     /// The driver's number of one of the machine's. Any loop; does not allocate.
     pub fn own(&self, machine: u32) -> Option<u32> {
-        let run = self.0.iter().find(|run| (run.machine..run.machine + run.count).contains(&machine))?;
+        let run = self
+            .0
+            .iter()
+            .find(|run| (run.machine..run.machine + run.count).contains(&machine))?;
         Some(run.own + (machine - run.machine))
     }
 
     /// The machine's number of one of the driver's. Any loop; does not allocate.
     pub fn machine(&self, own: u32) -> Option<u32> {
-        let run = self.0.iter().find(|run| (run.own..run.own + run.count).contains(&own))?;
+        let run = self
+            .0
+            .iter()
+            .find(|run| (run.own..run.own + run.count).contains(&own))?;
         Some(run.machine + (own - run.own))
     }
 }
@@ -148,28 +187,55 @@ mod tests {
         let numbers = Numbers::of(&[8, 9, 10, 3, 63]);
         assert_eq!(numbers.runs().len(), 3);
         assert_eq!(numbers.to_own(1 << 9 | 1 << 3 | 1 << 63 | 1 << 4), 0b11010);
-        assert_eq!(numbers.to_machine(0b11010 | 1 << 7), 1 << 9 | 1 << 3 | 1 << 63);
         assert_eq!(
-            (numbers.own(3), numbers.own(4), numbers.machine(4), numbers.machine(5)),
+            numbers.to_machine(0b11010 | 1 << 7),
+            1 << 9 | 1 << 3 | 1 << 63
+        );
+        assert_eq!(
+            (
+                numbers.own(3),
+                numbers.own(4),
+                numbers.machine(4),
+                numbers.machine(5)
+            ),
             (Some(3), None, Some(63), None)
         );
         let all: Vec<u32> = (0..64).collect();
         let all = Numbers::of(&all);
-        assert_eq!((all.runs().len(), all.to_own(u64::MAX), all.to_machine(u64::MAX)), (1, u64::MAX, u64::MAX));
+        assert_eq!(
+            (
+                all.runs().len(),
+                all.to_own(u64::MAX),
+                all.to_machine(u64::MAX)
+            ),
+            (1, u64::MAX, u64::MAX)
+        );
         assert_eq!(Numbers::default().to_machine(u64::MAX), 0);
     }
 
     #[test]
     fn a_driver_is_told_of_its_own_joints_in_its_own_order() {
-        let owned = Owned { joints: vec!["u".into(), "x".into()], ..Owned::default() };
+        let owned = Owned {
+            joints: vec!["u".into(), "x".into()],
+            ..Owned::default()
+        };
         let share = Share::of(&owned, &["x", "y", "z", "u"]).unwrap();
         let mut whole = DriverContext::new(4, 0.001);
         whole.start_position = AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]);
         let own = share.context(&whole);
-        assert_eq!((own.joint_count, own.start_position), (2, AxisVector::from_slice(&[4.0, 1.0])));
-        let beyond = Owned { joints: vec!["x".into(); MAX_AXES + 1], ..Owned::default() };
+        assert_eq!(
+            (own.joint_count, own.start_position),
+            (2, AxisVector::from_slice(&[4.0, 1.0]))
+        );
+        let beyond = Owned {
+            joints: vec!["x".into(); MAX_AXES + 1],
+            ..Owned::default()
+        };
         assert_eq!(Share::of(&beyond, &["x"]).unwrap_err(), "x");
-        let none = Owned { joints: vec!["w".into()], ..Owned::default() };
+        let none = Owned {
+            joints: vec!["w".into()],
+            ..Owned::default()
+        };
         assert_eq!(Share::of(&none, &["x"]).unwrap_err(), "w");
     }
 }

@@ -11,7 +11,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crossbeam_queue::ArrayQueue;
-use tandem_sdk::{Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words};
+use tandem_sdk::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, Setpoint, Words,
+};
 
 /// How long the thread sleeps where nothing new was told: a fraction of any answer that needs a thread.
 const IDLE: Duration = Duration::from_millis(1);
@@ -112,11 +114,20 @@ impl Slow {
         if setpoint.spindle_rad_per_s.to_bits() != self.last.spindle_rad_per_s.to_bits() {
             self.spindle_since = self.period;
         }
-        let message = Message { period: self.period, setpoint: *setpoint };
+        let message = Message {
+            period: self.period,
+            setpoint: *setpoint,
+        };
         let replaced = self.shared.message.force_push(message);
         if replaced.is_some_and(|message| message.setpoint.reset != 0) && setpoint.reset == 0 {
-            let setpoint = Setpoint { reset: 1, ..*setpoint };
-            let _ = self.shared.message.force_push(Message { period: self.period, setpoint });
+            let setpoint = Setpoint {
+                reset: 1,
+                ..*setpoint
+            };
+            let _ = self.shared.message.force_push(Message {
+                period: self.period,
+                setpoint,
+            });
         }
         self.last = *setpoint;
     }
@@ -125,12 +136,16 @@ impl Slow {
     fn hear(&mut self, feedback: &mut Feedback) -> Result<(), PluginError> {
         let mut result = Ok(());
         if let Some(answer) = self.shared.answered.pop() {
-            (self.answered, self.feedback, result) = (answer.period, answer.feedback, answer.result);
+            (self.answered, self.feedback, result) =
+                (answer.period, answer.feedback, answer.result);
         }
         let age = self.period - self.answered;
         *feedback = self.feedback;
         let short = u16::try_from(age).unwrap_or(u16::MAX);
-        feedback.input_age_periods.iter_mut().for_each(|own| *own = own.saturating_add(short));
+        feedback
+            .input_age_periods
+            .iter_mut()
+            .for_each(|own| *own = own.saturating_add(short));
         // An answer to what was told before the speed was changed says nothing of the new one.
         let is_old = age > self.patience_periods || self.answered < self.spindle_since;
         if is_old {
@@ -147,7 +162,9 @@ impl Switch {
     /// The computer gives no thread.
     pub fn begin(&self) -> std::io::Result<()> {
         let shared = Arc::clone(&self.0);
-        let thread = thread::Builder::new().name("tandem-slow".to_string()).spawn(move || shared.run())?;
+        let thread = thread::Builder::new()
+            .name("tandem-slow".to_string())
+            .spawn(move || shared.run())?;
         *self.0.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
         self.0.has_thread.store(true, Release);
         Ok(())
@@ -167,14 +184,22 @@ impl Shared {
                 continue;
             };
             let result = driver.exchange(&setpoint, &mut feedback);
-            self.answered.force_push(Answer { period, feedback, result });
+            self.answered.force_push(Answer {
+                period,
+                feedback,
+                result,
+            });
         }
     }
 
     /// Whether the thread, if there is one, has come back.
     fn end(&self) -> bool {
         self.ends.store(true, Release);
-        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let thread = self
+            .thread
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         let Some(thread) = thread else { return true };
         for _ in 0..END.as_millis() / IDLE.as_millis() {
             if thread.is_finished() {
@@ -198,16 +223,24 @@ impl Driver for Slow {
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
         self.patience_periods = (self.patience_s / context.fine_period_s).ceil() as u64;
-        self.driver().map_or_else(|| Err(does_not_answer()), |mut driver| driver.open(context))
+        self.driver()
+            .map_or_else(|| Err(does_not_answer()), |mut driver| driver.open(context))
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        self.driver().map_or_else(|| Err(does_not_answer()), |mut driver| driver.start())
+        self.driver()
+            .map_or_else(|| Err(does_not_answer()), |mut driver| driver.start())
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         if !self.shared.has_thread.load(Acquire) {
-            return self.driver().map_or(Ok(()), |mut driver| driver.exchange(setpoint, feedback));
+            return self
+                .driver()
+                .map_or(Ok(()), |mut driver| driver.exchange(setpoint, feedback));
         }
         self.period += 1;
         self.tell(setpoint);
@@ -226,11 +259,13 @@ impl Driver for Slow {
         if !self.shared.end() {
             return Err(does_not_answer());
         }
-        self.driver().map_or_else(|| Err(does_not_answer()), |mut driver| driver.stop())
+        self.driver()
+            .map_or_else(|| Err(does_not_answer()), |mut driver| driver.stop())
     }
 
     fn explain(&self, joint: u32, code: u32) -> Words {
-        self.driver().map_or_else(Words::default, |driver| driver.explain(joint, code))
+        self.driver()
+            .map_or_else(Words::default, |driver| driver.explain(joint, code))
     }
 }
 

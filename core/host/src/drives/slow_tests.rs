@@ -23,7 +23,10 @@ struct Gated {
 
 impl Driver for Gated {
     fn describe(&self) -> DriverDescription {
-        DriverDescription { slow: 1, ..DriverDescription::real() }
+        DriverDescription {
+            slow: 1,
+            ..DriverDescription::real()
+        }
     }
     fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
@@ -31,8 +34,14 @@ impl Driver for Gated {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::default())
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        let _ = self.asked.send(Asked::Exchange(setpoint.tick, setpoint.reset));
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
+        let _ = self
+            .asked
+            .send(Asked::Exchange(setpoint.tick, setpoint.reset));
         feedback.inputs = setpoint.tick;
         feedback.spindle_at_speed = 1;
         self.answers.recv().unwrap_or(Ok(()))
@@ -59,17 +68,34 @@ impl Bench {
     fn new() -> Self {
         let (asked_of, asked) = channel();
         let (answers, given) = channel();
-        let mut slow = Slow::new(Box::new(Gated { asked: asked_of, answers: given }), 0.001 * PATIENCE_PERIODS as f64);
+        let mut slow = Slow::new(
+            Box::new(Gated {
+                asked: asked_of,
+                answers: given,
+            }),
+            0.001 * PATIENCE_PERIODS as f64,
+        );
         slow.open(&DriverContext::new(0, 0.001)).unwrap();
         slow.start().unwrap();
         slow.switch().begin().unwrap();
-        Self { slow, asked, answers, tick: 0, feedback: Feedback::default() }
+        Self {
+            slow,
+            asked,
+            answers,
+            tick: 0,
+            feedback: Feedback::default(),
+        }
     }
 
     /// One fine period.
     fn exchange(&mut self, reset: u32) -> Result<(), PluginError> {
         self.tick += 1;
-        let setpoint = Setpoint { enable: 1, reset, tick: self.tick, ..Setpoint::default() };
+        let setpoint = Setpoint {
+            enable: 1,
+            reset,
+            tick: self.tick,
+            ..Setpoint::default()
+        };
         self.slow.exchange(&setpoint, &mut self.feedback)
     }
 
@@ -83,16 +109,26 @@ impl Bench {
 }
 
 #[test]
-fn an_answer_is_as_old_as_the_periods_since_it_was_asked_for_and_says_nothing_of_the_spindle_beyond_patience() {
+fn an_answer_is_as_old_as_the_periods_since_it_was_asked_for_and_says_nothing_of_the_spindle_beyond_patience()
+ {
     let mut bench = Bench::new();
     bench.exchange(0).unwrap();
     assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(1, 0)));
     bench.answer(Ok(()));
     for age in 1..=2 * PATIENCE_PERIODS {
         bench.exchange(0).unwrap();
-        assert_eq!((bench.feedback.inputs, u64::from(bench.feedback.input_age_periods[3])), (1, age));
+        assert_eq!(
+            (
+                bench.feedback.inputs,
+                u64::from(bench.feedback.input_age_periods[3])
+            ),
+            (1, age)
+        );
         let is_known = u32::from(age <= PATIENCE_PERIODS);
-        assert_eq!(bench.feedback.spindle_at_speed, is_known, "{age} periods old");
+        assert_eq!(
+            bench.feedback.spindle_at_speed, is_known,
+            "{age} periods old"
+        );
     }
     drop(bench.answers);
     bench.slow.stop().unwrap();
@@ -107,7 +143,11 @@ fn a_reset_that_came_while_the_device_was_busy_reaches_it_once() {
         bench.exchange(reset).unwrap();
     }
     bench.answer(Ok(()));
-    assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(5, 1)), "the newest setpoint, and the reset");
+    assert_eq!(
+        bench.asked.recv(),
+        Ok(Asked::Exchange(5, 1)),
+        "the newest setpoint, and the reset"
+    );
     bench.exchange(0).unwrap();
     bench.answer(Ok(()));
     assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(6, 0)));
@@ -135,7 +175,10 @@ fn its_failure_is_that_of_an_exchange_and_told_once() {
     bench.exchange(0).unwrap();
     assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(1, 0)));
     bench.answer(Err(PluginError::fixed("the line is cut")));
-    assert_eq!(bench.exchange(0), Err(PluginError::fixed("the line is cut")));
+    assert_eq!(
+        bench.exchange(0),
+        Err(PluginError::fixed("the line is cut"))
+    );
     assert_eq!(bench.exchange(0), Ok(()));
     drop(bench.answers);
     bench.slow.stop().unwrap();

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use tandem_machine::Machine;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, JointLanes, Planner, PlannerDescription, PluginError,
-    Segment, SegmentSink, Slice,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, JointLanes, Planner,
+    PlannerDescription, PluginError, Segment, SegmentSink, Slice,
 };
 
 use super::space::JointSpace;
@@ -24,12 +24,21 @@ pub struct CoupledJoints {
 impl CoupledJoints {
     /// `planner` as it is where the joints are the axes; else one that keeps their travel too, and carries their lanes. Host;
     /// allocates.
-    pub fn around(planner: Box<dyn Planner>, joints: &Arc<JointSpace>, machine: &Machine) -> Box<dyn Planner> {
+    pub fn around(
+        planner: Box<dyn Planner>,
+        joints: &Arc<JointSpace>,
+        machine: &Machine,
+    ) -> Box<dyn Planner> {
         if joints.are_axes() {
             return planner;
         }
         let lanes = joints.lanes();
-        Box::new(Self { planner, lanes, travel: Travel::new(Arc::clone(joints), machine.axes), points: Vec::new() })
+        Box::new(Self {
+            planner,
+            lanes,
+            travel: Travel::new(Arc::clone(joints), machine.axes),
+            points: Vec::new(),
+        })
     }
 }
 
@@ -42,13 +51,20 @@ fn filled(block: &Block, lanes: &JointLanes) -> Block {
 }
 
 /// `curve` with the lanes of its control points filled; `points` holds them meanwhile.
-fn filled_curve<'a>(curve: Curve<'a>, lanes: &JointLanes, points: &'a mut Vec<AxisVector>) -> Curve<'a> {
+fn filled_curve<'a>(
+    curve: Curve<'a>,
+    lanes: &JointLanes,
+    points: &'a mut Vec<AxisVector>,
+) -> Curve<'a> {
     points.clear();
     points.extend_from_slice(&curve.control_points);
     for point in points.iter_mut() {
         lanes.fill(point);
     }
-    Curve { control_points: Slice::new(points), ..curve }
+    Curve {
+        control_points: Slice::new(points),
+        ..curve
+    }
 }
 
 impl Planner for CoupledJoints {
@@ -68,7 +84,9 @@ impl Planner for CoupledJoints {
     }
 
     fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        let Some(lanes) = self.lanes else { return self.planner.accept(block, curve) };
+        let Some(lanes) = self.lanes else {
+            return self.planner.accept(block, curve);
+        };
         let curve = curve.map(|curve| filled_curve(curve, lanes, &mut self.points));
         self.planner.accept(&filled(block, lanes), curve)
     }
@@ -77,10 +95,16 @@ impl Planner for CoupledJoints {
         self.planner.finish();
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         match self.lanes {
             None => self.planner.advance(duration_s, sink),
-            Some(lanes) => self.planner.advance(duration_s, &mut Filling { sink, lanes }),
+            Some(lanes) => self
+                .planner
+                .advance(duration_s, &mut Filling { sink, lanes }),
         }
     }
 

@@ -19,18 +19,32 @@ pub struct Folded {
 }
 
 /// Folds joints with these weights and offsets into the limits of the machine's axes.
-pub fn fold(machine: &Machine, joints: &[Joint], weights: &[AxisVector], offsets: &[f64]) -> Result<Folded, HostError> {
+pub fn fold(
+    machine: &Machine,
+    joints: &[Joint],
+    weights: &[AxisVector],
+    offsets: &[f64],
+) -> Result<Folded, HostError> {
     let axes = machine.axes.count();
     let (mut limits, mut rows, mut lanes) = (machine.limits, vec![], vec![]);
     let mut behind = vec![];
     for (index, joint) in joints.iter().enumerate() {
         let (row, offset) = (&weights[index], offsets[index]);
-        let most = row.0.iter().fold(0.0f64, |most, weight| most.max(weight.abs()));
-        let moving: Vec<usize> = (0..axes).filter(|axis| row[*axis].abs() > ROUNDING * most).collect();
+        let most = row
+            .0
+            .iter()
+            .fold(0.0f64, |most, weight| most.max(weight.abs()));
+        let moving: Vec<usize> = (0..axes)
+            .filter(|axis| row[*axis].abs() > ROUNDING * most)
+            .collect();
         if let Some(axis) = joint.axis.filter(|axis| !moving.contains(axis)) {
             let (letter, name) = (machine.axes.letter(axis), &machine.kinematics.plugin);
             let cause = format!("{name} does not move this joint with {letter}");
-            return Err(refusal(machine, &format!("joints.{}.axis", joint.name), cause));
+            return Err(refusal(
+                machine,
+                &format!("joints.{}.axis", joint.name),
+                cause,
+            ));
         }
         match moving.as_slice() {
             [] => {}
@@ -49,12 +63,22 @@ pub fn fold(machine: &Machine, joints: &[Joint], weights: &[AxisVector], offsets
         Some(lasting(JointLanes::new(axes, &rows)).map_err(|e| refusal(machine, "joints", e))?)
     };
     let limits = Limits::new(&all).map_err(|e| refusal(machine, "joints", e))?;
-    Ok(Folded { limits, coupled, lanes })
+    Ok(Folded {
+        limits,
+        coupled,
+        lanes,
+    })
 }
 
 /// The machine's limits with those of all joints behind them, for the guard.
 pub fn behind(machine: &Machine, joints: &[Joint]) -> Result<Limits, HostError> {
-    let all: Vec<AxisLimits> = machine.limits.axes().iter().copied().chain(joints.iter().map(|j| j.limits)).collect();
+    let all: Vec<AxisLimits> = machine
+        .limits
+        .axes()
+        .iter()
+        .copied()
+        .chain(joints.iter().map(|j| j.limits))
+        .collect();
     if all.len() > MAX_AXES {
         let cause = format!(
             "{} is not linear in the axes, so that the guard judges its {} joints beside the {} axes: together at most \
@@ -83,9 +107,15 @@ pub fn narrow(
     let least = |of: &mut f64, joint: f64| *of = of.min(joint / size);
     least(&mut of.feed_mm_per_s, joint_limits.feed_mm_per_s);
     least(&mut of.rapid_mm_per_s, joint_limits.rapid_mm_per_s);
-    least(&mut of.acceleration_mm_per_s2, joint_limits.acceleration_mm_per_s2);
+    least(
+        &mut of.acceleration_mm_per_s2,
+        joint_limits.acceleration_mm_per_s2,
+    );
     least(&mut of.jerk_mm_per_s3, joint_limits.jerk_mm_per_s3);
-    least(&mut of.speed_difference_mm_per_s, joint_limits.speed_difference_mm_per_s);
+    least(
+        &mut of.speed_difference_mm_per_s,
+        joint_limits.speed_difference_mm_per_s,
+    );
     if of.min_mm < of.max_mm {
         return Ok(());
     }
@@ -98,7 +128,11 @@ pub fn narrow(
 }
 
 fn shifted(limits: &AxisLimits, offset: f64) -> AxisLimits {
-    AxisLimits { min_mm: limits.min_mm - offset, max_mm: limits.max_mm - offset, ..*limits }
+    AxisLimits {
+        min_mm: limits.min_mm - offset,
+        max_mm: limits.max_mm - offset,
+        ..*limits
+    }
 }
 
 /// The lanes, kept for as long as the process lives: the same ones once.

@@ -28,7 +28,11 @@ pub fn beyond(joint: &Joint, position: f64) -> Option<String> {
     }
     let unit = if joint.rotary { "deg" } else { "mm" };
     let shown = |value: f64| {
-        let value = if joint.rotary { value.to_degrees() } else { value };
+        let value = if joint.rotary {
+            value.to_degrees()
+        } else {
+            value
+        };
         (value * 1e6).round() / 1e6
     };
     Some(format!(

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use tandem_machine::Machine;
 use tandem_recorder::{JointWatch, WatchedJoint};
 use tandem_sdk::abi::{Method, calling};
-use tandem_sdk::{AxisVector, JointLanes, Kinematics, Limits, MAX_AXES, PlannerDescription, PluginError};
+use tandem_sdk::{
+    AxisVector, JointLanes, Kinematics, Limits, MAX_AXES, PlannerDescription, PluginError,
+};
 
 use super::joint::{Joint, beyond};
 use super::linear::{Linear, positions};
@@ -47,28 +49,58 @@ impl JointSpace {
     }
 
     fn found(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
-        let (axes, are_own) = (machine.axes.count(), machine.kinematics.plugin == "identity");
+        let (axes, are_own) = (
+            machine.axes.count(),
+            machine.kinematics.plugin == "identity",
+        );
         let (joints, kinematics) = stated::joints(machine, registry)?;
         let Some(kinematics) = kinematics else {
             let mut limits = machine.limits;
             for (axis, joint) in joints.iter().enumerate() {
                 fold::narrow(machine, &mut limits, axis, joint, (1.0, 0.0))?;
             }
-            let this = Self { joints, map: Map::Axes, axes, are_own, limits, lanes: vec![] };
+            let this = Self {
+                joints,
+                map: Map::Axes,
+                axes,
+                are_own,
+                limits,
+                lanes: vec![],
+            };
             this.check_health(machine)?;
             return Ok(this);
         };
         let positions = positions(&machine.limits);
         let sound = linear::check(kinematics.as_ref(), joints.len(), axes, &positions);
-        sound.map_err(|e| refusal(machine, "kinematics.plugin", format!("{}: {e}", machine.kinematics.plugin)))?;
+        sound.map_err(|e| {
+            refusal(
+                machine,
+                "kinematics.plugin",
+                format!("{}: {e}", machine.kinematics.plugin),
+            )
+        })?;
         let linear = Linear::of(kinematics.as_ref(), joints.len(), axes, &positions);
         let this = if let Some((weights, offsets)) = linear {
             let folded = fold::fold(machine, &joints, &weights, &offsets)?;
             let map = Map::Linear(Linear::new(weights, offsets, kinematics), folded.coupled);
-            Self { joints, map, axes, are_own, limits: folded.limits, lanes: folded.lanes }
+            Self {
+                joints,
+                map,
+                axes,
+                are_own,
+                limits: folded.limits,
+                lanes: folded.lanes,
+            }
         } else {
             let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
-            Self { joints, map: Map::Curved(kinematics), axes, are_own, limits, lanes }
+            Self {
+                joints,
+                map: Map::Curved(kinematics),
+                axes,
+                are_own,
+                limits,
+                lanes,
+            }
         };
         this.check_health(machine)?;
         Ok(this)
@@ -96,12 +128,19 @@ impl JointSpace {
 
     /// The limits as planners see them.
     pub fn planned(&self) -> Limits {
-        if self.are_curved() { self.of_axes() } else { self.limits }
+        if self.are_curved() {
+            self.of_axes()
+        } else {
+            self.limits
+        }
     }
 
     /// The limits of the axes alone, as narrow as joints make them.
     pub fn of_axes(&self) -> Limits {
-        Limits { count: self.axes as u32, ..self.limits }
+        Limits {
+            count: self.axes as u32,
+            ..self.limits
+        }
     }
 
     /// What the fine loop needs to know of the joints.
@@ -118,7 +157,9 @@ impl JointSpace {
         match &self.map {
             Map::Axes => *axes,
             Map::Linear(linear, _) => linear.to_joints(axes),
-            Map::Curved(kinematics) => calling(Method::KinematicsConvert, || kinematics.to_joints(axes)),
+            Map::Curved(kinematics) => {
+                calling(Method::KinematicsConvert, || kinematics.to_joints(axes))
+            }
         }
     }
 
@@ -127,7 +168,9 @@ impl JointSpace {
         let axes = match &self.map {
             Map::Axes => *joints,
             Map::Linear(linear, _) => linear.to_axes(joints),
-            Map::Curved(kinematics) => calling(Method::KinematicsConvert, || kinematics.to_axes(joints)),
+            Map::Curved(kinematics) => {
+                calling(Method::KinematicsConvert, || kinematics.to_axes(joints))
+            }
         };
         AxisVector::from_slice(&axes.0[..self.axes])
     }
@@ -143,7 +186,11 @@ impl JointSpace {
     /// The reason, where one of them is no finite number.
     pub fn health(&self, joints: &AxisVector) -> Result<(), PluginError> {
         match &self.map {
-            Map::Curved(kinematics) if joints.0[..self.count()].iter().any(|joint| !joint.is_finite()) => {
+            Map::Curved(kinematics)
+                if joints.0[..self.count()]
+                    .iter()
+                    .any(|joint| !joint.is_finite()) =>
+            {
                 kinematics.health()
             }
             _ => Ok(()),
@@ -157,7 +204,8 @@ impl JointSpace {
             Map::Linear(_, Some(lanes)) => lanes.fill(&mut all),
             Map::Curved(kinematics) => {
                 let joints = calling(Method::KinematicsConvert, || kinematics.to_joints(axes));
-                all.0[self.axes..self.axes + self.count()].copy_from_slice(&joints.0[..self.count()]);
+                all.0[self.axes..self.axes + self.count()]
+                    .copy_from_slice(&joints.0[..self.count()]);
             }
             _ => {}
         }
@@ -166,7 +214,11 @@ impl JointSpace {
 
     /// Largest following error of each joint.
     pub fn max_following_error_mm(&self) -> AxisVector {
-        let each = |i: usize| self.joints.get(i).map_or(f64::INFINITY, |joint| joint.max_following_error_mm);
+        let each = |i: usize| {
+            self.joints
+                .get(i)
+                .map_or(f64::INFINITY, |joint| joint.max_following_error_mm)
+        };
         AxisVector(std::array::from_fn(each))
     }
 
@@ -185,7 +237,11 @@ impl JointSpace {
     /// there lacks.
     pub fn behind(&self, entry: usize) -> Option<(&Joint, f64)> {
         let joint = *self.lanes.get(entry.checked_sub(self.axes)?)?;
-        let offset = if let Map::Linear(linear, _) = &self.map { linear.offset(joint) } else { 0.0 };
+        let offset = if let Map::Linear(linear, _) = &self.map {
+            linear.offset(joint)
+        } else {
+            0.0
+        };
         Some((&self.joints[joint], offset))
     }
 
@@ -199,10 +255,17 @@ impl JointSpace {
         if self.are_axes() {
             return None;
         }
-        let watched = |joint: &Joint| WatchedJoint { name: joint.name.clone(), rotary: joint.rotary };
+        let watched = |joint: &Joint| WatchedJoint {
+            name: joint.name.clone(),
+            rotary: joint.rotary,
+        };
         let space = Arc::clone(self);
         let to_joints = move |axes: &AxisVector| space.to_joints(axes);
-        Some(JointWatch::new(self.joints.iter().map(watched).collect(), to_joints, fine_period_s))
+        Some(JointWatch::new(
+            self.joints.iter().map(watched).collect(),
+            to_joints,
+            fine_period_s,
+        ))
     }
 
     /// The map for the fine loop; none where the joints are the axes.
@@ -226,7 +289,11 @@ impl JointSpace {
     pub fn axes_moved_by(&self, joints: u32) -> u32 {
         let all = (1 << self.axes) - 1;
         let of = |joint: &Joint| joint.axis.map_or(all, |axis| 1 << axis);
-        let moved = self.joints.iter().enumerate().filter(|(i, _)| joints >> i & 1 == 1);
+        let moved = self
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| joints >> i & 1 == 1);
         moved.fold(0, |axes, (_, joint)| axes | of(joint))
     }
 
@@ -236,7 +303,8 @@ impl JointSpace {
     /// Why they do not.
     pub fn check_health(&self, machine: &Machine) -> Result<(), HostError> {
         let at = self.to_joints(&machine.start);
-        self.health(&at).map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))
+        self.health(&at)
+            .map_err(|e| refusal(machine, "kinematics.plugin", e.to_string()))
     }
 
     /// Whether the machine starts within the travel of its joints: programs do.
@@ -248,7 +316,11 @@ impl JointSpace {
         for (i, joint) in self.joints.iter().enumerate() {
             if let Some(words) = beyond(joint, at[i]) {
                 let key = format!("joints.{}", joint.name);
-                return Err(refusal(machine, &key, format!("where the machine starts, {words}")));
+                return Err(refusal(
+                    machine,
+                    &key,
+                    format!("where the machine starts, {words}"),
+                ));
             }
         }
         Ok(())

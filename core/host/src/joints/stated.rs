@@ -12,7 +12,11 @@ type Stated = (Vec<Joint>, Option<Box<dyn Kinematics>>);
 
 /// The joints in the order of the drives, and the map to them; no map where each axis is its joint.
 pub fn joints(machine: &Machine, registry: &Registry) -> Result<Stated, HostError> {
-    if machine.kinematics.plugin == "identity" { of_axes(machine) } else { of_plugin(machine, registry) }
+    if machine.kinematics.plugin == "identity" {
+        of_axes(machine)
+    } else {
+        of_plugin(machine, registry)
+    }
 }
 
 /// Without kinematics of their own: every axis has the joints that are stated for it, or itself.
@@ -24,7 +28,13 @@ fn of_axes(machine: &Machine) -> Result<Stated, HostError> {
     let mut joints = vec![];
     for axis in 0..machine.axes.count() {
         let before = joints.len();
-        joints.extend(machine.joints.iter().filter(|joint| joint.axis == Some(axis)).map(stated));
+        joints.extend(
+            machine
+                .joints
+                .iter()
+                .filter(|joint| joint.axis == Some(axis))
+                .map(stated),
+        );
         if joints.len() == before {
             joints.push(axis_itself(machine, axis));
         }
@@ -36,7 +46,9 @@ fn of_axes(machine: &Machine) -> Result<Stated, HostError> {
     if joints.len() == machine.axes.count() {
         return Ok((joints, None));
     }
-    let map = Gantry { axes: joints.iter().map(|joint| joint.axis.unwrap_or(0)).collect() };
+    let map = Gantry {
+        axes: joints.iter().map(|joint| joint.axis.unwrap_or(0)).collect(),
+    };
     Ok((joints, Some(Box::new(map))))
 }
 
@@ -46,23 +58,42 @@ fn of_plugin(machine: &Machine, registry: &Registry) -> Result<Stated, HostError
     let (count, stands) = (made.joint_count(machine.axes.count()), machine.joints.len());
     if !(1..=MAX_AXES).contains(&count) {
         let words = format!("{name} has {count} joints: a machine has 1 to {MAX_AXES}");
-        let cause = made.health().map_or_else(|error| format!("{name}: {error}"), |()| words);
+        let cause = made
+            .health()
+            .map_or_else(|error| format!("{name}: {error}"), |()| words);
         return Err(refusal(machine, "kinematics.plugin", cause));
     }
-    made.health().map_err(|e| refusal(machine, "kinematics.plugin", format!("{name}: {e}")))?;
+    made.health()
+        .map_err(|e| refusal(machine, "kinematics.plugin", format!("{name}: {e}")))?;
     if stands != count {
         let cause = format!(
             "{name} has {count} joints on these axes, and {stands} are stated: every joint needs its limits, as \
              [joints.<name>] tables in the order of the drives"
         );
-        return Err(refusal(machine, if stands == 0 { "kinematics.plugin" } else { "joints" }, cause));
+        return Err(refusal(
+            machine,
+            if stands == 0 {
+                "kinematics.plugin"
+            } else {
+                "joints"
+            },
+            cause,
+        ));
     }
     let joints: Vec<Joint> = machine.joints.iter().map(stated).collect();
     let watched = |axis: usize| joints.iter().any(|joint| joint.axis == Some(axis));
-    let mut followed = (0..machine.axes.count()).filter(|axis| machine.max_following_error_mm[*axis].is_finite());
+    let mut followed =
+        (0..machine.axes.count()).filter(|axis| machine.max_following_error_mm[*axis].is_finite());
     if let Some(axis) = followed.find(|axis| !watched(*axis)) {
-        let unit = if machine.axes.is_rotary(axis) { "deg" } else { "mm" };
-        let key = format!("axes.{}.max_following_error_{unit}", machine.axes.letter(axis).to_ascii_lowercase());
+        let unit = if machine.axes.is_rotary(axis) {
+            "deg"
+        } else {
+            "mm"
+        };
+        let key = format!(
+            "axes.{}.max_following_error_{unit}",
+            machine.axes.letter(axis).to_ascii_lowercase()
+        );
         let cause = format!(
             "following errors are those of joints, and no joint states this axis: state it in [joints.*] of {name}"
         );
@@ -117,7 +148,13 @@ impl Kinematics for Gantry {
             axes[*axis] += joints[joint];
             counts[*axis] += 1.0;
         }
-        AxisVector(std::array::from_fn(|axis| if counts[axis] > 1.0 { axes[axis] / counts[axis] } else { axes[axis] }))
+        AxisVector(std::array::from_fn(|axis| {
+            if counts[axis] > 1.0 {
+                axes[axis] / counts[axis]
+            } else {
+                axes[axis]
+            }
+        }))
     }
 }
 

@@ -41,27 +41,44 @@ impl Travel {
     fn at(&self, position: &AxisVector) -> Result<(), PluginError> {
         let joints = self.space.to_joints(position);
         self.space.health(&joints)?;
-        let words = self.space.joints.iter().enumerate().find_map(|(i, joint)| beyond(joint, joints[i]));
+        let words = self
+            .space
+            .joints
+            .iter()
+            .enumerate()
+            .find_map(|(i, joint)| beyond(joint, joints[i]));
         words.map_or(Ok(()), |words| Err(PluginError::new(words)))
     }
 
     fn tried(&self, block: &Block) -> Result<(), PluginError> {
-        let Some(path) = Path::new(block) else { return Ok(()) };
-        (0..=TRIED).try_for_each(|i| self.at(&path.position(path.length_mm() * f64::from(i) / f64::from(TRIED))))
+        let Some(path) = Path::new(block) else {
+            return Ok(());
+        };
+        (0..=TRIED).try_for_each(|i| {
+            self.at(&path.position(path.length_mm() * f64::from(i) / f64::from(TRIED)))
+        })
     }
 
     /// At the end of an arc, and wherever a joint turns on it.
     fn arc(&self, block: &Block) -> Result<(), PluginError> {
         self.at(&block.end)?;
-        let (Map::Linear(linear, _), Some(path)) = (&self.space.map, Path::new(block)) else { return Ok(()) };
+        let (Map::Linear(linear, _), Some(path)) = (&self.space.map, Path::new(block)) else {
+            return Ok(());
+        };
         let mm_per_rad = path.length_mm() / block.arc.sweep_rad.abs();
         let turns = (0..self.space.count()).flat_map(|joint| turns(block, linear.weights(joint)));
-        turns.into_iter().try_for_each(|angle| self.at(&path.position(angle * mm_per_rad)))
+        turns
+            .into_iter()
+            .try_for_each(|angle| self.at(&path.position(angle * mm_per_rad)))
     }
 
     fn curve(&self, curve: Curve<'_>) -> Result<(), PluginError> {
-        let curve = Nurbs::new(&curve.to_data(), &self.axes).map_err(|e| PluginError::new(e.to_string()))?;
-        for span in curve.knots()[curve.degree()..=curve.points()].windows(2).filter(|span| span[1] > span[0]) {
+        let curve = Nurbs::new(&curve.to_data(), &self.axes)
+            .map_err(|e| PluginError::new(e.to_string()))?;
+        for span in curve.knots()[curve.degree()..=curve.points()]
+            .windows(2)
+            .filter(|span| span[1] > span[0])
+        {
             let place = |i: u32| span[0] + (span[1] - span[0]) * f64::from(i) / f64::from(TRIED);
             (0..=TRIED).try_for_each(|i| self.at(&curve.position(place(i))))?;
         }
@@ -77,16 +94,20 @@ fn turns(block: &Block, weights: &AxisVector) -> Vec<f64> {
     let plane = arc.plane.map(|axis| axis as usize);
     let [q, p] = plane.map(|axis| arc.radius_mm * weights[axis]);
     let outside = (0..weights.0.len()).filter(|axis| !plane.contains(axis));
-    let rise: f64 = outside.map(|axis| weights[axis] * (block.end[axis] - block.start[axis])).sum();
+    let rise: f64 = outside
+        .map(|axis| weights[axis] * (block.end[axis] - block.start[axis]))
+        .sum();
     let level = -sign * rise / (arc.sweep_rad.abs() * p.hypot(q));
     if !(-1.0..=1.0).contains(&level) {
         return vec![];
     }
     let (phase, swept) = (q.atan2(p), arc.sweep_rad.abs());
-    let both =
-        [level.acos(), -level.acos()].map(|angle| (sign * (angle - phase - arc.start_angle_rad)).rem_euclid(TAU));
+    let both = [level.acos(), -level.acos()]
+        .map(|angle| (sign * (angle - phase - arc.start_angle_rad)).rem_euclid(TAU));
     let inside = both.into_iter().filter(|angle| *angle <= swept);
-    inside.flat_map(|angle| [angle, angle + TAU * ((swept - angle) / TAU).floor()]).collect()
+    inside
+        .flat_map(|angle| [angle, angle + TAU * ((swept - angle) / TAU).floor()])
+        .collect()
 }
 
 #[cfg(test)]

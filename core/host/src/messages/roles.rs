@@ -7,7 +7,10 @@ use crate::switches::Switches;
 
 /// What the fine loop judges of the machine's inputs.
 pub fn of(machine: &Machine, switches: Switches) -> Roles {
-    let mut roles = Roles { may_leave_limits: switches.unhomed, ..Roles::default() };
+    let mut roles = Roles {
+        may_leave_limits: switches.unhomed,
+        ..Roles::default()
+    };
     let mut seen = 0;
     for input in &machine.inputs {
         let Some(role) = input.role else { continue };
@@ -18,11 +21,18 @@ pub fn of(machine: &Machine, switches: Switches) -> Roles {
         // The greatest age stands for anything older: no age is above it.
         let most = (periods as u16).min(u16::MAX - 1);
         let age = &mut roles.max_age_periods[input.input.min(63) as usize];
-        *age = if seen & bit == 0 { most } else { most.min(*age) };
+        *age = if seen & bit == 0 {
+            most
+        } else {
+            most.min(*age)
+        };
         seen |= bit;
     }
-    roles.home_switches =
-        machine.homing.iter().filter_map(AxisHoming::switch).fold(0, |bits, switch| bits | 1 << switch.input.min(63));
+    roles.home_switches = machine
+        .homing
+        .iter()
+        .filter_map(AxisHoming::switch)
+        .fold(0, |bits, switch| bits | 1 << switch.input.min(63));
     roles
 }
 
@@ -49,7 +59,9 @@ pub fn fault_text(machine: &Machine, role: InputFault, input: u32, old: bool) ->
         named.input == input && meant
     };
     let named = machine.inputs.iter().find(is_meant);
-    let who = named.map_or(format!("input {input}"), |named| format!("input {} ({input})", named.name));
+    let who = named.map_or(format!("input {input}"), |named| {
+        format!("input {} ({input})", named.name)
+    });
     let age_ms = named.map_or(0.0, |named| named.max_age_s * 1e3);
     let what = match role {
         InputFault::EmergencyStop => "emergency stop",
@@ -58,17 +70,32 @@ pub fn fault_text(machine: &Machine, role: InputFault, input: u32, old: bool) ->
         InputFault::Awaited => "the motion waits for a switch that is not heard of",
     };
     if old {
-        return format!("{what}: {who} has not been heard of for more than {age_ms} ms, which counts as tripped");
+        return format!(
+            "{what}: {who} has not been heard of for more than {age_ms} ms, which counts as tripped"
+        );
     }
-    format!("{what}: {who} is {}", if named.is_none_or(|named| named.normally_closed) { "open" } else { "closed" })
+    format!(
+        "{what}: {who} is {}",
+        if named.is_none_or(|named| named.normally_closed) {
+            "open"
+        } else {
+            "closed"
+        }
+    )
 }
 
 /// The inputs among those `tripped`, a bit each, that hold the machine, in words; none where none does.
 pub fn holding(machine: &Machine, tripped: u64) -> Option<String> {
     let holds = |named: &&Input| {
-        matches!(named.role, Some(Role::Door | Role::FeedHold)) && tripped >> named.input.min(63) & 1 == 1
+        matches!(named.role, Some(Role::Door | Role::FeedHold))
+            && tripped >> named.input.min(63) & 1 == 1
     };
-    let names: Vec<_> = machine.inputs.iter().filter(holds).map(|named| named.name.as_str()).collect();
+    let names: Vec<_> = machine
+        .inputs
+        .iter()
+        .filter(holds)
+        .map(|named| named.name.as_str())
+        .collect();
     (!names.is_empty()).then(|| names.join(", "))
 }
 
@@ -80,21 +107,37 @@ mod tests {
 
     #[test]
     fn roles_become_masks_and_faults_name_their_input() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let table = "inputs.guard={input=4,role=\"door\",normally_closed=false,max_age_ms=2.5}";
         let stop = "inputs.button={input=7,role=\"emergency-stop\",max_age_ms=5000}";
-        let sets = [table, stop].map(|set| set.split_once('=').unwrap()).map(|(k, v)| (k.to_string(), v.to_string()));
+        let sets = [table, stop]
+            .map(|set| set.split_once('=').unwrap())
+            .map(|(k, v)| (k.to_string(), v.to_string()));
         let machine = Machine::read(&path, &sets).unwrap();
         let roles = of(&machine, Switches::default());
-        assert_eq!((roles.door, roles.emergency_stop, roles.normally_closed), (1 << 4, 1 << 7, 1 << 7));
-        assert_eq!((roles.max_age_periods[4], roles.max_age_periods[7]), (2, 5000));
+        assert_eq!(
+            (roles.door, roles.emergency_stop, roles.normally_closed),
+            (1 << 4, 1 << 7, 1 << 7)
+        );
+        assert_eq!(
+            (roles.max_age_periods[4], roles.max_age_periods[7]),
+            (2, 5000)
+        );
         assert!(
-            !roles.may_leave_limits && of(&machine, Switches { unhomed: true, ..Switches::default() }).may_leave_limits
+            !roles.may_leave_limits
+                && of(
+                    &machine,
+                    Switches {
+                        unhomed: true,
+                        ..Switches::default()
+                    }
+                )
+                .may_leave_limits
         );
         let words = |old| fault_text(&machine, InputFault::EmergencyStop, 7, old);
         assert_eq!(words(false), "emergency stop: input button (7) is open");
-        let old =
-            "emergency stop: input button (7) has not been heard of for more than 5000 ms, which counts as tripped";
+        let old = "emergency stop: input button (7) has not been heard of for more than 5000 ms, which counts as tripped";
         assert_eq!(words(true), old);
         assert_eq!(holding(&machine, u64::MAX).as_deref(), Some("guard"));
         assert_eq!(holding(&machine, 1 << 7), None);

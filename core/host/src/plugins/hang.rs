@@ -76,16 +76,30 @@ pub struct FineWatch(Arc<Shared>);
 impl HangWatch {
     /// Begins to watch this thread, where the program has said what to do about a hang.
     pub fn of(machine: &Machine) -> Option<Self> {
-        AT_HANG.get().and_then(|at_hang| Self::start(machine, Arc::clone(at_hang)))
+        AT_HANG
+            .get()
+            .and_then(|at_hang| Self::start(machine, Arc::clone(at_hang)))
     }
 
     /// Begins to watch this thread; `None` where the computer gives no thread to do so, which is no reason to stop.
     fn start(machine: &Machine, at_hang: AtHang) -> Option<Self> {
-        let lane = |most_s: f64| Lane { place: Arc::default(), most: Duration::from_secs_f64(most_s) };
+        let lane = |most_s: f64| Lane {
+            place: Arc::default(),
+            most: Duration::from_secs_f64(most_s),
+        };
         let names = Names {
             planner: machine.planner.plugin.clone(),
-            strategy: machine.feed_strategy.as_ref().map(|choice| choice.plugin.clone()).unwrap_or_default(),
-            driver: machine.drivers.iter().map(DriverChoice::title).collect::<Vec<_>>().join(", "),
+            strategy: machine
+                .feed_strategy
+                .as_ref()
+                .map(|choice| choice.plugin.clone())
+                .unwrap_or_default(),
+            driver: machine
+                .drivers
+                .iter()
+                .map(DriverChoice::title)
+                .collect::<Vec<_>>()
+                .join(", "),
             kinematics: machine.kinematics.plugin.clone(),
         };
         let shared = Arc::new(Shared {
@@ -99,14 +113,24 @@ impl HangWatch {
             at_hang,
         });
         let seen = Arc::clone(&shared);
-        let builder = thread::Builder::new().name("tandem-hang".to_string()).stack_size(STACK_BYTES);
+        let builder = thread::Builder::new()
+            .name("tandem-hang".to_string())
+            .stack_size(STACK_BYTES);
         let thread = builder.spawn(move || seen.watch()).ok()?;
-        Some(Self { _here: watch_this_thread(&shared.soft.place), shared, thread: Some(thread) })
+        Some(Self {
+            _here: watch_this_thread(&shared.soft.place),
+            shared,
+            thread: Some(thread),
+        })
     }
 
     /// The run begins with these atomics.
     pub fn begin(&self, controls: Arc<Controls>, status: Arc<Status>) {
-        *self.shared.machine.lock().unwrap_or_else(PoisonError::into_inner) = Some((controls, status));
+        *self
+            .shared
+            .machine
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = Some((controls, status));
     }
 
     /// The end for the fine loop's thread.
@@ -117,7 +141,11 @@ impl HangWatch {
 
 impl Drop for HangWatch {
     fn drop(&mut self) {
-        *self.shared.over.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        *self
+            .shared
+            .over
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = true;
         self.shared.ends.notify_all();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -130,7 +158,10 @@ impl FineWatch {
     pub fn begin(&self) -> FineRuns {
         let watched = watch_this_thread(&self.0.fine.place);
         self.0.fine_runs.store(true, Release);
-        FineRuns { shared: Arc::clone(&self.0), _watched: watched }
+        FineRuns {
+            shared: Arc::clone(&self.0),
+            _watched: watched,
+        }
     }
 }
 
@@ -157,7 +188,12 @@ struct Look {
 
 impl Look {
     /// Looks again after `passed`, when it is time to: whether the lane hangs, and in which method.
-    fn again(&mut self, lane: &Lane, passed: Duration, must_move: impl Fn(Method) -> bool) -> Option<Method> {
+    fn again(
+        &mut self,
+        lane: &Lane,
+        passed: Duration,
+        must_move: impl Fn(Method) -> bool,
+    ) -> Option<Method> {
         self.next = self.next.saturating_sub(passed);
         if !self.next.is_zero() {
             return None;
@@ -178,7 +214,10 @@ impl Shared {
         let (mut soft, mut fine) = (Look::default(), Look::default());
         let mut over = self.over.lock().unwrap_or_else(PoisonError::into_inner);
         while !*over {
-            let waited = self.ends.wait_timeout(over, between).unwrap_or_else(PoisonError::into_inner);
+            let waited = self
+                .ends
+                .wait_timeout(over, between)
+                .unwrap_or_else(PoisonError::into_inner);
             over = waited.0;
             if *over {
                 return;
@@ -203,23 +242,40 @@ impl Shared {
     fn words(&self, method: Method, most: Duration) -> String {
         let most_s = most.as_secs_f64();
         let machine = self.machine.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = machine
-            .as_ref()
-            .map(|(_, status)| format!(" (line {}, tick {})", status.line.load(Relaxed), status.tick.load(Relaxed)));
+        let at = machine.as_ref().map(|(_, status)| {
+            format!(
+                " (line {}, tick {})",
+                status.line.load(Relaxed),
+                status.tick.load(Relaxed)
+            )
+        });
         let at = at.unwrap_or_default();
         if let Some((kind, call)) = method.words() {
             let name = self.names.of(kind);
-            return format!("{} {name}: {call} does not come back: no answer for {most_s} s{at}", kind.name());
+            return format!(
+                "{} {name}: {call} does not come back: no answer for {most_s} s{at}",
+                kind.name()
+            );
         }
         let asked = &self.names.kinematics;
-        let or = if asked == "identity" { String::new() } else { format!(", or kinematics {asked} that it asks,") };
+        let or = if asked == "identity" {
+            String::new()
+        } else {
+            format!(", or kinematics {asked} that it asks,")
+        };
         format!("the fine loop{or} does not come back: no period for {most_s} s{at}")
     }
 
     /// Nothing new will be planned, but the fine loop still moves: it stops on the path.
     fn stop_machine(&self) {
-        let machine = self.machine.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let Some((controls, status)) = machine else { return };
+        let machine = self
+            .machine
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
+        let Some((controls, status)) = machine else {
+            return;
+        };
         controls.soft_fault.store(true, Relaxed);
         let asked = Instant::now();
         while self.fine_runs.load(Acquire) && asked.elapsed() < LONGEST_STOP {
@@ -275,8 +331,12 @@ mod tests {
     }
 
     fn machine() -> Machine {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
-        let set = [("loops.soft_hang_after_s", "0.1"), ("loops.fine_hang_after_ms", "100")];
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let set = [
+            ("loops.soft_hang_after_s", "0.1"),
+            ("loops.fine_hang_after_ms", "100"),
+        ];
         let set = set.map(|(key, value)| (key.to_string(), value.to_string()));
         Machine::read(&path, &set).unwrap()
     }
@@ -293,9 +353,14 @@ mod tests {
             go_on.send(()).unwrap();
         });
         let watch = HangWatch::start(&machine(), at_hang).unwrap();
-        let kinematics = plugin.kinematics("", &KinematicsContext::new(machine().axes)).unwrap();
+        let kinematics = plugin
+            .kinematics("", &KinematicsContext::new(machine().axes))
+            .unwrap();
         kinematics.health().unwrap();
-        assert_eq!(words.recv().unwrap(), "kinematics identity: health does not come back: no answer for 0.1 s");
+        assert_eq!(
+            words.recv().unwrap(),
+            "kinematics identity: health does not come back: no answer for 0.1 s"
+        );
         drop(watch);
     }
 
@@ -319,9 +384,17 @@ mod tests {
             }
             drop(runs);
         });
-        assert!(words.recv_timeout(Duration::from_millis(300)).is_err(), "it beats");
+        assert!(
+            words.recv_timeout(Duration::from_millis(300)).is_err(),
+            "it beats"
+        );
         beats.store(false, Relaxed);
-        assert!(words.recv().unwrap().starts_with("the fine loop does not come back: no period for 0.1 s"));
+        assert!(
+            words
+                .recv()
+                .unwrap()
+                .starts_with("the fine loop does not come back: no period for 0.1 s")
+        );
         drop(watch);
         thread.join().unwrap();
     }

@@ -21,14 +21,18 @@ pub fn load(path: &Path) -> Result<Vec<Plugin>, String> {
     // The system's loader looks for a bare name in folders of its own.
     let path = std::path::absolute(path).map_err(|e| e.to_string())?;
     if path.is_dir() {
-        return Err("it is a folder: name the shared library that cargo built in it, under target/release".to_string());
+        return Err(
+            "it is a folder: name the shared library that cargo built in it, under target/release"
+                .to_string(),
+        );
     }
     if !path.is_file() {
         return Err("there is no such file".to_string());
     }
     whole::check(&path)?;
     // SAFETY: loading runs the library's initialisers; who names a plugin in machine.toml trusts it with the machine.
-    let library = unsafe { Library::new(&path) }.map_err(|e| format!("it cannot be loaded: {}", cause(&e)))?;
+    let library = unsafe { Library::new(&path) }
+        .map_err(|e| format!("it cannot be loaded: {}", cause(&e)))?;
     let library: &'static Library = Box::leak(Box::new(library));
     let descriptor = symbol(library, &symbol_by_name(&path))
         .or_else(|| symbol(library, &symbol_in(&path)?))
@@ -47,7 +51,10 @@ fn symbol(library: &'static Library, name: &str) -> Option<*const abi::Library> 
 /// The symbol of the crate that cargo builds as a file of this name.
 fn symbol_by_name(path: &Path) -> String {
     let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-    format!("{SYMBOL_PREFIX}{}", stem.strip_prefix("lib").unwrap_or(stem))
+    format!(
+        "{SYMBOL_PREFIX}{}",
+        stem.strip_prefix("lib").unwrap_or(stem)
+    )
 }
 
 /// The symbol as it stands in the library's table of names, for a file that was renamed.
@@ -68,17 +75,26 @@ fn missing(path: &Path) -> String {
 /// What looks like a plugin's symbol of any version.
 fn names(bytes: &[u8]) -> impl Iterator<Item = String> {
     let begin = ANY_VERSION.as_bytes();
-    bytes.windows(begin.len() + 1).enumerate().filter_map(move |(at, window)| {
-        let numbered = window.starts_with(begin) && window[begin.len()].is_ascii_digit();
-        let name = || bytes[at..].iter().take_while(|b| b.is_ascii_alphanumeric() || **b == b'_');
-        let whole = numbered && bytes.get(at + name().count()) == Some(&0);
-        whole.then(|| name().map(|b| *b as char).collect())
-    })
+    bytes
+        .windows(begin.len() + 1)
+        .enumerate()
+        .filter_map(move |(at, window)| {
+            let numbered = window.starts_with(begin) && window[begin.len()].is_ascii_digit();
+            let name = || {
+                bytes[at..]
+                    .iter()
+                    .take_while(|b| b.is_ascii_alphanumeric() || **b == b'_')
+            };
+            let whole = numbered && bytes.get(at + name().count()) == Some(&0);
+            whole.then(|| name().map(|b| *b as char).collect())
+        })
 }
 
 /// The loader's own words, which the error keeps behind it.
 fn cause(error: &dyn std::error::Error) -> String {
-    error.source().map_or_else(|| error.to_string(), ToString::to_string)
+    error
+        .source()
+        .map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 #[cfg(test)]
@@ -88,13 +104,23 @@ mod tests {
     #[test]
     fn symbols_are_found_among_bytes() {
         let bytes = b"..tandem_plugin_v1__\0tandem_plugin_v\0\0tandem_plugin_v2__my_planner\0tandem_plugin_v1__x!";
-        assert_eq!(names(bytes).collect::<Vec<_>>(), ["tandem_plugin_v1__", "tandem_plugin_v2__my_planner"]);
+        assert_eq!(
+            names(bytes).collect::<Vec<_>>(),
+            ["tandem_plugin_v1__", "tandem_plugin_v2__my_planner"]
+        );
     }
 
     #[test]
     fn what_is_no_library_is_refused() {
-        assert_eq!(load(Path::new("no/such/libx.so")).unwrap_err(), "there is no such file");
-        assert!(load(&std::env::temp_dir()).unwrap_err().starts_with("it is a folder: "));
+        assert_eq!(
+            load(Path::new("no/such/libx.so")).unwrap_err(),
+            "there is no such file"
+        );
+        assert!(
+            load(&std::env::temp_dir())
+                .unwrap_err()
+                .starts_with("it is a folder: ")
+        );
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "not a library").unwrap();
         let refusal = load(file.path()).unwrap_err();

@@ -48,7 +48,9 @@ pub fn drain_plugin_log(each: &mut dyn FnMut(&str)) {
     }
     let lost = LOST.swap(0, Relaxed);
     if lost > 0 {
-        each(&format!("plugins wrote {lost} lines more than the log has room for"));
+        each(&format!(
+            "plugins wrote {lost} lines more than the log has room for"
+        ));
     }
 }
 
@@ -62,7 +64,12 @@ mod tests {
         listen();
         let used = heap_use_of(|| {
             for joint in 0..20 {
-                tandem_sdk::log!(Warning, "joint {joint}: {} frames lost, the last one {:.3} s ago", 3 * joint, 0.25);
+                tandem_sdk::log!(
+                    Warning,
+                    "joint {joint}: {} frames lost, the last one {:.3} s ago",
+                    3 * joint,
+                    0.25
+                );
             }
         });
         assert_eq!(used, HeapUse::default());
@@ -77,7 +84,15 @@ mod tests {
         let mut lines = vec![];
         drain_plugin_log(&mut |line| lines.push(line.to_string()));
         // Tests of this crate that run beside this one share the log.
-        assert!(lines.contains(&"tandem-host: warning: line 7".to_string()), "{lines:?}");
-        assert!(lines.last().is_some_and(|last| last.contains("more than the log has room for")), "{lines:?}");
+        assert!(
+            lines.contains(&"tandem-host: warning: line 7".to_string()),
+            "{lines:?}"
+        );
+        assert!(
+            lines
+                .last()
+                .is_some_and(|last| last.contains("more than the log has room for")),
+            "{lines:?}"
+        );
     }
 }

@@ -2,8 +2,8 @@
 
 use tandem_machine::{DriverChoice, Machine, PluginChoice};
 use tandem_sdk::{
-    Driver, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext, Plugin, PluginError, PluginKind,
-    StrategyContext,
+    Driver, FeedStrategy, Kinematics, KinematicsContext, Planner, PlannerContext, Plugin,
+    PluginError, PluginKind, StrategyContext,
 };
 
 use crate::error::{HostError, refusal};
@@ -52,7 +52,10 @@ impl Registry {
     pub fn register(&mut self, plugin: Plugin) -> Result<(), String> {
         let (kind, name) = (plugin.kind(), plugin.name());
         if self.named(kind, name).is_some() {
-            return Err(format!("a {} called {name} is registered twice", kind.name()));
+            return Err(format!(
+                "a {} called {name} is registered twice",
+                kind.name()
+            ));
         }
         self.plugins.push(plugin);
         Ok(())
@@ -70,19 +73,32 @@ impl Registry {
     /// It is not there, or the library is refused.
     pub fn find(&self, kind: PluginKind, choice: &PluginChoice) -> Result<Plugin, PluginRefusal> {
         let found = match &choice.library {
-            Some(path) => self.loaded(kind, path).map_err(|cause| format!("{}: {cause}", path.display())),
-            None => self.named(kind, &choice.plugin).ok_or_else(|| self.unknown(kind, &choice.plugin)),
+            Some(path) => self
+                .loaded(kind, path)
+                .map_err(|cause| format!("{}: {cause}", path.display())),
+            None => self
+                .named(kind, &choice.plugin)
+                .ok_or_else(|| self.unknown(kind, &choice.plugin)),
         };
-        found.map_err(|cause| PluginRefusal { option: None, cause })
+        found.map_err(|cause| PluginRefusal {
+            option: None,
+            cause,
+        })
     }
 
     /// Opens the planner that a machine asks for.
     ///
     /// # Errors
     /// It is not there, or refuses its options.
-    pub fn planner(&self, choice: &PluginChoice, context: &PlannerContext) -> Result<Box<dyn Planner>, PluginRefusal> {
+    pub fn planner(
+        &self,
+        choice: &PluginChoice,
+        context: &PlannerContext,
+    ) -> Result<Box<dyn Planner>, PluginRefusal> {
         let plugin = self.find(PluginKind::Planner, choice)?;
-        plugin.planner(&choice.options, context).map_err(|e| refused(plugin, &e))
+        plugin
+            .planner(&choice.options, context)
+            .map_err(|e| refused(plugin, &e))
     }
 
     /// Opens the feed strategy that a machine asks for.
@@ -95,7 +111,9 @@ impl Registry {
         context: &StrategyContext,
     ) -> Result<Box<dyn FeedStrategy>, PluginRefusal> {
         let plugin = self.find(PluginKind::FeedStrategy, choice)?;
-        plugin.feed_strategy(&choice.options, context).map_err(|e| refused(plugin, &e))
+        plugin
+            .feed_strategy(&choice.options, context)
+            .map_err(|e| refused(plugin, &e))
     }
 
     /// Makes the driver that a machine asks for.
@@ -104,7 +122,9 @@ impl Registry {
     /// It is not there, or refuses its options.
     pub fn driver(&self, choice: &PluginChoice) -> Result<Box<dyn Driver>, PluginRefusal> {
         let plugin = self.find(PluginKind::Driver, choice)?;
-        plugin.driver(&choice.options).map_err(|e| refused(plugin, &e))
+        plugin
+            .driver(&choice.options)
+            .map_err(|e| refused(plugin, &e))
     }
 
     /// Makes the kinematics that a machine asks for.
@@ -117,11 +137,16 @@ impl Registry {
         context: &KinematicsContext,
     ) -> Result<Box<dyn Kinematics>, PluginRefusal> {
         let plugin = self.find(PluginKind::Kinematics, choice)?;
-        plugin.kinematics(&choice.options, context).map_err(|e| refused(plugin, &e))
+        plugin
+            .kinematics(&choice.options, context)
+            .map_err(|e| refused(plugin, &e))
     }
 
     fn named(&self, kind: PluginKind, name: &str) -> Option<Plugin> {
-        self.plugins.iter().find(|p| p.kind() == kind && p.name() == name).copied()
+        self.plugins
+            .iter()
+            .find(|p| p.kind() == kind && p.name() == name)
+            .copied()
     }
 
     fn loaded(&self, kind: PluginKind, path: &std::path::Path) -> Result<Plugin, String> {
@@ -129,40 +154,74 @@ impl Registry {
         let mut fitting = all.iter().filter(|plugin| plugin.kind() == kind);
         let plugin = *fitting.next().ok_or_else(|| wrong_kind(kind, &all))?;
         if fitting.next().is_some() {
-            return Err(format!("it holds several plugins of kind {}; one can be chosen by its file", kind.name()));
+            return Err(format!(
+                "it holds several plugins of kind {}; one can be chosen by its file",
+                kind.name()
+            ));
         }
         let name = plugin.name();
         match self.named(kind, name) {
-            Some(_) => Err(format!("it calls itself {name}, and a {} of that name is there already", kind.name())),
+            Some(_) => Err(format!(
+                "it calls itself {name}, and a {} of that name is there already",
+                kind.name()
+            )),
             None => Ok(plugin),
         }
     }
 
     fn unknown(&self, kind: PluginKind, name: &str) -> String {
-        let known: Vec<&str> = self.plugins.iter().filter(|p| p.kind() == kind).map(Plugin::name).collect();
-        let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-        format!("no {} is called {name:?}; there is: {known}. A shared library is named by its path", kind.name())
+        let known: Vec<&str> = self
+            .plugins
+            .iter()
+            .filter(|p| p.kind() == kind)
+            .map(Plugin::name)
+            .collect();
+        let known = if known.is_empty() {
+            "none".to_string()
+        } else {
+            known.join(", ")
+        };
+        format!(
+            "no {} is called {name:?}; there is: {known}. A shared library is named by its path",
+            kind.name()
+        )
     }
 }
 
 fn wrong_kind(kind: PluginKind, all: &[Plugin]) -> String {
-    let there: Vec<String> = all.iter().map(|p| format!("{} {}", p.kind().name(), p.name())).collect();
+    let there: Vec<String> = all
+        .iter()
+        .map(|p| format!("{} {}", p.kind().name(), p.name()))
+        .collect();
     format!("it is no {}: it holds {}", kind.name(), there.join(", "))
 }
 
 fn refused(plugin: Plugin, error: &PluginError) -> PluginRefusal {
-    let cause = format!("{} {}: {}", plugin.kind().name(), plugin.name(), error.message());
-    PluginRefusal { option: error.option().map(str::to_string), cause }
+    let cause = format!(
+        "{} {}: {}",
+        plugin.kind().name(),
+        plugin.name(),
+        error.message()
+    );
+    PluginRefusal {
+        option: error.option().map(str::to_string),
+        cause,
+    }
 }
 
 /// Whether real drives are behind the machine; not where a driver cannot be made, which every run refuses. The drivers are made
 /// under watch, for a constructor that does not come back is told as such. Host.
 pub fn moves_metal(machine: &Machine, registry: &Registry) -> bool {
     let _watch = HangWatch::of(machine);
-    machine.drivers.iter().any(|driver| is_real(driver, registry))
+    machine
+        .drivers
+        .iter()
+        .any(|driver| is_real(driver, registry))
 }
 
 /// Whether real drives are behind `driver`; not where it cannot be made.
 pub fn is_real(driver: &DriverChoice, registry: &Registry) -> bool {
-    registry.driver(&driver.choice).is_ok_and(|driver| driver.describe().simulated == 0)
+    registry
+        .driver(&driver.choice)
+        .is_ok_and(|driver| driver.describe().simulated == 0)
 }

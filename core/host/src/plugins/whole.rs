@@ -17,9 +17,9 @@ const LOADED: u64 = 1;
 pub fn check(path: &Path) -> Result<(), String> {
     let (bytes, head) = head(path).map_err(|e| format!("it cannot be loaded: {e}"))?;
     match end_of_loaded(&head) {
-        Some(end) if end > bytes => {
-            Err(format!("it is cut off: {bytes} bytes, of at least {end}; build it or copy it once more"))
-        }
+        Some(end) if end > bytes => Err(format!(
+            "it is cut off: {bytes} bytes, of at least {end}; build it or copy it once more"
+        )),
         _ => Ok(()),
     }
 }
@@ -37,12 +37,20 @@ fn head(path: &Path) -> io::Result<(u64, Vec<u8>)> {
 fn end_of_loaded(head: &[u8]) -> Option<u64> {
     let number = |at: usize, bytes: usize| -> Option<u64> {
         let part = head.get(at..at.checked_add(bytes)?)?;
-        Some(part.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte)))
+        Some(
+            part.iter()
+                .rev()
+                .fold(0, |number, byte| number << 8 | u64::from(*byte)),
+        )
     };
     if !head.starts_with(b"\x7fELF\x02\x01") {
         return None;
     }
-    let (table, size, count) = (number(32, 8)? as usize, number(54, 2)? as usize, number(56, 2)? as usize);
+    let (table, size, count) = (
+        number(32, 8)? as usize,
+        number(54, 2)? as usize,
+        number(56, 2)? as usize,
+    );
     let mut end = 0;
     for header in 0..count {
         let at = table.checked_add(header * size)?;
@@ -80,7 +88,9 @@ mod tests {
         };
         assert_eq!(written(&elf(4096, 1000), 5096), Ok(()));
         assert!(
-            written(&elf(4096, 1000), 5095).unwrap_err().starts_with("it is cut off: 5095 bytes, of at least 5096")
+            written(&elf(4096, 1000), 5095)
+                .unwrap_err()
+                .starts_with("it is cut off: 5095 bytes, of at least 5096")
         );
     }
 

@@ -24,7 +24,9 @@ pub struct PolicyHost {
 impl PolicyHost {
     /// Compiles and starts the machine's script, if it names one.
     pub fn open(machine: &Machine) -> Result<Option<Self>, HostError> {
-        let Some(choice) = &machine.policy else { return Ok(None) };
+        let Some(choice) = &machine.policy else {
+            return Ok(None);
+        };
         let refuse = |cause: String| refusal(machine, "policy.script", cause);
         let path = choice.script.clone();
         let stamp = stamp(&path);
@@ -32,13 +34,25 @@ impl PolicyHost {
         let named = |e: tandem_policy::Refusal| refuse(format!("{}: {e}", path.display()));
         let engine = Engine::new().map_err(named)?;
         let script = engine.compile(&bytes).map_err(named)?;
-        let PolicySetup { values, budget, bounds, facts } = PolicySetup::of(machine)?;
+        let PolicySetup {
+            values,
+            budget,
+            bounds,
+            facts,
+        } = PolicySetup::of(machine)?;
         let policy = Policy::new(script, values, budget, bounds, &facts);
         let policy = policy.map_err(|e| match e {
-            e @ tandem_policy::Refusal::Parameters(_) => refusal(machine, "policy.parameters", e.to_string()),
+            e @ tandem_policy::Refusal::Parameters(_) => {
+                refusal(machine, "policy.parameters", e.to_string())
+            }
             e => refuse(format!("{}: {e}", path.display())),
         })?;
-        Ok(Some(Self { engine, path, stamp, policy: Arc::new(Mutex::new(policy)) }))
+        Ok(Some(Self {
+            engine,
+            path,
+            stamp,
+            policy: Arc::new(Mutex::new(policy)),
+        }))
     }
 
     /// The ratio after a rough period; `None` where the script asks for none.
@@ -56,7 +70,12 @@ impl PolicyHost {
         let policy = self.lock();
         let counters = policy.counters();
         PolicySummary {
-            name: self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            name: self
+                .path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
             windows: counters.windows,
             blocks: counters.blocks,
             periods: counters.periods,

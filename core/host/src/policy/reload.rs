@@ -77,7 +77,9 @@ impl Reloader {
 
     fn take(&self, candidate: Candidate) {
         let mut policy = self.host.lock();
-        let swapped = candidate.and_then(|(script, instance)| policy.swap(script, instance).map_err(|e| e.to_string()));
+        let swapped = candidate.and_then(|(script, instance)| {
+            policy.swap(script, instance).map_err(|e| e.to_string())
+        });
         if let Err(why) = swapped {
             policy.keep(&why);
         }
@@ -144,15 +146,21 @@ mod tests {
         let folder = tempfile::TempDir::new().unwrap();
         let file = folder.path().join("policy.wat");
         std::fs::write(&file, ONE).unwrap();
-        let mill = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let mill =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let set = ("policy.script".to_string(), file.display().to_string());
-        let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap()).unwrap().unwrap();
+        let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap())
+            .unwrap()
+            .unwrap();
         let mut reloader = Reloader::new(host.clone());
         reloader.watch().unwrap();
         std::fs::write(&file, "no module").unwrap();
         let refused = until(&reloader, |summary| summary.refused_reloads > 0);
         assert_eq!(refused.reloads, 0);
-        assert!(reloader.take_notes()[0].contains("the old one goes on: not a WASM module"), "the cause is told");
+        assert!(
+            reloader.take_notes()[0].contains("the old one goes on: not a WASM module"),
+            "the cause is told"
+        );
         std::fs::write(&file, OTHER).unwrap();
         assert_eq!(until(&reloader, |summary| summary.reloads > 0).reloads, 1);
         // Asked to, it takes a file that has not changed.

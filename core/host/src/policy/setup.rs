@@ -32,19 +32,44 @@ impl PolicySetup {
             path_tolerance_mm: machine.motion.path_tolerance_mm,
             rough_period_s: machine.rough_period_s,
         };
-        let bounds = Bounds { max_feed_ratio: machine.motion.max_feed_ratio, ..Bounds::default() };
-        let this = Self { bounds, facts, ..Self::default() };
-        let Some(policy) = &machine.policy else { return Ok(this) };
+        let bounds = Bounds {
+            max_feed_ratio: machine.motion.max_feed_ratio,
+            ..Bounds::default()
+        };
+        let this = Self {
+            bounds,
+            facts,
+            ..Self::default()
+        };
+        let Some(policy) = &machine.policy else {
+            return Ok(this);
+        };
         let values = values(machine, &policy.parameters)?;
-        Ok(Self { values, budget: budget(policy), bounds: stated(policy, bounds), ..this })
+        Ok(Self {
+            values,
+            budget: budget(policy),
+            bounds: stated(policy, bounds),
+            ..this
+        })
     }
 }
 
 impl Default for PolicySetup {
     fn default() -> Self {
-        let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap_or_else(|e| unreachable!("{e}"));
-        let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 };
-        Self { values: vec![], budget: Budget::default(), bounds: Bounds::default(), facts }
+        let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)])
+            .unwrap_or_else(|e| unreachable!("{e}"));
+        let facts = Facts {
+            axes,
+            time_constant_s: 0.05,
+            path_tolerance_mm: 0.01,
+            rough_period_s: 0.008,
+        };
+        Self {
+            values: vec![],
+            budget: Budget::default(),
+            bounds: Bounds::default(),
+            facts,
+        }
     }
 }
 
@@ -57,7 +82,11 @@ fn values(machine: &Machine, table: &toml::Table) -> Result<Values, HostError> {
             Value::Boolean(truth) => f64::from(u8::from(*truth)),
             _ => {
                 let key = format!("policy.parameters.{name}");
-                return Err(refusal(machine, &key, "a parameter is a number, or true or false"));
+                return Err(refusal(
+                    machine,
+                    &key,
+                    "a parameter is a number, or true or false",
+                ));
             }
         };
         Ok((name.clone(), number))
@@ -74,7 +103,9 @@ fn budget(policy: &Policy) -> Budget {
 }
 
 fn stated(policy: &Policy, default: Bounds) -> Bounds {
-    let tolerance_mm = policy.path_tolerance_mm.map(|(smallest, largest)| (smallest, Some(largest)));
+    let tolerance_mm = policy
+        .path_tolerance_mm
+        .map(|(smallest, largest)| (smallest, Some(largest)));
     Bounds {
         time_constant_s: policy.time_constant_s,
         path_tolerance_mm: tolerance_mm.unwrap_or(default.path_tolerance_mm),

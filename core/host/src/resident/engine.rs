@@ -64,7 +64,8 @@ pub struct Resident {
 
 impl Body for Resident {
     fn is_over(&self) -> bool {
-        self.shared.over.load(Ordering::Acquire) || (self.fine.fault().is_some() && self.fine.is_over())
+        self.shared.over.load(Ordering::Acquire)
+            || (self.fine.fault().is_some() && self.fine.is_over())
     }
 
     fn begin(&self) -> Option<FineRuns> {
@@ -86,7 +87,9 @@ impl Body for Resident {
         if !self.told && self.fine.has_ended() {
             self.told = self.ends.push(self.fine.job_end()).is_ok();
         }
-        self.shared.released.store(self.fine.is_over(), Ordering::Release);
+        self.shared
+            .released
+            .store(self.fine.is_over(), Ordering::Release);
         self.shared.periods.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -125,7 +128,16 @@ impl Engine {
         };
         let mut timed = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
         let notes = std::mem::take(&mut timed.notes);
-        Ok((Self::Thread(Thread { timed, next, retired, ends, shared }), notes))
+        Ok((
+            Self::Thread(Thread {
+                timed,
+                next,
+                retired,
+                ends,
+                shared,
+            }),
+            notes,
+        ))
     }
 
     /// Has `fine` take over from the loop that is there, which rests. With `resets` the drives' faults are reset before they are
@@ -140,7 +152,9 @@ impl Engine {
                 while thread.ends.pop().is_ok() {}
                 thread.shared.released.store(false, Ordering::Release);
                 let sent = thread.next.push(Next { fine, resets });
-                sent.map_err(|_| HostError::System("the fine loop takes no further job".to_string()))
+                sent.map_err(|_| {
+                    HostError::System("the fine loop takes no further job".to_string())
+                })
             }
             Self::Here(last) | Self::Down(Some(last)) => {
                 fine.succeed(last, resets);

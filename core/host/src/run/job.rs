@@ -57,8 +57,25 @@ pub struct Made {
 impl Made {
     /// The job of `ready` on drives that stand as `attached` says. In `real_time` samples have room for a recorder that looks
     /// away. The operator's atomics and the fine loop's status are `shared` with the jobs before and after. Allocates.
-    pub fn of(ready: Ready, attached: &Attached, real_time: bool, shared: (Arc<Controls>, Arc<Status>)) -> Self {
-        let Ready { machine, program, source, policy, planner, claim, feed, joints, checked, switches, .. } = ready;
+    pub fn of(
+        ready: Ready,
+        attached: &Attached,
+        real_time: bool,
+        shared: (Arc<Controls>, Arc<Status>),
+    ) -> Self {
+        let Ready {
+            machine,
+            program,
+            source,
+            policy,
+            planner,
+            claim,
+            feed,
+            joints,
+            checked,
+            switches,
+            ..
+        } = ready;
         let roster = claim.roster();
         let drives = roster.describe();
         let description = planner.describe();
@@ -67,12 +84,26 @@ impl Made {
         let segments = Sizes::segments_for(ready.entries as f64 + cuts);
         // As lockstep needs it: the samples of each rough period are taken behind it.
         let lockstep = machine.fine_periods_per_rough as usize;
-        let samples = if real_time { Sizes::default().samples } else { lockstep };
+        let samples = if real_time {
+            Sizes::default().samples
+        } else {
+            lockstep
+        };
         let (rough_end, end, host) = bridge_with(Sizes { samples, segments }, shared.0, shared.1);
-        let mut config = parts::fine_config(&machine, &joints, &description, (&drives, attached), switches);
+        let mut config = parts::fine_config(
+            &machine,
+            &joints,
+            &description,
+            (&drives, attached),
+            switches,
+        );
         config.record_drives = ready.records_drives;
-        host.status.hexadecimal_codes.store(drives.hexadecimal_codes != 0, Relaxed);
-        host.controls.optional_stop.store(switches.optional_stop, Relaxed);
+        host.status
+            .hexadecimal_codes
+            .store(drives.hexadecimal_codes != 0, Relaxed);
+        host.controls
+            .optional_stop
+            .store(switches.optional_stop, Relaxed);
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
@@ -94,7 +125,12 @@ impl Made {
             roster,
             checked,
         };
-        Self { job, config, end, kinematics: ready.kinematics }
+        Self {
+            job,
+            config,
+            end,
+            kinematics: ready.kinematics,
+        }
     }
 }
 
@@ -102,12 +138,17 @@ impl Job {
     /// Names of the feed strategy's signals, and after them those of the analog inputs.
     pub fn signals(&self) -> Vec<String> {
         let own = self.feed.as_ref().map_or(&[][..], FeedRunner::signals);
-        own.iter().map(|name| (*name).to_string()).chain(self.machine.analog.iter().map(Analog::signal)).collect()
+        own.iter()
+            .map(|name| (*name).to_string())
+            .chain(self.machine.analog.iter().map(Analog::signal))
+            .collect()
     }
 
     /// Whether the planner makes use of velocity steps where blocks meet.
     pub fn allows_steps(&self) -> bool {
-        self.speed_difference_mm_per_s.iter().any(|step| *step > 0.0)
+        self.speed_difference_mm_per_s
+            .iter()
+            .any(|step| *step > 0.0)
     }
 
     /// The soft side of the job, and who puts it into words when it is over.
@@ -122,10 +163,16 @@ impl Job {
         {
             observer.note(&note);
         }
-        let mut soft_loop = SoftLoop::new(self.rough, self.host, self.feed, reloader, monitor, observer);
+        let mut soft_loop = SoftLoop::new(
+            self.rough, self.host, self.feed, reloader, monitor, observer,
+        );
         soft_loop.waits = Some(Waits::new(&machine));
         soft_loop.skips_homing = self.switches.home.is_some();
-        soft_loop.analog = machine.analog.iter().map(|analog| analog.input as usize).collect();
+        soft_loop.analog = machine
+            .analog
+            .iter()
+            .map(|analog| analog.input as usize)
+            .collect();
         soft_loop.on_record_error = machine.on_record_error;
         soft_loop.planner.clone_from(&machine.planner.plugin);
         let conclusion = Conclusion {
@@ -157,7 +204,13 @@ impl Conclusion {
     pub fn summary(&self, soft_loop: &mut SoftLoop<'_>, counters: &Counters) -> Summary {
         soft_loop.tell_policy_notes();
         soft_loop.tell_plugin_log();
-        let mut summary = summarise(&self.machine, &self.program, self.clock, soft_loop, counters);
+        let mut summary = summarise(
+            &self.machine,
+            &self.program,
+            self.clock,
+            soft_loop,
+            counters,
+        );
         summary.dry_run = self.switches.dry_run;
         summary.policy = self.policy.as_ref().map(PolicyHost::summary);
         summary.stopped = soft_loop.aborted.map(|rest| stopped(rest.line));
@@ -165,8 +218,20 @@ impl Conclusion {
     }
 
     /// The fault of `fine` in words; `soft` is the cause of one on the soft side, `late` what made the loop late.
-    pub fn words(&self, fault: &Fault, fine: &FineLoop, soft: Option<&str>, late: Option<&str>) -> String {
-        let known = Known { soft, driver: fine.plugin_error(), drives: fine.driver(), roster: &self.roster, late };
+    pub fn words(
+        &self,
+        fault: &Fault,
+        fine: &FineLoop,
+        soft: Option<&str>,
+        late: Option<&str>,
+    ) -> String {
+        let known = Known {
+            soft,
+            driver: fine.plugin_error(),
+            drives: fine.driver(),
+            roster: &self.roster,
+            late,
+        };
         describe(&self.machine, &self.joints, fault, known)
     }
 }

@@ -78,7 +78,9 @@ impl Run {
         program: Program,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        Self::open(Ready::of_program(machine, registry, program, switches, true)?)
+        Self::open(Ready::of_program(
+            machine, registry, program, switches, true,
+        )?)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -93,7 +95,13 @@ impl Run {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let behind = |machine: &Machine| parts::behind_homing(machine, source, switches);
-        Self::open(Ready::of_source(machine, registry, Some(name), behind, switches)?)
+        Self::open(Ready::of_source(
+            machine,
+            registry,
+            Some(name),
+            behind,
+            switches,
+        )?)
     }
 
     /// A run that homes the axes of [`Machine::homing`], which `homing` does, and nothing else. Its samples are in the coordinates of the
@@ -101,10 +109,25 @@ impl Run {
     ///
     /// # Errors
     /// Everything that refuses: plugins, what does not go together.
-    pub fn home(machine: Machine, registry: &Registry, homing: Lead, switches: Switches) -> Result<Self, HostError> {
+    pub fn home(
+        machine: Machine,
+        registry: &Registry,
+        homing: Lead,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
         // What it does not home stays as unknown as it is: nothing else moves.
-        let switches = Switches { home: Some(homing), unhomed: true, ..switches };
-        Self::open(Ready::of_source(machine, registry, None, |machine| homing(machine, None), switches)?)
+        let switches = Switches {
+            home: Some(homing),
+            unhomed: true,
+            ..switches
+        };
+        Self::open(Ready::of_source(
+            machine,
+            registry,
+            None,
+            |machine| homing(machine, None),
+            switches,
+        )?)
     }
 
     /// Makes the loops around drives that are claimed.
@@ -116,7 +139,11 @@ impl Run {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
         let exchange = Arc::new(ExchangeTimes::default());
-        let driver = Box::new(exchange_time::Timed::new(driver, ready.machine.fine_period_s, Arc::clone(&exchange)));
+        let driver = Box::new(exchange_time::Timed::new(
+            driver,
+            ready.machine.fine_period_s,
+            Arc::clone(&exchange),
+        ));
         let made = Made::of(ready, &attached, false, (Arc::default(), Arc::default()));
         let mut fine = FineLoop::new(&made.config, made.end, driver, made.kinematics);
         fine.reset();
@@ -125,7 +152,11 @@ impl Run {
         Ok(Self {
             watch,
             fine,
-            clock: job.switches.clock.unwrap_or(if simulated { Clock::Virtual } else { Clock::Wall }),
+            clock: job.switches.clock.unwrap_or(if simulated {
+                Clock::Virtual
+            } else {
+                Clock::Wall
+            }),
             unknown_axes: job.joints.axes_moved_by(!(attached.known | attached.homed)),
             exchange,
             checked: job.checked.clone(),
@@ -177,7 +208,12 @@ impl Run {
     ///
     /// # Errors
     /// The computer refuses: a thread cannot be started. Real drives are refused on the virtual clock.
-    pub fn drive(self, clock: Clock, commands: &[Timed], observer: &mut dyn RunObserver) -> Result<Outcome, HostError> {
+    pub fn drive(
+        self,
+        clock: Clock,
+        commands: &[Timed],
+        observer: &mut dyn RunObserver,
+    ) -> Result<Outcome, HostError> {
         let started = Instant::now();
         if let Err(refused) = begin(&self.job.machine, &self.job.roster, clock) {
             let _ = self.fine.into_driver().stop();
@@ -192,7 +228,12 @@ impl Run {
         let mut measured = None;
         self.exchange.measures.store(clock == Clock::Wall, Relaxed);
         match clock {
-            Clock::Virtual => virtual_clock::drive(&mut soft_loop, &mut fine, machine.fine_periods_per_rough, commands),
+            Clock::Virtual => virtual_clock::drive(
+                &mut soft_loop,
+                &mut fine,
+                machine.fine_periods_per_rough,
+                commands,
+            ),
             Clock::Wall => {
                 let watch = self.watch.as_ref().map(HangWatch::for_fine);
                 let timed = wall_clock::drive(&mut soft_loop, fine, periods(machine), watch)?;
@@ -203,11 +244,16 @@ impl Run {
         let mut summary = conclusion.summary(&mut soft_loop, &fine.counters());
         tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
-        let words = |fault: Fault| conclusion.words(&fault, &fine, soft_loop.soft_cause(), late.as_deref());
+        let words =
+            |fault: Fault| conclusion.words(&fault, &fine, soft_loop.soft_cause(), late.as_deref());
         summary.fault = fault.map(words);
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
         let sent = conclusion.switches.home.is_some() || fine.joints_went_alone();
-        let position = if sent { fine.sent() } else { soft_loop.monitor.position };
+        let position = if sent {
+            fine.sent()
+        } else {
+            soft_loop.monitor.position
+        };
         let left = fine.left();
         let stopped = fine.into_driver().stop();
         drop(soft_loop);
@@ -217,7 +263,12 @@ impl Run {
         // What plugins say when they are stopped and dropped.
         drain_plugin_log(&mut |line| observer.note(line));
         summary.wall_time_s = started.elapsed().as_secs_f64();
-        Ok(Outcome { summary, fault, position, left })
+        Ok(Outcome {
+            summary,
+            fault,
+            position,
+            left,
+        })
     }
 }
 
@@ -228,14 +279,21 @@ pub fn begin(machine: &Machine, roster: &Roster, clock: Clock) -> Result<(), Hos
         (Clock::Virtual, None) => Ok(()),
         (Clock::Wall, _) => {
             let begun = roster.begin_threads();
-            begun.map_err(|error| HostError::System(format!("a slow driver has no thread: {error}")))
+            begun
+                .map_err(|error| HostError::System(format!("a slow driver has no thread: {error}")))
         }
     }
 }
 
 /// What was `measured` in real time, where it was.
-fn tell_times(summary: &mut Summary, measured: Option<&(Timing, PageFaults)>, exchange: &ExchangeTimes) {
-    let Some((timing, page_faults)) = measured else { return };
+fn tell_times(
+    summary: &mut Summary,
+    measured: Option<&(Timing, PageFaults)>,
+    exchange: &ExchangeTimes,
+) {
+    let Some((timing, page_faults)) = measured else {
+        return;
+    };
     summary.overruns = timing.overruns;
     summary.lateness_us = Some(LatenessUs::from(&timing.lateness));
     summary.page_faults = Some(*page_faults);
@@ -243,8 +301,16 @@ fn tell_times(summary: &mut Summary, measured: Option<&(Timing, PageFaults)>, ex
 }
 
 /// The driver could not release the drives: that is the fault of a run that has no other, and is told beside any other.
-fn not_let_go(roster: &Roster, error: &PluginError, summary: &mut Summary, observer: &mut dyn RunObserver) {
-    let words = format!("driver {}: the drives were not let go of: {error}", roster.titles());
+fn not_let_go(
+    roster: &Roster,
+    error: &PluginError,
+    summary: &mut Summary,
+    observer: &mut dyn RunObserver,
+) {
+    let words = format!(
+        "driver {}: the drives were not let go of: {error}",
+        roster.titles()
+    );
     match &summary.fault {
         None => summary.fault = Some(words),
         Some(_) => observer.note(&format!("error: {words}")),

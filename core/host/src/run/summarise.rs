@@ -21,17 +21,33 @@ pub fn summarise(
     let monitor = &soft_loop.monitor;
     let axes = &machine.axes;
     let of = |rotary: bool, values: &AxisVector| {
-        let shown = |i: usize| if rotary { values[i].to_degrees() } else { values[i] };
+        let shown = |i: usize| {
+            if rotary {
+                values[i].to_degrees()
+            } else {
+                values[i]
+            }
+        };
         let chosen = (0..axes.count()).filter(|i| axes.is_rotary(*i) == rotary);
-        chosen.map(|i| (axes.letter(i).to_lowercase().to_string(), shown(i))).collect()
+        chosen
+            .map(|i| (axes.letter(i).to_lowercase().to_string(), shown(i)))
+            .collect()
     };
-    let (linear, rotary) = (|values: &AxisVector| of(false, values), |values: &AxisVector| of(true, values));
+    let (linear, rotary) = (
+        |values: &AxisVector| of(false, values),
+        |values: &AxisVector| of(true, values),
+    );
     Summary {
         format: SUMMARY_FORMAT,
         program: program.to_string(),
         machine: machine.name.clone(),
         planner: machine.planner.plugin.clone(),
-        clock: if clock == Clock::Virtual { "virtual" } else { "wall" }.to_string(),
+        clock: if clock == Clock::Virtual {
+            "virtual"
+        } else {
+            "wall"
+        }
+        .to_string(),
         dry_run: false,
         blocks: monitor.blocks,
         length_mm: monitor.length_mm,
@@ -51,9 +67,19 @@ pub fn summarise(
         joints: monitor.joints.as_ref().map(JointWatch::peaks),
         max_path_deviation_mm: monitor.max_path_deviation_mm(),
         worst_of_limits: (0..machine.axes.count())
-            .map(|i| (machine.axes.letter(i).to_lowercase().to_string(), monitor.worst.of_axis(i)))
+            .map(|i| {
+                (
+                    machine.axes.letter(i).to_lowercase().to_string(),
+                    monitor.worst.of_axis(i),
+                )
+            })
             .collect(),
-        jerk: if machine.motion.jerk == JerkMode::Limit { "limit" } else { "report" }.to_string(),
+        jerk: if machine.motion.jerk == JerkMode::Limit {
+            "limit"
+        } else {
+            "report"
+        }
+        .to_string(),
         limit_violations: counters.limit_violations,
         guard_stops: counters.guard_stops,
         governed_samples: counters.governed_samples,

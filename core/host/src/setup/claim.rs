@@ -22,12 +22,22 @@ pub struct Claim {
 impl Claim {
     /// Drivers whose drives are not claimed.
     pub fn new(drives: Drives) -> Self {
-        Self { drives: Some(drives), elsewhere: None, faults: None, attached: None }
+        Self {
+            drives: Some(drives),
+            elsewhere: None,
+            faults: None,
+            attached: None,
+        }
     }
 
     /// Drives that another has claimed, which this job is driven on.
     pub fn elsewhere(roster: Roster) -> Self {
-        Self { drives: None, elsewhere: Some(roster), faults: None, attached: None }
+        Self {
+            drives: None,
+            elsewhere: Some(roster),
+            faults: None,
+            attached: None,
+        }
     }
 
     /// Whether another has the drives: whoever claimed them has seen to it that they may move.
@@ -37,7 +47,11 @@ impl Claim {
 
     /// Who is who among the drivers.
     pub fn roster(&self) -> Roster {
-        let elsewhere = || self.elsewhere.clone().unwrap_or_else(|| Roster::of_one(DriverDescription::real()));
+        let elsewhere = || {
+            self.elsewhere
+                .clone()
+                .unwrap_or_else(|| Roster::of_one(DriverDescription::real()))
+        };
         self.drives.as_ref().map_or_else(elsewhere, Drives::roster)
     }
 
@@ -51,7 +65,9 @@ impl Claim {
     /// # Errors
     /// What a driver refuses.
     pub fn check(&self, machine: &Machine, joints: &JointSpace) -> Result<(), HostError> {
-        self.drives.as_ref().map_or(Ok(()), |drives| drives.check(machine, joints))
+        self.drives
+            .as_ref()
+            .map_or(Ok(()), |drives| drives.check(machine, joints))
     }
 
     /// Puts `faults` around the drivers, once their drives are claimed.
@@ -70,12 +86,20 @@ impl Claim {
         joints: &JointSpace,
         switches: Switches,
     ) -> Result<AxisVector, HostError> {
-        let Some(drives) = &mut self.drives else { return Ok(machine.start) };
+        let Some(drives) = &mut self.drives else {
+            return Ok(machine.start);
+        };
         let is_real = drives.roster().describe().simulated == 0;
         let real_time = switches.clock.map_or(is_real, |clock| clock == Clock::Wall);
         let attached = drives.open(machine, joints, real_time)?;
         self.attached = Some(attached);
-        let look = Look { machine, joints, attached: &attached, drives, roster: drives.roster() };
+        let look = Look {
+            machine,
+            joints,
+            attached: &attached,
+            drives,
+            roster: drives.roster(),
+        };
         look.at_numbers()?;
         look.at_states(switches.reset)?;
         look.at_skew()?;
@@ -114,13 +138,27 @@ struct Look<'a> {
 
 impl Look<'_> {
     /// What is wrong with the joints that `which` says: `cause` makes a sentence of their names, for the driver of the first.
-    fn refuse(&self, which: impl Fn(usize) -> bool, cause: impl Fn(&str) -> String) -> Result<(), HostError> {
-        let Some(first) = (0..self.joints.count()).find(|i| which(*i)) else { return Ok(()) };
+    fn refuse(
+        &self,
+        which: impl Fn(usize) -> bool,
+        cause: impl Fn(&str) -> String,
+    ) -> Result<(), HostError> {
+        let Some(first) = (0..self.joints.count()).find(|i| which(*i)) else {
+            return Ok(());
+        };
         let driver = self.roster.of_joint(first);
-        let of_driver = |joint: &usize| which(*joint) && self.roster.of_joint(*joint).section == driver.section;
-        let names: Vec<_> = (0..self.joints.count()).filter(of_driver).map(|i| self.joints.name(i)).collect();
+        let of_driver =
+            |joint: &usize| which(*joint) && self.roster.of_joint(*joint).section == driver.section;
+        let names: Vec<_> = (0..self.joints.count())
+            .filter(of_driver)
+            .map(|i| self.joints.name(i))
+            .collect();
         let words = format!("driver {}: {}", driver.title, cause(&names.join(", ")));
-        Err(refusal(self.machine, &format!("{}.plugin", driver.section), words))
+        Err(refusal(
+            self.machine,
+            &format!("{}.plugin", driver.section),
+            words,
+        ))
     }
 
     fn at_numbers(&self) -> Result<(), HostError> {
@@ -131,18 +169,28 @@ impl Look<'_> {
         )?;
         self.refuse(
             |i| !attached.state[i].is_known(),
-            |names| format!("its start gives a number as the state of {names} that stands for none"),
+            |names| {
+                format!("its start gives a number as the state of {names} that stands for none")
+            },
         )?;
         self.refuse(
             |i| attached.delay_periods[i] > MAX_DELAY_PERIODS,
-            |names| format!("the feedback of {names} is more than {MAX_DELAY_PERIODS} fine periods behind"),
+            |names| {
+                format!(
+                    "the feedback of {names} is more than {MAX_DELAY_PERIODS} fine periods behind"
+                )
+            },
         )
     }
 
     fn at_states(&self, reset: bool) -> Result<(), HostError> {
         let is = |state: JointState| move |i: usize| self.attached.state[i] == state;
-        self.refuse(is(JointState::Lost), |names| format!("the drive of {names} cannot be reached"))?;
-        let faulty = (0..self.joints.count()).find(|i| is(JointState::Fault)(*i)).filter(|_| !reset);
+        self.refuse(is(JointState::Lost), |names| {
+            format!("the drive of {names} cannot be reached")
+        })?;
+        let faulty = (0..self.joints.count())
+            .find(|i| is(JointState::Fault)(*i))
+            .filter(|_| !reset);
         self.refuse(
             |i| Some(i) == faulty,
             |name| {
@@ -160,13 +208,18 @@ impl Look<'_> {
     fn at_skew(&self) -> Result<(), HostError> {
         let known = |joint: usize| self.attached.known >> joint & 1 == 1;
         for axis in 0..self.machine.axes.count() {
-            let moves = |joint: &usize| self.joints.joints[*joint].axis == Some(axis) && known(*joint);
+            let moves =
+                |joint: &usize| self.joints.joints[*joint].axis == Some(axis) && known(*joint);
             let joints: Vec<usize> = (0..self.joints.count()).filter(moves).collect();
             let at = |joint: &usize| self.attached.position[*joint];
             let low = joints.iter().min_by(|a, b| at(a).total_cmp(&at(b)));
             let high = joints.iter().max_by(|a, b| at(a).total_cmp(&at(b)));
-            let (Some(low), Some(high)) = (low, high) else { continue };
-            if at(high) - at(low) > self.machine.max_skew_mm[axis] && self.joints.are_stated_by_axes() {
+            let (Some(low), Some(high)) = (low, high) else {
+                continue;
+            };
+            if at(high) - at(low) > self.machine.max_skew_mm[axis]
+                && self.joints.are_stated_by_axes()
+            {
                 return Err(self.too_skew(axis, *low, *high));
             }
         }
@@ -175,19 +228,39 @@ impl Look<'_> {
 
     fn too_skew(&self, axis: usize, low: usize, high: usize) -> HostError {
         let rotary = self.machine.axes.is_rotary(axis);
-        let (scale, unit) = if rotary { (1f64.to_degrees(), "deg") } else { (1.0, "mm") };
+        let (scale, unit) = if rotary {
+            (1f64.to_degrees(), "deg")
+        } else {
+            (1.0, "mm")
+        };
         let letter = self.machine.axes.letter(axis).to_ascii_lowercase();
         let at = |joint: usize| {
-            format!("{} stands at {:.4} {unit}", self.joints.name(joint), self.attached.position[joint] * scale)
+            format!(
+                "{} stands at {:.4} {unit}",
+                self.joints.name(joint),
+                self.attached.position[joint] * scale
+            )
         };
         let most = self.machine.max_skew_mm[axis] * scale;
-        let cause = format!("the gantry is skew: {}, {}; at most {most} {unit} are allowed", at(low), at(high));
-        refusal(self.machine, &format!("axes.{letter}.max_skew_{unit}"), cause)
+        let cause = format!(
+            "the gantry is skew: {}, {}; at most {most} {unit} are allowed",
+            at(low),
+            at(high)
+        );
+        refusal(
+            self.machine,
+            &format!("axes.{letter}.max_skew_{unit}"),
+            cause,
+        )
     }
 
     /// Programs and lines are refused where it is not known where a joint is.
     fn at_known(&self, switches: Switches) -> Result<(), HostError> {
-        let homing = self.machine.homing.iter().filter(|_| switches.home.is_some());
+        let homing = self
+            .machine
+            .homing
+            .iter()
+            .filter(|_| switches.home.is_some());
         // Where axes are homed, joints are axes.
         let homed = homing.fold(0, |joints, of| joints | 1 << of.axis);
         let known = self.attached.known | self.attached.homed | homed;

@@ -41,8 +41,15 @@ pub fn with_user_commands(
     if rules.user_commands.is_empty() || switches.dry_run || !moves_metal(machine, registry) {
         return source;
     }
-    let limit = Duration::try_from_secs_f64(rules.user_command_time_limit_s).unwrap_or(Duration::MAX);
-    Box::new(Commands { source, programs: rules.user_commands.clone(), limit, held: vec![], state: State::Idle })
+    let limit =
+        Duration::try_from_secs_f64(rules.user_command_time_limit_s).unwrap_or(Duration::MAX);
+    Box::new(Commands {
+        source,
+        programs: rules.user_commands.clone(),
+        limit,
+        held: vec![],
+        state: State::Idle,
+    })
 }
 
 struct Commands {
@@ -65,8 +72,12 @@ enum State {
 impl Commands {
     /// Keeps back the first command of `items` from `from` on, and what follows it.
     fn cut(&mut self, items: &mut Vec<Item>, from: usize) {
-        let found = items[from..].iter().position(|item| matches!(item, Item::Command(_)));
-        let Some(at) = found.map(|at| from + at) else { return };
+        let found = items[from..]
+            .iter()
+            .position(|item| matches!(item, Item::Command(_)));
+        let Some(at) = found.map(|at| from + at) else {
+            return;
+        };
         let mut rest = items.split_off(at).into_iter();
         if let Some(Item::Command(command)) = rest.next() {
             self.state = State::Due(command, 0);
@@ -76,7 +87,10 @@ impl Commands {
 
     fn start(&self, command: &UserCommand) -> State {
         let Some(program) = self.programs.get(&command.number) else {
-            return State::Over(Err(format!("line {}: M{} is not listed", command.line, command.number)));
+            return State::Over(Err(format!(
+                "line {}: M{} is not listed",
+                command.line, command.number
+            )));
         };
         State::Running(Running::start(*command, program.clone(), self.limit))
     }
@@ -109,7 +123,9 @@ impl Source for Commands {
                 false
             }
             State::Running(running) => {
-                let Some(done) = running.done() else { return false };
+                let Some(done) = running.done() else {
+                    return false;
+                };
                 self.state = State::Over(done);
                 true
             }
@@ -152,7 +168,12 @@ impl Running {
         let asked = Arc::clone(&stop);
         thread::spawn(move || {
             let said = run(&command, &program, limit, &asked);
-            let place = format!("line {}: M{} ({})", command.line, command.number, program.display());
+            let place = format!(
+                "line {}: M{} ({})",
+                command.line,
+                command.number,
+                program.display()
+            );
             let _ = tell.send(said.map_err(|why| format!("{place} {why}")));
         });
         Self { done, stop }
@@ -162,7 +183,9 @@ impl Running {
         match self.done.try_recv() {
             Ok(done) => Some(done),
             Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => Some(Err("a command was given up without a word".into())),
+            Err(TryRecvError::Disconnected) => {
+                Some(Err("a command was given up without a word".into()))
+            }
         }
     }
 }
@@ -174,40 +197,80 @@ impl Drop for Running {
 }
 
 /// Runs a program to its end.
-fn run(command: &UserCommand, program: &Path, limit: Duration, stop: &AtomicBool) -> Result<(), String> {
-    let arguments = [command.p, command.q].map(|value| format!("{:.6}", value.unwrap_or(NOT_GIVEN)));
+fn run(
+    command: &UserCommand,
+    program: &Path,
+    limit: Duration,
+    stop: &AtomicBool,
+) -> Result<(), String> {
+    let arguments =
+        [command.p, command.q].map(|value| format!("{:.6}", value.unwrap_or(NOT_GIVEN)));
     let mut started = Command::new(program);
-    started.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = started.spawn().map_err(|error| format!("cannot be started: {error}"))?;
+    started
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut child = started
+        .spawn()
+        .map_err(|error| format!("cannot be started: {error}"))?;
     let tails = [(); 2].map(|()| Arc::new(Mutex::new(Vec::new())));
     let err = child.stderr.take().map(|pipe| follow(pipe, &tails[0]));
     let out = child.stdout.take().map(|pipe| follow(pipe, &tails[1]));
     let status = wait(&mut child, limit, stop)?;
     let until = Instant::now() + LAST_WORDS;
-    while Instant::now() < until && [&out, &err].into_iter().flatten().any(|reader| !reader.is_finished()) {
+    while Instant::now() < until
+        && [&out, &err]
+            .into_iter()
+            .flatten()
+            .any(|reader| !reader.is_finished())
+    {
         thread::sleep(LOOK_EVERY);
     }
     if status.success() {
         return Ok(());
     }
     // What it says of errors comes first.
-    let said = tails.iter().map(|tail| last_line(&tail.lock().unwrap_or_else(PoisonError::into_inner)));
-    let said = said.into_iter().find(|said| !said.is_empty()).unwrap_or_default();
-    Err(if said.is_empty() { format!("ended with {status}") } else { format!("ended with {status}: {said}") })
+    let said = tails
+        .iter()
+        .map(|tail| last_line(&tail.lock().unwrap_or_else(PoisonError::into_inner)));
+    let said = said
+        .into_iter()
+        .find(|said| !said.is_empty())
+        .unwrap_or_default();
+    Err(if said.is_empty() {
+        format!("ended with {status}")
+    } else {
+        format!("ended with {status}: {said}")
+    })
 }
 
-fn wait(child: &mut Child, limit: Duration, stop: &AtomicBool) -> Result<std::process::ExitStatus, String> {
+fn wait(
+    child: &mut Child,
+    limit: Duration,
+    stop: &AtomicBool,
+) -> Result<std::process::ExitStatus, String> {
     let begun = Instant::now();
     loop {
-        if let Some(status) = child.try_wait().map_err(|error| format!("cannot be watched: {error}"))? {
+        if let Some(status) = child
+            .try_wait()
+            .map_err(|error| format!("cannot be watched: {error}"))?
+        {
             return Ok(status);
         }
         let late = begun.elapsed() > limit;
         if late || stop.load(Ordering::Relaxed) {
             let _ = child.kill();
             let _ = child.wait();
-            let why = format!("had not ended after {} s ([user_commands] time_limit_s)", limit.as_secs_f64());
-            return Err(if late { why } else { "was ended with the program".into() });
+            let why = format!(
+                "had not ended after {} s ([user_commands] time_limit_s)",
+                limit.as_secs_f64()
+            );
+            return Err(if late {
+                why
+            } else {
+                "was ended with the program".into()
+            });
         }
         thread::sleep(LOOK_EVERY);
     }
@@ -229,8 +292,16 @@ fn follow(mut pipe: impl Read + Send + 'static, tail: &Arc<Mutex<Vec<u8>>>) -> J
 
 fn last_line(tail: &[u8]) -> String {
     let text = String::from_utf8_lossy(tail);
-    let line = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default().trim();
-    line.chars().filter(|c| !c.is_control()).take(MAX_LAST_LINE).collect()
+    let line = text
+        .lines()
+        .rev()
+        .find(|line| !line.trim().is_empty())
+        .unwrap_or_default()
+        .trim();
+    line.chars()
+        .filter(|c| !c.is_control())
+        .take(MAX_LAST_LINE)
+        .collect()
 }
 
 #[cfg(test)]
@@ -245,8 +316,21 @@ mod tests {
 
     impl Source for Two {
         fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-            let command = UserCommand { line: 7, before_block: 0, number: 101, p: Some(2.5), q: None };
-            items.extend([Item::Command(command), Item::Command(UserCommand { q: Some(1.0), ..command }), Item::End]);
+            let command = UserCommand {
+                line: 7,
+                before_block: 0,
+                number: 101,
+                p: Some(2.5),
+                q: None,
+            };
+            items.extend([
+                Item::Command(command),
+                Item::Command(UserCommand {
+                    q: Some(1.0),
+                    ..command
+                }),
+                Item::End,
+            ]);
             self.0 += 1;
             Ok(true)
         }
@@ -264,7 +348,13 @@ mod tests {
         std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
         let programs = BTreeMap::from([(101, program)]);
-        let mut source = Commands { source: Box::new(Two(0)), programs, limit, held: vec![], state: State::Idle };
+        let mut source = Commands {
+            source: Box::new(Two(0)),
+            programs,
+            limit,
+            held: vec![],
+            state: State::Idle,
+        };
         let mut items = Vec::new();
         while !items.iter().any(|item| matches!(item, Item::End)) {
             if source.may_go_on(true) {
@@ -282,23 +372,38 @@ mod tests {
         let said = folder.path().join("said");
         let script = format!("echo \"$1 $2\" >> {}", said.display());
         assert_eq!(driven(&script, LIMIT, folder.path()).unwrap().len(), 1);
-        assert_eq!(std::fs::read_to_string(said).unwrap(), "2.500000 -1.000000\n2.500000 1.000000\n");
+        assert_eq!(
+            std::fs::read_to_string(said).unwrap(),
+            "2.500000 -1.000000\n2.500000 1.000000\n"
+        );
     }
 
     #[test]
     fn a_command_that_fails_or_hangs_ends_the_run_with_its_last_line() {
         let folder = tempfile::tempdir().unwrap();
         let why = driven("echo first\necho no air >&2\nexit 3", LIMIT, folder.path()).unwrap_err();
-        assert!(why.starts_with("line 7: M101 (") && why.ends_with("ended with exit status: 3: no air"), "{why}");
+        assert!(
+            why.starts_with("line 7: M101 (") && why.ends_with("ended with exit status: 3: no air"),
+            "{why}"
+        );
         let why = driven("exec sleep 100", Duration::from_millis(50), folder.path()).unwrap_err();
-        assert!(why.contains("had not ended after 0.05 s ([user_commands] time_limit_s)"), "{why}");
+        assert!(
+            why.contains("had not ended after 0.05 s ([user_commands] time_limit_s)"),
+            "{why}"
+        );
     }
 
     #[test]
     fn nothing_starts_before_the_machine_stands() {
         let programs = BTreeMap::from([(101, PathBuf::from("/nonexistent"))]);
         let limit = Duration::from_secs(1);
-        let mut source = Commands { source: Box::new(Two(0)), programs, limit, held: vec![], state: State::Idle };
+        let mut source = Commands {
+            source: Box::new(Two(0)),
+            programs,
+            limit,
+            held: vec![],
+            state: State::Idle,
+        };
         source.next_items(&mut Vec::new()).unwrap();
         for driven in [false, true, false, true, false] {
             assert!(!source.may_go_on(driven));

@@ -24,7 +24,11 @@ pub(crate) struct Density {
 impl Density {
     /// No block yet; the queue is to hold `depth_s`.
     pub fn new(machine: &Machine, depth_s: f64) -> Self {
-        let rapids = machine.limits.axes().iter().map(|axis| axis.rapid_mm_per_s.powi(2));
+        let rapids = machine
+            .limits
+            .axes()
+            .iter()
+            .map(|axis| axis.rapid_mm_per_s.powi(2));
         Self {
             depth_s,
             max_feed_ratio: machine.motion.max_feed_ratio,
@@ -42,14 +46,22 @@ impl Density {
             return;
         }
         let speed = (self.max_feed_ratio * block.feed_mm_per_s).min(self.fastest_mm_per_s);
-        let time_s = if block.kind == BlockKind::Dwell { block.dwell_s } else { block.length_mm / speed };
+        let time_s = if block.kind == BlockKind::Dwell {
+            block.dwell_s
+        } else {
+            block.length_mm / speed
+        };
         self.times_s.push_back(time_s);
         self.sum_s += time_s;
         while self.sum_s > self.depth_s
             && let Some(first_s) = self.times_s.pop_front()
         {
             // What rounding leaves of a sum ends with the blocks that it was made of.
-            self.sum_s = if self.times_s.is_empty() { 0.0 } else { self.sum_s - first_s };
+            self.sum_s = if self.times_s.is_empty() {
+                0.0
+            } else {
+                self.sum_s - first_s
+            };
         }
         self.most = self.most.max(self.times_s.len());
     }
@@ -66,12 +78,20 @@ mod tests {
     use tandem_sdk::AxisVector;
 
     fn density(lengths_mm: impl IntoIterator<Item = f64>) -> usize {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machines/mill-3axis.toml");
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../examples/machines/mill-3axis.toml"
+        );
         let machine = Machine::read(path.as_ref(), &[]).unwrap();
         let mut density = Density::new(&machine, 0.501);
         for length_mm in lengths_mm {
             let kind = BlockKind::Line;
-            density.block(&Block { kind, length_mm, feed_mm_per_s: 50.0, ..Block::at(AxisVector::ZERO) });
+            density.block(&Block {
+                kind,
+                length_mm,
+                feed_mm_per_s: 50.0,
+                ..Block::at(AxisVector::ZERO)
+            });
         }
         density.entries()
     }

@@ -15,14 +15,19 @@ pub struct DryRun<S> {
 impl<S: Source> DryRun<S> {
     /// `source` at `feed_mm_per_s`.
     pub fn new(source: S, axes: Axes, feed_mm_per_s: f64) -> Self {
-        Self { source, axes, feed_mm_per_s }
+        Self {
+            source,
+            axes,
+            feed_mm_per_s,
+        }
     }
 
     /// Rapids and dwells are as they are; so is what a feed in mm/s says nothing of, and motion towards a probe or a
     /// switch, whose feed is chosen for what it may touch.
     fn set_feed(&self, block: &mut Block) {
         let way = block.end - block.start;
-        let slides = (0..self.axes.count()).any(|axis| !self.axes.is_rotary(axis) && way[axis] != 0.0);
+        let slides =
+            (0..self.axes.count()).any(|axis| !self.axes.is_rotary(axis) && way[axis] != 0.0);
         let feeds = match block.kind {
             BlockKind::Rapid | BlockKind::Dwell => false,
             BlockKind::Line => slides,
@@ -80,15 +85,35 @@ mod tests {
         let dry = DryRun::new(Nothing, axes, 50.0);
         let feed = |kind, end: [f64; 2], edge| {
             let end = AxisVector::from_slice(&end);
-            let mut block = Block { kind, end, feed_mm_per_s: 3.0, ..Block::at(AxisVector::ZERO) };
-            block.stop_on = StopOn { edge, ..StopOn::default() };
+            let mut block = Block {
+                kind,
+                end,
+                feed_mm_per_s: 3.0,
+                ..Block::at(AxisVector::ZERO)
+            };
+            block.stop_on = StopOn {
+                edge,
+                ..StopOn::default()
+            };
             dry.set_feed(&mut block);
             block.feed_mm_per_s
         };
         assert_eq!(feed(BlockKind::Line, [1.0, 0.0], Edge::None), 50.0);
-        assert_eq!(feed(BlockKind::Arc, [0.0, 0.0], Edge::None), 50.0, "a full circle");
-        assert_eq!(feed(BlockKind::Line, [0.0, 1.0], Edge::None), 3.0, "only A turns");
+        assert_eq!(
+            feed(BlockKind::Arc, [0.0, 0.0], Edge::None),
+            50.0,
+            "a full circle"
+        );
+        assert_eq!(
+            feed(BlockKind::Line, [0.0, 1.0], Edge::None),
+            3.0,
+            "only A turns"
+        );
         assert_eq!(feed(BlockKind::Rapid, [1.0, 0.0], Edge::None), 3.0);
-        assert_eq!(feed(BlockKind::Line, [1.0, 0.0], Edge::Rising), 3.0, "a probe");
+        assert_eq!(
+            feed(BlockKind::Line, [1.0, 0.0], Edge::Rising),
+            3.0,
+            "a probe"
+        );
     }
 }

@@ -10,12 +10,30 @@ const USER_OUTPUTS: u32 = 62;
 
 /// Outputs and inputs that drivers have: all where one driver has the whole machine. Host; allocates.
 pub fn of(machine: &Machine) -> (Lines, Lines) {
-    let owned: Option<Vec<&Owned>> = machine.drivers.iter().map(|driver| driver.owns.as_ref()).collect();
-    let Some(owned) = owned else { return (Lines::all(), Lines::all()) };
-    let outputs = owned.iter().flat_map(|owned| &owned.outputs).copied().filter(|output| *output < USER_OUTPUTS);
+    let owned: Option<Vec<&Owned>> = machine
+        .drivers
+        .iter()
+        .map(|driver| driver.owns.as_ref())
+        .collect();
+    let Some(owned) = owned else {
+        return (Lines::all(), Lines::all());
+    };
+    let outputs = owned
+        .iter()
+        .flat_map(|owned| &owned.outputs)
+        .copied()
+        .filter(|output| *output < USER_OUTPUTS);
     let inputs = owned.iter().flat_map(|owned| &owned.inputs).copied();
-    let named_outputs = machine.outputs.iter().map(|named| (named.output, named.name.as_str())).collect();
-    let named_inputs = machine.inputs.iter().map(|named| (named.input, named.name.as_str())).collect();
+    let named_outputs = machine
+        .outputs
+        .iter()
+        .map(|named| (named.output, named.name.as_str()))
+        .collect();
+    let named_inputs = machine
+        .inputs
+        .iter()
+        .map(|named| (named.input, named.name.as_str()))
+        .collect();
     (lines(outputs, &named_outputs), lines(inputs, &named_inputs))
 }
 
@@ -25,6 +43,12 @@ fn lines(numbers: impl Iterator<Item = u32>, names: &BTreeMap<u32, &str>) -> Lin
         Some(name) => format!("{number} ({name})"),
         None => number.to_string(),
     };
-    let all: Vec<_> = (0..u64::BITS).filter(|number| mask >> number & 1 == 1).map(shown).collect();
-    Lines { mask, shown: all.join(", ") }
+    let all: Vec<_> = (0..u64::BITS)
+        .filter(|number| mask >> number & 1 == 1)
+        .map(shown)
+        .collect();
+    Lines {
+        mask,
+        shown: all.join(", "),
+    }
 }

@@ -8,8 +8,8 @@ use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, Planner, PlannerContext,
-    PlannerDescription, StrategyContext,
+    Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, Planner,
+    PlannerContext, PlannerDescription, StrategyContext,
 };
 
 use crate::error::HostError;
@@ -35,16 +35,22 @@ pub fn interpreter_config(machine: &Machine, simulated: bool, switches: Switches
     config.start = start(machine, switches);
     config.block_delete = switches.block_delete;
     config.reference = [machine.home; 2];
-    config.time_constant_s =
-        machine.motion.time_constant_range_s.unwrap_or((machine.fine_period_s, MOST_TIME_CONSTANT_S));
+    config.time_constant_s = machine
+        .motion
+        .time_constant_range_s
+        .unwrap_or((machine.fine_period_s, MOST_TIME_CONSTANT_S));
     for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
         *travel = (axis.min_mm, axis.max_mm);
     }
-    config.probe = machine.probe.map(|probe| ProbeInput { input: probe.input, inverted: probe.inverted });
+    config.probe = machine.probe.map(|probe| ProbeInput {
+        input: probe.input,
+        inverted: probe.inverted,
+    });
     let (outputs, inputs) = lines::of(machine);
     (config.outputs, config.inputs) = (outputs, inputs);
     config.tools = machine.tools.tools.iter().map(tool).collect();
-    config.zero_length_without_table = machine.tools.path.is_none() && (machine.tools.zero_without_table || simulated);
+    config.zero_length_without_table =
+        machine.tools.path.is_none() && (machine.tools.zero_without_table || simulated);
     // Drives that are simulated take what no real one is known to have.
     if !simulated {
         (config.analog_outputs, config.analog_inputs) = (Lines::none(), Lines::none());
@@ -76,14 +82,21 @@ pub fn source(
 ) -> Result<Box<dyn Source + Send>, HostError> {
     let mut source = program(machine, stream, switches);
     if let Some(policy) = policy {
-        source = Box::new(Tuned::new(source, Tuner::new(policy.clone(), planner_on(machine, registry, joints)?)));
+        source = Box::new(Tuned::new(
+            source,
+            Tuner::new(policy.clone(), planner_on(machine, registry, joints)?),
+        ));
     }
     let source = with_user_commands(machine, registry, switches, source);
     Ok(behind_homing(machine, source, switches))
 }
 
 /// `source`, behind homing where that is asked for.
-pub fn behind_homing(machine: &Machine, source: Box<dyn Source + Send>, switches: Switches) -> Box<dyn Source + Send> {
+pub fn behind_homing(
+    machine: &Machine,
+    source: Box<dyn Source + Send>,
+    switches: Switches,
+) -> Box<dyn Source + Send> {
     match switches.home {
         Some(homing) => homing(machine, Some(source)),
         None => source,
@@ -92,7 +105,11 @@ pub fn behind_homing(machine: &Machine, source: Box<dyn Source + Send>, switches
 
 /// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
 fn program(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
-    match machine.operator.dry_run_feed_mm_per_s.filter(|_| switches.dry_run) {
+    match machine
+        .operator
+        .dry_run_feed_mm_per_s
+        .filter(|_| switches.dry_run)
+    {
         Some(feed_mm_per_s) => Box::new(DryRun::new(stream, machine.axes, feed_mm_per_s)),
         None if switches.assumes_edges => Box::new(AssumedEdges(stream)),
         None => Box::new(stream),
@@ -100,7 +117,12 @@ fn program(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Sou
 }
 
 fn tool(tool: &tandem_machine::Tool) -> Tool {
-    Tool { number: tool.number, pocket: Some(tool.pocket), offset: tool.offset, diameter_mm: tool.diameter_mm }
+    Tool {
+        number: tool.number,
+        pocket: Some(tool.pocket),
+        offset: tool.offset,
+        diameter_mm: tool.diameter_mm,
+    }
 }
 
 /// Opens the machine's planner. It keeps the limits of the joints, and their travel. Host; allocates.
@@ -109,7 +131,11 @@ fn tool(tool: &tandem_machine::Tool) -> Tool {
 /// The planner is not there or refuses its options; or what is wrong with the joints.
 pub fn planner(machine: &Machine, registry: &Registry) -> Result<Box<dyn Planner>, HostError> {
     let _watch = HangWatch::of(machine);
-    planner_on(machine, registry, &Arc::new(JointSpace::of(machine, registry)?))
+    planner_on(
+        machine,
+        registry,
+        &Arc::new(JointSpace::of(machine, registry)?),
+    )
 }
 
 /// The same on joints that are there.
@@ -130,7 +156,9 @@ pub fn planner_on(
         joint_lanes: joints.lanes(),
     };
     let choice = &machine.planner;
-    let planner = registry.planner(choice, &context).map_err(|e| e.at(machine, "planner"))?;
+    let planner = registry
+        .planner(choice, &context)
+        .map_err(|e| e.at(machine, "planner"))?;
     Ok(CoupledJoints::around(planner, joints, machine))
 }
 
@@ -154,11 +182,22 @@ pub fn feed(
     if strategy.is_none() && policy.is_none() {
         return Ok(None);
     }
-    let signals = strategy.as_ref().map_or::<&[&str], _>(&[], |strategy| strategy.signals());
-    let policy = policy.map(|p| (p.clone(), Means::new(machine.axes, machine.fine_period_s, length_mm, signals)));
+    let signals = strategy
+        .as_ref()
+        .map_or::<&[&str], _>(&[], |strategy| strategy.signals());
+    let policy = policy.map(|p| {
+        (
+            p.clone(),
+            Means::new(machine.axes, machine.fine_period_s, length_mm, signals),
+        )
+    });
     let per_window = machine.fine_periods_per_rough as usize;
     let mut runner = FeedRunner::new(strategy, policy, per_window, machine.motion.max_feed_ratio);
-    runner.name = machine.feed_strategy.as_ref().map(|choice| choice.plugin.clone()).unwrap_or_default();
+    runner.name = machine
+        .feed_strategy
+        .as_ref()
+        .map(|choice| choice.plugin.clone())
+        .unwrap_or_default();
     Ok(Some(runner))
 }
 
@@ -168,7 +207,9 @@ fn strategy(
     registry: &Registry,
     joints: &JointSpace,
 ) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
-    let Some(choice) = &machine.feed_strategy else { return Ok(None) };
+    let Some(choice) = &machine.feed_strategy else {
+        return Ok(None);
+    };
     let context = StrategyContext {
         axis_count: machine.axes.count() as u32,
         axes: machine.axes,
@@ -189,17 +230,31 @@ const LEFT_IN_TURNS: f64 = 0.6;
 pub fn queue_depth_s(machine: &Machine, joints: &JointSpace, order: u32) -> f64 {
     let stop_s = |limits: &AxisLimits| {
         let speed = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
-        let ramp_s = if order >= 3 { limits.acceleration_mm_per_s2 / limits.jerk_mm_per_s3 } else { 0.0 };
-        speed / (LEFT_IN_TURNS * STOP_SHARE * limits.acceleration_mm_per_s2) + 2.0 * ramp_s / STOP_JERK_SHARE
+        let ramp_s = if order >= 3 {
+            limits.acceleration_mm_per_s2 / limits.jerk_mm_per_s3
+        } else {
+            0.0
+        };
+        speed / (LEFT_IN_TURNS * STOP_SHARE * limits.acceleration_mm_per_s2)
+            + 2.0 * ramp_s / STOP_JERK_SHARE
     };
-    let worst_s = joints.limits.axes().iter().map(stop_s).filter(|stop_s| stop_s.is_finite()).fold(0.0, f64::max);
+    let worst_s = joints
+        .limits
+        .axes()
+        .iter()
+        .map(stop_s)
+        .filter(|stop_s| stop_s.is_finite())
+        .fold(0.0, f64::max);
     worst_s + 5.0 * machine.rough_period_s + 3.0 * machine.fine_period_s
 }
 
 /// Program time that the planner is asked for at a time, s: whole rough periods, one where a ring of `segments` holds
 /// `depth_s` in pieces that short. Each piece is a segment at least; a quarter of the ring is for these cuts.
 pub fn advance_s(rough_period_s: f64, depth_s: f64, segments: usize) -> f64 {
-    rough_period_s * (4.0 * depth_s / (rough_period_s * segments as f64)).ceil().max(1.0)
+    rough_period_s
+        * (4.0 * depth_s / (rough_period_s * segments as f64))
+            .ceil()
+            .max(1.0)
 }
 
 /// The fine loop's view of the machine.
@@ -211,11 +266,16 @@ pub fn fine_config(
     switches: Switches,
 ) -> FineConfig {
     let periods = |seconds: f64| (seconds / machine.fine_period_s).ceil() as u64;
-    let limited = machine.homing.iter().filter(|homing| homing.max_torque_percent.is_some());
+    let limited = machine
+        .homing
+        .iter()
+        .filter(|homing| homing.max_torque_percent.is_some());
     FineConfig {
         period_s: machine.fine_period_s,
         limits: joints.limits,
-        linear: (0..machine.axes.count()).filter(|&i| !machine.axes.is_rotary(i)).fold(0, |mask, i| mask | 1 << i),
+        linear: (0..machine.axes.count())
+            .filter(|&i| !machine.axes.is_rotary(i))
+            .fold(0, |mask, i| mask | 1 << i),
         joints: joints.fine(),
         speed_difference_mm_per_s: joints.speed_difference_mm_per_s(planner),
         order: planner.order,
@@ -226,12 +286,18 @@ pub fn fine_config(
         position: joints.with_lanes(&machine.start),
         max_feed_ratio: machine.motion.max_feed_ratio,
         max_following_error_mm: joints.max_following_error_mm(),
-        missed: MissedLimits { in_a_row: u64::from(machine.max_missed_periods), share: machine.max_missed_share },
+        missed: MissedLimits {
+            in_a_row: u64::from(machine.max_missed_periods),
+            share: machine.max_missed_share,
+        },
         kept_outputs: machine.kept_outputs(),
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
         unhomed: if switches.home.is_some() {
-            machine.homing.iter().fold(0, |mask, homing| mask | 1 << homing.axis)
+            machine
+                .homing
+                .iter()
+                .fold(0, |mask, homing| mask | 1 << homing.axis)
         } else {
             0
         },

@@ -86,17 +86,31 @@ impl Plugins {
         let joints = Arc::new(JointSpace::of(machine, registry)?);
         let planner = parts::planner_on(machine, registry, &joints)?;
         let claim = Claim::new(Drives::of(machine, registry, &joints)?);
-        Ok(Self { watch, joints, planner, claim })
+        Ok(Self {
+            watch,
+            joints,
+            planner,
+            claim,
+        })
     }
 
     /// Makes those of a job on drives that are claimed, on a machine that stays. Host; allocates.
     ///
     /// # Errors
     /// One of them is not there, or refuses its options.
-    fn on_drives(machine: &Machine, registry: &Registry, roster: &Roster) -> Result<Self, HostError> {
+    fn on_drives(
+        machine: &Machine,
+        registry: &Registry,
+        roster: &Roster,
+    ) -> Result<Self, HostError> {
         let joints = Arc::new(JointSpace::of(machine, registry)?);
         let planner = parts::planner_on(machine, registry, &joints)?;
-        Ok(Self { watch: None, joints, planner, claim: Claim::elsewhere(roster.clone()) })
+        Ok(Self {
+            watch: None,
+            joints,
+            planner,
+            claim: Claim::elsewhere(roster.clone()),
+        })
     }
 
     /// Whether they go with each other, and with what is asked of them.
@@ -128,9 +142,15 @@ impl Plugins {
     /// # Errors
     /// What `[faults]` says wrongly.
     pub fn add_faults(&mut self, machine: &Machine) -> Result<(), HostError> {
-        let Some(table) = &machine.faults else { return Ok(()) };
-        let joints = Joints { rotary: self.joints.rotary(), count: self.joints.count() };
-        let faults = Faults::read(table, &joints).map_err(|wrong| refusal(machine, &wrong.key, wrong.cause))?;
+        let Some(table) = &machine.faults else {
+            return Ok(());
+        };
+        let joints = Joints {
+            rotary: self.joints.rotary(),
+            count: self.joints.count(),
+        };
+        let faults = Faults::read(table, &joints)
+            .map_err(|wrong| refusal(machine, &wrong.key, wrong.cause))?;
         self.claim.add_faults(faults);
         Ok(())
     }
@@ -178,7 +198,8 @@ impl Ready {
         // Only real drives know where a program on them begins.
         let asks_first = claims && !simulated;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let mut passed = (!asks_first).then(|| Passed::of(&machine, &plugins, &mut program, simulated, switches));
+        let mut passed = (!asks_first)
+            .then(|| Passed::of(&machine, &plugins, &mut program, simulated, switches));
         if let Some(Err(refused)) = passed {
             return Err(refused);
         }
@@ -196,10 +217,32 @@ impl Ready {
             None => Passed::of(&machine, &plugins, &mut program, simulated, switches)?,
         };
         let name = program.name().to_string();
-        let stream = Stream::new(program, &parts::interpreter_config(&machine, simulated, switches))?;
-        let source = parts::source(&machine, registry, stream, switches, policy.as_ref(), &plugins.joints)?;
-        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
-        Ok(Self { entries: passed.entries, ..ready })
+        let stream = Stream::new(
+            program,
+            &parts::interpreter_config(&machine, simulated, switches),
+        )?;
+        let source = parts::source(
+            &machine,
+            registry,
+            stream,
+            switches,
+            policy.as_ref(),
+            &plugins.joints,
+        )?;
+        let ready = Self::new(
+            machine,
+            registry,
+            Some(name),
+            source,
+            policy,
+            plugins,
+            passed.report,
+            switches,
+        )?;
+        Ok(Self {
+            entries: passed.entries,
+            ..ready
+        })
     }
 
     /// Checks the whole program and makes everything for it, on drives that another has claimed, from where the machine stands
@@ -226,9 +269,28 @@ impl Ready {
         let name = program.name().to_string();
         let mut stream = Stream::new(program, &config)?;
         stream.tell(memory.ledger.clone());
-        let source = parts::source(&machine, registry, stream, switches, policy.as_ref(), &plugins.joints)?;
-        let ready = Self::new(machine, registry, Some(name), source, policy, plugins, passed.report, switches)?;
-        Ok(Self { entries: passed.entries, ..ready })
+        let source = parts::source(
+            &machine,
+            registry,
+            stream,
+            switches,
+            policy.as_ref(),
+            &plugins.joints,
+        )?;
+        let ready = Self::new(
+            machine,
+            registry,
+            Some(name),
+            source,
+            policy,
+            plugins,
+            passed.report,
+            switches,
+        )?;
+        Ok(Self {
+            entries: passed.entries,
+            ..ready
+        })
     }
 
     /// Makes everything for a run of what `source` gives, which begins where the machine that it is given stands; the drives are
@@ -279,7 +341,16 @@ impl Ready {
         feed(&machine, registry, &plugins.joints, None, 0.0)?;
         let (machine, plugins) = plugins.attach(machine, registry, switches)?;
         let source = source(&machine);
-        Self::new(machine, registry, name, source, None, plugins, CheckReport::default(), switches)
+        Self::new(
+            machine,
+            registry,
+            name,
+            source,
+            None,
+            plugins,
+            CheckReport::default(),
+            switches,
+        )
     }
 
     /// Makes what every run needs for the parts that differ between runs. Host; allocates.
@@ -294,7 +365,13 @@ impl Ready {
         checked: CheckReport,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        let feed = feed(&machine, registry, &plugins.joints, policy.as_ref(), checked.length_mm)?;
+        let feed = feed(
+            &machine,
+            registry,
+            &plugins.joints,
+            policy.as_ref(),
+            checked.length_mm,
+        )?;
         Ok(Self {
             // Its own: a plugin that panics on the soft side does not take the fine loop's with it.
             kinematics: JointSpace::of(&machine, registry)?.into_kinematics(),
@@ -331,16 +408,36 @@ impl Passed {
         simulated: bool,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        Self::with(machine, plugins, program, &parts::interpreter_config(machine, simulated, switches))
+        Self::with(
+            machine,
+            plugins,
+            program,
+            &parts::interpreter_config(machine, simulated, switches),
+        )
     }
 
     /// The same for a program that begins as `config` says.
-    fn with(machine: &Machine, plugins: &Plugins, program: &mut Program, config: &Config) -> Result<Self, HostError> {
-        let depth_s = parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
+    fn with(
+        machine: &Machine,
+        plugins: &Plugins,
+        program: &mut Program,
+        config: &Config,
+    ) -> Result<Self, HostError> {
+        let depth_s =
+            parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
         let mut density = Density::new(machine, depth_s);
-        let report = first_pass(machine, plugins.planner.as_ref(), program, config, &mut density)?;
+        let report = first_pass(
+            machine,
+            plugins.planner.as_ref(),
+            program,
+            config,
+            &mut density,
+        )?;
         if report.is_ok() {
-            Ok(Self { report, entries: density.entries() })
+            Ok(Self {
+                report,
+                entries: density.entries(),
+            })
         } else {
             Err(HostError::Check(Box::new(report)))
         }
@@ -433,5 +530,9 @@ const HOMING: &str = "(homing)";
 
 fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
     let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;
-    format!("the spindle is asked for {:.0} rpm; it turns at most at {:.0}", rpm(asked_rad_per_s), rpm(most_rad_per_s))
+    format!(
+        "the spindle is asked for {:.0} rpm; it turns at most at {:.0}",
+        rpm(asked_rad_per_s),
+        rpm(most_rad_per_s)
+    )
 }

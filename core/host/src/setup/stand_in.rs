@@ -26,18 +26,36 @@ pub fn with_stand_ins(
             continue;
         }
         let (title, section) = (driver.title(), driver.section());
-        let inputs_at_rest = if driver.stand_in.is_none() { inputs_at_rest(&machine) } else { 0 };
-        let stand_in = driver.stand_in.clone().or_else(|| ideal.map(PluginChoice::named));
+        let inputs_at_rest = if driver.stand_in.is_none() {
+            inputs_at_rest(&machine)
+        } else {
+            0
+        };
+        let stand_in = driver
+            .stand_in
+            .clone()
+            .or_else(|| ideal.map(PluginChoice::named));
         let Some(choice) = stand_in else {
             let cause = format!("driver {title} moves metal, and nothing stands in for it");
             return Err(refusal(&machine, &format!("{section}.stand_in"), cause));
         };
-        let replaced = DriverChoice { choice, inputs_at_rest, ..driver.clone() };
+        let replaced = DriverChoice {
+            choice,
+            inputs_at_rest,
+            ..driver.clone()
+        };
         if is_real(&replaced, registry) {
             let cause = format!("{} moves metal itself", replaced.choice.plugin);
-            return Err(refusal(&machine, &format!("{section}.stand_in.plugin"), cause));
+            return Err(refusal(
+                &machine,
+                &format!("{section}.stand_in.plugin"),
+                cause,
+            ));
         }
-        notes.push(format!("driver {title} moves metal: {} stands in for it", replaced.choice.plugin));
+        notes.push(format!(
+            "driver {title} moves metal: {} stands in for it",
+            replaced.choice.plugin
+        ));
         machine.drivers[index] = replaced;
     }
     Ok((machine, notes))
@@ -45,10 +63,23 @@ pub fn with_stand_ins(
 
 /// Inputs that are 1 as long as nothing trips them: an inverted probe or home switch, and what is normally closed.
 fn inputs_at_rest(machine: &Machine) -> u64 {
-    let probe = machine.probe.filter(|probe| probe.inverted).map(|probe| probe.input);
-    let switches = machine.homing.iter().filter_map(AxisHoming::switch).filter(|switch| switch.inverted);
-    let roles = machine.inputs.iter().filter(|input| input.role.is_some() && input.normally_closed);
-    let all = probe.into_iter().chain(switches.map(|switch| switch.input)).chain(roles.map(|input| input.input));
+    let probe = machine
+        .probe
+        .filter(|probe| probe.inverted)
+        .map(|probe| probe.input);
+    let switches = machine
+        .homing
+        .iter()
+        .filter_map(AxisHoming::switch)
+        .filter(|switch| switch.inverted);
+    let roles = machine
+        .inputs
+        .iter()
+        .filter(|input| input.role.is_some() && input.normally_closed);
+    let all = probe
+        .into_iter()
+        .chain(switches.map(|switch| switch.input))
+        .chain(roles.map(|input| input.input));
     all.fold(0, |mask, input| mask | 1 << input.min(63))
 }
 
@@ -78,6 +109,10 @@ impl<S: Source> Source for AssumedEdges<S> {
         if rest.cause != RestCause::Missed {
             return self.0.provide_rest(rest);
         }
-        self.0.provide_rest(&Rest { cause: RestCause::Edge, latch: Some(rest.position), ..*rest })
+        self.0.provide_rest(&Rest {
+            cause: RestCause::Edge,
+            latch: Some(rest.position),
+            ..*rest
+        })
     }
 }

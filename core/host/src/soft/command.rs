@@ -68,10 +68,14 @@ impl Timed {
     pub fn parse(line: &str) -> Result<Self, String> {
         let mut fields = line.split(',').map(str::trim);
         let tick = fields.next().unwrap_or_default();
-        let tick = tick.parse().map_err(|_| format!("{tick:?} is not the number of a fine period"))?;
+        let tick = tick
+            .parse()
+            .map_err(|_| format!("{tick:?} is not the number of a fine period"))?;
         let name = fields.next().ok_or("a line is tick,command[,value]")?;
         let command = Command::parse(name, fields.next())?;
-        fields.next().map_or(Ok(Self { tick, command }), |more| Err(format!("{more:?} is one field too many")))
+        fields.next().map_or(Ok(Self { tick, command }), |more| {
+            Err(format!("{more:?} is one field too many"))
+        })
     }
 }
 
@@ -120,12 +124,12 @@ impl Command {
     /// The ratio and what it may be.
     pub fn check(self, max_feed_ratio: f64) -> Result<(), String> {
         match self {
-            Self::FeedOverride(ratio) if ratio > max_feed_ratio => {
-                Err(format!("a feed override of {ratio} is above motion.max_feed_ratio, which is {max_feed_ratio}"))
-            }
-            Self::RapidOverride(ratio) if ratio > 1.0 => {
-                Err(format!("a rapid override of {ratio} is above 1: rapids run at the axes' rapid feeds"))
-            }
+            Self::FeedOverride(ratio) if ratio > max_feed_ratio => Err(format!(
+                "a feed override of {ratio} is above motion.max_feed_ratio, which is {max_feed_ratio}"
+            )),
+            Self::RapidOverride(ratio) if ratio > 1.0 => Err(format!(
+                "a rapid override of {ratio} is above 1: rapids run at the axes' rapid feeds"
+            )),
             _ => Ok(()),
         }
     }
@@ -137,13 +141,19 @@ impl Command {
     pub fn parse(name: &str, value: Option<&str>) -> Result<Self, String> {
         let number = || -> Result<f64, String> {
             let text = value.ok_or_else(|| format!("{name} needs a value"))?;
-            let ratio = text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0);
+            let ratio = text
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite() && *v >= 0.0);
             ratio.ok_or_else(|| format!("{text:?} is not a number of zero or more"))
         };
         let switch = || match value {
             Some("0") => Ok(false),
             Some("1") => Ok(true),
-            other => Err(format!("{name} is switched with 1 or 0, not {:?}", other.unwrap_or_default())),
+            other => Err(format!(
+                "{name} is switched with 1 or 0, not {:?}",
+                other.unwrap_or_default()
+            )),
         };
         let command = match name {
             "hold" => Self::Hold,
@@ -164,7 +174,9 @@ impl Command {
                 ));
             }
         };
-        value.map_or(Ok(command), |more| Err(format!("{name} takes no value, not {more:?}")))
+        value.map_or(Ok(command), |more| {
+            Err(format!("{name} takes no value, not {more:?}"))
+        })
     }
 }
 
@@ -174,7 +186,13 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let lines = ["1,hold", "2,resume", "3,feed-override,0.1", "4,rapid-override,1", "5,optional-stop,1"];
+        let lines = [
+            "1,hold",
+            "2,resume",
+            "3,feed-override,0.1",
+            "4,rapid-override,1",
+            "5,optional-stop,1",
+        ];
         for line in lines.into_iter().chain([
             "6,single-block,0",
             "7,emergency-stop",
@@ -188,10 +206,34 @@ mod tests {
 
     #[test]
     fn lines_of_a_command_file() {
-        assert_eq!(Timed::parse("120, hold"), Ok(Timed { tick: 120, command: Command::Hold }));
-        assert_eq!(Timed::parse("3,feed-override,0.5"), Ok(Timed { tick: 3, command: Command::FeedOverride(0.5) }));
-        assert_eq!(Timed::parse("7,single-block,1"), Ok(Timed { tick: 7, command: Command::SingleBlock(true) }));
-        assert_eq!(Timed::parse("8,optional-stop,0"), Ok(Timed { tick: 8, command: Command::OptionalStop(false) }));
+        assert_eq!(
+            Timed::parse("120, hold"),
+            Ok(Timed {
+                tick: 120,
+                command: Command::Hold
+            })
+        );
+        assert_eq!(
+            Timed::parse("3,feed-override,0.5"),
+            Ok(Timed {
+                tick: 3,
+                command: Command::FeedOverride(0.5)
+            })
+        );
+        assert_eq!(
+            Timed::parse("7,single-block,1"),
+            Ok(Timed {
+                tick: 7,
+                command: Command::SingleBlock(true)
+            })
+        );
+        assert_eq!(
+            Timed::parse("8,optional-stop,0"),
+            Ok(Timed {
+                tick: 8,
+                command: Command::OptionalStop(false)
+            })
+        );
         for bad in [
             "",
             "x,hold",

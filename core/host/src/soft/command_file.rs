@@ -17,20 +17,28 @@ pub fn parse_commands(name: &str, text: &str, max_feed_ratio: f64) -> Result<Vec
     for (number, line) in (1..).zip(text.lines()).filter(told) {
         let at = |cause: String| format!("{name}:{number}: {cause}");
         let allowed = |timed: Timed| match timed.command {
-            Command::Reset => {
-                Err("a fault ends its run, so there is none to reset in it: run --reset does before it".into())
-            }
+            Command::Reset => Err(
+                "a fault ends its run, so there is none to reset in it: run --reset does before it"
+                    .into(),
+            ),
             command => command.check(max_feed_ratio).map(|()| timed),
         };
         match (Timed::parse(line).and_then(allowed), commands.last()) {
             (Err(cause), _) => errors.push(at(cause)),
             (Ok(now), Some(last)) if now.tick < last.tick => {
-                errors.push(at(format!("tick {} comes after tick {}", now.tick, last.tick)));
+                errors.push(at(format!(
+                    "tick {} comes after tick {}",
+                    now.tick, last.tick
+                )));
             }
             (Ok(now), _) => commands.push(now),
         }
     }
-    if errors.is_empty() { Ok(commands) } else { Err(listed(&errors)) }
+    if errors.is_empty() {
+        Ok(commands)
+    } else {
+        Err(listed(&errors))
+    }
 }
 
 /// The first errors, a line each, and how many more there are.
@@ -52,9 +60,21 @@ mod tests {
         let errors = parse_commands("c.csv", text, 1.2).unwrap_err();
         let lines: Vec<&str> = errors.lines().collect();
         assert_eq!(lines.len(), 4, "{errors}");
-        assert!(lines[3].starts_with("c.csv:7: a fault ends its run"), "{errors}");
-        assert!(lines[0].starts_with("c.csv:4: tick 4 comes after tick 5"), "{errors}");
-        assert!(lines[1].starts_with("c.csv:5: a feed override of 1.3"), "{errors}");
-        assert!(lines[2].starts_with("c.csv:6: no command is called"), "{errors}");
+        assert!(
+            lines[3].starts_with("c.csv:7: a fault ends its run"),
+            "{errors}"
+        );
+        assert!(
+            lines[0].starts_with("c.csv:4: tick 4 comes after tick 5"),
+            "{errors}"
+        );
+        assert!(
+            lines[1].starts_with("c.csv:5: a feed override of 1.3"),
+            "{errors}"
+        );
+        assert!(
+            lines[2].starts_with("c.csv:6: no command is called"),
+            "{errors}"
+        );
     }
 }

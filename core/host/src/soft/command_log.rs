@@ -21,7 +21,10 @@ impl CommandLog {
         let (tick, last, now) = (sample.tick, self.last, sample.given);
         self.last = now;
         let changed = (now != last).then(|| changes(&last, &now));
-        changed.into_iter().flatten().map(move |command| Timed { tick, command })
+        changed
+            .into_iter()
+            .flatten()
+            .map(move |command| Timed { tick, command })
     }
 }
 
@@ -30,9 +33,12 @@ fn changes(last: &OperatorInputs, now: &OperatorInputs) -> impl Iterator<Item = 
     // An abort ends the hold by itself.
     let resumed = last.hold && !now.hold && !last.abort;
     let changes = [
-        (now.feed_override != last.feed_override).then_some(Command::FeedOverride(now.feed_override)),
-        (now.rapid_override != last.rapid_override).then_some(Command::RapidOverride(now.rapid_override)),
-        (now.optional_stop != last.optional_stop).then_some(Command::OptionalStop(now.optional_stop)),
+        (now.feed_override != last.feed_override)
+            .then_some(Command::FeedOverride(now.feed_override)),
+        (now.rapid_override != last.rapid_override)
+            .then_some(Command::RapidOverride(now.rapid_override)),
+        (now.optional_stop != last.optional_stop)
+            .then_some(Command::OptionalStop(now.optional_stop)),
         (now.single_block != last.single_block).then_some(Command::SingleBlock(now.single_block)),
         (now.hold && !last.hold).then_some(Command::Hold),
         resumed.then_some(Command::Resume),
@@ -49,14 +55,58 @@ mod tests {
     #[test]
     fn each_change_is_told_once_in_its_tick() {
         let mut log = CommandLog::new(OperatorInputs::default());
-        let mut told = |tick, given| log.sample(&Sample { tick, given, ..Sample::default() }).collect::<Vec<_>>();
+        let mut told = |tick, given| {
+            log.sample(&Sample {
+                tick,
+                given,
+                ..Sample::default()
+            })
+            .collect::<Vec<_>>()
+        };
         assert!(told(0, OperatorInputs::default()).is_empty());
-        let held = OperatorInputs { hold: true, feed_override: 0.5, ..OperatorInputs::default() };
-        let expected = [Command::FeedOverride(0.5), Command::Hold].map(|command| Timed { tick: 1, command });
+        let held = OperatorInputs {
+            hold: true,
+            feed_override: 0.5,
+            ..OperatorInputs::default()
+        };
+        let expected =
+            [Command::FeedOverride(0.5), Command::Hold].map(|command| Timed { tick: 1, command });
         assert_eq!(told(1, held), expected);
         assert!(told(2, held).is_empty());
-        assert_eq!(told(3, OperatorInputs { hold: false, ..held }), [Timed { tick: 3, command: Command::Resume }]);
-        assert_eq!(told(4, OperatorInputs { abort: true, ..held })[1].command, Command::Abort);
-        assert!(told(5, OperatorInputs { hold: false, ..held }).is_empty(), "the abort has ended the hold");
+        assert_eq!(
+            told(
+                3,
+                OperatorInputs {
+                    hold: false,
+                    ..held
+                }
+            ),
+            [Timed {
+                tick: 3,
+                command: Command::Resume
+            }]
+        );
+        assert_eq!(
+            told(
+                4,
+                OperatorInputs {
+                    abort: true,
+                    ..held
+                }
+            )[1]
+            .command,
+            Command::Abort
+        );
+        assert!(
+            told(
+                5,
+                OperatorInputs {
+                    hold: false,
+                    ..held
+                }
+            )
+            .is_empty(),
+            "the abort has ended the hold"
+        );
     }
 }

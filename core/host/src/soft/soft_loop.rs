@@ -163,7 +163,15 @@ impl<'a> SoftLoop<'a> {
     /// The rough loop, and who looks at what it does.
     fn with_tee(&mut self) -> (&mut RoughLoop, Tee<'_>) {
         let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
-        (&mut self.rough, Tee { monitor: &mut self.monitor, observer: self.observer, aborted, skips_homing })
+        (
+            &mut self.rough,
+            Tee {
+                monitor: &mut self.monitor,
+                observer: self.observer,
+                aborted,
+                skips_homing,
+            },
+        )
     }
 
     /// Takes the rests that have been reported, where no rough period follows to do it: the machine may be over.
@@ -178,19 +186,27 @@ impl<'a> SoftLoop<'a> {
     /// Puts a new policy script in place, if there is one.
     fn serve_policy(&mut self) {
         let asked = self.host.controls.reload_policy.swap(false, Relaxed);
-        let Some(reloader) = &self.reloader else { return };
+        let Some(reloader) = &self.reloader else {
+            return;
+        };
         reloader.serve(asked);
         self.tell_policy_notes();
     }
 
     /// Tells what the policy script did since the last time.
     pub fn tell_policy_notes(&mut self) {
-        let Some(reloader) = &self.reloader else { return };
+        let Some(reloader) = &self.reloader else {
+            return;
+        };
         let notes = reloader.take_notes();
         for note in &notes {
             self.observer.note(note);
         }
-        self.untold = if notes.is_empty() { self.untold + 1 } else { TOLD_EVERY };
+        self.untold = if notes.is_empty() {
+            self.untold + 1
+        } else {
+            TOLD_EVERY
+        };
         if self.untold >= TOLD_EVERY {
             self.observer.policy(&reloader.summary());
             self.untold = 0;
@@ -227,15 +243,25 @@ impl<'a> SoftLoop<'a> {
     /// Gives a command of the command file to the fine loop, or does what it says of the rough loop.
     pub fn give(&mut self, timed: &Timed) {
         timed.command.give(&self.host.controls);
-        if matches!(timed.command, Command::StallRough(_) | Command::ReloadPolicy) {
+        if matches!(
+            timed.command,
+            Command::StallRough(_) | Command::ReloadPolicy
+        ) {
             self.observer.command(timed);
         }
     }
 
     /// Takes the samples that have come. They are looked at where they lie: a sample is large.
     pub fn drain(&mut self) {
-        let HostEnd { samples, ratios, requests, .. } = &mut self.host;
-        let Ok(come) = samples.read_chunk(samples.slots()) else { return };
+        let HostEnd {
+            samples,
+            ratios,
+            requests,
+            ..
+        } = &mut self.host;
+        let Ok(come) = samples.read_chunk(samples.slots()) else {
+            return;
+        };
         let (first, second) = come.as_slices();
         for sample in first.iter().chain(second) {
             for command in self.commands.sample(sample) {
@@ -243,7 +269,8 @@ impl<'a> SoftLoop<'a> {
             }
             let deviation_mm = self.monitor.sample(sample);
             let (signals, count) = signals(self.feed.as_ref(), &self.analog, sample);
-            self.observer.sample(sample, deviation_mm, &signals[..count]);
+            self.observer
+                .sample(sample, deviation_mm, &signals[..count]);
             if let (Some(feed), None) = (&mut self.feed, &self.soft_error)
                 && let Some(note) = feed.sample(sample, ratios, requests)
             {
@@ -257,14 +284,20 @@ impl<'a> SoftLoop<'a> {
     /// Where a file cannot be written any further: the motion goes on, or stops on the path, as the machine file says. Who
     /// is there may resume it; without anybody the run ends at that rest.
     fn serve_broken_record(&mut self) {
-        let Some(words) = self.observer.broken_record() else { return };
+        let Some(words) = self.observer.broken_record() else {
+            return;
+        };
         match self.on_record_error {
             RecordErrorMode::Continue => {
-                self.observer.note("the motion goes on without that file (recorder.on_error = \"continue\")");
+                self.observer.note(
+                    "the motion goes on without that file (recorder.on_error = \"continue\")",
+                );
             }
             RecordErrorMode::Hold if self.observer.is_attended() => {
                 self.host.controls.hold.store(true, Relaxed);
-                self.observer.note("feed hold (recorder.on_error = \"hold\"): a resume goes on without that file");
+                self.observer.note(
+                    "feed hold (recorder.on_error = \"hold\"): a resume goes on without that file",
+                );
             }
             RecordErrorMode::Hold => self.fail(format!("recorder: {words}")),
         }
@@ -279,7 +312,9 @@ impl<'a> SoftLoop<'a> {
                 StopAnswer::Wait => return,
                 StopAnswer::GoOn => {}
                 StopAnswer::Nobody => {
-                    self.fail(format!("line {line}: the program waits for an operator, and there is none"));
+                    self.fail(format!(
+                        "line {line}: the program waits for an operator, and there is none"
+                    ));
                 }
             }
             self.host.controls.program_hold.store(false, Relaxed);
@@ -288,7 +323,10 @@ impl<'a> SoftLoop<'a> {
 
     /// Nothing will move any more, and nothing is left that could change that.
     pub fn give_up(&mut self) {
-        self.fail("nothing has moved for a minute of machine time, and no command is left to change that".to_string());
+        self.fail(
+            "nothing has moved for a minute of machine time, and no command is left to change that"
+                .to_string(),
+        );
     }
 
     /// Whether an operator may still change something.
@@ -320,8 +358,14 @@ impl<'a> SoftLoop<'a> {
 }
 
 /// The strategy's last signals, and after them the `analog` inputs that have a name.
-fn signals(feed: Option<&FeedRunner>, analog: &[usize], sample: &Sample) -> ([f64; MAX_SIGNALS], usize) {
-    let mut signals = feed.and_then(|s| s.answer).map_or([0.0; MAX_SIGNALS], |a| a.signals);
+fn signals(
+    feed: Option<&FeedRunner>,
+    analog: &[usize],
+    sample: &Sample,
+) -> ([f64; MAX_SIGNALS], usize) {
+    let mut signals = feed
+        .and_then(|s| s.answer)
+        .map_or([0.0; MAX_SIGNALS], |a| a.signals);
     let own = feed.map_or(0, |s| s.signals().len());
     let count = (own + analog.len()).min(MAX_SIGNALS);
     for (to, from) in signals[own..count].iter_mut().zip(analog) {

@@ -47,7 +47,9 @@ impl FeedRunner {
 
     /// Names of the strategy's signals.
     pub fn signals(&self) -> &'static [&'static str] {
-        self.strategy.as_ref().map_or(&[], |strategy| strategy.signals())
+        self.strategy
+            .as_ref()
+            .map_or(&[], |strategy| strategy.signals())
     }
 
     /// Takes a sample; where it completes a rough period k, the lesser of the ratios that strategy and policy ask for goes
@@ -78,7 +80,10 @@ impl FeedRunner {
                     (strategy, policy) => strategy.or(policy).unwrap_or(1.0),
                 };
                 // A full ring means that 64 ratios wait for their tick: the fine loop has stopped, and the last one stands.
-                let _ = ratios.push(Ratio { tick, ratio: ratio.clamp(0.0, self.max_ratio) });
+                let _ = ratios.push(Ratio {
+                    tick,
+                    ratio: ratio.clamp(0.0, self.max_ratio),
+                });
                 match answer.map_or(Request::None, |answer| answer.request) {
                     Request::None => None,
                     Request::Hold => Some(RequestKind::Hold),
@@ -98,21 +103,41 @@ impl FeedRunner {
 
     /// Who asks for a hold, where, and what its signals say.
     fn words_of_hold(&self, sample: &Sample, tick: u64) -> String {
-        let values = self.answer.map_or([0.0; MAX_SIGNALS], |answer| answer.signals);
-        let signals: Vec<String> =
-            self.signals().iter().zip(values).map(|(name, value)| format!("{name} = {value:.4}")).collect();
-        let because = if signals.is_empty() { String::new() } else { format!(": {}", signals.join(", ")) };
-        format!("line {}: the feed strategy {} asks for a hold, at tick {tick}{because}", sample.line, self.name)
+        let values = self
+            .answer
+            .map_or([0.0; MAX_SIGNALS], |answer| answer.signals);
+        let signals: Vec<String> = self
+            .signals()
+            .iter()
+            .zip(values)
+            .map(|(name, value)| format!("{name} = {value:.4}"))
+            .collect();
+        let because = if signals.is_empty() {
+            String::new()
+        } else {
+            format!(": {}", signals.join(", "))
+        };
+        format!(
+            "line {}: the feed strategy {} asks for a hold, at tick {tick}{because}",
+            sample.line, self.name
+        )
     }
 
     fn ask(&mut self, period: u64) -> Result<Option<Answer>, String> {
-        let Some(strategy) = &mut self.strategy else { return Ok(None) };
+        let Some(strategy) = &mut self.strategy else {
+            return Ok(None);
+        };
         let window = Window::new(period, &self.window);
         let answer = strategy.update(&window).map_err(|e| e.to_string())?;
         if !answer.ratio.is_finite() {
             return Err(format!("update answers the ratio {}", answer.ratio));
         }
-        match strategy.signals().iter().zip(answer.signals).find(|(_, value)| !value.is_finite()) {
+        match strategy
+            .signals()
+            .iter()
+            .zip(answer.signals)
+            .find(|(_, value)| !value.is_finite())
+        {
             Some((name, value)) => Err(format!("update answers {value} for the signal {name}")),
             None => Ok(Some(answer)),
         }
@@ -120,7 +145,10 @@ impl FeedRunner {
 
     fn ask_policy(&mut self, period: u64) -> Option<f64> {
         let (policy, means) = self.policy.as_mut()?;
-        let strategy = self.answer.as_ref().map(|answer| (answer.ratio, answer.signals.as_slice()));
+        let strategy = self
+            .answer
+            .as_ref()
+            .map(|answer| (answer.ratio, answer.signals.as_slice()));
         policy.period(&means.of(period, &self.window, strategy))
     }
 

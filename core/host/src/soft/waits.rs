@@ -27,7 +27,13 @@ pub struct Waits {
 impl Waits {
     /// Nothing yet. Host; allocates.
     pub fn new(machine: &Machine) -> Self {
-        Self { machine: machine.clone(), enabling_periods: 0, enabling: None, held_by: None, spindle_periods: 0 }
+        Self {
+            machine: machine.clone(),
+            enabling_periods: 0,
+            enabling: None,
+            held_by: None,
+            spindle_periods: 0,
+        }
     }
 
     /// A rough period: words, where what the machine waits for is new.
@@ -39,7 +45,9 @@ impl Waits {
             let news = held_by.clone().filter(|_| held_by != self.held_by);
             self.held_by = held_by;
             if let Some(names) = news {
-                return Some(format!("input {names} holds the machine: close it, then resume"));
+                return Some(format!(
+                    "input {names} holds the machine: close it, then resume"
+                ));
             }
         }
         let waits = status.spindle.waits.load(Relaxed);

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, Plugin, PluginError,
-    Setpoint, local_plugin,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, Plugin,
+    PluginError, Setpoint, local_plugin,
 };
 
 use super::{ARM, Arm, run};
@@ -30,14 +30,18 @@ pub fn kinematics() -> Plugin {
 impl Failing {
     /// How many calls it has been failing for, from 1.
     fn failing(&self) -> Option<u32> {
-        (self.1.fetch_add(1, Relaxed) + 1).checked_sub(self.0.call).map(|calls| calls + 1)
+        (self.1.fetch_add(1, Relaxed) + 1)
+            .checked_sub(self.0.call)
+            .map(|calls| calls + 1)
     }
 }
 
 impl Kinematics for Failing {
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {
         let mut joints = Arm.to_joints(axes);
-        let Some(calls) = self.failing().filter(|_| !self.0.how.starts_with("back")) else { return joints };
+        let Some(calls) = self.failing().filter(|_| !self.0.how.starts_with("back")) else {
+            return joints;
+        };
         match self.0.how.as_str() {
             "panic" => panic!("as it was told"),
             "no number" => joints[1] = f64::NAN,
@@ -92,13 +96,21 @@ impl Driver for Recorder {
     fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::at(self.2))
     }
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         feedback.follow(setpoint, self.1);
         let exchanges = RECORDED.with_borrow_mut(|recorded| {
             recorded.push(*setpoint);
             recorded.len()
         });
-        if exchanges == self.0.fails_at { Err(PluginError::fixed("the wire is cut")) } else { Ok(()) }
+        if exchanges == self.0.fails_at {
+            Err(PluginError::fixed("the wire is cut"))
+        } else {
+            Ok(())
+        }
     }
     fn quick_stop(&mut self) {}
     fn stop(&mut self) -> Result<(), PluginError> {
@@ -108,19 +120,36 @@ impl Driver for Recorder {
 
 /// Velocity and acceleration of the drives of [`ARM`], mm or rad.
 fn limits() -> [[f64; 2]; 3] {
-    [[150.0, 1600.0], [30.0, 300.0].map(f64::to_radians), [50.0, 500.0]]
+    [
+        [150.0, 1600.0],
+        [30.0, 300.0].map(f64::to_radians),
+        [50.0, 500.0],
+    ]
 }
 
 /// The greatest share of a limit that any joint has used in any period, from the positions that were sent alone.
 fn judge(recorded: &[Setpoint]) -> f64 {
     let (mut most, period_s) = (0.0f64, 0.001);
     for (joint, [fastest, steepest]) in limits().into_iter().enumerate() {
-        let at: Vec<f64> = recorded.iter().map(|setpoint| setpoint.position[joint]).collect();
-        let speeds: Vec<f64> = at.windows(2).map(|pair| (pair[1] - pair[0]) / period_s).collect();
+        let at: Vec<f64> = recorded
+            .iter()
+            .map(|setpoint| setpoint.position[joint])
+            .collect();
+        let speeds: Vec<f64> = at
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) / period_s)
+            .collect();
         let (first, last) = (speeds.first().unwrap(), speeds.last().unwrap());
-        assert!(*first == 0.0 && *last == 0.0 && at.iter().all(|at| at.is_finite()), "from rest to rest");
-        most = speeds.iter().fold(most, |most, speed| most.max(speed.abs() / fastest));
-        most = speeds.windows(2).fold(most, |most, pair| most.max((pair[1] - pair[0]).abs() / period_s / steepest));
+        assert!(
+            *first == 0.0 && *last == 0.0 && at.iter().all(|at| at.is_finite()),
+            "from rest to rest"
+        );
+        most = speeds
+            .iter()
+            .fold(most, |most, speed| most.max(speed.abs() / fastest));
+        most = speeds.windows(2).fold(most, |most, pair| {
+            most.max((pair[1] - pair[0]).abs() / period_s / steepest)
+        });
     }
     most
 }
@@ -136,8 +165,16 @@ fn arc(how: &str, call: u32, more: &[(&str, &str)]) -> (Vec<Setpoint>, Option<St
         ("motion.allowable_speed_difference_mm_per_min", "0.001"),
     ];
     RECORDED.take();
-    let settings: Vec<_> = ARM.into_iter().chain(ours).chain(more.iter().copied()).collect();
-    let outcome = run("G21 G90\nF6000\nG3 X0 Y60 I0 J30\nG3 X0 Y0 I0 J-30\nM2\n", &settings).unwrap();
+    let settings: Vec<_> = ARM
+        .into_iter()
+        .chain(ours)
+        .chain(more.iter().copied())
+        .collect();
+    let outcome = run(
+        "G21 G90\nF6000\nG3 X0 Y60 I0 J30\nG3 X0 Y0 I0 J-30\nM2\n",
+        &settings,
+    )
+    .unwrap();
     (RECORDED.take(), outcome.summary.fault)
 }
 
@@ -149,7 +186,10 @@ fn sound_ones_are_driven_within_limits() {
     assert!((0.3..=1.0).contains(&share), "{share} of the limits");
     let mut moved = recorded;
     moved[700].position[0] += 0.002;
-    assert!(judge(&moved) > 1.0, "one sample moved by two thousandths is found out");
+    assert!(
+        judge(&moved) > 1.0,
+        "one sample moved by two thousandths is found out"
+    );
 }
 
 /// In each of these the joints move at tens of mm/s when it happens.
@@ -159,24 +199,44 @@ const CALLS: [u32; 4] = [300, 700, 1100, 1500];
 fn joints_keep_their_limits_on_the_way_to_rest() {
     for (how, words) in [
         ("panic", "failing panicked in to_joints"),
-        ("no number", "the position of joint 1 (b) is not a finite number"),
-        ("no number once", "the position of joint 0 (a) is not a finite number"),
+        (
+            "no number",
+            "the position of joint 1 (b) is not a finite number",
+        ),
+        (
+            "no number once",
+            "the position of joint 0 (a) is not a finite number",
+        ),
         ("far", "guard: kinematics failing asks for joint a position"),
-        ("a turn", "guard: kinematics failing asks for joint b position"),
+        (
+            "a turn",
+            "guard: kinematics failing asks for joint b position",
+        ),
         ("a little", "guard: kinematics failing asks for joint a"),
         ("each second", "guard: kinematics failing asks for joint a"),
         ("stuck", "guard: kinematics failing asks for joint"),
         ("back: panic", "failing panicked in to_axes"),
-        ("back: no number", "the position of axis X is not a finite number"),
+        (
+            "back: no number",
+            "the position of axis X is not a finite number",
+        ),
     ] {
         for call in CALLS {
             let (recorded, fault) = arc(how, call, &[]);
             let fault = fault.unwrap_or_else(|| panic!("{how} from call {call} is no fault"));
             assert!(fault.contains(words), "{how} from call {call}: {fault}");
             let share = judge(&recorded);
-            assert!(share <= 1.0 + 2e-6, "{how} from call {call}: {share} of a joint's limit; {fault}");
-            let fastest = recorded.iter().fold(0.0f64, |most, setpoint| most.max(setpoint.velocity[0].abs()));
-            assert!(recorded.len() > 100 && fastest > 10.0, "it failed in motion: {fastest} mm/s");
+            assert!(
+                share <= 1.0 + 2e-6,
+                "{how} from call {call}: {share} of a joint's limit; {fault}"
+            );
+            let fastest = recorded.iter().fold(0.0f64, |most, setpoint| {
+                most.max(setpoint.velocity[0].abs())
+            });
+            assert!(
+                recorded.len() > 100 && fastest > 10.0,
+                "it failed in motion: {fastest} mm/s"
+            );
         }
     }
 }
@@ -184,12 +244,27 @@ fn joints_keep_their_limits_on_the_way_to_rest() {
 /// The driver fails first, and the kinematics on the way to rest, or never.
 #[test]
 fn after_another_fault_too() {
-    for how in ["never", "panic", "no number once", "far", "a turn", "each second", "stuck", "back: panic"] {
+    for how in [
+        "never",
+        "panic",
+        "no number once",
+        "far",
+        "a turn",
+        "each second",
+        "stuck",
+        "back: panic",
+    ] {
         for call in [880, 895, 920] {
             let (recorded, fault) = arc(how, call, &[("driver.options.fails_at", "800")]);
             let (share, fault) = (judge(&recorded), fault.unwrap());
-            assert!(fault.contains("the wire is cut") && recorded.len() > 820, "{fault}");
-            assert!(share <= 1.0 + 2e-6, "{how} from call {call}: {share} of a joint's limit");
+            assert!(
+                fault.contains("the wire is cut") && recorded.len() > 820,
+                "{fault}"
+            );
+            assert!(
+                share <= 1.0 + 2e-6,
+                "{how} from call {call}: {share} of a joint's limit"
+            );
         }
     }
 }

@@ -10,8 +10,8 @@ use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_recorder::JointPeaks;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext, NoOptions, Planner,
-    PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext,
+    NoOptions, Planner, PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
 /// A turning arm: joint 0 is its length, joint 1 its angle about a pivot 400 mm in front of the table.
@@ -59,14 +59,37 @@ macro_rules! opens {
 }
 
 opens!(arm, Arm, Arm);
-opens!(belts, Belts { back: 0.5, astray: 0.0 }, Belts);
-opens!(one_way, Belts { back: 0.51, astray: 0.0 }, Belts);
-opens!(astray, Belts { back: 0.5, astray: f64::NAN }, Belts);
+opens!(
+    belts,
+    Belts {
+        back: 0.5,
+        astray: 0.0
+    },
+    Belts
+);
+opens!(
+    one_way,
+    Belts {
+        back: 0.51,
+        astray: 0.0
+    },
+    Belts
+);
+opens!(
+    astray,
+    Belts {
+        back: 0.5,
+        astray: f64::NAN
+    },
+    Belts
+);
 
 /// The look-ahead planner, which takes the joints for 1 % faster than they are.
 fn too_fast(options: &Options, context: &PlannerContext) -> Opened<LookAhead> {
     let mut context = *context;
-    context.limits.axes[3..].iter_mut().for_each(|joint| joint.feed_mm_per_s *= 1.01);
+    context.limits.axes[3..]
+        .iter_mut()
+        .for_each(|joint| joint.feed_mm_per_s *= 1.01);
     LookAhead::new(options, &context)
 }
 
@@ -104,7 +127,11 @@ impl Planner for Bent {
     fn finish(&mut self) {
         self.0.finish();
     }
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
         self.0.advance(duration_s, &mut BentSink(sink))
     }
     fn reset(&mut self, position: &AxisVector) {
@@ -123,7 +150,10 @@ fn corexy() -> PathBuf {
 /// The drives of the arm, instead of those of the belts.
 const ARM: [(&str, &str); 3] = [
     ("kinematics.plugin", "arm"),
-    ("joints.a", "{travel_mm = [300, 500], max_feed_mm_per_min = 9000, max_acceleration_mm_per_s2 = 1600}"),
+    (
+        "joints.a",
+        "{travel_mm = [300, 500], max_feed_mm_per_min = 9000, max_acceleration_mm_per_s2 = 1600}",
+    ),
     (
         "joints.b",
         "{kind = \"rotary\", travel_deg = [-20, 20], max_feed_deg_per_min = 1800, max_acceleration_deg_per_s2 = 300}",
@@ -134,7 +164,10 @@ fn run(text: &str, settings: &[(&str, &str)]) -> Result<Outcome, HostError> {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("program.ngc");
     std::fs::write(&program, text).unwrap();
-    let settings: Vec<_> = settings.iter().map(|(key, value)| ((*key).to_string(), (*value).to_string())).collect();
+    let settings: Vec<_> = settings
+        .iter()
+        .map(|(key, value)| ((*key).to_string(), (*value).to_string()))
+        .collect();
     let machine = Machine::read(&corexy(), &settings).unwrap();
     let mut registry = Registry::default();
     let kinematics = [
@@ -154,14 +187,21 @@ fn run(text: &str, settings: &[(&str, &str)]) -> Result<Outcome, HostError> {
     registry.register(tandem_look_ahead::PLUGIN).unwrap();
     registry.register(tandem_sim::PLUGIN).unwrap();
     registry.register(failing::driver()).unwrap();
-    let run = Run::prepare(machine, &registry, Program::open(&program).unwrap(), Switches::default())?;
+    let run = Run::prepare(
+        machine,
+        &registry,
+        Program::open(&program).unwrap(),
+        Switches::default(),
+    )?;
     run.drive(Clock::Virtual, &[], &mut Nobody)
 }
 
 /// What is said of a program or machine that is refused.
 fn refusal(text: &str, settings: &[(&str, &str)]) -> String {
     match run(text, settings) {
-        Err(HostError::Check(report)) => report.diagnostics.iter().map(ToString::to_string).collect(),
+        Err(HostError::Check(report)) => {
+            report.diagnostics.iter().map(ToString::to_string).collect()
+        }
         Err(refused) => refused.to_string(),
         Ok(outcome) => panic!("it ran: {:?}", outcome.summary.fault),
     }
@@ -170,9 +210,11 @@ fn refusal(text: &str, settings: &[(&str, &str)]) -> String {
 /// Largest velocity and acceleration of a joint that slides, mm and s.
 fn linear(peaks: &JointPeaks) -> [f64; 2] {
     match *peaks {
-        JointPeaks::Linear { max_velocity_mm_s, max_acceleration_mm_s2, .. } => {
-            [max_velocity_mm_s, max_acceleration_mm_s2]
-        }
+        JointPeaks::Linear {
+            max_velocity_mm_s,
+            max_acceleration_mm_s2,
+            ..
+        } => [max_velocity_mm_s, max_acceleration_mm_s2],
         JointPeaks::Rotary { .. } => panic!("the joint turns: {peaks:?}"),
     }
 }
@@ -182,13 +224,30 @@ const DIAGONAL: &str = "G21 G90\nF20000\nG1 X60 Y60\nG1 X0 Y0\nM2\n";
 #[test]
 fn a_planner_that_takes_joints_for_faster_is_governed() {
     let sound = run(DIAGONAL, &[]).unwrap();
-    assert_eq!((sound.summary.governed_samples, sound.summary.guard_stops, &sound.summary.fault), (0, 0, &None));
+    assert_eq!(
+        (
+            sound.summary.governed_samples,
+            sound.summary.guard_stops,
+            &sound.summary.fault
+        ),
+        (0, 0, &None)
+    );
     let outcome = run(DIAGONAL, &[("planner.plugin", "too-fast")]).unwrap();
-    assert!(outcome.summary.governed_samples > 0, "one percent is too much for joint a");
+    assert!(
+        outcome.summary.governed_samples > 0,
+        "one percent is too much for joint a"
+    );
     let peaks = outcome.summary.joints.unwrap();
     assert!(linear(&peaks["a"])[0] <= 250.0 * (1.0 + 1e-6), "{peaks:?}");
-    let counted = run(DIAGONAL, &[("planner.plugin", "too-fast"), ("guard.mode", "count")]).unwrap();
-    assert!(counted.summary.limit_violations > 0 && linear(&counted.summary.joints.unwrap()["a"])[0] > 251.0);
+    let counted = run(
+        DIAGONAL,
+        &[("planner.plugin", "too-fast"), ("guard.mode", "count")],
+    )
+    .unwrap();
+    assert!(
+        counted.summary.limit_violations > 0
+            && linear(&counted.summary.joints.unwrap()["a"])[0] > 251.0
+    );
 }
 
 #[test]
@@ -196,7 +255,10 @@ fn the_guard_names_the_joint_that_would_leave_its_travel() {
     let settings = [("planner.plugin", "too-far")];
     let outcome = run("G21 G90\nF6000\nG1 X124.5 Y125\nM2\n", &settings).unwrap();
     let fault = outcome.summary.fault.unwrap();
-    assert!(fault.contains("guard: planner too-far asks for joint a position 250."), "{fault}");
+    assert!(
+        fault.contains("guard: planner too-far asks for joint a position 250."),
+        "{fault}"
+    );
     assert!(fault.contains("travel ends at 250.000000 mm"), "{fault}");
     let peaks = outcome.summary.joints.unwrap();
     assert!(linear(&peaks["a"])[1] <= 1500.0 * 1.7, "{peaks:?}");
@@ -205,27 +267,45 @@ fn the_guard_names_the_joint_that_would_leave_its_travel() {
 #[test]
 fn kinematics_that_do_not_lead_back_or_end_somewhere_are_refused() {
     let words = refusal(DIAGONAL, &[("kinematics.plugin", "one-way")]);
-    assert!(words.contains("one-way: axes at") && words.contains("lead back to"), "{words}");
+    assert!(
+        words.contains("one-way: axes at") && words.contains("lead back to"),
+        "{words}"
+    );
     let words = refusal(DIAGONAL, &[("kinematics.plugin", "astray")]);
-    assert!(words.contains("astray: joint 1 is no finite number"), "{words}");
+    assert!(
+        words.contains("astray: joint 1 is no finite number"),
+        "{words}"
+    );
 }
 
 #[test]
 fn of_kinematics_that_are_not_linear_the_joints_are_guarded() {
     let slow = "G21 G90\nF3000\nG1 X60 Y20\nG3 X-60 Y20 I-60 J-100\nG1 X0 Y0\nM2\n";
     let outcome = run(slow, &ARM).unwrap();
-    assert_eq!((outcome.summary.fault, outcome.summary.governed_samples), (None, 0));
+    assert_eq!(
+        (outcome.summary.fault, outcome.summary.governed_samples),
+        (None, 0)
+    );
     let peaks = outcome.summary.joints.unwrap();
     // Joint b turns, and what is said of it is called so: it stood under mm/s.
     let said = serde_json::to_value(&peaks).unwrap();
     let turning_deg_s = said["b"]["max_velocity_deg_s"].as_f64().unwrap();
     assert!(turning_deg_s > 5.0 && turning_deg_s < 30.0, "{said}");
-    assert!(said["b"]["max_velocity_mm_s"].is_null() && said["a"]["max_velocity_mm_s"].is_f64(), "{said}");
+    assert!(
+        said["b"]["max_velocity_mm_s"].is_null() && said["a"]["max_velocity_mm_s"].is_f64(),
+        "{said}"
+    );
     // 200 mm/s across the arm of 400 mm are 28 deg/s; outwards they are 200 mm/s of 150.
     let outcome = run("G21 G90\nF12000\nG1 Y100\nM2\n", &ARM).unwrap();
     let fault = outcome.summary.fault.unwrap();
-    assert!(fault.contains("asks for joint a velocity 150.") && fault.contains("limit 150.000000 mm/s"), "{fault}");
+    assert!(
+        fault.contains("asks for joint a velocity 150.") && fault.contains("limit 150.000000 mm/s"),
+        "{fault}"
+    );
     assert!(linear(&outcome.summary.joints.unwrap()["a"])[0] <= 150.0 * (1.0 + 1e-6));
     let words = refusal("G21 G90\nF3000\nG1 Y0\nG1 X148 Y-20\nM2\n", &ARM);
-    assert!(words.contains("joint b would reach 20.") && words.contains("of -20 to 20 deg"), "{words}");
+    assert!(
+        words.contains("joint b would reach 20.") && words.contains("of -20 to 20 deg"),
+        "{words}"
+    );
 }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_gcode::{Interpreter, Program};
-use tandem_host::{Clock, JobOutcome, Memory, Registry, Resident, Run, RunObserver, Switches, interpreter_config};
+use tandem_host::{
+    Clock, JobOutcome, Memory, Registry, Resident, Run, RunObserver, Switches, interpreter_config,
+};
 use tandem_machine::Machine;
 use tandem_rings::{Sample, Switched};
 
@@ -27,13 +29,19 @@ impl RunObserver for Kept {
         if let Some(ledger) = &self.reached {
             ledger.reach(sample.block);
         }
-        let is_at =
-            |at: &Option<(u64, Arc<tandem_rings::Controls>)>| at.as_ref().is_some_and(|(tick, _)| *tick == sample.tick);
+        let is_at = |at: &Option<(u64, Arc<tandem_rings::Controls>)>| {
+            at.as_ref().is_some_and(|(tick, _)| *tick == sample.tick)
+        };
         if is_at(&self.abort_at) {
             self.abort_at.take().unwrap().1.abort.store(true, Relaxed);
         }
         if is_at(&self.stop_at) {
-            self.stop_at.take().unwrap().1.emergency_stop.store(true, Relaxed);
+            self.stop_at
+                .take()
+                .unwrap()
+                .1
+                .emergency_stop
+                .store(true, Relaxed);
         }
     }
 }
@@ -44,7 +52,11 @@ fn examples() -> PathBuf {
 
 fn registry() -> Registry {
     let mut registry = Registry::default();
-    for plugin in [tandem_look_ahead::PLUGIN, tandem_block_overlap::PLUGIN, tandem_sim::PLUGIN] {
+    for plugin in [
+        tandem_look_ahead::PLUGIN,
+        tandem_block_overlap::PLUGIN,
+        tandem_sim::PLUGIN,
+    ] {
         registry.register(plugin).unwrap();
     }
     registry
@@ -60,12 +72,21 @@ fn program(text: &str) -> Program {
 
 fn memory(machine: &Machine) -> Memory {
     let interpreter = Interpreter::new(interpreter_config(machine, true, Switches::default()));
-    Memory { lasting: Arc::new(interpreter.lasting()), ..Memory::default() }
+    Memory {
+        lasting: Arc::new(interpreter.lasting()),
+        ..Memory::default()
+    }
 }
 
 fn alone(machine: &Machine, text: &str) -> Vec<Sample> {
     let registry = registry();
-    let run = Run::prepare(machine.clone(), &registry, program(text), Switches::default()).unwrap();
+    let run = Run::prepare(
+        machine.clone(),
+        &registry,
+        program(text),
+        Switches::default(),
+    )
+    .unwrap();
     let mut kept = Kept::default();
     let outcome = run.drive(Clock::Virtual, &[], &mut kept).unwrap();
     assert_eq!(outcome.summary.fault, None);
@@ -74,7 +95,9 @@ fn alone(machine: &Machine, text: &str) -> Vec<Sample> {
 
 fn driven(resident: &mut Resident<'_>, text: &str, kept: &mut Kept) -> JobOutcome {
     let memory = memory(resident.machine());
-    let job = resident.program(program(text), Switches::default(), &memory).unwrap();
+    let job = resident
+        .program(program(text), Switches::default(), &memory)
+        .unwrap();
     resident.drive(job, kept).unwrap()
 }
 
@@ -82,7 +105,10 @@ fn assert_same(ours: &[Sample], theirs: &[Sample]) {
     assert_eq!(ours.len(), theirs.len());
     for (ours, theirs) in ours.iter().zip(theirs) {
         // Who has switched off what is off is remembered from the job before; a trace does not keep it.
-        let switched = Switched { by: theirs.switched.by, ..ours.switched };
+        let switched = Switched {
+            by: theirs.switched.by,
+            ..ours.switched
+        };
         assert_eq!(&Sample { switched, ..*ours }, theirs);
     }
 }
@@ -99,7 +125,10 @@ fn a_job_is_the_same_alone_after_others_and_after_a_long_uptime() {
         resident.begin_at((uptime_s / machine.fine_period_s) as u64);
         let mut kept = Kept::default();
         let outcome = driven(&mut resident, PART, &mut kept);
-        assert_eq!((outcome.summary.fault, outcome.position), (None, machine.start));
+        assert_eq!(
+            (outcome.summary.fault, outcome.position),
+            (None, machine.start)
+        );
         assert_same(&kept.samples, &expected);
         for _ in 0..100 {
             assert_eq!(resident.idle(&mut ()).unwrap(), None);
@@ -114,7 +143,10 @@ fn after_an_abort_a_fault_and_letting_go_the_next_job_begins_where_the_machine_s
     let mut resident = Resident::attach(machine.clone(), &registry, Clock::Virtual).unwrap();
     resident.enable(false, &mut ()).unwrap();
     let controls = Arc::clone(resident.controls());
-    let mut kept = Kept { abort_at: Some((300, Arc::clone(&controls))), ..Kept::default() };
+    let mut kept = Kept {
+        abort_at: Some((300, Arc::clone(&controls))),
+        ..Kept::default()
+    };
     let outcome = driven(&mut resident, PART, &mut kept);
     assert!(outcome.aborted && outcome.fault.is_none());
     assert_eq!(outcome.position, kept.samples.last().unwrap().command);
@@ -125,14 +157,20 @@ fn after_an_abort_a_fault_and_letting_go_the_next_job_begins_where_the_machine_s
     driven(&mut resident, PART, &mut kept);
     assert_same(&kept.samples, &alone(&there, PART));
 
-    let mut kept = Kept { stop_at: Some((200, Arc::clone(&controls))), ..Kept::default() };
+    let mut kept = Kept {
+        stop_at: Some((200, Arc::clone(&controls))),
+        ..Kept::default()
+    };
     let outcome = driven(&mut resident, PART, &mut kept);
     assert!(outcome.summary.fault.is_some() && !resident.is_enabled());
     assert_eq!(outcome.position, kept.samples.last().unwrap().command);
     assert_eq!(resident.enable(true, &mut ()).unwrap().summary.fault, None);
     assert!(resident.is_enabled());
     let off_mm = resident.machine().start - outcome.position;
-    assert!(off_mm.0.iter().all(|mm| mm.abs() < 1e-3), "the drives say where their own quick stop ended: {off_mm:?}");
+    assert!(
+        off_mm.0.iter().all(|mm| mm.abs() < 1e-3),
+        "the drives say where their own quick stop ended: {off_mm:?}"
+    );
     let there = resident.machine().clone();
     let mut kept = Kept::default();
     driven(&mut resident, PART, &mut kept);
@@ -158,15 +196,29 @@ fn on_the_wall_clock_one_thread_lives_through_all_jobs() {
     for _ in 0..3 {
         let mut kept = Kept::default();
         let outcome = driven(&mut resident, text, &mut kept);
-        assert_eq!((outcome.summary.fault, outcome.position), (None, machine.start));
+        assert_eq!(
+            (outcome.summary.fault, outcome.position),
+            (None, machine.start)
+        );
         assert_eq!(kept.samples.first().map(|sample| sample.tick), Some(0));
         let periods = resident.uptime_periods();
-        assert!(periods > before + kept.samples.len() as u64, "periods go on between jobs");
+        assert!(
+            periods > before + kept.samples.len() as u64,
+            "periods go on between jobs"
+        );
         before = periods;
     }
-    let mut kept = Kept { stop_at: Some((20, Arc::clone(resident.controls()))), ..Kept::default() };
+    let mut kept = Kept {
+        stop_at: Some((20, Arc::clone(resident.controls()))),
+        ..Kept::default()
+    };
     assert!(driven(&mut resident, text, &mut kept).fault.is_some());
     assert_eq!(resident.enable(true, &mut ()).unwrap().summary.fault, None);
-    assert_eq!(driven(&mut resident, text, &mut Kept::default()).summary.fault, None);
+    assert_eq!(
+        driven(&mut resident, text, &mut Kept::default())
+            .summary
+            .fault,
+        None
+    );
     resident.stop(&mut ()).unwrap();
 }

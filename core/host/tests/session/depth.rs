@@ -24,17 +24,31 @@ fn driven(depth_factor: f64, before: usize, stalled: usize) -> (u64, usize) {
     rig.stall(stalled);
     rig.until_driven();
     rig.assert_smooth();
-    let off_path = rig.samples.iter().map(|s| s.command).find(|at| at[1].abs() > 1e-9 && (at[0] - 240.0).abs() > 1e-9);
+    let off_path = rig
+        .samples
+        .iter()
+        .map(|s| s.command)
+        .find(|at| at[1].abs() > 1e-9 && (at[0] - 240.0).abs() > 1e-9);
     assert_eq!(off_path, None);
-    (rig.fine.counters().starvations, rig.samples.iter().filter(|sample| sample.feed_mm_per_s > 0.0).count())
+    (
+        rig.fine.counters().starvations,
+        rig.samples
+            .iter()
+            .filter(|sample| sample.feed_mm_per_s > 0.0)
+            .count(),
+    )
 }
 
 /// What the starvation scenarios ask for: nothing starves that is not stalled, three rough periods are not noticed,
 /// longer ones stop the machine on the path, once, and it goes on.
 fn passes(depth_factor: f64) -> bool {
     let (starved, free) = driven(depth_factor, 0, 0);
-    let unnoticed = (1..free / 8).step_by(7).all(|before| driven(depth_factor, before, 3) == (starved, free));
-    let once = (1..free / 8).step_by(7).all(|before| driven(depth_factor, before, 60).0 <= 1);
+    let unnoticed = (1..free / 8)
+        .step_by(7)
+        .all(|before| driven(depth_factor, before, 3) == (starved, free));
+    let once = (1..free / 8)
+        .step_by(7)
+        .all(|before| driven(depth_factor, before, 60).0 <= 1);
     starved == 0 && unnoticed && once && driven(depth_factor, 60, 60).0 == 1
 }
 

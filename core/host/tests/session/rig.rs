@@ -10,7 +10,8 @@ use tandem_look_ahead::{LookAhead, Options};
 use tandem_rings::{HostEnd, MachineState, Rest, Sample, Sizes, bridge};
 use tandem_rough::{RoughConfig, RoughError, RoughLoop, Source};
 use tandem_sdk::{
-    Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits, PlannerContext, StopOn,
+    Axes, AxisLimits, AxisVector, Block, BlockKind, DriverContext, Event, EventKind, Limits,
+    PlannerContext, StopOn,
 };
 
 /// Fine period, s.
@@ -79,11 +80,27 @@ impl Rig {
         let mut fine = FineLoop::new(&config, fine_end, driver, None);
         fine.reset();
         let feed = Feed::default();
-        let rough_config =
-            RoughConfig { depth_factor, ..RoughConfig::new(f64::from(FINE_PER_ROUGH) * PERIOD_S, PERIOD_S) };
-        let rough = RoughLoop::new(rough_config, Box::new(feed.clone()), planner(&limits), rough_end);
+        let rough_config = RoughConfig {
+            depth_factor,
+            ..RoughConfig::new(f64::from(FINE_PER_ROUGH) * PERIOD_S, PERIOD_S)
+        };
+        let rough = RoughLoop::new(
+            rough_config,
+            Box::new(feed.clone()),
+            planner(&limits),
+            rough_end,
+        );
         let (position, samples) = (AxisVector::ZERO, vec![]);
-        Self { rough, fine, host, feed, position, blocks: 0, samples, error: None }
+        Self {
+            rough,
+            fine,
+            host,
+            feed,
+            position,
+            blocks: 0,
+            samples,
+            error: None,
+        }
     }
 
     /// Queues a line to `end` at `feed_mm_per_s`.
@@ -184,13 +201,23 @@ impl Rig {
 
     /// No period is missing, and over the whole session no axis accelerates more than it may: nowhere a jump.
     pub fn assert_smooth(&self) {
-        let velocity: Vec<AxisVector> =
-            self.samples.windows(2).map(|pair| (pair[1].command - pair[0].command) * (1.0 / PERIOD_S)).collect();
-        assert!(self.samples.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+        let velocity: Vec<AxisVector> = self
+            .samples
+            .windows(2)
+            .map(|pair| (pair[1].command - pair[0].command) * (1.0 / PERIOD_S))
+            .collect();
+        assert!(
+            self.samples
+                .windows(2)
+                .all(|pair| pair[1].tick == pair[0].tick + 1)
+        );
         for (index, pair) in velocity.windows(2).enumerate() {
             let change = (pair[1] - pair[0]) * (1.0 / PERIOD_S);
             let most = change.0.iter().fold(0.0f64, |most, a| most.max(a.abs()));
-            assert!(most <= ACCELERATION_MM_PER_S2 * (1.0 + 1e-6), "{most} mm/s² at sample {index}");
+            assert!(
+                most <= ACCELERATION_MM_PER_S2 * (1.0 + 1e-6),
+                "{most} mm/s² at sample {index}"
+            );
         }
         assert_eq!(self.fine.fault(), None);
     }

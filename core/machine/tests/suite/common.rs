@@ -11,12 +11,20 @@ pub fn fixtures() -> PathBuf {
 
 /// Reads a machine with `--set` overrides, each `key=value`.
 pub fn read(path: &Path, overrides: &[&str]) -> Result<Machine, MachineError> {
-    let split = |text: &&str| text.split_once('=').map(|(key, value)| (key.to_owned(), value.to_owned()));
-    Machine::read(path, &overrides.iter().filter_map(split).collect::<Vec<_>>())
+    let split = |text: &&str| {
+        text.split_once('=')
+            .map(|(key, value)| (key.to_owned(), value.to_owned()))
+    };
+    Machine::read(
+        path,
+        &overrides.iter().filter_map(split).collect::<Vec<_>>(),
+    )
 }
 
 /// The words with which a machine is refused, the fixtures' directory left out.
 pub fn refusal(path: &Path, overrides: &[&str]) -> String {
     let error = read(path, overrides).expect_err(&path.display().to_string());
-    error.to_string().replace(&format!("{}/", fixtures().display()), "")
+    error
+        .to_string()
+        .replace(&format!("{}/", fixtures().display()), "")
 }

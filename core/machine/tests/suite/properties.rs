@@ -31,19 +31,37 @@ fn check(result: Result<Machine, MachineError>) {
         Ok(machine) => check_machine(&machine),
         Err(error) => {
             assert!(!error.problems.is_empty() && error.problems.len() <= 101);
-            assert_eq!(error.to_string().lines().count(), error.problems.len(), "one line each: {error}");
+            assert_eq!(
+                error.to_string().lines().count(),
+                error.problems.len(),
+                "one line each: {error}"
+            );
         }
     }
 }
 
 fn check_machine(machine: &Machine) {
     let periods = machine.rough_period_s / machine.fine_period_s;
-    assert!(machine.fine_period_s > 0.0 && (periods - f64::from(machine.fine_periods_per_rough)).abs() < 1e-6);
+    assert!(
+        machine.fine_period_s > 0.0
+            && (periods - f64::from(machine.fine_periods_per_rough)).abs() < 1e-6
+    );
     let joints = machine.joints.iter().map(|j| (&j.limits, j.home));
-    let axes = machine.limits.axes().iter().enumerate().map(|(i, limits)| (limits, machine.start[i]));
+    let axes = machine
+        .limits
+        .axes()
+        .iter()
+        .enumerate()
+        .map(|(i, limits)| (limits, machine.start[i]));
     for (limits, position) in axes.chain(joints) {
-        assert!(limits.min_mm < limits.max_mm && (limits.min_mm..=limits.max_mm).contains(&position));
-        let positive = [limits.feed_mm_per_s, limits.rapid_mm_per_s, limits.acceleration_mm_per_s2];
+        assert!(
+            limits.min_mm < limits.max_mm && (limits.min_mm..=limits.max_mm).contains(&position)
+        );
+        let positive = [
+            limits.feed_mm_per_s,
+            limits.rapid_mm_per_s,
+            limits.acceleration_mm_per_s2,
+        ];
         assert!(positive.iter().all(|v| v.is_finite() && *v > 0.0) && limits.jerk_mm_per_s3 > 0.0);
         assert!(limits.speed_difference_mm_per_s >= 0.0);
     }
@@ -86,7 +104,10 @@ fn odd_text() -> impl Strategy<Value = String> {
         "[axes.y]\n",
         "[tools]\n",
     ];
-    prop_oneof![prop::sample::select(pieces.to_vec()).prop_map(str::to_owned), ".{0,6}"]
+    prop_oneof![
+        prop::sample::select(pieces.to_vec()).prop_map(str::to_owned),
+        ".{0,6}"
+    ]
 }
 
 /// Swaps two lines, which moves keys into tables where they do not belong.
@@ -145,10 +166,15 @@ proptest! {
 type Axis = (f64, f64, f64, f64);
 
 fn written(letters: &[char], numbers: &[Axis], fine: f64, rough: f64) -> String {
-    let mut text = format!("format = 1\nloops = {{ fine_period_ms = {fine:?}, rough_period_ms = {rough:?} }}\n");
+    let mut text = format!(
+        "format = 1\nloops = {{ fine_period_ms = {fine:?}, rough_period_ms = {rough:?} }}\n"
+    );
     text += "planner.plugin = \"look-ahead\"\ndriver.plugin = \"sim\"\n";
     for (letter, (low, high, feed, acceleration)) in letters.iter().zip(numbers) {
-        let _ = writeln!(text, "[axes.{letter}]\ntravel_mm = [{low:?}, {high:?}]\nmax_feed_mm_per_min = {feed:?}");
+        let _ = writeln!(
+            text,
+            "[axes.{letter}]\ntravel_mm = [{low:?}, {high:?}]\nmax_feed_mm_per_min = {feed:?}"
+        );
         let _ = writeln!(text, "max_acceleration_mm_per_s2 = {acceleration:?}");
     }
     text
@@ -156,30 +182,58 @@ fn written(letters: &[char], numbers: &[Axis], fine: f64, rough: f64) -> String 
 
 #[test]
 fn the_configuration_in_force_reads_as_the_same_machine() {
-    let machine = read(&fixtures().join("good/full.toml"), &["axes.x.start_mm=17", "planner.options.zeta=2"]).unwrap();
+    let machine = read(
+        &fixtures().join("good/full.toml"),
+        &["axes.x.start_mm=17", "planner.options.zeta=2"],
+    )
+    .unwrap();
     let again = read_bytes(machine.effective_toml().as_bytes(), &[]).unwrap();
     assert_eq!(again.effective_toml(), machine.effective_toml());
     assert_eq!(again.start[0], 17.0);
     let said = |m: &Machine| {
-        format!("{:?}", (m.axes, m.limits, m.home, &m.joints, &m.planner, &m.drivers, &m.tools, &m.policy))
+        format!(
+            "{:?}",
+            (
+                m.axes, m.limits, m.home, &m.joints, &m.planner, &m.drivers, &m.tools, &m.policy
+            )
+        )
     };
     assert_eq!(said(&again), said(&machine));
 }
 
 #[test]
 fn deep_nesting_and_long_files_are_refused() {
-    let arrays = format!("format = 1\nfaults = {{ a = {}1{} }}", "[".repeat(70), "]".repeat(70));
+    let arrays = format!(
+        "format = 1\nfaults = {{ a = {}1{} }}",
+        "[".repeat(70),
+        "]".repeat(70)
+    );
     let words = read_bytes(arrays.as_bytes(), &[]).unwrap_err().to_string();
     assert!(words.contains(":2:"), "{words}");
-    assert!(words.contains("faults.a: nested more than 64 levels deep"), "{words}");
+    assert!(
+        words.contains("faults.a: nested more than 64 levels deep"),
+        "{words}"
+    );
     check(read_bytes("[".repeat(1_000_000).as_bytes(), &[]));
-    check(read_bytes(format!("{}a = 1", "a.".repeat(500_000)).as_bytes(), &[]));
+    check(read_bytes(
+        format!("{}a = 1", "a.".repeat(500_000)).as_bytes(),
+        &[],
+    ));
     let dotted = format!("{}a=", "a.".repeat(78));
-    let tables =
-        format!("format = 1\n[{}a]\n{dotted}{}1{}", "a.".repeat(78), format!("{{{dotted}").repeat(78), "}".repeat(78));
+    let tables = format!(
+        "format = 1\n[{}a]\n{dotted}{}1{}",
+        "a.".repeat(78),
+        format!("{{{dotted}").repeat(78),
+        "}".repeat(78)
+    );
     check(read_bytes(tables.as_bytes(), &[]));
-    let words = read_bytes("# long\n".repeat(200_000).as_bytes(), &[]).unwrap_err().to_string();
-    assert!(words.ends_with("machine.toml: cannot be read: longer than 1048576 bytes"), "{words}");
+    let words = read_bytes("# long\n".repeat(200_000).as_bytes(), &[])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        words.ends_with("machine.toml: cannot be read: longer than 1048576 bytes"),
+        "{words}"
+    );
 }
 
 #[test]
@@ -187,19 +241,30 @@ fn many_problems_end_in_a_count() {
     let text = (0..50_000).fold(String::new(), |text, i| text + &format!("key{i} = 1\n"));
     let error = read_bytes(format!("format = 1\n{text}").as_bytes(), &[]).unwrap_err();
     assert_eq!(error.problems.len(), 101);
-    assert_eq!(error.problems[100].what, "100 problems so far; the rest is not listed");
+    assert_eq!(
+        error.problems[100].what,
+        "100 problems so far; the rest is not listed"
+    );
 }
 
 #[test]
 fn text_that_is_not_utf_8_is_refused_with_its_place() {
-    let error = read_bytes(b"format = 1\nname = \"\xff\"\n", &[]).unwrap_err().to_string();
-    assert!(error.ends_with("machine.toml:2:9: not UTF-8 text"), "{error}");
+    let error = read_bytes(b"format = 1\nname = \"\xff\"\n", &[])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.ends_with("machine.toml:2:9: not UTF-8 text"),
+        "{error}"
+    );
 }
 
 #[test]
 fn a_file_that_cannot_be_read_is_named() {
     let error = Machine::read(Path::new("absent.toml"), &[]).unwrap_err();
-    assert_eq!(error.to_string(), "absent.toml: cannot be read: No such file or directory (os error 2)");
+    assert_eq!(
+        error.to_string(),
+        "absent.toml: cannot be read: No such file or directory (os error 2)"
+    );
 }
 
 #[test]
@@ -211,6 +276,11 @@ fn files_that_include_many_others_end() {
         fs::write(directory.path().join(format!("{level}.toml")), text).unwrap();
     }
     fs::write(directory.path().join("20.toml"), "").unwrap();
-    let error = Machine::read(&directory.path().join("0.toml"), &[]).unwrap_err().to_string();
-    assert!(error.contains("the machine is made of more than 64 files"), "{error}");
+    let error = Machine::read(&directory.path().join("0.toml"), &[])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("the machine is made of more than 64 files"),
+        "{error}"
+    );
 }

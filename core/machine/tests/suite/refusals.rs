@@ -17,7 +17,10 @@ fn every_bad_file_is_refused_in_the_expected_words() {
 
 fn bad_files() -> Vec<PathBuf> {
     let entries = fs::read_dir(fixtures().join("bad")).unwrap();
-    let mut files: Vec<_> = entries.map(|e| e.unwrap().path()).filter(|p| p.extension().unwrap() == "toml").collect();
+    let mut files: Vec<_> = entries
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.extension().unwrap() == "toml")
+        .collect();
     files.sort();
     files
 }

@@ -35,7 +35,12 @@ const ROUNDING_MM: f64 = 1e-9;
 impl ArcLength {
     /// An empty table at the start of `curve`.
     pub fn empty(curve: &Nurbs) -> Self {
-        Self { fits: Vec::new(), lines: Vec::new(), next_span: curve.degree(), built: Length::default() }
+        Self {
+            fits: Vec::new(),
+            lines: Vec::new(),
+            next_span: curve.degree(),
+            built: Length::default(),
+        }
     }
 
     /// The table of the whole `curve`. Allocates.
@@ -47,7 +52,10 @@ impl ArcLength {
 
     /// The table of `piece` of `curve`, with s from its start: at its ends the derivatives are those inside. Allocates.
     pub fn of_piece(curve: &Nurbs, piece: &Piece) -> Self {
-        let mut table = Self { next_span: curve.span(piece.range.0), ..Self::empty(curve) };
+        let mut table = Self {
+            next_span: curve.span(piece.range.0),
+            ..Self::empty(curve)
+        };
         while table.next_span < curve.points() && curve.knots()[table.next_span] < piece.range.1 {
             // What a turn leaves of a span may be rounding: there is nothing to drive, and no direction.
             table.add_part(curve, piece.range, ROUNDING_MM);
@@ -76,18 +84,37 @@ impl ArcLength {
         self.next_span += 1;
         let from = curve.knots()[span].max(range.0);
         let to = curve.knots()[span + 1].min(range.1);
-        let whole = if to > from { curve.gauss(span, from, to) } else { 0.0 };
+        let whole = if to > from {
+            curve.gauss(span, from, to)
+        } else {
+            0.0
+        };
         if to > from && whole >= least_mm {
             let start_mm = self.built.mm;
             self.add(curve, span, (from, to), whole, MAX_HALVINGS);
-            self.lines.extend(Line::new(curve, span, (from, to), [start_mm, self.built.mm]));
+            self.lines.extend(Line::new(
+                curve,
+                span,
+                (from, to),
+                [start_mm, self.built.mm],
+            ));
         }
     }
 
     /// Adds a part of a span, whose length by the rule is `whole`.
-    fn add(&mut self, curve: &Nurbs, span: usize, (from, to): (f64, f64), whole: f64, halvings: u32) {
+    fn add(
+        &mut self,
+        curve: &Nurbs,
+        span: usize,
+        (from, to): (f64, f64),
+        whole: f64,
+        halvings: u32,
+    ) {
         let middle = 0.5 * (from + to);
-        let [left, right] = [curve.gauss(span, from, middle), curve.gauss(span, middle, to)];
+        let [left, right] = [
+            curve.gauss(span, from, middle),
+            curve.gauss(span, middle, to),
+        ];
         let halves = left + right;
         let error_mm = (whole - halves).abs() + curve.hidden_mm(span, (from, to), halves);
         let last = halvings == 0 || middle <= from || middle >= to;
@@ -176,7 +203,9 @@ impl ArcLength {
             return None;
         }
         let behind = self.lines.partition_point(|line| line.start_mm <= s_mm);
-        self.lines[..behind].last().filter(|line| s_mm <= line.end_mm + ROUNDING_MM)
+        self.lines[..behind]
+            .last()
+            .filter(|line| s_mm <= line.end_mm + ROUNDING_MM)
     }
 
     /// The part that holds `s_mm`, sought a few parts around `place`, then by halving.

@@ -36,13 +36,22 @@ impl Nurbs {
     pub fn new(data: &NurbsData, axes: &Axes) -> Result<Self, NurbsError> {
         check_points(data)?;
         check_knots(data)?;
-        let homogeneous =
-            data.control_points.iter().zip(&data.weights).map(|(point, weight)| homogeneous(point, *weight));
+        let homogeneous = data
+            .control_points
+            .iter()
+            .zip(&data.weights)
+            .map(|(point, weight)| homogeneous(point, *weight));
         let levels = Levels::new(homogeneous.collect(), &data.knots, data.degree);
         let plain = data.weights.iter().all(|weight| *weight == data.weights[0]);
         let counted = counted(data, axes)?;
         check_spans(data, &counted)?;
-        Ok(Self { degree: data.degree, knots: data.knots.clone(), levels, plain, counted })
+        Ok(Self {
+            degree: data.degree,
+            knots: data.knots.clone(),
+            levels,
+            plain,
+            counted,
+        })
     }
 
     /// The degree.
@@ -63,7 +72,10 @@ impl Nurbs {
     /// Control point and weight `index`.
     pub fn control_point(&self, index: usize) -> (AxisVector, f64) {
         let point = self.levels.point(index);
-        (point.axes() * (1.0 / point[Wide::WEIGHT]), point[Wide::WEIGHT])
+        (
+            point.axes() * (1.0 / point[Wide::WEIGHT]),
+            point[Wide::WEIGHT],
+        )
     }
 
     /// First and last parameter.
@@ -90,8 +102,12 @@ impl Nurbs {
     pub fn data(&self) -> NurbsData {
         NurbsData {
             degree: self.degree,
-            control_points: (0..self.points()).map(|index| self.control_point(index).0).collect(),
-            weights: (0..self.points()).map(|index| self.control_point(index).1).collect(),
+            control_points: (0..self.points())
+                .map(|index| self.control_point(index).0)
+                .collect(),
+            weights: (0..self.points())
+                .map(|index| self.control_point(index).1)
+                .collect(),
             knots: self.knots.clone(),
         }
     }
@@ -114,17 +130,32 @@ fn check_points(data: &NurbsData) -> Result<(), NurbsError> {
     if points <= degree {
         return Err(NurbsError::Points { degree, points });
     }
-    if let Some(index) = data.control_points.iter().position(|point| !point.is_finite()) {
+    if let Some(index) = data
+        .control_points
+        .iter()
+        .position(|point| !point.is_finite())
+    {
         return Err(NurbsError::Point(index));
     }
     if data.weights.len() != points {
-        return Err(NurbsError::Weights { points, weights: data.weights.len() });
+        return Err(NurbsError::Weights {
+            points,
+            weights: data.weights.len(),
+        });
     }
     let wrong = |weight: &f64| !weight.is_finite() || *weight <= 0.0;
     if let Some(index) = data.weights.iter().position(wrong) {
-        return Err(NurbsError::Weight { index, value: data.weights[index] });
+        return Err(NurbsError::Weight {
+            index,
+            value: data.weights[index],
+        });
     }
-    let (low, high) = data.weights.iter().fold((f64::INFINITY, 0.0f64), |(low, high), w| (low.min(*w), high.max(*w)));
+    let (low, high) = data
+        .weights
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(low, high), w| {
+            (low.min(*w), high.max(*w))
+        });
     if high > MAX_WEIGHT_RATIO * low {
         return Err(NurbsError::WeightRatio { ratio: high / low });
     }
@@ -136,12 +167,20 @@ fn check_knots(data: &NurbsData) -> Result<(), NurbsError> {
     let points = data.control_points.len();
     let knots = &data.knots;
     if knots.len() != points + degree + 1 {
-        return Err(NurbsError::Knots { points, degree, knots: knots.len() });
+        return Err(NurbsError::Knots {
+            points,
+            degree,
+            knots: knots.len(),
+        });
     }
     let mut before = f64::NEG_INFINITY;
     for (index, value) in knots.iter().copied().enumerate() {
         if !value.is_finite() || value < before {
-            return Err(NurbsError::Knot { index, value, before });
+            return Err(NurbsError::Knot {
+                index,
+                value,
+                before,
+            });
         }
         before = value;
     }
@@ -153,18 +192,33 @@ fn check_knots(data: &NurbsData) -> Result<(), NurbsError> {
     for value in [first, last] {
         let count = knots.iter().filter(|knot| **knot == value).count();
         if count > degree + 1 {
-            return Err(NurbsError::End { value, count, degree });
+            return Err(NurbsError::End {
+                value,
+                count,
+                degree,
+            });
         }
     }
     check_spacing(data, first, last)
 }
 
 fn check_spacing(data: &NurbsData, first: f64, last: f64) -> Result<(), NurbsError> {
-    let inside = data.knots.iter().enumerate().filter(|(_, knot)| **knot > first && **knot < last);
+    let inside = data
+        .knots
+        .iter()
+        .enumerate()
+        .filter(|(_, knot)| **knot > first && **knot < last);
     for (index, value) in inside {
-        let count = data.knots[index..].iter().take_while(|knot| *knot == value).count();
+        let count = data.knots[index..]
+            .iter()
+            .take_while(|knot| *knot == value)
+            .count();
         if count > data.degree {
-            return Err(NurbsError::Multiplicity { value: *value, count, degree: data.degree });
+            return Err(NurbsError::Multiplicity {
+                value: *value,
+                count,
+                degree: data.degree,
+            });
         }
     }
     for index in data.degree..data.control_points.len() {
@@ -193,12 +247,22 @@ fn check_spans(data: &NurbsData, counted: &AxisVector) -> Result<(), NurbsError>
 
 /// Which axes path speed counts on this curve.
 fn counted(data: &NurbsData, axes: &Axes) -> Result<AxisVector, NurbsError> {
-    let moves = |axis: usize| data.control_points.iter().any(|point| point[axis] != data.control_points[0][axis]);
-    let moving = |rotary: bool| (0..axes.count()).filter(move |axis| axes.is_rotary(*axis) == rotary && moves(*axis));
+    let moves = |axis: usize| {
+        data.control_points
+            .iter()
+            .any(|point| point[axis] != data.control_points[0][axis])
+    };
+    let moving = |rotary: bool| {
+        (0..axes.count()).filter(move |axis| axes.is_rotary(*axis) == rotary && moves(*axis))
+    };
     let rotary = moving(false).next().is_none();
     let mut counted = AxisVector::ZERO;
     for axis in moving(rotary) {
         counted[axis] = 1.0;
     }
-    if counted == AxisVector::ZERO { Err(NurbsError::NoLength) } else { Ok(counted) }
+    if counted == AxisVector::ZERO {
+        Err(NurbsError::NoLength)
+    } else {
+        Ok(counted)
+    }
 }

@@ -31,7 +31,9 @@ pub enum NurbsError {
         value: f64,
     },
     /// Weights so far apart that digits are lost.
-    #[error("the largest weight is {ratio:.1e} times the smallest: at most 1e6 is evaluated to its digits")]
+    #[error(
+        "the largest weight is {ratio:.1e} times the smallest: at most 1e6 is evaluated to its digits"
+    )]
     WeightRatio {
         /// Largest by smallest.
         ratio: f64,
@@ -60,7 +62,9 @@ pub enum NurbsError {
         before: f64,
     },
     /// A knot inside that stands so often that the curve falls apart.
-    #[error("knot {value} stands {count} times inside a curve of degree {degree}: the curve breaks in two there")]
+    #[error(
+        "knot {value} stands {count} times inside a curve of degree {degree}: the curve breaks in two there"
+    )]
     Multiplicity {
         /// The knot.
         value: f64,
@@ -98,7 +102,9 @@ pub enum NurbsError {
     #[error("all control points coincide: the curve has no length")]
     NoLength,
     /// On a part of the curve only axes move that path speed does not count.
-    #[error("between the knots {from} and {to} only rotary axes move: a feed in mm says nothing about them")]
+    #[error(
+        "between the knots {from} and {to} only rotary axes move: a feed in mm says nothing about them"
+    )]
     NotCounted {
         /// Start of the part.
         from: f64,
@@ -106,6 +112,8 @@ pub enum NurbsError {
         to: f64,
     },
     /// A knot to insert that is not inside, or stands too often already.
-    #[error("knot {0} cannot be inserted: it lies outside or stands as often as the degree already")]
+    #[error(
+        "knot {0} cannot be inserted: it lies outside or stands as often as the degree already"
+    )]
     Insert(f64),
 }

@@ -23,7 +23,9 @@ impl Nurbs {
         while span < last && u >= self.knots[span + 1] {
             span += 1;
         }
-        while span > self.degree && (u < self.knots[span] || self.knots[span] == self.knots[span + 1]) {
+        while span > self.degree
+            && (u < self.knots[span] || self.knots[span] == self.knots[span + 1])
+        {
             span -= 1;
         }
         span
@@ -112,7 +114,12 @@ impl Nurbs {
 
     /// Position and derivatives by the quotient rule (A4.2); the lane of the weight becomes 1, 0, 0, 0.
     #[inline]
-    fn quotients<const N: usize>(&self, levels: &[Vec<[f64; N]>; 4], span: usize, u: f64) -> [[f64; N]; 4]
+    fn quotients<const N: usize>(
+        &self,
+        levels: &[Vec<[f64; N]>; 4],
+        span: usize,
+        u: f64,
+    ) -> [[f64; N]; 4]
     where
         [f64; N]: Lanes,
     {
@@ -127,17 +134,28 @@ impl Nurbs {
         let inverse = 1.0 / a[weight];
         let position = a.map(|v| v * inverse);
         if self.plain {
-            return [position, a1.map(|v| v * inverse), a2.map(|v| v * inverse), a3.map(|v| v * inverse)];
+            return [
+                position,
+                a1.map(|v| v * inverse),
+                a2.map(|v| v * inverse),
+                a3.map(|v| v * inverse),
+            ];
         }
         let [w1, w2, w3] = [a1[weight], a2[weight], a3[weight]];
         let first = std::array::from_fn(|n| (a1[n] - position[n] * w1) * inverse);
-        let second = std::array::from_fn(|n| (a2[n] - first[n] * (2.0 * w1) - position[n] * w2) * inverse);
-        let third = |n: usize| (a3[n] - second[n] * (3.0 * w1) - first[n] * (3.0 * w2) - position[n] * w3) * inverse;
+        let second =
+            std::array::from_fn(|n| (a2[n] - first[n] * (2.0 * w1) - position[n] * w2) * inverse);
+        let third = |n: usize| {
+            (a3[n] - second[n] * (3.0 * w1) - first[n] * (3.0 * w2) - position[n] * w3) * inverse
+        };
         [position, first, second, std::array::from_fn(third)]
     }
 
     #[inline]
-    fn along<const N: usize>(&self, [position, first, second, third]: &[[f64; N]; 4]) -> Option<AlongPath>
+    fn along<const N: usize>(
+        &self,
+        [position, first, second, third]: &[[f64; N]; 4],
+    ) -> Option<AlongPath>
     where
         [f64; N]: Lanes,
     {
@@ -152,7 +170,8 @@ impl Nurbs {
         let u_ss = -mixed * inverse * inverse;
         let u_sss = u_s * inverse * inverse * (4.0 * mixed * mixed * inverse - rate);
         let c = [u_s * u_s, u_s * u_s * u_s, 3.0 * u_s * u_ss];
-        let by_s3: [f64; N] = std::array::from_fn(|n| third[n] * c[1] + second[n] * c[2] + first[n] * u_sss);
+        let by_s3: [f64; N] =
+            std::array::from_fn(|n| third[n] * c[1] + second[n] * c[2] + first[n] * u_sss);
         Some(AlongPath {
             position: position.axes(),
             direction: first.map(|v| v * u_s).axes(),
@@ -232,5 +251,10 @@ fn derivatives<const N: usize>([position, first, second, third]: &[[f64; N]; 4])
 where
     [f64; N]: Lanes,
 {
-    Derivatives { position: position.axes(), first: first.axes(), second: second.axes(), third: third.axes() }
+    Derivatives {
+        position: position.axes(),
+        first: first.axes(),
+        second: second.axes(),
+        third: third.axes(),
+    }
 }

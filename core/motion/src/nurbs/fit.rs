@@ -25,8 +25,21 @@ const SHORTEST_MM: f64 = 1e-9;
 
 impl Fit {
     /// The fit over the part of `span` from `from` to `to`, of length `length_mm`, where it keeps its tolerance.
-    pub fn new(curve: &Nurbs, span: usize, (from, to): (f64, f64), start_mm: f64, length_mm: f64) -> Option<Self> {
-        let mut fit = Self { start_mm, length_mm, from, to, span, coefficients: [0.0; 8] };
+    pub fn new(
+        curve: &Nurbs,
+        span: usize,
+        (from, to): (f64, f64),
+        start_mm: f64,
+        length_mm: f64,
+    ) -> Option<Self> {
+        let mut fit = Self {
+            start_mm,
+            length_mm,
+            from,
+            to,
+            span,
+            coefficients: [0.0; 8],
+        };
         fit.coefficients[1] = to - from;
         if length_mm <= SHORTEST_MM {
             return Some(fit);
@@ -46,7 +59,8 @@ impl Fit {
             return self.to;
         }
         let c = &self.coefficients;
-        let sum = x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * (c[5] + x * (c[6] + x * c[7]))))));
+        let sum =
+            x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * (c[5] + x * (c[6] + x * c[7]))))));
         (self.from + sum).clamp(self.from, self.to)
     }
 
@@ -68,7 +82,10 @@ impl Fit {
 
 /// Coefficients of the polynomial that meets u and its three derivatives by s at both ends, without its constant term.
 fn hermite(curve: &Nurbs, span: usize, (from, to): (f64, f64), length: f64) -> Option<[f64; 8]> {
-    let [a, b] = [curve.along_path_in(span, from)?.parameter, curve.along_path_in(span, to)?.parameter];
+    let [a, b] = [
+        curve.along_path_in(span, from)?.parameter,
+        curve.along_path_in(span, to)?.parameter,
+    ];
     let width = to - from;
     let l2 = length * length;
     let l3 = length * length * length;

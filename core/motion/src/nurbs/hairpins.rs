@@ -18,7 +18,10 @@ impl Nurbs {
     pub fn hairpins(&self, range: (f64, f64), radius_mm: f64) -> Vec<f64> {
         let mut found = Vec::new();
         for span in self.span(range.0)..self.points() {
-            let part = (self.knots[span].max(range.0), self.knots[span + 1].min(range.1));
+            let part = (
+                self.knots[span].max(range.0),
+                self.knots[span + 1].min(range.1),
+            );
             if part.1 > part.0 {
                 self.hairpins_in(span, part, radius_mm, &mut found);
             }
@@ -26,11 +29,20 @@ impl Nurbs {
         found
     }
 
-    fn hairpins_in(&self, span: usize, (from, to): (f64, f64), radius_mm: f64, found: &mut Vec<f64>) {
+    fn hairpins_in(
+        &self,
+        span: usize,
+        (from, to): (f64, f64),
+        radius_mm: f64,
+        found: &mut Vec<f64>,
+    ) {
         // Speed in the parameter, and half of how its square changes.
         let look = |u: f64| {
             let at = self.derivatives_in(span, u);
-            (self.counted_length(&at.first), self.counted_product(&at.first, &at.second))
+            (
+                self.counted_length(&at.first),
+                self.counted_product(&at.first, &at.second),
+            )
         };
         let at = |n: u32| from + (to - from) * (f64::from(n) / f64::from(LOOKS));
         let fastest = (0..=LOOKS).map(|n| look(at(n)).0).fold(0.0, f64::max);
@@ -49,7 +61,11 @@ impl Nurbs {
             }
             for _ in 0..HALVINGS {
                 let middle = f64::midpoint(low, high);
-                if look(middle).1 < 0.0 { low = middle } else { high = middle }
+                if look(middle).1 < 0.0 {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             // An axis that does not count and moves there would have to do so on no way at all, from rest as well.
             let first = self.derivatives_in(span, high).first;
@@ -57,7 +73,9 @@ impl Nurbs {
                 continue;
             }
             // Where it stands still it has no curvature: that is a cusp.
-            let per_mm = self.curvature(&self.derivatives_in(span, high)).unwrap_or(f64::INFINITY);
+            let per_mm = self
+                .curvature(&self.derivatives_in(span, high))
+                .unwrap_or(f64::INFINITY);
             if per_mm * radius_mm > 1.0 && high > from && high < to {
                 found.push(high);
             }

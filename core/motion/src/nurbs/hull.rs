@@ -18,10 +18,18 @@ pub(super) struct Hull {
 impl Nurbs {
     /// Whether the curve lies inside a convex set all the way between two parameters. True is proven: the control points of
     /// the parts of the curve there are inside, and a part that is not is halved up to `halvings` times. Does not allocate.
-    pub fn lies_inside(&self, range: (f64, f64), halvings: u32, inside: &impl Fn(&AxisVector) -> bool) -> bool {
+    pub fn lies_inside(
+        &self,
+        range: (f64, f64),
+        halvings: u32,
+        inside: &impl Fn(&AxisVector) -> bool,
+    ) -> bool {
         let spans = self.span(range.0)..=self.span(range.1);
         spans.into_iter().all(|span| {
-            let part = (self.knots[span].max(range.0), self.knots[span + 1].min(range.1));
+            let part = (
+                self.knots[span].max(range.0),
+                self.knots[span + 1].min(range.1),
+            );
             part.1 <= part.0 || Hull::of_part(self, span, part).is_inside(halvings, inside)
         })
     }
@@ -35,9 +43,19 @@ impl Hull {
 
     /// The part of `span`, which has an extent, between two parameters: the blossom of the curve at them. Does not allocate.
     fn of_part(curve: &Nurbs, span: usize, (from, to): (f64, f64)) -> Self {
-        let mut hull = Self { degree: curve.degree, points: [[0.0; MAX_AXES + 1]; MAX_DEGREE + 1], range: (from, to) };
+        let mut hull = Self {
+            degree: curve.degree,
+            points: [[0.0; MAX_AXES + 1]; MAX_DEGREE + 1],
+            range: (from, to),
+        };
         for index in 0..=curve.degree {
-            hull.points[index] = blossom(curve, span, |level| if level + index <= curve.degree { from } else { to });
+            hull.points[index] = blossom(curve, span, |level| {
+                if level + index <= curve.degree {
+                    from
+                } else {
+                    to
+                }
+            });
         }
         hull
     }
@@ -45,11 +63,18 @@ impl Hull {
     /// Its halves (de Casteljau).
     pub fn halves(&self) -> [Self; 2] {
         let middle = f64::midpoint(self.range.0, self.range.1);
-        let mut first = Self { range: (self.range.0, middle), ..*self };
-        let mut second = Self { range: (middle, self.range.1), ..*self };
+        let mut first = Self {
+            range: (self.range.0, middle),
+            ..*self
+        };
+        let mut second = Self {
+            range: (middle, self.range.1),
+            ..*self
+        };
         for level in 1..=self.degree {
             for index in 0..=self.degree - level {
-                second.points[index] = between(&second.points[index], &second.points[index + 1], 0.5);
+                second.points[index] =
+                    between(&second.points[index], &second.points[index + 1], 0.5);
             }
             first.points[level] = second.points[0];
         }
@@ -64,7 +89,10 @@ impl Hull {
         // Its ends are places of the curve itself: where one is outside, no halving helps.
         halvings > 0
             && self.ends().iter().all(inside)
-            && self.halves().iter().all(|half| half.is_inside(halvings - 1, inside))
+            && self
+                .halves()
+                .iter()
+                .all(|half| half.is_inside(halvings - 1, inside))
     }
 
     /// Degree of the curve.
@@ -85,8 +113,12 @@ impl Hull {
 
     /// Between what `axis` stays, mm or rad.
     pub fn bounds(&self, axis: usize) -> (f64, f64) {
-        let values = self.points[..=self.degree].iter().map(|point| point[axis] / point[Wide::WEIGHT]);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+        let values = self.points[..=self.degree]
+            .iter()
+            .map(|point| point[axis] / point[Wide::WEIGHT]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(v), high.max(v))
+        })
     }
 
     /// No point of it is nearer to `point` than this, mm.
@@ -95,7 +127,10 @@ impl Hull {
             let (low, high) = self.bounds(axis);
             (low - point[axis]).max(point[axis] - high).max(0.0)
         };
-        (0..MAX_AXES).map(|axis| off(axis).powi(2)).sum::<f64>().sqrt()
+        (0..MAX_AXES)
+            .map(|axis| off(axis).powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 }
 
@@ -103,7 +138,8 @@ impl Hull {
 fn blossom(curve: &Nurbs, span: usize, parameter: impl Fn(usize) -> f64) -> Wide {
     let degree = curve.degree;
     let first = span - curve.degree;
-    let mut points: [Wide; MAX_DEGREE + 1] = std::array::from_fn(|index| curve.levels.point(first + index.min(degree)));
+    let mut points: [Wide; MAX_DEGREE + 1] =
+        std::array::from_fn(|index| curve.levels.point(first + index.min(degree)));
     for level in 1..=degree {
         for index in (level..=degree).rev() {
             let low = curve.knots[first + index];

@@ -19,12 +19,27 @@ impl Nurbs {
         let point = |index: usize| match self.share(span - count, index, u) {
             1.0 => self.levels.point(index),
             0.0 => self.levels.point(index - 1),
-            share => mix(1.0 - share, &self.levels.point(index - 1), share, &self.levels.point(index)),
+            share => mix(
+                1.0 - share,
+                &self.levels.point(index - 1),
+                share,
+                &self.levels.point(index),
+            ),
         };
         let mut knots = self.knots.clone();
         knots.insert(span + 1, u);
-        let levels = Levels::new((0..=self.points()).map(point).collect(), &knots, self.degree);
-        Ok(Self { degree: self.degree, knots, levels, plain: self.plain, counted: self.counted })
+        let levels = Levels::new(
+            (0..=self.points()).map(point).collect(),
+            &knots,
+            self.degree,
+        );
+        Ok(Self {
+            degree: self.degree,
+            knots,
+            levels,
+            plain: self.plain,
+            counted: self.counted,
+        })
     }
 
     /// How much of the control point of the same index goes into the new one; the rest is of the one before.

@@ -42,7 +42,10 @@ impl Nurbs {
         let mut sum = Length::default();
         for span in self.degree..self.points() {
             let part = self.length_in(span, self.knots[span], self.knots[span + 1]);
-            sum = Length { mm: sum.mm + part.mm, error_mm: sum.error_mm + part.error_mm };
+            sum = Length {
+                mm: sum.mm + part.mm,
+                error_mm: sum.error_mm + part.error_mm,
+            };
         }
         sum
     }
@@ -54,7 +57,11 @@ impl Nurbs {
             return Length::default();
         }
         let whole = self.gauss(span, from, to);
-        let halving = Halving { scale_mm: whole.max(1e-3), left: MAX_HALVINGS, agreed: false };
+        let halving = Halving {
+            scale_mm: whole.max(1e-3),
+            left: MAX_HALVINGS,
+            agreed: false,
+        };
         self.refine(span, (from, to), whole, halving)
     }
 
@@ -66,12 +73,22 @@ impl Nurbs {
         let error_mm = error_mm + self.hidden_mm(span, (from, to), left + right);
         let agrees = error_mm <= RELATIVE * halving.scale_mm;
         if agrees && halving.agreed || halving.left == 0 || middle <= from || middle >= to {
-            return Length { mm: left + right, error_mm };
+            return Length {
+                mm: left + right,
+                error_mm,
+            };
         }
-        let next = Halving { left: halving.left - 1, agreed: agrees, ..halving };
+        let next = Halving {
+            left: halving.left - 1,
+            agreed: agrees,
+            ..halving
+        };
         let first = self.refine(span, (from, middle), left, next);
         let second = self.refine(span, (middle, to), right, next);
-        Length { mm: first.mm + second.mm, error_mm: first.error_mm + second.error_mm }
+        Length {
+            mm: first.mm + second.mm,
+            error_mm: first.error_mm + second.error_mm,
+        }
     }
 
     /// What a place at which the curve stands still can hide from the rule, mm: there |C′| goes through zero as |u − u₀|, and
@@ -80,7 +97,11 @@ impl Nurbs {
     pub(super) fn hidden_mm(&self, span: usize, (from, to): (f64, f64), mm: f64) -> f64 {
         let mean = mm / (to - from);
         let shares = [from, to].map(|u| self.speed_in(span, u) / mean);
-        shares.iter().filter(|share| **share < SEEN).map(|share| share * share * mm / 2.0).sum()
+        shares
+            .iter()
+            .filter(|share| **share < SEEN)
+            .map(|share| share * share * mm / 2.0)
+            .sum()
     }
 
     /// The 8-point rule over a part of a span, mm.
@@ -89,7 +110,10 @@ impl Nurbs {
         let middle = 0.5 * (from + to);
         let half = 0.5 * (to - from);
         let speed = |u: f64| self.speed_in(span, u);
-        let sum: f64 = RULE.iter().map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x))).sum();
+        let sum: f64 = RULE
+            .iter()
+            .map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x)))
+            .sum();
         sum * half
     }
 }

@@ -22,7 +22,10 @@ pub(super) enum Levels {
 impl Levels {
     /// The levels of a curve of `degree` with these homogeneous points.
     pub fn new(points: Vec<Wide>, knots: &[f64], degree: usize) -> Self {
-        if points.iter().all(|point| point[Narrow::WEIGHT..MAX_AXES].iter().all(|v| *v == 0.0)) {
+        if points
+            .iter()
+            .all(|point| point[Narrow::WEIGHT..MAX_AXES].iter().all(|v| *v == 0.0))
+        {
             return Self::Narrow(derived(points.iter().map(narrow).collect(), knots, degree));
         }
         Self::Wide(derived(points, knots, degree))
@@ -83,13 +86,21 @@ fn wide(point: &Narrow) -> Wide {
 }
 
 /// Control points of the derivatives (A3.3). Where knots coincide they have no span to act on.
-fn derived<const N: usize>(points: Vec<[f64; N]>, knots: &[f64], degree: usize) -> [Vec<[f64; N]>; 4] {
+fn derived<const N: usize>(
+    points: Vec<[f64; N]>,
+    knots: &[f64],
+    degree: usize,
+) -> [Vec<[f64; N]>; 4] {
     let mut levels = [points, Vec::new(), Vec::new(), Vec::new()];
     for order in 1..=degree.min(3) {
         let before = &levels[order - 1];
         let next = before.windows(2).enumerate().map(|(index, pair)| {
             let width = knots[index + degree + 1] - knots[index + order];
-            let factor = if width > 0.0 { (degree + 1 - order) as f64 / width } else { 0.0 };
+            let factor = if width > 0.0 {
+                (degree + 1 - order) as f64 / width
+            } else {
+                0.0
+            };
             std::array::from_fn(|n| (pair[1][n] - pair[0][n]) * factor)
         });
         levels[order] = next.collect();
@@ -99,7 +110,12 @@ fn derived<const N: usize>(points: Vec<[f64; N]>, knots: &[f64], degree: usize) 
 
 /// The sum of the points from `first` on, weighted by basis functions of `degree`.
 #[inline]
-pub(super) fn combine<const N: usize>(level: &[[f64; N]], first: usize, degree: usize, row: &Row) -> [f64; N] {
+pub(super) fn combine<const N: usize>(
+    level: &[[f64; N]],
+    first: usize,
+    degree: usize,
+    row: &Row,
+) -> [f64; N] {
     let mut sum = [0.0; N];
     for (point, share) in level[first..=first + degree].iter().zip(row) {
         for n in 0..N {

@@ -35,7 +35,14 @@ impl Nurbs {
     /// put most of a span between two samples. Does not allocate.
     pub fn nearest(&self, point: &AxisVector, from_span: usize, to_span: usize) -> Nearest {
         let spans = from_span.max(self.degree)..=to_span.min(self.points() - 1);
-        self.nearer_on(spans, point, Nearest { u: self.range().0, distance_mm: f64::INFINITY })
+        self.nearer_on(
+            spans,
+            point,
+            Nearest {
+                u: self.range().0,
+                distance_mm: f64::INFINITY,
+            },
+        )
     }
 
     /// The point of the whole curve nearest to `point`, where `best` is one known before: spans further away than that cost
@@ -44,9 +51,16 @@ impl Nurbs {
         self.nearer_on(self.degree..=self.points() - 1, point, best)
     }
 
-    fn nearer_on(&self, spans: RangeInclusive<usize>, point: &AxisVector, mut best: Nearest) -> Nearest {
+    fn nearer_on(
+        &self,
+        spans: RangeInclusive<usize>,
+        point: &AxisVector,
+        mut best: Nearest,
+    ) -> Nearest {
         for span in spans {
-            if self.knots[span + 1] > self.knots[span] && self.least_distance_mm(span, point) < best.distance_mm {
+            if self.knots[span + 1] > self.knots[span]
+                && self.least_distance_mm(span, point) < best.distance_mm
+            {
                 self.nearest_in(span, point, &mut best);
                 if best.distance_mm > ON_CURVE_MM {
                     self.prove(span, &Hull::of_span(self, span), point, HALVINGS, &mut best);
@@ -67,12 +81,26 @@ impl Nurbs {
                 high[axis] = high[axis].max(at[axis]);
             }
         }
-        let off = |axis: usize| (low[axis] - point[axis]).max(point[axis] - high[axis]).max(0.0);
-        (0..MAX_AXES).map(|axis| off(axis).powi(2)).sum::<f64>().sqrt()
+        let off = |axis: usize| {
+            (low[axis] - point[axis])
+                .max(point[axis] - high[axis])
+                .max(0.0)
+        };
+        (0..MAX_AXES)
+            .map(|axis| off(axis).powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 
     /// Looks for a nearer point on a part of `span`, in the nearer half first.
-    fn prove(&self, span: usize, part: &Hull, point: &AxisVector, halvings: u32, best: &mut Nearest) {
+    fn prove(
+        &self,
+        span: usize,
+        part: &Hull,
+        point: &AxisVector,
+        halvings: u32,
+        best: &mut Nearest,
+    ) {
         if part.least_distance_mm(point) >= PROVED * best.distance_mm - ROUNDING {
             return;
         }
@@ -97,12 +125,21 @@ impl Nurbs {
         let from = self.knots[span];
         let to = self.knots[span + 1];
         let at = |step: usize| (from + (to - from) * step as f64 / TRIED as f64).min(to);
-        let tried: [f64; TRIED + 1] =
-            std::array::from_fn(|step| distance(point, &self.derivatives_in(span, at(step)).position));
+        let tried: [f64; TRIED + 1] = std::array::from_fn(|step| {
+            distance(point, &self.derivatives_in(span, at(step)).position)
+        });
         for step in 0..=TRIED {
             let lower = |other: Option<&f64>| other.is_none_or(|other| tried[step] <= *other);
-            if lower(step.checked_sub(1).map(|before| &tried[before])) && lower(tried.get(step + 1)) {
-                let found = self.improve(span, point, Nearest { u: at(step), distance_mm: tried[step] });
+            if lower(step.checked_sub(1).map(|before| &tried[before])) && lower(tried.get(step + 1))
+            {
+                let found = self.improve(
+                    span,
+                    point,
+                    Nearest {
+                        u: at(step),
+                        distance_mm: tried[step],
+                    },
+                );
                 if found.distance_mm < best.distance_mm {
                     *best = found;
                 }
@@ -118,7 +155,12 @@ impl Nurbs {
         for _ in 0..ROUNDS {
             let at = self.derivatives_in(span, best.u);
             let squared: f64 = at.first.0.iter().map(|v| v * v).sum();
-            let along: f64 = (*point - at.position).0.iter().zip(at.first.0).map(|(a, b)| a * b).sum();
+            let along: f64 = (*point - at.position)
+                .0
+                .iter()
+                .zip(at.first.0)
+                .map(|(a, b)| a * b)
+                .sum();
             let u = (best.u + share * along / squared).clamp(from, to);
             if !u.is_finite() || u == best.u {
                 break;
@@ -154,7 +196,9 @@ fn widen(part: &Hull, axis: usize, halvings: u32, extent: &mut (f64, f64)) {
     }
     let (low, high) = part.bounds(axis);
     if halvings > 0 && (low < extent.0 - ROUNDING || high > extent.1 + ROUNDING) {
-        part.halves().iter().for_each(|half| widen(half, axis, halvings - 1, extent));
+        part.halves()
+            .iter()
+            .for_each(|half| widen(half, axis, halvings - 1, extent));
     }
 }
 

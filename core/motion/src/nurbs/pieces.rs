@@ -54,7 +54,11 @@ impl Nurbs {
                 if goes_on {
                     continue;
                 }
-                pieces.push(Piece { range: (from, u), start_direction, end_direction });
+                pieces.push(Piece {
+                    range: (from, u),
+                    start_direction,
+                    end_direction,
+                });
             }
             start = (!stays).then(|| (u, self.direction_behind(u)));
         }
@@ -80,7 +84,10 @@ impl Nurbs {
     /// The distinct knots inside the curve.
     pub fn inner_knots(&self) -> impl Iterator<Item = f64> {
         let (from, to) = self.range();
-        let knots = self.knots.windows(2).filter(move |pair| pair[1] > pair[0] && pair[1] > from && pair[1] < to);
+        let knots = self
+            .knots
+            .windows(2)
+            .filter(move |pair| pair[1] > pair[0] && pair[1] > from && pair[1] < to);
         knots.map(|pair| pair[1])
     }
 
@@ -100,13 +107,20 @@ impl Nurbs {
     pub fn turns_alone(&self) -> Option<f64> {
         let (start, _) = self.control_point(0);
         let uncounted = |vector: AxisVector, least: f64| {
-            vector.0.iter().zip(self.counted.0).any(|(v, counted)| counted == 0.0 && v.abs() > least)
+            vector
+                .0
+                .iter()
+                .zip(self.counted.0)
+                .any(|(v, counted)| counted == 0.0 && v.abs() > least)
         };
-        if !(1..self.points()).any(|index| uncounted(self.control_point(index).0 - start, SAME_MM)) {
+        if !(1..self.points()).any(|index| uncounted(self.control_point(index).0 - start, SAME_MM))
+        {
             return None;
         }
-        let spans = (self.degree..self.points()).filter(|span| self.knots[span + 1] > self.knots[*span]);
-        let mut knots = spans.flat_map(|span| [(span, self.knots[span]), (span, self.knots[span + 1])]);
+        let spans =
+            (self.degree..self.points()).filter(|span| self.knots[span + 1] > self.knots[*span]);
+        let mut knots =
+            spans.flat_map(|span| [(span, self.knots[span]), (span, self.knots[span + 1])]);
         let alone = knots.find(|(span, knot)| {
             let first = self.derivatives_in(*span, *knot).first;
             let width = self.knots[span + 1] - self.knots[*span];
@@ -143,17 +157,34 @@ impl Nurbs {
         let point = |n: usize| hull.position(if backward { last - n } else { n });
         let start = point(0);
         let far = start.0.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-        let extent = (1..=last).map(|n| self.counted_length(&(point(n) - start))).fold(far, f64::max);
-        let other = (1..=last).map(|n| point(n) - start).find(|way| self.counted_length(way) > COINCIDES * extent);
+        let extent = (1..=last)
+            .map(|n| self.counted_length(&(point(n) - start)))
+            .fold(far, f64::max);
+        let other = (1..=last)
+            .map(|n| point(n) - start)
+            .find(|way| self.counted_length(way) > COINCIDES * extent);
         let sign = if backward { -1.0 } else { 1.0 };
-        other.map_or(AxisVector::ZERO, |way| way * (sign / self.counted_length(&way)))
+        other.map_or(AxisVector::ZERO, |way| {
+            way * (sign / self.counted_length(&way))
+        })
     }
 
     /// The direction in which the curve leaves a point, by the first derivative that is not zero: `step` is signed.
     fn direction(&self, at: &Derivatives, step: f64) -> AxisVector {
-        let moves = [at.first * step, at.second * (step * step / 2.0), at.third * (step * step * step / 6.0)];
-        let largest = moves.iter().map(|m| self.counted_length(m)).fold(0.0, f64::max);
-        let first = moves.iter().find(|m| self.counted_length(m) > STANDS_STILL * largest);
-        first.map_or(AxisVector::ZERO, |m| *m * (step.signum() / self.counted_length(m)))
+        let moves = [
+            at.first * step,
+            at.second * (step * step / 2.0),
+            at.third * (step * step * step / 6.0),
+        ];
+        let largest = moves
+            .iter()
+            .map(|m| self.counted_length(m))
+            .fold(0.0, f64::max);
+        let first = moves
+            .iter()
+            .find(|m| self.counted_length(m) > STANDS_STILL * largest);
+        first.map_or(AxisVector::ZERO, |m| {
+            *m * (step.signum() / self.counted_length(m))
+        })
     }
 }

@@ -38,7 +38,12 @@ pub(super) struct Line {
 impl Line {
     /// The line along `span` between two parameters and path coordinates; `None` where the span is not straight, turns back
     /// in between, or is the same by its parameter (degree 1).
-    pub fn new(curve: &Nurbs, span: usize, (from, to): (f64, f64), [start_mm, end_mm]: [f64; 2]) -> Option<Self> {
+    pub fn new(
+        curve: &Nurbs,
+        span: usize,
+        (from, to): (f64, f64),
+        [start_mm, end_mm]: [f64; 2],
+    ) -> Option<Self> {
         if curve.degree == 1 {
             return None;
         }
@@ -46,13 +51,24 @@ impl Line {
         let [start, end] = [from, to].map(|u| curve.derivatives_in(span, u).position);
         let way = end - start;
         let length_mm = end_mm - start_mm;
-        let runs_one_way = (curve.counted_length(&way) - length_mm).abs() <= OFF_LENGTH * length_mm + OFF_MM;
-        runs_one_way.then(|| Self { start_mm, end_mm, position: start, direction: way * (1.0 / length_mm) })
+        let runs_one_way =
+            (curve.counted_length(&way) - length_mm).abs() <= OFF_LENGTH * length_mm + OFF_MM;
+        runs_one_way.then(|| Self {
+            start_mm,
+            end_mm,
+            position: start,
+            direction: way * (1.0 / length_mm),
+        })
     }
 
     pub fn at(&self, s_mm: f64) -> AlongPath {
-        let position = self.position + self.direction * (s_mm.clamp(self.start_mm, self.end_mm) - self.start_mm);
-        AlongPath { position, direction: self.direction, ..AlongPath::default() }
+        let position = self.position
+            + self.direction * (s_mm.clamp(self.start_mm, self.end_mm) - self.start_mm);
+        AlongPath {
+            position,
+            direction: self.direction,
+            ..AlongPath::default()
+        }
     }
 }
 
@@ -64,12 +80,26 @@ impl Nurbs {
             if self.knots[span + 1] > self.knots[span] {
                 let hull = Hull::of_span(self, span);
                 if let Some(line) = hull.line() {
-                    let far = hull.position(0).0.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
-                    let least = ROUNDING * hull.along(&line).fold(far, |most, v| f64::max(most, v.abs()));
+                    let far = hull
+                        .position(0)
+                        .0
+                        .iter()
+                        .fold(0.0, |most, v| f64::max(most, v.abs()));
+                    let least = ROUNDING
+                        * hull
+                            .along(&line)
+                            .fold(far, |most, v| f64::max(most, v.abs()));
                     let mut last = None;
                     let mut parts = MAX_PARTS;
                     let before = found.len();
-                    self.turns(span, &hull, (&line, least), (HALVINGS, &mut parts), &mut last, &mut found);
+                    self.turns(
+                        span,
+                        &hull,
+                        (&line, least),
+                        (HALVINGS, &mut parts),
+                        &mut last,
+                        &mut found,
+                    );
                     if parts == 0 {
                         found.truncate(before);
                     }
@@ -89,15 +119,31 @@ impl Nurbs {
         last: &mut Option<(f64, f64)>,
         found: &mut Vec<f64>,
     ) {
-        let steps = || part.along(line).zip(part.along(line).skip(1)).map(|(from, to)| to - from);
+        let steps = || {
+            part.along(line)
+                .zip(part.along(line).skip(1))
+                .map(|(from, to)| to - from)
+        };
         if steps().map(f64::abs).sum::<f64>() <= least || halvings == 0 || *parts == 0 {
             return;
         }
         *parts -= 1;
-        let (forth, back) = (steps().all(|step| step >= 0.0), steps().all(|step| step <= 0.0));
+        let (forth, back) = (
+            steps().all(|step| step >= 0.0),
+            steps().all(|step| step <= 0.0),
+        );
         if !forth && !back {
             let halves = part.halves();
-            let look = |half| self.turns(span, half, (line, least), (halvings - 1, parts), last, found);
+            let look = |half| {
+                self.turns(
+                    span,
+                    half,
+                    (line, least),
+                    (halvings - 1, parts),
+                    last,
+                    found,
+                )
+            };
             return halves.iter().for_each(look);
         }
         let middle = f64::midpoint(part.range.0, part.range.1);
@@ -111,12 +157,22 @@ impl Nurbs {
     }
 
     /// Where the derivative along `line` changes its sign to that of `way`, by halving.
-    fn turn_between(&self, span: usize, line: &AxisVector, (mut low, mut high): (f64, f64), way: f64) -> f64 {
+    fn turn_between(
+        &self,
+        span: usize,
+        line: &AxisVector,
+        (mut low, mut high): (f64, f64),
+        way: f64,
+    ) -> f64 {
         for _ in 0..HALVINGS {
             let middle = f64::midpoint(low, high);
             let first = self.derivatives_in(span, middle).first;
             let along: f64 = first.0.iter().zip(line.0).map(|(a, b)| a * b).sum();
-            if along * way > 0.0 { high = middle } else { low = middle }
+            if along * way > 0.0 {
+                high = middle
+            } else {
+                low = middle
+            }
         }
         high
     }
@@ -146,7 +202,14 @@ impl Hull {
     /// The control points along `line`, from the first one on.
     fn along<'a>(&'a self, line: &'a AxisVector) -> impl Iterator<Item = f64> + 'a {
         let start = self.position(0);
-        let on = move |index: usize| (self.position(index) - start).0.iter().zip(line.0).map(|(a, b)| a * b).sum();
+        let on = move |index: usize| {
+            (self.position(index) - start)
+                .0
+                .iter()
+                .zip(line.0)
+                .map(|(a, b)| a * b)
+                .sum()
+        };
         (0..=self.degree()).map(on)
     }
 }

@@ -56,7 +56,14 @@ pub struct Point {
 impl Default for Point {
     fn default() -> Self {
         let zero = [0.0; MAX_LANES];
-        Self { first: zero, second: zero, third: zero, most: f64::INFINITY, jerk_share: 1.0, acceleration_share: 1.0 }
+        Self {
+            first: zero,
+            second: zero,
+            third: zero,
+            most: f64::INFINITY,
+            jerk_share: 1.0,
+            acceleration_share: 1.0,
+        }
     }
 }
 

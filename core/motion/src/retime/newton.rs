@@ -73,7 +73,11 @@ impl Share {
             }
             let [[d0, d1], [g0, g1]] = rows;
             let over = (place.common + value.abs() - place.right) / place.right;
-            self.violation = if over > self.violation { over } else { self.violation };
+            self.violation = if over > self.violation {
+                over
+            } else {
+                self.violation
+            };
             self.square(form, d0 + d1);
             self.slope(form, g0 - g1);
             sum += d0 + d1;
@@ -96,9 +100,16 @@ impl Share {
         let residual = over + single.slack;
         single.change = residual;
         single.answer = per_slack;
-        self.violation = if over > self.violation { over } else { self.violation };
+        self.violation = if over > self.violation {
+            over
+        } else {
+            self.violation
+        };
         self.square(w, single.multiplier * per_slack);
-        self.slope(w, sign * (target + single.multiplier * residual) * per_slack);
+        self.slope(
+            w,
+            sign * (target + single.multiplier * residual) * per_slack,
+        );
     }
 }
 
@@ -138,8 +149,16 @@ impl Reach {
             pair.change[n] = change;
             pair.answer[n] = answer;
             let shares = [-change * per_slack, -answer / pair.multiplier[n]];
-            self.slack[n] = if shares[0] > self.slack[n] { shares[0] } else { self.slack[n] };
-            self.multiplier[n] = if shares[1] > self.multiplier[n] { shares[1] } else { self.multiplier[n] };
+            self.slack[n] = if shares[0] > self.slack[n] {
+                shares[0]
+            } else {
+                self.slack[n]
+            };
+            self.multiplier[n] = if shares[1] > self.multiplier[n] {
+                shares[1]
+            } else {
+                self.multiplier[n]
+            };
         }
     }
 
@@ -152,8 +171,16 @@ impl Reach {
         single.change = change;
         single.answer = answer;
         let shares = [-change * per_slack, -answer / single.multiplier];
-        self.slack[0] = if shares[0] > self.slack[0] { shares[0] } else { self.slack[0] };
-        self.multiplier[0] = if shares[1] > self.multiplier[0] { shares[1] } else { self.multiplier[0] };
+        self.slack[0] = if shares[0] > self.slack[0] {
+            shares[0]
+        } else {
+            self.slack[0]
+        };
+        self.multiplier[0] = if shares[1] > self.multiplier[0] {
+            shares[1]
+        } else {
+            self.multiplier[0]
+        };
     }
 
     /// Lengths of the step for slacks and for multipliers, 1 at most.

@@ -45,7 +45,12 @@ pub struct Site {
 
 impl Site {
     pub fn new(interval: usize, z: [f64; PLACES], points: &[Point; PLACES]) -> Self {
-        Self { interval, values: z.map(|z| weights(z)[0]), most: points.map(|p| p.most.min(MAX_RATE_SQUARED)), z }
+        Self {
+            interval,
+            values: z.map(|z| weights(z)[0]),
+            most: points.map(|p| p.most.min(MAX_RATE_SQUARED)),
+            z,
+        }
     }
 
     /// The coefficients that count here.
@@ -61,7 +66,13 @@ impl Site {
         self.values.map(|w| {
             let b = dot(&w, beta);
             let (right, weight) = tangent(b);
-            Place { beta: *beta, w, weight, common: weight * b, right }
+            Place {
+                beta: *beta,
+                w,
+                weight,
+                common: weight * b,
+                right,
+            }
         })
     }
 }
@@ -80,16 +91,21 @@ pub fn push_forms(forms: &mut Vec<Form>, site: &Site, points: &[Point; PLACES], 
             let x2 = point.second[lane];
             let x3 = point.third[lane];
             forms.push(std::array::from_fn(|n| {
-                per * (x3 * value[n] + 1.5 * x2 * slope[n] * scales[1] + 0.5 * x1 * curve[n] * scales[2])
+                per * (x3 * value[n]
+                    + 1.5 * x2 * slope[n] * scales[1]
+                    + 0.5 * x1 * curve[n] * scales[2])
             }));
         }
     }
     for (point, [value, slope, _]) in points.iter().zip(&places).take(2) {
         for lane in 0..limits.lanes {
-            let per = 1.0 / (ACCELERATION_SHARE * point.acceleration_share * limits.acceleration[lane]);
+            let per =
+                1.0 / (ACCELERATION_SHARE * point.acceleration_share * limits.acceleration[lane]);
             let x1 = point.first[lane];
             let x2 = point.second[lane];
-            forms.push(std::array::from_fn(|n| per * (x2 * value[n] + 0.5 * x1 * slope[n] * scales[1])));
+            forms.push(std::array::from_fn(|n| {
+                per * (x2 * value[n] + 0.5 * x1 * slope[n] * scales[1])
+            }));
         }
     }
 }

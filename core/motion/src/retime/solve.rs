@@ -29,9 +29,15 @@ struct Start {
 }
 
 /// From a rate of 1, which may be far from what is sought.
-const FIRST: Start = Start { slack: 0.1, product: 0.05 };
+const FIRST: Start = Start {
+    slack: 0.1,
+    product: 0.05,
+};
 /// From a rate that was found for about the same points.
-const AGAIN: Start = Start { slack: 0.01, product: 1e-3 };
+const AGAIN: Start = Start {
+    slack: 0.01,
+    product: 1e-3,
+};
 
 /// How solving ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,8 +115,16 @@ impl Retimer {
         self.intervals = task.points.len();
         self.forms.clear();
         self.sites.clear();
-        let grid = task.points.iter().enumerate().map(|(k, points)| (k, GRID, points));
-        for (k, z, points) in grid.chain(task.between.iter().map(|more| (more.interval, more.z, &more.points))) {
+        let grid = task
+            .points
+            .iter()
+            .enumerate()
+            .map(|(k, points)| (k, GRID, points));
+        for (k, z, points) in grid.chain(
+            task.between
+                .iter()
+                .map(|more| (more.interval, more.z, &more.points)),
+        ) {
             let site = Site::new(k, z, points);
             push_forms(&mut self.forms, &site, points, task);
             self.sites.push(site);
@@ -119,13 +133,20 @@ impl Retimer {
     }
 
     fn iterate(&mut self) -> Status {
-        let mut status = Status { iterations: 0, gap: self.gap(), violation: f64::INFINITY };
+        let mut status = Status {
+            iterations: 0,
+            gap: self.gap(),
+            violation: f64::INFINITY,
+        };
         let mut shrink = 0.1;
         loop {
             let target = shrink * status.gap;
             status.violation = self.assemble(target);
             let lost = status.gap > LOST || status.gap.is_nan();
-            if lost || status.iterations == ITERATIONS || status.gap < ENOUGH && status.is_feasible() {
+            if lost
+                || status.iterations == ITERATIONS
+                || status.gap < ENOUGH && status.is_feasible()
+            {
                 return status;
             }
             self.matrix.solve(&mut self.step);
@@ -154,21 +175,39 @@ impl Retimer {
             if !is_fixed && !repeats {
                 next += 1;
             }
-            self.unknown.push(if is_fixed { None } else { Some(next - 1) });
+            self.unknown
+                .push(if is_fixed { None } else { Some(next - 1) });
         }
         self.unknowns = next as usize;
     }
 
     /// Slacks and multipliers for the present rate.
-    fn start(&mut self, Start { slack: least, product }: Start) {
+    fn start(
+        &mut self,
+        Start {
+            slack: least,
+            product,
+        }: Start,
+    ) {
         let per_site = (PLACES + 2) * self.lanes;
         let pair = |value: f64, common: f64, right: f64| {
-            let slack = [(right - common - value).max(least), (right - common + value).max(least)];
-            Pair { slack, multiplier: slack.map(|s| product / s), ..Pair::default() }
+            let slack = [
+                (right - common - value).max(least),
+                (right - common + value).max(least),
+            ];
+            Pair {
+                slack,
+                multiplier: slack.map(|s| product / s),
+                ..Pair::default()
+            }
         };
         let single = |room: f64| {
             let slack = room.max(least);
-            Single { slack, multiplier: product / slack, ..Single::default() }
+            Single {
+                slack,
+                multiplier: product / slack,
+                ..Single::default()
+            }
         };
         self.pairs.clear();
         self.singles.clear();
@@ -176,19 +215,25 @@ impl Retimer {
             let beta = site.beta(&self.rate.coefficients);
             let places = site.places(&beta);
             for (n, form) in forms.iter().enumerate() {
-                let (common, right) =
-                    places.get(n / self.lanes).map_or((0.0, 1.0), |place| (place.common, place.right));
+                let (common, right) = places
+                    .get(n / self.lanes)
+                    .map_or((0.0, 1.0), |place| (place.common, place.right));
                 self.pairs.push(pair(dot(form, &beta), common, right));
             }
             for (most, value) in site.most.iter().zip(&site.values) {
                 self.singles.push(single(most - dot(value, &beta)));
             }
-            self.singles.push(single(dot(&site.values[1], &beta) - MIN_RATE_SQUARED));
+            self.singles
+                .push(single(dot(&site.values[1], &beta) - MIN_RATE_SQUARED));
         }
     }
 
     fn gap(&self) -> f64 {
-        let pairs: f64 = self.pairs.iter().map(|p| p.slack[0] * p.multiplier[0] + p.slack[1] * p.multiplier[1]).sum();
+        let pairs: f64 = self
+            .pairs
+            .iter()
+            .map(|p| p.slack[0] * p.multiplier[0] + p.slack[1] * p.multiplier[1])
+            .sum();
         let singles: f64 = self.singles.iter().map(|s| s.slack * s.multiplier).sum();
         (pairs + singles) / (2 * self.pairs.len() + self.singles.len()) as f64
     }
@@ -206,27 +251,47 @@ impl Retimer {
         let mut pairs = self.pairs.chunks_exact_mut(per_site);
         let mut singles = self.singles.chunks_exact_mut(SINGLES);
         for (n, site) in self.sites.iter().enumerate() {
-            let (Some(forms), Some(pairs), Some(singles)) = (forms.next(), pairs.next(), singles.next()) else { break };
+            let (Some(forms), Some(pairs), Some(singles)) =
+                (forms.next(), pairs.next(), singles.next())
+            else {
+                break;
+            };
             let beta = site.beta(&self.rate.coefficients);
             let places = site.places(&beta);
             let mut share = Share::default();
             if n < self.intervals {
                 share.time(&site.values[1], &beta);
             }
-            for (place, (forms, pairs)) in
-                places.iter().zip(forms.chunks_exact(lanes).zip(pairs.chunks_exact_mut(lanes)))
+            for (place, (forms, pairs)) in places
+                .iter()
+                .zip(forms.chunks_exact(lanes).zip(pairs.chunks_exact_mut(lanes)))
             {
                 share.pairs(forms, pairs, place, target);
             }
-            let steady = Place { weight: 0.0, common: 0.0, right: 1.0, ..places[0] };
-            share.pairs(&forms[PLACES * lanes..], &mut pairs[PLACES * lanes..], &steady, target);
+            let steady = Place {
+                weight: 0.0,
+                common: 0.0,
+                right: 1.0,
+                ..places[0]
+            };
+            share.pairs(
+                &forms[PLACES * lanes..],
+                &mut pairs[PLACES * lanes..],
+                &steady,
+                target,
+            );
             for ((place, most), single) in places.iter().zip(&site.most).zip(&mut *singles) {
                 share.single(&place.w, 1.0, dot(&place.w, &beta) - most, single, target);
             }
             let under = MIN_RATE_SQUARED - dot(&site.values[1], &beta);
             share.single(&site.values[1], -1.0, under, &mut singles[PLACES], target);
             violation = violation.max(share.violation);
-            scatter(&self.unknown[site.interval..site.interval + 3], &share, &mut self.matrix, &mut self.step);
+            scatter(
+                &self.unknown[site.interval..site.interval + 3],
+                &share,
+                &mut self.matrix,
+                &mut self.step,
+            );
         }
         violation
     }
@@ -261,12 +326,20 @@ impl Retimer {
         let mut pairs = self.pairs.chunks_exact_mut(per_site);
         let mut singles = self.singles.chunks_exact_mut(SINGLES);
         for site in &self.sites {
-            let (Some(forms), Some(pairs), Some(singles)) = (forms.next(), pairs.next(), singles.next()) else { break };
+            let (Some(forms), Some(pairs), Some(singles)) =
+                (forms.next(), pairs.next(), singles.next())
+            else {
+                break;
+            };
             let beta = site.beta(&self.rate.coefficients);
             let unknown = &self.unknown[site.interval..site.interval + 3];
-            let step: Form = std::array::from_fn(|n| unknown[n].map_or(0.0, |u| self.step[u as usize]));
+            let step: Form =
+                std::array::from_fn(|n| unknown[n].map_or(0.0, |u| self.step[u as usize]));
             let along = site.values.map(|w| dot(&w, &step));
-            let rows = forms.chunks_exact(lanes).zip(pairs.chunks_exact_mut(lanes)).enumerate();
+            let rows = forms
+                .chunks_exact(lanes)
+                .zip(pairs.chunks_exact_mut(lanes))
+                .enumerate();
             for (place, (forms, pairs)) in rows {
                 let common = match site.values.get(place) {
                     Some(w) => tangent(dot(w, &beta)).1 * along[place],
@@ -290,7 +363,9 @@ fn scatter(unknown: &[Option<u32>], share: &Share, matrix: &mut Pentadiagonal, s
         let Some(row) = unknown[i] else { continue };
         step[row as usize] -= share.gradient[i];
         for (column, at) in unknown.iter().zip(at) {
-            let Some(right) = column.and_then(|column| column.checked_sub(row)) else { continue };
+            let Some(right) = column.and_then(|column| column.checked_sub(row)) else {
+                continue;
+            };
             matrix.rows[row as usize][right as usize] += share.hessian[*at];
         }
     }

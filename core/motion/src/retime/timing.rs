@@ -11,7 +11,11 @@ pub struct Rate {
 #[inline]
 pub fn weights(z: f64) -> [[f64; 3]; 3] {
     let y = 1.0 - z;
-    [[y * y / 2.0, 0.5 + z - z * z, z * z / 2.0], [-y, 1.0 - 2.0 * z, z], [1.0, -2.0, 1.0]]
+    [
+        [y * y / 2.0, 0.5 + z - z * z, z * z / 2.0],
+        [-y, 1.0 - 2.0 * z, z],
+        [1.0, -2.0, 1.0],
+    ]
 }
 
 impl Rate {
@@ -33,9 +37,16 @@ impl Rate {
     /// Where in interval `k` b is least, 0 to 1, and b there: not above zero it has no time. Does not allocate.
     pub fn least(&self, k: usize) -> (f64, f64) {
         let [first, slope, bend] = self.at(k, 0.0, 1.0);
-        let inside = if bend > 0.0 { (-slope / bend).clamp(0.0, 1.0) } else { 0.0 };
+        let inside = if bend > 0.0 {
+            (-slope / bend).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         let b = |z: f64| first + z * (slope + z * bend / 2.0);
-        let least = [0.0, inside, 1.0].into_iter().min_by(|x, y| b(*x).total_cmp(&b(*y))).unwrap_or(0.0);
+        let least = [0.0, inside, 1.0]
+            .into_iter()
+            .min_by(|x, y| b(*x).total_cmp(&b(*y)))
+            .unwrap_or(0.0);
         (least, b(least))
     }
 
@@ -74,10 +85,16 @@ const SMALL: f64 = 0.02;
 #[inline]
 fn atanh_by_root(x: f64) -> f64 {
     if x.abs() < SMALL {
-        return 1.0 + x * (1.0 / 3.0 + x * (0.2 + x * (1.0 / 7.0 + x * (1.0 / 9.0 + x * (1.0 / 11.0 + x / 13.0)))));
+        return 1.0
+            + x * (1.0 / 3.0
+                + x * (0.2 + x * (1.0 / 7.0 + x * (1.0 / 9.0 + x * (1.0 / 11.0 + x / 13.0)))));
     }
     let root = x.abs().sqrt();
-    if x > 0.0 { root.atanh() / root } else { root.atan() / root }
+    if x > 0.0 {
+        root.atanh() / root
+    } else {
+        root.atan() / root
+    }
 }
 
 /// `sinh(√x)/√x` and `(cosh(√x) − 1)/x`, for negative x with sin and cos.
@@ -89,7 +106,11 @@ fn solutions(x: f64) -> [f64; 2] {
         return [first, second];
     }
     let root = x.abs().sqrt();
-    if x > 0.0 { [root.sinh() / root, (root.cosh() - 1.0) / x] } else { [root.sin() / root, (root.cos() - 1.0) / x] }
+    if x > 0.0 {
+        [root.sinh() / root, (root.cosh() - 1.0) / x]
+    } else {
+        [root.sin() / root, (root.cos() - 1.0) / x]
+    }
 }
 
 #[cfg(test)]
@@ -99,28 +120,50 @@ mod tests {
     #[test]
     fn time_and_place_of_a_parabola_answer_each_other() {
         let step_s = 0.004;
-        for coefficients in
-            [[1.0, 1.0, 1.0], [0.9, 1.0, 1.2], [4.0, 0.2, 0.9], [0.02, 0.01, 3.0], [1.0, 2.0, 1.0], [0.5, 3.0, 0.5]]
-        {
-            let rate = Rate { coefficients: coefficients.to_vec() };
+        for coefficients in [
+            [1.0, 1.0, 1.0],
+            [0.9, 1.0, 1.2],
+            [4.0, 0.2, 0.9],
+            [0.02, 0.01, 3.0],
+            [1.0, 2.0, 1.0],
+            [0.5, 3.0, 0.5],
+        ] {
+            let rate = Rate {
+                coefficients: coefficients.to_vec(),
+            };
             let mut sum_s = 0.0;
             for n in 0..2000 {
                 let z = f64::from(n) / 2000.0;
-                assert!((rate.place(0, rate.time_s(0, z, step_s), step_s) - z).abs() < 1e-12, "{coefficients:?} {z}");
+                assert!(
+                    (rate.place(0, rate.time_s(0, z, step_s), step_s) - z).abs() < 1e-12,
+                    "{coefficients:?} {z}"
+                );
                 // Simpson's rule over a part so small that it is exact to 1e-12.
                 let inverse = |z: f64| 1.0 / rate.at(0, z, step_s)[0].sqrt();
                 let h = 1.0 / 2000.0;
-                sum_s += step_s * h / 6.0 * (inverse(z) + 4.0 * inverse(z + h / 2.0) + inverse(z + h));
+                sum_s +=
+                    step_s * h / 6.0 * (inverse(z) + 4.0 * inverse(z + h / 2.0) + inverse(z + h));
             }
-            assert!((rate.time_s(0, 1.0, step_s) / sum_s - 1.0).abs() < 1e-9, "{coefficients:?}");
+            assert!(
+                (rate.time_s(0, 1.0, step_s) / sum_s - 1.0).abs() < 1e-9,
+                "{coefficients:?}"
+            );
         }
     }
 
     #[test]
     fn the_least_rate_of_an_interval() {
-        let rate = Rate { coefficients: vec![4.0, 0.2, 0.9] };
+        let rate = Rate {
+            coefficients: vec![4.0, 0.2, 0.9],
+        };
         let (z, b) = rate.least(0);
         let near = [-1e-3, 1e-3].map(|off| rate.at(0, z + off, 1.0)[0]);
-        assert!(z > 0.0 && z < 1.0 && b < near[0] && b < near[1] && (rate.at(0, z, 1.0)[0] - b).abs() < 1e-12);
+        assert!(
+            z > 0.0
+                && z < 1.0
+                && b < near[0]
+                && b < near[1]
+                && (rate.at(0, z, 1.0)[0] - b).abs() < 1e-12
+        );
     }
 }

@@ -28,5 +28,7 @@ pub fn smaller(a: f64, b: f64) -> f64 {
 /// The largest of all lanes.
 #[inline]
 pub fn largest<const L: usize>(values: &Lanes<L>) -> f64 {
-    values.iter().fold(f64::NEG_INFINITY, |most, v| larger(most, *v))
+    values
+        .iter()
+        .fold(f64::NEG_INFINITY, |most, v| larger(most, *v))
 }

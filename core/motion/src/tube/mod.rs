@@ -10,8 +10,14 @@
 //!
 //! Rough loop. The solvers allocate where a grid is larger than any before; solving again does not.
 
-#![allow(clippy::inline_always, reason = "what is inlined is compiled for the wide instructions of its caller")]
-#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go side by side")]
+#![allow(
+    clippy::inline_always,
+    reason = "what is inlined is compiled for the wide instructions of its caller"
+)]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "lanes of several arrays go side by side"
+)]
 
 mod banded;
 mod lanes;

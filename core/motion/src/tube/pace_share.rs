@@ -58,7 +58,11 @@ fn sum<const L: usize>(lanes: &Lanes<L>) -> f64 {
 
 impl<const L: usize> Default for Share<L> {
     fn default() -> Self {
-        Self { hessian: [[0.0; L]; 6], gradient: [[0.0; L]; 3], violation: [0.0; L] }
+        Self {
+            hessian: [[0.0; L]; 6],
+            gradient: [[0.0; L]; 3],
+            violation: [0.0; L],
+        }
     }
 }
 
@@ -74,7 +78,8 @@ impl<const L: usize> Share<L> {
         group: usize,
         target: f64,
     ) {
-        let value: Lanes<L> = each(|l| form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2]);
+        let value: Lanes<L> =
+            each(|l| form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2]);
         let over = sides.common - sides.right;
         rows.weight[group] = sides.weight;
         self.violation = each(|l| larger(self.violation[l], over + value[l].abs()));
@@ -90,8 +95,13 @@ impl<const L: usize> Share<L> {
             d[n] = each(|l| multiplier[l] * per_slack[l]);
             g[n] = each(|l| (target + multiplier[l] * residual[l]) * per_slack[l]);
         }
-        let (sum, gap): (Lanes<L>, Lanes<L>) = (each(|l| d[0][l] + d[1][l]), each(|l| d[0][l] - d[1][l]));
-        let common = [sides.w[0] * sides.weight, sides.w[1] * sides.weight, sides.w[2] * sides.weight];
+        let (sum, gap): (Lanes<L>, Lanes<L>) =
+            (each(|l| d[0][l] + d[1][l]), each(|l| d[0][l] - d[1][l]));
+        let common = [
+            sides.w[0] * sides.weight,
+            sides.w[1] * sides.weight,
+            sides.w[2] * sides.weight,
+        ];
         for (n, (i, j)) in AT.into_iter().enumerate() {
             let both = common[i] * common[j];
             let entry = &mut self.hessian[n];
@@ -103,19 +113,33 @@ impl<const L: usize> Share<L> {
         }
         for i in 0..3 {
             let entry = &mut self.gradient[i];
-            *entry = each(|l| entry[l] + (g[0][l] - g[1][l]) * form[i][l] + (g[0][l] + g[1][l]) * common[i]);
+            *entry = each(|l| {
+                entry[l] + (g[0][l] - g[1][l]) * form[i][l] + (g[0][l] + g[1][l]) * common[i]
+            });
         }
     }
 
     /// Adds the single row `sign·w·β ≤ …` that is `over` its right side.
     #[inline(always)]
-    pub fn single(&mut self, w: &[f64; 3], sign: f64, over: f64, rows: &mut Rows<L>, index: usize, target: f64) {
+    pub fn single(
+        &mut self,
+        w: &[f64; 3],
+        sign: f64,
+        over: f64,
+        rows: &mut Rows<L>,
+        index: usize,
+        target: f64,
+    ) {
         let slack = rows.single_slack[index];
         let multiplier = rows.single_multiplier[index];
         rows.single_residual[index] = over + slack;
         self.violation[0] = larger(self.violation[0], over);
         let per_slack = 1.0 / slack;
-        self.add(w, multiplier * per_slack, sign * (target + multiplier * (over + slack)) * per_slack);
+        self.add(
+            w,
+            multiplier * per_slack,
+            sign * (target + multiplier * (over + slack)) * per_slack,
+        );
     }
 
     /// Adds `bend·w·wᵀ` and `slope·w`.
@@ -134,6 +158,16 @@ impl<const L: usize> Share<L> {
     pub fn sums(&self) -> ([f64; 6], [f64; 3]) {
         let h = &self.hessian;
         let g = &self.gradient;
-        ([sum(&h[0]), sum(&h[1]), sum(&h[2]), sum(&h[3]), sum(&h[4]), sum(&h[5])], [sum(&g[0]), sum(&g[1]), sum(&g[2])])
+        (
+            [
+                sum(&h[0]),
+                sum(&h[1]),
+                sum(&h[2]),
+                sum(&h[3]),
+                sum(&h[4]),
+                sum(&h[5]),
+            ],
+            [sum(&g[0]), sum(&g[1]), sum(&g[2])],
+        )
     }
 }

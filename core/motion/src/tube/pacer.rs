@@ -93,7 +93,12 @@ fn sides(z: f64, beta: &[f64; 3]) -> Sides {
     let b = larger(dot(&w, beta), MIN_RATE_SQUARED);
     let inverse = 1.0 / b.sqrt();
     let weight = 0.5 * inverse / b;
-    Sides { w, weight, common: weight * b, right: 1.5 * inverse }
+    Sides {
+        w,
+        weight,
+        common: weight * b,
+        right: 1.5 * inverse,
+    }
 }
 
 /// The three places of an interval where limits are asked for.
@@ -169,7 +174,11 @@ impl<const L: usize> Pacer<L> {
     fn solve_any(&mut self, ends: (End, End), asked: &Asked) -> PaceStatus {
         self.name_unknowns(ends);
         self.start();
-        let mut status = PaceStatus { iterations: 0, gap: START, violation: f64::INFINITY };
+        let mut status = PaceStatus {
+            iterations: 0,
+            gap: START,
+            violation: f64::INFINITY,
+        };
         let mut shrink = 0.1;
         loop {
             let target = shrink * status.gap;
@@ -220,11 +229,16 @@ impl<const L: usize> Pacer<L> {
             let mut multiplier = [[[0.0; L]; 2]; GROUPS];
             for (group, form) in forms.iter().enumerate() {
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    slack[group][n] = each(|l| larger(1.0 - sign * (form[0][l] + form[1][l] + form[2][l]), 0.1));
+                    slack[group][n] =
+                        each(|l| larger(1.0 - sign * (form[0][l] + form[1][l] + form[2][l]), 0.1));
                     multiplier[group][n] = each(|l| START / slack[group][n][l]);
                 }
             }
-            let single_slack = [larger(most[0] - 1.0, 0.1), larger(most[1] - 1.0, 0.1), 1.0 - MIN_RATE_SQUARED];
+            let single_slack = [
+                larger(most[0] - 1.0, 0.1),
+                larger(most[1] - 1.0, 0.1),
+                1.0 - MIN_RATE_SQUARED,
+            ];
             self.rows.push(Rows {
                 slack,
                 multiplier,
@@ -240,12 +254,15 @@ impl<const L: usize> Pacer<L> {
 
     #[inline(always)]
     fn beta(&self, k: usize) -> [f64; 3] {
-        *self.rate.coefficients[k..].first_chunk().expect("three coefficients")
+        *self.rate.coefficients[k..]
+            .first_chunk()
+            .expect("three coefficients")
     }
 
     #[inline(always)]
     fn mean(&self, pairs: &Lanes<L>, singles: f64) -> f64 {
-        (pairs.iter().sum::<f64>() + singles) / (self.rows.len() * (2 * GROUPS * L + SINGLES)) as f64
+        (pairs.iter().sum::<f64>() + singles)
+            / (self.rows.len() * (2 * GROUPS * L + SINGLES)) as f64
     }
 
     /// The Newton system with `f = Σ b^(−1/2)` in the middles; gives the largest violation.
@@ -265,14 +282,33 @@ impl<const L: usize> Pacer<L> {
             for (group, place) in places.iter().enumerate() {
                 share.pair(&forms[group], &beta, place, rows, group, target);
             }
-            let steady = Sides { weight: 0.0, common: 0.0, right: 1.0, ..places[0] };
+            let steady = Sides {
+                weight: 0.0,
+                common: 0.0,
+                right: 1.0,
+                ..places[0]
+            };
             share.pair(&forms[3], &beta, &steady, rows, 3, target);
             for (n, place) in places.iter().take(2).enumerate() {
-                share.single(&place.w, 1.0, dot(&place.w, &beta) - most[n], rows, n, target);
+                share.single(
+                    &place.w,
+                    1.0,
+                    dot(&place.w, &beta) - most[n],
+                    rows,
+                    n,
+                    target,
+                );
             }
             let middle = &places[1].w;
             let b = larger(dot(middle, &beta), MIN_RATE_SQUARED);
-            share.single(middle, -1.0, MIN_RATE_SQUARED - dot(middle, &beta), rows, 2, target);
+            share.single(
+                middle,
+                -1.0,
+                MIN_RATE_SQUARED - dot(middle, &beta),
+                rows,
+                2,
+                target,
+            );
             let slope = -0.5 / (b * b.sqrt());
             share.add(middle, -1.5 * slope / b, slope);
             violation = each(|l| larger(violation[l], share.violation[l]));
@@ -288,7 +324,9 @@ impl<const L: usize> Pacer<L> {
         let unknown: [i32; 3] = *self.unknown[k..].first_chunk().expect("three coefficients");
         if unknown[0] >= 0 && unknown[1] == unknown[0] + 1 && unknown[2] == unknown[1] + 1 {
             let first = unknown[0] as usize;
-            let rows: &mut [[f64; 3]; 3] = self.matrix.rows[first..].first_chunk_mut().expect("three unknowns");
+            let rows: &mut [[f64; 3]; 3] = self.matrix.rows[first..]
+                .first_chunk_mut()
+                .expect("three unknowns");
             for (i, row) in rows.iter_mut().enumerate() {
                 for j in i..3 {
                     row[j - i] += hessian[AT[i][j]];
@@ -298,10 +336,14 @@ impl<const L: usize> Pacer<L> {
             return;
         }
         for i in 0..3 {
-            let Ok(row) = usize::try_from(unknown[i]) else { continue };
+            let Ok(row) = usize::try_from(unknown[i]) else {
+                continue;
+            };
             self.step[row] -= gradient[i];
             for j in 0..3 {
-                let Ok(right) = usize::try_from(unknown[j] - unknown[i]) else { continue };
+                let Ok(right) = usize::try_from(unknown[j] - unknown[i]) else {
+                    continue;
+                };
                 self.matrix.rows[row][right] += hessian[AT[i][j]];
             }
         }
@@ -324,7 +366,8 @@ impl<const L: usize> Pacer<L> {
                     // Δλ = (target − λ·(s + Δs))/s.
                     rows.multiplier[group][n] = each(|l| {
                         let per_slack = multiplier[l] * inverse[l];
-                        multiplier[l] + back * (target - multiplier[l] * (slack[l] + change[l])) * per_slack
+                        multiplier[l]
+                            + back * (target - multiplier[l] * (slack[l] + change[l])) * per_slack
                     });
                     let slack = &rows.slack[group][n];
                     let multiplier = &rows.multiplier[group][n];
@@ -332,10 +375,14 @@ impl<const L: usize> Pacer<L> {
                 }
             }
             for n in 0..SINGLES {
-                let (slack, multiplier, change) =
-                    (rows.single_slack[n], rows.single_multiplier[n], rows.single_residual[n]);
+                let (slack, multiplier, change) = (
+                    rows.single_slack[n],
+                    rows.single_multiplier[n],
+                    rows.single_residual[n],
+                );
                 rows.single_slack[n] = slack + length * change;
-                rows.single_multiplier[n] = multiplier + back * (target - multiplier * (slack + change)) / slack;
+                rows.single_multiplier[n] =
+                    multiplier + back * (target - multiplier * (slack + change)) / slack;
                 singles += rows.single_slack[n] * rows.single_multiplier[n];
             }
         }
@@ -355,15 +402,22 @@ impl<const L: usize> Pacer<L> {
         let mut most = [0.0; L];
         let mut most_back = [0.0; L];
         for k in 0..self.forms.len() {
-            let change = |n: usize| usize::try_from(self.unknown[k + n]).map_or(0.0, |u| self.step[u]);
+            let change =
+                |n: usize| usize::try_from(self.unknown[k + n]).map_or(0.0, |u| self.step[u]);
             let step = [change(0), change(1), change(2)];
             let forms = &self.forms[k];
             let rows = &mut self.rows[k];
-            let along = [dot(&VALUES[0], &step), dot(&VALUES[1], &step), dot(&VALUES[2], &step), 0.0];
+            let along = [
+                dot(&VALUES[0], &step),
+                dot(&VALUES[1], &step),
+                dot(&VALUES[2], &step),
+                0.0,
+            ];
             for group in 0..GROUPS {
                 let form = &forms[group];
                 let common = rows.weight[group] * along[group];
-                let value: Lanes<L> = each(|l| form[0][l] * step[0] + form[1][l] * step[1] + form[2][l] * step[2]);
+                let value: Lanes<L> =
+                    each(|l| form[0][l] * step[0] + form[1][l] * step[1] + form[2][l] * step[2]);
                 for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                     let multiplier = &rows.multiplier[group][n];
                     let residual = rows.residual[group][n];
@@ -373,7 +427,8 @@ impl<const L: usize> Pacer<L> {
                     let inverse = &rows.inverse[group][n];
                     let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
                     most = each(|l| larger(most[l], shrinking[l]));
-                    most_back = each(|l| larger(most_back[l], 1.0 - shrinking[l] - target * inverse[l]));
+                    most_back =
+                        each(|l| larger(most_back[l], 1.0 - shrinking[l] - target * inverse[l]));
                 }
             }
             for n in 0..SINGLES {

@@ -70,7 +70,13 @@ pub struct Smoother<const L: usize> {
 
 impl<const L: usize> Default for Smoother<L> {
     fn default() -> Self {
-        Self { rows: Vec::new(), matrix: Vec::new(), step: Vec::new(), scale: [0.0; L], firm: (0, 1.0) }
+        Self {
+            rows: Vec::new(),
+            matrix: Vec::new(),
+            step: Vec::new(),
+            scale: [0.0; L],
+            firm: (0, 1.0),
+        }
     }
 }
 
@@ -121,7 +127,10 @@ impl<const L: usize> Smoother<L> {
         self.begin(spline, waypoints);
         let mut gap = self.gap();
         let mut shrink = [0.1; L];
-        let mut status = SmoothStatus { iterations: 0, violation: f64::INFINITY };
+        let mut status = SmoothStatus {
+            iterations: 0,
+            violation: f64::INFINITY,
+        };
         loop {
             let target = each(|l| shrink[l] * gap[l]);
             status.violation = self.assemble(spline, &target);
@@ -147,12 +156,24 @@ impl<const L: usize> Smoother<L> {
             let per_half: Lanes<L> = each(|l| 1.0 / waypoint.half[l]);
             let at = combine(&w, control(spline, interval));
             let value: Lanes<L> = each(|l| (at[l] - waypoint.point[l]) * per_half[l]);
-            let slack = [each(|l| larger(1.0 - value[l], 0.2)), each(|l| larger(1.0 + value[l], 0.2))];
+            let slack = [
+                each(|l| larger(1.0 - value[l], 0.2)),
+                each(|l| larger(1.0 + value[l], 0.2)),
+            ];
             let multiplier = [each(|l| 0.05 / slack[0][l]), each(|l| 0.05 / slack[1][l])];
             let residual = [[0.0; L]; 2];
             let inverse = [[0.0; L]; 2];
             let point = waypoint.point;
-            self.rows.push(Rows { interval, weights: w, point, per_half, slack, multiplier, residual, inverse });
+            self.rows.push(Rows {
+                interval,
+                weights: w,
+                point,
+                per_half,
+                slack,
+                multiplier,
+                residual,
+                inverse,
+            });
         }
     }
 
@@ -195,7 +216,10 @@ impl<const L: usize> Smoother<L> {
                 let per_slack: Lanes<L> = each(|l| multiplier[l] * inverse[l]);
                 row.inverse[n] = inverse;
                 weight = each(|l| weight[l] + multiplier[l] * per_slack[l]);
-                slope = each(|l| slope[l] + sign * (target[l] + multiplier[l] * row.residual[n][l]) * per_slack[l]);
+                slope = each(|l| {
+                    slope[l]
+                        + sign * (target[l] + multiplier[l] * row.residual[n][l]) * per_slack[l]
+                });
             }
             let weight: Lanes<L> = each(|l| weight[l] * row.per_half[l] * row.per_half[l]);
             let slope: Lanes<L> = each(|l| slope[l] * row.per_half[l]);
@@ -220,8 +244,9 @@ impl<const L: usize> Smoother<L> {
         const D: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
         let scale = &self.scale;
         let jerk: Lanes<L> = each(|l| (c[3][l] - c[0][l] + 3.0 * (c[1][l] - c[2][l])) * scale[l]);
-        let bend: Lanes<L> =
-            each(|l| (GENTLE + if jerk[l].abs() > CLOSING { weight } else { 0.0 }) * scale[l] * scale[l]);
+        let bend: Lanes<L> = each(|l| {
+            (GENTLE + if jerk[l].abs() > CLOSING { weight } else { 0.0 }) * scale[l] * scale[l]
+        });
         let slope: Lanes<L> = each(|l| {
             let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
             (GENTLE * jerk[l] + weight * over) * scale[l]
@@ -246,7 +271,9 @@ impl<const L: usize> Smoother<L> {
         let mut most = [0.0; L];
         let mut most_back = [0.0; L];
         for row in &mut self.rows {
-            let steps = self.step[row.interval..].first_chunk().expect("four control points");
+            let steps = self.step[row.interval..]
+                .first_chunk()
+                .expect("four control points");
             let along = combine(&row.weights, steps);
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                 let multiplier = &row.multiplier[n];
@@ -256,7 +283,8 @@ impl<const L: usize> Smoother<L> {
                 let inverse = &row.inverse[n];
                 let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
                 most = each(|l| larger(most[l], shrinking[l]));
-                most_back = each(|l| larger(most_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
+                most_back =
+                    each(|l| larger(most_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
             }
         }
         let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
@@ -271,7 +299,8 @@ impl<const L: usize> Smoother<L> {
                 // Δλ = (target − λ·(s + Δs))/s.
                 row.multiplier[n] = each(|l| {
                     let per_slack = multiplier[l] * inverse[l];
-                    multiplier[l] + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) * per_slack
+                    multiplier[l]
+                        + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) * per_slack
                 });
             }
         }
@@ -284,5 +313,7 @@ impl<const L: usize> Smoother<L> {
 
 #[inline(always)]
 fn control<const L: usize>(spline: &Spline<L>, k: usize) -> &[Lanes<L>; 4] {
-    spline.points[k..].first_chunk().expect("four control points")
+    spline.points[k..]
+        .first_chunk()
+        .expect("four control points")
 }

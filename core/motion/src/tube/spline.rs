@@ -13,7 +13,10 @@ pub struct Spline<const L: usize> {
 
 impl<const L: usize> Default for Spline<L> {
     fn default() -> Self {
-        Self { points: Vec::new(), step_s: 1.0 }
+        Self {
+            points: Vec::new(),
+            step_s: 1.0,
+        }
     }
 }
 
@@ -63,7 +66,11 @@ impl<const L: usize> Spline<L> {
         let s2 = 1.0 - 3.0 * z;
         [
             each(|l| w[0] * c0[l] + w[1] * c1[l] + w[2] * c2[l] + w[3] * c3[l]),
-            each(|l| rate * (z * z / 2.0 * (c3[l] - c2[l]) + f1 * (c2[l] - c1[l]) + y * y / 2.0 * (c1[l] - c0[l]))),
+            each(|l| {
+                rate * (z * z / 2.0 * (c3[l] - c2[l])
+                    + f1 * (c2[l] - c1[l])
+                    + y * y / 2.0 * (c1[l] - c0[l]))
+            }),
             each(|l| rate * rate * (y * c0[l] + s1 * c1[l] + s2 * c2[l] + z * c3[l])),
             each(|l| rate * rate * rate * (c3[l] - c0[l] + 3.0 * (c1[l] - c2[l]))),
         ]
@@ -76,8 +83,13 @@ mod tests {
 
     #[test]
     fn derivatives_match_differences_and_the_start_is_met() {
-        let points = (0..9).map(|k| [f64::from(k * k % 7), 1.0 - f64::from(k)]).collect();
-        let mut spline = Spline::<2> { points, step_s: 0.25 };
+        let points = (0..9)
+            .map(|k| [f64::from(k * k % 7), 1.0 - f64::from(k)])
+            .collect();
+        let mut spline = Spline::<2> {
+            points,
+            step_s: 0.25,
+        };
         spline.begin(&[[1.0, 2.0], [3.0, -4.0], [5.0, 6.0]]);
         let start = spline.at(0, 0.0);
         for (value, wanted) in start.iter().zip([[1.0, 2.0], [3.0, -4.0], [5.0, 6.0]]) {
@@ -89,7 +101,10 @@ mod tests {
             let [low, here, high] = [z - e, z, z + e].map(|z| spline.at(3, z));
             for lane in 0..2 {
                 let slope = (high[order][lane] - low[order][lane]) / (2.0 * e * spline.step_s);
-                assert!((slope - here[order + 1][lane]).abs() < 1e-4, "order {order}");
+                assert!(
+                    (slope - here[order + 1][lane]).abs() < 1e-4,
+                    "order {order}"
+                );
             }
         }
     }

@@ -8,7 +8,10 @@ use crate::common::{canonical, case, curve, data, distance, numbers};
 fn assert_near(got: &[f64], expected: &[f64], relative: f64, what: &str) {
     let scale = expected.iter().map(|v| v.abs()).fold(1.0, f64::max);
     for (g, e) in got.iter().zip(expected) {
-        assert!((g - e).abs() <= relative * scale, "{what}: {g} instead of {e}");
+        assert!(
+            (g - e).abs() <= relative * scale,
+            "{what}: {g} instead of {e}"
+        );
     }
 }
 
@@ -26,13 +29,22 @@ fn evaluation() {
             let at = curve.derivatives(u);
             let what = format!("{} at {u}", entry["name"]);
             let position = numbers(&sample["C"]);
-            assert!((0..2).all(|i| (at.position[i] - position[i]).abs() < 1e-9), "{what}");
+            assert!(
+                (0..2).all(|i| (at.position[i] - position[i]).abs() < 1e-9),
+                "{what}"
+            );
             assert_near(&at.first.0[..2], &numbers(&sample["C1"]), 1e-9, &what);
             assert_near(&at.second.0[..2], &numbers(&sample["C2"]), 1e-8, &what);
             assert_near(&at.third.0[..2], &numbers(&sample["C3"]), 1e-7, &what);
             let kappa = sample["kappa"].as_f64().unwrap();
-            assert!((curve.curvature(&at).unwrap() - kappa).abs() <= 1e-8 * kappa.max(1e-3), "{what}");
-            assert!((table.length_at(&curve, u) - sample["s"].as_f64().unwrap()).abs() < 1e-8, "{what}");
+            assert!(
+                (curve.curvature(&at).unwrap() - kappa).abs() <= 1e-8 * kappa.max(1e-3),
+                "{what}"
+            );
+            assert!(
+                (table.length_at(&curve, u) - sample["s"].as_f64().unwrap()).abs() < 1e-8,
+                "{what}"
+            );
         }
     }
 }
@@ -45,7 +57,11 @@ fn feed(curve: &Nurbs, adaptive: bool, constant: f64, u: f64) -> f64 {
     let radius = 1.0 / curve.curvature(&curve.derivatives(u)).unwrap();
     let chord_error = 0.001f64.min(radius);
     let chord_feed = 2.0 / 0.002 * (2.0 * radius * chord_error - chord_error * chord_error).sqrt();
-    if radius.is_finite() { chord_feed.min(250.0) } else { 250.0 }
+    if radius.is_finite() {
+        chord_feed.min(250.0)
+    } else {
+        250.0
+    }
 }
 
 /// Runs the exact parameter update; the parameters and the largest relative error of a step along the arc.
@@ -67,26 +83,53 @@ fn march(curve: &Nurbs, adaptive: bool, constant: f64, period_s: f64) -> (Vec<f6
 }
 
 fn chord_fluctuation_pct(curve: &Nurbs, us: &[f64], value: &Value) -> f64 {
-    let constant = value["feed"].as_str().unwrap().split(' ').next_back().unwrap().parse().unwrap_or(0.0);
+    let constant = value["feed"]
+        .as_str()
+        .unwrap()
+        .split(' ')
+        .next_back()
+        .unwrap()
+        .parse()
+        .unwrap_or(0.0);
     let (adaptive, period_s) = (constant == 0.0, value["Ts_s"].as_f64().unwrap());
     let error = |pair: &[f64]| {
         let commanded = feed(curve, adaptive, constant, pair[0]);
         distance(&curve.position(pair[1]), &curve.position(pair[0])) / period_s / commanded - 1.0
     };
-    us.windows(2).map(|pair| 100.0 * error(pair).abs()).fold(0.0, f64::max)
+    us.windows(2)
+        .map(|pair| 100.0 * error(pair).abs())
+        .fold(0.0, f64::max)
 }
 
 #[test]
 fn feed_fluctuation_of_the_exact_update() {
     let case = case("002_fluctuation");
-    let rows = case["results"].as_array().unwrap().iter().filter(|row| row["method"] == "ARC");
+    let rows = case["results"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|row| row["method"] == "ARC");
     let mut count = 0;
     for row in rows {
         let curve = canonical(row["curve"].as_str().unwrap());
-        let constant: f64 = row["feed"].as_str().unwrap().trim_start_matches("constant ").parse().unwrap_or(0.0);
-        let (us, worst) = march(&curve, constant == 0.0, constant, row["Ts_s"].as_f64().unwrap());
+        let constant: f64 = row["feed"]
+            .as_str()
+            .unwrap()
+            .trim_start_matches("constant ")
+            .parse()
+            .unwrap_or(0.0);
+        let (us, worst) = march(
+            &curve,
+            constant == 0.0,
+            constant,
+            row["Ts_s"].as_f64().unwrap(),
+        );
         assert!(worst < 1e-5, "{row}: {worst:e} along the arc");
-        assert!(us.len().abs_diff(row["steps"].as_u64().unwrap() as usize) <= 1, "{row}: {}", us.len());
+        assert!(
+            us.len().abs_diff(row["steps"].as_u64().unwrap() as usize) <= 1,
+            "{row}: {}",
+            us.len()
+        );
         for (got, expected) in us.iter().zip(numbers(&row["u_first10"])) {
             assert!((got - expected).abs() < 1e-9, "{row}: {got}");
         }

@@ -28,7 +28,9 @@ impl Add for Homogeneous {
 
 fn theirs(data: &NurbsData) -> BSpline<Homogeneous, f64> {
     let points = data.control_points.iter().zip(&data.weights);
-    let homogeneous = points.map(|(p, w)| Homogeneous([p[0] * w, p[1] * w, p[2] * w, *w])).collect();
+    let homogeneous = points
+        .map(|(p, w)| Homogeneous([p[0] * w, p[1] * w, p[2] * w, *w]))
+        .collect();
     BSpline::new(data.degree, homogeneous, data.knots.clone())
 }
 
@@ -44,7 +46,10 @@ fn canonical_curves() {
         let theirs = theirs(&ours.data());
         for step in 0..=1000 {
             let u = f64::from(step) / 1000.0;
-            assert!(distance(&ours.position(u), &at(&theirs, u)) < 1e-10, "{name} at {u}");
+            assert!(
+                distance(&ours.position(u), &at(&theirs, u)) < 1e-10,
+                "{name} at {u}"
+            );
         }
     }
 }

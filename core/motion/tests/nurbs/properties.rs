@@ -142,14 +142,20 @@ fn a_circle_has_its_length_and_curvature() {
     for radius in [0.01, 1.0, 50.0] {
         let circle = curve(&circle(radius));
         let table = ArcLength::new(&circle);
-        assert!((table.length().mm - std::f64::consts::TAU * radius).abs() < 1e-9 * radius.max(1.0));
+        assert!(
+            (table.length().mm - std::f64::consts::TAU * radius).abs() < 1e-9 * radius.max(1.0)
+        );
         assert_eq!(circle.pieces().len(), 1);
         for step in 0..100 {
             let s = f64::from(step) / 100.0 * table.length().mm;
             let at = table.along_path(&circle, s, &mut Place::default()).unwrap();
             let angle = s / radius;
             let on = AxisVector::from_slice(&[radius * angle.cos(), radius * angle.sin()]);
-            assert!(distance(&at.position, &on) < 5e-8, "{radius} {s}: {}", distance(&at.position, &on));
+            assert!(
+                distance(&at.position, &on) < 5e-8,
+                "{radius} {s}: {}",
+                distance(&at.position, &on)
+            );
             assert!((distance(&at.curvature, &AxisVector::ZERO) * radius - 1.0).abs() < 1e-8);
         }
     }

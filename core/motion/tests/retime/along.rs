@@ -23,10 +23,14 @@ const PERIOD_S: f64 = 1e-3;
 pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -> Retimed {
     let slow_s = 4.0 * along.length / along.feed + 0.2;
     // Speed rises and falls as a square of a sine: smooth at both ends.
-    let slow =
-        |t: f64| along.length * (t / slow_s - (std::f64::consts::TAU * t / slow_s).sin() / std::f64::consts::TAU);
-    let mut timing: Vec<(f64, f64)> =
-        (0..=4000).map(|i| slow_s * f64::from(i) / 4000.0).map(|t| (t, slow(t))).collect();
+    let slow = |t: f64| {
+        along.length
+            * (t / slow_s - (std::f64::consts::TAU * t / slow_s).sin() / std::f64::consts::TAU)
+    };
+    let mut timing: Vec<(f64, f64)> = (0..=4000)
+        .map(|i| slow_s * f64::from(i) / 4000.0)
+        .map(|t| (t, slow(t)))
+        .collect();
     let mut retimer = Retimer::default();
     let mut done = None;
     for _ in 0..rounds {
@@ -34,11 +38,18 @@ pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -
         let count = ((total / step_s).ceil() as usize).max(7);
         let h = total / count as f64;
         let spline = coefficients(&timing, h, count, along.length);
-        let points: Vec<[Point; PLACES]> =
-            (0..count).map(|k| [0.0, 0.5, 1.0].map(|z| point(along, value(&spline, k, z, h)))).collect();
+        let points: Vec<[Point; PLACES]> = (0..count)
+            .map(|k| [0.0, 0.5, 1.0].map(|z| point(along, value(&spline, k, z, h))))
+            .collect();
         let ends = (End::Rest, End::Rest);
-        let status =
-            retimer.solve(&Task { points: &points, between: &[], limits: *limits, jerk_share: 0.99, step_s: h, ends });
+        let status = retimer.solve(&Task {
+            points: &points,
+            between: &[],
+            limits: *limits,
+            jerk_share: 0.99,
+            step_s: h,
+            ends,
+        });
         timing = vec![(0.0, 0.0)];
         let mut t = 0.0;
         for k in 0..count {
@@ -47,7 +58,11 @@ pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -
             }
             t += retimer.rate.time_s(k, 1.0, h);
         }
-        done = Some(Retimed { time_s: t, status, samples: sampled(&retimer, &spline, count, h) });
+        done = Some(Retimed {
+            time_s: t,
+            status,
+            samples: sampled(&retimer, &spline, count, h),
+        });
     }
     done.unwrap()
 }
@@ -60,14 +75,20 @@ fn point(along: &Along, [s, s1, s2, s3]: [f64; 4]) -> Point {
         point.second[lane] = x2[lane] * s1 * s1 + x1[lane] * s2;
         point.third[lane] = x3[lane] * s1 * s1 * s1 + 3.0 * x2[lane] * s1 * s2 + x1[lane] * s3;
     }
-    point.most = if s1 > 1e-9 { (along.feed / s1).powi(2) } else { f64::INFINITY };
+    point.most = if s1 > 1e-9 {
+        (along.feed / s1).powi(2)
+    } else {
+        f64::INFINITY
+    };
     point
 }
 
 /// Greville ordinates: the coordinate at the time that a coefficient stands for. Rest at both ends.
 fn coefficients(timing: &[(f64, f64)], h: f64, count: usize, length: f64) -> Vec<f64> {
     let at = |t: f64| {
-        let i = timing.partition_point(|(time, _)| *time < t).clamp(1, timing.len() - 1);
+        let i = timing
+            .partition_point(|(time, _)| *time < t)
+            .clamp(1, timing.len() - 1);
         let ((t0, s0), (t1, s1)) = (timing[i - 1], timing[i]);
         s0 + (s1 - s0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
     };
@@ -81,11 +102,25 @@ fn coefficients(timing: &[(f64, f64)], h: f64, count: usize, length: f64) -> Vec
 fn value(c: &[f64], k: usize, z: f64, h: f64) -> [f64; 4] {
     let (c, y) = (&c[k..k + 4], 1.0 - z);
     let sum = |w: [f64; 4]| w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3];
-    let cubic =
-        [y * y * y, 3.0 * z * z * z - 6.0 * z * z + 4.0, -3.0 * z * z * z + 3.0 * z * z + 3.0 * z + 1.0, z * z * z];
-    let square = [-y * y, 3.0 * z * z - 4.0 * z, -3.0 * z * z + 2.0 * z + 1.0, z * z];
+    let cubic = [
+        y * y * y,
+        3.0 * z * z * z - 6.0 * z * z + 4.0,
+        -3.0 * z * z * z + 3.0 * z * z + 3.0 * z + 1.0,
+        z * z * z,
+    ];
+    let square = [
+        -y * y,
+        3.0 * z * z - 4.0 * z,
+        -3.0 * z * z + 2.0 * z + 1.0,
+        z * z,
+    ];
     let slope = [y, 3.0 * z - 2.0, 1.0 - 3.0 * z, z];
-    [sum(cubic) / 6.0, sum(square) / (2.0 * h), sum(slope) / (h * h), sum([-1.0, 3.0, -3.0, 1.0]) / (h * h * h)]
+    [
+        sum(cubic) / 6.0,
+        sum(square) / (2.0 * h),
+        sum(slope) / (h * h),
+        sum([-1.0, 3.0, -3.0, 1.0]) / (h * h * h),
+    ]
 }
 
 fn sampled(retimer: &Retimer, spline: &[f64], count: usize, h: f64) -> Vec<f64> {
@@ -115,9 +150,15 @@ impl Retimed {
         for axis in 0..along.lanes {
             let mut position = vec![0.0];
             for pair in self.samples.windows(2) {
-                let at = |part: f64| (along.derivatives)(pair[0] + part * (pair[1] - pair[0]))[0][axis];
+                let at =
+                    |part: f64| (along.derivatives)(pair[0] + part * (pair[1] - pair[0]))[0][axis];
                 // Boole's rule: exact to degree 5.
-                let mean = (7.0 * at(0.0) + 32.0 * at(0.25) + 12.0 * at(0.5) + 32.0 * at(0.75) + 7.0 * at(1.0)) / 90.0;
+                let mean = (7.0 * at(0.0)
+                    + 32.0 * at(0.25)
+                    + 12.0 * at(0.5)
+                    + 32.0 * at(0.75)
+                    + 7.0 * at(1.0))
+                    / 90.0;
                 position.push(position.last().unwrap() + mean * (pair[1] - pair[0]));
             }
             let acceleration = differences(&differences(&position));
@@ -130,5 +171,8 @@ impl Retimed {
 }
 
 fn differences(values: &[f64]) -> Vec<f64> {
-    values.windows(2).map(|w| (w[1] - w[0]) / PERIOD_S).collect()
+    values
+        .windows(2)
+        .map(|w| (w[1] - w[0]) / PERIOD_S)
+        .collect()
 }

@@ -9,21 +9,39 @@ use tandem_motion::retime::{Between, End, LaneLimits, PLACES, Point, Retimer, Ta
 const FEED: f64 = 250.0;
 
 fn limits(lanes: usize) -> LaneLimits {
-    LaneLimits { lanes, acceleration: [5000.0; 8], jerk: [4e5; 8] }
+    LaneLimits {
+        lanes,
+        acceleration: [5000.0; 8],
+        jerk: [4e5; 8],
+    }
 }
 
 /// A straight line of `length` in the first axis.
 fn line(length: f64) -> Along {
-    Along { length, lanes: 1, feed: FEED, derivatives: Box::new(|_| [[1.0, 0.0], [0.0; 2], [0.0; 2]]) }
+    Along {
+        length,
+        lanes: 1,
+        feed: FEED,
+        derivatives: Box::new(|_| [[1.0, 0.0], [0.0; 2], [0.0; 2]]),
+    }
 }
 
 /// Three quarters of a circle.
 fn circle(radius: f64, feed: f64) -> Along {
     let derivatives = move |s: f64| {
         let (sin, cos) = (s / radius).sin_cos();
-        [[-sin, cos], [-cos / radius, -sin / radius], [sin / (radius * radius), -cos / (radius * radius)]]
+        [
+            [-sin, cos],
+            [-cos / radius, -sin / radius],
+            [sin / (radius * radius), -cos / (radius * radius)],
+        ]
     };
-    Along { length: 1.5 * std::f64::consts::PI * radius, lanes: 2, feed, derivatives: Box::new(derivatives) }
+    Along {
+        length: 1.5 * std::f64::consts::PI * radius,
+        lanes: 2,
+        feed,
+        derivatives: Box::new(derivatives),
+    }
 }
 
 #[test]
@@ -31,7 +49,10 @@ fn a_line_takes_the_time_of_the_s_curve() {
     // Rest to rest with 250 mm/s, 5000 mm/s², 4e5 mm/s³: with a cruise, and with a peak below the feed.
     for (length, closed_form_s) in [(50.0, 0.2625), (5.0, 0.076_968_984_8)] {
         let done = retimed(&line(length), &limits(1), 1e-3, 4);
-        println!("{length} mm: {} s, {closed_form_s} s, {:?}", done.time_s, done.status);
+        println!(
+            "{length} mm: {} s, {closed_form_s} s, {:?}",
+            done.time_s, done.status
+        );
         assert!(done.status.is_feasible());
         let ratio = done.time_s / closed_form_s;
         assert!((0.999..1.03).contains(&ratio), "{ratio}");
@@ -52,28 +73,51 @@ fn a_tight_turn_uses_the_jerk_that_there_is() {
     let steady = (4e5f64).cbrt().min(5000.0f64.sqrt());
     let speeds = done.speeds();
     let middle = speeds[speeds.len() / 2];
-    assert!(middle <= 2f64.sqrt() * steady && middle > 0.9 * steady, "{middle} {steady}");
+    assert!(
+        middle <= 2f64.sqrt() * steady && middle > 0.9 * steady,
+        "{middle} {steady}"
+    );
 }
 
 /// What is asked for between the places of the grid is kept there, and changes nothing far from it.
 #[test]
 fn places_between_those_of_the_grid_count() {
-    let mut steady = Point { most: 1.5, ..Point::default() };
+    let mut steady = Point {
+        most: 1.5,
+        ..Point::default()
+    };
     steady.first[0] = 100.0;
     let points = vec![[steady; PLACES]; 80];
     let ends = (End::Moving, End::Moving);
     let mut retimer = Retimer::default();
     let mut solve = |between: &[Between]| {
-        let task = Task { points: &points, between, limits: limits(1), jerk_share: 1.0, step_s: 2e-3, ends };
+        let task = Task {
+            points: &points,
+            between,
+            limits: limits(1),
+            jerk_share: 1.0,
+            step_s: 2e-3,
+            ends,
+        };
         let status = retimer.solve(&task);
         assert!(status.is_feasible(), "{status:?}");
         [0.2, 0.5, 0.9].map(|z| retimer.rate.at(40, z, 2e-3)[0])
     };
     let free = solve(&[]);
     assert!(free.iter().all(|b| *b > 1.45), "{free:?}");
-    let slow = Point { most: 0.8, ..steady };
-    let held = solve(&[Between { interval: 40, z: [0.2, 0.5, 0.9], points: [slow; PLACES] }]);
-    assert!(held.iter().all(|b| *b < 0.8 * 1.002 && *b > 0.78), "{held:?}");
+    let slow = Point {
+        most: 0.8,
+        ..steady
+    };
+    let held = solve(&[Between {
+        interval: 40,
+        z: [0.2, 0.5, 0.9],
+        points: [slow; PLACES],
+    }]);
+    assert!(
+        held.iter().all(|b| *b < 0.8 * 1.002 && *b > 0.78),
+        "{held:?}"
+    );
 }
 
 proptest! {
@@ -91,9 +135,22 @@ proptest! {
 
 #[test]
 fn a_motion_that_is_none_ends_the_iteration_at_once() {
-    let points = vec![[Point { first: [f64::INFINITY; 8], ..Point::default() }; PLACES]; 40];
+    let points = vec![
+        [Point {
+            first: [f64::INFINITY; 8],
+            ..Point::default()
+        }; PLACES];
+        40
+    ];
     let ends = (End::Rest, End::Rest);
-    let task = Task { points: &points, between: &[], limits: limits(1), jerk_share: 1.0, step_s: f64::INFINITY, ends };
+    let task = Task {
+        points: &points,
+        between: &[],
+        limits: limits(1),
+        jerk_share: 1.0,
+        step_s: f64::INFINITY,
+        ends,
+    };
     let status = Retimer::default().solve(&task);
     assert!(status.iterations <= 1 && status.gap.is_nan(), "{status:?}");
 }

@@ -45,7 +45,9 @@ fn plain() -> Config {
 
 fn module(config: Config, random: &mut Random) -> Option<Vec<u8>> {
     let bytes = random.bytes(4096);
-    Module::new(config, &mut Unstructured::new(&bytes)).ok().map(|module| module.to_bytes())
+    Module::new(config, &mut Unstructured::new(&bytes))
+        .ok()
+        .map(|module| module.to_bytes())
 }
 
 /// How many modules of a kind are made.
@@ -56,7 +58,13 @@ fn wanted() -> usize {
 /// A module with the exports of a policy, and a layout that is right.
 fn policy(random: &mut Random) -> Option<String> {
     let exports = wat::parse_str(EXPORTS).unwrap();
-    let made = module(Config { exports: Some(exports), ..plain() }, random)?;
+    let made = module(
+        Config {
+            exports: Some(exports),
+            ..plain()
+        },
+        random,
+    )?;
     let text = wasmprinter::print_bytes(made).unwrap();
     Some(format!("{}{LAYOUT}", text.trim_end().strip_suffix(')')?))
 }
@@ -88,14 +96,23 @@ fn try_out(name: &str, bytes: &[u8]) -> Option<String> {
 fn generated_policies_are_contained() {
     let mut random = Random::from_the_clock();
     let made: Vec<_> = (0..wanted()).filter_map(|_| policy(&mut random)).collect();
-    let refused: Vec<_> = made.iter().filter_map(|text| try_out(text, text.as_bytes())).collect();
-    assert!(made.len() - refused.len() >= 10, "of {} generated policies too few start: {refused:#?}", made.len());
+    let refused: Vec<_> = made
+        .iter()
+        .filter_map(|text| try_out(text, text.as_bytes()))
+        .collect();
+    assert!(
+        made.len() - refused.len() >= 10,
+        "of {} generated policies too few start: {refused:#?}",
+        made.len()
+    );
 }
 
 #[test]
 fn generated_modules_of_every_kind_are_refused_or_contained() {
     let mut random = Random::from_the_clock();
-    let made: Vec<_> = (0..wanted()).filter_map(|_| module(Config::default(), &mut random)).collect();
+    let made: Vec<_> = (0..wanted())
+        .filter_map(|_| module(Config::default(), &mut random))
+        .collect();
     assert!(made.len() >= 10, "{}", made.len());
     for bytes in made {
         try_out(&format!("{bytes:02x?}"), &bytes);

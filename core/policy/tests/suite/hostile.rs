@@ -13,10 +13,18 @@ pub fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
         decide(policy, blocks);
         for index in 0..blocks.len() {
             let tuning = policy.tuning(index);
-            let asked = [tuning.time_constant_s, tuning.path_tolerance_mm, tuning.feed_cap_mm_per_s];
+            let asked = [
+                tuning.time_constant_s,
+                tuning.path_tolerance_mm,
+                tuning.feed_cap_mm_per_s,
+            ];
             seen.extend(asked.iter().map(|ask| ask.map_or(0, f64::to_bits)));
         }
-        let ratio = policy.period(&Period { period, duration_s: 0.008, ..Period::default() });
+        let ratio = policy.period(&Period {
+            period,
+            duration_s: 0.008,
+            ..Period::default()
+        });
         seen.push(ratio.map_or(0, f64::to_bits));
     }
     seen
@@ -24,9 +32,16 @@ pub fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
 
 /// Time constants, tolerances, feed caps and ratios that a machine at 50 mm/s may get.
 pub fn assert_within_the_machine(name: &str, seen: &[u64]) {
-    for value in seen.iter().filter(|bits| **bits != 0).map(|bits| f64::from_bits(*bits)) {
+    for value in seen
+        .iter()
+        .filter(|bits| **bits != 0)
+        .map(|bits| f64::from_bits(*bits))
+    {
         let most = Bounds::default().time_constant_s.1.max(50.0);
-        assert!(value.is_finite() && value > 0.0 && value <= most, "{name}: {value}");
+        assert!(
+            value.is_finite() && value > 0.0 && value <= most,
+            "{name}: {value}"
+        );
     }
 }
 
@@ -40,11 +55,27 @@ fn every_hostile_script_is_contained_and_asks_for_nothing_beyond_the_machine() {
         let seen = live(&mut policy, &blocks);
         assert_within_the_machine(&name, &seen);
         let mut again = start(&bytes, &[]).unwrap();
-        assert_eq!(live(&mut again, &blocks), seen, "{name} is not the same twice");
+        assert_eq!(
+            live(&mut again, &blocks),
+            seen,
+            "{name} is not the same twice"
+        );
         assert_eq!(again.counters(), policy.counters(), "{name}");
-        let harmless = ["largest-numbers", "most-negative-numbers", "nan", "tiny-numbers", "flutter", "vandal"];
+        let harmless = [
+            "largest-numbers",
+            "most-negative-numbers",
+            "nan",
+            "tiny-numbers",
+            "flutter",
+            "vandal",
+        ];
         let expected = u32::from(!harmless.contains(&name.as_str())) * 3;
-        assert_eq!(policy.strikes(), expected, "{name}: {:?}", policy.take_notes());
+        assert_eq!(
+            policy.strikes(),
+            expected,
+            "{name}: {:?}",
+            policy.take_notes()
+        );
         assert_eq!(policy.is_quarantined(), expected == 3, "{name}");
     }
 }
@@ -52,42 +83,78 @@ fn every_hostile_script_is_contained_and_asks_for_nothing_beyond_the_machine() {
 #[test]
 fn each_kind_of_trouble_is_counted_as_what_it_is() {
     let of = |name: &str| {
-        let mut policy = start(&read(&format!("tests/fixtures/policies/hostile/{name}.wat")), &[]).unwrap();
+        let mut policy = start(
+            &read(&format!("tests/fixtures/policies/hostile/{name}.wat")),
+            &[],
+        )
+        .unwrap();
         live(&mut policy, &chain(&[0.0, 90.0]));
         (policy.counters().clone(), policy.take_notes().join("\n"))
     };
     assert_eq!(of("infinite-loop").0.out_of_fuel, 3);
-    assert_eq!(of("deep-recursion").0.stack_overflows + of("deep-recursion").0.out_of_fuel, 3);
+    assert_eq!(
+        of("deep-recursion").0.stack_overflows + of("deep-recursion").0.out_of_fuel,
+        3
+    );
     assert_eq!(of("memory-growth").0.memory_refusals, 3);
     assert_eq!(of("memory-growth-slow").0.memory_refusals, 3);
     assert_eq!(of("table-growth").0.memory_refusals, 3);
     assert_eq!(of("unreachable").0.traps, 3);
     assert_eq!(of("infinities").0.not_finite, 3);
     let (counters, notes) = of("infinite-loop");
-    assert_eq!((counters.windows, counters.periods), (2, 1), "not called after the third strike");
-    assert!(notes.contains("line 7: on_blocks: out of fuel: more than 22000 instructions in one call"), "{notes}");
+    assert_eq!(
+        (counters.windows, counters.periods),
+        (2, 1),
+        "not called after the third strike"
+    );
+    assert!(
+        notes.contains("line 7: on_blocks: out of fuel: more than 22000 instructions in one call"),
+        "{notes}"
+    );
     assert!(notes.contains("strike 3 of 3, in quarantine"), "{notes}");
 }
 
 #[test]
 fn requests_beyond_the_machine_are_limited_and_counted() {
-    let mut policy = start(&read("tests/fixtures/policies/hostile/largest-numbers.wat"), &[]).unwrap();
+    let mut policy = start(
+        &read("tests/fixtures/policies/hostile/largest-numbers.wat"),
+        &[],
+    )
+    .unwrap();
     let blocks = chain(&[0.0, 90.0]);
     decide(&mut policy, &blocks);
     assert_eq!(policy.tuning(0).time_constant_s, Some(1.0));
-    assert_eq!((policy.tuning(0).feed_cap_mm_per_s, policy.tuning(0).path_tolerance_mm), (None, None));
-    assert_eq!((policy.counters().limited, policy.counters().time_constants), (6, 2));
+    assert_eq!(
+        (
+            policy.tuning(0).feed_cap_mm_per_s,
+            policy.tuning(0).path_tolerance_mm
+        ),
+        (None, None)
+    );
+    assert_eq!(
+        (policy.counters().limited, policy.counters().time_constants),
+        (6, 2)
+    );
     let notes = policy.take_notes().join("\n");
-    assert!(notes.contains("line 7: time constant 50 -> 1000 ms, 1.798e308 was asked for"), "{notes}");
+    assert!(
+        notes.contains("line 7: time constant 50 -> 1000 ms, 1.798e308 was asked for"),
+        "{notes}"
+    );
 }
 
 /// A script that asks for the least, as often as it is asked, with these calls.
 fn greedy(calls: &str) -> String {
-    let module = String::from_utf8(read("tests/fixtures/policies/hostile/most-negative-numbers.wat")).unwrap();
+    let module = String::from_utf8(read(
+        "tests/fixtures/policies/hostile/most-negative-numbers.wat",
+    ))
+    .unwrap();
     let kept = |line: &&str| {
-        [("on_blocks", "(func (export \"on_blocks\")"), ("on_period", "(func (export \"on_period\")")]
-            .iter()
-            .all(|(call, start)| !line.trim_start().starts_with(start) || calls.contains(call))
+        [
+            ("on_blocks", "(func (export \"on_blocks\")"),
+            ("on_period", "(func (export \"on_period\")"),
+        ]
+        .iter()
+        .all(|(call, start)| !line.trim_start().starts_with(start) || calls.contains(call))
     };
     module.lines().filter(kept).collect::<Vec<_>>().join("\n")
 }
@@ -98,14 +165,32 @@ fn cap_and_ratio_together_never_go_below_the_lowest_feed_ratio() {
     for calls in ["on_blocks on_period", "on_blocks", "on_period"] {
         let mut policy = start(greedy(calls).as_bytes(), &[]).unwrap();
         decide(&mut policy, &chain(&[0.0; 64]));
-        let caps = (0..64).map(|index| policy.tuning(index).feed_cap_mm_per_s.map_or(1.0, |cap| cap / 50.0));
+        let caps = (0..64).map(|index| {
+            policy
+                .tuning(index)
+                .feed_cap_mm_per_s
+                .map_or(1.0, |cap| cap / 50.0)
+        });
         let cap = caps.fold(1.0, f64::min);
-        let ratios = (0..60)
-            .map(|period| policy.period(&Period { period, duration_s: 0.008, ..Period::default() }).unwrap_or(1.0));
+        let ratios = (0..60).map(|period| {
+            policy
+                .period(&Period {
+                    period,
+                    duration_s: 0.008,
+                    ..Period::default()
+                })
+                .unwrap_or(1.0)
+        });
         let ratio = ratios.fold(1.0, f64::min);
         let product = cap * ratio;
-        assert!(product >= lowest * (1.0 - 1e-12), "{calls}: {cap} x {ratio} = {product}");
-        assert!(product < lowest * (1.0 + 1e-12), "{calls}: what is allowed can be had: {product}");
+        assert!(
+            product >= lowest * (1.0 - 1e-12),
+            "{calls}: {cap} x {ratio} = {product}"
+        );
+        assert!(
+            product < lowest * (1.0 + 1e-12),
+            "{calls}: what is allowed can be had: {product}"
+        );
     }
 }
 
@@ -118,7 +203,13 @@ fn truncated_and_random_bytes_are_refused_or_run_within_their_budget() {
         Err(refusal) => assert!(refusal.to_string().len() < 2000, "{refusal}"),
     };
     for end in (0..whole.len()).step_by(37) {
-        assert!(matches!(start(&whole[..end], &[]), Err(Refusal::NotAModule(_) | Refusal::Exports(_))), "{end} bytes");
+        assert!(
+            matches!(
+                start(&whole[..end], &[]),
+                Err(Refusal::NotAModule(_) | Refusal::Exports(_))
+            ),
+            "{end} bytes"
+        );
     }
     let mut random = Random::from_the_clock();
     for _ in 0..200 {

@@ -51,17 +51,36 @@ const PERIOD: &[(&str, usize)] = &[
 fn fields(text: &str, head: &str, name_first: bool) -> (Fields, usize) {
     let body = text.split_once(head).unwrap_or_else(|| panic!("{head}")).1;
     let (mut fields, mut offset) = (vec![], 0);
-    for line in
-        body.lines().skip(1).map(str::trim).take_while(|line| !line.starts_with('}') && !line.contains("@inline"))
+    for line in body
+        .lines()
+        .skip(1)
+        .map(str::trim)
+        .take_while(|line| !line.starts_with('}') && !line.contains("@inline"))
     {
-        let Some((field, _)) = line.split_once([';', ',']).filter(|_| !line.starts_with(['/', '*'])) else { continue };
-        let words: Vec<&str> = field.split([' ', ':']).filter(|w| !["", "pub", "private"].contains(w)).collect();
-        let (name, kind) = if name_first { (words[0], words[1]) } else { (words[1], words[0]) };
+        let Some((field, _)) = line
+            .split_once([';', ','])
+            .filter(|_| !line.starts_with(['/', '*']))
+        else {
+            continue;
+        };
+        let words: Vec<&str> = field
+            .split([' ', ':'])
+            .filter(|w| !["", "pub", "private"].contains(w))
+            .collect();
+        let (name, kind) = if name_first {
+            (words[0], words[1])
+        } else {
+            (words[1], words[0])
+        };
         let eight = name.contains("[8]") || kind.starts_with('[');
         let bytes = if kind.contains("32") { 4 } else { 8 };
         assert_eq!(offset % bytes, 0, "{name} is not aligned");
         if name != "reserved" {
-            fields.push((name.trim_end_matches("[8]").replace("current_0_a", "current_a"), offset));
+            fields.push((
+                name.trim_end_matches("[8]")
+                    .replace("current_0_a", "current_a"),
+                offset,
+            ));
         }
         offset += if eight { 8 * bytes } else { bytes };
     }
@@ -72,16 +91,42 @@ fn fields(text: &str, head: &str, name_first: bool) -> (Fields, usize) {
 #[test]
 fn every_sdk_lays_out_blocks_and_periods_as_the_abi_says() {
     let sdks = [
-        ("rust/src/tandem_policy.rs", "pub struct Block {", "pub struct Period {", true),
-        ("c/tandem_policy.h", "typedef struct tandem_block {", "typedef struct tandem_period {", false),
-        ("assemblyscript/tandem-policy.ts", "export class Block {", "export class Period {", true),
+        (
+            "rust/src/tandem_policy.rs",
+            "pub struct Block {",
+            "pub struct Period {",
+            true,
+        ),
+        (
+            "c/tandem_policy.h",
+            "typedef struct tandem_block {",
+            "typedef struct tandem_period {",
+            false,
+        ),
+        (
+            "assemblyscript/tandem-policy.ts",
+            "export class Block {",
+            "export class Period {",
+            true,
+        ),
     ];
     let named = |expected: &[(&str, usize)]| -> Fields {
-        expected.iter().map(|(name, offset)| ((*name).to_string(), *offset)).collect()
+        expected
+            .iter()
+            .map(|(name, offset)| ((*name).to_string(), *offset))
+            .collect()
     };
     for (file, of_block, of_period, name_first) in sdks {
         let text = std::fs::read_to_string(root().join("scripts/sdk").join(file)).unwrap();
-        assert_eq!(fields(&text, of_block, name_first), (named(BLOCK), block::BYTES), "{file}");
-        assert_eq!(fields(&text, of_period, name_first), (named(PERIOD), period::BYTES), "{file}");
+        assert_eq!(
+            fields(&text, of_block, name_first),
+            (named(BLOCK), block::BYTES),
+            "{file}"
+        );
+        assert_eq!(
+            fields(&text, of_period, name_first),
+            (named(PERIOD), period::BYTES),
+            "{file}"
+        );
     }
 }

@@ -14,7 +14,10 @@ use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
 
 /// The folder of the workspace.
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .canonicalize()
+        .unwrap()
 }
 
 fn read(path: &str) -> Vec<u8> {
@@ -23,11 +26,18 @@ fn read(path: &str) -> Vec<u8> {
 
 /// Every file of a folder that ends in `.wat`: its name and its bytes.
 fn each(folder: &str) -> Vec<(String, Vec<u8>)> {
-    let entries = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = entries.filter(|path| path.extension().is_some_and(|e| e == "wat")).collect();
+    let entries = std::fs::read_dir(root().join(folder))
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = entries
+        .filter(|path| path.extension().is_some_and(|e| e == "wat"))
+        .collect();
     files.sort();
     let name = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
-    files.iter().map(|path| (name(path), std::fs::read(path).unwrap())).collect()
+    files
+        .iter()
+        .map(|path| (name(path), std::fs::read(path).unwrap()))
+        .collect()
 }
 
 fn engine() -> Engine {
@@ -40,22 +50,44 @@ fn compile(bytes: &[u8]) -> Result<Script, Refusal> {
 
 fn facts() -> Facts {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
-    Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 }
+    Facts {
+        axes,
+        time_constant_s: 0.05,
+        path_tolerance_mm: 0.01,
+        rough_period_s: 0.008,
+    }
 }
 
 fn values(stated: &[(&str, f64)]) -> Values {
-    stated.iter().map(|(name, value)| ((*name).to_string(), *value)).collect()
+    stated
+        .iter()
+        .map(|(name, value)| ((*name).to_string(), *value))
+        .collect()
 }
 
 fn start(bytes: &[u8], stated: &[(&str, f64)]) -> Result<Policy, Refusal> {
-    Policy::new(compile(bytes)?, values(stated), Budget::default(), Bounds::default(), &facts())
+    Policy::new(
+        compile(bytes)?,
+        values(stated),
+        Budget::default(),
+        Bounds::default(),
+        &facts(),
+    )
 }
 
 /// A line of 10 mm that leaves `from` in the direction `degrees`, at 50 mm/s.
 fn line(from: AxisVector, degrees: f64) -> Block {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let end = from + AxisVector::from_slice(&[10.0 * cos, 10.0 * sin]);
-    Block { kind: BlockKind::Line, end, feed_mm_per_s: 50.0, length_mm: 10.0, line: 7, tool: 3, ..Block::at(from) }
+    Block {
+        kind: BlockKind::Line,
+        end,
+        feed_mm_per_s: 50.0,
+        length_mm: 10.0,
+        line: 7,
+        tool: 3,
+        ..Block::at(from)
+    }
 }
 
 /// A chain of lines with these directions.

@@ -6,7 +6,10 @@ use crate::{compile, each, read, start};
 
 fn refusal(name: &str) -> String {
     let bytes = read(&format!("tests/fixtures/policies/refused/{name}.wat"));
-    start(&bytes, &[]).err().unwrap_or_else(|| panic!("{name} is accepted")).to_string()
+    start(&bytes, &[])
+        .err()
+        .unwrap_or_else(|| panic!("{name} is accepted"))
+        .to_string()
 }
 
 #[test]
@@ -22,19 +25,46 @@ fn every_unfit_module_is_refused_on_one_line() {
 #[test]
 fn refusals_say_what_is_missing_and_which_version() {
     let cases = [
-        ("other-version", "speaks version 2 of the policy ABI, this host speaks version 1"),
-        ("missing-import", "it imports env.seed: a policy script needs no imports"),
+        (
+            "other-version",
+            "speaks version 2 of the policy ABI, this host speaks version 1",
+        ),
+        (
+            "missing-import",
+            "it imports env.seed: a policy script needs no imports",
+        ),
         ("imported-memory", "it imports env.memory"),
-        ("no-layout", "the function tandem_policy_v1 () -> i32 is not exported"),
+        (
+            "no-layout",
+            "the function tandem_policy_v1 () -> i32 is not exported",
+        ),
         ("no-memory", "the memory memory is not exported"),
-        ("no-calls", "exports neither on_blocks (i32, i32) nor on_period (i32) -> f64"),
-        ("wrong-types", "its export on_blocks is not (i32, i32); its export on_period is not (i32) -> f64"),
+        (
+            "no-calls",
+            "exports neither on_blocks (i32, i32) nor on_period (i32) -> f64",
+        ),
+        (
+            "wrong-types",
+            "its export on_blocks is not (i32, i32); its export on_period is not (i32) -> f64",
+        ),
         ("start-traps", "it does not start: trap:"),
-        ("start-never-ends", "it does not start: out of fuel: more than 1000000 instructions"),
+        (
+            "start-never-ends",
+            "it does not start: out of fuel: more than 1000000 instructions",
+        ),
         ("layout-recurses", "it does not start: "),
-        ("giant-memory", "memory refused: it asked for 65536 pages of memory, 32 are allowed"),
-        ("layout-outside", "its layout is wrong: it lies outside of the memory"),
-        ("window-outside", "its layout is wrong: the window lies outside of the memory"),
+        (
+            "giant-memory",
+            "memory refused: it asked for 65536 pages of memory, 32 are allowed",
+        ),
+        (
+            "layout-outside",
+            "its layout is wrong: it lies outside of the memory",
+        ),
+        (
+            "window-outside",
+            "its layout is wrong: the window lies outside of the memory",
+        ),
         ("text", "not a WASM module: "),
     ];
     for (name, expected) in cases {
@@ -46,10 +76,21 @@ fn refusals_say_what_is_missing_and_which_version() {
 #[test]
 fn parameters_that_do_not_fit_are_refused() {
     let bytes = read("scripts/policies/corner-time-constant.wasm");
-    let refused = |stated: &[(&str, f64)]| start(&bytes, stated).err().map(|e| e.to_string()).unwrap_or_default();
+    let refused = |stated: &[(&str, f64)]| {
+        start(&bytes, stated)
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default()
+    };
     let text = refused(&[("corner_eror_um", 5.0), ("longest_ms", 0.0)]);
-    assert!(text.contains("it has no parameter \"corner_eror_um\"; the nearest is corner_error_um"), "{text}");
-    assert!(text.contains("longest_ms is 0; it must be from 1 to 1000"), "{text}");
+    assert!(
+        text.contains("it has no parameter \"corner_eror_um\"; the nearest is corner_error_um"),
+        "{text}"
+    );
+    assert!(
+        text.contains("longest_ms is 0; it must be from 1 to 1000"),
+        "{text}"
+    );
     assert_eq!(refused(&[("corner_error_um", 5.0)]), "");
 }
 
@@ -63,6 +104,9 @@ fn a_file_of_any_size_is_not_compiled() {
 fn the_same_bytes_are_compiled_once() {
     let engine = Engine::new().unwrap();
     let bytes = read("scripts/policies/load-feed.wasm");
-    let (one, two) = (engine.compile(&bytes).unwrap(), engine.compile(&bytes).unwrap());
+    let (one, two) = (
+        engine.compile(&bytes).unwrap(),
+        engine.compile(&bytes).unwrap(),
+    );
     assert!(one.is_same(&two));
 }

@@ -6,14 +6,17 @@ use crate::{chain, compile, decide, read, start, values};
 
 fn swap(policy: &mut Policy, bytes: &[u8]) -> Result<(), String> {
     let script = compile(bytes).map_err(|e| e.to_string())?;
-    let instance = Instance::new(&script, &Budget::default(), policy.values()).map_err(|e| e.to_string())?;
+    let instance =
+        Instance::new(&script, &Budget::default(), policy.values()).map_err(|e| e.to_string())?;
     policy.swap(script, instance).map_err(|e| e.to_string())
 }
 
 /// Feed caps of a window of lines.
 fn caps(policy: &mut Policy, blocks: usize) -> Vec<Option<f64>> {
     decide(policy, &chain(&vec![0.0; blocks]));
-    (0..blocks).map(|index| policy.tuning(index).feed_cap_mm_per_s).collect()
+    (0..blocks)
+        .map(|index| policy.tuning(index).feed_cap_mm_per_s)
+        .collect()
 }
 
 #[test]
@@ -27,7 +30,10 @@ fn state_that_is_saved_survives() {
     }
     assert_eq!(reloaded.counters().reloads, 3);
     // A script made afresh begins its cut again.
-    assert_ne!(caps(&mut start(&bytes, &[]).unwrap(), 1), caps(&mut reloaded, 1));
+    assert_ne!(
+        caps(&mut start(&bytes, &[]).unwrap(), 1),
+        caps(&mut reloaded, 1)
+    );
 }
 
 #[test]
@@ -45,15 +51,27 @@ fn a_bad_script_leaves_the_old_one_running() {
 
 #[test]
 fn a_new_script_ends_the_quarantine() {
-    let mut policy = start(&read("tests/fixtures/policies/hostile/unreachable.wat"), &[]).unwrap();
+    let mut policy = start(
+        &read("tests/fixtures/policies/hostile/unreachable.wat"),
+        &[],
+    )
+    .unwrap();
     for _ in 0..5 {
         assert_eq!(caps(&mut policy, 1), [None]);
     }
     assert!(policy.is_quarantined());
-    swap(&mut policy, &read("tests/fixtures/policies/good/half-feed.wat")).unwrap();
+    swap(
+        &mut policy,
+        &read("tests/fixtures/policies/good/half-feed.wat"),
+    )
+    .unwrap();
     assert!(!policy.is_quarantined());
     assert_eq!(caps(&mut policy, 1), [Some(25.0)]);
-    let odd = Period { period: 3, duration_s: 0.008, ..Period::default() };
+    let odd = Period {
+        period: 3,
+        duration_s: 0.008,
+        ..Period::default()
+    };
     assert_eq!(policy.period(&odd), Some(0.9));
 }
 
@@ -61,8 +79,15 @@ fn a_new_script_ends_the_quarantine() {
 fn a_script_that_gives_another_answer_than_the_first_is_refused_within_a_run() {
     // Caps of blocks that are planned already were made without a ratio in mind.
     let mut policy = start(&read("scripts/policies/gentle-start.wasm"), &[]).unwrap();
-    let why = swap(&mut policy, &read("tests/fixtures/policies/good/half-feed.wat")).unwrap_err();
-    assert!(why.contains("it exports on_period") && why.contains("a new run"), "{why}");
+    let why = swap(
+        &mut policy,
+        &read("tests/fixtures/policies/good/half-feed.wat"),
+    )
+    .unwrap_err();
+    assert!(
+        why.contains("it exports on_period") && why.contains("a new run"),
+        "{why}"
+    );
     assert_eq!(policy.counters().reloads, 0);
 }
 
@@ -72,8 +97,15 @@ fn parameters_of_the_machine_file_reach_the_new_script() {
     let mut policy = start(&bytes, &[("material", 3.0)]).unwrap();
     let before = caps(&mut policy, 1);
     swap(&mut policy, &bytes).unwrap();
-    assert_eq!((caps(&mut policy, 1), before), (vec![Some(800.0 / 60.0)], vec![Some(800.0 / 60.0)]));
+    assert_eq!(
+        (caps(&mut policy, 1), before),
+        (vec![Some(800.0 / 60.0)], vec![Some(800.0 / 60.0)])
+    );
     assert_eq!(*policy.values(), values(&[("material", 3.0)]));
     // A script that does not know the parameter is refused.
-    assert!(swap(&mut policy, &read("scripts/policies/load-feed.wasm")).unwrap_err().contains("no parameter"));
+    assert!(
+        swap(&mut policy, &read("scripts/policies/load-feed.wasm"))
+            .unwrap_err()
+            .contains("no parameter")
+    );
 }

@@ -33,20 +33,43 @@ impl BlocksCsv {
         let columns = "index,line,kind,length_mm,feed_mm_s,start_feed_mm_s,peak_feed_mm_s,end_feed_mm_s,time_s,time_constant_ms,limited_by";
         let mut head: Vec<String> = columns.split(',').map(str::to_string).collect();
         for axis in 0..machine.axes.count() {
-            let unit = if machine.axes.is_rotary(axis) { "deg" } else { "mm" };
-            head.push(format!("{}_end_{unit}", machine.axes.letter(axis).to_ascii_lowercase()));
+            let unit = if machine.axes.is_rotary(axis) {
+                "deg"
+            } else {
+                "mm"
+            };
+            head.push(format!(
+                "{}_end_{unit}",
+                machine.axes.letter(axis).to_ascii_lowercase()
+            ));
         }
         head.push("planned_time_s".to_string());
         writeln!(out, "{}", head.join(",")).map_err(|e| format!("{}: {e}", path.display()))?;
-        let rapid_mm_per_s = machine.limits.axes().iter().map(|a| a.rapid_mm_per_s).collect();
+        let rapid_mm_per_s = machine
+            .limits
+            .axes()
+            .iter()
+            .map(|a| a.rapid_mm_per_s)
+            .collect();
         let times = BlockTimes::new(machine.fine_period_s, machine.motion.max_feed_ratio);
-        Ok(Self { out, axes: machine.axes, rapid_mm_per_s, open: VecDeque::new(), times, failed: false })
+        Ok(Self {
+            out,
+            axes: machine.axes,
+            rapid_mm_per_s,
+            open: VecDeque::new(),
+            times,
+            failed: false,
+        })
     }
 
     /// A block is planned for good: its row is written when it has been driven.
     pub fn block(&mut self, block: &Block, report: &BlockReport) {
         if !self.failed {
-            self.open.push_back(Open { index: block.index, line: block.line, row: self.row(block, report) });
+            self.open.push_back(Open {
+                index: block.index,
+                line: block.line,
+                row: self.row(block, report),
+            });
             self.times.block(block, report);
         }
     }
@@ -60,8 +83,14 @@ impl BlocksCsv {
             return Ok(());
         }
         let mut written = Ok(());
-        let Self { times, open, out, .. } = self;
-        times.sample(sample, |_, _| {}, |index, time_s| write(out, open, &mut written, index, time_s));
+        let Self {
+            times, open, out, ..
+        } = self;
+        times.sample(
+            sample,
+            |_, _| {},
+            |index, time_s| write(out, open, &mut written, index, time_s),
+        );
         self.failed = written.is_err();
         written
     }
@@ -76,26 +105,56 @@ impl BlocksCsv {
             return Ok(());
         }
         let mut written = Ok(());
-        let Self { times, open, out, .. } = &mut self;
+        let Self {
+            times, open, out, ..
+        } = &mut self;
         times.finish(|index, time_s| write(out, open, &mut written, index, time_s));
         written.and_then(|()| self.out.finish_record("blocks"))
     }
 
     fn row(&self, block: &Block, report: &BlockReport) -> Vec<String> {
-        let feed = if block.kind == BlockKind::Rapid { self.rapid_feed(block) } else { block.command_feed_mm_per_s() };
+        let feed = if block.kind == BlockKind::Rapid {
+            self.rapid_feed(block)
+        } else {
+            block.command_feed_mm_per_s()
+        };
         let time_constant_ms = report.time_constant_s * 1e3;
-        let mut row = vec![block.index.to_string(), block.line.to_string(), kind(block).to_string()];
-        let feed = if block.kind == BlockKind::Dwell { 0.0 } else { feed };
-        let numbers =
-            [block.length_mm, feed, report.start_feed_mm_per_s, report.peak_feed_mm_per_s, report.end_feed_mm_per_s];
+        let mut row = vec![
+            block.index.to_string(),
+            block.line.to_string(),
+            kind(block).to_string(),
+        ];
+        let feed = if block.kind == BlockKind::Dwell {
+            0.0
+        } else {
+            feed
+        };
+        let numbers = [
+            block.length_mm,
+            feed,
+            report.start_feed_mm_per_s,
+            report.peak_feed_mm_per_s,
+            report.end_feed_mm_per_s,
+        ];
         row.extend(numbers.iter().map(f64::to_string));
         debug_assert_eq!(row.len(), TIME);
         row.push(String::new());
-        row.push(if time_constant_ms.is_nan() { String::new() } else { time_constant_ms.to_string() });
+        row.push(if time_constant_ms.is_nan() {
+            String::new()
+        } else {
+            time_constant_ms.to_string()
+        });
         row.push(limited_by(report.limited_by).to_string());
         for axis in 0..self.axes.count() {
             let end = block.end[axis];
-            row.push(if self.axes.is_rotary(axis) { end.to_degrees() } else { end }.to_string());
+            row.push(
+                if self.axes.is_rotary(axis) {
+                    end.to_degrees()
+                } else {
+                    end
+                }
+                .to_string(),
+            );
         }
         row.push(report.time_s.to_string());
         row
@@ -103,8 +162,13 @@ impl BlocksCsv {
 
     /// The feed that the axes' rapid speeds give along the block.
     fn rapid_feed(&self, block: &Block) -> f64 {
-        let each = self.rapid_mm_per_s.iter().enumerate().filter(|(i, _)| block.end[*i] != block.start[*i]);
-        each.map(|(i, v)| v * block.length_mm / (block.end[i] - block.start[i]).abs()).fold(f64::INFINITY, f64::min)
+        let each = self
+            .rapid_mm_per_s
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| block.end[*i] != block.start[*i]);
+        each.map(|(i, v)| v * block.length_mm / (block.end[i] - block.start[i]).abs())
+            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -119,12 +183,26 @@ struct Open {
 const TIME: usize = 8;
 
 /// Writes the row of the block `index`, which has taken `time_s`, unless one before could not be written.
-fn write(out: &mut Output, open: &mut VecDeque<Open>, written: &mut Result<(), RecordError>, index: u64, time_s: f64) {
-    let Some(mut block) = open.pop_front_if(|front| front.index == index).filter(|_| written.is_ok()) else { return };
+fn write(
+    out: &mut Output,
+    open: &mut VecDeque<Open>,
+    written: &mut Result<(), RecordError>,
+    index: u64,
+    time_s: f64,
+) {
+    let Some(mut block) = open
+        .pop_front_if(|front| front.index == index)
+        .filter(|_| written.is_ok())
+    else {
+        return;
+    };
     block.row[TIME] = time_s.to_string();
     // Names and numbers: nothing that a CSV would have to quote.
     if let Err(error) = writeln!(out, "{}", block.row.join(",")) {
-        *written = Err(RecordError { line: Some(block.line), ..RecordError::of("blocks", out, error) });
+        *written = Err(RecordError {
+            line: Some(block.line),
+            ..RecordError::of("blocks", out, error)
+        });
     }
 }
 
@@ -141,5 +219,6 @@ fn kind(block: &Block) -> &'static str {
 
 fn is_helix(block: &Block) -> bool {
     let plane = block.arc.plane.map(|axis| axis as usize);
-    (0..block.end.0.len()).any(|axis| !plane.contains(&axis) && block.end[axis] != block.start[axis])
+    (0..block.end.0.len())
+        .any(|axis| !plane.contains(&axis) && block.end[axis] != block.start[axis])
 }

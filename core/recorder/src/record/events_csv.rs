@@ -94,7 +94,12 @@ impl Word {
             What::Orient => event.value.to_degrees(),
             What::Spindle | What::Analog(_) | What::Command(_) => event.value,
         };
-        Some(Self { what, value, line: event.line, before_block: event.before_block })
+        Some(Self {
+            what,
+            value,
+            line: event.line,
+            before_block: event.before_block,
+        })
     }
 }
 
@@ -116,15 +121,30 @@ impl EventsCsv {
     /// The path with the system's words.
     pub fn create(path: &Path, fine_period_s: f64) -> Result<Self, String> {
         let mut out = Output::create(path)?;
-        writeln!(out, "time_s,tick,line,word,value,by").map_err(|e| format!("{}: {e}", path.display()))?;
+        writeln!(out, "time_s,tick,line,word,value,by")
+            .map_err(|e| format!("{}: {e}", path.display()))?;
         let (last, ahead, told) = (Switched::default(), VecDeque::new(), VecDeque::new());
-        Ok(Self { out, period_s: fine_period_s, last, ahead, told, waits: false, failed: false })
+        Ok(Self {
+            out,
+            period_s: fine_period_s,
+            last,
+            ahead,
+            told,
+            waits: false,
+            failed: false,
+        })
     }
 
     /// An event of the program is on its way to the drives.
     pub fn event(&mut self, event: &Event) {
-        let Some(word) = Word::of(event).filter(|_| !self.failed) else { return };
-        let queue = if word.what.is_sampled() { &mut self.ahead } else { &mut self.told };
+        let Some(word) = Word::of(event).filter(|_| !self.failed) else {
+            return;
+        };
+        let queue = if word.what.is_sampled() {
+            &mut self.ahead
+        } else {
+            &mut self.told
+        };
         queue.push_back(word);
     }
 
@@ -133,11 +153,29 @@ impl EventsCsv {
     /// # Errors
     /// Once: no further row can be written.
     pub fn sample(&mut self, sample: &Sample) -> Result<(), RecordError> {
-        let Sample { tick, block, line, switched, .. } = *sample;
+        let Sample {
+            tick,
+            block,
+            line,
+            switched,
+            ..
+        } = *sample;
         let waits = sample.cause == StopCause::Spindle;
-        let written = self.period(&Period { tick, block, line, switched, waits }).map_err(|error| error.at(sample));
+        let written = self
+            .period(&Period {
+                tick,
+                block,
+                line,
+                switched,
+                waits,
+            })
+            .map_err(|error| error.at(sample));
         // What stands before a block that is over has switched, or was so already.
-        while self.ahead.pop_front_if(|word| word.before_block < block).is_some() {}
+        while self
+            .ahead
+            .pop_front_if(|word| word.before_block < block)
+            .is_some()
+        {}
         written
     }
 
@@ -150,17 +188,37 @@ impl EventsCsv {
         if self.failed {
             return Ok(());
         }
-        let Left { tick, block, line, switched } = *left;
-        self.period(&Period { tick, block, line, switched, waits: false })?;
+        let Left {
+            tick,
+            block,
+            line,
+            switched,
+        } = *left;
+        self.period(&Period {
+            tick,
+            block,
+            line,
+            switched,
+            waits: false,
+        })?;
         if completed {
             // Words behind the last motion have been reached too.
-            self.period(&Period { tick, block: u64::MAX - 1, line, switched, waits: false })?;
+            self.period(&Period {
+                tick,
+                block: u64::MAX - 1,
+                line,
+                switched,
+                waits: false,
+            })?;
         }
         self.out.finish_record("events")
     }
 
     fn period(&mut self, period: &Period) -> Result<(), RecordError> {
-        let comes = self.told.front().is_some_and(|word| word.before_block <= period.block);
+        let comes = self
+            .told
+            .front()
+            .is_some_and(|word| word.before_block <= period.block);
         if self.failed || (period.switched == self.last && period.waits == self.waits && !comes) {
             return Ok(());
         }
@@ -173,43 +231,93 @@ impl EventsCsv {
     }
 
     fn rows(&mut self, period: &Period) -> std::io::Result<()> {
-        let (now, last) = (period.switched, std::mem::replace(&mut self.last, period.switched));
-        while let Some(word) = self.told.pop_front_if(|word| word.before_block <= period.block) {
+        let (now, last) = (
+            period.switched,
+            std::mem::replace(&mut self.last, period.switched),
+        );
+        while let Some(word) = self
+            .told
+            .pop_front_if(|word| word.before_block <= period.block)
+        {
             self.told_row(period, &word)?;
         }
         if now.spindle_rad_per_s != last.spindle_rad_per_s {
             self.row(period, What::Spindle, now.spindle_rad_per_s)?;
         }
         if std::mem::replace(&mut self.waits, period.waits) != period.waits {
-            let (time_s, waits) = (TraceCsv::t_s(period.tick, self.period_s), u8::from(period.waits));
-            writeln!(self.out, "{time_s},{},{},waits for spindle,{waits},spindle", period.tick, period.line)?;
+            let (time_s, waits) = (
+                TraceCsv::t_s(period.tick, self.period_s),
+                u8::from(period.waits),
+            );
+            writeln!(
+                self.out,
+                "{time_s},{},{},waits for spindle,{waits},spindle",
+                period.tick, period.line
+            )?;
         }
         for output in (0..u64::BITS).filter(|output| now.is_on(*output) != last.is_on(*output)) {
-            self.row(period, What::Output(output), f64::from(u8::from(now.is_on(output))))?;
+            self.row(
+                period,
+                What::Output(output),
+                f64::from(u8::from(now.is_on(output))),
+            )?;
         }
         Ok(())
     }
 
     fn told_row(&mut self, period: &Period, word: &Word) -> std::io::Result<()> {
         let (time_s, tick) = (TraceCsv::t_s(period.tick, self.period_s), period.tick);
-        writeln!(self.out, "{time_s},{tick},{},{},{},program", word.line, word.what.shown(), word.value)
+        writeln!(
+            self.out,
+            "{time_s},{tick},{},{},{},program",
+            word.line,
+            word.what.shown(),
+            word.value
+        )
     }
 
     fn row(&mut self, period: &Period, what: What, value: f64) -> std::io::Result<()> {
-        let Period { tick, block, line, switched, .. } = period;
-        let by_word = (switched.by == SwitchedBy::Program).then(|| self.line_of(what, value, *block)).flatten();
-        let (time_s, line) = (TraceCsv::t_s(*tick, self.period_s), by_word.unwrap_or(*line));
-        let (word, shown) = (what.shown(), if what == What::Spindle { rpm(value) } else { value });
+        let Period {
+            tick,
+            block,
+            line,
+            switched,
+            ..
+        } = period;
+        let by_word = (switched.by == SwitchedBy::Program)
+            .then(|| self.line_of(what, value, *block))
+            .flatten();
+        let (time_s, line) = (
+            TraceCsv::t_s(*tick, self.period_s),
+            by_word.unwrap_or(*line),
+        );
+        let (word, shown) = (
+            what.shown(),
+            if what == What::Spindle {
+                rpm(value)
+            } else {
+                value
+            },
+        );
         // Names and numbers: nothing that a CSV would have to quote.
-        writeln!(self.out, "{time_s},{tick},{line},{word},{shown},{}", switched.by.name())
+        writeln!(
+            self.out,
+            "{time_s},{tick},{line},{word},{shown},{}",
+            switched.by.name()
+        )
     }
 
     /// The line of the word that has switched `what` to `value` by the time `block` moves, or stands before the next. Of words
     /// at one place the last counts. It, and those for the same before it, are used up.
     fn line_of(&mut self, what: What, value: f64, block: u64) -> Option<u32> {
-        let is_it = |word: &Word| word.what == what && word.value == value && word.before_block <= block + 1;
+        let is_it = |word: &Word| {
+            word.what == what && word.value == value && word.before_block <= block + 1
+        };
         let place = self.ahead.iter().find(|word| is_it(word))?.before_block;
-        let found = self.ahead.iter().rposition(|word| is_it(word) && word.before_block == place)?;
+        let found = self
+            .ahead
+            .iter()
+            .rposition(|word| is_it(word) && word.before_block == place)?;
         let line = self.ahead[found].line;
         let mut index = 0;
         self.ahead.retain(|word| {

@@ -65,7 +65,12 @@ impl Output {
             let handle = io::stdout().as_fd().try_clone_to_owned();
             let file = handle.map_err(|e| format!("standard output cannot be written: {e}"))?;
             let path = PathBuf::from("standard output");
-            return Ok(Self { writer: begin(File::from(file), &path), path, part: None, keeps: false });
+            return Ok(Self {
+                writer: begin(File::from(file), &path),
+                path,
+                part: None,
+                keeps: false,
+            });
         }
         // A link stays a link: the file that it leads to is the one to replace.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -77,7 +82,12 @@ impl Output {
         };
         let file = file.map_err(|e| format!("{}: it cannot be written: {e}", path.display()))?;
         let writer = begin(file, part.as_ref().unwrap_or(&path));
-        Ok(Self { path, part, writer, keeps: false })
+        Ok(Self {
+            path,
+            part,
+            writer,
+            keeps: false,
+        })
     }
 
     /// Takes room for the first `bytes` now, so that they can be written when the disk has become full. What is no regular
@@ -87,7 +97,9 @@ impl Output {
     /// The path with the system's words: there is no room for them now.
     pub fn reserve(&mut self, bytes: u64) -> Result<(), String> {
         let mut writer = lock(&self.writer);
-        let (Some(_), Some(writer)) = (&self.part, writer.as_mut()) else { return Ok(()) };
+        let (Some(_), Some(writer)) = (&self.part, writer.as_mut()) else {
+            return Ok(());
+        };
         let file = writer.get_mut();
         let taken = rustix::fs::fallocate(&*file, rustix::fs::FallocateFlags::empty(), 0, bytes);
         // Not every file system knows how: then the room is written.
@@ -115,7 +127,9 @@ impl Output {
     /// # Errors
     /// The path with the system's words.
     pub fn finish(mut self) -> Result<(), String> {
-        self.close().and_then(|()| self.name()).map_err(|e| format!("{}: {e}", self.path.display()))
+        self.close()
+            .and_then(|()| self.name())
+            .map_err(|e| format!("{}: {e}", self.path.display()))
     }
 
     /// [`Output::finish`] for `what` of a run: where it fails, what is written stays.
@@ -128,7 +142,9 @@ impl Output {
     }
 
     fn name(&self) -> io::Result<()> {
-        self.part.as_ref().map_or(Ok(()), |part| fs::rename(part, &self.path))
+        self.part
+            .as_ref()
+            .map_or(Ok(()), |part| fs::rename(part, &self.path))
     }
 
     /// Everything is written, or as much as can be: the first error is also that of [`Output::finish`].
@@ -137,7 +153,9 @@ impl Output {
     /// The system's words.
     pub fn close(&mut self) -> io::Result<()> {
         let mut place = lock(&self.writer);
-        let Some(writer) = place.as_mut() else { return Ok(()) };
+        let Some(writer) = place.as_mut() else {
+            return Ok(());
+        };
         writer.flush()?;
         // Of the room that was taken what is not used goes back.
         if self.part.is_some() {
@@ -155,7 +173,9 @@ impl Output {
     /// The system's words.
     pub fn begin_again(&mut self) -> io::Result<()> {
         let mut place = lock(&self.writer);
-        let Some(writer) = place.take() else { return Ok(()) };
+        let Some(writer) = place.take() else {
+            return Ok(());
+        };
         // What could not be written is given up.
         let (mut file, _) = writer.into_parts();
         if self.part.is_some() {
@@ -174,7 +194,9 @@ fn beside(path: &Path) -> PathBuf {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        lock(&self.writer).as_mut().map_or(Err(io::ErrorKind::BrokenPipe.into()), |w| w.write(bytes))
+        lock(&self.writer)
+            .as_mut()
+            .map_or(Err(io::ErrorKind::BrokenPipe.into()), |w| w.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -184,7 +206,9 @@ impl Write for Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        let Some(writer) = lock(&self.writer).take() else { return };
+        let Some(writer) = lock(&self.writer).take() else {
+            return;
+        };
         // What could not be written is not tried once more.
         drop(writer.into_parts());
         if let (false, Some(part)) = (self.keeps, &self.part) {
@@ -214,25 +238,43 @@ impl RecordError {
     /// That `what` could not be written to `out`, because of `cause`; nothing is left of it.
     pub fn lost(what: &'static str, file: &Path, cause: impl fmt::Display) -> Self {
         let (file, cause) = (file.display().to_string(), cause.to_string());
-        Self { what, file, cause, tick: None, line: None, kept_as: None }
+        Self {
+            what,
+            file,
+            cause,
+            tick: None,
+            line: None,
+            kept_as: None,
+        }
     }
 
     /// That `what` could not be written to `out`, because of `cause`. What was written of it stays where it is.
     pub fn of(what: &'static str, out: &mut Output, cause: impl fmt::Display) -> Self {
         let kept_as = out.keep().map(|part| part.display().to_string());
-        Self { kept_as, ..Self::lost(what, out.path(), cause) }
+        Self {
+            kept_as,
+            ..Self::lost(what, out.path(), cause)
+        }
     }
 
     /// The same, with the first sample that is missing.
     #[must_use]
     pub fn at(self, sample: &Sample) -> Self {
-        Self { tick: Some(sample.tick), line: Some(sample.line), ..self }
+        Self {
+            tick: Some(sample.tick),
+            line: Some(sample.line),
+            ..self
+        }
     }
 }
 
 impl fmt::Display for RecordError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}: it cannot be written any further", self.what, self.file)?;
+        write!(
+            f,
+            "{}: {}: it cannot be written any further",
+            self.what, self.file
+        )?;
         match (self.tick, self.line) {
             (Some(tick), Some(line)) => write!(f, ", from tick {tick}, line {line}")?,
             (None, Some(line)) => write!(f, ", from line {line}")?,

@@ -45,7 +45,13 @@ impl TraceCsv {
         let mut out = Output::create(path)?;
         let head = head(&axes, signals, switched);
         writeln!(out, "{head}").map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Self { out, axes, period_s: fine_period_s, switched, failed: false })
+        Ok(Self {
+            out,
+            axes,
+            period_s: fine_period_s,
+            switched,
+            failed: false,
+        })
     }
 
     /// Adds a row. After an error all further ones are left out.
@@ -68,7 +74,11 @@ impl TraceCsv {
     /// The last rows cannot be written, or the file cannot take its name. What [`TraceCsv::sample`] has told is not told
     /// again.
     pub fn finish(self) -> Result<(), RecordError> {
-        if self.failed { Ok(()) } else { self.out.finish_record("trace") }
+        if self.failed {
+            Ok(())
+        } else {
+            self.out.finish_record("trace")
+        }
     }
 
     /// The time at which a tick stands in the trace, s.
@@ -78,15 +88,34 @@ impl TraceCsv {
     }
 
     fn row(&mut self, sample: &Sample, signals: &[f64]) -> std::io::Result<()> {
-        write!(self.out, "{},{}", number(Self::t_s(sample.tick, self.period_s)), sample.line)?;
+        write!(
+            self.out,
+            "{},{}",
+            number(Self::t_s(sample.tick, self.period_s)),
+            sample.line
+        )?;
         for position in [&sample.command, &sample.feedback] {
             for axis in 0..self.axes.count() {
-                let value = if self.axes.is_rotary(axis) { position[axis].to_degrees() } else { position[axis] };
+                let value = if self.axes.is_rotary(axis) {
+                    position[axis].to_degrees()
+                } else {
+                    position[axis]
+                };
                 write!(self.out, ",{}", number(value))?;
             }
         }
-        write!(self.out, ",{},{}", number(sample.feed_mm_per_s), number(sample.sigma))?;
-        write!(self.out, ",{},{}", sample.state.name(), number(sample.ratio))?;
+        write!(
+            self.out,
+            ",{},{}",
+            number(sample.feed_mm_per_s),
+            number(sample.sigma)
+        )?;
+        write!(
+            self.out,
+            ",{},{}",
+            sample.state.name(),
+            number(sample.ratio)
+        )?;
         if self.switched {
             self.switched(sample)?;
         }
@@ -98,7 +127,13 @@ impl TraceCsv {
 
     fn switched(&mut self, sample: &Sample) -> std::io::Result<()> {
         let (switched, rpm) = (&sample.switched, rpm(sample.switched.spindle_rad_per_s));
-        write!(self.out, ",{},{},{}", number(rpm), switched.coolant(), outputs_word(switched))?;
+        write!(
+            self.out,
+            ",{},{},{}",
+            number(rpm),
+            switched.coolant(),
+            outputs_word(switched)
+        )?;
         match sample.phase_ns {
             Some(ns) => write!(self.out, ",{ns}"),
             None => write!(self.out, ",nan"),
@@ -124,18 +159,30 @@ fn head(axes: &Axes, signals: &[&str], switched: bool) -> String {
     for kind in ["cmd", "fb"] {
         for axis in 0..axes.count() {
             let unit = if axes.is_rotary(axis) { "deg" } else { "mm" };
-            head.push(format!("{}_{kind}_{unit}", axes.letter(axis).to_ascii_lowercase()));
+            head.push(format!(
+                "{}_{kind}_{unit}",
+                axes.letter(axis).to_ascii_lowercase()
+            ));
         }
     }
     head.extend(["feed_mm_s", "sigma", "state", "ratio"].map(str::to_string));
-    head.extend(SWITCHED_COLUMNS.iter().filter(|_| switched).map(ToString::to_string));
+    head.extend(
+        SWITCHED_COLUMNS
+            .iter()
+            .filter(|_| switched)
+            .map(ToString::to_string),
+    );
     head.extend(signals.iter().map(|signal| format!("sig_{signal}")));
     head.join(",")
 }
 
 /// 17 significant digits: reading it back gives the same number.
 fn number(value: f64) -> String {
-    if value == 0.0 { "0".to_string() } else { format!("{value:.16e}") }
+    if value == 0.0 {
+        "0".to_string()
+    } else {
+        format!("{value:.16e}")
+    }
 }
 
 trait RoundIfClose {
@@ -146,6 +193,10 @@ trait RoundIfClose {
 impl RoundIfClose for f64 {
     fn round_if_close(self) -> f64 {
         let whole = self.round();
-        if (self - whole).abs() <= 1e-9 * whole { whole } else { self }
+        if (self - whole).abs() <= 1e-9 * whole {
+            whole
+        } else {
+            self
+        }
     }
 }

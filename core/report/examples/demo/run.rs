@@ -15,7 +15,11 @@ pub fn report(turns: u32, broken: bool) -> Report {
     if broken {
         break_it(&mut samples);
     }
-    let load = samples.feed_mm_s.iter().zip(&samples.line).map(|(feed, line)| 20.0 + feed * 0.4 + f64::from(line % 3));
+    let load = samples
+        .feed_mm_s
+        .iter()
+        .zip(&samples.line)
+        .map(|(feed, line)| 20.0 + feed * 0.4 + f64::from(line % 3));
     Report {
         title: "Square and spiral".into(),
         program: "square <and> spiral.ngc".into(),
@@ -24,7 +28,11 @@ pub fn report(turns: u32, broken: bool) -> Report {
         facts: facts(&samples),
         axes: ['X', 'Y', 'Z'].map(axis).into(),
         fine_period_s: PERIOD_S,
-        signals: vec![Signal { name: "spindle load".into(), unit: "%".into(), values: load.collect() }],
+        signals: vec![Signal {
+            name: "spindle load".into(),
+            unit: "%".into(),
+            values: load.collect(),
+        }],
         samples,
         path_tolerance_mm: Some(0.01),
         ..Report::default()
@@ -43,7 +51,10 @@ fn axis(letter: char) -> Axis {
 }
 
 fn facts(samples: &Samples) -> Vec<(String, String)> {
-    let end = samples.command.iter().map(|axis| format!("{:.3}", axis.last().unwrap_or(&0.0)));
+    let end = samples
+        .command
+        .iter()
+        .map(|axis| format!("{:.3}", axis.last().unwrap_or(&0.0)));
     [
         ("clock", "virtual".to_owned()),
         ("fine period", "1 ms".to_owned()),
@@ -64,9 +75,18 @@ struct Piece {
 }
 
 fn line(from: Point, to: Point, feed: f64) -> Piece {
-    let length = from.iter().zip(to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
+    let length = from
+        .iter()
+        .zip(to)
+        .map(|(a, b)| (b - a).powi(2))
+        .sum::<f64>()
+        .sqrt();
     let at = move |s: f64| [0, 1, 2].map(|k| from[k] + (to[k] - from[k]) * s / length);
-    Piece { at: Box::new(at), length, feed }
+    Piece {
+        at: Box::new(at),
+        length,
+        feed,
+    }
 }
 
 /// A spiral that winds inwards and down, walked by angle with a nearly constant speed.
@@ -82,12 +102,19 @@ fn spiral(turns: u32, feed: f64) -> Piece {
         let (sin, cos) = (turned * angle).sin_cos();
         [radius * cos, radius * sin, -20.0 * turned]
     };
-    Piece { at: Box::new(at), length, feed }
+    Piece {
+        at: Box::new(at),
+        length,
+        feed,
+    }
 }
 
 fn pieces(turns: u32) -> Vec<Piece> {
-    let corners = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0]].map(|[x, y]| [x, y, 0.0]);
-    let mut pieces: Vec<Piece> = (0..4).map(|k| line(corners[k], corners[(k + 1) % 4], 100.0)).collect();
+    let corners =
+        [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0]].map(|[x, y]| [x, y, 0.0]);
+    let mut pieces: Vec<Piece> = (0..4)
+        .map(|k| line(corners[k], corners[(k + 1) % 4], 100.0))
+        .collect();
     pieces.push(line(corners[0], [40.0, 0.0, 0.0], 200.0));
     let spiral = spiral(turns, 40.0);
     let end = (spiral.at)(spiral.length);
@@ -97,7 +124,11 @@ fn pieces(turns: u32) -> Vec<Piece> {
 }
 
 fn simulate(turns: u32) -> Samples {
-    let mut samples = Samples { command: vec![Vec::new(); 3], feedback: vec![Vec::new(); 3], ..Samples::default() };
+    let mut samples = Samples {
+        command: vec![Vec::new(); 3],
+        feedback: vec![Vec::new(); 3],
+        ..Samples::default()
+    };
     let mut actual = [-50.0, -50.0, 0.0];
     for (index, piece) in pieces(turns).iter().enumerate() {
         for (s, feed, sigma) in speeds(piece, index == 2) {
@@ -114,8 +145,13 @@ fn simulate(turns: u32) -> Samples {
             samples.sigma.push(sigma);
         }
     }
-    samples.deviation_mm =
-        Some(samples.feed_mm_s.iter().map(|feed| feed * feed * 1.4e-7 + 2e-5 * feed.sin().abs()).collect());
+    samples.deviation_mm = Some(
+        samples
+            .feed_mm_s
+            .iter()
+            .map(|feed| feed * feed * 1.4e-7 + 2e-5 * feed.sin().abs())
+            .collect(),
+    );
     samples
 }
 
@@ -144,7 +180,10 @@ fn trapezoid(t: f64, duration: f64, top: f64, acceleration: f64, length: f64) ->
     let from_rest = |t: f64| 0.5 * acceleration * t * t;
     match t {
         _ if t < ramp => (from_rest(t), acceleration * t),
-        _ if t > duration - ramp => (length - from_rest(duration - t), acceleration * (duration - t)),
+        _ if t > duration - ramp => (
+            length - from_rest(duration - t),
+            acceleration * (duration - t),
+        ),
         _ => (from_rest(ramp) + (t - ramp) * top, top),
     }
 }
@@ -153,6 +192,9 @@ fn trapezoid(t: f64, duration: f64, top: f64, acceleration: f64, length: f64) ->
 fn break_it(samples: &mut Samples) {
     let n = samples.t_s.len();
     samples.command[0][n / 2] += 0.004;
-    let deviation = samples.deviation_mm.as_mut().expect("the demonstration measures it");
+    let deviation = samples
+        .deviation_mm
+        .as_mut()
+        .expect("the demonstration measures it");
     deviation[n / 3..n / 3 + 40].fill(0.0132);
 }

@@ -14,7 +14,10 @@ const AREA: [f64; 4] = [64.0, 900.0, 14.0, 214.0];
 pub fn histogram(series: &[LatencySeries]) -> String {
     let most = bins(series).map(|bin| bin.count).max().unwrap_or(0) as f64;
     // A count of one stands a little above the ground.
-    let (x, y) = (lateness(series), Scale::new(0.5, most.max(1.0), AREA[3], AREA[2]));
+    let (x, y) = (
+        lateness(series),
+        Scale::new(0.5, most.max(1.0), AREA[3], AREA[2]),
+    );
     let mut bars = String::new();
     for (index, one) in series.iter().enumerate() {
         for bin in one.bins.iter().filter(|bin| bin.count > 0) {
@@ -39,7 +42,10 @@ pub fn histogram(series: &[LatencySeries]) -> String {
 /// Stairs that fall from all of the wake-ups to the latest.
 pub fn later(series: &[LatencySeries]) -> String {
     let most = series.iter().map(LatencySeries::count).max().unwrap_or(0) as f64;
-    let (x, y) = (lateness(series), Scale::new(0.5 / most.max(1.0), 1.0, AREA[3], AREA[2]));
+    let (x, y) = (
+        lateness(series),
+        Scale::new(0.5 / most.max(1.0), 1.0, AREA[3], AREA[2]),
+    );
     let mut curves = String::new();
     for (index, one) in series.iter().enumerate().filter(|(_, one)| one.count() > 0) {
         let all = one.count();
@@ -48,8 +54,16 @@ pub fn later(series: &[LatencySeries]) -> String {
         for bin in &one.bins {
             left -= bin.count;
             // The latest is known exactly; its bin reaches further.
-            let at = if left == 0 { one.percentiles_us[3].clamp(bin.from_us, bin.below_us) } else { bin.below_us };
-            let share = if left == 0 { 0.0 } else { left as f64 / all as f64 };
+            let at = if left == 0 {
+                one.percentiles_us[3].clamp(bin.from_us, bin.below_us)
+            } else {
+                bin.below_us
+            };
+            let share = if left == 0 {
+                0.0
+            } else {
+                left as f64 / all as f64
+            };
             let _ = write!(path, " H{:.1} V{:.1}", x.place(at), y.place(share));
         }
         let _ = write!(curves, "<path class=\"s{index}\" d=\"{path}\"/>");
@@ -62,23 +76,41 @@ fn bins(series: &[LatencySeries]) -> impl Iterator<Item = &LatencyBin> {
 }
 
 fn lateness(series: &[LatencySeries]) -> Scale {
-    let low = bins(series).map(|bin| bin.from_us).fold(f64::INFINITY, f64::min);
-    let high = bins(series).map(|bin| bin.below_us).fold(f64::NEG_INFINITY, f64::max);
+    let low = bins(series)
+        .map(|bin| bin.from_us)
+        .fold(f64::INFINITY, f64::min);
+    let high = bins(series)
+        .map(|bin| bin.below_us)
+        .fold(f64::NEG_INFINITY, f64::max);
     Scale::new(low.max(0.5), high, AREA[0], AREA[1])
 }
 
 /// Scales, grid and content.
 fn drawing(x: Scale, y: Scale, what: &str, content: &str) -> String {
-    let mut text = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{what} by lateness\">");
+    let mut text = format!(
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{what} by lateness\">"
+    );
     for mark in x.marks() {
         let at = x.place(mark);
-        let _ = write!(text, "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>", AREA[2], AREA[3]);
-        let _ =
-            write!(text, "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>", AREA[3] + 15.0, number(mark));
+        let _ = write!(
+            text,
+            "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>",
+            AREA[2], AREA[3]
+        );
+        let _ = write!(
+            text,
+            "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+            AREA[3] + 15.0,
+            number(mark)
+        );
     }
     for mark in y.marks() {
         let at = y.place(mark);
-        let _ = write!(text, "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>", AREA[0], AREA[1]);
+        let _ = write!(
+            text,
+            "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>",
+            AREA[0], AREA[1]
+        );
         let _ = write!(
             text,
             "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
@@ -87,8 +119,17 @@ fn drawing(x: Scale, y: Scale, what: &str, content: &str) -> String {
             number(mark)
         );
     }
-    let _ = write!(text, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">lateness, µs</text>", AREA[1], HEIGHT - 5.0);
-    let _ = write!(text, "<text x=\"6\" y=\"{}\">{what}</text>{content}</svg>", HEIGHT - 5.0);
+    let _ = write!(
+        text,
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">lateness, µs</text>",
+        AREA[1],
+        HEIGHT - 5.0
+    );
+    let _ = write!(
+        text,
+        "<text x=\"6\" y=\"{}\">{what}</text>{content}</svg>",
+        HEIGHT - 5.0
+    );
     text
 }
 

@@ -143,12 +143,16 @@ macro_rules! contract {
 /// The plugin behind a handle and its fault, by names of the caller's.
 macro_rules! instance {
     (ref $this:ident: $type:ty, $plugin:ident, $fault:ident) => {
-        let $crate::abi::entry::Instance { plugin: $plugin, fault: $fault } =
-            &*$this.cast::<$crate::abi::entry::Instance<$type>>();
+        let $crate::abi::entry::Instance {
+            plugin: $plugin,
+            fault: $fault,
+        } = &*$this.cast::<$crate::abi::entry::Instance<$type>>();
     };
     (mut $this:ident: $type:ty, $plugin:ident, $fault:ident) => {
-        let $crate::abi::entry::Instance { plugin: $plugin, fault: $fault } =
-            &mut *$this.cast::<$crate::abi::entry::Instance<$type>>();
+        let $crate::abi::entry::Instance {
+            plugin: $plugin,
+            fault: $fault,
+        } = &mut *$this.cast::<$crate::abi::entry::Instance<$type>>();
     };
 }
 

@@ -1,7 +1,10 @@
 //! Drivers across the border.
 
 use super::contract::contract;
-use crate::{Attached, Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, Setpoint, Words};
+use crate::{
+    Attached, Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, Setpoint,
+    Words,
+};
 
 contract! {
     /// The functions of a driver. Each writes its answer, or an error.
@@ -43,7 +46,9 @@ pub fn open(table: &'static Table, name: &'static str, options: &str) -> Made<dy
 impl Driver for Linked {
     fn describe(&self) -> DriverDescription {
         // One that has panicked says so when it is opened.
-        self.0.describe().unwrap_or_else(|_| DriverDescription::real())
+        self.0
+            .describe()
+            .unwrap_or_else(|_| DriverDescription::real())
     }
 
     fn check(&self, context: &DriverContext) -> Result<(), PluginError> {
@@ -65,7 +70,11 @@ impl Driver for Linked {
         }
     }
 
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
+    fn exchange(
+        &mut self,
+        setpoint: &Setpoint,
+        feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         self.0.exchange(setpoint, feedback)
     }
 

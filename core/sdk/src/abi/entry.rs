@@ -33,7 +33,10 @@ pub struct Fault {
 
 impl Fault {
     fn new(name: &'static str) -> Self {
-        Self { name, words: OnceLock::new() }
+        Self {
+            name,
+            words: OnceLock::new(),
+        }
     }
 
     /// Calls `work`, unless the plugin has panicked before; writes what it answers.
@@ -75,10 +78,13 @@ impl Fault {
     #[cold]
     fn keep(&self, method: &str, panic: Box<dyn Any + Send>) -> PluginError {
         let words = panic.downcast_ref::<String>().map(String::as_str);
-        let words = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
+        let words = words
+            .or_else(|| panic.downcast_ref::<&str>().copied())
+            .unwrap_or("without words");
         let place = PANICKED.with(|panicked| panicked.0.take().place);
-        let text: &'static str =
-            Box::leak(format!("{} panicked in {method}{place}: {words}", self.name).into_boxed_str());
+        let text: &'static str = Box::leak(
+            format!("{} panicked in {method}{place}: {words}", self.name).into_boxed_str(),
+        );
         // Dropping what the panic carries runs code of the plugin again, which may panic again.
         std::mem::forget(panic);
         let _ = self.words.set(text);
@@ -127,12 +133,21 @@ pub fn quiet_linked_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| if is_within() { keep_place(info) } else { before(info) }));
+        std::panic::set_hook(Box::new(move |info| {
+            if is_within() {
+                keep_place(info)
+            } else {
+                before(info)
+            }
+        }));
     });
 }
 
 fn keep_place(info: &PanicHookInfo<'_>) {
-    let place = info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+    let place = info
+        .location()
+        .map(|at| format!(" ({}:{})", at.file(), at.line()))
+        .unwrap_or_default();
     let words = info.payload_as_str().unwrap_or("without words").to_string();
     // At the very end of a thread there is no place for it any more.
     let _ = PANICKED.try_with(|panicked| panicked.0.replace(Told { place, words }));
@@ -141,7 +156,10 @@ fn keep_place(info: &PanicHookInfo<'_>) {
 /// A function or closure that captures nothing, made from its type: it has no data.
 pub fn function<F: Copy + 'static>() -> F {
     const {
-        assert!(size_of::<F>() == 0, "name the function itself, or a closure that captures nothing");
+        assert!(
+            size_of::<F>() == 0,
+            "name the function itself, or a closure that captures nothing"
+        );
     };
     // SAFETY: a value without data is read from anywhere; `F` is `Copy`, and the one given to the macro exists.
     unsafe { NonNull::<F>::dangling().read() }
@@ -161,7 +179,11 @@ pub unsafe fn open<T, O: PluginOptions>(
     let name = text(name);
     let work = || {
         let plugin = make(&O::read(text(options))?)?;
-        Ok(Box::into_raw(Box::new(Instance { plugin, fault: Fault::new(name) })).cast::<c_void>())
+        Ok(Box::into_raw(Box::new(Instance {
+            plugin,
+            fault: Fault::new(name),
+        }))
+        .cast::<c_void>())
     };
     // SAFETY: the caller's promise.
     unsafe { Fault::new(name).guard("its constructor", handle, error, work) }
@@ -171,10 +193,17 @@ pub unsafe fn open<T, O: PluginOptions>(
 ///
 /// # Safety
 /// Both can be written to.
-pub unsafe extern "C" fn describe<O: PluginOptions>(answer: *mut Text, error: *mut PluginError) -> u32 {
+pub unsafe extern "C" fn describe<O: PluginOptions>(
+    answer: *mut Text,
+    error: *mut PluginError,
+) -> u32 {
     let work = || {
-        let docs = OptionDocs { option: O::describe() };
-        toml::to_string(&docs).map(Text::owned).map_err(|e| PluginError::new(e.to_string()))
+        let docs = OptionDocs {
+            option: O::describe(),
+        };
+        toml::to_string(&docs)
+            .map(Text::owned)
+            .map_err(|e| PluginError::new(e.to_string()))
     };
     // SAFETY: the caller's promise.
     unsafe { Fault::new("it").guard("the description of its options", answer, error, work) }
@@ -221,7 +250,11 @@ impl Handle {
         call: impl FnOnce(*mut *mut c_void, *mut PluginError) -> u32,
     ) -> Result<Self, PluginError> {
         let instance = ask(new, call)?;
-        Ok(Self { instance, close, drop })
+        Ok(Self {
+            instance,
+            close,
+            drop,
+        })
     }
 }
 
@@ -247,15 +280,26 @@ pub fn choice<C: Choice>(method: Method, field: &str, number: u32) -> Result<C, 
 /// one that stands for no choice is never taken for a choice.
 pub fn foreign(method: Method, field: &str, value: u32, known: &str) -> PluginError {
     let name = method.words().map_or("a call", |(_, name)| name);
-    PluginError::new(format!("its {name} gives {value} as {field}: {known} are known"))
+    PluginError::new(format!(
+        "its {name} gives {value} as {field}: {known} are known"
+    ))
 }
 
 /// Makes a call of a table: room for its answer and its error, and the one of the two that came.
 #[inline]
-pub fn ask<R>(method: Method, call: impl FnOnce(*mut R, *mut PluginError) -> u32) -> Result<R, PluginError> {
+pub fn ask<R>(
+    method: Method,
+    call: impl FnOnce(*mut R, *mut PluginError) -> u32,
+) -> Result<R, PluginError> {
     let mut answer = std::mem::MaybeUninit::<R>::uninit();
     let mut error = std::mem::MaybeUninit::<PluginError>::uninit();
     let status = calling(method, || call(answer.as_mut_ptr(), error.as_mut_ptr()));
     // SAFETY: each status says which of the two was written.
-    unsafe { if status == DONE { Ok(answer.assume_init()) } else { Err(error.assume_init()) } }
+    unsafe {
+        if status == DONE {
+            Ok(answer.assume_init())
+        } else {
+            Err(error.assume_init())
+        }
+    }
 }

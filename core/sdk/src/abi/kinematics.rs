@@ -23,12 +23,18 @@ contract! {
 
 // SAFETY of both: the host passes the handle that `make` gave, and a vector that lives for the call.
 
-unsafe extern "C" fn to_joints<T: Kinematics>(this: *mut c_void, axes: *const AxisVector) -> AxisVector {
+unsafe extern "C" fn to_joints<T: Kinematics>(
+    this: *mut c_void,
+    axes: *const AxisVector,
+) -> AxisVector {
     let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
     convert(fault, "to_joints", || plugin.to_joints(unsafe { &*axes }))
 }
 
-unsafe extern "C" fn to_axes<T: Kinematics>(this: *mut c_void, joints: *const AxisVector) -> AxisVector {
+unsafe extern "C" fn to_axes<T: Kinematics>(
+    this: *mut c_void,
+    joints: *const AxisVector,
+) -> AxisVector {
     let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
     convert(fault, "to_axes", || plugin.to_axes(unsafe { &*joints }))
 }
@@ -61,13 +67,17 @@ pub fn open(
     options: &str,
     context: &KinematicsContext,
 ) -> Made<dyn Kinematics> {
-    Ok(Box::new(Linked(Calls::make(table, name, options, context)?)))
+    Ok(Box::new(Linked(Calls::make(
+        table, name, options, context,
+    )?)))
 }
 
 // SAFETY of the conversions: the handle is open, and references live for the call.
 impl Kinematics for Linked {
     fn joint_count(&self, axis_count: usize) -> usize {
-        self.0.joint_count(axis_count as u32).map_or(0, |joints| joints as usize)
+        self.0
+            .joint_count(axis_count as u32)
+            .map_or(0, |joints| joints as usize)
     }
 
     fn to_joints(&self, axes: &AxisVector) -> AxisVector {

@@ -30,7 +30,10 @@ pub struct Structure {
 
 impl Structure {
     pub const fn of<T: Layout>(name: &'static str) -> Self {
-        Self { name: Slice::new(name.as_bytes()), hash: T::HASH }
+        Self {
+            name: Slice::new(name.as_bytes()),
+            hash: T::HASH,
+        }
     }
 }
 
@@ -236,6 +239,9 @@ mod tests {
         assert_ne!(<[ours::Limits; 2]>::HASH, <[ours::Limits; 3]>::HASH);
         assert_ne!(Kind::HASH, renumbered::Kind::HASH);
         assert_eq!(fold_text(START, "fn(A, B)"), fold_text(START, "fn(A,B)"));
-        assert_ne!(fold_text(fold_text(START, "a"), "b"), fold_text(START, "ab"));
+        assert_ne!(
+            fold_text(fold_text(START, "a"), "b"),
+            fold_text(START, "ab")
+        );
     }
 }

@@ -8,10 +8,11 @@ use super::watch::Method;
 use crate::log::{HostTable, LogLevel, LogRecord};
 use crate::text::Text;
 use crate::{
-    ABI_VERSION, Accepted, Advanced, ArcGeometry, Arm, Attached, Axes, AxisLimits, AxisVector, Block, BlockKind,
-    BlockReport, Curve, DriverContext, DriverDescription, Edge, Feedback, FineSample, JointDescription, JointLanes,
-    JointState, KinematicsContext, Latch, LimitedBy, Limits, Name, PathMode, PlannerContext, PlannerDescription,
-    Plugin, PluginError, PluginKind, Segment, SegmentFlags, Setpoint, Slice, StopOn, StrategyContext, Window, Words,
+    ABI_VERSION, Accepted, Advanced, ArcGeometry, Arm, Attached, Axes, AxisLimits, AxisVector,
+    Block, BlockKind, BlockReport, Curve, DriverContext, DriverDescription, Edge, Feedback,
+    FineSample, JointDescription, JointLanes, JointState, KinematicsContext, Latch, LimitedBy,
+    Limits, Name, PathMode, PlannerContext, PlannerDescription, Plugin, PluginError, PluginKind,
+    Segment, SegmentFlags, Setpoint, Slice, StopOn, StrategyContext, Window, Words,
 };
 
 /// What the exported symbol is called before the name of the crate. The number is that of [`Library`] itself.
@@ -75,7 +76,9 @@ impl Descriptor {
     /// The description of the options, as TOML.
     pub(crate) fn options(&self) -> Result<Text, PluginError> {
         // SAFETY: `ask` gives places that can be written to.
-        entry::ask(Method::None, |answer, error| unsafe { (self.options)(answer, error) })
+        entry::ask(Method::None, |answer, error| unsafe {
+            (self.options)(answer, error)
+        })
     }
 }
 
@@ -118,7 +121,10 @@ impl Library {
     ///
     /// # Safety
     /// `library` is the symbol of a plugin crate, in a shared library that is never unloaded.
-    pub unsafe fn plugins(library: *const Self, host: &'static HostTable) -> Result<Vec<Plugin>, String> {
+    pub unsafe fn plugins(
+        library: *const Self,
+        host: &'static HostTable,
+    ) -> Result<Vec<Plugin>, String> {
         // SAFETY: the caller's promise. The first two numbers stand there in every version of the contract.
         let (size, version) = unsafe { ((*library).size, (*library).abi_version) };
         if version != ABI_VERSION {
@@ -127,14 +133,17 @@ impl Library {
             ));
         }
         if size != size_of::<Self>() as u32 {
-            return Err(format!("it is not a Tandem plugin: its descriptor has {size} bytes"));
+            return Err(format!(
+                "it is not a Tandem plugin: its descriptor has {size} bytes"
+            ));
         }
         // SAFETY: the version says that the rest is there, and a library is never unloaded: its texts and lists live as long.
         let this: &'static Self = unsafe { &*library };
         if this.layout != LAYOUT {
             let other = text(this.sdk_version);
             let differs = first_difference(&this.structures);
-            let differs = differs.map_or_else(String::new, |name| format!(": its {name} is another one"));
+            let differs =
+                differs.map_or_else(String::new, |name| format!(": its {name} is another one"));
             return Err(format!(
                 "it is built with another revision of tandem-sdk ({other}; this host has {}){differs}: build it again",
                 env!("CARGO_PKG_VERSION")
@@ -142,7 +151,11 @@ impl Library {
         }
         let descriptors: &'static [Descriptor] = this.plugins.get();
         if let Some(unknown) = descriptors.iter().find(|d| d.kind().is_none()) {
-            return Err(format!("{} is of kind {}, which this host does not know", unknown.name(), unknown.kind));
+            return Err(format!(
+                "{} is of kind {}, which this host does not know",
+                unknown.name(),
+                unknown.kind
+            ));
         }
         // SAFETY: the table lives as long as the program.
         unsafe { (this.prepare)(host) };
@@ -236,8 +249,15 @@ pub const LAYOUT: u64 = {
 /// The first structure of ours that is another one in `theirs`, or is not there.
 fn first_difference(theirs: &[Structure]) -> Option<&'static str> {
     let name = |structure: &Structure| text(structure.name);
-    let is_same = |ours: &&Structure| theirs.iter().any(|other| other.hash == ours.hash && name(other) == name(ours));
-    STRUCTURES.iter().find(|ours| !is_same(ours)).map(|ours| text(ours.name))
+    let is_same = |ours: &&Structure| {
+        theirs
+            .iter()
+            .any(|other| other.hash == ours.hash && name(other) == name(ours))
+    };
+    STRUCTURES
+        .iter()
+        .find(|ours| !is_same(ours))
+        .map(|ours| text(ours.name))
 }
 
 #[cfg(test)]
@@ -249,7 +269,10 @@ mod tests {
         assert_eq!(first_difference(STRUCTURES), None);
         let mut other = STRUCTURES.to_vec();
         let changed = |name: &str| ["AxisLimits", "Limits", "PlannerContext"].contains(&name);
-        for structure in other.iter_mut().filter(|structure| changed(text(structure.name))) {
+        for structure in other
+            .iter_mut()
+            .filter(|structure| changed(text(structure.name)))
+        {
             structure.hash ^= 1;
         }
         assert_eq!(first_difference(&other), Some("AxisLimits"));

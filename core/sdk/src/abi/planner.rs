@@ -10,8 +10,8 @@ use super::entry::{DONE, FAILED, choice};
 use super::layout::{Choice, table};
 use super::watch::{Method, beat, calling};
 use crate::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Edge, LimitedBy, Made, Planner, PlannerContext,
-    PlannerDescription, PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Edge, LimitedBy, Made, Planner,
+    PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
 };
 
 contract! {
@@ -85,7 +85,9 @@ impl HostSink<'_> {
         if self.emitted > MAX_EMITTED || self.panic.is_some() || self.foreign.is_some() {
             return FAILED;
         }
-        let taken = calling(Method::None, || catch_unwind(AssertUnwindSafe(|| put(self.sink))));
+        let taken = calling(Method::None, || {
+            catch_unwind(AssertUnwindSafe(|| put(self.sink)))
+        });
         self.panic = taken.err();
         if self.panic.is_none() { DONE } else { FAILED }
     }
@@ -131,8 +133,15 @@ unsafe extern "C" fn take_block(context: *mut c_void, report: *const BlockReport
 struct Linked(Calls);
 
 /// Opens a planner behind its table.
-pub fn open(table: &'static Table, name: &'static str, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
-    Ok(Box::new(Linked(Calls::make(table, name, options, context)?)))
+pub fn open(
+    table: &'static Table,
+    name: &'static str,
+    options: &str,
+    context: &PlannerContext,
+) -> Made<dyn Planner> {
+    Ok(Box::new(Linked(Calls::make(
+        table, name, options, context,
+    )?)))
 }
 
 /// A curve as it crosses: a null pointer where there is none.
@@ -143,7 +152,9 @@ fn crossing<'a>(curve: Option<&Curve<'a>>) -> *const Curve<'a> {
 impl Planner for Linked {
     fn describe(&self) -> PlannerDescription {
         // One that has panicked says so with the first block.
-        self.0.describe().unwrap_or_else(|_| PlannerDescription::order_2())
+        self.0
+            .describe()
+            .unwrap_or_else(|_| PlannerDescription::order_2())
     }
 
     fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
@@ -161,10 +172,23 @@ impl Planner for Linked {
         let _ = self.0.finish();
     }
 
-    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> Result<Advanced, PluginError> {
-        let mut host = HostSink { sink, emitted: 0, panic: None, foreign: None };
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
+        let mut host = HostSink {
+            sink,
+            emitted: 0,
+            panic: None,
+            foreign: None,
+        };
         let context = (&raw mut host).cast();
-        let sink = Sink { context, segment: take_segment, block: take_block };
+        let sink = Sink {
+            context,
+            segment: take_segment,
+            block: take_block,
+        };
         let advanced = self.0.advance(duration_s, &raw const sink);
         match (host.panic, host.foreign) {
             (Some(panic), _) => resume_unwind(panic),

@@ -7,13 +7,24 @@ use crate::Slice;
 unsafe extern "C" fn unused_describe(_: *mut c_void, _: *mut PlannerDescription, _: Errors) -> u32 {
     unreachable!("it is not asked")
 }
-unsafe extern "C" fn unused_check(_: *mut c_void, _: *const Block, _: *const Curve<'_>, _: *mut (), _: Errors) -> u32 {
+unsafe extern "C" fn unused_check(
+    _: *mut c_void,
+    _: *const Block,
+    _: *const Curve<'_>,
+    _: *mut (),
+    _: Errors,
+) -> u32 {
     unreachable!("it is not asked")
 }
 unsafe extern "C" fn unused_finish(_: *mut c_void, _: *mut (), _: Errors) -> u32 {
     unreachable!("it is not asked")
 }
-unsafe extern "C" fn unused_reset(_: *mut c_void, _: *const AxisVector, _: *mut (), _: Errors) -> u32 {
+unsafe extern "C" fn unused_reset(
+    _: *mut c_void,
+    _: *const AxisVector,
+    _: *mut (),
+    _: Errors,
+) -> u32 {
     unreachable!("it is not asked")
 }
 unsafe extern "C" fn unused_make(
@@ -53,25 +64,46 @@ unsafe fn emit(sink: *const Sink, answer: *mut Advanced, bad_segment: bool) -> u
     // SAFETY: the host's sink; places inside of what is there.
     unsafe {
         if bad_segment {
-            (&raw mut (*segment.as_mut_ptr()).stop_on.edge).cast::<u32>().write(250);
+            (&raw mut (*segment.as_mut_ptr()).stop_on.edge)
+                .cast::<u32>()
+                .write(250);
         } else {
-            (&raw mut (*report.as_mut_ptr()).limited_by).cast::<u32>().write(250);
+            (&raw mut (*report.as_mut_ptr()).limited_by)
+                .cast::<u32>()
+                .write(250);
         }
         let sink = &*sink;
         (sink.block)(sink.context, report.as_ptr());
         (sink.segment)(sink.context, segment.as_ptr());
-        answer.write(Advanced { duration_s: 1.0, done: 1 });
+        answer.write(Advanced {
+            duration_s: 1.0,
+            done: 1,
+        });
     }
     DONE
 }
-unsafe extern "C" fn bad_segment(_: *mut c_void, _: f64, sink: *const Sink, answer: *mut Advanced, _: Errors) -> u32 {
+unsafe extern "C" fn bad_segment(
+    _: *mut c_void,
+    _: f64,
+    sink: *const Sink,
+    answer: *mut Advanced,
+    _: Errors,
+) -> u32 {
     unsafe { emit(sink, answer, true) }
 }
-unsafe extern "C" fn bad_report(_: *mut c_void, _: f64, sink: *const Sink, answer: *mut Advanced, _: Errors) -> u32 {
+unsafe extern "C" fn bad_report(
+    _: *mut c_void,
+    _: f64,
+    sink: *const Sink,
+    answer: *mut Advanced,
+    _: Errors,
+) -> u32 {
     unsafe { emit(sink, answer, false) }
 }
 
-const fn table(advance: unsafe extern "C" fn(*mut c_void, f64, *const Sink, *mut Advanced, Errors) -> u32) -> Table {
+const fn table(
+    advance: unsafe extern "C" fn(*mut c_void, f64, *const Sink, *mut Advanced, Errors) -> u32,
+) -> Table {
     Table {
         make: unused_make,
         free,
@@ -94,7 +126,10 @@ fn planner(table: &'static Table) -> Linked {
         DONE
     };
     let handle = Handle::open([Method::PlannerNew, Method::PlannerDrop], free, opened);
-    Linked(Calls { table, handle: handle.unwrap() })
+    Linked(Calls {
+        table,
+        handle: handle.unwrap(),
+    })
 }
 
 #[derive(Default)]
@@ -112,18 +147,29 @@ impl SegmentSink for Taken {
 
 #[test]
 fn an_answer_that_is_no_choice_is_an_error_with_its_number() {
-    let error = planner(&BAD_SEGMENT).accept(&Block::at(AxisVector::ZERO), None).unwrap_err();
-    assert_eq!(error.message(), "its accept gives 250 as its answer: 0 and 1 are known");
+    let error = planner(&BAD_SEGMENT)
+        .accept(&Block::at(AxisVector::ZERO), None)
+        .unwrap_err();
+    assert_eq!(
+        error.message(),
+        "its accept gives 250 as its answer: 0 and 1 are known"
+    );
 }
 
 #[test]
 fn what_is_emitted_with_a_number_that_is_no_choice_goes_no_further() {
     let mut taken = Taken::default();
     let error = planner(&BAD_SEGMENT).advance(1.0, &mut taken).unwrap_err();
-    assert_eq!(error.message(), "its advance gives 250 as the edge of a segment: 0 to 2 are known");
+    assert_eq!(
+        error.message(),
+        "its advance gives 250 as the edge of a segment: 0 to 2 are known"
+    );
     assert_eq!(taken.0, ["block"]);
     let mut taken = Taken::default();
     let error = planner(&BAD_REPORT).advance(1.0, &mut taken).unwrap_err();
-    assert_eq!(error.message(), "its advance gives 250 as limited_by of a block: 0 to 9 are known");
+    assert_eq!(
+        error.message(),
+        "its advance gives 250 as limited_by of a block: 0 to 9 are known"
+    );
     assert!(taken.0.is_empty());
 }

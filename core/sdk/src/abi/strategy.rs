@@ -4,7 +4,9 @@ use super::contract::contract;
 use super::entry::{self, foreign};
 use super::layout::layout;
 use super::watch::Method;
-use crate::{Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, Request, Slice, StrategyContext, Window};
+use crate::{
+    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, Request, Slice, StrategyContext, Window,
+};
 
 contract! {
     /// The functions of a feed strategy. Each writes its answer, or an error.
@@ -29,10 +31,20 @@ layout!(Signals { count, names });
 impl Signals {
     fn new(names: &'static [&'static str]) -> Result<Self, PluginError> {
         if names.len() > MAX_SIGNALS {
-            return Err(PluginError::new(format!("it names {} signals; {MAX_SIGNALS} are possible", names.len())));
+            return Err(PluginError::new(format!(
+                "it names {} signals; {MAX_SIGNALS} are possible",
+                names.len()
+            )));
         }
-        let name = |i: usize| names.get(i).map_or(Slice::default(), |name| Slice::new(name.as_bytes()));
-        Ok(Self { count: names.len() as u32, names: std::array::from_fn(name) })
+        let name = |i: usize| {
+            names
+                .get(i)
+                .map_or(Slice::default(), |name| Slice::new(name.as_bytes()))
+        };
+        Ok(Self {
+            count: names.len() as u32,
+            names: std::array::from_fn(name),
+        })
     }
 }
 
@@ -48,7 +60,12 @@ pub struct Reply {
     signals: [f64; MAX_SIGNALS],
 }
 
-layout!(Reply { ratio, request, code, signals });
+layout!(Reply {
+    ratio,
+    request,
+    code,
+    signals
+});
 
 impl Reply {
     fn new(answer: &Answer) -> Self {
@@ -57,7 +74,12 @@ impl Reply {
             Request::Hold => (1, 0),
             Request::Fault(code) => (2, code),
         };
-        Self { ratio: answer.ratio, request, code, signals: answer.signals }
+        Self {
+            ratio: answer.ratio,
+            request,
+            code,
+            signals: answer.signals,
+        }
     }
 
     fn read(&self) -> Result<Answer, PluginError> {
@@ -65,9 +87,20 @@ impl Reply {
             0 => Request::None,
             1 => Request::Hold,
             2 => Request::Fault(self.code),
-            other => return Err(foreign(Method::StrategyUpdate, "the request", other, "0, 1 and 2")),
+            other => {
+                return Err(foreign(
+                    Method::StrategyUpdate,
+                    "the request",
+                    other,
+                    "0, 1 and 2",
+                ));
+            }
         };
-        Ok(Answer { ratio: self.ratio, request, signals: self.signals })
+        Ok(Answer {
+            ratio: self.ratio,
+            request,
+            signals: self.signals,
+        })
     }
 }
 
@@ -90,8 +123,16 @@ pub fn open(
     let max_ratio_change_per_s = calls.max_ratio_change_per_s()?;
     let names = &named.names[..(named.count as usize).min(MAX_SIGNALS)];
     // The contract hands names out for good, and few strategies are opened: their list is never freed.
-    let signals = names.iter().map(|name| entry::text(*name)).collect::<Vec<_>>().leak();
-    Ok(Box::new(Linked { calls, max_ratio_change_per_s, signals }))
+    let signals = names
+        .iter()
+        .map(|name| entry::text(*name))
+        .collect::<Vec<_>>()
+        .leak();
+    Ok(Box::new(Linked {
+        calls,
+        max_ratio_change_per_s,
+        signals,
+    }))
 }
 
 impl FeedStrategy for Linked {
@@ -115,11 +156,20 @@ mod tests {
     #[test]
     fn a_request_that_is_no_choice_is_an_error_with_its_number() {
         for request in [Request::None, Request::Hold, Request::Fault(7)] {
-            let answer = Answer { request, ..Answer::of_ratio(0.5) };
+            let answer = Answer {
+                request,
+                ..Answer::of_ratio(0.5)
+            };
             assert_eq!(Reply::new(&answer).read(), Ok(answer));
         }
-        let foreign = Reply { request: 250, ..Reply::new(&Answer::of_ratio(0.5)) };
+        let foreign = Reply {
+            request: 250,
+            ..Reply::new(&Answer::of_ratio(0.5))
+        };
         let error = foreign.read().unwrap_err();
-        assert_eq!(error.message(), "its update gives 250 as the request: 0, 1 and 2 are known");
+        assert_eq!(
+            error.message(),
+            "its update gives 250 as the request: 0, 1 and 2 are known"
+        );
     }
 }

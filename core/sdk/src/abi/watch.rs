@@ -94,10 +94,15 @@ impl Whereabouts {
     /// How often the thread said that it gets on, and the method that it is in. Nowhere, where no thread is watched.
     pub fn look(&self) -> (u64, Method) {
         let place = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(place) = *place else { return (0, Method::None) };
+        let Some(place) = *place else {
+            return (0, Method::None);
+        };
         let number = place.method.load(Relaxed);
         let method = Method::ALL.iter().find(|method| **method as u8 == number);
-        (place.beats.load(Relaxed), method.copied().unwrap_or(Method::None))
+        (
+            place.beats.load(Relaxed),
+            method.copied().unwrap_or(Method::None),
+        )
     }
 }
 
@@ -107,7 +112,10 @@ pub fn watch_this_thread(whereabouts: &Arc<Whereabouts>) -> Watched {
     // holds the lock while it does so. One that is never dropped is one of a thread that never ends.
     let place: &'static Place = PLACE.with(|place| unsafe { &*std::ptr::from_ref(place) });
     *whereabouts.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(place);
-    Watched { whereabouts: Arc::clone(whereabouts), _here: PhantomData }
+    Watched {
+        whereabouts: Arc::clone(whereabouts),
+        _here: PhantomData,
+    }
 }
 
 /// A thread whose calls of plugins can be seen. It stays on its thread.
@@ -119,19 +127,28 @@ pub struct Watched {
 
 impl Drop for Watched {
     fn drop(&mut self) {
-        *self.whereabouts.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *self
+            .whereabouts
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = None;
     }
 }
 
 /// This thread gets on: a period is over, a block was looked at, a segment was taken. Any loop; does not allocate.
 #[inline]
 pub fn beat() {
-    PLACE.with(|place| place.beats.store(place.beats.load(Relaxed).wrapping_add(1), Relaxed));
+    PLACE.with(|place| {
+        place
+            .beats
+            .store(place.beats.load(Relaxed).wrapping_add(1), Relaxed)
+    });
 }
 
 /// Whether this thread is in a call of a plugin.
 pub(super) fn is_within() -> bool {
-    let of_host = [Method::None, Method::FinePeriod, Method::KinematicsConvert].map(|method| method as u8);
+    let of_host =
+        [Method::None, Method::FinePeriod, Method::KinematicsConvert].map(|method| method as u8);
     CONVERTING.get() || PLACE.with(|place| !of_host.contains(&place.method.load(Relaxed)))
 }
 
@@ -171,7 +188,9 @@ mod tests {
         let (beats, nowhere) = look();
         assert_eq!(nowhere, Method::None);
         calling(Method::PlannerAdvance, || {
-            calling(Method::DriverExchange, || assert_eq!(look().1, Method::DriverExchange));
+            calling(Method::DriverExchange, || {
+                assert_eq!(look().1, Method::DriverExchange)
+            });
             calling(Method::None, || assert_eq!(look().1, Method::None));
             assert_eq!(look(), (beats, Method::PlannerAdvance));
             beat();
@@ -179,7 +198,9 @@ mod tests {
         });
         assert_eq!(look(), (beats + 1, Method::None));
         drop(watched);
-        calling(Method::PlannerAdvance, || assert_eq!(look(), (0, Method::None)));
+        calling(Method::PlannerAdvance, || {
+            assert_eq!(look(), (0, Method::None))
+        });
     }
 
     #[test]

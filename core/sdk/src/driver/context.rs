@@ -28,7 +28,11 @@ impl Name {
 
     /// The text. Any loop; does not allocate.
     pub fn as_str(&self) -> &str {
-        let length = self.bytes.iter().position(|byte| *byte == 0).unwrap_or(self.bytes.len());
+        let length = self
+            .bytes
+            .iter()
+            .position(|byte| *byte == 0)
+            .unwrap_or(self.bytes.len());
         std::str::from_utf8(&self.bytes[..length]).unwrap_or("a name that is not UTF-8")
     }
 }
@@ -56,7 +60,13 @@ pub struct JointDescription {
     pub limits: AxisLimits,
 }
 
-layout!(JointDescription { name, rotary, homing_method, homing_torque_percent, limits });
+layout!(JointDescription {
+    name,
+    rotary,
+    homing_method,
+    homing_torque_percent,
+    limits
+});
 
 /// What a driver is told when it is opened.
 #[derive(Clone, Copy, Debug)]
@@ -149,7 +159,15 @@ pub struct DriverDescription {
     pub disable_s: f64,
 }
 
-layout!(DriverDescription { simulated, watches_following, slow, hexadecimal_codes, gives_phase, enable_s, disable_s });
+layout!(DriverDescription {
+    simulated,
+    watches_following,
+    slow,
+    hexadecimal_codes,
+    gives_phase,
+    enable_s,
+    disable_s
+});
 
 /// Longest time that a driver may ask a host to wait for, s: ten minutes. What brings a bus up is done in
 /// [`crate::Driver::start`] and has no limit; contactors and brakes are done within seconds.
@@ -162,7 +180,10 @@ const ORDINARY_S: f64 = 5.0;
 impl DriverDescription {
     /// A simulated driver. Any loop; does not allocate.
     pub const fn simulated() -> Self {
-        Self { simulated: 1, ..Self::real() }
+        Self {
+            simulated: 1,
+            ..Self::real()
+        }
     }
 
     /// A driver with real drives behind it. Any loop; does not allocate.

@@ -103,7 +103,13 @@ pub struct Latch {
     pub position: AxisVector,
 }
 
-layout!(Latch { input, edge, joints, before_s, position });
+layout!(Latch {
+    input,
+    edge,
+    joints,
+    before_s,
+    position
+});
 
 /// What the drives report each fine period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -194,7 +200,11 @@ impl Feedback {
     pub fn follow(&mut self, setpoint: &Setpoint, joints: usize) {
         self.position = setpoint.position;
         self.speed = setpoint.velocity;
-        let state = if setpoint.enable == 0 { JointState::Disabled } else { JointState::Enabled };
+        let state = if setpoint.enable == 0 {
+            JointState::Disabled
+        } else {
+            JointState::Enabled
+        };
         // To fill the first of them takes 2 ns longer: it is made to do many at once, and finds out how many there are.
         for (joint, own) in self.state.iter_mut().enumerate() {
             *own = if joint < joints { state } else { *own };

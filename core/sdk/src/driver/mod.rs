@@ -103,7 +103,8 @@ pub trait Driver: Send {
     ///
     /// # Errors
     /// The driver itself cannot go on: the machine faults. Use [`PluginError::fixed`], which does not allocate.
-    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError>;
+    fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback)
+    -> Result<(), PluginError>;
 
     /// Bring the drives to rest by their own means, now. Fine loop: no allocation.
     fn quick_stop(&mut self);

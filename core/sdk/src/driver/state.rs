@@ -29,7 +29,15 @@ impl JointState {
     /// patience. Nothing is known of it.
     pub const Lost: Self = Self(6);
 
-    const NAMES: [&str; 7] = ["Disabled", "Enabling", "Enabled", "Homing", "QuickStop", "Fault", "Lost"];
+    const NAMES: [&str; 7] = [
+        "Disabled",
+        "Enabling",
+        "Enabled",
+        "Homing",
+        "QuickStop",
+        "Fault",
+        "Lost",
+    ];
 
     /// Whether it is one of the seven. Any loop; does not allocate.
     #[inline]
@@ -80,7 +88,14 @@ pub struct Attached {
     pub delay_periods: [u32; MAX_AXES],
 }
 
-layout!(Attached { known, homed, position, state, fault_code, delay_periods });
+layout!(Attached {
+    known,
+    homed,
+    position,
+    state,
+    fault_code,
+    delay_periods
+});
 
 /// Most periods that feedback may be behind the setpoint.
 pub const MAX_DELAY_PERIODS: u32 = 15;

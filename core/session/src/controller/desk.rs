@@ -210,7 +210,10 @@ impl Desk {
 
     /// Sends a line to a client, or to all.
     pub fn send(&self, to: Option<u64>, line: &Value) {
-        self.post.lock().unwrap_or_else(PoisonError::into_inner).push((to, format!("{line}\n")));
+        self.post
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push((to, format!("{line}\n")));
         // Where it rings already, it rings.
         let _ = (&self.bell.1).write(&[1]);
     }
@@ -241,11 +244,22 @@ impl Desk {
 
     fn state_of(&self, inner: &Inner) -> ControllerState {
         if let Some((_, emergency)) = &inner.fault {
-            return if *emergency { ControllerState::EmergencyStop } else { ControllerState::Fault };
+            return if *emergency {
+                ControllerState::EmergencyStop
+            } else {
+                ControllerState::Fault
+            };
         }
         let controls = self.hub.controls();
-        let stops = [&controls.abort, &controls.emergency_stop, &controls.soft_fault].iter().any(|s| s.load(Relaxed));
-        let ramps = MachineState::from_number(self.status.state.load(Relaxed)) == MachineState::Stopping;
+        let stops = [
+            &controls.abort,
+            &controls.emergency_stop,
+            &controls.soft_fault,
+        ]
+        .iter()
+        .any(|s| s.load(Relaxed));
+        let ramps =
+            MachineState::from_number(self.status.state.load(Relaxed)) == MachineState::Stopping;
         let held = controls.hold.load(Relaxed) || controls.program_hold.load(Relaxed);
         let homing_needed = inner.unknown_axes != 0;
         match inner.mode {
@@ -268,22 +282,49 @@ impl Desk {
         if inner.last_state.replace(state) != Some(state) {
             let fault = inner.fault.as_ref().map(|(words, _)| words.clone());
             drop(inner);
-            self.send(None, &json!({ "event": "state", "state": state.name(), "fault": fault }));
+            self.send(
+                None,
+                &json!({ "event": "state", "state": state.name(), "fault": fault }),
+            );
         }
     }
 
     /// Judges a request by the state of the machine, and does it or orders it.
     pub fn ask(&self, from: From, asked: &Asked) -> Answered {
         let mut inner = self.lock();
-        let name = if asked.request == "jog" && asked.with.contains_key("stop") { "jog-stop" } else { &asked.request };
+        let name = if asked.request == "jog" && asked.with.contains_key("stop") {
+            "jog-stop"
+        } else {
+            &asked.request
+        };
         if let Err(why) = judge(self.state_of(&inner), name) {
             return Some(Err(why.to_string()));
         }
-        let seen = ["status", "subscribe", "history", "lease", "list", "emergency-stop", "hold", "abort"];
-        let is_switch = ["feed-override", "rapid-override", "single-block", "optional-stop", "block-delete"];
-        let joins = matches!((&inner.order, name), (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop"));
+        let seen = [
+            "status",
+            "subscribe",
+            "history",
+            "lease",
+            "list",
+            "emergency-stop",
+            "hold",
+            "abort",
+        ];
+        let is_switch = [
+            "feed-override",
+            "rapid-override",
+            "single-block",
+            "optional-stop",
+            "block-delete",
+        ];
+        let joins = matches!(
+            (&inner.order, name),
+            (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop")
+        );
         if inner.order.is_some() && !joins && !seen.contains(&name) && !is_switch.contains(&name) {
-            return Some(Err("another request is being begun: wait for its answer".to_string()));
+            return Some(Err(
+                "another request is being begun: wait for its answer".to_string()
+            ));
         }
         let order = match self.act(from, asked, name, &mut inner) {
             Ok(Acted::Done(value)) => return Some(Ok(value)),
@@ -295,12 +336,24 @@ impl Desk {
         order.1
     }
 
-    fn act(&self, from: From, asked: &Asked, name: &str, inner: &mut Inner) -> Result<Acted, String> {
-        let give = |command: Command| self.hub.give(command).map(|tick| Acted::Done(json!({ "tick": tick })));
+    fn act(
+        &self,
+        from: From,
+        asked: &Asked,
+        name: &str,
+        inner: &mut Inner,
+    ) -> Result<Acted, String> {
+        let give = |command: Command| {
+            self.hub
+                .give(command)
+                .map(|tick| Acted::Done(json!({ "tick": tick })))
+        };
         let plain = |command: Command| asked.only(&[]).and_then(|()| give(command));
         match name {
             "status" => asked.only(&[]).map(|()| Acted::Done(self.status_of(inner))),
-            "history" => Ok(Acted::Done(json!({ "jobs": inner.history, "alarms": inner.alarms }))),
+            "history" => Ok(Acted::Done(
+                json!({ "jobs": inner.history, "alarms": inner.alarms }),
+            )),
             "list" => self.list().map(Acted::Done),
             "hold" => plain(Command::Hold),
             "resume" => plain(Command::Resume),
@@ -311,8 +364,14 @@ impl Desk {
                 self.jogs.forget();
                 Ok(done)
             }
-            "feed-override" => asked.number("ratio").and_then(ratio).and_then(|r| give(Command::FeedOverride(r))),
-            "rapid-override" => asked.number("ratio").and_then(ratio).and_then(|r| give(Command::RapidOverride(r))),
+            "feed-override" => asked
+                .number("ratio")
+                .and_then(ratio)
+                .and_then(|r| give(Command::FeedOverride(r))),
+            "rapid-override" => asked
+                .number("ratio")
+                .and_then(ratio)
+                .and_then(|r| give(Command::RapidOverride(r))),
             "single-block" => give(Command::SingleBlock(asked.on()?)),
             "optional-stop" => give(Command::OptionalStop(asked.on()?)),
             "block-delete" => {
@@ -321,19 +380,31 @@ impl Desk {
             }
             "load" | "check" => {
                 let program = self.program_of(asked)?;
-                Ok(Acted::Ordered(Order::Check { from, program, load: name == "load" }))
+                Ok(Acted::Ordered(Order::Check {
+                    from,
+                    program,
+                    load: name == "load",
+                }))
             }
             "start" => {
                 asked.only(&[])?;
                 let missing = "no program is loaded: \"load\" loads one";
-                inner.loaded.as_ref().map(|_| Acted::Ordered(Order::Start { from })).ok_or_else(|| missing.to_string())
+                inner
+                    .loaded
+                    .as_ref()
+                    .map(|_| Acted::Ordered(Order::Start { from }))
+                    .ok_or_else(|| missing.to_string())
             }
             "mdi" => {
                 asked.only(&["line"])?;
                 let begins = lock(&self.lines).judge(from.client, from.id, asked.text("line")?)?;
                 let judged = json!({ "judged": true });
                 let waits = inner.mode == Mode::Mdi || inner.order.is_some() || !begins;
-                Ok(if waits { Acted::Done(judged) } else { Acted::Begins(Order::Mdi, judged) })
+                Ok(if waits {
+                    Acted::Done(judged)
+                } else {
+                    Acted::Begins(Order::Mdi, judged)
+                })
             }
             "jog-stop" => {
                 self.jogs.let_go();
@@ -343,17 +414,30 @@ impl Desk {
                 self.jogs.ask(jog(asked)?.on(&self.machine.axes)?)?;
                 let done = json!({ "jog": asked.with.get("axis") });
                 let waits = inner.mode == Mode::Jog || inner.order.is_some();
-                Ok(if waits { Acted::Done(done) } else { Acted::Begins(Order::Jog, done) })
+                Ok(if waits {
+                    Acted::Done(done)
+                } else {
+                    Acted::Begins(Order::Jog, done)
+                })
             }
             "home" => {
                 asked.only(&["axis"])?;
-                let axis = if asked.with.contains_key("axis") { Some(self.axis(asked.text("axis")?)?) } else { None };
+                let axis = if asked.with.contains_key("axis") {
+                    Some(self.axis(asked.text("axis")?)?)
+                } else {
+                    None
+                };
                 Ok(Acted::Ordered(Order::Home { from, axis }))
             }
             "reset" => Ok(Acted::Ordered(Order::Enable { from, resets: true })),
-            "enable" => Ok(Acted::Ordered(Order::Enable { from, resets: false })),
+            "enable" => Ok(Acted::Ordered(Order::Enable {
+                from,
+                resets: false,
+            })),
             "disable" => Ok(Acted::Ordered(Order::Disable { from })),
-            "touch-off" | "set-offset" | "set-tool" | "set-parameter" => self.set(asked, name).map(Acted::Done),
+            "touch-off" | "set-offset" | "set-tool" | "set-parameter" => {
+                self.set(asked, name).map(Acted::Done)
+            }
             other => Err(format!("{other} is not done here")),
         }
     }
@@ -367,7 +451,9 @@ impl Desk {
         for axis in 0..axes.count() {
             let letter = axes.letter(axis);
             let unit = if axes.is_rotary(axis) { "deg" } else { "mm" };
-            if let Some(value) = asked.number_if_any(&format!("{}_{unit}", letter.to_ascii_lowercase()))? {
+            if let Some(value) =
+                asked.number_if_any(&format!("{}_{unit}", letter.to_ascii_lowercase()))?
+            {
                 words.push_str(&format!(" {letter}[{value:.9}]"));
             }
         }
@@ -378,10 +464,16 @@ impl Desk {
                     Some(name) => (0..tandem_gcode::WORK_SYSTEMS)
                         .find(|i| Some(system_code(*i).as_str()) == name.as_str())
                         .map(|i| i + 1)
-                        .ok_or_else(|| format!("{name} is no work coordinate system: G54 to G59, G59.1 to G59.3"))?,
+                        .ok_or_else(|| {
+                            format!(
+                                "{name} is no work coordinate system: G54 to G59, G59.1 to G59.3"
+                            )
+                        })?,
                 };
                 if words.is_empty() {
-                    return Err(format!("{name} needs the coordinate of at least one axis, as in \"x_mm\""));
+                    return Err(format!(
+                        "{name} needs the coordinate of at least one axis, as in \"x_mm\""
+                    ));
                 }
                 let number = if name == "touch-off" { 20 } else { 2 };
                 lines.lasting_behind(&format!("G10 L{number} P{system}{words}"))?
@@ -412,8 +504,15 @@ impl Desk {
             lasting.tool_in_spindle = number;
         }
         let at = lasting.tools.iter().position(|tool| tool.number == number);
-        let mut tool = at
-            .map_or(Tool { number, pocket: None, offset: AxisVector::ZERO, diameter_mm: 0.0 }, |at| lasting.tools[at]);
+        let mut tool = at.map_or(
+            Tool {
+                number,
+                pocket: None,
+                offset: AxisVector::ZERO,
+                diameter_mm: 0.0,
+            },
+            |at| lasting.tools[at],
+        );
         for axis in 0..self.machine.axes.count() {
             let letter = self.machine.axes.letter(axis).to_ascii_lowercase();
             if let Some(mm) = asked.number_if_any(&format!("{letter}_mm"))? {
@@ -433,30 +532,53 @@ impl Desk {
 
     fn axis(&self, letter: &str) -> Result<usize, String> {
         let mut letters = letter.chars();
-        let one = letters.next().filter(|_| letters.next().is_none()).map(|letter| letter.to_ascii_uppercase());
-        one.and_then(|one| self.machine.axes.index(one)).ok_or_else(|| format!("the machine has no axis {letter}"))
+        let one = letters
+            .next()
+            .filter(|_| letters.next().is_none())
+            .map(|letter| letter.to_ascii_uppercase());
+        one.and_then(|one| self.machine.axes.index(one))
+            .ok_or_else(|| format!("the machine has no axis {letter}"))
     }
 
     /// A program, as text or as a file of the programs folder.
     fn program_of(&self, asked: &Asked) -> Result<Loaded, String> {
         asked.only(&["path", "text", "name"])?;
         if asked.with.contains_key("text") {
-            let name = asked.with.get("name").and_then(Value::as_str).unwrap_or("program.ngc").to_string();
-            return Ok(Loaded { name, text: asked.text("text")?.as_bytes().into() });
+            let name = asked
+                .with
+                .get("name")
+                .and_then(Value::as_str)
+                .unwrap_or("program.ngc")
+                .to_string();
+            return Ok(Loaded {
+                name,
+                text: asked.text("text")?.as_bytes().into(),
+            });
         }
         let path = asked.text("path")?;
         let folder = self.folder()?;
-        let safe = Path::new(path).components().all(|part| matches!(part, std::path::Component::Normal(_)));
+        let safe = Path::new(path)
+            .components()
+            .all(|part| matches!(part, std::path::Component::Normal(_)));
         if !safe {
-            return Err(format!("{path}: a program is named by its path within the programs folder"));
+            return Err(format!(
+                "{path}: a program is named by its path within the programs folder"
+            ));
         }
         let file = folder.join(path);
-        let size = std::fs::metadata(&file).map_err(|e| format!("{}: {e}", file.display()))?.len();
+        let size = std::fs::metadata(&file)
+            .map_err(|e| format!("{}: {e}", file.display()))?
+            .len();
         if size > MAX_PROGRAM_BYTES {
-            return Err(format!("{path}: it has {size} bytes, {MAX_PROGRAM_BYTES} are allowed"));
+            return Err(format!(
+                "{path}: it has {size} bytes, {MAX_PROGRAM_BYTES} are allowed"
+            ));
         }
         let text = std::fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
-        Ok(Loaded { name: path.to_string(), text: text.into() })
+        Ok(Loaded {
+            name: path.to_string(),
+            text: text.into(),
+        })
     }
 
     fn folder(&self) -> Result<&Path, String> {
@@ -466,9 +588,14 @@ impl Desk {
 
     fn list(&self) -> Result<Value, String> {
         let folder = self.folder()?;
-        let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let files = entries.filter_map(Result::ok).filter(|entry| entry.path().is_file());
-        let mut names: Vec<String> = files.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let entries =
+            std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let files = entries
+            .filter_map(Result::ok)
+            .filter(|entry| entry.path().is_file());
+        let mut names: Vec<String> = files
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .collect();
         names.sort();
         Ok(json!({ "programs": names }))
     }
@@ -485,10 +612,13 @@ impl Desk {
         let lasting = standing.lasting();
         let axes = &self.machine.axes;
         let place = self.hub.position();
-        let shown = |vector: &AxisVector| serde_json::to_value(Position::new(axes, vector)).unwrap_or_default();
+        let shown = |vector: &AxisVector| {
+            serde_json::to_value(Position::new(axes, vector)).unwrap_or_default()
+        };
         let letters = |mask: u32| -> Vec<String> {
             let of = (0..axes.count()).filter(|axis| mask >> axis & 1 == 1);
-            of.map(|axis| axes.letter(axis).to_ascii_lowercase().to_string()).collect()
+            of.map(|axis| axes.letter(axis).to_ascii_lowercase().to_string())
+                .collect()
         };
         let more = json!({
             "state": self.state_of(inner).name(),
@@ -527,7 +657,12 @@ impl Desk {
     /// A job is over. The loop that drives.
     pub fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
-        let driven = lock(&self.lines).end_job(outcome.position, whole, whole && mode == Mode::Program, !whole);
+        let driven = lock(&self.lines).end_job(
+            outcome.position,
+            whole,
+            whole && mode == Mode::Program,
+            !whole,
+        );
         self.tell_driven(&driven, whole);
         self.keeper.record(&lock(&self.lines).standing().lasting());
         self.hub.stands_at(&outcome.position);
@@ -562,7 +697,8 @@ impl Desk {
     pub fn stands(&self, position: &AxisVector, unknown_axes: u32) {
         self.hub.stands_at(position);
         self.jogs.disable(*position);
-        self.jogs.enable(self.hub.shared_controls(), true, unknown_axes);
+        self.jogs
+            .enable(self.hub.shared_controls(), true, unknown_axes);
     }
 
     fn fault_in(&self, inner: &mut Inner, words: &str) {
@@ -607,21 +743,43 @@ fn remember(all: &mut VecDeque<Value>, one: Value) {
 }
 
 fn ratio(value: f64) -> Result<f64, String> {
-    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(format!("{value} is not a number of zero or more")) }
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not a number of zero or more"))
+    }
 }
 
 /// A jog as clients ask for it.
 fn jog(asked: &Asked) -> Result<JogMessage, String> {
-    asked.only(&["axis", "distance_mm", "distance_deg", "direction", "feed_mm_per_min", "feed_deg_per_min"])?;
-    let axis = asked.text("axis")?.chars().next().ok_or("jog needs an axis")?;
+    asked.only(&[
+        "axis",
+        "distance_mm",
+        "distance_deg",
+        "direction",
+        "feed_mm_per_min",
+        "feed_deg_per_min",
+    ])?;
+    let axis = asked
+        .text("axis")?
+        .chars()
+        .next()
+        .ok_or("jog needs an axis")?;
     let degrees = asked.with.contains_key("feed_deg_per_min");
     let unit = if degrees { "deg" } else { "mm" };
     let feed_per_min = asked.number(&format!("feed_{unit}_per_min"))?;
     let distance = asked.number_if_any(&format!("distance_{unit}"))?;
     let reach = match (distance, asked.number_if_any("direction")?) {
         (Some(distance), None) => ReachMessage::By(distance),
-        (None, Some(direction)) if direction.abs() == 1.0 => ReachMessage::On { positive: direction > 0.0 },
+        (None, Some(direction)) if direction.abs() == 1.0 => ReachMessage::On {
+            positive: direction > 0.0,
+        },
         _ => return Err("jog needs one of distance and direction (1 or -1)".to_string()),
     };
-    Ok(JogMessage { axis, reach, feed_per_min, degrees: Some(degrees) })
+    Ok(JogMessage {
+        axis,
+        reach,
+        feed_per_min,
+        degrees: Some(degrees),
+    })
 }

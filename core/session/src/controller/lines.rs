@@ -99,7 +99,9 @@ impl Lines {
     pub fn lasting_behind(&self, line: &str) -> Result<Lasting, String> {
         let mut tried = self.standing.clone();
         tried.reset_modes();
-        tried.line(1, line.as_bytes(), &mut vec![]).map_err(|e| e.message)?;
+        tried
+            .line(1, line.as_bytes(), &mut vec![])
+            .map_err(|e| e.message)?;
         Ok(tried.lasting())
     }
 
@@ -109,10 +111,15 @@ impl Lines {
     /// What is wrong with it: nothing has changed.
     pub fn judge(&mut self, client: u64, id: u64, text: &str) -> Result<bool, String> {
         if self.asks {
-            return Err("the line before waits for an input or a probe: send this one when it is driven".to_string());
+            return Err(
+                "the line before waits for an input or a probe: send this one when it is driven"
+                    .to_string(),
+            );
         }
         if self.waiting.len() >= MOST_WAITING {
-            return Err(format!("{MOST_WAITING} lines wait already: send this one when they are driven"));
+            return Err(format!(
+                "{MOST_WAITING} lines wait already: send this one when they are driven"
+            ));
         }
         let begins = !self.driving && self.waiting.is_empty();
         if begins {
@@ -124,13 +131,24 @@ impl Lines {
         let (mut tried, mut items) = (self.ahead.clone(), vec![]);
         let number = self.count + 1;
         let first_block = tried.next_block();
-        tried.line(number, text.as_bytes(), &mut items).map_err(|e| e.to_string())?;
+        tried
+            .line(number, text.as_bytes(), &mut items)
+            .map_err(|e| e.to_string())?;
         for item in &items {
-            let Item::Block(block, curve) = item else { continue };
-            let judged = check_block(&self.machine, self.judge.as_ref(), block, curve.as_deref().map(NurbsData::curve));
+            let Item::Block(block, curve) = item else {
+                continue;
+            };
+            let judged = check_block(
+                &self.machine,
+                self.judge.as_ref(),
+                block,
+                curve.as_deref().map(NurbsData::curve),
+            );
             judged.map_err(|why| format!("input:{number}: {why}"))?;
         }
-        self.asks = items.iter().any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
+        self.asks = items
+            .iter()
+            .any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
         // M2 ends a program, not the conversation.
         items.retain(|item| !matches!(item, Item::End));
         tried.go_on();
@@ -139,7 +157,11 @@ impl Lines {
         }
         self.ahead = tried;
         self.count = number;
-        self.judged.push_back(Judged { client, id, behind: self.ahead.next_block() });
+        self.judged.push_back(Judged {
+            client,
+            id,
+            behind: self.ahead.next_block(),
+        });
         self.waiting.push_back(items);
         Ok(begins)
     }
@@ -152,14 +174,24 @@ impl Lines {
     /// The path has begun `block`: lines that are driven by now.
     pub fn reach(&mut self, block: u64) -> Vec<Judged> {
         self.ledger.reach(block);
-        let driven = self.judged.iter().take_while(|line| line.behind <= block).count();
+        let driven = self
+            .judged
+            .iter()
+            .take_while(|line| line.behind <= block)
+            .count();
         self.judged.drain(..driven).collect()
     }
 
     /// The job is over, and the machine stands at `position`; `whole` where all that was read is driven, and `ended` where a
     /// program has come to its end, behind which modes are as at the start. What is on was `switched_off` otherwise. Lines that
     /// were taken: driven where whole, else not.
-    pub fn end_job(&mut self, position: AxisVector, whole: bool, ended: bool, switched_off: bool) -> Vec<Judged> {
+    pub fn end_job(
+        &mut self,
+        position: AxisVector,
+        whole: bool,
+        ended: bool,
+        switched_off: bool,
+    ) -> Vec<Judged> {
         let goes_on = whole && !self.waiting.is_empty();
         if whole && !goes_on {
             self.ledger.reach_all();
@@ -244,7 +276,10 @@ impl Source for LineSource {
                 true
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
-                inner.ahead.provide_probe(&ProbeResult { touched: rest.latch, rest: rest.position });
+                inner.ahead.provide_probe(&ProbeResult {
+                    touched: rest.latch,
+                    rest: rest.position,
+                });
                 inner.asks = false;
                 true
             }

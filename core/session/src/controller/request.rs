@@ -18,13 +18,24 @@ pub struct Asked {
 /// # Errors
 /// What is wrong with it, with its id where it has one.
 pub fn read(text: &str) -> Result<Asked, (Option<u64>, String)> {
-    let value: Value = serde_json::from_str(text).map_err(|e| (None, format!("it is no JSON: {e}")))?;
-    let Value::Object(mut with) = value else { return Err((None, "it is no JSON object".to_string())) };
+    let value: Value =
+        serde_json::from_str(text).map_err(|e| (None, format!("it is no JSON: {e}")))?;
+    let Value::Object(mut with) = value else {
+        return Err((None, "it is no JSON object".to_string()));
+    };
     let id = with.remove("id").and_then(|id| id.as_u64());
-    let Some(id) = id else { return Err((None, "it has no \"id\", a whole number that its answer bears".to_string())) };
+    let Some(id) = id else {
+        return Err((
+            None,
+            "it has no \"id\", a whole number that its answer bears".to_string(),
+        ));
+    };
     match with.remove("request") {
         Some(Value::String(request)) => Ok(Asked { id, request, with }),
-        _ => Err((Some(id), "it has no \"request\", the name of what is asked for".to_string())),
+        _ => Err((
+            Some(id),
+            "it has no \"request\", the name of what is asked for".to_string(),
+        )),
     }
 }
 
@@ -34,7 +45,10 @@ impl Asked {
     /// # Errors
     /// It is not there, or no text.
     pub fn text(&self, key: &str) -> Result<&str, String> {
-        self.with.get(key).and_then(Value::as_str).ok_or_else(|| format!("{} needs \"{key}\", a text", self.request))
+        self.with
+            .get(key)
+            .and_then(Value::as_str)
+            .ok_or_else(|| format!("{} needs \"{key}\", a text", self.request))
     }
 
     /// The number of `key`.
@@ -51,7 +65,11 @@ impl Asked {
     /// # Errors
     /// It is no number.
     pub fn number_if_any(&self, key: &str) -> Result<Option<f64>, String> {
-        if self.with.contains_key(key) { self.number(key).map(Some) } else { Ok(None) }
+        if self.with.contains_key(key) {
+            self.number(key).map(Some)
+        } else {
+            Ok(None)
+        }
     }
 
     /// The switch `on`.
@@ -69,7 +87,11 @@ impl Asked {
     /// The first that it does not know, and those that it does.
     pub fn only(&self, keys: &[&str]) -> Result<(), String> {
         match self.with.keys().find(|key| !keys.contains(&key.as_str())) {
-            Some(key) => Err(format!("{} does not know \"{key}\"; it knows {}", self.request, keys.join(", "))),
+            Some(key) => Err(format!(
+                "{} does not know \"{key}\"; it knows {}",
+                self.request,
+                keys.join(", ")
+            )),
             None => Ok(()),
         }
     }

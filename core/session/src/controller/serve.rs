@@ -9,8 +9,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use tandem_gcode::{Interpreter, Item, Lasting, Program};
 use tandem_host::{
-    Clock, HostError, JobOutcome, Memory, PreparedJob, Registry, Resident, RunObserver, StopAnswer, Switches,
-    axis_limits, interpreter_config, moves_metal, planner,
+    Clock, HostError, JobOutcome, Memory, PreparedJob, Registry, Resident, RunObserver, StopAnswer,
+    Switches, axis_limits, interpreter_config, moves_metal, planner,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, Sample};
@@ -62,9 +62,16 @@ impl ScriptLine {
     /// What is wrong with the line.
     pub fn parse(text: &str) -> Result<Self, String> {
         let value: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
-        let tick = value["tick"].as_u64().ok_or("it has no \"tick\", the number of a fine period")?;
-        let client = value.get("client").map_or(Some(1), Value::as_u64).ok_or("\"client\" is a number")?;
-        let say = value.get("say").ok_or("it has no \"say\", the line of the client")?;
+        let tick = value["tick"]
+            .as_u64()
+            .ok_or("it has no \"tick\", the number of a fine period")?;
+        let client = value
+            .get("client")
+            .map_or(Some(1), Value::as_u64)
+            .ok_or("\"client\" is a number")?;
+        let say = value
+            .get("say")
+            .ok_or("it has no \"say\", the line of the client")?;
         let line = say.as_str().map_or_else(|| say.to_string(), str::to_string);
         Ok(Self { tick, client, line })
     }
@@ -105,7 +112,11 @@ impl<'r> Controller<'r> {
             config.tools.clone_from(&lasting.tools);
             config.lasting = Some(Arc::new(lasting));
         }
-        let lines = Lines::new(&machine, planner(&machine, registry)?, Interpreter::new(config));
+        let lines = Lines::new(
+            &machine,
+            planner(&machine, registry)?,
+            Interpreter::new(config),
+        );
         let mut jogged = machine.clone();
         jogged.limits = axis_limits(&machine, registry)?;
         let jogs = Arc::new(JogController::new(&jogged, planner(&machine, registry)?));
@@ -114,18 +125,43 @@ impl<'r> Controller<'r> {
         let hub = Arc::new(OperatorHub::new(&machine, controls, Arc::clone(&status)));
         let lines = Arc::new(std::sync::Mutex::new(lines));
         let unknown = not_homed(&machine, resident.unknown_axes());
-        let desk = Desk::new(&machine, hub, status, lines, jogs, keeper, options.programs, unknown).map_err(system)?;
+        let desk = Desk::new(
+            &machine,
+            hub,
+            status,
+            lines,
+            jogs,
+            keeper,
+            options.programs,
+            unknown,
+        )
+        .map_err(system)?;
         let desk = Arc::new(desk);
         desk.stands(&machine.start, unknown);
         if options.enable {
-            desk.lock().order = Some(Order::Enable { from: From { client: 0, id: 0 }, resets: false });
+            desk.lock().order = Some(Order::Enable {
+                from: From { client: 0, id: 0 },
+                resets: false,
+            });
         }
         let server = match options.listen.is_nowhere() {
             true => None,
-            false => Some(Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?),
+            false => Some(
+                Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?,
+            ),
         };
-        let script = Script { lines: options.script.into(), ..Script::default() };
-        Ok(Self { resident, desk, server, clock: options.clock, script, simulated })
+        let script = Script {
+            lines: options.script.into(),
+            ..Script::default()
+        };
+        Ok(Self {
+            resident,
+            desk,
+            server,
+            clock: options.clock,
+            script,
+            simulated,
+        })
     }
 
     /// The TCP address of its door, with the port that the system chose for port 0.
@@ -147,12 +183,20 @@ impl<'r> Controller<'r> {
         while !self.desk.is_over() {
             self.desk.tell_state();
             let order = self.desk.lock().order.clone();
-            let order = order.or_else(|| lock(&self.desk.lines).are_waiting().then_some(Order::Mdi));
+            let order =
+                order.or_else(|| lock(&self.desk.lines).are_waiting().then_some(Order::Mdi));
             match order {
                 Some(order) => self.obey(order, tell)?,
                 None if self.clock == Clock::Virtual && self.script.lines.is_empty() => break,
                 None => {
-                    let mut watch = Watch::new(&self.desk, &mut self.script, tell, Mode::Idle, self.clock, 0.0);
+                    let mut watch = Watch::new(
+                        &self.desk,
+                        &mut self.script,
+                        tell,
+                        Mode::Idle,
+                        self.clock,
+                        0.0,
+                    );
                     let fault = self.resident.idle(&mut watch)?;
                     watch.period();
                     if let Some(words) = fault {
@@ -161,26 +205,42 @@ impl<'r> Controller<'r> {
                 }
             }
         }
-        self.script.flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
+        self.script
+            .flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
         self.resident.stop(&mut Notes(tell))?;
-        self.desk.keeper.record(&lock(&self.desk.lines).standing().lasting());
+        self.desk
+            .keeper
+            .record(&lock(&self.desk.lines).standing().lasting());
         drop(self.server);
         Ok(())
     }
 
     fn obey(&mut self, order: Order, tell: Tell<'_>) -> Result<(), HostError> {
         match order {
-            Order::Check { from, program, load } => self.check(from, &program, load),
+            Order::Check {
+                from,
+                program,
+                load,
+            } => self.check(from, &program, load),
             Order::Start { from } => self.start(from, tell)?,
             Order::Mdi => {
                 let source = Box::new(LineSource::begin(&self.desk.lines));
-                let switches = Switches { pause_at_stops: true, ..self.switches() };
+                let switches = Switches {
+                    pause_at_stops: true,
+                    ..self.switches()
+                };
                 let job = self.resident.source("lines by hand", source, switches);
                 self.drive_or_tell(job, None, Mode::Mdi, "lines by hand", tell)?;
             }
             Order::Jog => {
-                let source = Box::new(Jogs { desk: Arc::clone(&self.desk), standing: 0 });
-                let switches = Switches { unhomed: true, ..self.switches() };
+                let source = Box::new(Jogs {
+                    desk: Arc::clone(&self.desk),
+                    standing: 0,
+                });
+                let switches = Switches {
+                    unhomed: true,
+                    ..self.switches()
+                };
                 let job = self.resident.source("jogging", source, switches);
                 self.drive_or_tell(job, None, Mode::Jog, "jogging", tell)?;
             }
@@ -191,7 +251,14 @@ impl<'r> Controller<'r> {
             Order::Enable { from, resets } => self.enable(from, resets, tell)?,
             Order::Disable { from } => {
                 while !self.resident.disable() {
-                    let mut watch = Watch::new(&self.desk, &mut self.script, tell, Mode::Idle, self.clock, 0.0);
+                    let mut watch = Watch::new(
+                        &self.desk,
+                        &mut self.script,
+                        tell,
+                        Mode::Idle,
+                        self.clock,
+                        0.0,
+                    );
                     self.resident.idle(&mut watch)?;
                 }
                 let mut inner = self.desk.lock();
@@ -213,19 +280,33 @@ impl<'r> Controller<'r> {
 
     fn memory(&self) -> Memory {
         let lines = lock(&self.desk.lines);
-        Memory { lasting: Arc::new(lines.standing().lasting()), ledger: lines.ledger.clone() }
+        Memory {
+            lasting: Arc::new(lines.standing().lasting()),
+            ledger: lines.ledger.clone(),
+        }
     }
 
     fn prepare(&self, program: &Loaded) -> Result<PreparedJob, String> {
-        let spooled = Program::spool(&program.name, &program.text[..]).map_err(|e| e.to_string())?;
-        let switches = Switches { pause_at_stops: true, ..self.switches() };
-        self.resident.program(spooled, switches, &self.memory()).map_err(|e| match e {
-            HostError::Check(report) => {
-                let all: Vec<String> = report.diagnostics.iter().map(ToString::to_string).collect();
-                format!("{} errors in the program: {}", all.len() as u64 + report.unlisted, all.join("; "))
-            }
-            other => other.to_string(),
-        })
+        let spooled =
+            Program::spool(&program.name, &program.text[..]).map_err(|e| e.to_string())?;
+        let switches = Switches {
+            pause_at_stops: true,
+            ..self.switches()
+        };
+        self.resident
+            .program(spooled, switches, &self.memory())
+            .map_err(|e| match e {
+                HostError::Check(report) => {
+                    let all: Vec<String> =
+                        report.diagnostics.iter().map(ToString::to_string).collect();
+                    format!(
+                        "{} errors in the program: {}",
+                        all.len() as u64 + report.unlisted,
+                        all.join("; ")
+                    )
+                }
+                other => other.to_string(),
+            })
     }
 
     fn check(&mut self, from: From, program: &Loaded, load: bool) {
@@ -270,11 +351,19 @@ impl<'r> Controller<'r> {
             Ok(job) => self.drive(job, from, mode, name, tell),
             Err(why) => {
                 self.desk.lock().order = None;
-                let dropped = lock(&self.desk.lines).end_job(self.resident.machine().start, false, false, false);
+                let dropped = lock(&self.desk.lines).end_job(
+                    self.resident.machine().start,
+                    false,
+                    false,
+                    false,
+                );
                 self.desk.tell_driven(&dropped, false);
                 match from {
                     Some(from) => self.desk.answer(from, Err(why.to_string())),
-                    None => self.desk.send(None, &json!({ "event": "refused", "job": name, "why": why.to_string() })),
+                    None => self.desk.send(
+                        None,
+                        &json!({ "event": "refused", "job": name, "why": why.to_string() }),
+                    ),
                 }
                 Ok(())
             }
@@ -294,7 +383,14 @@ impl<'r> Controller<'r> {
         if let Some(from) = from {
             self.desk.answer(from, Ok(json!({ "begins": name })));
         }
-        let mut watch = Watch::new(&self.desk, &mut self.script, tell, mode, self.clock, length_mm);
+        let mut watch = Watch::new(
+            &self.desk,
+            &mut self.script,
+            tell,
+            mode,
+            self.clock,
+            length_mm,
+        );
         let outcome = self.resident.drive(job, &mut watch)?;
         self.finish(mode, name, &outcome);
         Ok(())
@@ -310,7 +406,14 @@ impl<'r> Controller<'r> {
         inner.fault = None;
         drop(inner);
         self.desk.begin(Mode::Enabling);
-        let mut watch = Watch::new(&self.desk, &mut self.script, tell, Mode::Enabling, self.clock, 0.0);
+        let mut watch = Watch::new(
+            &self.desk,
+            &mut self.script,
+            tell,
+            Mode::Enabling,
+            self.clock,
+            0.0,
+        );
         let outcome = self.resident.enable(resets, &mut watch)?;
         self.finish(Mode::Enabling, "enabling", &outcome);
         let answer = match &outcome.summary.fault {
@@ -345,8 +448,13 @@ struct Script {
 impl Script {
     fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
         while self.lines.front().is_some_and(|line| line.tick <= tick) {
-            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else { return };
-            let talk = self.clients.entry(client).or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
+            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
+                return;
+            };
+            let talk = self
+                .clients
+                .entry(client)
+                .or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
             // Subscriptions live in real time, and are not for replays.
             let answer = talk.line(&line, &mut self.lease, Instant::now());
             self.print(tick, Some(client), &answer.line, tell);
@@ -400,7 +508,18 @@ impl<'a> Watch<'a> {
         clock: Clock,
         length_mm: f64,
     ) -> Self {
-        Self { desk, script, tell, mode, clock, length_mm, driven_mm: 0.0, block: None, tick: 0, ends: false }
+        Self {
+            desk,
+            script,
+            tell,
+            mode,
+            clock,
+            length_mm,
+            driven_mm: 0.0,
+            block: None,
+            tick: 0,
+            ends: false,
+        }
     }
 }
 
@@ -413,10 +532,15 @@ impl RunObserver for Watch<'_> {
         let hub = &self.desk.hub;
         if hub.waits_on_line().is_none() {
             hub.begin_wait(line);
-            self.desk.send(None, &json!({ "event": "waits", "line": line }));
+            self.desk
+                .send(None, &json!({ "event": "waits", "line": line }));
             return StopAnswer::Wait;
         }
-        if hub.answered() { StopAnswer::GoOn } else { StopAnswer::Wait }
+        if hub.answered() {
+            StopAnswer::GoOn
+        } else {
+            StopAnswer::Wait
+        }
     }
 
     fn is_attended(&self) -> bool {
@@ -429,7 +553,11 @@ impl RunObserver for Watch<'_> {
 
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
         self.driven_mm += sample.feed_mm_per_s * self.desk.machine.fine_period_s;
-        let share = if self.length_mm > 0.0 { (self.driven_mm / self.length_mm).min(1.0) } else { 0.0 };
+        let share = if self.length_mm > 0.0 {
+            (self.driven_mm / self.length_mm).min(1.0)
+        } else {
+            0.0
+        };
         self.desk.hub.sample(sample, share);
         if self.block != Some(sample.block) && matches!(self.mode, Mode::Program | Mode::Mdi) {
             self.block = Some(sample.block);
@@ -444,7 +572,8 @@ impl RunObserver for Watch<'_> {
             self.desk.hub.controls().abort.store(true, Relaxed);
         }
         self.desk.tell_state();
-        self.script.flush(self.desk, self.tick, self.clock, self.tell);
+        self.script
+            .flush(self.desk, self.tick, self.clock, self.tell);
     }
 
     fn before_tick(&mut self, uptime_periods: u64) {
@@ -471,7 +600,10 @@ impl Source for Jogs {
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         let (_, refused) = self.desk.jogs.next(items);
         for why in refused {
-            self.desk.send(None, &json!({ "event": "refused", "job": "jogging", "why": why }));
+            self.desk.send(
+                None,
+                &json!({ "event": "refused", "job": "jogging", "why": why }),
+            );
         }
         if !items.is_empty() {
             self.standing = 0;

@@ -98,11 +98,20 @@ const REASONS: [(char, &str); 9] = [
     ('b', "a job is driven: wait for its end, or abort it"),
     ('d', "the drives are disabled: \"enable\" enables them"),
     ('e', "the drives are enabled already"),
-    ('f', "the machine stands in a fault: \"reset\" takes it back"),
+    (
+        'f',
+        "the machine stands in a fault: \"reset\" takes it back",
+    ),
     ('k', "there is no fault to reset"),
-    ('n', "it is not known where the machine stands, or it is to be homed first: \"home\" homes it"),
+    (
+        'n',
+        "it is not known where the machine stands, or it is to be homed first: \"home\" homes it",
+    ),
     ('o', "the drives are disabled already"),
-    ('s', "the machine is being brought to rest, or its drives are being enabled"),
+    (
+        's',
+        "the machine is being brought to rest, or its drives are being enabled",
+    ),
     ('x', "nothing is driven"),
 ];
 
@@ -116,7 +125,10 @@ pub fn judge(state: ControllerState, request: &str) -> Result<(), &'static str> 
     };
     match row.chars().nth(state as usize) {
         Some('+') => Ok(()),
-        code => Err(REASONS.iter().find(|(c, _)| Some(*c) == code).map_or("it is refused", |(_, why)| *why)),
+        code => Err(REASONS
+            .iter()
+            .find(|(c, _)| Some(*c) == code)
+            .map_or("it is refused", |(_, why)| *why)),
     }
 }
 
@@ -136,7 +148,15 @@ pub fn table() -> String {
     for (name, row) in TABLE {
         let _ = write!(text, "\n| `{name}` |");
         for code in row.chars() {
-            let _ = write!(text, " {} |", if code == '+' { "done".to_string() } else { code.to_string() });
+            let _ = write!(
+                text,
+                " {} |",
+                if code == '+' {
+                    "done".to_string()
+                } else {
+                    code.to_string()
+                }
+            );
         }
     }
     text.push_str("\n\n");
@@ -160,7 +180,12 @@ mod tests {
                 assert_ne!(answer, Err("there is no such request"), "{name}");
             }
         }
-        assert!(ControllerState::ALL.iter().enumerate().all(|(at, state)| *state as usize == at));
+        assert!(
+            ControllerState::ALL
+                .iter()
+                .enumerate()
+                .all(|(at, state)| *state as usize == at)
+        );
     }
 
     /// Whatever state the machine is in, it can be stopped while something moves, and work begins from `ready` alone.
@@ -168,11 +193,23 @@ mod tests {
     fn stops_are_never_refused_and_programs_begin_where_the_machine_is_ready() {
         for state in ControllerState::ALL {
             assert!(judge(state, "emergency-stop").is_ok());
-            assert_eq!(judge(state, "start").is_ok(), state == ControllerState::Ready, "{}", state.name());
+            assert_eq!(
+                judge(state, "start").is_ok(),
+                state == ControllerState::Ready,
+                "{}",
+                state.name()
+            );
         }
         for state in &ControllerState::ALL[4..9] {
-            assert!(judge(*state, "hold").is_ok() && judge(*state, "abort").is_ok(), "{}", state.name());
+            assert!(
+                judge(*state, "hold").is_ok() && judge(*state, "abort").is_ok(),
+                "{}",
+                state.name()
+            );
         }
-        assert!(judge(ControllerState::Fault, "mdi").is_err() && judge(ControllerState::Fault, "reset").is_ok());
+        assert!(
+            judge(ControllerState::Fault, "mdi").is_err()
+                && judge(ControllerState::Fault, "reset").is_ok()
+        );
     }
 }

@@ -17,14 +17,29 @@ const MAX_STRANGERS_LINE_BYTES: usize = 4096;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Requests that need no control lease.
-const FREE: [&str; 8] = ["status", "subscribe", "history", "lease", "list", "hold", "emergency-stop", "token"];
+const FREE: [&str; 8] = [
+    "status",
+    "subscribe",
+    "history",
+    "lease",
+    "list",
+    "hold",
+    "emergency-stop",
+    "token",
+];
 
 /// Who lives behind the doors of a controller.
 pub struct Office(pub Arc<Desk>);
 
 impl House for Office {
     fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
-        Box::new(Protocol2 { desk: Arc::clone(&self.0), client: number, token, has_place: true, subscription: None })
+        Box::new(Protocol2 {
+            desk: Arc::clone(&self.0),
+            client: number,
+            token,
+            has_place: true,
+            subscription: None,
+        })
     }
 
     fn set_clients(&self, _count: usize) {}
@@ -50,7 +65,13 @@ pub struct Protocol2 {
 impl Protocol2 {
     /// A client that needs no token.
     pub fn known(desk: Arc<Desk>, client: u64) -> Self {
-        Self { desk, client, token: None, has_place: true, subscription: None }
+        Self {
+            desk,
+            client,
+            token: None,
+            has_place: true,
+            subscription: None,
+        }
     }
 
     fn greeting_line(&self) -> String {
@@ -66,31 +87,52 @@ impl Protocol2 {
 
     fn refused(&self, id: Option<u64>, why: &str) -> String {
         let state = self.desk.state().name();
-        format!("{}\n", json!({ "id": id, "error": { "what": "refused", "why": why, "state": state } }))
+        format!(
+            "{}\n",
+            json!({ "id": id, "error": { "what": "refused", "why": why, "state": state } })
+        )
     }
 
     fn introduce(&mut self, asked: Option<&Asked>) -> Answer {
         let expected = self.token.as_deref().unwrap_or_default();
-        let given = asked.filter(|asked| asked.request == "token").and_then(|asked| asked.text("token").ok());
+        let given = asked
+            .filter(|asked| asked.request == "token")
+            .and_then(|asked| asked.text("token").ok());
         match given {
             Some(given) if is_same(given, expected) && self.has_place => {
                 self.token = None;
-                Answer { line: self.greeting_line(), last: false }
+                Answer {
+                    line: self.greeting_line(),
+                    last: false,
+                }
             }
             Some(given) if is_same(given, expected) => self.close(&Problem::crowded(MAX_OWNERS)),
-            Some(_) => self.close(&Problem::refused("key \"token\"", "it is another token".to_string())),
+            Some(_) => self.close(&Problem::refused(
+                "key \"token\"",
+                "it is another token".to_string(),
+            )),
             None => {
-                let why = "the first line over TCP is {\"id\":0,\"request\":\"token\",\"token\":\"…\"}".to_string();
+                let why =
+                    "the first line over TCP is {\"id\":0,\"request\":\"token\",\"token\":\"…\"}"
+                        .to_string();
                 self.close(&Problem::refused("the whole line", why))
             }
         }
     }
 
-    fn grant(&mut self, asked: &Asked, lease: &mut Lease, now: Instant) -> Option<Result<Value, String>> {
+    fn grant(
+        &mut self,
+        asked: &Asked,
+        lease: &mut Lease,
+        now: Instant,
+    ) -> Option<Result<Value, String>> {
         let is_stop = asked.request == "jog" && asked.with.contains_key("stop");
         if !FREE.contains(&asked.request.as_str()) && !is_stop && !lease.is_held_by(self.client) {
-            let holder =
-                lease.holder().map_or("nobody holds it".to_string(), |client| format!("client {client} holds it"));
+            let holder = lease
+                .holder()
+                .map_or("nobody holds it".to_string(), |client| {
+                    format!("client {client} holds it")
+                });
             return Some(Err(format!(
                 "it needs the control lease, and {holder}; stops, hold and what only looks need none"
             )));
@@ -99,7 +141,13 @@ impl Protocol2 {
             "lease" => Some(self.lease(asked, lease, now)),
             "subscribe" => Some(self.subscribe(asked, now)),
             "token" => Some(Err("no token is asked for here".to_string())),
-            _ => self.desk.ask(From { client: self.client, id: asked.id }, asked),
+            _ => self.desk.ask(
+                From {
+                    client: self.client,
+                    id: asked.id,
+                },
+                asked,
+            ),
         }
     }
 
@@ -121,7 +169,11 @@ impl Protocol2 {
         asked.only(&["rate_hz"])?;
         let rate_hz = asked.number("rate_hz")?;
         if rate_hz != 0.0 && !RATES_HZ.contains(&rate_hz) {
-            return Err(format!("{rate_hz} is neither 0 nor within {} to {}", RATES_HZ.start(), RATES_HZ.end()));
+            return Err(format!(
+                "{rate_hz} is neither 0 nor within {} to {}",
+                RATES_HZ.start(),
+                RATES_HZ.end()
+            ));
         }
         self.subscription = (rate_hz != 0.0).then(|| (Duration::from_secs_f64(1.0 / rate_hz), now));
         Ok(json!({ "rate_hz": rate_hz }))
@@ -146,7 +198,11 @@ impl Talk for Protocol2 {
     }
 
     fn max_line_bytes(&self) -> usize {
-        if self.is_known() { MAX_LINE_BYTES } else { MAX_STRANGERS_LINE_BYTES }
+        if self.is_known() {
+            MAX_LINE_BYTES
+        } else {
+            MAX_STRANGERS_LINE_BYTES
+        }
     }
 
     fn line(&mut self, text: &str, lease: &mut Lease, now: Instant) -> Answer {
@@ -156,7 +212,10 @@ impl Talk for Protocol2 {
             return self.introduce(asked.as_ref().ok());
         }
         let line = match asked {
-            Err((id, why)) => format!("{}\n", json!({ "id": id, "error": { "what": "malformed line", "why": why } })),
+            Err((id, why)) => format!(
+                "{}\n",
+                json!({ "id": id, "error": { "what": "malformed line", "why": why } })
+            ),
             Ok(asked) => match self.grant(&asked, lease, now) {
                 None => String::new(),
                 Some(Ok(ok)) => format!("{}\n", json!({ "id": asked.id, "ok": ok })),
@@ -168,7 +227,10 @@ impl Talk for Protocol2 {
 
     fn close(&self, problem: &Problem) -> Answer {
         let error = json!({ "what": problem.what, "where": problem.place, "why": problem.why });
-        Answer { line: format!("{}\n", json!({ "id": null, "error": error })), last: true }
+        Answer {
+            line: format!("{}\n", json!({ "id": null, "error": error })),
+            last: true,
+        }
     }
 
     fn too_long(&mut self) -> Answer {
@@ -177,7 +239,9 @@ impl Talk for Protocol2 {
     }
 
     fn is_due(&mut self, now: Instant) -> bool {
-        let Some((every, due)) = self.subscription.as_mut().filter(|(_, due)| *due <= now) else { return false };
+        let Some((every, due)) = self.subscription.as_mut().filter(|(_, due)| *due <= now) else {
+            return false;
+        };
         // After a stall the rate starts anew: what was missed is not made up for.
         *due = (*due + *every).max(now);
         true
@@ -188,11 +252,17 @@ impl Talk for Protocol2 {
     }
 
     fn telemetry(&self, lost: u64) -> String {
-        format!("{}\n", json!({ "event": "status", "lost": lost, "status": self.desk.status() }))
+        format!(
+            "{}\n",
+            json!({ "event": "status", "lost": lost, "status": self.desk.status() })
+        )
     }
 
     fn ended(&self, _lost: u64) -> String {
-        format!("{}\n", json!({ "event": "end", "why": "the controller ends" }))
+        format!(
+            "{}\n",
+            json!({ "event": "end", "why": "the controller ends" })
+        )
     }
 
     fn tell_of_lease(&self, news: News) -> String {

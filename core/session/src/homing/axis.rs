@@ -62,13 +62,21 @@ impl Axis {
             letter: machine.axes.letter(index).to_ascii_lowercase(),
             travel_mm: limits.max_mm - limits.min_mm,
             acceleration_mm_per_s2: limits.acceleration_mm_per_s2,
-            unit: if rotary { (1f64.to_radians(), "deg") } else { (1.0, "mm") },
+            unit: if rotary {
+                (1f64.to_radians(), "deg")
+            } else {
+                (1.0, "mm")
+            },
         }
     }
 
     /// What it begins with.
     pub fn first(&self) -> Step {
-        if self.drive.is_some() { Step::HandOver } else { Step::Look }
+        if self.drive.is_some() {
+            Step::HandOver
+        } else {
+            Step::Look
+        }
     }
 
     /// 1 or −1.
@@ -93,11 +101,17 @@ impl Axis {
     /// The switch does not let go.
     pub fn after_input(&self, step: Step, value: f64) -> Result<Step, String> {
         match step {
-            Step::Look => Ok(if (value == 1.0) == self.plan.inverted { Step::Search } else { Step::Leave }),
+            Step::Look => Ok(if (value == 1.0) == self.plan.inverted {
+                Step::Search
+            } else {
+                Step::Leave
+            }),
             Step::HandOver => Ok(step),
             _ if value < 0.0 => {
                 let back = self.shown(self.plan.back_off_mm);
-                Err(self.failure(&format!("is still on {back} behind its edge: it sticks, or back_off is too short")))
+                Err(self.failure(&format!(
+                    "is still on {back} behind its edge: it sticks, or back_off is too short"
+                )))
             }
             _ => Ok(Step::Latch),
         }
@@ -111,24 +125,32 @@ impl Axis {
         let edge_mm = rest.latch.map(|latch| latch[self.index]);
         match (step, rest.cause, edge_mm) {
             (Step::Search | Step::Leave, RestCause::Edge, _) => Ok(Step::BackOff),
-            (Step::Latch, RestCause::Edge, Some(edge_mm)) => Ok(Step::Correct { by_mm: self.plan.switch_mm - edge_mm }),
+            (Step::Latch, RestCause::Edge, Some(edge_mm)) => Ok(Step::Correct {
+                by_mm: self.plan.switch_mm - edge_mm,
+            }),
             (Step::Correct { .. } | Step::HandOver, RestCause::Corrected, _) => Ok(Step::GoHome),
             (_, RestCause::Abort, _) => Ok(self.first()),
             (Step::Leave, ..) => {
                 let way = self.shown(self.search_mm());
-                Err(self.failure(&format!("is on and was not released within {way}: it sticks, or invert is wrong")))
+                Err(self.failure(&format!(
+                    "is on and was not released within {way}: it sticks, or invert is wrong"
+                )))
             }
             (Step::Search, ..) => {
                 let way = self.shown(self.search_mm());
-                Err(self
-                    .failure(&format!("did not trip within {way}: it does not work, or the search goes away from it")))
+                Err(self.failure(&format!(
+                    "did not trip within {way}: it does not work, or the search goes away from it"
+                )))
             }
             _ => Err(self.failure("did not trip again: it does not work")),
         }
     }
 
     fn failure(&self, what: &str) -> String {
-        format!("homing {}: the switch on input {} {what}", self.letter, self.plan.input)
+        format!(
+            "homing {}: the switch on input {} {what}",
+            self.letter, self.plan.input
+        )
     }
 
     fn shown(&self, mm: f64) -> String {

@@ -20,7 +20,8 @@ use axis::{Axis, Step};
 const BOUNCE_S: f64 = 0.2;
 
 /// Homes the axes of [`Machine::homing`], then hands out the program, if any: for [`tandem_host::Switches::home`].
-pub const HOMING: Lead = |machine, program| Box::new(Homing::new(machine, &machine.homing, program));
+pub const HOMING: Lead =
+    |machine, program| Box::new(Homing::new(machine, &machine.homing, program));
 
 /// Homes axes one after the other, then hands out another stream.
 pub struct Homing {
@@ -39,8 +40,15 @@ pub struct Homing {
 
 impl Homing {
     /// Homes the axes of `plan` on `machine`, then hands out `program`, if any.
-    pub fn new(machine: &Machine, plan: &[AxisHoming], program: Option<Box<dyn Source + Send>>) -> Self {
-        let axes: VecDeque<_> = plan.iter().map(|homing| Axis::new(machine, homing)).collect();
+    pub fn new(
+        machine: &Machine,
+        plan: &[AxisHoming],
+        program: Option<Box<dyn Source + Send>>,
+    ) -> Self {
+        let axes: VecDeque<_> = plan
+            .iter()
+            .map(|homing| Axis::new(machine, homing))
+            .collect();
         Self {
             step: axes.front().map_or(Step::Look, Axis::first),
             axes,
@@ -56,7 +64,11 @@ impl Homing {
     /// Hands out the next step of `axis`.
     fn begin(&mut self, axis: &Axis, items: &mut Vec<Item>) {
         let plan = &axis.plan;
-        let (trip, release) = if plan.inverted { (Edge::Falling, Edge::Rising) } else { (Edge::Rising, Edge::Falling) };
+        let (trip, release) = if plan.inverted {
+            (Edge::Falling, Edge::Rising)
+        } else {
+            (Edge::Rising, Edge::Falling)
+        };
         let (fast, slow) = (plan.search_mm_per_s.abs(), plan.latch_mm_per_s);
         self.awaiting = true;
         match self.step {
@@ -68,14 +80,30 @@ impl Homing {
             Step::Search => self.travel(axis, axis.search_mm(), fast, trip, items),
             Step::Leave => self.travel(axis, -axis.search_mm(), fast, release, items),
             Step::BackOff => {
-                self.travel(axis, -axis.direction() * plan.back_off_mm, fast, Edge::None, items);
-                let released = if plan.inverted { InputMode::High } else { InputMode::Low };
+                self.travel(
+                    axis,
+                    -axis.direction() * plan.back_off_mm,
+                    fast,
+                    Edge::None,
+                    items,
+                );
+                let released = if plan.inverted {
+                    InputMode::High
+                } else {
+                    InputMode::Low
+                };
                 items.push(self.read(plan, released, BOUNCE_S));
             }
             Step::Latch => self.travel(axis, axis.latch_mm(), slow, trip, items),
             Step::Correct { by_mm } => items.push(self.event(EventKind::Correct, axis, by_mm)),
             Step::GoHome => {
-                self.travel(axis, axis.home_mm - self.position[axis.index], f64::INFINITY, Edge::None, items);
+                self.travel(
+                    axis,
+                    axis.home_mm - self.position[axis.index],
+                    f64::INFINITY,
+                    Edge::None,
+                    items,
+                );
                 // The end is the home position itself, whatever the rounding of the way there.
                 self.position[axis.index] = axis.home_mm;
                 if let Some(Item::Block(block, _)) = items.last_mut() {
@@ -83,30 +111,59 @@ impl Homing {
                 }
                 items.push(self.event(EventKind::Homed, axis, 0.0));
                 self.axes.pop_front();
-                (self.step, self.awaiting) = (self.axes.front().map_or(Step::Look, Axis::first), false);
+                (self.step, self.awaiting) =
+                    (self.axes.front().map_or(Step::Look, Axis::first), false);
             }
         }
     }
 
     fn read(&self, plan: &SwitchHoming, mode: InputMode, timeout_s: f64) -> Item {
-        Item::Wait(InputWait { line: 0, before_block: self.blocks, input: Input::Digital(plan.input), mode, timeout_s })
+        Item::Wait(InputWait {
+            line: 0,
+            before_block: self.blocks,
+            input: Input::Digital(plan.input),
+            mode,
+            timeout_s,
+        })
     }
 
     fn event(&self, kind: EventKind, axis: &Axis, value: f64) -> Item {
-        Item::Event(Event::new(kind, 0, self.blocks, (axis.index as u32).cast_signed(), value))
+        Item::Event(Event::new(
+            kind,
+            0,
+            self.blocks,
+            (axis.index as u32).cast_signed(),
+            value,
+        ))
     }
 
     /// A straight line of one axis; at an infinite feed a rapid.
-    fn travel(&mut self, axis: &Axis, by_mm: f64, feed_mm_per_s: f64, edge: Edge, items: &mut Vec<Item>) {
+    fn travel(
+        &mut self,
+        axis: &Axis,
+        by_mm: f64,
+        feed_mm_per_s: f64,
+        edge: Edge,
+        items: &mut Vec<Item>,
+    ) {
         if by_mm == 0.0 {
             return;
         }
         let mut block = Block::at(self.position);
         block.end[axis.index] += by_mm;
-        block.kind = if feed_mm_per_s.is_finite() { BlockKind::Line } else { BlockKind::Rapid };
+        block.kind = if feed_mm_per_s.is_finite() {
+            BlockKind::Line
+        } else {
+            BlockKind::Rapid
+        };
         block.path_mode = PathMode::ExactStop;
-        (block.index, block.length_mm, block.feed_mm_per_s) = (self.blocks, by_mm.abs(), feed_mm_per_s);
-        block.stop_on = StopOn { input: axis.plan.input, edge, miss_is_fault: 0 };
+        (block.index, block.length_mm, block.feed_mm_per_s) =
+            (self.blocks, by_mm.abs(), feed_mm_per_s);
+        block.stop_on = StopOn {
+            input: axis.plan.input,
+            edge,
+            miss_is_fault: 0,
+        };
         if edge == Edge::None {
             block.stop_on = StopOn::default();
             self.position = block.end;
@@ -121,9 +178,14 @@ impl Homing {
 
     /// The program's items, numbered on.
     fn program_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        let Some(program) = &mut self.program else { return Ok(false) };
+        let Some(program) = &mut self.program else {
+            return Ok(false);
+        };
         if let Some(rest) = self.corrected.take() {
-            program.provide_rest(&Rest { position: self.position, ..rest });
+            program.provide_rest(&Rest {
+                position: self.position,
+                ..rest
+            });
         }
         let before = items.len();
         let more = program.next_items(items)?;
@@ -170,7 +232,10 @@ impl Source for Homing {
 
     fn provide_input(&mut self, value: f64) {
         let Some(axis) = self.axes.front() else {
-            return self.program.iter_mut().for_each(|program| program.provide_input(value));
+            return self
+                .program
+                .iter_mut()
+                .for_each(|program| program.provide_input(value));
         };
         self.awaiting = false;
         match axis.after_input(self.step, value) {
@@ -181,7 +246,10 @@ impl Source for Homing {
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         let Some(axis) = self.axes.front() else {
-            return self.program.as_mut().is_none_or(|program| program.provide_rest(rest));
+            return self
+                .program
+                .as_mut()
+                .is_none_or(|program| program.provide_rest(rest));
         };
         self.position = rest.position;
         self.awaiting = false;

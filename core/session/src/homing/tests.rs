@@ -18,7 +18,18 @@ fn rest(cause: RestCause, at_mm: f64, latch_mm: Option<f64>) -> Rest {
     let at = AxisVector::from_slice(&[at_mm]);
     let latch = latch_mm.map(|mm| AxisVector::from_slice(&[mm]));
     let (stop_on, epoch, tick, block, line) = (StopOn::default(), 0, 0, 0, 0);
-    Rest { epoch, cause, tick, block, line, stop_on, position: at, latch, program_time_s: 0.0, path_mm: 0.0 }
+    Rest {
+        epoch,
+        cause,
+        tick,
+        block,
+        line,
+        stop_on,
+        position: at,
+        latch,
+        program_time_s: 0.0,
+        path_mm: 0.0,
+    }
 }
 
 fn next(homing: &mut Homing) -> Vec<Item> {
@@ -28,7 +39,9 @@ fn next(homing: &mut Homing) -> Vec<Item> {
 }
 
 fn block(items: &[Item]) -> (f64, f64, Edge) {
-    let Some(Item::Block(block, _)) = items.first() else { panic!("{items:?}") };
+    let Some(Item::Block(block, _)) = items.first() else {
+        panic!("{items:?}")
+    };
     (block.end[0], block.feed_mm_per_s, block.stop_on.edge)
 }
 
@@ -40,21 +53,39 @@ fn an_axis_finds_its_switch_and_goes_home() {
     assert!(next(&mut homing).is_empty(), "the machine has not answered");
     homing.provide_input(0.0);
     let (end, feed, edge) = block(&next(&mut homing));
-    assert!((end + 112.0).abs() < 1e-9 && feed == 10.0 && edge == Edge::Rising, "{end}");
+    assert!(
+        (end + 112.0).abs() < 1e-9 && feed == 10.0 && edge == Edge::Rising,
+        "{end}"
+    );
     assert!(homing.provide_rest(&rest(RestCause::Edge, -40.5, Some(-40.25))));
     let back = next(&mut homing);
     assert_eq!((block(&back), back.len()), ((-38.5, 10.0, Edge::None), 2));
     homing.provide_input(0.0);
     let (end, feed, edge) = block(&next(&mut homing));
-    assert!((end + 42.6).abs() < 1e-9 && feed == 1.0 && edge == Edge::Rising, "{end}");
+    assert!(
+        (end + 42.6).abs() < 1e-9 && feed == 1.0 && edge == Edge::Rising,
+        "{end}"
+    );
     assert!(homing.provide_rest(&rest(RestCause::Edge, -40.5, Some(-40.0))));
-    let Item::Event(event) = next(&mut homing)[0] else { panic!("an event") };
+    let Item::Event(event) = next(&mut homing)[0] else {
+        panic!("an event")
+    };
     assert_eq!((event.kind, event.value), (EventKind::Correct, 39.0));
     assert!(homing.provide_rest(&rest(RestCause::Corrected, -1.5, None)));
     let home = next(&mut homing);
     assert_eq!(block(&home), (5.0, f64::INFINITY, Edge::None));
-    assert!(matches!(home[1], Item::Event(Event { kind: EventKind::Homed, before_block: 4, .. })));
-    assert!(!homing.next_items(&mut Vec::new()).unwrap(), "there is no program");
+    assert!(matches!(
+        home[1],
+        Item::Event(Event {
+            kind: EventKind::Homed,
+            before_block: 4,
+            ..
+        })
+    ));
+    assert!(
+        !homing.next_items(&mut Vec::new()).unwrap(),
+        "there is no program"
+    );
 }
 
 #[test]
@@ -79,7 +110,10 @@ fn what_a_switch_does_not_do_is_told() {
         assert_eq!(block(&next(homing)).2, Edge::Falling);
         homing.provide_rest(&rest(RestCause::Missed, 112.0, None));
     });
-    assert!(stuck.contains("is on and was not released within 112.000 mm"), "{stuck}");
+    assert!(
+        stuck.contains("is on and was not released within 112.000 mm"),
+        "{stuck}"
+    );
     let sticks = failure(&|homing| {
         homing.provide_input(0.0);
         next(homing);
@@ -87,5 +121,8 @@ fn what_a_switch_does_not_do_is_told() {
         next(homing);
         homing.provide_input(-1.0);
     });
-    assert!(sticks.contains("is still on 2.000 mm behind its edge"), "{sticks}");
+    assert!(
+        sticks.contains("is still on 2.000 mm behind its edge"),
+        "{sticks}"
+    );
 }

@@ -65,7 +65,11 @@ impl JogController {
             over: false,
         };
         let periods = (machine.operator.jog_keep_alive_s / machine.fine_period_s).round();
-        Self { machine: machine.clone(), keep_alive_periods: periods.max(1.0) as u64, inner: Mutex::new(inner) }
+        Self {
+            machine: machine.clone(),
+            keep_alive_periods: periods.max(1.0) as u64,
+            inner: Mutex::new(inner),
+        }
     }
 
     /// The machine that is jogged.
@@ -82,7 +86,9 @@ impl JogController {
         let mut inner = self.lock();
         self.judge_feed(&jog, inner.unknown)?;
         let Some(controls) = inner.controls.clone().filter(|_| !inner.over) else {
-            return Err("the machine is not enabled: it is in fault, or the session is over".to_string());
+            return Err(
+                "the machine is not enabled: it is in fault, or the session is over".to_string(),
+            );
         };
         if !inner.ready {
             return Err("the machine is not ready: it homes".to_string());
@@ -136,7 +142,11 @@ impl JogController {
 
     /// `value` of an axis in words, mm or deg.
     pub fn shown(&self, axis: usize, value: f64) -> String {
-        let (value, unit) = if self.machine.axes.is_rotary(axis) { (value.to_degrees(), "deg") } else { (value, "mm") };
+        let (value, unit) = if self.machine.axes.is_rotary(axis) {
+            (value.to_degrees(), "deg")
+        } else {
+            (value, "mm")
+        };
         format!("{} {unit}", (value * 1e6).round() / 1e6)
     }
 
@@ -174,7 +184,11 @@ impl JogController {
         let moved = inner.moving.take();
         inner.disarm();
         inner.position = rest.position;
-        let end = if inner.ended_by_word { JogEnd::LetGo } else { JogEnd::Late };
+        let end = if inner.ended_by_word {
+            JogEnd::LetGo
+        } else {
+            JogEnd::Late
+        };
         moved.map(|moved| moved.rest(rest.position, end))
     }
 
@@ -196,7 +210,12 @@ impl JogController {
     }
 
     /// `None` where the jog is kept alive by this; else whether it takes the place of all that moves and waits.
-    fn go_on(&self, inner: &mut Inner, controls: &Controls, jog: Jog) -> Result<Option<bool>, String> {
+    fn go_on(
+        &self,
+        inner: &mut Inner,
+        controls: &Controls,
+        jog: Jog,
+    ) -> Result<Option<bool>, String> {
         if inner.moving.is_none() && inner.waiting.is_empty() {
             self.target(&jog, &inner.position)?;
         }
@@ -207,9 +226,16 @@ impl JogController {
         Ok(if moves || waits { None } else { Some(true) })
     }
 
-    fn step(&self, inner: &mut Inner, controls: &Controls, jog: Jog) -> Result<Option<bool>, String> {
+    fn step(
+        &self,
+        inner: &mut Inner,
+        controls: &Controls,
+        jog: Jog,
+    ) -> Result<Option<bool>, String> {
         let goes_on = |jog: &Jog| matches!(jog.reach, Reach::On { .. });
-        if inner.moving.is_some_and(|moving| goes_on(&moving.jog)) || inner.waiting.front().is_some_and(goes_on) {
+        if inner.moving.is_some_and(|moving| goes_on(&moving.jog))
+            || inner.waiting.front().is_some_and(goes_on)
+        {
             // Where it starts is known when what moves has come to rest: it is judged then.
             return Ok(Some(true));
         }
@@ -218,14 +244,19 @@ impl JogController {
         }
         if !controls.jog.let_go.load(Relaxed) {
             let start = inner.moving.map_or(inner.position, |moving| moving.end);
-            let start = inner.waiting.iter().try_fold(start, |at, step| self.target(step, &at))?;
+            let start = inner
+                .waiting
+                .iter()
+                .try_fold(start, |at, step| self.target(step, &at))?;
             self.target(&jog, &start)?;
         }
         Ok(Some(false))
     }
 
     fn begin(&self, inner: &mut Inner, jog: Jog) -> Result<Block, String> {
-        let Some(controls) = inner.controls.clone() else { return Err("the machine is not enabled".to_string()) };
+        let Some(controls) = inner.controls.clone() else {
+            return Err("the machine is not enabled".to_string());
+        };
         let end = self.target(&jog, &inner.position)?;
         let block = Block {
             kind: BlockKind::Line,
@@ -242,7 +273,11 @@ impl JogController {
         inner.moving = Some(Moving { jog, end });
         inner.ended_by_word = false;
         controls.jog.let_go.store(false, Relaxed);
-        let most = if matches!(jog.reach, Reach::On { .. }) { self.keep_alive_periods } else { 0 };
+        let most = if matches!(jog.reach, Reach::On { .. }) {
+            self.keep_alive_periods
+        } else {
+            0
+        };
         controls.jog.most_periods.store(most, Relaxed);
         Ok(block)
     }
@@ -261,7 +296,10 @@ impl JogController {
             && (if positive { at >= high } else { at <= low })
         {
             let where_it_is = if at == end { "at" } else { "beyond" };
-            return Err(format!("{name} stands {where_it_is} its travel limit, {}", self.shown(jog.axis, end)));
+            return Err(format!(
+                "{name} stands {where_it_is} its travel limit, {}",
+                self.shown(jog.axis, end)
+            ));
         }
         // Who stands outside of the travel may go inward, as far as he likes.
         if !(low.min(at)..=high.max(at)).contains(&end) {
@@ -278,7 +316,8 @@ impl JogController {
     fn judge_feed(&self, jog: &Jog, unknown: u32) -> Result<(), String> {
         let slowest = self.machine.unhomed_max_feed_mm_per_s[jog.axis];
         if unknown >> jog.axis & 1 == 1 && jog.feed_mm_per_s > slowest * (1.0 + 1e-12) {
-            let [asked, slowest] = [jog.feed_mm_per_s, slowest].map(|feed| self.shown(jog.axis, feed * 60.0));
+            let [asked, slowest] =
+                [jog.feed_mm_per_s, slowest].map(|feed| self.shown(jog.axis, feed * 60.0));
             let name = self.name(jog.axis);
             return Err(format!(
                 "it is not known where {name} stands: until it is homed its feed is at most {slowest}/min, not {asked}/min"
@@ -290,7 +329,10 @@ impl JogController {
             return Ok(());
         }
         let [asked, most] = [jog.feed_mm_per_s, most].map(|feed| self.shown(jog.axis, feed * 60.0));
-        Err(format!("a feed of {asked}/min is above the highest of {}, {most}/min", self.name(jog.axis)))
+        Err(format!(
+            "a feed of {asked}/min is above the highest of {}, {most}/min",
+            self.name(jog.axis)
+        ))
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -324,6 +366,10 @@ impl Moving {
             Reach::On { .. } => JogEnd::AtLimit,
             Reach::By { .. } => JogEnd::Arrived,
         };
-        JogRest { axis: self.jog.axis, end, position }
+        JogRest {
+            axis: self.jog.axis,
+            end,
+            position,
+        }
     }
 }

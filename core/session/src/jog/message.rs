@@ -84,11 +84,19 @@ impl JogMessage {
     /// There is no such axis, the units are those of the other kind, or a number makes no sense.
     pub fn on(&self, axes: &Axes) -> Result<Jog, String> {
         let letter = self.axis.to_ascii_lowercase();
-        let axis = axes.index(letter.to_ascii_uppercase()).ok_or_else(|| no_axis(axes, self.axis))?;
+        let axis = axes
+            .index(letter.to_ascii_uppercase())
+            .ok_or_else(|| no_axis(axes, self.axis))?;
         let rotary = axes.is_rotary(axis);
         if self.degrees.is_some_and(|degrees| degrees != rotary) {
-            let (kind, unit) = if rotary { ("rotary", "deg") } else { ("linear", "mm") };
-            return Err(format!("{letter} is a {kind} axis: its feed and distance are in {unit}"));
+            let (kind, unit) = if rotary {
+                ("rotary", "deg")
+            } else {
+                ("linear", "mm")
+            };
+            return Err(format!(
+                "{letter} is a {kind} axis: its feed and distance are in {unit}"
+            ));
         }
         let scale = if rotary { 1f64.to_radians() } else { 1.0 };
         if !(self.feed_per_min.is_finite() && self.feed_per_min > 0.0) {
@@ -96,16 +104,24 @@ impl JogMessage {
         }
         let reach = match self.reach {
             ReachMessage::On { positive } => Reach::On { positive },
-            ReachMessage::By(distance) if distance.is_finite() && distance != 0.0 => {
-                Reach::By { distance_mm: distance * scale }
+            ReachMessage::By(distance) if distance.is_finite() && distance != 0.0 => Reach::By {
+                distance_mm: distance * scale,
+            },
+            ReachMessage::By(distance) => {
+                return Err(format!("a distance of {distance} goes nowhere"));
             }
-            ReachMessage::By(distance) => return Err(format!("a distance of {distance} goes nowhere")),
         };
-        Ok(Jog { axis, reach, feed_mm_per_s: self.feed_per_min * scale / 60.0 })
+        Ok(Jog {
+            axis,
+            reach,
+            feed_mm_per_s: self.feed_per_min * scale / 60.0,
+        })
     }
 }
 
 fn no_axis(axes: &Axes, asked: char) -> String {
-    let all: Vec<String> = (0..axes.count()).map(|i| axes.letter(i).to_ascii_lowercase().to_string()).collect();
+    let all: Vec<String> = (0..axes.count())
+        .map(|i| axes.letter(i).to_ascii_lowercase().to_string())
+        .collect();
     format!("the machine has no axis {asked}; it has {}", all.join(", "))
 }

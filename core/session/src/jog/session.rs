@@ -54,7 +54,13 @@ impl<'a> JogSession<'a> {
         let judge = planner(&machine, registry)?;
         machine.limits = axis_limits(&machine, registry)?;
         let jogs = Arc::new(JogController::new(&machine, judge));
-        Ok(Self { machine, registry, switches, jogs, input: Arc::new(Mutex::new(input)) })
+        Ok(Self {
+            machine,
+            registry,
+            switches,
+            jogs,
+            input: Arc::new(Mutex::new(input)),
+        })
     }
 
     /// Where jogs are asked for.
@@ -67,15 +73,32 @@ impl<'a> JogSession<'a> {
     /// # Errors
     /// The plugins refuse, or do not go together.
     pub fn enable(&self) -> Result<Run, HostError> {
-        let source = Jogging { jogs: Arc::clone(&self.jogs), input: Arc::clone(&self.input), standing: 0 };
+        let source = Jogging {
+            jogs: Arc::clone(&self.jogs),
+            input: Arc::clone(&self.input),
+            standing: 0,
+        };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
-        let run = Run::of_source(machine, self.registry, name, Box::new(source), self.switches)?;
+        let run = Run::of_source(
+            machine,
+            self.registry,
+            name,
+            Box::new(source),
+            self.switches,
+        )?;
         let homed = if self.switches.home.is_some() {
-            self.machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis)
+            self.machine
+                .homing
+                .iter()
+                .fold(0, |axes, of| axes | 1 << of.axis)
         } else {
             0
         };
-        self.jogs.enable(run.controls(), self.switches.home.is_none(), run.unknown_axes() & !homed);
+        self.jogs.enable(
+            run.controls(),
+            self.switches.home.is_none(),
+            run.unknown_axes() & !homed,
+        );
         Ok(run)
     }
 

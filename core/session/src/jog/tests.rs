@@ -19,7 +19,8 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-4axis.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-4axis.toml");
         let machine = Machine::read(&path, &[]).unwrap();
         let mut registry = Registry::default();
         registry.register(tandem_look_ahead::PLUGIN).unwrap();
@@ -30,7 +31,12 @@ impl Rig {
     }
 
     fn ask(&self, axis: char, reach: ReachMessage) -> Result<(), String> {
-        let words = JogMessage { axis, reach, feed_per_min: 600.0, degrees: None };
+        let words = JogMessage {
+            axis,
+            reach,
+            feed_per_min: 600.0,
+            degrees: None,
+        };
         self.jogs.ask(words.on(&self.jogs.machine().axes)?)
     }
 
@@ -42,7 +48,13 @@ impl Rig {
     fn begins(&self) -> Option<AxisVector> {
         let mut items = vec![];
         self.jogs.next(&mut items);
-        items.first().map(|item| if let Item::Block(block, _) = item { block.end } else { unreachable!("only lines") })
+        items.first().map(|item| {
+            if let Item::Block(block, _) = item {
+                block.end
+            } else {
+                unreachable!("only lines")
+            }
+        })
     }
 
     fn is_let_go(&self) -> bool {
@@ -78,7 +90,10 @@ fn the_same_jog_again_is_a_keep_alive_and_another_one_stops_it() {
     rig.on('x', false).unwrap();
     assert!(rig.is_let_go());
     let rest = rig.rests_at(12.0).unwrap();
-    assert_eq!((rest.end, rest.position[0], rig.is_let_go()), (JogEnd::LetGo, 12.0, false));
+    assert_eq!(
+        (rest.end, rest.position[0], rig.is_let_go()),
+        (JogEnd::LetGo, 12.0, false)
+    );
     assert_eq!(rig.begins().unwrap()[0], -250.0);
     assert!(rig.begins().is_none(), "once");
 }
@@ -93,7 +108,11 @@ fn a_keep_alive_that_comes_while_the_machine_stops_starts_it_again() {
     rig.on('x', true).unwrap();
     assert_eq!(rig.rests_at(3.0).unwrap().end, JogEnd::LetGo);
     assert_eq!(rig.begins().unwrap()[0], 250.0);
-    assert_eq!(rig.rests_at(4.0).unwrap().end, JogEnd::Late, "nobody has asked for this rest");
+    assert_eq!(
+        rig.rests_at(4.0).unwrap().end,
+        JogEnd::Late,
+        "nobody has asked for this rest"
+    );
     assert!(rig.begins().is_none());
 }
 
@@ -101,10 +120,15 @@ fn a_keep_alive_that_comes_while_the_machine_stops_starts_it_again() {
 fn steps_wait_for_each_other_and_are_forgotten_at_a_stop() {
     let rig = Rig::new();
     for _ in 0..3 {
-        rig.ask('x', ReachMessage::By(100.0)).unwrap_or_else(|why| assert!(why.contains("300 mm"), "{why}"));
+        rig.ask('x', ReachMessage::By(100.0))
+            .unwrap_or_else(|why| assert!(why.contains("300 mm"), "{why}"));
     }
     assert_eq!(rig.begins().unwrap()[0], 100.0);
-    assert_eq!(rig.controls.jog.most_periods.load(Relaxed), 0, "a step needs no keep-alive");
+    assert_eq!(
+        rig.controls.jog.most_periods.load(Relaxed),
+        0,
+        "a step needs no keep-alive"
+    );
     let rest = rig.jogs.arrived().unwrap();
     assert_eq!((rest.end, rest.position[0]), (JogEnd::Arrived, 100.0));
     assert_eq!(rig.begins().unwrap()[0], 200.0);
@@ -112,8 +136,13 @@ fn steps_wait_for_each_other_and_are_forgotten_at_a_stop() {
     rig.jogs.let_go();
     assert_eq!(rig.rests_at(150.0).unwrap().end, JogEnd::LetGo);
     assert!(rig.begins().is_none() && rig.jogs.is_still());
-    let crowd = (0..20).filter_map(|_| rig.ask('x', ReachMessage::By(1.0)).err()).collect::<Vec<_>>();
-    assert_eq!((crowd.len(), crowd[0].as_str()), (4, "16 steps wait already"));
+    let crowd = (0..20)
+        .filter_map(|_| rig.ask('x', ReachMessage::By(1.0)).err())
+        .collect::<Vec<_>>();
+    assert_eq!(
+        (crowd.len(), crowd[0].as_str()),
+        (4, "16 steps wait already")
+    );
 }
 
 #[test]
@@ -121,16 +150,37 @@ fn degrees_become_radians_and_units_must_fit() {
     let rig = Rig::new();
     rig.ask('a', ReachMessage::By(90.0)).unwrap();
     assert_eq!(rig.begins().unwrap()[3], 90f64.to_radians());
-    let words = JogMessage { axis: 'a', reach: ReachMessage::By(1.0), feed_per_min: 1.0, degrees: Some(false) };
-    assert!(words.on(&rig.jogs.machine().axes).unwrap_err().contains("a is a rotary axis"));
+    let words = JogMessage {
+        axis: 'a',
+        reach: ReachMessage::By(1.0),
+        feed_per_min: 1.0,
+        degrees: Some(false),
+    };
+    assert!(
+        words
+            .on(&rig.jogs.machine().axes)
+            .unwrap_err()
+            .contains("a is a rotary axis")
+    );
     for (reach, feed_per_min, why) in [
         (ReachMessage::By(0.0), 1.0, "goes nowhere"),
         (ReachMessage::By(f64::NAN), 1.0, "goes nowhere"),
         (ReachMessage::By(1.0), 0.0, "not above zero"),
         (ReachMessage::By(1.0), f64::INFINITY, "not above zero"),
     ] {
-        let words = JogMessage { axis: 'x', reach, feed_per_min, degrees: None };
-        assert!(words.on(&rig.jogs.machine().axes).unwrap_err().contains(why), "{words:?}");
+        let words = JogMessage {
+            axis: 'x',
+            reach,
+            feed_per_min,
+            degrees: None,
+        };
+        assert!(
+            words
+                .on(&rig.jogs.machine().axes)
+                .unwrap_err()
+                .contains(why),
+            "{words:?}"
+        );
     }
 }
 
@@ -142,7 +192,10 @@ fn a_machine_that_is_not_enabled_is_not_jogged() {
     rig.jogs.enable(Arc::clone(&rig.controls), false, 0);
     assert!(rig.on('x', false).unwrap_err().contains("not ready"));
     assert!(rig.begins().is_none());
-    assert_eq!(rig.on('x', true).unwrap_err(), "x stands at its travel limit, 250 mm");
+    assert_eq!(
+        rig.on('x', true).unwrap_err(),
+        "x stands at its travel limit, 250 mm"
+    );
     rig.jogs.end();
     assert!(rig.on('x', false).is_err());
 }

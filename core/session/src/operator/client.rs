@@ -56,13 +56,28 @@ enum Phase {
 
 impl Client {
     /// A client that has just come.
-    pub fn new(stream: Box<dyn Stream>, is_guest: bool, session: Box<dyn Talk>, door: usize, now: Instant) -> Self {
+    pub fn new(
+        stream: Box<dyn Stream>,
+        is_guest: bool,
+        session: Box<dyn Talk>,
+        door: usize,
+        now: Instant,
+    ) -> Self {
         let mut outbox = Outbox::default();
         if let Some(greeting) = session.greeting() {
             // There is nothing in it yet.
             let _ = outbox.answer(&greeting);
         }
-        Self { stream, door, is_guest, incoming: vec![], outbox, session, phase: Phase::Talking, since: now }
+        Self {
+            stream,
+            door,
+            is_guest,
+            incoming: vec![],
+            outbox,
+            session,
+            phase: Phase::Talking,
+            since: now,
+        }
     }
 
     /// Who it is.
@@ -117,7 +132,11 @@ impl Client {
             self.outbox.telemetry(|lost| self.session.telemetry(lost));
         }
         self.send(now);
-        let most = if self.phase == Phase::Talking { TOKEN_WITHIN } else { PATIENCE };
+        let most = if self.phase == Phase::Talking {
+            TOKEN_WITHIN
+        } else {
+            PATIENCE
+        };
         if self.age(now) > most && (self.phase != Phase::Talking || !self.session.is_known()) {
             self.phase = Phase::Gone;
         }
@@ -164,7 +183,13 @@ impl Client {
 
     /// A line that it has not asked for.
     pub fn tell(&mut self, line: &str, now: Instant) {
-        self.take(&Answer { line: line.to_string(), last: false }, now);
+        self.take(
+            &Answer {
+                line: line.to_string(),
+                last: false,
+            },
+            now,
+        );
         self.send(now);
     }
 
@@ -177,7 +202,9 @@ impl Client {
                 self.incoming.extend_from_slice(&chunk[..count]);
                 self.lines(lease, now);
             }
-            Err(error) if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+            Err(error)
+                if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
                 self.phase = Phase::Gone;
             }
             _ => {}
@@ -200,7 +227,8 @@ impl Client {
             let answer = match end {
                 Some(end) if end <= most => {
                     let line: Vec<u8> = self.incoming.drain(..=end).collect();
-                    self.session.line(&String::from_utf8_lossy(&line[..end]), lease, now)
+                    self.session
+                        .line(&String::from_utf8_lossy(&line[..end]), lease, now)
                 }
                 None if self.incoming.len() <= most => return,
                 _ => self.session.too_long(),

@@ -63,7 +63,10 @@ pub struct OneRun(pub Arc<OperatorHub>);
 
 impl House for OneRun {
     fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
-        Box::new(Protocol1 { hub: Arc::clone(&self.0), session: Session::new(number, token) })
+        Box::new(Protocol1 {
+            hub: Arc::clone(&self.0),
+            session: Session::new(number, token),
+        })
     }
 
     fn set_clients(&self, count: usize) {

@@ -79,7 +79,10 @@ impl OperatorHub {
     /// The hub of a session that jogs.
     #[must_use]
     pub fn with_jogs(self, jogs: Arc<JogController>) -> Self {
-        Self { jogs: Some(jogs), ..self }
+        Self {
+            jogs: Some(jogs),
+            ..self
+        }
     }
 
     /// Gives a command: the one way to the fine loop for keys and sockets. It acts in the next fine period. The answer is
@@ -107,7 +110,10 @@ impl OperatorHub {
     /// # Errors
     /// Nothing is jogged here, or the jog is refused; nothing has changed.
     pub fn jog(&self, words: Option<&JogMessage>) -> Result<u64, String> {
-        let jogs = self.jogs.as_ref().ok_or("nothing is jogged here: tandem jog does")?;
+        let jogs = self
+            .jogs
+            .as_ref()
+            .ok_or("nothing is jogged here: tandem jog does")?;
         match words {
             Some(words) => jogs.ask(words.on(&self.axes)?)?,
             None => jogs.let_go(),
@@ -124,11 +130,15 @@ impl OperatorHub {
         if command == Command::Resume
             && let Some(names) = holding_inputs(&self.machine, self.status.tripped.load(Relaxed))
         {
-            return Err(format!("{names} still holds the machine: resume when it is closed"));
+            return Err(format!(
+                "{names} still holds the machine: resume when it is closed"
+            ));
         }
         match command {
             Command::Reset => self.check_reset(),
-            Command::StallRough(_) => Err("stall-rough is for tests, from a command file".to_string()),
+            Command::StallRough(_) => {
+                Err("stall-rough is for tests, from a command file".to_string())
+            }
             command => command.check(self.max_feed_ratio),
         }
     }
@@ -140,7 +150,9 @@ impl OperatorHub {
         }
         let words = match MachineState::from_number(self.status.state.load(Relaxed)) {
             MachineState::Stopping => "the machine is still being brought to rest",
-            MachineState::Fault => "the fault ends this run: the next one resets the drives with --reset",
+            MachineState::Fault => {
+                "the fault ends this run: the next one resets the drives with --reset"
+            }
             _ => "there is no fault to reset",
         };
         Err(words.to_string())
@@ -150,7 +162,12 @@ impl OperatorHub {
     pub fn begin_job(&self) {
         let mut latest = self.latest();
         (latest.fault, latest.stopped, latest.waits_on_line) = (None, None, None);
-        (latest.waits_for_reset, latest.ended, latest.progress, latest.sigma) = (false, false, 0.0, 1.0);
+        (
+            latest.waits_for_reset,
+            latest.ended,
+            latest.progress,
+            latest.sigma,
+        ) = (false, false, 0.0, 1.0);
         drop(latest);
         self.go_on.store(false, Release);
     }
@@ -224,7 +241,13 @@ impl OperatorHub {
 
     /// Whether a stop for good is on its way: an abort or an emergency stop.
     pub fn is_stopping(&self) -> bool {
-        [&self.controls.abort, &self.controls.emergency_stop, &self.controls.soft_fault].iter().any(|s| s.load(Relaxed))
+        [
+            &self.controls.abort,
+            &self.controls.emergency_stop,
+            &self.controls.soft_fault,
+        ]
+        .iter()
+        .any(|s| s.load(Relaxed))
     }
 
     /// The line on which the program waits, if it does.
@@ -254,11 +277,20 @@ impl OperatorHub {
         let latest = self.latest();
         let state = MachineState::from_number(status.state.load(Relaxed));
         StatusLine {
-            state: if latest.fault.is_some() { MachineState::Fault } else { state }.name(),
+            state: if latest.fault.is_some() {
+                MachineState::Fault
+            } else {
+                state
+            }
+            .name(),
             tick: status.tick.load(Relaxed),
             line: status.line.load(Relaxed),
             position: Position::new(&self.axes, &latest.position),
-            feed_mm_per_min: if latest.ended { 0.0 } else { status.feed_mm_per_s.load() * 60.0 },
+            feed_mm_per_min: if latest.ended {
+                0.0
+            } else {
+                status.feed_mm_per_s.load() * 60.0
+            },
             sigma: latest.sigma,
             feed_override: controls.feed_override.load(),
             rapid_override: controls.rapid_override.load(),

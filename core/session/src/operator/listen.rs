@@ -70,7 +70,10 @@ stream!(TcpStream);
 #[derive(Debug)]
 pub enum Door {
     /// The file's mode lets the owner in alone.
-    Unix(UnixListener, #[allow(dead_code, reason = "the file goes with it")] SocketFile),
+    Unix(
+        UnixListener,
+        #[allow(dead_code, reason = "the file goes with it")] SocketFile,
+    ),
     /// Whoever knows the token.
     Tcp(TcpListener, String),
 }
@@ -103,7 +106,11 @@ impl Door {
                 stream.set_nonblocking(true)?;
                 bound_buffer(&stream);
                 let is_guest = !is_owner(&stream);
-                Ok(Comer { stream: Box::new(stream), token: None, is_guest })
+                Ok(Comer {
+                    stream: Box::new(stream),
+                    token: None,
+                    is_guest,
+                })
             }
             Self::Tcp(listener, token) => {
                 let stream = listener.accept()?.0;
@@ -111,7 +118,11 @@ impl Door {
                 // Answers are short and wait for nothing.
                 let _ = stream.set_nodelay(true);
                 bound_buffer(&stream);
-                Ok(Comer { stream: Box::new(stream), token: Some(token.clone()), is_guest: false })
+                Ok(Comer {
+                    stream: Box::new(stream),
+                    token: Some(token.clone()),
+                    is_guest: false,
+                })
             }
         }
     }
@@ -151,13 +162,19 @@ fn bound_buffer(stream: &impl AsFd) {
 
 fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
     if !address.ip().is_loopback() {
-        return Err(format!("{address}: operators are let in from this computer alone: 127.0.0.1 or [::1]"));
+        return Err(format!(
+            "{address}: operators are let in from this computer alone: 127.0.0.1 or [::1]"
+        ));
     }
-    let file =
-        listen.token_file.as_ref().ok_or("a TCP address needs a token file: anybody on this computer reaches it")?;
+    let file = listen
+        .token_file
+        .as_ref()
+        .ok_or("a TCP address needs a token file: anybody on this computer reaches it")?;
     let token = token::of_file(file)?;
     let listener = TcpListener::bind(address).map_err(|e| format!("{address}: {e}"))?;
-    listener.set_nonblocking(true).map_err(|e| format!("{address}: {e}"))?;
+    listener
+        .set_nonblocking(true)
+        .map_err(|e| format!("{address}: {e}"))?;
     Ok(Door::Tcp(listener, token))
 }
 
@@ -174,9 +191,18 @@ mod tests {
             token_file: token.then(|| folder.path().join("token")),
         };
         for elsewhere in ["0.0.0.0:0", "192.168.0.1:5000", "[::]:0"] {
-            assert!(Door::open(&listen(elsewhere, true)).unwrap_err().contains("this computer alone"), "{elsewhere}");
+            assert!(
+                Door::open(&listen(elsewhere, true))
+                    .unwrap_err()
+                    .contains("this computer alone"),
+                "{elsewhere}"
+            );
         }
-        assert!(Door::open(&listen("127.0.0.1:0", false)).unwrap_err().contains("token file"));
+        assert!(
+            Door::open(&listen("127.0.0.1:0", false))
+                .unwrap_err()
+                .contains("token file")
+        );
         let doors = Door::open(&listen("127.0.0.1:0", true)).unwrap();
         assert_ne!(doors[0].address().unwrap().port(), 0);
     }

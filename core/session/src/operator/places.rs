@@ -31,11 +31,17 @@ pub fn make_place_for_stranger(clients: &mut [Client], door: usize, now: Instant
     if has_place(clients, door, Standing::Stranger) {
         return true;
     }
-    let strangers = clients.iter_mut().filter(|client| is(client, door, Standing::Stranger));
-    let Some(oldest) = strangers.max_by_key(|client| client.age(now)).filter(|oldest| oldest.age(now) >= GRACE) else {
+    let strangers = clients
+        .iter_mut()
+        .filter(|client| is(client, door, Standing::Stranger));
+    let Some(oldest) = strangers
+        .max_by_key(|client| client.age(now))
+        .filter(|oldest| oldest.age(now) >= GRACE)
+    else {
         return false;
     };
-    let why = "its place is needed: the first line over TCP is {\"token\":\"…\"}, at once".to_string();
+    let why =
+        "its place is needed: the first line over TCP is {\"token\":\"…\"}, at once".to_string();
     oldest.turn_away(&Problem::refused("the connection", why), now);
     oldest.drop_now();
     true
@@ -50,7 +56,10 @@ fn most(standing: Standing) -> usize {
 }
 
 fn count(clients: &[Client], door: usize, standing: Standing) -> usize {
-    clients.iter().filter(|client| is(client, door, standing)).count()
+    clients
+        .iter()
+        .filter(|client| is(client, door, standing))
+        .count()
 }
 
 fn is(client: &Client, door: usize, standing: Standing) -> bool {

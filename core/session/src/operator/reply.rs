@@ -24,7 +24,11 @@ pub struct Problem {
 impl Problem {
     /// A line that cannot be understood: the connection closes.
     pub fn malformed(place: &str, why: &str) -> Self {
-        Self { what: "malformed line", place: place.to_string(), why: why.to_string() }
+        Self {
+            what: "malformed line",
+            place: place.to_string(),
+            why: why.to_string(),
+        }
     }
 
     /// A line that is no JSON, or JSON of the wrong form.
@@ -38,7 +42,11 @@ impl Problem {
     /// A request in whose handling the host failed: the connection closes.
     pub fn defect() -> Self {
         let why = "a defect of tandem: this connection ends, everything else goes on; standard error has the words";
-        Self { what: "failed", place: "the whole line".to_string(), why: why.to_string() }
+        Self {
+            what: "failed",
+            place: "the whole line".to_string(),
+            why: why.to_string(),
+        }
     }
 
     /// There is no place for one more of a client's kind, of which there may be `most`.
@@ -53,14 +61,20 @@ impl Problem {
 
     /// A request that is understood and not granted: the connection stays.
     pub fn refused(place: &str, why: String) -> Self {
-        Self { what: REFUSED, place: place.to_string(), why }
+        Self {
+            what: REFUSED,
+            place: place.to_string(),
+            why,
+        }
     }
 }
 
 /// The answer to a request that was not granted, on line `number` of the connection.
 pub fn error(number: u64, problem: &Problem) -> String {
     let Problem { what, place, why } = problem;
-    line(&json!({ "error": { "what": what, "where": format!("line {number}: {place}"), "why": why } }))
+    line(
+        &json!({ "error": { "what": what, "where": format!("line {number}: {place}"), "why": why } }),
+    )
 }
 
 /// The answer to a request that was granted.
@@ -78,7 +92,9 @@ pub fn status(status: &StatusLine) -> String {
     struct Inner<'a> {
         status: &'a StatusLine,
     }
-    line(&Answer { ok: Inner { status } })
+    line(&Answer {
+        ok: Inner { status },
+    })
 }
 
 /// A status line that was subscribed to; `lost` of them did not fit since the last one.
@@ -94,7 +110,9 @@ pub fn telemetry(status: &StatusLine, lost: u64) -> String {
 /// What becomes of the lease, to the client that holds it or held it; it is no answer.
 pub fn lease(news: News) -> String {
     let words = match news {
-        News::AskedBy(client) => json!({ "asked_by": client, "answer_within_s": ANSWER_WITHIN.as_secs_f64() }),
+        News::AskedBy(client) => {
+            json!({ "asked_by": client, "answer_within_s": ANSWER_WITHIN.as_secs_f64() })
+        }
         News::LostTo(client) => json!({ "lost_to": client }),
     };
     line(&json!({ "lease": words }))
@@ -113,8 +131,15 @@ pub fn ended(status: &StatusLine, lost: u64) -> String {
         fault: Option<&'a str>,
         stopped: Option<&'a str>,
     }
-    let end = End { fault: status.fault.as_deref(), stopped: status.stopped.as_deref() };
-    line(&Last { ended: end, status, lost })
+    let end = End {
+        fault: status.fault.as_deref(),
+        stopped: status.stopped.as_deref(),
+    };
+    line(&Last {
+        ended: end,
+        status,
+        lost,
+    })
 }
 
 fn line(value: &impl Serialize) -> String {

@@ -134,38 +134,74 @@ impl<'de> Visitor<'de> for ScalarVisitor {
 /// The line is malformed: what, where, why.
 pub fn parse(text: &str) -> Result<Request, Problem> {
     let line: Line = serde_json::from_str(text).map_err(|error| Problem::of_json(&error))?;
-    let Line { command, value, subscribe, status, lease, jog, token } = line;
+    let Line {
+        command,
+        value,
+        subscribe,
+        status,
+        lease,
+        jog,
+        token,
+    } = line;
     let commands = command.map(|name| to_command(&name, value.as_ref()));
     if commands.is_none() && value.is_some() {
-        return Err(Problem::malformed("key \"value\"", "it goes with \"command\""));
+        return Err(Problem::malformed(
+            "key \"value\"",
+            "it goes with \"command\"",
+        ));
     }
     let requests = [
         commands.transpose()?,
         subscribe.map(rate).transpose()?,
         status.map(|_| Request::Status),
         lease.map(Request::Lease),
-        jog.map(|line| line.read().map_err(|why| Problem::malformed("key \"jog\"", why))).transpose()?,
+        jog.map(|line| {
+            line.read()
+                .map_err(|why| Problem::malformed("key \"jog\"", why))
+        })
+        .transpose()?,
         token.map(Request::Token),
     ];
     let mut requests = requests.into_iter().flatten();
     match (requests.next(), requests.next()) {
         (Some(request), None) => Ok(request),
-        (None, _) => Err(Problem::malformed("the whole line", "it has none of command, subscribe, status, lease, jog")),
-        (Some(_), Some(_)) => Err(Problem::malformed("the whole line", "it asks for more than one thing")),
+        (None, _) => Err(Problem::malformed(
+            "the whole line",
+            "it has none of command, subscribe, status, lease, jog",
+        )),
+        (Some(_), Some(_)) => Err(Problem::malformed(
+            "the whole line",
+            "it asks for more than one thing",
+        )),
     }
 }
 
 fn to_command(name: &str, value: Option<&Scalar>) -> Result<Request, Problem> {
     let text = value.map(|Scalar(text)| text.as_str());
-    let place = if value.is_some() { "keys \"command\" and \"value\"" } else { "key \"command\"" };
-    Command::parse(name, text).map(Request::Command).map_err(|why| Problem::malformed(place, &why))
+    let place = if value.is_some() {
+        "keys \"command\" and \"value\""
+    } else {
+        "key \"command\""
+    };
+    Command::parse(name, text)
+        .map(Request::Command)
+        .map_err(|why| Problem::malformed(place, &why))
 }
 
 impl JogLine {
     fn read(&self) -> Result<Request, &'static str> {
-        let of_jog = [self.distance_mm, self.distance_deg, self.feed_mm_per_min, self.feed_deg_per_min];
+        let of_jog = [
+            self.distance_mm,
+            self.distance_deg,
+            self.feed_mm_per_min,
+            self.feed_deg_per_min,
+        ];
         let stops = self.stop == Some(true);
-        if stops && self.axis.is_none() && self.direction.is_none() && of_jog.iter().all(Option::is_none) {
+        if stops
+            && self.axis.is_none()
+            && self.direction.is_none()
+            && of_jog.iter().all(Option::is_none)
+        {
             return Ok(Request::Jog(None));
         }
         if self.stop.is_some() {
@@ -176,18 +212,29 @@ impl JogLine {
             (None, Some(feed)) => (feed, true),
             _ => return Err("it needs one of feed_mm_per_min and feed_deg_per_min"),
         };
-        let distance = if degrees { self.distance_deg } else { self.distance_mm };
+        let distance = if degrees {
+            self.distance_deg
+        } else {
+            self.distance_mm
+        };
         if self.distance_mm.or(self.distance_deg) != distance {
             return Err("feed and distance are both in mm or both in deg");
         }
         let reach = match (self.direction, distance) {
-            (Some(direction @ (1 | -1)), None) => ReachMessage::On { positive: direction == 1 },
+            (Some(direction @ (1 | -1)), None) => ReachMessage::On {
+                positive: direction == 1,
+            },
             (None, Some(distance)) => ReachMessage::By(distance),
             (Some(_), None) => return Err("\"direction\" is 1 or -1"),
             _ => return Err("it needs one of direction and distance"),
         };
         let axis = self.axis.ok_or("it needs an axis")?;
-        Ok(Request::Jog(Some(JogMessage { axis, reach, feed_per_min, degrees: Some(degrees) })))
+        Ok(Request::Jog(Some(JogMessage {
+            axis,
+            reach,
+            feed_per_min,
+            degrees: Some(degrees),
+        })))
     }
 }
 
@@ -207,29 +254,61 @@ mod tests {
     use super::*;
 
     fn jog(reach: ReachMessage, degrees: bool) -> Request {
-        Request::Jog(Some(JogMessage { axis: 'x', reach, feed_per_min: 600.0, degrees: Some(degrees) }))
+        Request::Jog(Some(JogMessage {
+            axis: 'x',
+            reach,
+            feed_per_min: 600.0,
+            degrees: Some(degrees),
+        }))
     }
 
     #[test]
     fn every_request() {
         for (text, request) in [
             (r#"{"command":"hold"}"#, Request::Command(Command::Hold)),
-            (r#"{"command":"feed-override","value":0.5}"#, Request::Command(Command::FeedOverride(0.5))),
-            (r#"{"command":"single-block","value":true}"#, Request::Command(Command::SingleBlock(true))),
-            (r#"{"command":"optional-stop","value":0}"#, Request::Command(Command::OptionalStop(false))),
-            (r#"{"command":"emergency-stop"}"#, Request::Command(Command::EmergencyStop)),
-            (r#"{"subscribe":{"rate_hz":20}}"#, Request::Subscribe(Some(20.0))),
-            (r#"{"subscribe":{"rate_hz":-0.0}}"#, Request::Subscribe(None)),
+            (
+                r#"{"command":"feed-override","value":0.5}"#,
+                Request::Command(Command::FeedOverride(0.5)),
+            ),
+            (
+                r#"{"command":"single-block","value":true}"#,
+                Request::Command(Command::SingleBlock(true)),
+            ),
+            (
+                r#"{"command":"optional-stop","value":0}"#,
+                Request::Command(Command::OptionalStop(false)),
+            ),
+            (
+                r#"{"command":"emergency-stop"}"#,
+                Request::Command(Command::EmergencyStop),
+            ),
+            (
+                r#"{"subscribe":{"rate_hz":20}}"#,
+                Request::Subscribe(Some(20.0)),
+            ),
+            (
+                r#"{"subscribe":{"rate_hz":-0.0}}"#,
+                Request::Subscribe(None),
+            ),
             (r#"{"status":{}}"#, Request::Status),
             (r#"{"lease":"take"}"#, Request::Lease(LeaseWord::Take)),
-            (r#"{"lease":"take-over"}"#, Request::Lease(LeaseWord::TakeOver)),
-            (r#" { "lease" : "release" } "#, Request::Lease(LeaseWord::Release)),
+            (
+                r#"{"lease":"take-over"}"#,
+                Request::Lease(LeaseWord::TakeOver),
+            ),
+            (
+                r#" { "lease" : "release" } "#,
+                Request::Lease(LeaseWord::Release),
+            ),
             (r#"{"jog":{"stop":true}}"#, Request::Jog(None)),
             (
                 r#"{"jog":{"axis":"x","feed_mm_per_min":600,"direction":-1}}"#,
                 jog(ReachMessage::On { positive: false }, false),
             ),
-            (r#"{"jog":{"axis":"x","distance_deg":0.1,"feed_deg_per_min":600}}"#, jog(ReachMessage::By(0.1), true)),
+            (
+                r#"{"jog":{"axis":"x","distance_deg":0.1,"feed_deg_per_min":600}}"#,
+                jog(ReachMessage::By(0.1), true),
+            ),
             (r#"{"token":"abc"}"#, Request::Token("abc".to_string())),
         ] {
             assert_eq!(parse(text), Ok(request), "{text}");
@@ -238,9 +317,16 @@ mod tests {
 
     #[test]
     fn a_value_that_nests_deeper_than_a_stack_is_refused_like_any_other() {
-        let deep = format!(r#"{{"command":"feed-override","value":{}1{}}}"#, "[".repeat(120), "]".repeat(120));
+        let deep = format!(
+            r#"{{"command":"feed-override","value":{}1{}}}"#,
+            "[".repeat(120),
+            "]".repeat(120)
+        );
         assert!(parse(&deep).unwrap_err().why.contains("not a number"));
-        let deeper = format!(r#"{{"command":"feed-override","value":{}"#, "{\"a\":".repeat(800));
+        let deeper = format!(
+            r#"{{"command":"feed-override","value":{}"#,
+            "{\"a\":".repeat(800)
+        );
         assert!(parse(&deeper).is_err());
     }
 
@@ -253,28 +339,87 @@ mod tests {
             ("{}", "the whole line", "none of"),
             ("[]", "column", "invalid"),
             (r#"{"comand":"hold"}"#, "column 9", "unknown field `comand`"),
-            (r#"{"command":"hodl"}"#, "\"command\"", "no command is called \"hodl\""),
-            (r#"{"command":"hold","value":1}"#, "\"value\"", "takes no value"),
-            (r#"{"command":"feed-override"}"#, "\"command\"", "needs a value"),
-            (r#"{"command":"feed-override","value":-1}"#, "\"value\"", "zero or more"),
-            (r#"{"command":"feed-override","value":{}}"#, "\"value\"", "not a number"),
+            (
+                r#"{"command":"hodl"}"#,
+                "\"command\"",
+                "no command is called \"hodl\"",
+            ),
+            (
+                r#"{"command":"hold","value":1}"#,
+                "\"value\"",
+                "takes no value",
+            ),
+            (
+                r#"{"command":"feed-override"}"#,
+                "\"command\"",
+                "needs a value",
+            ),
+            (
+                r#"{"command":"feed-override","value":-1}"#,
+                "\"value\"",
+                "zero or more",
+            ),
+            (
+                r#"{"command":"feed-override","value":{}}"#,
+                "\"value\"",
+                "not a number",
+            ),
             (r#"{"value":1,"status":{}}"#, "\"value\"", "goes with"),
-            (r#"{"status":{},"lease":"take"}"#, "the whole line", "more than one"),
+            (
+                r#"{"status":{},"lease":"take"}"#,
+                "the whole line",
+                "more than one",
+            ),
             (r#"{"lease":"steal"}"#, "column", "unknown variant"),
-            (r#"{"subscribe":{"rate_hz":1000}}"#, "\"rate_hz\"", "within 0.01 to 100"),
-            (r#"{"subscribe":{"rate_hz":1e-21}}"#, "\"rate_hz\"", "within 0.01 to 100"),
-            (r#"{"subscribe":{"rate_hz":-1}}"#, "\"rate_hz\"", "within 0.01 to 100"),
+            (
+                r#"{"subscribe":{"rate_hz":1000}}"#,
+                "\"rate_hz\"",
+                "within 0.01 to 100",
+            ),
+            (
+                r#"{"subscribe":{"rate_hz":1e-21}}"#,
+                "\"rate_hz\"",
+                "within 0.01 to 100",
+            ),
+            (
+                r#"{"subscribe":{"rate_hz":-1}}"#,
+                "\"rate_hz\"",
+                "within 0.01 to 100",
+            ),
             (r#"{"jog":{}}"#, "\"jog\"", "feed_mm_per_min"),
-            (r#"{"jog":{"axis":"xy","feed_mm_per_min":1,"direction":1}}"#, "column", "character"),
-            (r#"{"jog":{"feed_mm_per_min":1,"direction":1}}"#, "\"jog\"", "an axis"),
-            (r#"{"jog":{"axis":"x","feed_mm_per_min":1,"direction":2}}"#, "\"jog\"", "1 or -1"),
-            (r#"{"jog":{"axis":"x","feed_mm_per_min":1,"distance_deg":2}}"#, "\"jog\"", "both in mm"),
-            (r#"{"jog":{"axis":"x","feed_mm_per_min":1}}"#, "\"jog\"", "direction and distance"),
+            (
+                r#"{"jog":{"axis":"xy","feed_mm_per_min":1,"direction":1}}"#,
+                "column",
+                "character",
+            ),
+            (
+                r#"{"jog":{"feed_mm_per_min":1,"direction":1}}"#,
+                "\"jog\"",
+                "an axis",
+            ),
+            (
+                r#"{"jog":{"axis":"x","feed_mm_per_min":1,"direction":2}}"#,
+                "\"jog\"",
+                "1 or -1",
+            ),
+            (
+                r#"{"jog":{"axis":"x","feed_mm_per_min":1,"distance_deg":2}}"#,
+                "\"jog\"",
+                "both in mm",
+            ),
+            (
+                r#"{"jog":{"axis":"x","feed_mm_per_min":1}}"#,
+                "\"jog\"",
+                "direction and distance",
+            ),
             (r#"{"jog":{"stop":true,"axis":"x"}}"#, "\"jog\"", "alone"),
             (r#"{"status":{},"status":{}}"#, "column", "duplicate field"),
         ] {
             let problem = parse(text).expect_err(text);
-            assert!(problem.place.contains(place) && problem.why.contains(why), "{text}: {problem:?}");
+            assert!(
+                problem.place.contains(place) && problem.why.contains(why),
+                "{text}: {problem:?}"
+            );
         }
     }
 }

@@ -56,10 +56,17 @@ impl Server {
         let over = Arc::new(AtomicBool::new(false));
         let mut room = Room::new(house, doors);
         let seen = Arc::clone(&over);
-        let builder = thread::Builder::new().name("tandem-operator".to_string()).stack_size(STACK_BYTES);
+        let builder = thread::Builder::new()
+            .name("tandem-operator".to_string())
+            .stack_size(STACK_BYTES);
         let handle = builder.spawn(move || room.serve(&seen));
-        let handle = handle.map_err(|e| format!("the thread for operators cannot be started: {e}"))?;
-        Ok(Self { over, handle: Some(handle), address })
+        let handle =
+            handle.map_err(|e| format!("the thread for operators cannot be started: {e}"))?;
+        Ok(Self {
+            over,
+            handle: Some(handle),
+            address,
+        })
     }
 }
 
@@ -88,7 +95,14 @@ struct Room {
 impl Room {
     fn new(house: Arc<dyn House>, doors: Vec<Door>) -> Self {
         let shut_until = doors.iter().map(|_| None).collect();
-        Self { house, doors, shut_until, clients: vec![], lease: Lease::default(), comers: 0 }
+        Self {
+            house,
+            doors,
+            shut_until,
+            clients: vec![],
+            lease: Lease::default(),
+            comers: 0,
+        }
     }
 
     fn serve(&mut self, over: &AtomicBool) {
@@ -121,13 +135,22 @@ impl Room {
             }
         }
         for (number, news) in self.lease.news() {
-            if let Some(client) = self.clients.iter_mut().find(|client| client.number() == number) {
+            if let Some(client) = self
+                .clients
+                .iter_mut()
+                .find(|client| client.number() == number)
+            {
                 client.tell_of_lease(news, now);
             }
         }
         self.deliver(now);
         self.clients.retain(|client| !client.is_gone());
-        self.house.set_clients(self.clients.iter().filter(|client| client.is_talking()).count());
+        self.house.set_clients(
+            self.clients
+                .iter()
+                .filter(|client| client.is_talking())
+                .count(),
+        );
     }
 
     /// Hands out what nobody has asked for in this moment.
@@ -137,8 +160,13 @@ impl Room {
             let _ = std::io::Read::read(&mut bell, &mut [0; 64]);
         }
         for (to, line) in self.house.post() {
-            let for_it = |client: &&mut Client| client.is_talking() && to.is_none_or(|to| client.number() == to);
-            self.clients.iter_mut().filter(for_it).for_each(|client| client.tell(&line, now));
+            let for_it = |client: &&mut Client| {
+                client.is_talking() && to.is_none_or(|to| client.number() == to)
+            };
+            self.clients
+                .iter_mut()
+                .filter(for_it)
+                .for_each(|client| client.tell(&line, now));
         }
     }
 
@@ -184,15 +212,25 @@ impl Room {
         let doors_due = self.shut_until.iter().flatten().min();
         let due = [due, doors_due.copied()].into_iter().flatten().min();
         let sleep = due.map_or(most, |due| due.saturating_duration_since(now).min(most));
-        let open = self.doors.iter().zip(&self.shut_until).filter(|(_, shut)| shut.is_none());
+        let open = self
+            .doors
+            .iter()
+            .zip(&self.shut_until)
+            .filter(|(_, shut)| shut.is_none());
         let doors = open.map(|(door, _)| PollFd::from_borrowed_fd(door.fd(), PollFlags::IN));
         let clients = self.clients.iter().map(|client| {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)
         });
-        let bell = self.house.bell().map(|bell| PollFd::new(bell, PollFlags::IN));
+        let bell = self
+            .house
+            .bell()
+            .map(|bell| PollFd::new(bell, PollFlags::IN));
         let mut all: Vec<PollFd<'_>> = doors.chain(clients).chain(bell).collect();
-        let timeout = Timespec { tv_sec: 0, tv_nsec: i64::from(sleep.subsec_nanos()) };
+        let timeout = Timespec {
+            tv_sec: 0,
+            tv_nsec: i64::from(sleep.subsec_nanos()),
+        };
         // A signal ends the sleep early: a round more does no harm.
         let _ = poll(&mut all, Some(&timeout));
     }

@@ -40,9 +40,17 @@ impl Stream for Defective {
 }
 
 fn room() -> Room {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
     let machine = Machine::read(&path, &[]).unwrap();
-    Room::new(Arc::new(OneRun(Arc::new(OperatorHub::new(&machine, Arc::default(), Arc::default())))), vec![])
+    Room::new(
+        Arc::new(OneRun(Arc::new(OperatorHub::new(
+            &machine,
+            Arc::default(),
+            Arc::default(),
+        )))),
+        vec![],
+    )
 }
 
 impl Room {
@@ -82,8 +90,16 @@ fn a_panic_in_the_handling_of_a_client_ends_that_client_and_no_other() {
     room.lease.take(2, now).unwrap();
     assert!(room.ask(&mut friend, r#"{"command":"hold"}"#, now)["ok"].is_object());
     assert_eq!(hear(&mut BufReader::new(theirs))["error"]["what"], "failed");
-    assert!(!room.clients.iter().any(|client| client.number() == 2 && client.is_talking()));
-    assert!(room.ask(&mut friend, r#"{"lease":"take"}"#, now)["ok"].is_object(), "the lease went with it");
+    assert!(
+        !room
+            .clients
+            .iter()
+            .any(|client| client.number() == 2 && client.is_talking())
+    );
+    assert!(
+        room.ask(&mut friend, r#"{"lease":"take"}"#, now)["ok"].is_object(),
+        "the lease went with it"
+    );
     room.round(now);
     assert!(room.ask(&mut friend, r#"{"command":"resume"}"#, now)["ok"].is_object());
 }
@@ -95,7 +111,13 @@ fn a_hung_holder_of_the_lease_loses_it_to_who_asks_twice_and_is_told() {
     let take = r#"{"lease":"take"}"#;
     room.ask(&mut hung, take, now);
     let refusal = room.ask(&mut other, take, now);
-    assert!(refusal["error"]["why"].as_str().unwrap().contains("client 1 holds the lease"), "{refusal}");
+    assert!(
+        refusal["error"]["why"]
+            .as_str()
+            .unwrap()
+            .contains("client 1 holds the lease"),
+        "{refusal}"
+    );
     assert_eq!(hear(&mut hung)["lease"]["asked_by"], 2);
     let later = now + Duration::from_secs(4);
     assert!(room.ask(&mut other, take, later)["error"].is_object());
@@ -129,6 +151,9 @@ fn the_lease_is_taken_over_from_whoever_holds_it_by_an_explicit_request() {
     assert!(room.ask(&mut other, r#"{"lease":"take-over"}"#, now)["ok"].is_object());
     assert_eq!(hear(&mut holder)["lease"]["lost_to"], 2);
     assert!(room.ask(&mut holder, r#"{"command":"abort"}"#, now)["error"].is_object());
-    assert!(room.ask(&mut holder, r#"{"command":"hold"}"#, now)["ok"].is_object(), "to hold needs no lease");
+    assert!(
+        room.ask(&mut holder, r#"{"command":"hold"}"#, now)["ok"].is_object(),
+        "to hold needs no lease"
+    );
     assert!(room.ask(&mut other, r#"{"command":"resume"}"#, now)["ok"].is_object());
 }

@@ -46,7 +46,13 @@ struct Subscription {
 impl Session {
     /// A client that has just come; over TCP its first line names `token`.
     pub fn new(client: u64, token: Option<String>) -> Self {
-        Self { client, token, has_place: true, lines: 0, subscription: None }
+        Self {
+            client,
+            token,
+            has_place: true,
+            lines: 0,
+            subscription: None,
+        }
     }
 
     /// Whether the client has said who it is, or need not.
@@ -55,14 +61,27 @@ impl Session {
     }
 
     /// Answers a line.
-    pub fn line(&mut self, text: &str, hub: &OperatorHub, lease: &mut Lease, now: Instant) -> Answer {
+    pub fn line(
+        &mut self,
+        text: &str,
+        hub: &OperatorHub,
+        lease: &mut Lease,
+        now: Instant,
+    ) -> Answer {
         self.lines += 1;
         lease.hears(self.client);
         let request = match parse(text) {
             Ok(request) => request,
             // Who has not said yet who it is has one line.
-            Err(problem) if problem.ends_connection() || !self.is_known() => return self.close(&problem),
-            Err(problem) => return Answer { line: reply::error(self.lines, &problem), last: false },
+            Err(problem) if problem.ends_connection() || !self.is_known() => {
+                return self.close(&problem);
+            }
+            Err(problem) => {
+                return Answer {
+                    line: reply::error(self.lines, &problem),
+                    last: false,
+                };
+            }
         };
         if let Some(token) = self.token.take() {
             let answer = self.introduce(&token, &request);
@@ -72,24 +91,35 @@ impl Session {
         }
         match self.grant(&request, hub, lease, now) {
             Ok(line) => Answer { line, last: false },
-            Err(problem) => Answer { line: reply::error(self.lines, &problem), last: false },
+            Err(problem) => Answer {
+                line: reply::error(self.lines, &problem),
+                last: false,
+            },
         }
     }
 
     /// The end of a client that is not understood.
     pub fn close(&self, problem: &Problem) -> Answer {
-        Answer { line: reply::error(self.lines, problem), last: true }
+        Answer {
+            line: reply::error(self.lines, problem),
+            last: true,
+        }
     }
 
     /// A line was cut off before it was read.
     pub fn too_long(&mut self, most: usize) -> Answer {
         self.lines += 1;
-        self.close(&Problem::malformed("the whole line", &format!("it is longer than {most} bytes")))
+        self.close(&Problem::malformed(
+            "the whole line",
+            &format!("it is longer than {most} bytes"),
+        ))
     }
 
     /// Whether a status line is due now.
     pub fn is_due(&mut self, now: Instant) -> bool {
-        let Some(subscription) = self.subscription.as_mut().filter(|s| s.due <= now) else { return false };
+        let Some(subscription) = self.subscription.as_mut().filter(|s| s.due <= now) else {
+            return false;
+        };
         // After a stall the rate starts anew: what was missed is not made up for.
         subscription.due = (subscription.due + subscription.every).max(now);
         true
@@ -106,11 +136,19 @@ impl Session {
                 if !self.has_place {
                     return self.close(&Problem::crowded(MAX_OWNERS));
                 }
-                Answer { line: reply::ok(&json!({ "client": self.client })), last: false }
+                Answer {
+                    line: reply::ok(&json!({ "client": self.client })),
+                    last: false,
+                }
             }
-            Request::Token(_) => self.close(&Problem::refused("key \"token\"", "it is another token".to_string())),
-            _ => self
-                .close(&Problem::refused("the whole line", "the first line over TCP is {\"token\":\"…\"}".to_string())),
+            Request::Token(_) => self.close(&Problem::refused(
+                "key \"token\"",
+                "it is another token".to_string(),
+            )),
+            _ => self.close(&Problem::refused(
+                "the whole line",
+                "the first line over TCP is {\"token\":\"…\"}".to_string(),
+            )),
         }
     }
 
@@ -126,26 +164,45 @@ impl Session {
             Request::Status => Ok(reply::status(&hub.status())),
             Request::Jog(words) => self.jog(words.as_ref(), hub, lease),
             Request::Lease(word) => self.lease(*word, lease, now),
-            Request::Token(_) => Err(Problem::refused("key \"token\"", "no token is asked for here".to_string())),
+            Request::Token(_) => Err(Problem::refused(
+                "key \"token\"",
+                "no token is asked for here".to_string(),
+            )),
             Request::Subscribe(rate_hz) => {
                 let every = rate_hz.map(|rate_hz| Duration::from_secs_f64(1.0 / rate_hz));
                 self.subscription = every.map(|every| Subscription { every, due: now });
-                Ok(reply::ok(&json!({ "subscribe": { "rate_hz": rate_hz.unwrap_or(0.0) } })))
+                Ok(reply::ok(
+                    &json!({ "subscribe": { "rate_hz": rate_hz.unwrap_or(0.0) } }),
+                ))
             }
         }
     }
 
-    fn command(&self, command: Command, hub: &OperatorHub, lease: &Lease) -> Result<String, Problem> {
+    fn command(
+        &self,
+        command: Command,
+        hub: &OperatorHub,
+        lease: &Lease,
+    ) -> Result<String, Problem> {
         // Safety needs no lease.
         let free = matches!(command, Command::Hold | Command::EmergencyStop);
         if !free && !lease.is_held_by(self.client) {
             return Err(Problem::refused("key \"command\"", without_lease(lease)));
         }
-        let tick = hub.give(command).map_err(|why| Problem::refused("key \"value\"", why))?;
-        Ok(reply::ok(&json!({ "command": command.name(), "tick": tick })))
+        let tick = hub
+            .give(command)
+            .map_err(|why| Problem::refused("key \"value\"", why))?;
+        Ok(reply::ok(
+            &json!({ "command": command.name(), "tick": tick }),
+        ))
     }
 
-    fn jog(&self, words: Option<&JogMessage>, hub: &OperatorHub, lease: &Lease) -> Result<String, Problem> {
+    fn jog(
+        &self,
+        words: Option<&JogMessage>,
+        hub: &OperatorHub,
+        lease: &Lease,
+    ) -> Result<String, Problem> {
         let refused = |why: String| Problem::refused("key \"jog\"", why);
         // To stop is safety.
         if words.is_some() && !lease.is_held_by(self.client) {
@@ -153,7 +210,9 @@ impl Session {
         }
         let tick = hub.jog(words).map_err(refused)?;
         let axis = words.map(|words| words.axis.to_ascii_lowercase());
-        Ok(reply::ok(&json!({ "jog": axis.map_or(json!("stop"), |axis| json!({ "axis": axis })), "tick": tick })))
+        Ok(reply::ok(
+            &json!({ "jog": axis.map_or(json!("stop"), |axis| json!({ "axis": axis })), "tick": tick }),
+        ))
     }
 
     fn lease(&self, word: LeaseWord, lease: &mut Lease, now: Instant) -> Result<String, Problem> {
@@ -165,11 +224,13 @@ impl Session {
                 .map_err(|holder| refused(held_by(holder))),
             LeaseWord::TakeOver => {
                 lease.take_over(self.client);
-                Ok(reply::ok(&json!({ "lease": "take-over", "client": self.client })))
+                Ok(reply::ok(
+                    &json!({ "lease": "take-over", "client": self.client }),
+                ))
             }
-            LeaseWord::Release if lease.release(self.client) => {
-                Ok(reply::ok(&json!({ "lease": "release", "client": self.client })))
-            }
+            LeaseWord::Release if lease.release(self.client) => Ok(reply::ok(
+                &json!({ "lease": "release", "client": self.client }),
+            )),
             LeaseWord::Release => Err(refused("this client does not hold the lease".to_string())),
         }
     }
@@ -184,8 +245,14 @@ fn held_by(holder: u64) -> String {
 }
 
 fn without_lease(lease: &Lease) -> String {
-    let holder = lease.holder().map_or("nobody holds it".to_string(), |client| format!("client {client} holds it"));
-    format!("it needs the control lease, and {holder}; only hold, emergency-stop and the stop of a jog need none")
+    let holder = lease
+        .holder()
+        .map_or("nobody holds it".to_string(), |client| {
+            format!("client {client} holds it")
+        });
+    format!(
+        "it needs the control lease, and {holder}; only hold, emergency-stop and the stop of a jog need none"
+    )
 }
 
 #[cfg(test)]

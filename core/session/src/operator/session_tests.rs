@@ -17,10 +17,19 @@ struct Room {
 
 impl Room {
     fn new() -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
-        let machine = Machine::read(&path, &[("motion.max_feed_ratio".to_string(), "1.5".to_string())]).unwrap();
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+        let machine = Machine::read(
+            &path,
+            &[("motion.max_feed_ratio".to_string(), "1.5".to_string())],
+        )
+        .unwrap();
         let hub = OperatorHub::new(&machine, Arc::default(), Arc::default());
-        Self { hub, lease: Lease::default(), now: Instant::now() }
+        Self {
+            hub,
+            lease: Lease::default(),
+            now: Instant::now(),
+        }
     }
 
     /// The answer to a line, and whether it is the last.
@@ -58,9 +67,17 @@ fn commands_need_the_lease_and_safety_needs_none() {
     room.is_granted(&mut b, r#"{"command":"hold"}"#);
     assert!(room.hub.controls().hold.load(Relaxed));
     for command in ["resume", "abort"] {
-        room.is_refused(&mut b, &format!("{{\"command\":\"{command}\"}}"), "client 1 holds it");
+        room.is_refused(
+            &mut b,
+            &format!("{{\"command\":\"{command}\"}}"),
+            "client 1 holds it",
+        );
     }
-    room.is_refused(&mut b, r#"{"command":"feed-override","value":0}"#, "client 1 holds it");
+    room.is_refused(
+        &mut b,
+        r#"{"command":"feed-override","value":0}"#,
+        "client 1 holds it",
+    );
     room.is_granted(&mut a, RESUME);
     assert!(!room.hub.controls().hold.load(Relaxed));
     room.is_granted(&mut b, r#"{"command":"emergency-stop"}"#);
@@ -76,9 +93,21 @@ fn overrides_beyond_the_machine_are_refused_not_clamped() {
     let mut session = Session::new(1, None);
     room.is_granted(&mut session, TAKE);
     room.is_granted(&mut session, r#"{"command":"feed-override","value":1.5}"#);
-    room.is_refused(&mut session, r#"{"command":"feed-override","value":1.6}"#, "motion.max_feed_ratio, which is 1.5");
-    room.is_refused(&mut session, r#"{"command":"rapid-override","value":1.1}"#, "above 1");
-    room.is_refused(&mut session, r#"{"command":"stall-rough","value":3}"#, "for tests");
+    room.is_refused(
+        &mut session,
+        r#"{"command":"feed-override","value":1.6}"#,
+        "motion.max_feed_ratio, which is 1.5",
+    );
+    room.is_refused(
+        &mut session,
+        r#"{"command":"rapid-override","value":1.1}"#,
+        "above 1",
+    );
+    room.is_refused(
+        &mut session,
+        r#"{"command":"stall-rough","value":3}"#,
+        "for tests",
+    );
     assert_eq!(room.hub.controls().feed_override.load(), 1.5);
     assert_eq!(room.hub.controls().rapid_override.load(), 1.0);
 }
@@ -106,7 +135,10 @@ fn over_tcp_the_first_line_is_the_token() {
     ] {
         let mut session = Session::new(1, token());
         let (answer, last) = room.ask(&mut session, line);
-        assert!(last && answer["error"]["why"].as_str().unwrap().contains(why), "{answer}");
+        assert!(
+            last && answer["error"]["why"].as_str().unwrap().contains(why),
+            "{answer}"
+        );
     }
     assert!(!room.hub.controls().hold.load(Relaxed));
     let mut session = Session::new(1, token());
@@ -136,7 +168,16 @@ fn the_status_is_in_the_machines_units() {
     let mut room = Room::new();
     let mut session = Session::new(1, None);
     let status = room.is_granted(&mut session, r#"{"status":{}}"#)["status"].clone();
-    for key in ["state", "tick", "line", "feed_mm_per_min", "sigma", "feed_override", "counters", "fault"] {
+    for key in [
+        "state",
+        "tick",
+        "line",
+        "feed_mm_per_min",
+        "sigma",
+        "feed_override",
+        "counters",
+        "fault",
+    ] {
         assert!(status.get(key).is_some(), "{key}: {status}");
     }
     assert_eq!(status["position"]["x_mm"], 0.0);

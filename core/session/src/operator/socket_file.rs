@@ -20,17 +20,23 @@ pub struct SocketFile {
 /// # Errors
 /// The path with the cause: something is there that is not a dead socket, or the system refuses.
 pub fn listen(path: &Path) -> Result<(UnixListener, SocketFile), String> {
-    remove_dead(path).and_then(|()| bind(path)).map_err(|why| format!("{}: {why}", path.display()))
+    remove_dead(path)
+        .and_then(|()| bind(path))
+        .map_err(|why| format!("{}: {why}", path.display()))
 }
 
 /// Removes a socket that nobody listens at any more.
 fn remove_dead(path: &Path) -> Result<(), String> {
-    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
+    let Ok(found) = fs::symlink_metadata(path) else {
+        return Ok(());
+    };
     if !found.file_type().is_socket() {
         return Err("it exists and is no socket; it is left as it is".to_string());
     }
     match UnixStream::connect(path) {
-        Err(error) if error.kind() == ErrorKind::ConnectionRefused => fs::remove_file(path).map_err(|e| e.to_string()),
+        Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
+            fs::remove_file(path).map_err(|e| e.to_string())
+        }
         Err(error) => Err(format!("it exists and cannot be looked at: {error}")),
         Ok(_) => Err("another program listens there".to_string()),
     }
@@ -38,9 +44,15 @@ fn remove_dead(path: &Path) -> Result<(), String> {
 
 /// Binds in a folder of our own, sets the mode, and moves the socket to its place.
 fn bind(path: &Path) -> Result<(UnixListener, SocketFile), String> {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let folder = parent.join(format!(".t{}", std::process::id()));
-    fs::DirBuilder::new().mode(0o700).create(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    fs::DirBuilder::new()
+        .mode(0o700)
+        .create(&folder)
+        .map_err(|e| format!("{}: {e}", folder.display()))?;
     let made = bind_in(&folder.join("s"), path);
     // What is left in it would be a socket that could not be moved.
     let _ = fs::remove_dir_all(&folder);
@@ -53,7 +65,13 @@ fn bind_in(place: &Path, path: &Path) -> io::Result<(UnixListener, SocketFile)> 
     listener.set_nonblocking(true)?;
     renameat_with(CWD, place, CWD, path, RenameFlags::NOREPLACE)?;
     let inode = fs::symlink_metadata(path)?.ino();
-    Ok((listener, SocketFile { path: path.to_owned(), inode }))
+    Ok((
+        listener,
+        SocketFile {
+            path: path.to_owned(),
+            inode,
+        },
+    ))
 }
 
 impl Drop for SocketFile {
@@ -75,9 +93,17 @@ mod tests {
         let path = folder.path().join("s");
         let (listener, file) = listen(&path).unwrap();
         assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "nothing is left beside it"
+        );
         assert!(UnixStream::connect(&path).is_ok());
-        assert!(listen(&path).unwrap_err().contains("another program listens"));
+        assert!(
+            listen(&path)
+                .unwrap_err()
+                .contains("another program listens")
+        );
         drop((listener, file));
         assert!(!path.exists());
     }

@@ -22,21 +22,32 @@ pub fn of_file(path: &Path) -> Result<String, String> {
     let read = || -> Result<String, String> {
         let metadata = fs::metadata(path).map_err(|e| e.to_string())?;
         if metadata.mode() & 0o077 != 0 {
-            return Err(format!("others may read it (mode {:o}); `chmod 600` it", metadata.mode() & 0o777));
+            return Err(format!(
+                "others may read it (mode {:o}); `chmod 600` it",
+                metadata.mode() & 0o777
+            ));
         }
         let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
         let token = text.trim();
         if token.chars().count() < LEAST_CHARACTERS {
-            return Err(format!("the token in it has fewer than {LEAST_CHARACTERS} characters"));
+            return Err(format!(
+                "the token in it has fewer than {LEAST_CHARACTERS} characters"
+            ));
         }
         Ok(token.to_string())
     };
-    made.and_then(|()| read()).map_err(|why| format!("{}: {why}", path.display()))
+    made.and_then(|()| read())
+        .map_err(|why| format!("{}: {why}", path.display()))
 }
 
 /// Makes the file where it does not exist.
 fn make(path: &Path) -> Result<(), String> {
-    let mut file = match OpenOptions::new().write(true).create_new(true).mode(0o600).open(path) {
+    let mut file = match OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(path)
+    {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(()),
         Err(error) => return Err(error.to_string()),
@@ -53,7 +64,10 @@ fn make(path: &Path) -> Result<(), String> {
 
 /// Whether two tokens are the same, in a time that does not tell how far they agree.
 pub fn is_same(a: &str, b: &str) -> bool {
-    let differences = a.bytes().zip(b.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    let differences = a
+        .bytes()
+        .zip(b.bytes())
+        .fold(0, |all, (a, b)| all | (a ^ b));
     a.len() == b.len() && std::hint::black_box(differences) == 0
 }
 

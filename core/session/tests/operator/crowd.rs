@@ -22,12 +22,17 @@ fn forty_strangers_who_come_again_and_again_do_not_keep_the_owner_out() {
             let (over, came) = (&over, &came);
             scope.spawn(move || {
                 while !over.load(Relaxed) {
-                    let Ok(mut stream) = TcpStream::connect(address) else { continue };
+                    let Ok(mut stream) = TcpStream::connect(address) else {
+                        continue;
+                    };
                     came.fetch_add(1, Relaxed);
-                    stream.set_read_timeout(Some(std::time::Duration::from_secs(1))).unwrap();
+                    stream
+                        .set_read_timeout(Some(std::time::Duration::from_secs(1)))
+                        .unwrap();
                     // Some wait and some guess.
                     if stranger % 4 == 0 {
-                        let _ = stream.write_all(b"{\"token\":\"0123456789abcdef0123456789abcdef\"}\n");
+                        let _ =
+                            stream.write_all(b"{\"token\":\"0123456789abcdef0123456789abcdef\"}\n");
                     }
                     // Until it is sent away, or hears nothing for a while.
                     let _ = stream.read(&mut [0; 256]);
@@ -40,7 +45,12 @@ fn forty_strangers_who_come_again_and_again_do_not_keep_the_owner_out() {
         let unix = (0..HOLDS).filter(|_| office.over_unix().holds()).count();
         let tcp = (0..HOLDS).filter(|_| office.over_tcp().holds()).count();
         over.store(true, Relaxed);
-        assert_eq!((unix, tcp), (HOLDS, HOLDS), "{} strangers came", came.load(Relaxed));
+        assert_eq!(
+            (unix, tcp),
+            (HOLDS, HOLDS),
+            "{} strangers came",
+            came.load(Relaxed)
+        );
     });
 }
 
@@ -50,7 +60,10 @@ fn whoever_is_known_has_sixteen_places_at_each_door() {
     let mut unix: Vec<_> = (0..16).map(|_| office.over_unix()).collect();
     assert!(unix.iter_mut().all(super::Client::holds));
     let mut tcp: Vec<_> = (0..16).map(|_| office.over_tcp()).collect();
-    assert!(tcp.iter_mut().all(super::Client::holds), "the other door has its own");
+    assert!(
+        tcp.iter_mut().all(super::Client::holds),
+        "the other door has its own"
+    );
     let mut late = String::new();
     let mut stream = TcpStream::connect(office.address()).unwrap();
     writeln!(stream, "{{\"token\":\"{}\"}}", office.token).unwrap();

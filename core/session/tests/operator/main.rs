@@ -43,15 +43,23 @@ struct Office {
 
 impl Office {
     fn open() -> Self {
-        let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-4axis.toml");
+        let machine =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-4axis.toml");
         let machine = Machine::read(&machine, &[]).unwrap();
         let mut registry = Registry::default();
         for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN] {
             registry.register(plugin).unwrap();
         }
-        let session = JogSession::new(machine.clone(), &registry, Switches::default(), Box::new(Nobody)).unwrap();
+        let session = JogSession::new(
+            machine.clone(),
+            &registry,
+            Switches::default(),
+            Box::new(Nobody),
+        )
+        .unwrap();
         let run = session.enable().unwrap();
-        let hub = OperatorHub::new(&machine, run.controls(), run.status()).with_jogs(Arc::clone(session.jogs()));
+        let hub = OperatorHub::new(&machine, run.controls(), run.status())
+            .with_jogs(Arc::clone(session.jogs()));
         let folder = tempfile::tempdir().unwrap();
         let listen = Listen {
             unix: Some(folder.path().join("s")),
@@ -59,8 +67,15 @@ impl Office {
             token_file: Some(folder.path().join("token")),
         };
         let server = Server::start(Arc::new(hub), &listen).unwrap();
-        let token = std::fs::read_to_string(folder.path().join("token")).unwrap().trim().to_string();
-        Self { folder, server, token }
+        let token = std::fs::read_to_string(folder.path().join("token"))
+            .unwrap()
+            .trim()
+            .to_string();
+        Self {
+            folder,
+            server,
+            token,
+        }
     }
 
     fn socket(&self) -> PathBuf {

@@ -68,22 +68,36 @@ fn command() -> impl Strategy<Value = String> {
         "\\u0000",
         "\\ud800",
     ];
-    (prop::sample::select(names.to_vec()), number(), any::<bool>()).prop_map(|(name, number, bare)| {
-        if bare {
-            format!("{{\"command\":\"{name}\"}}")
-        } else {
-            format!("{{\"command\":\"{name}\",\"value\":{number}}}")
-        }
-    })
+    (
+        prop::sample::select(names.to_vec()),
+        number(),
+        any::<bool>(),
+    )
+        .prop_map(|(name, number, bare)| {
+            if bare {
+                format!("{{\"command\":\"{name}\"}}")
+            } else {
+                format!("{{\"command\":\"{name}\",\"value\":{number}}}")
+            }
+        })
 }
 
 fn jog() -> impl Strategy<Value = String> {
     let axes = prop::sample::select(vec!["x", "A", "a", "q", "", "xy", "\\u00df"]);
-    let keys = ["direction", "distance_mm", "distance_deg", "feed_mm_per_min", "feed_deg_per_min", "stop"];
+    let keys = [
+        "direction",
+        "distance_mm",
+        "distance_deg",
+        "feed_mm_per_min",
+        "feed_deg_per_min",
+        "stop",
+    ];
     let key = prop::sample::select(keys.to_vec());
     (axes, prop::collection::vec((key, number()), 0..4)).prop_map(|(axis, numbers)| {
         let keys = [format!("\"axis\":\"{axis}\"")];
-        let numbers = numbers.iter().map(|(key, number)| format!("\"{key}\":{number}"));
+        let numbers = numbers
+            .iter()
+            .map(|(key, number)| format!("\"{key}\":{number}"));
         let all: Vec<String> = keys.into_iter().chain(numbers).collect();
         format!("{{\"jog\":{{{}}}}}", all.join(","))
     })
@@ -98,10 +112,28 @@ fn whole_jog() -> impl Strategy<Value = String> {
 }
 
 fn nest() -> impl Strategy<Value = String> {
-    let parts = [("[", "]"), ("{\"a\":", "}"), ("{\"command\":\"hold\",\"value\":[", "]}"), ("{\"status\":", "}")];
-    (prop::sample::select(parts.to_vec()), 1_usize..1500, any::<bool>()).prop_map(|((open, close), depth, ends)| {
-        format!("{}1{}", open.repeat(depth), if ends { close.repeat(depth) } else { String::new() })
-    })
+    let parts = [
+        ("[", "]"),
+        ("{\"a\":", "}"),
+        ("{\"command\":\"hold\",\"value\":[", "]}"),
+        ("{\"status\":", "}"),
+    ];
+    (
+        prop::sample::select(parts.to_vec()),
+        1_usize..1500,
+        any::<bool>(),
+    )
+        .prop_map(|((open, close), depth, ends)| {
+            format!(
+                "{}1{}",
+                open.repeat(depth),
+                if ends {
+                    close.repeat(depth)
+                } else {
+                    String::new()
+                }
+            )
+        })
 }
 
 /// Bytes of one client: whole lines, half lines, lines that are none.
@@ -180,8 +212,20 @@ fn a_rate_that_no_clock_can_wait_for_is_refused_with_its_field_and_ends_nothing(
     let mut client = office.over_unix();
     for rate in ["1e-21", "1e-300", "5e-324", "-1", "101", "1e300", "0.0099"] {
         let answer = client.ask(&format!("{{\"subscribe\":{{\"rate_hz\":{rate}}}}}"));
-        assert!(answer["error"]["where"].as_str().unwrap().contains("\"rate_hz\""), "{rate}: {answer}");
-        assert!(answer["error"]["why"].as_str().unwrap().contains("within 0.01 to 100"), "{rate}: {answer}");
+        assert!(
+            answer["error"]["where"]
+                .as_str()
+                .unwrap()
+                .contains("\"rate_hz\""),
+            "{rate}: {answer}"
+        );
+        assert!(
+            answer["error"]["why"]
+                .as_str()
+                .unwrap()
+                .contains("within 0.01 to 100"),
+            "{rate}: {answer}"
+        );
     }
     assert!(client.holds() && office.over_unix().holds());
 }

@@ -15,7 +15,13 @@ pub fn axes() -> Axes {
 pub fn all_say(n: u64) -> Vec<Change> {
     let value = n as f64;
     let same = AxisVector::from_slice(&[value; 4]);
-    let tool = Tool { number: 7, offset: same, wear: same, diameter_mm: value, ..Tool::default() };
+    let tool = Tool {
+        number: 7,
+        offset: same,
+        wear: same,
+        diameter_mm: value,
+        ..Tool::default()
+    };
     let mut state = LastingState::default();
     state.offsets.origins[0] = same;
     state.offsets.rotations_rad[0] = value;
@@ -29,12 +35,19 @@ pub fn change(state: &LastingState) -> Change {
 }
 
 pub fn owner(axes: &Axes) -> Owner<'_> {
-    Owner { machine: "mill", axes, home: AxisVector::ZERO }
+    Owner {
+        machine: "mill",
+        axes,
+        home: AxisVector::ZERO,
+    }
 }
 
 /// What a recorder is told of `n`: a parameter that lasts because it is listed.
 pub fn recorded(n: u64) -> Change {
-    Change::ListParameter { number: 100, value: n as f64 }
+    Change::ListParameter {
+        number: 100,
+        value: n as f64,
+    }
 }
 
 /// What all rows say; none where they do not say the same.
@@ -51,8 +64,9 @@ pub fn said(state: &LastingState) -> Option<u64> {
 
 /// A machine of any axes in any order.
 pub fn machine_of(random: &mut Random) -> Axes {
-    let mut letters =
-        ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'].map(|letter| (letter, random.unit() < 0.4)).to_vec();
+    let mut letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W']
+        .map(|letter| (letter, random.unit() < 0.4))
+        .to_vec();
     for last in (1..letters.len()).rev() {
         letters.swap(last, random.below(last as u64 + 1) as usize);
     }
@@ -106,11 +120,15 @@ pub fn any_state(random: &mut Random, axes: &Axes) -> LastingState {
         ..LastingState::default()
     };
     for _ in 0..random.below(20) {
-        state.parameters.insert(31 + random.below(4970) as usize, random.unit() * 1e9 - 5e8);
+        state
+            .parameters
+            .insert(31 + random.below(4970) as usize, random.unit() * 1e9 - 5e8);
         let number = 1 + random.below(99_999) as u32;
         let tool = any_tool(random, axes, number);
         state.tools.insert(number, tool);
-        state.policy_parameters.insert(format!("p{}", random.below(1000)), random.unit());
+        state
+            .policy_parameters
+            .insert(format!("p{}", random.below(1000)), random.unit());
     }
     for axis in 0..axes.count() {
         state.turns[axis] = random.below(1 << 50).cast_signed() - (1 << 49);

@@ -97,9 +97,15 @@ impl Disk {
                 xFullPathname: Some(full_path),
                 ..*default
             };
-            assert_eq!(ffi::sqlite3_vfs_register(Box::into_raw(Box::new(vfs)), 0), ffi::SQLITE_OK);
+            assert_eq!(
+                ffi::sqlite3_vfs_register(Box::into_raw(Box::new(vfs)), 0),
+                ffi::SQLITE_OK
+            );
         }
-        Self { name: name.to_owned(), inside }
+        Self {
+            name: name.to_owned(),
+            inside,
+        }
     }
 
     pub fn name(&self) -> &str {
@@ -203,7 +209,10 @@ static METHODS: ffi::sqlite3_io_methods = ffi::sqlite3_io_methods {
 };
 
 /// SAFETY of all below: SQLite hands out the pointers that `Disk::new` and `open` gave it, to one thread at a time.
-unsafe fn on<T>(file: *mut ffi::sqlite3_file, act: impl FnOnce(&mut Inside, &str, &mut Open) -> T) -> T {
+unsafe fn on<T>(
+    file: *mut ffi::sqlite3_file,
+    act: impl FnOnce(&mut Inside, &str, &mut Open) -> T,
+) -> T {
     let file = unsafe { &mut *file.cast::<Open>() };
     let (inside, name) = unsafe { (&*file.inside, &*file.name) };
     act(&mut lock(inside), name, file)
@@ -230,34 +239,61 @@ unsafe extern "C" fn open(
     if inside.cut {
         return ffi::SQLITE_IOERR;
     }
-    let name = if name.is_null() { format!("temporary-{}", inside.files.len()) } else { unsafe { text(name) } };
+    let name = if name.is_null() {
+        format!("temporary-{}", inside.files.len())
+    } else {
+        unsafe { text(name) }
+    };
     let is_new = !inside.files.contains_key(&name);
     if is_new && (flags & ffi::SQLITE_OPEN_CREATE == 0 || inside.read_only) {
         return ffi::SQLITE_CANTOPEN;
     }
-    let journals = ffi::SQLITE_OPEN_WAL | ffi::SQLITE_OPEN_MAIN_JOURNAL | ffi::SQLITE_OPEN_SUPER_JOURNAL;
+    let journals =
+        ffi::SQLITE_OPEN_WAL | ffi::SQLITE_OPEN_MAIN_JOURNAL | ffi::SQLITE_OPEN_SUPER_JOURNAL;
     if !out_flags.is_null() {
         let read_only = inside.read_only;
-        let given = if read_only { flags & !ffi::SQLITE_OPEN_READWRITE | ffi::SQLITE_OPEN_READONLY } else { flags };
+        let given = if read_only {
+            flags & !ffi::SQLITE_OPEN_READWRITE | ffi::SQLITE_OPEN_READONLY
+        } else {
+            flags
+        };
         unsafe { *out_flags = given };
     }
     inside.files.entry(name.clone()).or_default();
     let names_folder = is_new && flags & journals != 0;
     let gone_at_close = flags & ffi::SQLITE_OPEN_DELETEONCLOSE != 0;
-    let base = ffi::sqlite3_file { pMethods: &raw const METHODS };
-    let disk = unsafe { (*vfs).pAppData }.cast::<Mutex<Inside>>().cast_const();
+    let base = ffi::sqlite3_file {
+        pMethods: &raw const METHODS,
+    };
+    let disk = unsafe { (*vfs).pAppData }
+        .cast::<Mutex<Inside>>()
+        .cast_const();
     let name = Box::into_raw(Box::new(name));
-    unsafe { opened.write(Open { base, inside: disk, name, names_folder, gone_at_close }) };
+    unsafe {
+        opened.write(Open {
+            base,
+            inside: disk,
+            name,
+            names_folder,
+            gone_at_close,
+        })
+    };
     ffi::SQLITE_OK
 }
 
-unsafe extern "C" fn delete(vfs: *mut ffi::sqlite3_vfs, name: *const c_char, sync_folder: c_int) -> c_int {
+unsafe extern "C" fn delete(
+    vfs: *mut ffi::sqlite3_vfs,
+    name: *const c_char,
+    sync_folder: c_int,
+) -> c_int {
     let mut inside = unsafe { of_vfs(vfs) };
     if !inside.operate() {
         return ffi::SQLITE_IOERR_DELETE;
     }
     let name = unsafe { text(name) };
-    let Some(file) = inside.files.remove(&name) else { return ffi::SQLITE_IOERR_DELETE_NOENT };
+    let Some(file) = inside.files.remove(&name) else {
+        return ffi::SQLITE_IOERR_DELETE_NOENT;
+    };
     inside.deleted.push((name, file));
     if sync_folder != 0 {
         inside.sync_folder();
@@ -265,14 +301,27 @@ unsafe extern "C" fn delete(vfs: *mut ffi::sqlite3_vfs, name: *const c_char, syn
     ffi::SQLITE_OK
 }
 
-unsafe extern "C" fn access(vfs: *mut ffi::sqlite3_vfs, name: *const c_char, _: c_int, out: *mut c_int) -> c_int {
+unsafe extern "C" fn access(
+    vfs: *mut ffi::sqlite3_vfs,
+    name: *const c_char,
+    _: c_int,
+    out: *mut c_int,
+) -> c_int {
     let inside = unsafe { of_vfs(vfs) };
-    let is_there = inside.files.get(&unsafe { text(name) }).is_some_and(|file| !file.now.is_empty());
+    let is_there = inside
+        .files
+        .get(&unsafe { text(name) })
+        .is_some_and(|file| !file.now.is_empty());
     unsafe { *out = c_int::from(is_there) };
     ffi::SQLITE_OK
 }
 
-unsafe extern "C" fn full_path(_: *mut ffi::sqlite3_vfs, name: *const c_char, room: c_int, out: *mut c_char) -> c_int {
+unsafe extern "C" fn full_path(
+    _: *mut ffi::sqlite3_vfs,
+    name: *const c_char,
+    room: c_int,
+    out: *mut c_char,
+) -> c_int {
     let bytes = unsafe { CStr::from_ptr(name) }.to_bytes_with_nul();
     if bytes.len() > room as usize {
         return ffi::SQLITE_CANTOPEN;
@@ -293,7 +342,12 @@ unsafe extern "C" fn close(file: *mut ffi::sqlite3_file) -> c_int {
     ffi::SQLITE_OK
 }
 
-unsafe extern "C" fn read(file: *mut ffi::sqlite3_file, to: *mut c_void, count: c_int, from: i64) -> c_int {
+unsafe extern "C" fn read(
+    file: *mut ffi::sqlite3_file,
+    to: *mut c_void,
+    count: c_int,
+    from: i64,
+) -> c_int {
     unsafe {
         on(file, |inside, name, _| {
             if inside.cut {
@@ -305,12 +359,21 @@ unsafe extern "C" fn read(file: *mut ffi::sqlite3_file, to: *mut c_void, count: 
             let got = there.len().min(to.len());
             to[..got].copy_from_slice(&there[..got]);
             to[got..].fill(0);
-            if got == to.len() { ffi::SQLITE_OK } else { ffi::SQLITE_IOERR_SHORT_READ }
+            if got == to.len() {
+                ffi::SQLITE_OK
+            } else {
+                ffi::SQLITE_IOERR_SHORT_READ
+            }
         })
     }
 }
 
-unsafe extern "C" fn write(file: *mut ffi::sqlite3_file, bytes: *const c_void, count: c_int, from: i64) -> c_int {
+unsafe extern "C" fn write(
+    file: *mut ffi::sqlite3_file,
+    bytes: *const c_void,
+    count: c_int,
+    from: i64,
+) -> c_int {
     unsafe {
         on(file, |inside, name, _| {
             if !inside.operate() {
@@ -365,7 +428,12 @@ unsafe extern "C" fn sync(file: *mut ffi::sqlite3_file, _: c_int) -> c_int {
 
 unsafe extern "C" fn size(file: *mut ffi::sqlite3_file, out: *mut i64) -> c_int {
     unsafe {
-        on(file, |inside, name, _| *out = inside.files.get(name).map_or(0, |file| file.now.len() as i64));
+        on(file, |inside, name, _| {
+            *out = inside
+                .files
+                .get(name)
+                .map_or(0, |file| file.now.len() as i64)
+        });
     }
     ffi::SQLITE_OK
 }
@@ -406,7 +474,10 @@ unsafe extern "C" fn map(
             while extend != 0 && file.shared.len() <= region as usize {
                 file.shared.push(vec![0; REGION].into_boxed_slice());
             }
-            *out = file.shared.get_mut(region as usize).map_or(ptr::null_mut(), |region| region.as_mut_ptr().cast());
+            *out = file
+                .shared
+                .get_mut(region as usize)
+                .map_or(ptr::null_mut(), |region| region.as_mut_ptr().cast());
         });
     }
     ffi::SQLITE_OK

@@ -4,7 +4,10 @@
 //! `STATE_CUTS=2000` takes power away more often, `STATE_SEED=17` judges one history.
 
 #![allow(clippy::doc_markdown, reason = "SQLite is a name, not code")]
-#![allow(clippy::cast_possible_wrap, reason = "SQLite takes sizes as signed numbers")]
+#![allow(
+    clippy::cast_possible_wrap,
+    reason = "SQLite takes sizes as signed numbers"
+)]
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -40,8 +43,8 @@ fn history(seed: u64) -> u64 {
         let opened = open(&path, &disk);
         let mut why = opened.as_ref().err().map(ToString::to_string);
         if let Ok(store) = opened {
-            let whole =
-                said(store.load()).unwrap_or_else(|| panic!("seed {seed}, cut {cut}: torn: {:?}", store.load()));
+            let whole = said(store.load())
+                .unwrap_or_else(|| panic!("seed {seed}, cut {cut}: torn: {:?}", store.load()));
             assert!(
                 whole == acknowledged || whole == acknowledged + 1,
                 "seed {seed}, cut {cut}: {acknowledged} was on disk, now it is {whole}"
@@ -49,20 +52,32 @@ fn history(seed: u64) -> u64 {
             acknowledged = whole;
             let recorder = store.recorder();
             loop {
-                why = store.commit(all_say(acknowledged + 1)).err().map(|error| error.to_string());
+                why = store
+                    .commit(all_say(acknowledged + 1))
+                    .err()
+                    .map(|error| error.to_string());
                 if why.is_some() {
                     break;
                 }
                 acknowledged += 1;
                 recorder.record(recorded(acknowledged)).unwrap();
-                recorder.driven(Driven { job: 1, hash: "h".into(), line: 1, epoch: acknowledged });
+                recorder.driven(Driven {
+                    job: 1,
+                    hash: "h".into(),
+                    line: 1,
+                    epoch: acknowledged,
+                });
             }
         }
-        assert!(disk.is_cut(), "seed {seed}, cut {cut}: writing ended before the power did: {why:?}");
+        assert!(
+            disk.is_cut(),
+            "seed {seed}, cut {cut}: writing ended before the power did: {why:?}"
+        );
         disk.power_on(&mut random);
     }
     let store = open(&path, &disk).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    let whole = said(store.load()).unwrap_or_else(|| panic!("seed {seed}: torn: {:?}", store.load()));
+    let whole =
+        said(store.load()).unwrap_or_else(|| panic!("seed {seed}: torn: {:?}", store.load()));
     assert!(
         whole == acknowledged || whole == acknowledged + 1,
         "seed {seed}: {acknowledged} was on disk, now it is {whole}"
@@ -72,7 +87,11 @@ fn history(seed: u64) -> u64 {
 
 #[test]
 fn a_power_cut_loses_nothing_acknowledged_and_tears_nothing() {
-    let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let number = |name| {
+        std::env::var(name)
+            .ok()
+            .and_then(|text| text.parse::<u64>().ok())
+    };
     let seeds = match number("STATE_SEED") {
         Some(seed) => seed..seed + 1,
         None => 0..number("STATE_CUTS").unwrap_or(100) / 4,
@@ -91,7 +110,10 @@ fn a_full_disk_refuses_requests_keeps_what_was_recorded_and_goes_on() {
     disk.hold_at_most(disk.bytes() + 2000);
     let refusal = store.commit(all_say(2)).unwrap_err();
     assert!(matches!(refusal, StateError::Write { .. }), "{refusal}");
-    assert!(refusal.to_string().contains("the disk is full; make room"), "{refusal}");
+    assert!(
+        refusal.to_string().contains("the disk is full; make room"),
+        "{refusal}"
+    );
     let recorder = store.recorder();
     for value in 0..20_000 {
         recorder.record(recorded(value)).unwrap();
@@ -104,7 +126,11 @@ fn a_full_disk_refuses_requests_keeps_what_was_recorded_and_goes_on() {
     drop(store);
     let store = open(&path, &disk).unwrap();
     assert_eq!(said(store.load()), Some(1), "what was refused is not there");
-    assert_eq!(store.load().parameters.get(&100), Some(&19_999.0), "what was recorded is");
+    assert_eq!(
+        store.load().parameters.get(&100),
+        Some(&19_999.0),
+        "what was recorded is"
+    );
 }
 
 #[test]
@@ -114,5 +140,8 @@ fn a_file_that_cannot_be_written_is_an_error_in_words() {
     drop(open(&path, &disk).unwrap());
     disk.read_only();
     let refusal = open(&path, &disk).unwrap_err().to_string();
-    assert!(refusal.contains("mill.sqlite") && refusal.contains("read-only"), "{refusal}");
+    assert!(
+        refusal.contains("mill.sqlite") && refusal.contains("read-only"),
+        "{refusal}"
+    );
 }

@@ -9,23 +9,50 @@ use crate::made::{Row, bits, header, motion, read, written};
 const COUNT: u64 = 3 * KEY_INTERVAL + 9;
 
 fn records(items: &[Item]) -> Vec<Record> {
-    items.iter().filter_map(|item| if let Item::Record(record) = item { Some(*record) } else { None }).collect()
+    items
+        .iter()
+        .filter_map(|item| {
+            if let Item::Record(record) = item {
+                Some(*record)
+            } else {
+                None
+            }
+        })
+        .collect()
 }
 
 fn damages(items: &[Item]) -> Vec<Damage> {
-    items.iter().filter_map(|item| if let Item::Damage(damage) = item { Some(*damage) } else { None }).collect()
+    items
+        .iter()
+        .filter_map(|item| {
+            if let Item::Damage(damage) = item {
+                Some(*damage)
+            } else {
+                None
+            }
+        })
+        .collect()
 }
 
 /// Every record is the one that was written under its number, in order.
 fn are_sound(items: &[Item], rows: &[Row]) -> bool {
     let records = records(items);
-    let same = |r: &Record| rows.get(r.number as usize).is_some_and(|row| bits(row) == bits(&(r.sample, r.signals)));
-    records.iter().all(same) && records.windows(2).all(|pair| pair[0].number < pair[1].number)
+    let same = |r: &Record| {
+        rows.get(r.number as usize)
+            .is_some_and(|row| bits(row) == bits(&(r.sample, r.signals)))
+    };
+    records.iter().all(same)
+        && records
+            .windows(2)
+            .all(|pair| pair[0].number < pair[1].number)
 }
 
 /// Where each record ends, the closing one last.
 fn ends(bytes: &[u8]) -> Vec<usize> {
-    let starts: Vec<_> = records(&read(bytes).unwrap().0).iter().map(|r| r.offset as usize).collect();
+    let starts: Vec<_> = records(&read(bytes).unwrap().0)
+        .iter()
+        .map(|r| r.offset as usize)
+        .collect();
     // The closing record: head, marker, number.
     [&starts[1..], &[bytes.len() - 18, bytes.len()]].concat()
 }
@@ -44,7 +71,11 @@ fn cut_at_every_byte_all_complete_records_are_read() {
         let complete = ends.iter().take_while(|end| **end <= cut).count();
         assert_eq!(items.len(), complete, "cut at {cut}");
         assert!(are_sound(&items, &rows), "cut at {cut}");
-        let byte = if complete == 0 { first } else { ends[complete - 1] } as u64;
+        let byte = if complete == 0 {
+            first
+        } else {
+            ends[complete - 1]
+        } as u64;
         assert_eq!(ending, Ending::Truncated { byte }, "cut at {cut}");
     }
 }
@@ -62,7 +93,9 @@ fn one_flipped_bit_anywhere_is_noticed() {
 
 /// The bytes are refused, or read with the damage said.
 fn is_noticed(bytes: &[u8], rows: &[Row]) {
-    let Ok((items, ending)) = read(bytes) else { return };
+    let Ok((items, ending)) = read(bytes) else {
+        return;
+    };
     assert!(are_sound(&items, rows));
     assert!(ending != Ending::Complete || !damages(&items).is_empty());
 }
@@ -76,8 +109,13 @@ fn damage_costs_records_up_to_the_next_key_and_says_how_many() {
     bytes[ends[hit - 1] + 9] ^= 0x40;
     let (items, ending) = read(&bytes).unwrap();
     assert_eq!(ending, Ending::Complete);
-    let [damage] = damages(&items)[..] else { panic!("{:?}", damages(&items)) };
-    assert_eq!((damage.from, damage.lost_records), (ends[hit - 1] as u64, Some(KEY_INTERVAL - 17)));
+    let [damage] = damages(&items)[..] else {
+        panic!("{:?}", damages(&items))
+    };
+    assert_eq!(
+        (damage.from, damage.lost_records),
+        (ends[hit - 1] as u64, Some(KEY_INTERVAL - 17))
+    );
     assert_eq!(damage.to, ends[2 * KEY_INTERVAL as usize - 1] as u64);
     assert_eq!(records(&items).len() as u64, COUNT - (KEY_INTERVAL - 17));
     assert!(are_sound(&items, &rows));
@@ -110,21 +148,39 @@ fn records_of_another_trace_are_not_taken() {
     let at = ends(&bytes)[KEY_INTERVAL as usize - 1];
     let (items, ending) = read(&[&bytes[..at], &foreign[at..]].concat()).unwrap();
     assert_eq!(records(&items).len() as u64, KEY_INTERVAL);
-    assert_eq!((damages(&items).len(), ending), (1, Ending::Truncated { byte: at as u64 }));
+    assert_eq!(
+        (damages(&items).len(), ending),
+        (1, Ending::Truncated { byte: at as u64 })
+    );
 }
 
 #[test]
 fn other_files_are_refused_with_the_cause() {
     let refused = |bytes: &[u8]| Reader::new(bytes).err().unwrap().to_string();
-    assert_eq!(refused(b""), "byte 0: not a Tandem trace (its first bytes are others)");
-    assert_eq!(refused(b"t_s,line"), "byte 0: not a Tandem trace (its first bytes are others)");
+    assert_eq!(
+        refused(b""),
+        "byte 0: not a Tandem trace (its first bytes are others)"
+    );
+    assert_eq!(
+        refused(b"t_s,line"),
+        "byte 0: not a Tandem trace (its first bytes are others)"
+    );
     let mut bytes = written(&header(3, 0), &[]);
-    assert_eq!(refused(&bytes[..30]), "byte 30: the file ends within its header");
+    assert_eq!(
+        refused(&bytes[..30]),
+        "byte 30: the file ends within its header"
+    );
     bytes[MAGIC.len()] = 9;
-    assert_eq!(refused(&bytes), "byte 8: the trace has format 9, this program reads formats 1 to 3");
+    assert_eq!(
+        refused(&bytes),
+        "byte 8: the trace has format 9, this program reads formats 1 to 3"
+    );
     bytes[MAGIC.len()] = 1;
     bytes[20] ^= 1;
-    assert_eq!(refused(&bytes), "byte 0: the header is damaged: its checksum differs");
+    assert_eq!(
+        refused(&bytes),
+        "byte 0: the header is damaged: its checksum differs"
+    );
 }
 
 #[test]
@@ -198,7 +254,15 @@ fn a_command_behind_damage_is_read_and_samples_wait_for_the_next_key() {
     assert!(items.contains(&Item::Command("100,hold".to_string())));
     assert!(are_sound(&items, &rows));
     let numbers: Vec<_> = records(&items).iter().map(|r| r.number).collect();
-    assert!(numbers.iter().copied().eq((0..50).chain(KEY_INTERVAL..2 * KEY_INTERVAL)));
-    let lost: u64 = damages(&items).iter().filter_map(|damage| damage.lost_records).sum();
+    assert!(
+        numbers
+            .iter()
+            .copied()
+            .eq((0..50).chain(KEY_INTERVAL..2 * KEY_INTERVAL))
+    );
+    let lost: u64 = damages(&items)
+        .iter()
+        .filter_map(|damage| damage.lost_records)
+        .sum();
     assert_eq!(lost, KEY_INTERVAL - 50);
 }

@@ -10,7 +10,11 @@ pub type Row = (Sample, [f64; MAX_SIGNALS]);
 
 /// A header with so many axes and signals.
 pub fn header(axes: usize, signals: usize) -> Header {
-    let letters: Vec<_> = "XYZABCUV".chars().map(|letter| (letter, "ABC".contains(letter))).take(axes).collect();
+    let letters: Vec<_> = "XYZABCUV"
+        .chars()
+        .map(|letter| (letter, "ABC".contains(letter)))
+        .take(axes)
+        .collect();
     Header {
         fine_period_s: 0.001,
         axes: Axes::new(&letters).unwrap(),
@@ -18,7 +22,9 @@ pub fn header(axes: usize, signals: usize) -> Header {
         program: "part.ngc".to_string(),
         planner: "look-ahead".to_string(),
         dry_run: false,
-        signals: (0..signals).map(|index| format!("force_{index}_n")).collect(),
+        signals: (0..signals)
+            .map(|index| format!("force_{index}_n"))
+            .collect(),
     }
 }
 
@@ -26,7 +32,9 @@ pub fn header(axes: usize, signals: usize) -> Header {
 pub fn written(header: &Header, rows: &[Row]) -> Vec<u8> {
     let mut writer = Writer::new(vec![], header).unwrap();
     for (sample, signals) in rows {
-        writer.sample(sample, &signals[..header.signals.len()]).unwrap();
+        writer
+            .sample(sample, &signals[..header.signals.len()])
+            .unwrap();
     }
     writer.finish().unwrap()
 }
@@ -35,25 +43,51 @@ pub fn written(header: &Header, rows: &[Row]) -> Vec<u8> {
 pub fn read(bytes: &[u8]) -> Result<(Vec<Item>, Ending), TraceError> {
     let mut reader = Reader::new(bytes)?;
     let items = reader.by_ref().collect::<Result<Vec<_>, _>>()?;
-    Ok((items, reader.ending().expect("a trace that was read has an ending")))
+    Ok((
+        items,
+        reader
+            .ending()
+            .expect("a trace that was read has an ending"),
+    ))
 }
 
 /// Every bit of what a trace keeps.
 pub fn bits((s, signals): &Row) -> Vec<u64> {
-    let floats = s.command.0.into_iter().chain(s.feedback.0).chain([s.feed_mm_per_s, s.sigma, s.ratio]);
+    let floats =
+        s.command
+            .0
+            .into_iter()
+            .chain(s.feedback.0)
+            .chain([s.feed_mm_per_s, s.sigma, s.ratio]);
     let bits = floats.chain(*signals).map(f64::to_bits);
     let phase = s.phase_ns.map_or([0, 0], |ns| [1, ns.cast_unsigned()]);
-    let switched = [s.switched.outputs, s.switched.spindle_rad_per_s.to_bits()].into_iter().chain(phase);
-    [s.tick, s.block, u64::from(s.line), s.state as u64].into_iter().chain(switched).chain(bits).collect()
+    let switched = [s.switched.outputs, s.switched.spindle_rad_per_s.to_bits()]
+        .into_iter()
+        .chain(phase);
+    [s.tick, s.block, u64::from(s.line), s.state as u64]
+        .into_iter()
+        .chain(switched)
+        .chain(bits)
+        .collect()
 }
 
 /// Rows of any numbers whatever, with so many axes and signals.
 pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value = Vec<Row>> {
     let floats = prop::array::uniform32(any_double());
     let phase = prop::option::of(i64::MIN + 1..=i64::MAX);
-    let row = (any::<u64>(), any::<u64>(), any::<u32>(), 0..7_u32, floats, any::<u64>(), phase).prop_map(
-        move |(tick, block, line, state, f, outputs, phase_ns)| {
-            let some = |from: usize, count: usize| std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 });
+    let row = (
+        any::<u64>(),
+        any::<u64>(),
+        any::<u32>(),
+        0..7_u32,
+        floats,
+        any::<u64>(),
+        phase,
+    )
+        .prop_map(move |(tick, block, line, state, f, outputs, phase_ns)| {
+            let some = |from: usize, count: usize| {
+                std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 })
+            };
             let sample = Sample {
                 tick,
                 block,
@@ -64,19 +98,27 @@ pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value
                 feed_mm_per_s: f[16],
                 sigma: f[17],
                 ratio: f[18],
-                switched: Switched { outputs, spindle_rad_per_s: f[27], ..Switched::default() },
+                switched: Switched {
+                    outputs,
+                    spindle_rad_per_s: f[27],
+                    ..Switched::default()
+                },
                 phase_ns,
                 ..Sample::default()
             };
             (sample, some(19, signals))
-        },
-    );
+        });
     prop::collection::vec(row, 0..most)
 }
 
 /// Any pattern of bits, NaN and the rest, and ordinary numbers as often.
 fn any_double() -> impl Strategy<Value = f64> {
-    prop_oneof![any::<u64>().prop_map(f64::from_bits), -1e3..1e3_f64, Just(0.0), Just(-0.0)]
+    prop_oneof![
+        any::<u64>().prop_map(f64::from_bits),
+        -1e3..1e3_f64,
+        Just(0.0),
+        Just(-0.0)
+    ]
 }
 
 /// A run of `count` samples that moves as machines do.

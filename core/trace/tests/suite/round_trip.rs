@@ -27,7 +27,10 @@ proptest! {
 fn the_header_survives() {
     let header = header(8, 8);
     let bytes = written(&header, &[]);
-    assert_eq!(tandem_trace::Reader::new(&bytes[..]).unwrap().header(), &header);
+    assert_eq!(
+        tandem_trace::Reader::new(&bytes[..]).unwrap().header(),
+        &header
+    );
 }
 
 #[test]
@@ -54,7 +57,11 @@ fn commands_stand_before_the_sample_of_their_tick() {
     assert_eq!(ending, Ending::Complete);
     let mut expected = vec![];
     for number in 0..rows.len() {
-        expected.extend([0, 1, 7, 256, 257].contains(&number).then(|| format!("{number},hold")));
+        expected.extend(
+            [0, 1, 7, 256, 257]
+                .contains(&number)
+                .then(|| format!("{number},hold")),
+        );
         expected.push(number.to_string());
     }
     expected.push("300,feed-override,0.5".to_string());
@@ -64,13 +71,23 @@ fn commands_stand_before_the_sample_of_their_tick() {
         Item::Damage(damage) => panic!("{damage:?}"),
     });
     assert!(said.eq(expected));
-    assert!(Writer::new(vec![], &header(3, 0)).unwrap().command(&"x".repeat(1 << 13)).is_err());
+    assert!(
+        Writer::new(vec![], &header(3, 0))
+            .unwrap()
+            .command(&"x".repeat(1 << 13))
+            .is_err()
+    );
 }
 
 #[test]
 fn what_cannot_be_read_is_not_written() {
     let mut other = header(3, 1);
-    assert!(Writer::new(vec![], &other).unwrap().sample(&motion(1)[0].0, &[]).is_err());
+    assert!(
+        Writer::new(vec![], &other)
+            .unwrap()
+            .sample(&motion(1)[0].0, &[])
+            .is_err()
+    );
     other.fine_period_s = f64::NAN;
     assert!(Writer::new(vec![], &other).is_err());
     let mut long = header(3, 0);

@@ -68,7 +68,12 @@ impl Axis {
             }
             Power::Brake | Power::None => {
                 self.torque = 0.0;
-                let most = rated * if power == Power::Brake { BRAKE } else { FRICTION };
+                let most = rated
+                    * if power == Power::Brake {
+                        BRAKE
+                    } else {
+                        FRICTION
+                    };
                 -(self.velocity / dt_s).clamp(-most, most)
             }
         };

@@ -79,19 +79,33 @@ impl DriveDescription {
         let positive = [
             ("counts_per_turn", self.counts_per_turn),
             ("position_gain_per_s", self.position_gain_per_s),
-            ("rated_acceleration_counts_per_s2", self.rated_acceleration_counts_per_s2),
+            (
+                "rated_acceleration_counts_per_s2",
+                self.rated_acceleration_counts_per_s2,
+            ),
         ];
-        if let Some((key, _)) = positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+        if let Some((key, _)) = positive
+            .into_iter()
+            .find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+        {
             return Err(format!("drive.{key} is more than 0"));
         }
         let shortest = super::STEP_NS as f64 / 1e9;
-        if !(shortest..=1.0).contains(&self.velocity_lag_s) || self.position_gain_per_s > 0.5 / self.velocity_lag_s {
+        if !(shortest..=1.0).contains(&self.velocity_lag_s)
+            || self.position_gain_per_s > 0.5 / self.velocity_lag_s
+        {
             return Err(format!(
                 "drive.velocity_lag_s is {shortest} to 1, and position_gain_per_s at most half its inverse"
             ));
         }
-        let times = [("brake_open_ms", self.brake_open_ms), ("brake_close_ms", self.brake_close_ms)];
-        if let Some((key, _)) = times.into_iter().find(|(_, value)| !(0.0..=60_000.0).contains(value)) {
+        let times = [
+            ("brake_open_ms", self.brake_open_ms),
+            ("brake_close_ms", self.brake_close_ms),
+        ];
+        if let Some((key, _)) = times
+            .into_iter()
+            .find(|(_, value)| !(0.0..=60_000.0).contains(value))
+        {
             return Err(format!("drive.{key} is 0 to 60000"));
         }
         if !(-1e15..=1e15).contains(&self.position_counts) {

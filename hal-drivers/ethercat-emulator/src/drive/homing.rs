@@ -84,12 +84,25 @@ impl Homing {
             (None, false) => Phase::Stop(place),
         };
         let index_direction = if switch.is_some() { -towards } else { towards };
-        Some(Self { switch, towards, index_direction, with_index, phase, last_place: place })
+        Some(Self {
+            switch,
+            towards,
+            index_direction,
+            with_index,
+            phase,
+            last_place: place,
+        })
     }
 
     /// Goes on. A home switch that is on above its edge is off below: methods 5 and 21 meet it from above, and look for
     /// off instead of on.
-    pub(super) fn step(&mut self, place: f64, turn: f64, switches: Switches, at_rest: bool) -> Step {
+    pub(super) fn step(
+        &mut self,
+        place: f64,
+        turn: f64,
+        switches: Switches,
+        at_rest: bool,
+    ) -> Step {
         let before = std::mem::replace(&mut self.last_place, place);
         let from_above = self.switch == Some(Switch::Home) && self.towards < 0.0;
         let on = self.switch.is_some_and(|switch| switch.of(switches)) != from_above;
@@ -97,7 +110,13 @@ impl Homing {
         match self.phase {
             Phase::Search if on => self.phase = Phase::Leave,
             Phase::Search | Phase::Leave if ends => return Step::Failed,
-            Phase::Leave if !on => self.phase = if self.with_index { Phase::Index } else { Phase::Stop(place) },
+            Phase::Leave if !on => {
+                self.phase = if self.with_index {
+                    Phase::Index
+                } else {
+                    Phase::Stop(place)
+                }
+            }
             Phase::Index if (before / turn).floor() != (place / turn).floor() => {
                 self.phase = Phase::Stop((before.max(place) / turn).floor() * turn);
             }

@@ -86,7 +86,9 @@ impl Drive {
 
     /// A drive whose objects lie in `dictionary`; none where they do not.
     pub(crate) fn new(of: &DriveDescription, dictionary: &Dictionary) -> Option<Self> {
-        let probe_levels = of.probes_counts.map(|edge| edge.is_some_and(|edge| of.position_counts > edge));
+        let probe_levels = of
+            .probes_counts
+            .map(|edge| edge.is_some_and(|edge| of.position_counts > edge));
         Some(Self {
             of: of.clone(),
             slots: Slots::find(dictionary)?,
@@ -157,25 +159,36 @@ impl Drive {
         if self.state != DriveState::OperationEnabled || self.stop.is_some() || self.mode != 8 {
             return;
         }
-        let period = cycle_s.unwrap_or_else(|| interpolation_s(dictionary)).max(STEP_S);
+        let period = cycle_s
+            .unwrap_or_else(|| interpolation_s(dictionary))
+            .max(STEP_S);
         // The target has 32 bits and wraps; the axis does not.
         let target = dictionary.signed(self.slots.target) as i32;
         let ahead = target.wrapping_sub(self.axis.demand.round() as i64 as i32);
         let to = self.axis.demand.round() + f64::from(ahead);
-        self.course = Course::Cyclic { velocity: (to - self.axis.demand) / period, left_s: period };
+        self.course = Course::Cyclic {
+            velocity: (to - self.axis.demand) / period,
+            left_s: period,
+        };
         self.feed_forward = dictionary.signed(self.slots.velocity_offset) as f64;
     }
 
     /// The bus is no longer in a state in which the master leads the drive.
     pub(crate) fn lose_bus(&mut self, dictionary: &mut Dictionary) {
-        if matches!(self.state, DriveState::OperationEnabled | DriveState::QuickStopActive) {
+        if matches!(
+            self.state,
+            DriveState::OperationEnabled | DriveState::QuickStopActive
+        ) {
             match dictionary.signed(self.slots.abort_option) {
                 0 => {}
                 2 => self.switch_off(),
                 3 => self.quick_stop(dictionary),
                 _ => self.fail(BUS_LOST, dictionary),
             }
-        } else if matches!(self.state, DriveState::ReadyToSwitchOn | DriveState::SwitchedOn) {
+        } else if matches!(
+            self.state,
+            DriveState::ReadyToSwitchOn | DriveState::SwitchedOn
+        ) {
             self.state = DriveState::SwitchOnDisabled;
         }
         dictionary.set(self.slots.control, 0);
@@ -184,12 +197,18 @@ impl Drive {
 
     /// Goes into a fault.
     pub(crate) fn fail(&mut self, code: u16, dictionary: &mut Dictionary) {
-        if matches!(self.state, DriveState::FaultReactionActive | DriveState::Fault) {
+        if matches!(
+            self.state,
+            DriveState::FaultReactionActive | DriveState::Fault
+        ) {
             return;
         }
         dictionary.set(self.slots.error_code, i64::from(code));
         self.emergency = Some(code);
-        let with_torque = matches!(self.state, DriveState::OperationEnabled | DriveState::QuickStopActive);
+        let with_torque = matches!(
+            self.state,
+            DriveState::OperationEnabled | DriveState::QuickStopActive
+        );
         let deceleration = match dictionary.signed(self.slots.fault_option) {
             0 => None,
             1 => Some(self.slots.deceleration),
@@ -206,8 +225,16 @@ impl Drive {
 
     fn quick_stop(&mut self, dictionary: &Dictionary) {
         let option = dictionary.signed(self.slots.quick_stop_option);
-        let slot = if matches!(option, 1 | 5) { self.slots.deceleration } else { self.slots.quick_stop_deceleration };
-        let then = if option >= 5 { DriveState::QuickStopActive } else { DriveState::SwitchOnDisabled };
+        let slot = if matches!(option, 1 | 5) {
+            self.slots.deceleration
+        } else {
+            self.slots.quick_stop_deceleration
+        };
+        let then = if option >= 5 {
+            DriveState::QuickStopActive
+        } else {
+            DriveState::SwitchOnDisabled
+        };
         if option == 0 {
             self.switch_off();
             return;
@@ -220,7 +247,10 @@ impl Drive {
         // The ramp begins at the speed that the axis has, so that a demand in steps does not matter.
         self.axis.demand_velocity = self.axis.velocity;
         self.course = Course::Hold;
-        self.stop = Some(Stop { deceleration: deceleration.max(1.0), then });
+        self.stop = Some(Stop {
+            deceleration: deceleration.max(1.0),
+            then,
+        });
     }
 
     /// Takes the torque away at once.
@@ -247,21 +277,30 @@ impl Drive {
         }
         let before = self.axis.position;
         let limit = dictionary.unsigned(self.slots.max_torque) as f64 / 1000.0;
-        self.axis.step(&self.of, STEP_S, power, self.feed_forward, limit);
+        self.axis
+            .step(&self.of, STEP_S, power, self.feed_forward, limit);
         self.catch(before, dictionary);
         self.watch_following(dictionary);
         self.publish(dictionary);
     }
 
     fn take_mode(&mut self, dictionary: &Dictionary) {
-        let asked = self.trouble.mode_shown.map_or_else(|| dictionary.signed(self.slots.mode), i64::from);
+        let asked = self
+            .trouble
+            .mode_shown
+            .map_or_else(|| dictionary.signed(self.slots.mode), i64::from);
         let asked = if asked == 0 { self.mode } else { asked };
-        let known = self.of.modes.iter().any(|mode| i64::from(*mode) == asked) || self.trouble.mode_shown.is_some();
+        let known = self.of.modes.iter().any(|mode| i64::from(*mode) == asked)
+            || self.trouble.mode_shown.is_some();
         if asked != self.mode && known {
             self.mode = asked;
             self.homing_status = 0;
             self.feed_forward = 0.0;
-            self.course = if matches!(asked, 3 | 9) { Course::Velocity } else { Course::Hold };
+            self.course = if matches!(asked, 3 | 9) {
+                Course::Velocity
+            } else {
+                Course::Hold
+            };
         }
     }
 
@@ -270,8 +309,8 @@ impl Drive {
         if let Some(code) = self.trouble.fault.take() {
             self.fail(code, dictionary);
         }
-        let safe =
-            self.trouble.has(Lasting::TorqueOff) && !matches!(self.state, DriveState::Fault | DriveState::NotReady);
+        let safe = self.trouble.has(Lasting::TorqueOff)
+            && !matches!(self.state, DriveState::Fault | DriveState::NotReady);
         if safe || std::mem::take(&mut self.trouble.disable) {
             self.switch_off();
         }
@@ -284,7 +323,8 @@ impl Drive {
         let reset = control & !self.last_control & 0x80 != 0;
         let able = !self.trouble.has(Lasting::TorqueOff);
         self.state = match (self.state, command) {
-            (State::NotReady, _) | (State::ReadyToSwitchOn | State::SwitchedOn, DisableVoltage | QuickStop) => {
+            (State::NotReady, _)
+            | (State::ReadyToSwitchOn | State::SwitchedOn, DisableVoltage | QuickStop) => {
                 State::SwitchOnDisabled
             }
             (State::Fault, _) if reset && !self.trouble.has(Lasting::FaultStays) => {
@@ -294,7 +334,9 @@ impl Drive {
             (State::SwitchOnDisabled, Shutdown) if able => State::ReadyToSwitchOn,
             (State::ReadyToSwitchOn, SwitchOn | EnableOperation) => State::SwitchedOn,
             (State::SwitchedOn, Shutdown) => State::ReadyToSwitchOn,
-            (State::SwitchedOn, EnableOperation) if !self.trouble.has(Lasting::NeverEnables) => self.enable(),
+            (State::SwitchedOn, EnableOperation) if !self.trouble.has(Lasting::NeverEnables) => {
+                self.enable()
+            }
             (State::OperationEnabled | State::QuickStopActive, DisableVoltage) => {
                 self.switch_off();
                 return;
@@ -303,9 +345,11 @@ impl Drive {
                 self.quick_stop(dictionary);
                 return;
             }
-            (State::OperationEnabled, Shutdown) => {
-                self.disable(self.slots.shutdown_option, State::ReadyToSwitchOn, dictionary)
-            }
+            (State::OperationEnabled, Shutdown) => self.disable(
+                self.slots.shutdown_option,
+                State::ReadyToSwitchOn,
+                dictionary,
+            ),
             (State::OperationEnabled, SwitchOn) => {
                 self.disable(self.slots.disable_option, State::SwitchedOn, dictionary)
             }
@@ -332,7 +376,11 @@ impl Drive {
     }
 
     fn resume(&mut self) -> DriveState {
-        self.course = if matches!(self.mode, 3 | 9) { Course::Velocity } else { Course::Hold };
+        self.course = if matches!(self.mode, 3 | 9) {
+            Course::Velocity
+        } else {
+            Course::Hold
+        };
         self.feed_forward = 0.0;
         self.late_s = 0.0;
         DriveState::OperationEnabled
@@ -360,12 +408,16 @@ impl Drive {
                 Power::Motor
             }
             // While the brake opens the motor holds already, and while it closes still.
-            State::SwitchedOn if Command::of(self.last_control) == Command::EnableOperation => Power::Motor,
+            State::SwitchedOn if Command::of(self.last_control) == Command::EnableOperation => {
+                Power::Motor
+            }
             State::ReadyToSwitchOn | State::SwitchedOn if self.brake_s > 0.0 => {
                 self.brake_s -= STEP_S;
                 Power::Motor
             }
-            _ if self.axis.velocity.abs() > REST_COUNTS_PER_S && self.of.brake_close_ms == 0.0 => Power::None,
+            _ if self.axis.velocity.abs() > REST_COUNTS_PER_S && self.of.brake_close_ms == 0.0 => {
+                Power::None
+            }
             _ => Power::Brake,
         }
     }

@@ -52,7 +52,14 @@ impl Drive {
         let target = number(self.slots.target_velocity);
         let (target, acceleration) = if self.mode == 3 {
             let faster = target.abs() > self.axis.demand_velocity.abs();
-            (target, number(if faster { self.slots.acceleration } else { self.slots.deceleration }))
+            (
+                target,
+                number(if faster {
+                    self.slots.acceleration
+                } else {
+                    self.slots.deceleration
+                }),
+            )
         } else {
             (target + number(self.slots.velocity_offset), f64::INFINITY)
         };
@@ -92,11 +99,19 @@ impl Drive {
     }
 
     fn lead_homing(&mut self, dictionary: &mut Dictionary) {
-        let Course::Homing(mut homing) = self.course else { return };
+        let Course::Homing(mut homing) = self.course else {
+            return;
+        };
         let switches = self.switches();
-        let at_rest = self.axis.demand_velocity == 0.0 && self.axis.velocity.abs() < REST_COUNTS_PER_S;
+        let at_rest =
+            self.axis.demand_velocity == 0.0 && self.axis.velocity.abs() < REST_COUNTS_PER_S;
         let speed = |sub| dictionary.number(HOMING_SPEEDS, sub) as f64;
-        let velocity = match homing.step(self.axis.place(), self.of.counts_per_turn, switches, at_rest) {
+        let velocity = match homing.step(
+            self.axis.place(),
+            self.of.counts_per_turn,
+            switches,
+            at_rest,
+        ) {
             Step::Fast(direction) => direction * speed(1),
             Step::Slow(direction) => direction * speed(2),
             Step::Found(place) => {
@@ -121,8 +136,14 @@ impl Drive {
     fn switches(&self) -> Switches {
         let place = self.axis.place();
         Switches {
-            negative: self.of.negative_limit_counts.is_some_and(|edge| place < edge),
-            positive: self.of.positive_limit_counts.is_some_and(|edge| place > edge),
+            negative: self
+                .of
+                .negative_limit_counts
+                .is_some_and(|edge| place < edge),
+            positive: self
+                .of
+                .positive_limit_counts
+                .is_some_and(|edge| place > edge),
             home: self.of.home_switch_counts.is_some_and(|edge| place > edge),
         }
     }
@@ -132,7 +153,9 @@ impl Drive {
         let function = dictionary.unsigned(self.slots.probe_function) as u16;
         for (number, probe) in self.probes.iter_mut().enumerate() {
             probe.arm((function >> (8 * number)) as u8);
-            let Some(edge) = self.of.probes_counts[number] else { continue };
+            let Some(edge) = self.of.probes_counts[number] else {
+                continue;
+            };
             let edge = edge + self.axis.origin;
             let (from, to) = (before > edge, self.axis.position > edge);
             if from != to {
@@ -146,8 +169,12 @@ impl Drive {
     pub(super) fn watch_following(&mut self, dictionary: &mut Dictionary) {
         let error = (self.axis.demand - self.axis.position).abs();
         let window = dictionary.unsigned(self.slots.window);
-        let positioning = matches!(self.course, Course::Cyclic { .. } | Course::Homing(_) | Course::Hold);
-        let judged = self.state == DriveState::OperationEnabled && positioning && window != 0xffff_ffff;
+        let positioning = matches!(
+            self.course,
+            Course::Cyclic { .. } | Course::Homing(_) | Course::Hold
+        );
+        let judged =
+            self.state == DriveState::OperationEnabled && positioning && window != 0xffff_ffff;
         if !judged || error <= window as f64 {
             self.late_s = 0.0;
             return;
@@ -169,7 +196,10 @@ impl Drive {
         dictionary.set(slots.position, shown(self.axis.position));
         dictionary.set(slots.velocity, shown(self.axis.velocity));
         dictionary.set(slots.torque, shown(self.axis.torque * 1000.0));
-        dictionary.set(slots.following_error, shown(self.axis.demand - self.axis.position));
+        dictionary.set(
+            slots.following_error,
+            shown(self.axis.demand - self.axis.position),
+        );
         let levels = self.probes.map(|probe| probe.level());
         let inputs = i64::from(switches.negative)
             | i64::from(switches.positive) << 1

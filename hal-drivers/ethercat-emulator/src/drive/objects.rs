@@ -82,31 +82,70 @@ pub(super) const SYNC_ERROR: u16 = 0x10F1;
 pub(super) fn describe_records(of: &DriveDescription, dictionary: &mut Dictionary) {
     let mut record = |index: u16, name: &str, entries: &[(Kind, i64)]| {
         dictionary.name(index, name);
-        dictionary.add(index, 0, Kind::U8, Access::ReadOnly, i64::from(entries.len() as u8));
+        dictionary.add(
+            index,
+            0,
+            Kind::U8,
+            Access::ReadOnly,
+            i64::from(entries.len() as u8),
+        );
         for (sub, (kind, value)) in (1..).zip(entries) {
             dictionary.add(index, sub, *kind, Access::ReadWrite, *value);
         }
     };
-    record(HOMING_SPEEDS, "homing speeds", &[(Kind::U32, 1_000_000), (Kind::U32, 100_000)]);
-    record(INTERPOLATION, "interpolation time period", &[(Kind::U8, 1), (Kind::I8, -3)]);
-    record(SYNC_ERROR, "sync error settings", &[(Kind::U32, 1), (Kind::U16, i64::from(of.sync_error_limit))]);
+    record(
+        HOMING_SPEEDS,
+        "homing speeds",
+        &[(Kind::U32, 1_000_000), (Kind::U32, 100_000)],
+    );
+    record(
+        INTERPOLATION,
+        "interpolation time period",
+        &[(Kind::U8, 1), (Kind::I8, -3)],
+    );
+    record(
+        SYNC_ERROR,
+        "sync error settings",
+        &[(Kind::U32, 1), (Kind::U16, i64::from(of.sync_error_limit))],
+    );
     let counts = of.counts_per_turn as i64;
     let modes = of.modes.iter().map(|mode| 1 << (mode - 1)).sum();
-    record(0x608F, "position encoder resolution", &[(Kind::U32, counts), (Kind::U32, 1)]);
-    let sync = [(Kind::U16, 2), (Kind::U32, 0), (Kind::U32, 0), (Kind::U16, 0x401F)];
+    record(
+        0x608F,
+        "position encoder resolution",
+        &[(Kind::U32, counts), (Kind::U32, 1)],
+    );
+    let sync = [
+        (Kind::U16, 2),
+        (Kind::U32, 0),
+        (Kind::U32, 0),
+        (Kind::U16, 0x401F),
+    ];
     record(0x1C32, "output sync manager parameter", &sync);
     record(0x1C33, "input sync manager parameter", &sync);
     for (index, kind, access, value, name) in [
         (0x605D, Kind::I16, Access::ReadWrite, 1, "halt option code"),
         (0x6071, Kind::I16, Access::ReadWrite, 0, "target torque"),
         (0x60B2, Kind::I16, Access::ReadWrite, 0, "torque offset"),
-        (0x6502, Kind::U32, Access::ReadOnly, modes, "supported drive modes"),
+        (
+            0x6502,
+            Kind::U32,
+            Access::ReadOnly,
+            modes,
+            "supported drive modes",
+        ),
     ] {
         dictionary.name(index, name);
         dictionary.add(index, 0, kind, access, value);
     }
     dictionary.name(0x60E3, "supported homing methods");
-    dictionary.add(0x60E3, 0, Kind::U8, Access::ReadOnly, i64::from(HOMING_METHODS.len() as u8));
+    dictionary.add(
+        0x60E3,
+        0,
+        Kind::U8,
+        Access::ReadOnly,
+        i64::from(HOMING_METHODS.len() as u8),
+    );
     for (sub, method) in (1..).zip(HOMING_METHODS) {
         dictionary.add(0x60E3, sub, Kind::I8, Access::ReadOnly, i64::from(method));
     }
@@ -116,7 +155,11 @@ pub(super) fn describe_records(of: &DriveDescription, dictionary: &mut Dictionar
 
 /// What a drive maps until its master says otherwise.
 pub(crate) fn default_pdos() -> Vec<Pdo> {
-    let entry = |(index, bits)| PdoEntry { index, sub: 0, bits };
+    let entry = |(index, bits)| PdoEntry {
+        index,
+        sub: 0,
+        bits,
+    };
     let pdo = |index, manager, entries: &[(u16, u8)]| Pdo {
         index,
         manager,
@@ -124,8 +167,23 @@ pub(crate) fn default_pdos() -> Vec<Pdo> {
         entries: entries.iter().copied().map(entry).collect(),
     };
     vec![
-        pdo(0x1600, Some(2), &[(0x6040, 16), (0x6060, 8), (0, 8), (0x607A, 32), (0x60B1, 32), (0x60B8, 16)]),
-        pdo(0x1601, None, &[(0x6040, 16), (0x6060, 8), (0, 8), (0x60FF, 32)]),
+        pdo(
+            0x1600,
+            Some(2),
+            &[
+                (0x6040, 16),
+                (0x6060, 8),
+                (0, 8),
+                (0x607A, 32),
+                (0x60B1, 32),
+                (0x60B8, 16),
+            ],
+        ),
+        pdo(
+            0x1601,
+            None,
+            &[(0x6040, 16), (0x6060, 8), (0, 8), (0x60FF, 32)],
+        ),
         pdo(
             0x1A00,
             Some(3),
@@ -142,12 +200,27 @@ pub(crate) fn default_pdos() -> Vec<Pdo> {
                 (0x60FD, 32),
             ],
         ),
-        pdo(0x1A01, None, &[(0x6041, 16), (0x6061, 8), (0, 8), (0x606C, 32), (0x603F, 16)]),
+        pdo(
+            0x1A01,
+            None,
+            &[
+                (0x6041, 16),
+                (0x6061, 8),
+                (0, 8),
+                (0x606C, 32),
+                (0x603F, 16),
+            ],
+        ),
     ]
 }
 
 /// Refuses values that a drive cannot take.
-pub(crate) fn judge_write(dictionary: &Dictionary, index: u16, sub: u8, data: &[u8]) -> Result<(), Abort> {
+pub(crate) fn judge_write(
+    dictionary: &Dictionary,
+    index: u16,
+    sub: u8,
+    data: &[u8],
+) -> Result<(), Abort> {
     let value = number_at(data, 0, 8);
     let fits = match (index, sub) {
         (0x6060, 0) => {

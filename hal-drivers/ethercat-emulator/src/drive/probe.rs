@@ -48,8 +48,11 @@ impl Probe {
         if std::mem::replace(&mut self.level, level) == level || self.function & ENABLED == 0 {
             return;
         }
-        let (wanted, caught, turns) =
-            if level { (RISING, CAUGHT_RISING, TURNS_RISING) } else { (FALLING, CAUGHT_FALLING, TURNS_FALLING) };
+        let (wanted, caught, turns) = if level {
+            (RISING, CAUGHT_RISING, TURNS_RISING)
+        } else {
+            (FALLING, CAUGHT_FALLING, TURNS_FALLING)
+        };
         let continuous = self.function & CONTINUOUS != 0;
         if self.function & wanted == 0 || self.status & caught != 0 && !continuous {
             return;
@@ -88,7 +91,10 @@ mod tests {
         probe.follow(true, 3.0);
         probe.follow(false, 4.0);
         probe.follow(true, 5.0);
-        assert_eq!((probe.status(), probe.rising, probe.falling), (ENABLED | CAUGHT_RISING, 3.0, 0.0));
+        assert_eq!(
+            (probe.status(), probe.rising, probe.falling),
+            (ENABLED | CAUGHT_RISING, 3.0, 0.0)
+        );
         probe.arm(ENABLED);
         probe.arm(ENABLED | RISING);
         assert_eq!(probe.status(), ENABLED);

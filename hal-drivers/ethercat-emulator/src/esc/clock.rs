@@ -70,7 +70,13 @@ pub(crate) struct Sync {
 
 impl Clock {
     pub(crate) fn new(kind: Clocking, start_ns: u64, drift_ppb: i64) -> Self {
-        Self { kind, base_local: start_ns, drift_ppb, filter_depth: 4, ..Self::default() }
+        Self {
+            kind,
+            base_local: start_ns,
+            drift_ppb,
+            filter_depth: 4,
+            ..Self::default()
+        }
     }
 
     fn speed_ppb(&self) -> i64 {
@@ -97,7 +103,11 @@ impl Clock {
     /// System time as the registers show it.
     pub(crate) fn system_shown(&self, at_ns: u64) -> u64 {
         let system = self.system(at_ns);
-        if self.kind == Clocking::Bits32 { system & 0xffff_ffff } else { system }
+        if self.kind == Clocking::Bits32 {
+            system & 0xffff_ffff
+        } else {
+            system
+        }
     }
 
     fn rebase(&mut self, at_ns: u64) {
@@ -122,7 +132,8 @@ impl Clock {
 
     /// Latches the times at which a frame came in at the ports; `after_ns` counts from its arrival at port 0.
     pub(crate) fn latch(&mut self, at_ns: u64, after_ns: &[Option<u64>; 4]) {
-        self.receive_times = after_ns.map(|after| after.map_or(0, |after| self.local(at_ns + after) as u32));
+        self.receive_times =
+            after_ns.map(|after| after.map_or(0, |after| self.local(at_ns + after) as u32));
         self.receive_time_unit = self.local(at_ns);
     }
 
@@ -155,8 +166,11 @@ impl Clock {
         } else {
             own.wrapping_sub(due).cast_signed() as f64
         };
-        self.mean_difference += (difference - self.mean_difference) / f64::from(1_u32 << self.filter_depth);
-        let elapsed = self.last_compensated_ns.map_or(0, |last| at_ns.saturating_sub(last));
+        self.mean_difference +=
+            (difference - self.mean_difference) / f64::from(1_u32 << self.filter_depth);
+        let elapsed = self
+            .last_compensated_ns
+            .map_or(0, |last| at_ns.saturating_sub(last));
         self.last_compensated_ns = Some(at_ns);
         // The speed of critical damping: proportional with the time constant, integral with a quarter of its square.
         let proportional = -difference * 1e9 / COMPENSATION_NS;
@@ -173,7 +187,11 @@ impl Clock {
     /// The mean difference as its register shows it: the highest bit is set where the own time is behind.
     pub(crate) fn difference_shown(&self) -> u32 {
         let magnitude = self.mean_difference.abs().min(f64::from(0x7fff_ffff)) as u32;
-        if self.mean_difference < 0.0 { magnitude | 1 << 31 } else { magnitude }
+        if self.mean_difference < 0.0 {
+            magnitude | 1 << 31
+        } else {
+            magnitude
+        }
     }
 
     /// Takes new cycles of SYNC0 and SYNC1.
@@ -216,7 +234,9 @@ impl Clock {
 
     /// Skips the pulses that a jump of the system time has passed.
     fn realign(&mut self, at_ns: u64) {
-        let (Some(next), Some(cycle)) = (self.sync.next, self.sync_cycle_ns()) else { return };
+        let (Some(next), Some(cycle)) = (self.sync.next, self.sync_cycle_ns()) else {
+            return;
+        };
         let now = self.system(at_ns);
         let late = now.wrapping_sub(next).cast_signed();
         let cycle = i64::from(cycle);
@@ -233,17 +253,26 @@ impl Clock {
         if self.system(until_ns).wrapping_sub(next).cast_signed() < 0 {
             return None;
         }
-        let ahead = next.wrapping_sub(self.offset).wrapping_sub(self.base_local).cast_signed();
+        let ahead = next
+            .wrapping_sub(self.offset)
+            .wrapping_sub(self.base_local)
+            .cast_signed();
         let speed = 1_000_000_000 + i128::from(self.speed_ppb());
         // Up to the next whole ns, at which the local time is there.
-        let elapsed = (i128::from(ahead) * 1_000_000_000 + speed - 1).div_euclid(speed).max(0) as u64;
+        let elapsed = (i128::from(ahead) * 1_000_000_000 + speed - 1)
+            .div_euclid(speed)
+            .max(0) as u64;
         Some((self.base_ns + elapsed).min(until_ns))
     }
 
     /// Goes on to the next SYNC0; answers whether this one is seen.
     pub(crate) fn sync_passes(&mut self) -> bool {
-        let Some(next) = self.sync.next else { return false };
-        self.sync.next = self.sync_cycle_ns().map(|cycle| next.wrapping_add(u64::from(cycle)));
+        let Some(next) = self.sync.next else {
+            return false;
+        };
+        self.sync.next = self
+            .sync_cycle_ns()
+            .map(|cycle| next.wrapping_add(u64::from(cycle)));
         let swallowed = self.sync.swallow > 0;
         self.sync.swallow = self.sync.swallow.saturating_sub(1);
         !swallowed
@@ -252,7 +281,11 @@ impl Clock {
     /// System time of the next SYNC0, as its register shows it.
     pub(crate) fn sync_next_shown(&self) -> u64 {
         let shown = self.sync.next.unwrap_or(self.sync.start);
-        if self.kind == Clocking::Bits32 { shown & 0xffff_ffff } else { shown }
+        if self.kind == Clocking::Bits32 {
+            shown & 0xffff_ffff
+        } else {
+            shown
+        }
     }
 }
 
@@ -268,7 +301,10 @@ mod tests {
             clock.compensate(at, reference.system(at), 8);
         }
         let end = writes * step;
-        clock.system(end).wrapping_sub(reference.system(end)).cast_signed()
+        clock
+            .system(end)
+            .wrapping_sub(reference.system(end))
+            .cast_signed()
     }
 
     #[test]
@@ -276,7 +312,10 @@ mod tests {
         for step in [10_000, 250_000, 1_000_000] {
             for drift in [-100_000, 0, 100_000] {
                 let left = followed(drift, 40_000, step, 400_000_000 / step);
-                assert!(left.abs() <= 150, "{left} ns at {drift} ppb with a write every {step} ns");
+                assert!(
+                    left.abs() <= 150,
+                    "{left} ns at {drift} ppb with a write every {step} ns"
+                );
             }
         }
     }
@@ -294,7 +333,11 @@ mod tests {
     #[test]
     fn sync0_comes_on_the_devices_own_time_and_not_for_a_start_in_the_past() {
         let mut clock = Clock::new(Clocking::Bits64, 500, 50_000);
-        clock.sync = Sync { start: 1_000_500, cycle0: 1_000_000, ..Sync::default() };
+        clock.sync = Sync {
+            start: 1_000_500,
+            cycle0: 1_000_000,
+            ..Sync::default()
+        };
         clock.activate(0, 3);
         assert_eq!(clock.sync_due(900_000), None);
         let due = clock.sync_due(3_000_000).unwrap();
@@ -309,7 +352,11 @@ mod tests {
     #[test]
     fn a_clock_of_32_bits_starts_behind_its_wrap() {
         let mut clock = Clock::new(Clocking::Bits32, 0xffff_ff00, 0);
-        clock.sync = Sync { start: 0x100, cycle0: 1_000_000, ..Sync::default() };
+        clock.sync = Sync {
+            start: 0x100,
+            cycle0: 1_000_000,
+            ..Sync::default()
+        };
         clock.activate(0, 3);
         assert_eq!(clock.sync_due(10_000), Some(0x200));
         assert_eq!(clock.system_shown(0x200), 0x100);

@@ -26,7 +26,13 @@ pub(crate) struct Eeprom {
 
 impl Eeprom {
     pub(crate) fn new(image: Vec<u8>, wide: bool) -> Self {
-        Self { image, wide, registers: [0; 16], busy_until_ns: 0, stores_until_ns: 0 }
+        Self {
+            image,
+            wide,
+            registers: [0; 16],
+            busy_until_ns: 0,
+            stores_until_ns: 0,
+        }
     }
 
     /// A register from 0x0500 on.

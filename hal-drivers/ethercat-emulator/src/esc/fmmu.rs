@@ -32,7 +32,11 @@ impl Fmmu {
         let (first, last) = (u64::from(registers[6] & 7), u64::from(registers[7] & 7));
         let active = registers[12] & 1 == 1 && length > 0;
         let start_bit = start * 8 + first;
-        let end_bit = if active { (start + length - 1) * 8 + last + 1 } else { start_bit };
+        let end_bit = if active {
+            (start + length - 1) * 8 + last + 1
+        } else {
+            start_bit
+        };
         Self {
             start_bit,
             end_bit: end_bit.max(start_bit),

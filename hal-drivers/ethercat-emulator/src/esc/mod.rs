@@ -140,7 +140,8 @@ impl Esc {
     /// Whether a datagram with a station address is for this device.
     pub(crate) fn has_address(&self, address: u16) -> bool {
         let alias_in_use = self.memory[at::DL_CONTROL + 3] & 1 == 1;
-        address == self.u16(at::STATION_ADDRESS) || alias_in_use && address == self.u16(at::STATION_ALIAS)
+        address == self.u16(at::STATION_ADDRESS)
+            || alias_in_use && address == self.u16(at::STATION_ALIAS)
     }
 
     /// A master reads; answers whether the working counter counts it.
@@ -174,7 +175,11 @@ impl Esc {
             }
         }
         if touches(at::WATCHDOG_STATUS, at::WATCHDOG_STATUS + 2) {
-            self.set(at::WATCHDOG_STATUS, 2, u64::from(!self.watchdog_expired(at_ns)));
+            self.set(
+                at::WATCHDOG_STATUS,
+                2,
+                u64::from(!self.watchdog_expired(at_ns)),
+            );
         }
         if touches(at::SII_CONFIGURATION, at::SII_CONFIGURATION + 16) {
             for offset in 0..16 {
@@ -195,7 +200,11 @@ impl Esc {
         }
         self.set(at::SYSTEM_TIME, 8, self.clock.system_shown(at_ns));
         self.set(at::RECEIVE_TIME_UNIT, 8, self.clock.receive_time_unit);
-        self.set(at::SYSTEM_TIME_DIFFERENCE, 4, u64::from(self.clock.difference_shown()));
+        self.set(
+            at::SYSTEM_TIME_DIFFERENCE,
+            4,
+            u64::from(self.clock.difference_shown()),
+        );
         self.set(at::SYNC0_START, 8, self.clock.sync_next_shown());
     }
 
@@ -208,7 +217,11 @@ impl Esc {
         if verdicts.contains(&Access::Refused) {
             return false;
         }
-        for (index, verdict) in verdicts.into_iter().enumerate().filter(|(_, verdict)| *verdict != Access::Beside) {
+        for (index, verdict) in verdicts
+            .into_iter()
+            .enumerate()
+            .filter(|(_, verdict)| *verdict != Access::Beside)
+        {
             let manager = &mut self.sync_managers[index];
             manager.follow(verdict, writes);
             if verdict != Access::Completed {
@@ -239,7 +252,12 @@ impl Esc {
         let mut buffer = [0; crate::frame::MAX_DATA];
         // What is written is taken before what is read lies over it: both may be the same logical bytes.
         for unit in self.fmmus {
-            let Some(part) = unit.overlap(address, data.len()).filter(|_| unit.writes && writes) else { continue };
+            let Some(part) = unit
+                .overlap(address, data.len())
+                .filter(|_| unit.writes && writes)
+            else {
+                continue;
+            };
             let start = part.physical_bit / 8;
             let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
             if start >= end {
@@ -251,11 +269,22 @@ impl Esc {
             written |= self.write(at_ns, start, &buffer[..end - start]);
         }
         for unit in self.fmmus {
-            let Some(part) = unit.overlap(address, data.len()).filter(|_| unit.reads && reads) else { continue };
+            let Some(part) = unit
+                .overlap(address, data.len())
+                .filter(|_| unit.reads && reads)
+            else {
+                continue;
+            };
             let start = part.physical_bit / 8;
             let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
             if start < end && self.read(at_ns, start, &mut buffer[..end - start]) {
-                copy_bits(&buffer[..end - start], part.physical_bit % 8, data, part.data_bit, part.bits);
+                copy_bits(
+                    &buffer[..end - start],
+                    part.physical_bit % 8,
+                    data,
+                    part.data_bit,
+                    part.bits,
+                );
                 read = true;
             }
         }
@@ -270,8 +299,13 @@ impl Esc {
 
     /// Whether process data are watched and too old.
     pub(crate) fn watchdog_expired(&self, at_ns: u64) -> bool {
-        let watched = self.sync_managers.iter().any(|manager| manager.is_active() && manager.triggers_watchdog());
-        let (Some(limit), Some(last)) = (self.watchdog_ns(), self.last_trigger_ns) else { return false };
+        let watched = self
+            .sync_managers
+            .iter()
+            .any(|manager| manager.is_active() && manager.triggers_watchdog());
+        let (Some(limit), Some(last)) = (self.watchdog_ns(), self.last_trigger_ns) else {
+            return false;
+        };
         watched && at_ns.saturating_sub(last) > limit
     }
 
@@ -301,7 +335,10 @@ impl Esc {
     pub(crate) fn is_set_up(&self, index: usize, direction: Direction) -> bool {
         let manager = &self.sync_managers[index];
         let end = manager.start + manager.length;
-        manager.is_active() && manager.direction() == direction && manager.start >= at::PROCESS_MEMORY && end <= MEMORY
+        manager.is_active()
+            && manager.direction() == direction
+            && manager.start >= at::PROCESS_MEMORY
+            && end <= MEMORY
     }
 
     /// Takes the registers of the clock away, or gives them back.

@@ -108,7 +108,8 @@ const WRITABLE_CLOCK: &[(usize, usize)] = &[
 ];
 
 fn within(list: &[(usize, usize)], address: usize) -> bool {
-    list.iter().any(|(first, last)| (*first..=*last).contains(&address))
+    list.iter()
+        .any(|(first, last)| (*first..=*last).contains(&address))
 }
 
 impl Extent {

@@ -49,7 +49,15 @@ impl SyncManager {
         };
         let same = (self.start, self.length, self.control, self.activate & 1)
             == (new.start, new.length, new.control, new.activate & 1);
-        *self = if same { new } else { Self { full: false, open: false, ..new } };
+        *self = if same {
+            new
+        } else {
+            Self {
+                full: false,
+                open: false,
+                ..new
+            }
+        };
     }
 
     /// Whether it guards anything.
@@ -59,7 +67,11 @@ impl SyncManager {
 
     /// Who writes.
     pub(crate) fn direction(&self) -> Direction {
-        if self.control >> 2 & 3 == 1 { Direction::ToDevice } else { Direction::ToMaster }
+        if self.control >> 2 & 3 == 1 {
+            Direction::ToDevice
+        } else {
+            Direction::ToMaster
+        }
     }
 
     /// Whether it is a mailbox; otherwise it is a buffer that always holds the newest.
@@ -99,7 +111,11 @@ impl SyncManager {
         } else if !writes && !self.full {
             return Access::Refused;
         }
-        if end >= last { Access::Completed } else { Access::Granted }
+        if end >= last {
+            Access::Completed
+        } else {
+            Access::Granted
+        }
     }
 
     /// Follows an access that was granted.
@@ -131,7 +147,10 @@ mod tests {
         assert_eq!(mailbox.judge(0x1000, 0x1010, true), Access::Refused);
         assert_eq!(mailbox.judge(0x1004, 0x1010, false), Access::Refused);
         assert_eq!(mailbox.judge(0x1010, 0x1020, false), Access::Beside);
-        for (start, end, verdict) in [(0x1000, 0x1008, Access::Granted), (0x1008, 0x1010, Access::Completed)] {
+        for (start, end, verdict) in [
+            (0x1000, 0x1008, Access::Granted),
+            (0x1008, 0x1010, Access::Completed),
+        ] {
             assert_eq!(mailbox.judge(start, end, false), verdict);
             mailbox.follow(verdict, false);
         }

@@ -83,13 +83,17 @@ impl Esc {
         }
         if start == at::SYSTEM_TIME && data.len() >= 4 {
             let bytes = data.len().min(8);
-            self.clock.compensate(at_ns, number_at(data, 0, bytes), bytes);
+            self.clock
+                .compensate(at_ns, number_at(data, 0, bytes), bytes);
         }
         if touches(at::SYNC0_START, 8) {
             self.clock.sync.start = u64_at(&self.memory, at::SYNC0_START);
         }
         if touches(at::SYNC0_CYCLE, 8) {
-            let cycles = (u32_at(&self.memory, at::SYNC0_CYCLE), u32_at(&self.memory, at::SYNC1_CYCLE));
+            let cycles = (
+                u32_at(&self.memory, at::SYNC0_CYCLE),
+                u32_at(&self.memory, at::SYNC1_CYCLE),
+            );
             self.clock.set_cycles(at_ns, cycles.0, cycles.1);
         }
         // The start has to be known before the activation that may come in the same write.

@@ -42,8 +42,16 @@ impl Device {
                 self.post_again();
             }
         }
-        let outputs = self.plan.process.iter().filter(|plan| plan.direction == Direction::ToDevice);
-        if outputs.map(|plan| events.written >> plan.manager & 1).sum::<u16>() > 0 {
+        let outputs = self
+            .plan
+            .process
+            .iter()
+            .filter(|plan| plan.direction == Direction::ToDevice);
+        if outputs
+            .map(|plan| events.written >> plan.manager & 1)
+            .sum::<u16>()
+            > 0
+        {
             self.outputs_came();
         }
     }
@@ -68,7 +76,11 @@ impl Device {
             return;
         }
         let firmware = &mut self.firmware;
-        for mapping in firmware.mappings.iter().filter(|mapping| mapping.direction == Direction::ToDevice) {
+        for mapping in firmware
+            .mappings
+            .iter()
+            .filter(|mapping| mapping.direction == Direction::ToDevice)
+        {
             mapping.unpack(self.esc.buffer(mapping.manager), &mut firmware.dictionary);
         }
         if let Some(drive) = &mut firmware.drive {
@@ -79,7 +91,11 @@ impl Device {
     /// Lets the master read the newest inputs.
     pub(crate) fn publish_inputs(&mut self) {
         let firmware = &self.firmware;
-        for mapping in firmware.mappings.iter().filter(|mapping| mapping.direction == Direction::ToMaster) {
+        for mapping in firmware
+            .mappings
+            .iter()
+            .filter(|mapping| mapping.direction == Direction::ToMaster)
+        {
             mapping.pack(&firmware.dictionary, self.esc.fill(mapping.manager));
         }
     }
@@ -119,7 +135,11 @@ impl Device {
 
     fn clear_outputs(&mut self) {
         let firmware = &mut self.firmware;
-        for mapping in firmware.mappings.iter().filter(|mapping| mapping.direction == Direction::ToDevice) {
+        for mapping in firmware
+            .mappings
+            .iter()
+            .filter(|mapping| mapping.direction == Direction::ToDevice)
+        {
             mapping.clear(&mut firmware.dictionary);
         }
     }
@@ -138,7 +158,10 @@ impl Device {
     /// A SYNC0 of this device.
     pub(crate) fn sync0(&mut self) {
         let cycle_ns = self.esc.clock.sync_cycle_ns();
-        if !self.esc.clock.sync_passes() || self.firmware.state < AlState::SafeOp || !self.is_synchronous() {
+        if !self.esc.clock.sync_passes()
+            || self.firmware.state < AlState::SafeOp
+            || !self.is_synchronous()
+        {
             return;
         }
         let watch = &mut self.firmware.sync;
@@ -166,7 +189,9 @@ impl Device {
             return;
         }
         self.firmware.mail_due_ns = None;
-        let (Some(plan), Some(mailbox)) = (self.plan.mailbox, &mut self.firmware.mailbox) else { return };
+        let (Some(plan), Some(mailbox)) = (self.plan.mailbox, &mut self.firmware.mailbox) else {
+            return;
+        };
         let message = self.esc.buffer(TO_DEVICE).to_vec();
         self.esc.sync_managers[TO_DEVICE].full = false;
         if self.firmware.state == AlState::Init || self.firmware.trouble.silent {
@@ -189,7 +214,14 @@ impl Device {
         if self.esc.sync_managers[TO_MASTER].full || self.firmware.state == AlState::Init {
             return;
         }
-        let Some(message) = self.firmware.mailbox.as_mut().and_then(super::mailbox::Mailbox::next) else { return };
+        let Some(message) = self
+            .firmware
+            .mailbox
+            .as_mut()
+            .and_then(super::mailbox::Mailbox::next)
+        else {
+            return;
+        };
         lay(self.esc.fill(TO_MASTER), message);
     }
 

@@ -118,7 +118,13 @@ impl Dictionary {
     /// Adds an entry; one that is there already stays.
     pub(crate) fn add(&mut self, index: u16, sub: u8, kind: Kind, access: Access, value: i64) {
         let bytes = kind.bits().unwrap_or(0).div_ceil(8);
-        let mut entry = Entry { index, sub, kind, access, value: vec![0; bytes] };
+        let mut entry = Entry {
+            index,
+            sub,
+            kind,
+            access,
+            value: vec![0; bytes],
+        };
         put(&mut entry.value, value as u64);
         self.insert(entry);
     }
@@ -126,12 +132,24 @@ impl Dictionary {
     /// Adds a text.
     pub(crate) fn add_text(&mut self, index: u16, text: &str) {
         let value = text.as_bytes().to_vec();
-        self.insert(Entry { index, sub: 0, kind: Kind::Text, access: Access::ReadOnly, value });
+        self.insert(Entry {
+            index,
+            sub: 0,
+            kind: Kind::Text,
+            access: Access::ReadOnly,
+            value,
+        });
     }
 
     /// Adds octets that can be written.
     pub(crate) fn add_bytes(&mut self, index: u16, value: Vec<u8>) {
-        self.insert(Entry { index, sub: 0, kind: Kind::Bytes, access: Access::ReadWrite, value });
+        self.insert(Entry {
+            index,
+            sub: 0,
+            kind: Kind::Bytes,
+            access: Access::ReadWrite,
+            value,
+        });
     }
 
     /// Adds what a file describes.
@@ -142,8 +160,18 @@ impl Dictionary {
             4 => Kind::U32,
             _ => Kind::Bytes,
         };
-        let access = if of.writable { Access::ReadWrite } else { Access::ReadOnly };
-        self.insert(Entry { index: of.index, sub: of.sub, kind, access, value: of.value.clone() });
+        let access = if of.writable {
+            Access::ReadWrite
+        } else {
+            Access::ReadOnly
+        };
+        self.insert(Entry {
+            index: of.index,
+            sub: of.sub,
+            kind,
+            access,
+            value: of.value.clone(),
+        });
     }
 
     fn insert(&mut self, entry: Entry) {
@@ -162,7 +190,8 @@ impl Dictionary {
     }
 
     fn search(&self, index: u16, sub: u8) -> Result<Slot, usize> {
-        self.entries.binary_search_by_key(&(index, sub), |entry| (entry.index, entry.sub))
+        self.entries
+            .binary_search_by_key(&(index, sub), |entry| (entry.index, entry.sub))
     }
 
     /// Where an entry lies.
@@ -173,7 +202,11 @@ impl Dictionary {
     /// Where an entry lies, or why there is none.
     pub(crate) fn find(&self, index: u16, sub: u8) -> Result<Slot, Abort> {
         let slot = self.slot(index, sub);
-        slot.ok_or(if self.of_object(index).is_empty() { Abort::NO_OBJECT } else { Abort::NO_SUB })
+        slot.ok_or(if self.of_object(index).is_empty() {
+            Abort::NO_OBJECT
+        } else {
+            Abort::NO_SUB
+        })
     }
 
     pub(crate) fn entry(&self, slot: Slot) -> &Entry {
@@ -193,7 +226,9 @@ impl Dictionary {
 
     /// The indexes of all objects.
     pub(crate) fn objects(&self) -> impl Iterator<Item = u16> {
-        self.entries.chunk_by(|one, other| one.index == other.index).map(|object| object[0].index)
+        self.entries
+            .chunk_by(|one, other| one.index == other.index)
+            .map(|object| object[0].index)
     }
 
     /// An entry as an unsigned number.
@@ -205,7 +240,10 @@ impl Dictionary {
     pub(crate) fn signed(&self, slot: Slot) -> i64 {
         let value = &self.entries[slot].value;
         let unused = 64 - 8 * value.len().min(8) as u32;
-        number_at(value, 0, 8).unbounded_shl(unused).cast_signed().unbounded_shr(unused)
+        number_at(value, 0, 8)
+            .unbounded_shl(unused)
+            .cast_signed()
+            .unbounded_shr(unused)
     }
 
     /// Sets an entry from inside of the device.

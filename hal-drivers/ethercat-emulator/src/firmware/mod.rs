@@ -74,8 +74,21 @@ impl Firmware {
         }
         let identity = plan.identity;
         dictionary.name(0x1000, "device type");
-        dictionary.add(0x1000, 0, Kind::U32, Access::ReadOnly, if plan.drive.is_some() { 0x0002_0192 } else { 0x1389 });
-        for (index, name, text) in [(0x1008, "device name", &plan.order), (0x1009, "hardware version", &plan.name)] {
+        dictionary.add(
+            0x1000,
+            0,
+            Kind::U32,
+            Access::ReadOnly,
+            if plan.drive.is_some() {
+                0x0002_0192
+            } else {
+                0x1389
+            },
+        );
+        for (index, name, text) in [
+            (0x1008, "device name", &plan.order),
+            (0x1009, "hardware version", &plan.name),
+        ] {
             dictionary.name(index, name);
             dictionary.add_text(index, text);
         }
@@ -83,7 +96,12 @@ impl Firmware {
         dictionary.add_text(0x100A, env!("CARGO_PKG_VERSION"));
         dictionary.name(0x1018, "identity");
         dictionary.add(0x1018, 0, Kind::U8, Access::ReadOnly, 4);
-        let numbers = [identity.vendor, identity.product, identity.revision, identity.serial];
+        let numbers = [
+            identity.vendor,
+            identity.product,
+            identity.revision,
+            identity.serial,
+        ];
         for (sub, number) in (1..).zip(numbers) {
             dictionary.add(0x1018, sub, Kind::U32, Access::ReadOnly, i64::from(number));
         }
@@ -91,7 +109,15 @@ impl Firmware {
             Drive::describe(drive, &mut dictionary);
         }
         process::describe(plan, &mut dictionary);
-        let drive = plan.drive.as_ref().and_then(|drive| Drive::new(drive, &dictionary));
-        Self { dictionary, drive, mailbox: plan.mailbox.map(|_| Mailbox::default()), ..Self::default() }
+        let drive = plan
+            .drive
+            .as_ref()
+            .and_then(|drive| Drive::new(drive, &dictionary));
+        Self {
+            dictionary,
+            drive,
+            mailbox: plan.mailbox.map(|_| Mailbox::default()),
+            ..Self::default()
+        }
     }
 }

@@ -57,7 +57,9 @@ impl SdoServer {
     /// Answers a message of CAN over EtherCAT.
     pub(crate) fn serve(&mut self, message: &[u8], context: &mut Context) -> Vec<Vec<u8>> {
         match u16_at(message, 0) >> 12 {
-            REQUEST if message.len() >= SHORTEST => self.request(message, context).into_iter().collect(),
+            REQUEST if message.len() >= SHORTEST => {
+                self.request(message, context).into_iter().collect()
+            }
             INFORMATION => sdo_information::serve(message, context.dictionary, context.room),
             _ => vec![],
         }
@@ -88,7 +90,11 @@ impl SdoServer {
     fn upload(&mut self, command: u8, index: u16, sub: u8, context: &mut Context) -> Answer {
         let complete = command & 0x10 != 0;
         refused(context, index, sub)?;
-        let data = if complete { read_object(context, index, sub)? } else { read_entry(context, index, sub)? };
+        let data = if complete {
+            read_object(context, index, sub)?
+        } else {
+            read_entry(context, index, sub)?
+        };
         if data.len() <= 4 && !complete {
             let unused = 4 - data.len() as u8;
             let mut answer = head(RESPONSE, 0x43 | unused << 2, index, sub);
@@ -100,7 +106,14 @@ impl SdoServer {
         answer.extend((data.len() as u32).to_le_bytes());
         let at = data.len().min(context.room.saturating_sub(SHORTEST));
         answer.extend(&data[..at]);
-        self.upload = (at < data.len()).then_some(Transfer { index, sub, complete, data, at, toggle: false });
+        self.upload = (at < data.len()).then_some(Transfer {
+            index,
+            sub,
+            complete,
+            data,
+            at,
+            toggle: false,
+        });
         Ok(answer)
     }
 
@@ -135,7 +148,11 @@ impl SdoServer {
             answer
         };
         if command & 2 != 0 {
-            let stated = if command & 1 != 0 { 4 - usize::from(command >> 2 & 3) } else { 4 };
+            let stated = if command & 1 != 0 {
+                4 - usize::from(command >> 2 & 3)
+            } else {
+                4
+            };
             write(context, index, sub, complete, &message[DATA..DATA + stated])?;
             return Ok(answer());
         }
@@ -148,7 +165,14 @@ impl SdoServer {
             write(context, index, sub, complete, &data[..size])?;
         } else {
             let data = data.to_vec();
-            self.download = Some(Transfer { index, sub, complete, data, at: size, toggle: false });
+            self.download = Some(Transfer {
+                index,
+                sub,
+                complete,
+                data,
+                at: size,
+                toggle: false,
+            });
         }
         Ok(answer())
     }
@@ -160,8 +184,14 @@ impl SdoServer {
             return Err(Abort::TOGGLE);
         }
         let data = &message[BODY + 1..];
-        let unused = if data.len() <= 7 { usize::from(command >> 1 & 7) } else { 0 };
-        transfer.data.extend(&data[..data.len().saturating_sub(unused)]);
+        let unused = if data.len() <= 7 {
+            usize::from(command >> 1 & 7)
+        } else {
+            0
+        };
+        transfer
+            .data
+            .extend(&data[..data.len().saturating_sub(unused)]);
         if transfer.data.len() > transfer.at {
             return Err(Abort::TOO_LONG);
         }
@@ -170,7 +200,15 @@ impl SdoServer {
         answer.resize(SHORTEST, 0);
         transfer.toggle = !transfer.toggle;
         if command & 1 != 0 {
-            let Some(Transfer { index, sub, complete, data, at, .. }) = self.download.take() else {
+            let Some(Transfer {
+                index,
+                sub,
+                complete,
+                data,
+                at,
+                ..
+            }) = self.download.take()
+            else {
                 return Err(Abort::COMMAND);
             };
             if data.len() < at {
@@ -191,7 +229,10 @@ fn head(service: u16, command: u8, index: u16, sub: u8) -> Vec<u8> {
 }
 
 fn refused(context: &Context, index: u16, sub: u8) -> Result<(), Abort> {
-    let refusal = context.refusals.iter().find(|refusal| refusal.meets(index, sub));
+    let refusal = context
+        .refusals
+        .iter()
+        .find(|refusal| refusal.meets(index, sub));
     refusal.map_or(Ok(()), |refusal| Err(Abort(refusal.abort)))
 }
 
@@ -209,19 +250,34 @@ fn read_object(context: &Context, index: u16, sub: u8) -> Answer {
         return Err(Abort::UNSUPPORTED);
     }
     let entries = context.dictionary.of_object(index);
-    let Some(count) = entries.first() else { return Err(Abort::NO_OBJECT) };
+    let Some(count) = entries.first() else {
+        return Err(Abort::NO_OBJECT);
+    };
     if entries.len() == 1 {
         return Ok(count.value.clone());
     }
-    let mut data = if sub == 0 { vec![count.value[0], 0] } else { vec![] };
+    let mut data = if sub == 0 {
+        vec![count.value[0], 0]
+    } else {
+        vec![]
+    };
     let most = count.value[0];
-    for entry in entries.iter().filter(|entry| (1..=most).contains(&entry.sub)) {
+    for entry in entries
+        .iter()
+        .filter(|entry| (1..=most).contains(&entry.sub))
+    {
         data.extend(&entry.value);
     }
     Ok(data)
 }
 
-fn write(context: &mut Context, index: u16, sub: u8, complete: bool, data: &[u8]) -> Result<(), Abort> {
+fn write(
+    context: &mut Context,
+    index: u16,
+    sub: u8,
+    complete: bool,
+    data: &[u8],
+) -> Result<(), Abort> {
     if !complete {
         return write_entry(context, index, sub, data, false);
     }
@@ -256,7 +312,13 @@ fn write(context: &mut Context, index: u16, sub: u8, complete: bool, data: &[u8]
 }
 
 /// `at_once` says that a whole object is written, which needs no emptying of a list before.
-fn write_entry(context: &mut Context, index: u16, sub: u8, data: &[u8], at_once: bool) -> Result<(), Abort> {
+fn write_entry(
+    context: &mut Context,
+    index: u16,
+    sub: u8,
+    data: &[u8],
+    at_once: bool,
+) -> Result<(), Abort> {
     let slot = context.dictionary.find(index, sub)?;
     let entry = context.dictionary.entry(slot);
     match entry.access {

@@ -60,7 +60,9 @@ fn list(number: u16, dictionary: &Dictionary) -> Vec<u8> {
 
 fn object(index: u16, dictionary: &Dictionary) -> Result<Vec<u8>, Abort> {
     let entries = dictionary.of_object(index);
-    let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return Err(Abort::NO_OBJECT) };
+    let (Some(first), Some(last)) = (entries.first(), entries.last()) else {
+        return Err(Abort::NO_OBJECT);
+    };
     let mut body = index.to_le_bytes().to_vec();
     body.extend(first.kind.number().to_le_bytes());
     // A variable is 7, a record 9.

@@ -36,14 +36,19 @@ impl Device {
         if self.plan.simple {
             self.follow_simply(control);
         } else {
-            self.firmware.change =
-                Some(Change { due_ns: at_ns + CHANGE_NS, control, gives_up_ns: at_ns + CHANGE_NS + PATIENCE_NS });
+            self.firmware.change = Some(Change {
+                due_ns: at_ns + CHANGE_NS,
+                control,
+                gives_up_ns: at_ns + CHANGE_NS + PATIENCE_NS,
+            });
         }
     }
 
     /// A device without firmware shows what it was asked for, whatever it is.
     fn follow_simply(&mut self, control: u16) {
-        let Some(state) = AlState::of(control) else { return };
+        let Some(state) = AlState::of(control) else {
+            return;
+        };
         if self.firmware.trouble.hanging.contains(&state) {
             return;
         }
@@ -61,14 +66,25 @@ impl Device {
     }
 
     fn refusal(&self, state: AlState) -> Option<AlCode> {
-        self.firmware.trouble.refused.iter().find(|(refused, _)| *refused == state).map(|(_, code)| *code)
+        self.firmware
+            .trouble
+            .refused
+            .iter()
+            .find(|(refused, _)| *refused == state)
+            .map(|(_, code)| *code)
     }
 
     /// Looks whether a change is due.
     pub(super) fn pursue_change(&mut self, at_ns: u64) {
-        let Some(change) = self.firmware.change.filter(|change| change.due_ns <= at_ns) else { return };
+        let Some(change) = self.firmware.change.filter(|change| change.due_ns <= at_ns) else {
+            return;
+        };
         let Some(target) = AlState::of(change.control) else {
-            let code = if change.control & 0x0f == 3 { AlCode::NO_BOOT } else { AlCode::UNKNOWN_STATE };
+            let code = if change.control & 0x0f == 3 {
+                AlCode::NO_BOOT
+            } else {
+                AlCode::UNKNOWN_STATE
+            };
             self.end_change(Some(code));
             return;
         };
@@ -91,7 +107,10 @@ impl Device {
         } else if self.firmware.state.next() != Some(target) {
             self.end_change(Some(AlCode::INVALID_CHANGE));
         } else {
-            match self.refusal(target).map_or_else(|| self.step_up(target), Outcome::Refused) {
+            match self
+                .refusal(target)
+                .map_or_else(|| self.step_up(target), Outcome::Refused)
+            {
                 Outcome::Done => {
                     self.enter(target);
                     self.end_change(None);
@@ -115,8 +134,16 @@ impl Device {
     fn show_state(&mut self) {
         let code = self.firmware.code;
         let error = if code.is_some() { ERROR } else { 0 };
-        self.esc.set(at::AL_STATUS, 2, u64::from(self.firmware.state.number() | error));
-        self.esc.set(at::AL_STATUS_CODE, 2, u64::from(code.map_or(0, |code| code.0)));
+        self.esc.set(
+            at::AL_STATUS,
+            2,
+            u64::from(self.firmware.state.number() | error),
+        );
+        self.esc.set(
+            at::AL_STATUS_CODE,
+            2,
+            u64::from(code.map_or(0, |code| code.0)),
+        );
     }
 
     /// Whether the setup is good enough for the next state.
@@ -130,28 +157,41 @@ impl Device {
     }
 
     fn judge_mailbox(&self) -> Outcome {
-        let Some(mailbox) = self.plan.mailbox else { return Outcome::Done };
+        let Some(mailbox) = self.plan.mailbox else {
+            return Outcome::Done;
+        };
         let fits = |index: usize, direction, (start, length): (u16, u16)| {
             let manager = self.esc.sync_managers[index];
             self.esc.is_set_up(index, direction)
                 && manager.is_mailbox()
                 && (manager.start, manager.length) == (usize::from(start), usize::from(length))
         };
-        let good = fits(0, Direction::ToDevice, mailbox.to_device) && fits(1, Direction::ToMaster, mailbox.to_master);
-        if good { Outcome::Done } else { Outcome::Refused(AlCode::MAILBOX) }
+        let good = fits(0, Direction::ToDevice, mailbox.to_device)
+            && fits(1, Direction::ToMaster, mailbox.to_master);
+        if good {
+            Outcome::Done
+        } else {
+            Outcome::Refused(AlCode::MAILBOX)
+        }
     }
 
     fn judge_process_data(&mut self) -> Outcome {
-        let Some(mappings) = process::mappings(&self.plan.process, &self.firmware.dictionary) else {
+        let Some(mappings) = process::mappings(&self.plan.process, &self.firmware.dictionary)
+        else {
             return Outcome::Refused(AlCode::OUTPUTS);
         };
         for mapping in &mappings {
             let manager = self.esc.sync_managers[mapping.manager];
             let fits = mapping.bytes == 0 && !manager.is_active()
-                || self.esc.is_set_up(mapping.manager, mapping.direction) && manager.length == mapping.bytes;
+                || self.esc.is_set_up(mapping.manager, mapping.direction)
+                    && manager.length == mapping.bytes;
             if !fits {
                 let outputs = mapping.direction == Direction::ToDevice;
-                return Outcome::Refused(if outputs { AlCode::OUTPUTS } else { AlCode::INPUTS });
+                return Outcome::Refused(if outputs {
+                    AlCode::OUTPUTS
+                } else {
+                    AlCode::INPUTS
+                });
             }
         }
         let sync = self.esc.clock.sync;
@@ -169,8 +209,15 @@ impl Device {
         let watch = &self.firmware.sync;
         let wants_sync = self.firmware.drive.is_some() && self.esc.clock.sync.activation & 3 == 3;
         // Where outputs are watched, there is nothing to be watched before the first.
-        let watched = |mapping: &&process::Mapping| self.esc.sync_managers[mapping.manager].triggers_watchdog();
-        let takes_outputs = self.firmware.mappings.iter().filter(watched).any(|mapping| mapping.bytes > 0);
+        let watched = |mapping: &&process::Mapping| {
+            self.esc.sync_managers[mapping.manager].triggers_watchdog()
+        };
+        let takes_outputs = self
+            .firmware
+            .mappings
+            .iter()
+            .filter(watched)
+            .any(|mapping| mapping.bytes > 0);
         if wants_sync && !self.esc.clock.sync_runs() {
             Outcome::Refused(AlCode::NO_SYNC)
         } else if wants_sync && watch.pulses == 0 {
@@ -230,7 +277,12 @@ impl Device {
         self.firmware.change = None;
         self.enter(state.min(self.firmware.state));
         self.firmware.code = Some(code);
-        for plan in self.plan.process.iter().filter(|plan| plan.direction == Direction::ToDevice) {
+        for plan in self
+            .plan
+            .process
+            .iter()
+            .filter(|plan| plan.direction == Direction::ToDevice)
+        {
             let manager = &mut self.esc.sync_managers[usize::from(plan.manager)];
             manager.pdi_control |= 1;
         }

@@ -8,7 +8,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use pcap_file::pcapng::{Block, PcapNgReader};
-use tandem_ethercat_emulator::{BusDescription, Clocking, DeviceDescription, Kind, MAX_FRAME, ObjectDescription, Wire};
+use tandem_ethercat_emulator::{
+    BusDescription, Clocking, DeviceDescription, Kind, MAX_FRAME, ObjectDescription, Wire,
+};
 
 /// One datagram as it went out or came back.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,10 +40,15 @@ fn captures() -> Option<Vec<PathBuf>> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo")))?;
     let sources = std::fs::read_dir(home.join("registry/src")).ok()?;
-    let mut folders = sources.flatten().map(|source| source.path().join("ethercrab-0.7.1/tests"));
+    let mut folders = sources
+        .flatten()
+        .map(|source| source.path().join("ethercrab-0.7.1/tests"));
     let files = folders.find_map(|folder| std::fs::read_dir(folder).ok())?;
     let mut files: Vec<PathBuf> = files.flatten().map(|file| file.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "pcapng"));
+    files.retain(|file| {
+        file.extension()
+            .is_some_and(|extension| extension == "pcapng")
+    });
     files.sort();
     Some(files)
 }
@@ -84,7 +91,11 @@ fn exchanges(file: &Path) -> Vec<Exchange> {
     for (at_ns, frame) in frames {
         if frame[6] & 2 == 0 {
             waiting.insert(frame[17], all.len());
-            all.push(Exchange { at_ns: at_ns - begin_ns, sent: frame, back: vec![] });
+            all.push(Exchange {
+                at_ns: at_ns - begin_ns,
+                sent: frame,
+                back: vec![],
+            });
         } else if let Some(index) = waiting.remove(&frame[17]) {
             all[index].back = datagrams(&frame);
         }
@@ -96,20 +107,33 @@ fn exchanges(file: &Path) -> Vec<Exchange> {
 /// The devices of a capture, by what was read from them: SII, clocks, features, units.
 fn devices(exchanges: &[Exchange]) -> Vec<DeviceDescription> {
     let all = || exchanges.iter().flat_map(|exchange| &exchange.back);
-    let stations: Vec<u16> =
-        all().filter(|d| d.command == APWR && d.address == 0x10).map(|d| number(&d.data, 0)).collect();
+    let stations: Vec<u16> = all()
+        .filter(|d| d.command == APWR && d.address == 0x10)
+        .map(|d| number(&d.data, 0))
+        .collect();
     // How many devices took the clearing of each unit.
-    let takers = |address: u16| all().find(|d| d.command == BWR && d.address == address).map_or(0, |d| d.counter);
+    let takers = |address: u16| {
+        all()
+            .find(|d| d.command == BWR && d.address == address)
+            .map_or(0, |d| d.counter)
+    };
     let units = |first: u16, step: u16, device: usize| {
-        (0..16).filter(|unit| usize::from(takers(first + step * unit)) > device).count() as u8
+        (0..16)
+            .filter(|unit| usize::from(takers(first + step * unit)) > device)
+            .count() as u8
     };
     let describe = |(number, station): (usize, &u16)| {
         let own = || all().filter(|d| d.station == *station && d.command == FPRD && d.counter == 1);
         let mut description = DeviceDescription::new(Kind::Image);
         description.image = image(exchanges, *station);
-        description.clocking =
-            Some(if own().any(|d| d.address == 0x918) { Clocking::Bits64 } else { Clocking::Delays });
-        description.features = own().find(|d| d.address == 0x08).map(|d| number_of(&d.data));
+        description.clocking = Some(if own().any(|d| d.address == 0x918) {
+            Clocking::Bits64
+        } else {
+            Clocking::Delays
+        });
+        description.features = own()
+            .find(|d| d.address == 0x08)
+            .map(|d| number_of(&d.data));
         description.fmmus = Some(units(0x600, 16, number));
         description.sync_managers = Some(units(0x800, 8, number));
         description.objects = objects(exchanges, *station);
@@ -127,7 +151,11 @@ fn image(exchanges: &[Exchange], station: u16) -> Vec<u8> {
     let mut image = vec![0xff; 0x1000];
     let mut known = vec![false; 0x1000];
     let mut address = 0;
-    for datagram in exchanges.iter().flat_map(|exchange| &exchange.back).filter(|d| d.station == station) {
+    for datagram in exchanges
+        .iter()
+        .flat_map(|exchange| &exchange.back)
+        .filter(|d| d.station == station)
+    {
         match (datagram.command, datagram.address) {
             (FPRD, 0x012) if !known[8] => image[8..10].copy_from_slice(&datagram.data),
             (FPWR, 0x502) => address = 2 * usize::from(number(&datagram.data, 2)),
@@ -147,7 +175,11 @@ fn image(exchanges: &[Exchange], station: u16) -> Vec<u8> {
 /// Entries that were read from a device, and those that were written.
 fn objects(exchanges: &[Exchange], station: u16) -> Vec<ObjectDescription> {
     let mut objects: BTreeMap<(u16, u8), ObjectDescription> = BTreeMap::new();
-    for datagram in exchanges.iter().flat_map(|exchange| &exchange.back).filter(|d| d.station == station) {
+    for datagram in exchanges
+        .iter()
+        .flat_map(|exchange| &exchange.back)
+        .filter(|d| d.station == station)
+    {
         let data = &datagram.data;
         if data.len() < 0x80 || !matches!(datagram.command, FPRD | FPWR) || datagram.counter == 0 {
             continue;
@@ -157,16 +189,28 @@ fn objects(exchanges: &[Exchange], station: u16) -> Vec<ObjectDescription> {
             2 if command & 2 == 2 && number(data, 6) >> 12 == 3 => {
                 data[12..16 - usize::from(command >> 2 & 3)].to_vec()
             }
-            2 if number(data, 6) >> 12 == 3 => data[16..16 + usize::from(number(data, 12))].to_vec(),
+            2 if number(data, 6) >> 12 == 3 => {
+                data[16..16 + usize::from(number(data, 12))].to_vec()
+            }
             1 if number(data, 6) >> 12 == 2 => vec![0; 4 - usize::from(command >> 2 & 3)],
             _ => continue,
         };
         // What is assigned is there.
         if (0x1C10..0x1C20).contains(&index) && sub > 0 && command >> 5 == 1 {
-            let assigned = ObjectDescription { index: number(data, 12), sub: 0, value: vec![0], writable: false };
+            let assigned = ObjectDescription {
+                index: number(data, 12),
+                sub: 0,
+                value: vec![0],
+                writable: false,
+            };
             objects.entry((assigned.index, 0)).or_insert(assigned);
         }
-        objects.entry((index, sub)).or_insert(ObjectDescription { index, sub, value, writable: true });
+        objects.entry((index, sub)).or_insert(ObjectDescription {
+            index,
+            sub,
+            value,
+            writable: true,
+        });
     }
     objects.into_values().collect()
 }
@@ -202,20 +246,33 @@ fn message(data: &[u8]) -> Vec<u8> {
 
 /// Whether the next frame asks the same once more: then a device may be sooner or later than the real one was.
 fn is_asked_again(exchanges: &[Exchange], index: usize) -> bool {
-    let key = |exchange: &Exchange| (exchange.back[0].command, exchange.back[0].station, exchange.back[0].address);
-    exchanges.get(index + 1).is_some_and(|next| key(next) == key(&exchanges[index]))
+    let key = |exchange: &Exchange| {
+        (
+            exchange.back[0].command,
+            exchange.back[0].station,
+            exchange.back[0].address,
+        )
+    };
+    exchanges
+        .get(index + 1)
+        .is_some_and(|next| key(next) == key(&exchanges[index]))
 }
 
 /// Replays a capture; answers how many datagrams were compared, and what differs.
 fn replay(file: &Path) -> (usize, Vec<String>) {
     let exchanges = exchanges(file);
-    let description = BusDescription { devices: devices(&exchanges), ..BusDescription::default() };
+    let description = BusDescription {
+        devices: devices(&exchanges),
+        ..BusDescription::default()
+    };
     let mut wire = Wire::new(&description).unwrap();
     let (mut compared, mut differences) = (0, vec![]);
     for (index, exchange) in exchanges.iter().enumerate() {
         wire.send(exchange.at_ns, &exchange.sent);
         let mut reply = [0; MAX_FRAME];
-        let length = wire.receive(exchange.at_ns + 200_000, &mut reply).unwrap_or(0);
+        let length = wire
+            .receive(exchange.at_ns + 200_000, &mut reply)
+            .unwrap_or(0);
         if length == 0 {
             differences.push(format!("frame {index}: no reply"));
             continue;
@@ -228,7 +285,11 @@ fn replay(file: &Path) -> (usize, Vec<String>) {
             compared += 1;
             let same = own.counter == real.counter && own.station == real.station;
             if !same || comparable(own) != comparable(real) {
-                differences.push(format!("frame {index}: emulated {}\n  real {}", told(own), told(real)));
+                differences.push(format!(
+                    "frame {index}: emulated {}\n  real {}",
+                    told(own),
+                    told(real)
+                ));
             }
         }
     }
@@ -236,14 +297,25 @@ fn replay(file: &Path) -> (usize, Vec<String>) {
 }
 
 fn told(datagram: &Datagram) -> String {
-    let Datagram { command, station, address, counter, .. } = datagram;
-    format!("{command} {station:04x}:{address:04x} {:02x?} counter {counter}", comparable(datagram))
+    let Datagram {
+        command,
+        station,
+        address,
+        counter,
+        ..
+    } = datagram;
+    format!(
+        "{command} {station:04x}:{address:04x} {:02x?} counter {counter}",
+        comparable(datagram)
+    )
 }
 
 #[test]
 fn real_terminals_answered_as_emulated_ones_do() {
     let Some(files) = captures().filter(|files| !files.is_empty()) else {
-        println!("skipped: cargo keeps no source of ethercrab 0.7.1 here, whose tests hold the captures");
+        println!(
+            "skipped: cargo keeps no source of ethercrab 0.7.1 here, whose tests hold the captures"
+        );
         return;
     };
     assert_eq!(files.len(), 8);
@@ -251,9 +323,19 @@ fn real_terminals_answered_as_emulated_ones_do() {
     for file in files {
         let (compared, differences) = replay(&file);
         let name = file.file_name().unwrap().to_string_lossy().to_string();
-        println!("{name}: {compared} datagrams compared, {} differ", differences.len());
-        assert!(compared > 200, "{name}: only {compared} datagrams were compared");
-        failed.extend(differences.into_iter().map(|difference| format!("{name}: {difference}")));
+        println!(
+            "{name}: {compared} datagrams compared, {} differ",
+            differences.len()
+        );
+        assert!(
+            compared > 200,
+            "{name}: only {compared} datagrams were compared"
+        );
+        failed.extend(
+            differences
+                .into_iter()
+                .map(|difference| format!("{name}: {difference}")),
+        );
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }

@@ -26,26 +26,47 @@ fn drifting(ppm: [f64; 3]) -> String {
 /// Differences of the clocks to the first one's, in ns.
 fn differences(rig: &Rig) -> Vec<i64> {
     let wire = rig.wire.borrow();
-    let times: Vec<u64> = wire.bus().devices().iter().map(|device| device.system_time_ns(now_ns())).collect();
-    times.iter().map(|time| time.wrapping_sub(times[0]).cast_signed()).collect()
+    let times: Vec<u64> = wire
+        .bus()
+        .devices()
+        .iter()
+        .map(|device| device.system_time_ns(now_ns()))
+        .collect();
+    times
+        .iter()
+        .map(|time| time.wrapping_sub(times[0]).cast_signed())
+        .collect()
 }
 
 /// Brings a bus up with SYNC0 and exchanges so many periods in OPERATIONAL, each in the middle between two SYNC0.
 async fn synchronous(rig: &Rig, master: &MainDevice<'static>, periods: u32) {
-    let mut group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+    let mut group = master
+        .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+        .await
+        .unwrap();
     for mut device in group.iter_mut(master) {
         device.set_dc_sync(DcSync::Sync0);
     }
     let group = group.into_pre_op_pdi(master).await.unwrap();
     for n in 1..300 {
         group.tx_rx_sync_system_time(master).await.unwrap();
-        rig.until(now_ns() / 1_000_000 * 1_000_000 + 1_000_000).await;
+        rig.until(now_ns() / 1_000_000 * 1_000_000 + 1_000_000)
+            .await;
         let all = differences(rig);
-        assert!(n < 299 || all.iter().all(|ns| ns.abs() < 1000), "{all:?} ns");
+        assert!(
+            n < 299 || all.iter().all(|ns| ns.abs() < 1000),
+            "{all:?} ns"
+        );
     }
-    let configuration =
-        DcConfiguration { start_delay: Duration::from_millis(20), sync0_period: PERIOD, sync0_shift: PERIOD / 2 };
-    let group = group.configure_dc_sync(master, configuration).await.unwrap();
+    let configuration = DcConfiguration {
+        start_delay: Duration::from_millis(20),
+        sync0_period: PERIOD,
+        sync0_shift: PERIOD / 2,
+    };
+    let group = group
+        .configure_dc_sync(master, configuration)
+        .await
+        .unwrap();
     let group = group.into_safe_op(master).await.unwrap();
     let group = group.request_into_op(master).await.unwrap();
     let mut left = periods;
@@ -54,8 +75,11 @@ async fn synchronous(rig: &Rig, master: &MainDevice<'static>, periods: u32) {
         if answer.all_op() {
             left -= 1;
         }
-        let CycleInfo { next_cycle_wait, .. } = answer.extra;
-        rig.until(now_ns() + next_cycle_wait.as_nanos() as u64).await;
+        let CycleInfo {
+            next_cycle_wait, ..
+        } = answer.extra;
+        rig.until(now_ns() + next_cycle_wait.as_nanos() as u64)
+            .await;
     }
 }
 
@@ -99,9 +123,15 @@ fn missed_sync_events_beyond_the_limit_are_an_error_of_the_device() {
 fn a_clock_that_jumps_is_slewed_back_and_one_that_is_lost_does_not_answer() {
     let (rig, master) = Rig::of(&drifting([0.0, 20.0, -20.0]));
     rig.run(async {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await
+            .unwrap();
         let group = group.into_pre_op_pdi(&master).await.unwrap();
-        let jump = What::ClockJump { device: 1, by_ns: 50_000 };
+        let jump = What::ClockJump {
+            device: 1,
+            by_ns: 50_000,
+        };
         rig.wire.borrow_mut().inject(jump, None).unwrap();
         assert!(differences(&rig)[1] > 49_000);
         for _ in 0..400 {
@@ -110,8 +140,15 @@ fn a_clock_that_jumps_is_slewed_back_and_one_that_is_lost_does_not_answer() {
         }
         let left = differences(&rig)[1];
         assert!(left.abs() < 1000, "{left} ns");
-        let before = group.tx_rx_sync_system_time(&master).await.unwrap().working_counter;
-        rig.wire.borrow_mut().inject(What::LostClock { device: 0 }, None).unwrap();
+        let before = group
+            .tx_rx_sync_system_time(&master)
+            .await
+            .unwrap()
+            .working_counter;
+        rig.wire
+            .borrow_mut()
+            .inject(What::LostClock { device: 0 }, None)
+            .unwrap();
         for _ in 0..400 {
             let answer = group.tx_rx_sync_system_time(&master).await.unwrap();
             assert_eq!(answer.working_counter, before);
@@ -125,9 +162,13 @@ fn a_clock_that_jumps_is_slewed_back_and_one_that_is_lost_does_not_answer() {
 
 #[test]
 fn a_silent_master_is_noticed_by_the_devices_own_time() {
-    let (rig, master) = Rig::of("[[devices]]\nkind = \"drive\"\n[[devices]]\nkind = \"digital-outputs\"\n");
+    let (rig, master) =
+        Rig::of("[[devices]]\nkind = \"drive\"\n[[devices]]\nkind = \"digital-outputs\"\n");
     rig.run(async {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await
+            .unwrap();
         for device in group.iter(&master) {
             // 100 counts of 100 µs.
             device.register_write(0x0420_u16, 100_u16).await.unwrap();
@@ -138,19 +179,44 @@ fn a_silent_master_is_noticed_by_the_devices_own_time() {
         let mut target = 0;
         for _ in 0..100 {
             target += 300;
-            bus.exchange(0, Command { control: 0x0f, mode: 8, target, velocity: 300_000, probe: 0 }).await;
+            bus.exchange(
+                0,
+                Command {
+                    control: 0x0f,
+                    mode: 8,
+                    target,
+                    velocity: 300_000,
+                    probe: 0,
+                },
+            )
+            .await;
         }
     });
     let seen = |rig: &Rig| {
         let wire = rig.wire.borrow();
-        let [drive, outputs] = wire.bus().devices() else { panic!("two devices") };
+        let [drive, outputs] = wire.bus().devices() else {
+            panic!("two devices")
+        };
         assert_eq!(outputs.al_state(), AlState::Op);
-        (drive.al_state(), drive.al_code(), drive.drive_state().unwrap(), outputs.output(0).unwrap())
+        (
+            drive.al_state(),
+            drive.al_code(),
+            drive.drive_state().unwrap(),
+            outputs.output(0).unwrap(),
+        )
     };
     rig.silence(9);
-    assert_eq!(seen(&rig), (AlState::Op, None, DriveState::OperationEnabled, true));
+    assert_eq!(
+        seen(&rig),
+        (AlState::Op, None, DriveState::OperationEnabled, true)
+    );
     rig.silence(2);
-    let fallen = (AlState::SafeOp, Some(AlCode::WATCHDOG), DriveState::FaultReactionActive, false);
+    let fallen = (
+        AlState::SafeOp,
+        Some(AlCode::WATCHDOG),
+        DriveState::FaultReactionActive,
+        false,
+    );
     assert_eq!(seen(&rig), fallen);
     rig.silence(100);
     let wire = rig.wire.borrow();

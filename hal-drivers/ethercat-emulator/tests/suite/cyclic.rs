@@ -47,15 +47,26 @@ pub struct Answer {
 
 impl<'a> Cyclic<'a> {
     pub async fn bring_up(rig: &'a Rig, master: &'a MainDevice<'static>) -> Result<Self, Error> {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await?;
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await?;
         Self::of(rig, master, group).await
     }
 
-    pub async fn of(rig: &'a Rig, master: &'a MainDevice<'static>, group: InPreOp) -> Result<Self, Error> {
+    pub async fn of(
+        rig: &'a Rig,
+        master: &'a MainDevice<'static>,
+        group: InPreOp,
+    ) -> Result<Self, Error> {
         let group = group.into_safe_op(master).await?;
         let group = group.request_into_op(master).await?;
         while !group.tx_rx(master).await?.all_op() {}
-        Ok(Self { rig, master, group, next_ns: Cell::new(now_ns()) })
+        Ok(Self {
+            rig,
+            master,
+            group,
+            next_ns: Cell::new(now_ns()),
+        })
     }
 
     /// Waits for the next period and exchanges; what a device answers is what it was in the last exchange.
@@ -104,22 +115,41 @@ impl<'a> Cyclic<'a> {
 
     /// Through the states to *Operation enabled*, where the drive stands.
     pub async fn enable(&self, device: usize, mode: i8) -> Answer {
-        let mut command = Command { mode, ..Command::default() };
+        let mut command = Command {
+            mode,
+            ..Command::default()
+        };
         for (control, status) in [(0x80, 0x40), (0x06, 0x21), (0x07, 0x23), (0x0f, 0x27)] {
-            command.target = self.exchange(device, Command { control, ..command }).await.position;
+            command.target = self
+                .exchange(device, Command { control, ..command })
+                .await
+                .position;
             let state = |answer: &Answer| answer.status & 0x6f == status;
-            self.until(device, Command { control, ..command }, 500, state).await;
+            self.until(device, Command { control, ..command }, 500, state)
+                .await;
         }
-        self.exchange(device, Command { control: 0x0f, ..command }).await
+        self.exchange(
+            device,
+            Command {
+                control: 0x0f,
+                ..command
+            },
+        )
+        .await
     }
 
     /// Sets the first outputs of a terminal.
     pub fn switch(&self, device: usize, outputs: u8) {
-        self.group.subdevice(self.master, device).unwrap().outputs_raw_mut()[0] = outputs;
+        self.group
+            .subdevice(self.master, device)
+            .unwrap()
+            .outputs_raw_mut()[0] = outputs;
     }
 
     /// The state that a drive is really in.
     pub fn drive_state(&self, device: usize) -> DriveState {
-        self.rig.wire.borrow().bus().devices()[device].drive_state().unwrap()
+        self.rig.wire.borrow().bus().devices()[device]
+            .drive_state()
+            .unwrap()
     }
 }

@@ -3,7 +3,8 @@
 use ethercrab::error::{CoeAbortCode, Error, MailboxError};
 use proptest::prelude::*;
 use tandem_ethercat_emulator::{
-    BusDescription, DeviceDescription, DriveDescription, DriveState, Kind, MAX_FRAME, ObjectDescription, What,
+    BusDescription, DeviceDescription, DriveDescription, DriveState, Kind, MAX_FRAME,
+    ObjectDescription, What,
 };
 
 use crate::counting_allocator::{HeapUse, heap_use_of};
@@ -11,11 +12,23 @@ use crate::cyclic::{Command, Cyclic, PERIOD_NS, PERIOD_S};
 use crate::rig::{MAX_BYTES, MAX_DEVICES, Rig, now_ns};
 
 fn one_drive(drive: DriveDescription) -> BusDescription {
-    let device = DeviceDescription { drive, ..DeviceDescription::new(Kind::Drive) };
-    BusDescription { devices: vec![device], ..BusDescription::default() }
+    let device = DeviceDescription {
+        drive,
+        ..DeviceDescription::new(Kind::Drive)
+    };
+    BusDescription {
+        devices: vec![device],
+        ..BusDescription::default()
+    }
 }
 
-const ENABLED: Command = Command { control: 0x0f, mode: 8, target: 0, velocity: 0, probe: 0 };
+const ENABLED: Command = Command {
+    control: 0x0f,
+    mode: 8,
+    target: 0,
+    velocity: 0,
+    probe: 0,
+};
 
 /// A position that speeds up, drives on and slows down, each for a third of the periods.
 fn course(from: i32, step: f64, periods: i32, n: i32) -> (i32, i32) {
@@ -27,7 +40,10 @@ fn course(from: i32, step: f64, periods: i32, n: i32) -> (i32, i32) {
         step * (up * up / (2.0 * third) + on + down - down * down / (2.0 * third))
     };
     let (now, before) = (place(f64::from(n)), place(f64::from(n - 1)));
-    (from.wrapping_add(now.round() as i32), ((now - before) / PERIOD_S).round() as i32)
+    (
+        from.wrapping_add(now.round() as i32),
+        ((now - before) / PERIOD_S).round() as i32,
+    )
 }
 
 proptest! {
@@ -70,10 +86,18 @@ proptest! {
 #[test]
 fn a_frame_of_process_data_allocates_nothing() {
     // An emergency message would be one for the mailbox, whose messages take memory.
-    let mut description = one_drive(DriveDescription { emergency: false, ..DriveDescription::default() });
-    description
-        .devices
-        .extend([Kind::DigitalInputs, Kind::DigitalOutputs, Kind::AnalogInputs].map(DeviceDescription::new));
+    let mut description = one_drive(DriveDescription {
+        emergency: false,
+        ..DriveDescription::default()
+    });
+    description.devices.extend(
+        [
+            Kind::DigitalInputs,
+            Kind::DigitalOutputs,
+            Kind::AnalogInputs,
+        ]
+        .map(DeviceDescription::new),
+    );
     let (rig, master) = Rig::new(&description);
     rig.run(async {
         let bus = Cyclic::bring_up(&rig, &master).await.unwrap();
@@ -100,7 +124,17 @@ fn without_feed_forward_an_axis_lags_by_its_velocity_over_its_gain() {
         bus.enable(0, 8).await;
         let mut behind = 0;
         for n in 1..=200 {
-            behind = n * 100 - bus.exchange(0, Command { target: n * 100, ..ENABLED }).await.position;
+            behind = n * 100
+                - bus
+                    .exchange(
+                        0,
+                        Command {
+                            target: n * 100,
+                            ..ENABLED
+                        },
+                    )
+                    .await
+                    .position;
         }
         // 100 000 counts/s at 150/s are 667 counts; one to three periods of delay come on top.
         assert!((700..1000).contains(&behind), "{behind} counts");
@@ -109,7 +143,10 @@ fn without_feed_forward_an_axis_lags_by_its_velocity_over_its_gain() {
 
 #[test]
 fn an_open_brake_takes_its_time_and_the_axis_does_not_move_meanwhile() {
-    let (rig, master) = Rig::new(&one_drive(DriveDescription { brake_open_ms: 120.0, ..DriveDescription::default() }));
+    let (rig, master) = Rig::new(&one_drive(DriveDescription {
+        brake_open_ms: 120.0,
+        ..DriveDescription::default()
+    }));
     rig.run(async {
         let bus = Cyclic::bring_up(&rig, &master).await.unwrap();
         for control in [0x80, 0x06, 0x06, 0x06, 0x07, 0x07, 0x07] {
@@ -130,8 +167,13 @@ fn a_jump_at_enable_is_a_following_error_and_a_reset_helps() {
     rig.run(async {
         let bus = Cyclic::bring_up(&rig, &master).await.unwrap();
         bus.enable(0, 8).await;
-        let jump = Command { target: 5_000_000, ..ENABLED };
-        let fault = bus.until(0, jump, 3000, |answer| answer.status & 0x4f == 0x08).await;
+        let jump = Command {
+            target: 5_000_000,
+            ..ENABLED
+        };
+        let fault = bus
+            .until(0, jump, 3000, |answer| answer.status & 0x4f == 0x08)
+            .await;
         assert_eq!(fault.error, 0x8611);
         assert_eq!(bus.drive_state(0), DriveState::Fault);
         let again = bus.enable(0, 8).await;
@@ -142,8 +184,10 @@ fn a_jump_at_enable_is_a_following_error_and_a_reset_helps() {
 #[test]
 fn a_fault_stops_the_axis_on_its_ramp_in_every_state() {
     let deceleration = 2_000_000.0;
-    let description =
-        DriveDescription { quick_stop_deceleration_counts_per_s2: 2_000_000, ..DriveDescription::default() };
+    let description = DriveDescription {
+        quick_stop_deceleration_counts_per_s2: 2_000_000,
+        ..DriveDescription::default()
+    };
     for control in [0x00, 0x06, 0x07, 0x0f] {
         let (rig, master) = Rig::new(&one_drive(description.clone()));
         rig.run(async {
@@ -152,17 +196,61 @@ fn a_fault_stops_the_axis_on_its_ramp_in_every_state() {
             let mut target = 0;
             for _ in 0..200 {
                 target += 200;
-                bus.exchange(0, Command { target, velocity: 200_000, ..ENABLED }).await;
+                bus.exchange(
+                    0,
+                    Command {
+                        target,
+                        velocity: 200_000,
+                        ..ENABLED
+                    },
+                )
+                .await;
             }
             for _ in 0..if control == 0x0f { 0 } else { 300 } {
-                bus.exchange(0, Command { control, target, ..ENABLED }).await;
+                bus.exchange(
+                    0,
+                    Command {
+                        control,
+                        target,
+                        ..ENABLED
+                    },
+                )
+                .await;
             }
-            rig.wire.borrow_mut().inject(What::DriveFault { device: 0, code: 0x7121, stays: false }, None).unwrap();
-            let mut before = rig.wire.borrow().bus().devices()[0].position_and_velocity_counts().unwrap().1;
+            rig.wire
+                .borrow_mut()
+                .inject(
+                    What::DriveFault {
+                        device: 0,
+                        code: 0x7121,
+                        stays: false,
+                    },
+                    None,
+                )
+                .unwrap();
+            let mut before = rig.wire.borrow().bus().devices()[0]
+                .position_and_velocity_counts()
+                .unwrap()
+                .1;
             loop {
-                let answer = bus.exchange(0, Command { control, target, ..ENABLED }).await;
-                let now = rig.wire.borrow().bus().devices()[0].position_and_velocity_counts().unwrap().1;
-                assert!((now - before).abs() <= 1.2 * deceleration * PERIOD_S + 2.0, "from {before} to {now} counts/s");
+                let answer = bus
+                    .exchange(
+                        0,
+                        Command {
+                            control,
+                            target,
+                            ..ENABLED
+                        },
+                    )
+                    .await;
+                let now = rig.wire.borrow().bus().devices()[0]
+                    .position_and_velocity_counts()
+                    .unwrap()
+                    .1;
+                assert!(
+                    (now - before).abs() <= 1.2 * deceleration * PERIOD_S + 2.0,
+                    "from {before} to {now} counts/s"
+                );
                 before = now;
                 if answer.status & 0x4f == 0x08 {
                     assert_eq!(answer.error, 0x7121);
@@ -176,14 +264,21 @@ fn a_fault_stops_the_axis_on_its_ramp_in_every_state() {
 
 #[test]
 fn a_probe_catches_the_first_edge_that_is_asked_for_where_it_was() {
-    let drive = DriveDescription { probes_counts: [Some(12_345.0), None], ..DriveDescription::default() };
+    let drive = DriveDescription {
+        probes_counts: [Some(12_345.0), None],
+        ..DriveDescription::default()
+    };
     let (rig, master) = Rig::new(&one_drive(drive));
     rig.run(async {
         let bus = Cyclic::bring_up(&rig, &master).await.unwrap();
         bus.enable(0, 8).await;
         let mut caught = None;
         for target in (0..200).map(|n| n * 100) {
-            let armed = Command { target, probe: 0x11, ..ENABLED };
+            let armed = Command {
+                target,
+                probe: 0x11,
+                ..ENABLED
+            };
             let answer = bus.exchange(0, armed).await;
             if answer.probe_status & 2 != 0 {
                 caught = Some(answer);
@@ -194,7 +289,16 @@ fn a_probe_catches_the_first_edge_that_is_asked_for_where_it_was() {
         assert_eq!(caught.inputs >> 16 & 1, 1);
         // On the way back there is another edge, which nobody asked for.
         for target in (0..200).rev().map(|n| n * 100) {
-            let answer = bus.exchange(0, Command { target, probe: 0x11, ..ENABLED }).await;
+            let answer = bus
+                .exchange(
+                    0,
+                    Command {
+                        target,
+                        probe: 0x11,
+                        ..ENABLED
+                    },
+                )
+                .await;
             assert_eq!((answer.probe_position, answer.probe_status), (12_345, 0x03));
         }
     });
@@ -204,10 +308,22 @@ fn a_probe_catches_the_first_edge_that_is_asked_for_where_it_was() {
 fn homing_finds_the_edge_of_its_method() {
     // Method, where it begins, where its edge lies, and how far from it the place may be found, by one step of the loop.
     let turn = 10_000.0;
-    let cases =
-        [(19, 0, 50_000), (21, 90_000, 50_000), (17, 0, -40_000), (18, 0, 120_000), (33, 12, 10_000), (34, 12, 0)];
-    let with_index =
-        [(3, 0, 40_000), (5, 90_000, 60_000), (1, 0, -30_000), (2, 0, 110_000), (37, 777, 777), (35, 777, 777)];
+    let cases = [
+        (19, 0, 50_000),
+        (21, 90_000, 50_000),
+        (17, 0, -40_000),
+        (18, 0, 120_000),
+        (33, 12, 10_000),
+        (34, 12, 0),
+    ];
+    let with_index = [
+        (3, 0, 40_000),
+        (5, 90_000, 60_000),
+        (1, 0, -30_000),
+        (2, 0, 110_000),
+        (37, 777, 777),
+        (35, 777, 777),
+    ];
     for (method, start, edge) in cases.into_iter().chain(with_index) {
         let drive = DriveDescription {
             position_counts: f64::from(start),
@@ -219,7 +335,10 @@ fn homing_finds_the_edge_of_its_method() {
         };
         let (rig, master) = Rig::new(&one_drive(drive));
         rig.run(async {
-            let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+            let group = master
+                .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+                .await
+                .unwrap();
             let device = group.subdevice(&master, 0).unwrap();
             device.sdo_write(0x6098, 0, method as i8).await.unwrap();
             device.sdo_write(0x607C, 0, 5000_i32).await.unwrap();
@@ -227,60 +346,118 @@ fn homing_finds_the_edge_of_its_method() {
             device.sdo_write(0x6099, 2, 16_000_u32).await.unwrap();
             let bus = Cyclic::of(&rig, &master, group).await.unwrap();
             bus.enable(0, 6).await;
-            let start_bit = Command { control: 0x1f, mode: 6, ..ENABLED };
-            let done = bus.until(0, start_bit, 20_000, |answer| answer.status & 0x3400 != 0).await;
+            let start_bit = Command {
+                control: 0x1f,
+                mode: 6,
+                ..ENABLED
+            };
+            let done = bus
+                .until(0, start_bit, 20_000, |answer| answer.status & 0x3400 != 0)
+                .await;
             assert_eq!(done.status & 0x3400, 0x1400, "method {method}");
-            let moved = rig.wire.borrow().bus().devices()[0].position_and_velocity_counts().unwrap().0 - 5000.0;
+            let moved = rig.wire.borrow().bus().devices()[0]
+                .position_and_velocity_counts()
+                .unwrap()
+                .0
+                - 5000.0;
             let place = f64::from(done.position) - 5000.0;
             assert!((moved - place).abs() < 3.0);
             // Where it stands now, by the switches, less what it calls this place, is where it found its edge.
             let found = rig.wire.borrow().bus().devices()[0].place_counts().unwrap() - moved;
-            assert!((found - f64::from(edge)).abs() <= 4.0, "method {method}: found {found}, not {edge}");
+            assert!(
+                (found - f64::from(edge)).abs() <= 4.0,
+                "method {method}: found {found}, not {edge}"
+            );
         });
     }
 }
 
 #[test]
 fn a_homing_that_meets_the_end_of_travel_says_so() {
-    let drive = DriveDescription { positive_limit_counts: Some(30_000.0), ..DriveDescription::default() };
+    let drive = DriveDescription {
+        positive_limit_counts: Some(30_000.0),
+        ..DriveDescription::default()
+    };
     let (rig, master) = Rig::new(&one_drive(drive));
     rig.run(async {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
-        group.subdevice(&master, 0).unwrap().sdo_write(0x6098, 0, 19_i8).await.unwrap();
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await
+            .unwrap();
+        group
+            .subdevice(&master, 0)
+            .unwrap()
+            .sdo_write(0x6098, 0, 19_i8)
+            .await
+            .unwrap();
         let bus = Cyclic::of(&rig, &master, group).await.unwrap();
         bus.enable(0, 6).await;
-        let start_bit = Command { control: 0x1f, mode: 6, ..ENABLED };
-        bus.until(0, start_bit, 5000, |answer| answer.status & 0x2000 != 0).await;
+        let start_bit = Command {
+            control: 0x1f,
+            mode: 6,
+            ..ENABLED
+        };
+        bus.until(0, start_bit, 5000, |answer| answer.status & 0x2000 != 0)
+            .await;
     });
 }
 
 #[test]
 fn sdos_are_read_and_written_whole_and_in_segments_and_refused_with_their_codes() {
     let mut description = one_drive(DriveDescription::default());
-    let long = ObjectDescription { index: 0x2001, sub: 0, value: (0..100).collect(), writable: false };
+    let long = ObjectDescription {
+        index: 0x2001,
+        sub: 0,
+        value: (0..100).collect(),
+        writable: false,
+    };
     description.devices[0].objects.push(long);
     let (rig, master) = Rig::new(&description);
     rig.run(async {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await
+            .unwrap();
         let device = group.subdevice(&master, 0).unwrap();
         // ethercrab 0.7.1 loses the data that come with the answer to the request of a transfer in segments, so that only
         // what fits into one message is read here; SOEM reads the rest.
         let long: [u8; 100] = device.sdo_read(0x2001, 0).await.unwrap();
         assert_eq!(long, std::array::from_fn(|n| n as u8));
-        assert_eq!(device.sdo_read::<u32>(0x6502, 0).await.unwrap(), 1 << 2 | 1 << 5 | 1 << 7 | 1 << 8);
+        assert_eq!(
+            device.sdo_read::<u32>(0x6502, 0).await.unwrap(),
+            1 << 2 | 1 << 5 | 1 << 7 | 1 << 8
+        );
         device.sdo_write(0x6085, 0, 123_456_u32).await.unwrap();
         assert_eq!(device.sdo_read::<u32>(0x6085, 0).await.unwrap(), 123_456);
         let code = |error: Error| match error {
             Error::Mailbox(MailboxError::Aborted { code, .. }) => code,
             other => panic!("{other:?}"),
         };
-        assert_eq!(code(device.sdo_read::<u32>(0x5555, 0).await.unwrap_err()), CoeAbortCode::from(0x0602_0000));
-        assert_eq!(code(device.sdo_read::<u32>(0x1018, 9).await.unwrap_err()), CoeAbortCode::from(0x0609_0011));
-        assert_eq!(code(device.sdo_write(0x6041, 0, 1_u16).await.unwrap_err()), CoeAbortCode::from(0x0601_0002));
-        assert_eq!(code(device.sdo_write(0x6085, 0, 1_u16).await.unwrap_err()), CoeAbortCode::from(0x0607_0013));
-        assert_eq!(code(device.sdo_write(0x6060, 0, 4_i8).await.unwrap_err()), CoeAbortCode::from(0x0609_0030));
+        assert_eq!(
+            code(device.sdo_read::<u32>(0x5555, 0).await.unwrap_err()),
+            CoeAbortCode::from(0x0602_0000)
+        );
+        assert_eq!(
+            code(device.sdo_read::<u32>(0x1018, 9).await.unwrap_err()),
+            CoeAbortCode::from(0x0609_0011)
+        );
+        assert_eq!(
+            code(device.sdo_write(0x6041, 0, 1_u16).await.unwrap_err()),
+            CoeAbortCode::from(0x0601_0002)
+        );
+        assert_eq!(
+            code(device.sdo_write(0x6085, 0, 1_u16).await.unwrap_err()),
+            CoeAbortCode::from(0x0607_0013)
+        );
+        assert_eq!(
+            code(device.sdo_write(0x6060, 0, 4_i8).await.unwrap_err()),
+            CoeAbortCode::from(0x0609_0030)
+        );
         // An assignment is emptied before it is filled.
-        assert_eq!(code(device.sdo_write(0x1C12, 1, 0x1601_u16).await.unwrap_err()), CoeAbortCode::from(0x0800_0022));
+        assert_eq!(
+            code(device.sdo_write(0x1C12, 1, 0x1601_u16).await.unwrap_err()),
+            CoeAbortCode::from(0x0800_0022)
+        );
     });
 }
 
@@ -288,16 +465,29 @@ fn sdos_are_read_and_written_whole_and_in_segments_and_refused_with_their_codes(
 fn a_spindle_is_mapped_as_a_velocity_drive_and_reaches_its_speed() {
     let (rig, master) = Rig::new(&one_drive(DriveDescription::default()));
     rig.run(async {
-        let group = master.init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns).await.unwrap();
+        let group = master
+            .init_single_group::<MAX_DEVICES, MAX_BYTES>(now_ns)
+            .await
+            .unwrap();
         let device = group.subdevice(&master, 0).unwrap();
         device.sdo_write_array(0x1C12, [0x1601_u16]).await.unwrap();
         device.sdo_write_array(0x1C13, [0x1A01_u16]).await.unwrap();
-        let group = group.into_safe_op(&master).await.unwrap().request_into_op(&master).await.unwrap();
+        let group = group
+            .into_safe_op(&master)
+            .await
+            .unwrap()
+            .request_into_op(&master)
+            .await
+            .unwrap();
         while !group.tx_rx(&master).await.unwrap().all_op() {}
         let spindle = group.subdevice(&master, 0).unwrap();
         assert_eq!(spindle.outputs_raw().len(), 8);
         assert_eq!(spindle.inputs_raw().len(), 10);
-        for (n, control) in [0x06_u16, 0x06, 0x07, 0x07, 0x0f].into_iter().chain([0x0f; 200]).enumerate() {
+        for (n, control) in [0x06_u16, 0x06, 0x07, 0x07, 0x0f]
+            .into_iter()
+            .chain([0x0f; 200])
+            .enumerate()
+        {
             rig.until(now_ns() + PERIOD_NS).await;
             let mut outputs = spindle.outputs_raw_mut();
             outputs[0..2].copy_from_slice(&control.to_le_bytes());

@@ -1,7 +1,8 @@
 //! What goes wrong: each fault at its frame, for its time, and nothing besides.
 
 use tandem_ethercat_emulator::{
-    AlCode, AlState, BusDescription, DeviceDescription, Fault, Kind, MAX_FRAME, Span, What, When, Wire,
+    AlCode, AlState, BusDescription, DeviceDescription, Fault, Kind, MAX_FRAME, Span, What, When,
+    Wire,
 };
 
 /// A frame with one datagram.
@@ -30,7 +31,10 @@ fn counter(reply: &[u8]) -> u16 {
 }
 
 fn three_drives() -> BusDescription {
-    BusDescription { devices: vec![DeviceDescription::new(Kind::Drive); 3], ..BusDescription::default() }
+    BusDescription {
+        devices: vec![DeviceDescription::new(Kind::Drive); 3],
+        ..BusDescription::default()
+    }
 }
 
 /// Sends so many frames, one a ms, and answers what came back: when, after the frame's ms, and the frame.
@@ -52,7 +56,12 @@ fn sent(wire: &mut Wire, frames: u8) -> Vec<(u64, Vec<u8>)> {
 /// The numbers of EtherCAT frames in the order in which they come back, where the third of six is faulty.
 fn numbers(what: What) -> (Vec<u8>, Vec<(u64, Vec<u8>)>) {
     let mut wire = Wire::new(&three_drives()).unwrap();
-    wire.add(Fault { at: When::Frame(3), lasts: None, what }).unwrap();
+    wire.add(Fault {
+        at: When::Frame(3),
+        lasts: None,
+        what,
+    })
+    .unwrap();
     let back = sent(&mut wire, 6);
     (back.iter().map(|(_, frame)| frame[17]).collect(), back)
 }
@@ -62,7 +71,10 @@ fn faults_of_frames_meet_one_frame() {
     assert_eq!(numbers(What::LostRequest).0, [1, 2, 4, 5, 6]);
     assert_eq!(numbers(What::LostReply).0, [1, 2, 4, 5, 6]);
     assert_eq!(numbers(What::Swapped).0, [1, 2, 4, 3, 5, 6]);
-    assert_eq!(numbers(What::Duplicate { after_us: 100.0 }).0, [1, 2, 3, 3, 4, 5, 6]);
+    assert_eq!(
+        numbers(What::Duplicate { after_us: 100.0 }).0,
+        [1, 2, 3, 3, 4, 5, 6]
+    );
     assert_eq!(numbers(What::Late { by_us: 2500.0 }).0, [1, 2, 4, 5, 3, 6]);
     let (late, back) = numbers(What::Late { by_us: 500.0 });
     assert_eq!(late, [1, 2, 3, 4, 5, 6]);
@@ -73,17 +85,36 @@ fn faults_of_frames_meet_one_frame() {
     let (_, back) = numbers(What::Stray);
     assert_eq!((back.len(), &back[2].1[12..14]), (7, &[0x08, 0x00][..]));
     let (_, back) = numbers(What::Truncated { bytes: 20 });
-    assert_eq!(back.iter().map(|(_, frame)| frame.len()).collect::<Vec<_>>(), [30, 30, 20, 30, 30, 30]);
-    let (_, back) = numbers(What::Corrupt { byte: 26, mask: 0x40 });
-    assert_eq!(back.iter().map(|(_, frame)| frame[26]).collect::<Vec<_>>(), [1, 1, 0x41, 1, 1, 1]);
-    assert!(back.iter().all(|(_, frame)| counter(frame) == 3 && frame[6] & 2 == 2));
+    assert_eq!(
+        back.iter()
+            .map(|(_, frame)| frame.len())
+            .collect::<Vec<_>>(),
+        [30, 30, 20, 30, 30, 30]
+    );
+    let (_, back) = numbers(What::Corrupt {
+        byte: 26,
+        mask: 0x40,
+    });
+    assert_eq!(
+        back.iter().map(|(_, frame)| frame[26]).collect::<Vec<_>>(),
+        [1, 1, 0x41, 1, 1, 1]
+    );
+    assert!(
+        back.iter()
+            .all(|(_, frame)| counter(frame) == 3 && frame[6] & 2 == 2)
+    );
 }
 
 #[test]
 fn a_lost_request_is_not_done_and_a_lost_reply_is() {
     for (what, done) in [(What::LostRequest, false), (What::LostReply, true)] {
         let mut wire = Wire::new(&three_drives()).unwrap();
-        wire.add(Fault { at: When::Frame(1), lasts: None, what }).unwrap();
+        wire.add(Fault {
+            at: When::Frame(1),
+            lasts: None,
+            what,
+        })
+        .unwrap();
         wire.send(0, &frame(1, 8, 0, 0x0420, &[7, 0]));
         wire.send(1_000_000, &frame(2, 7, 0, 0x0420, &[0, 0]));
         let mut reply = [0; MAX_FRAME];
@@ -94,24 +125,52 @@ fn a_lost_request_is_not_done_and_a_lost_reply_is() {
 
 #[test]
 fn a_cut_cable_ends_the_bus_there_until_it_is_plugged_again() {
-    for (behind, reached) in [(None, None), (Some(0), Some(1)), (Some(1), Some(2)), (Some(2), Some(3))] {
+    for (behind, reached) in [
+        (None, None),
+        (Some(0), Some(1)),
+        (Some(1), Some(2)),
+        (Some(2), Some(3)),
+    ] {
         let mut wire = Wire::new(&three_drives()).unwrap();
-        wire.add(Fault { at: When::Frame(2), lasts: Some(Span::Ms(2.5)), what: What::Cut { behind } }).unwrap();
+        wire.add(Fault {
+            at: When::Frame(2),
+            lasts: Some(Span::Ms(2.5)),
+            what: What::Cut { behind },
+        })
+        .unwrap();
         let back = sent(&mut wire, 6);
         let counters: Vec<u16> = back.iter().map(|(_, frame)| counter(frame)).collect();
         let cut = reached.into_iter().flat_map(|reached| [reached; 3]);
-        assert_eq!(counters, [3].into_iter().chain(cut).chain([3, 3]).collect::<Vec<_>>());
+        assert_eq!(
+            counters,
+            [3].into_iter().chain(cut).chain([3, 3]).collect::<Vec<_>>()
+        );
     }
 }
 
 #[test]
 fn a_device_that_is_deaf_lacks_in_the_working_counter() {
-    let outputs = DeviceDescription { channels: Some(8), ..DeviceDescription::new(Kind::DigitalOutputs) };
-    let mut wire = Wire::new(&BusDescription { devices: vec![outputs; 3], ..BusDescription::default() }).unwrap();
-    wire.add(Fault { at: When::Cycle(2), lasts: Some(Span::Cycles(2)), what: What::Deaf { device: 1 } }).unwrap();
+    let outputs = DeviceDescription {
+        channels: Some(8),
+        ..DeviceDescription::new(Kind::DigitalOutputs)
+    };
+    let mut wire = Wire::new(&BusDescription {
+        devices: vec![outputs; 3],
+        ..BusDescription::default()
+    })
+    .unwrap();
+    wire.add(Fault {
+        at: When::Cycle(2),
+        lasts: Some(Span::Cycles(2)),
+        what: What::Deaf { device: 1 },
+    })
+    .unwrap();
     let setup = [
         (0x0800, vec![0, 0x0f, 1, 0, 0x44, 0, 1, 0]),
-        (0x0600, vec![0, 0, 0, 0, 1, 0, 0, 7, 0, 0x0f, 0, 2, 1, 0, 0, 0]),
+        (
+            0x0600,
+            vec![0, 0, 0, 0, 1, 0, 0, 7, 0, 0x0f, 0, 2, 1, 0, 0, 0],
+        ),
     ];
     for (address, data) in setup {
         wire.send(0, &frame(0, 8, 0, address, &data));
@@ -130,13 +189,23 @@ fn a_device_that_is_deaf_lacks_in_the_working_counter() {
 
 #[test]
 fn power_gone_and_back_leaves_the_alias_and_nothing_else() {
-    let device = DeviceDescription { alias: 77, ..DeviceDescription::new(Kind::Drive) };
-    let mut wire = Wire::new(&BusDescription { devices: vec![device], ..BusDescription::default() }).unwrap();
+    let device = DeviceDescription {
+        alias: 77,
+        ..DeviceDescription::new(Kind::Drive)
+    };
+    let mut wire = Wire::new(&BusDescription {
+        devices: vec![device],
+        ..BusDescription::default()
+    })
+    .unwrap();
     let station = |wire: &mut Wire, at_ns: u64| {
         let mut reply = [0; MAX_FRAME];
         wire.send(at_ns, &frame(2, 1, 0, 0x10, &[0; 4]));
         assert!(wire.receive(at_ns + 500_000, &mut reply).is_some());
-        (u16::from_le_bytes([reply[26], reply[27]]), u16::from_le_bytes([reply[28], reply[29]]))
+        (
+            u16::from_le_bytes([reply[26], reply[27]]),
+            u16::from_le_bytes([reply[28], reply[29]]),
+        )
     };
     wire.send(0, &frame(1, 2, 0, 0x10, &[0xe9, 3]));
     wire.receive(500_000, &mut [0; MAX_FRAME]);
@@ -184,7 +253,9 @@ fn every_fault_can_be_written_in_a_file_and_happens_to_the_device_that_it_names(
     for kind in kinds {
         let with = |devices: usize, kind: &str| {
             let devices = "[[devices]]\nkind = \"drive\"\n".repeat(devices);
-            let text = format!("{devices}[[faults]]\nat = {{ ms = 1.5 }}\nlasts = {{ ms = 2 }}\nwhat = {{ {kind} }}\n");
+            let text = format!(
+                "{devices}[[faults]]\nat = {{ ms = 1.5 }}\nlasts = {{ ms = 2 }}\nwhat = {{ {kind} }}\n"
+            );
             BusDescription::from_toml(&text)
         };
         let description = with(3, kind).unwrap_or_else(|e| panic!("{kind}: {e}"));
@@ -201,17 +272,36 @@ fn every_fault_can_be_written_in_a_file_and_happens_to_the_device_that_it_names(
 #[test]
 fn an_error_of_a_device_begins_at_its_time_and_not_before() {
     let mut wire = Wire::new(&three_drives()).unwrap();
-    let what = What::AlError { device: 1, state: AlState::SafeOp, code: AlCode::FATAL_SYNC_ERROR };
-    wire.add(Fault { at: When::Ms(3.25), lasts: None, what }).unwrap();
+    let what = What::AlError {
+        device: 1,
+        state: AlState::SafeOp,
+        code: AlCode::FATAL_SYNC_ERROR,
+    };
+    wire.add(Fault {
+        at: When::Ms(3.25),
+        lasts: None,
+        what,
+    })
+    .unwrap();
     wire.advance(3_249_999);
     assert_eq!(wire.bus().devices()[1].al_code(), None);
     wire.advance(3_250_000);
-    let codes: Vec<_> = wire.bus().devices().iter().map(tandem_ethercat_emulator::Device::al_code).collect();
+    let codes: Vec<_> = wire
+        .bus()
+        .devices()
+        .iter()
+        .map(tandem_ethercat_emulator::Device::al_code)
+        .collect();
     assert_eq!(codes, [None, Some(AlCode::FATAL_SYNC_ERROR), None]);
 }
 
 #[test]
 fn a_file_with_an_unknown_key_is_refused_with_its_place() {
-    let refused = BusDescription::from_toml("[[devices]]\nkind = \"drive\"\nalais = 3\n").unwrap_err().to_string();
-    assert!(refused.contains("line 3") && refused.contains("alais"), "{refused}");
+    let refused = BusDescription::from_toml("[[devices]]\nkind = \"drive\"\nalais = 3\n")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refused.contains("line 3") && refused.contains("alais"),
+        "{refused}"
+    );
 }

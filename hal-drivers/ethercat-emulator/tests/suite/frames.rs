@@ -12,7 +12,10 @@ fn one_of_each() -> BusDescription {
         Kind::AnalogOutputs,
         Kind::Drive,
     ];
-    BusDescription { devices: kinds.map(DeviceDescription::new).to_vec(), ..BusDescription::default() }
+    BusDescription {
+        devices: kinds.map(DeviceDescription::new).to_vec(),
+        ..BusDescription::default()
+    }
 }
 
 /// A frame of datagrams with any command, at places where there is something.

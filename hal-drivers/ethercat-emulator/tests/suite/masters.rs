@@ -13,18 +13,35 @@ fn python_with(package: &str, version: &str) -> Result<PathBuf, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("python-{package}-{version}"));
     let python = folder.join("bin/python");
     let has = || {
-        let found = Command::new(&python).args(["-c", &format!("import {package}")]).output();
+        let found = Command::new(&python)
+            .args(["-c", &format!("import {package}")])
+            .output();
         found.is_ok_and(|found| found.status.success())
     };
     if !has() {
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
+        let venv = Command::new("python3")
+            .args(["-m", "venv"])
+            .arg(&folder)
+            .output();
         venv.map_err(|e| format!("no python3: {e}"))?;
-        let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-        let pip = Command::new(&python).args(install).arg(format!("{package}=={version}")).output();
+        let install = [
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+        ];
+        let pip = Command::new(&python)
+            .args(install)
+            .arg(format!("{package}=={version}"))
+            .output();
         let pip = pip.map_err(|e| format!("python3 makes no virtual environment: {e}"))?;
         if !pip.status.success() || !has() {
             let words = String::from_utf8_lossy(&pip.stderr);
-            return Err(format!("PyPI gives no {package} {version}: {}", words.lines().last().unwrap_or_default()));
+            return Err(format!(
+                "PyPI gives no {package} {version}: {}",
+                words.lines().last().unwrap_or_default()
+            ));
         }
     }
     Ok(python)
@@ -38,15 +55,27 @@ fn in_namespace(script: &str) -> Result<Output, String> {
         done || exit 99\n\
         fast=; chrt -f 50 true 2>/dev/null && fast='chrt -f 50'\n";
     let unshare = |options: &[&str]| {
-        Command::new("unshare").args(options).args(["sh", "-c"]).arg(format!("{setup}{script}")).output()
+        Command::new("unshare")
+            .args(options)
+            .args(["sh", "-c"])
+            .arg(format!("{setup}{script}"))
+            .output()
     };
     let output = unshare(&["--net"]).map_err(|e| format!("no unshare: {e}"))?;
     let refused = |output: &Output| {
-        output.status.code() == Some(99) || String::from_utf8_lossy(&output.stderr).contains("unshare failed")
+        output.status.code() == Some(99)
+            || String::from_utf8_lossy(&output.stderr).contains("unshare failed")
     };
-    let output = if refused(&output) { unshare(&["--user", "--map-root-user", "--net"]).unwrap() } else { output };
+    let output = if refused(&output) {
+        unshare(&["--user", "--map-root-user", "--net"]).unwrap()
+    } else {
+        output
+    };
     if refused(&output) {
-        return Err(format!("no network namespace: {}", String::from_utf8_lossy(&output.stderr).trim()));
+        return Err(format!(
+            "no network namespace: {}",
+            String::from_utf8_lossy(&output.stderr).trim()
+        ));
     }
     Ok(output)
 }
@@ -56,7 +85,9 @@ fn bus() -> PathBuf {
 }
 
 fn script_of(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/suite")
+        .join(name)
 }
 
 /// Runs a master against the emulator, up to three times: an ordinary kernel may stop either for longer than the master
@@ -73,7 +104,8 @@ fn master(package: &str, version: &str, script: &str) -> Result<(bool, String), 
             script = script_of(script).display(),
         );
         let output = in_namespace(&shell)?;
-        told = String::from_utf8_lossy(&output.stdout).to_string() + &String::from_utf8_lossy(&output.stderr);
+        told = String::from_utf8_lossy(&output.stdout).to_string()
+            + &String::from_utf8_lossy(&output.stderr);
         if output.status.success() {
             return Ok((true, told));
         }
@@ -104,20 +136,29 @@ fn a_master_that_is_killed_or_stopped_is_noticed_by_the_emulators_own_clock() {
         Err(why) => return println!("skipped: {why}"),
     };
     for signal in ["KILL", "STOP"] {
-        let told = (0..3).map(|_| killed(&python, signal)).find(|told| match told {
-            Ok(told) => told.contains("enabled"),
-            Err(_) => true,
-        });
+        let told = (0..3)
+            .map(|_| killed(&python, signal))
+            .find(|told| match told {
+                Ok(told) => told.contains("enabled"),
+                Err(_) => true,
+            });
         let told = match told.unwrap_or(Ok(String::new())) {
             Ok(told) => told,
             Err(why) => return println!("skipped: {why}"),
         };
-        let after =
-            told.split("silent\n").nth(1).unwrap_or_else(|| panic!("the master never enabled the drives: {told}"));
+        let after = told
+            .split("silent\n")
+            .nth(1)
+            .unwrap_or_else(|| panic!("the master never enabled the drives: {told}"));
         for drive in 0..4 {
-            let stopped =
-                |line: &str| line.contains(&format!("device {drive} ")) && line.contains("SafeOp, error 0x001B, Fault");
-            assert!(after.lines().any(stopped), "{signal}: device {drive} did not stop: {told}");
+            let stopped = |line: &str| {
+                line.contains(&format!("device {drive} "))
+                    && line.contains("SafeOp, error 0x001B, Fault")
+            };
+            assert!(
+                after.lines().any(stopped),
+                "{signal}: device {drive} did not stop: {told}"
+            );
         }
     }
 }
@@ -140,20 +181,35 @@ fn killed(python: &Path, signal: &str) -> Result<String, String> {
 #[test]
 fn an_interface_that_is_not_there_or_not_allowed_is_refused_in_words() {
     let run = |interface: &str| {
-        Command::new(EMULATOR).arg(bus()).args(["--interface", interface, "--for", "0.1"]).output().unwrap()
+        Command::new(EMULATOR)
+            .arg(bus())
+            .args(["--interface", interface, "--for", "0.1"])
+            .output()
+            .unwrap()
     };
     let output = run("tandem-nowhere");
     let words = String::from_utf8_lossy(&output.stderr).to_string();
     let allowed = !words.contains("CAP_NET_RAW");
     assert_eq!(output.status.code(), Some(1));
-    assert!(!allowed || words.contains("there is no network interface tandem-nowhere"), "{words}");
+    assert!(
+        !allowed || words.contains("there is no network interface tandem-nowhere"),
+        "{words}"
+    );
     // Without the capability, in a user namespace without one of the network.
-    let shell = format!("exec {EMULATOR} {} --interface lo --for 0.1", bus().display());
-    let outside = Command::new("unshare").args(["--user", "sh", "-c", &shell]).output();
+    let shell = format!(
+        "exec {EMULATOR} {} --interface lo --for 0.1",
+        bus().display()
+    );
+    let outside = Command::new("unshare")
+        .args(["--user", "sh", "-c", &shell])
+        .output();
     match outside {
         Ok(output) if !String::from_utf8_lossy(&output.stderr).contains("unshare") => {
             let words = String::from_utf8_lossy(&output.stderr).to_string();
-            assert!(words.contains("CAP_NET_RAW") && output.status.code() == Some(1), "{words}");
+            assert!(
+                words.contains("CAP_NET_RAW") && output.status.code() == Some(1),
+                "{words}"
+            );
         }
         _ => println!("skipped: no user namespace to be without permission in"),
     }

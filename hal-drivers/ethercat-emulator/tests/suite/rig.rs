@@ -55,11 +55,24 @@ impl Rig {
         let storage: &'static PduStorage<16, { PduStorage::element_size(1100) }> =
             Box::leak(Box::new(PduStorage::new()));
         let (tx, rx, pdu_loop) = storage.try_split().unwrap();
-        let config = MainDeviceConfig { dc_static_sync_iterations: 1000, ..MainDeviceConfig::default() };
-        let timeouts = Timeouts { wait_loop_delay: Duration::from_micros(100), ..Timeouts::default() };
+        let config = MainDeviceConfig {
+            dc_static_sync_iterations: 1000,
+            ..MainDeviceConfig::default()
+        };
+        let timeouts = Timeouts {
+            wait_loop_delay: Duration::from_micros(100),
+            ..Timeouts::default()
+        };
         let master = MainDevice::new(pdu_loop, timeouts, config);
         let wire = RefCell::new(Wire::new(description).unwrap());
-        (Self { wire, tx: RefCell::new(tx), rx: RefCell::new(rx) }, master)
+        (
+            Self {
+                wire,
+                tx: RefCell::new(tx),
+                rx: RefCell::new(rx),
+            },
+            master,
+        )
     }
 
     /// A bus by the text of its description.
@@ -77,7 +90,10 @@ impl Rig {
             }
             self.send();
             self.step();
-            assert!(now_ns() < MAX_NS, "the master waits for something that does not come");
+            assert!(
+                now_ns() < MAX_NS,
+                "the master waits for something that does not come"
+            );
         }
     }
 
@@ -96,7 +112,10 @@ impl Rig {
     fn step(&self) {
         let mut wire = self.wire.borrow_mut();
         let next = now_ns() + IDLE_NS;
-        NOW_NS.set(wire.next_reply_ns().map_or(next, |due_ns| due_ns.clamp(now_ns(), next)));
+        NOW_NS.set(
+            wire.next_reply_ns()
+                .map_or(next, |due_ns| due_ns.clamp(now_ns(), next)),
+        );
         let mut reply = [0; MAX_FRAME];
         while let Some(length) = wire.receive(now_ns(), &mut reply) {
             // A reply that the master does not want is its own matter.
@@ -106,7 +125,14 @@ impl Rig {
 
     /// Waits until a time.
     pub async fn until(&self, at_ns: u64) {
-        std::future::poll_fn(|_| if now_ns() >= at_ns { Poll::Ready(()) } else { Poll::Pending }).await;
+        std::future::poll_fn(|_| {
+            if now_ns() >= at_ns {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
+            }
+        })
+        .await;
     }
 
     /// Lets time pass without a master.

@@ -55,12 +55,19 @@ impl ServoAxis {
     pub fn rest_at(&mut self, angle_rad: f64, speed_rad_per_s: f64) {
         (self.angle_rad, self.speed_rad_per_s) = (angle_rad, speed_rad_per_s);
         (self.integral_nm, self.current_a) = (0.0, 0.0);
-        self.measured = Measured { angle_rad: self.quantised(), speed_rad_per_s };
+        self.measured = Measured {
+            angle_rad: self.quantised(),
+            speed_rad_per_s,
+        };
     }
 
     fn quantised(&self) -> f64 {
         let counts = f64::from(self.options.encoder_counts);
-        if counts == 0.0 { self.angle_rad } else { (self.angle_rad * counts / TAU).floor() * TAU / counts }
+        if counts == 0.0 {
+            self.angle_rad
+        } else {
+            (self.angle_rad * counts / TAU).floor() * TAU / counts
+        }
     }
 
     /// Reads the encoder, once a period.
@@ -71,7 +78,10 @@ impl ServoAxis {
         } else {
             (angle_rad - self.measured.angle_rad) / self.period_s
         };
-        self.measured = Measured { angle_rad, speed_rad_per_s };
+        self.measured = Measured {
+            angle_rad,
+            speed_rad_per_s,
+        };
         self.measured
     }
 
@@ -88,7 +98,8 @@ impl ServoAxis {
         let error = wanted - self.measured.speed_rad_per_s;
         let inertia = options.tuned_inertia_kg_m2.unwrap_or(options.inertia_kg_m2);
         let gain = inertia * TAU * options.velocity_loop_hz;
-        let integral_nm = self.integral_nm + gain / (options.velocity_integral_ms * 1e-3) * self.period_s * error;
+        let integral_nm =
+            self.integral_nm + gain / (options.velocity_integral_ms * 1e-3) * self.period_s * error;
         let current_a = (gain * error + integral_nm) / options.torque_constant_nm_per_a;
         self.current_a = current_a.clamp(-options.peak_current_a, options.peak_current_a);
         if current_a == self.current_a {
@@ -108,7 +119,11 @@ impl ServoAxis {
     /// The current as the drive measures it, A.
     pub fn measured_current_a(&mut self) -> f64 {
         let noise_a = self.options.current_noise_ma * 1e-3;
-        if noise_a == 0.0 { self.current_a } else { self.current_a + noise_a * self.noise.normal() }
+        if noise_a == 0.0 {
+            self.current_a
+        } else {
+            self.current_a + noise_a * self.noise.normal()
+        }
     }
 
     /// Torque at the motor per force at the table, N·m per N: lead/(2π) over the efficiency of the screw.

@@ -36,13 +36,24 @@ impl ServoJoints {
     pub fn new(options: &Options, start: &AxisVector, count: usize, period_s: f64) -> Self {
         let steps = (period_s / PLANT_STEP_S - 1e-6).ceil().max(1.0) as u32;
         let axis = |index: usize| {
-            let servo = options.servo.get(index).or(options.servo.last()).copied().unwrap_or_default();
-            let seed = options.seed.wrapping_mul(MAX_AXES as u64).wrapping_add(index as u64);
+            let servo = options
+                .servo
+                .get(index)
+                .or(options.servo.last())
+                .copied()
+                .unwrap_or_default();
+            let seed = options
+                .seed
+                .wrapping_mul(MAX_AXES as u64)
+                .wrapping_add(index as u64);
             ServoAxis::new(servo, start[index] * turns(&servo), period_s, seed)
         };
         Self {
             axes: (0..count).map(axis).collect(),
-            cutting: options.cutting.as_ref().map(|cutting| Cutting::new(cutting, options.seed)),
+            cutting: options
+                .cutting
+                .as_ref()
+                .map(|cutting| Cutting::new(cutting, options.seed)),
             steps,
             step_s: period_s / f64::from(steps),
             direction: [0.0; 3],
@@ -52,7 +63,10 @@ impl ServoJoints {
 
     /// One period towards `to`, at `velocity`. Fine loop.
     pub fn follow(&mut self, to: &AxisVector, velocity: &AxisVector, spindle_rad_per_s: f64) {
-        let speed = (0..3).map(|i| velocity[i] * velocity[i]).sum::<f64>().sqrt();
+        let speed = (0..3)
+            .map(|i| velocity[i] * velocity[i])
+            .sum::<f64>()
+            .sqrt();
         if speed > 0.0 {
             self.direction = std::array::from_fn(|i| velocity[i] / speed);
         }
@@ -72,13 +86,18 @@ impl ServoJoints {
             axis.measure();
         }
         self.truth.cutting_torque_nm = torque_nm / f64::from(self.steps);
-        self.truth.depth_mm = self.cutting.as_ref().map_or(0.0, |cutting| cutting.depth_mm);
+        self.truth.depth_mm = self
+            .cutting
+            .as_ref()
+            .map_or(0.0, |cutting| cutting.depth_mm);
     }
 
     /// Cutting torque at the motor of joints 0 to 2.
     fn loads_nm(&mut self, spindle_rad_per_s: f64) -> [f64; 3] {
         let position = std::array::from_fn(|i| self.axes.get(i).map_or(0.0, position_mm));
-        let Some(cutting) = &mut self.cutting else { return [0.0; 3] };
+        let Some(cutting) = &mut self.cutting else {
+            return [0.0; 3];
+        };
         let force_n = cutting.step(position, self.direction, spindle_rad_per_s, self.step_s);
         std::array::from_fn(|i| {
             let per_force = self.axes.get(i).map_or(0.0, ServoAxis::torque_per_force_m);
@@ -102,14 +121,20 @@ impl ServoJoints {
     pub fn motion(&self, index: usize) -> Motion {
         let axis = &self.axes[index];
         let turns = turns(&axis.options);
-        Motion { position: axis.angle_rad / turns, speed: axis.speed_rad_per_s / turns }
+        Motion {
+            position: axis.angle_rad / turns,
+            speed: axis.speed_rad_per_s / turns,
+        }
     }
 
     /// What the encoder of a joint says, mm and mm/s.
     pub fn measured(&self, index: usize) -> Motion {
         let axis = &self.axes[index];
         let (turns, measured) = (turns(&axis.options), axis.measured());
-        Motion { position: measured.angle_rad / turns, speed: measured.speed_rad_per_s / turns }
+        Motion {
+            position: measured.angle_rad / turns,
+            speed: measured.speed_rad_per_s / turns,
+        }
     }
 
     /// The current of a joint as its drive measures it, A.

@@ -8,7 +8,9 @@ pub(crate) struct Noise {
 
 impl Noise {
     pub fn new(seed: u64) -> Self {
-        Self { state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) }
+        Self {
+            state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15),
+        }
     }
 
     /// Uniform in [0, 1): splitmix64.
@@ -41,7 +43,9 @@ mod tests {
         let mean = values.iter().sum::<f64>() / 1e5;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 1e5;
         let beyond = values.iter().filter(|v| v.abs() > 1.96).count();
-        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.02 && (4500..5500).contains(&beyond));
+        assert!(
+            mean.abs() < 0.02 && (variance - 1.0).abs() < 0.02 && (4500..5500).contains(&beyond)
+        );
         assert!(row(3) == values && row(4) != values);
     }
 }

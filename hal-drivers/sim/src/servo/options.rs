@@ -63,23 +63,68 @@ impl ServoOptions {
     pub(crate) fn check(&self, index: usize) -> Result<(), PluginError> {
         let key = |name: &str| format!("servo[{index}].{name}");
         within(&key("inertia_kg_m2"), self.inertia_kg_m2, 1e-9, 1e3)?;
-        within(&key("tuned_inertia_kg_m2"), self.tuned_inertia_kg_m2.unwrap_or(1.0), 1e-9, 1e3)?;
-        within(&key("torque_constant_nm_per_a"), self.torque_constant_nm_per_a, 1e-6, 1e3)?;
+        within(
+            &key("tuned_inertia_kg_m2"),
+            self.tuned_inertia_kg_m2.unwrap_or(1.0),
+            1e-9,
+            1e3,
+        )?;
+        within(
+            &key("torque_constant_nm_per_a"),
+            self.torque_constant_nm_per_a,
+            1e-6,
+            1e3,
+        )?;
         within(&key("peak_current_a"), self.peak_current_a, 1e-6, 1e4)?;
         within(&key("lead_mm"), self.lead_mm, 1e-3, 1e4)?;
         within(&key("screw_efficiency"), self.screw_efficiency, 1e-3, 1.0)?;
-        within(&key("encoder_counts"), f64::from(self.encoder_counts), 0.0, 4.3e9)?;
+        within(
+            &key("encoder_counts"),
+            f64::from(self.encoder_counts),
+            0.0,
+            4.3e9,
+        )?;
         within(&key("current_noise_ma"), self.current_noise_ma, 0.0, 1e6)?;
-        within(&key("position_gain_per_s"), self.position_gain_per_s, 1e-3, 1e4)?;
-        within(&key("velocity_feed_forward"), self.velocity_feed_forward, 0.0, 1.0)?;
+        within(
+            &key("position_gain_per_s"),
+            self.position_gain_per_s,
+            1e-3,
+            1e4,
+        )?;
+        within(
+            &key("velocity_feed_forward"),
+            self.velocity_feed_forward,
+            0.0,
+            1.0,
+        )?;
         within(&key("velocity_loop_hz"), self.velocity_loop_hz, 1e-3, 1e4)?;
-        within(&key("velocity_integral_ms"), self.velocity_integral_ms, 1e-3, 1e9)?;
+        within(
+            &key("velocity_integral_ms"),
+            self.velocity_integral_ms,
+            1e-3,
+            1e9,
+        )?;
         let friction = &self.friction;
         within(&key("friction.coulomb_nm"), friction.coulomb_nm, 0.0, 1e3)?;
-        within(&key("friction.viscous_nm_s_per_rad"), friction.viscous_nm_s_per_rad, 0.0, 1e3)?;
+        within(
+            &key("friction.viscous_nm_s_per_rad"),
+            friction.viscous_nm_s_per_rad,
+            0.0,
+            1e3,
+        )?;
         within(&key("friction.stribeck_nm"), friction.stribeck_nm, 0.0, 1e3)?;
-        within(&key("friction.stribeck_speed_rad_per_s"), friction.stribeck_speed_rad_per_s, 1e-6, 1e6)?;
-        within(&key("friction.constant_nm"), friction.constant_nm, -1e3, 1e3)
+        within(
+            &key("friction.stribeck_speed_rad_per_s"),
+            friction.stribeck_speed_rad_per_s,
+            1e-6,
+            1e6,
+        )?;
+        within(
+            &key("friction.constant_nm"),
+            friction.constant_nm,
+            -1e3,
+            1e3,
+        )
     }
 }
 
@@ -111,14 +156,31 @@ fn teeth() -> u32 {
 
 impl CuttingOptions {
     pub(crate) fn check(&self) -> Result<(), PluginError> {
-        within("cutting.specific_force_n_per_mm2", self.specific_force_n_per_mm2, 0.0, 1e6)?;
+        within(
+            "cutting.specific_force_n_per_mm2",
+            self.specific_force_n_per_mm2,
+            0.0,
+            1e6,
+        )?;
         within("cutting.teeth", f64::from(self.teeth), 1.0, 100.0)?;
         within("cutting.tooth_ripple", self.tooth_ripple, 0.0, 1.0)?;
-        let finite = self.workpiece.origin_mm.iter().all(|v| v.is_finite()) && self.workpiece.direction_deg.is_finite();
+        let finite = self.workpiece.origin_mm.iter().all(|v| v.is_finite())
+            && self.workpiece.direction_deg.is_finite();
         if !finite {
-            return Err(refusal("cutting.workpiece", "origin_mm and direction_deg are numbers"));
+            return Err(refusal(
+                "cutting.workpiece",
+                "origin_mm and direction_deg are numbers",
+            ));
         }
-        within("cutting.workpiece.entry_radius_mm", self.workpiece.entry_radius_mm, 0.0, 1e4)?;
-        self.workpiece.profile().map(|_: Profile| ()).map_err(|what| refusal("cutting.workpiece", &what))
+        within(
+            "cutting.workpiece.entry_radius_mm",
+            self.workpiece.entry_radius_mm,
+            0.0,
+            1e4,
+        )?;
+        self.workpiece
+            .profile()
+            .map(|_: Profile| ())
+            .map_err(|what| refusal("cutting.workpiece", &what))
     }
 }

@@ -74,9 +74,13 @@ impl Workpiece {
     /// The profile; a random one has no steps yet. Why there is none.
     pub(crate) fn profile(&self) -> Result<Profile, String> {
         match (&self.steps, &self.slopes, &self.random) {
-            (Some(steps), None, None) => rising("steps", steps).map(|s| Profile::Steps(s, self.entry_radius_mm)),
+            (Some(steps), None, None) => {
+                rising("steps", steps).map(|s| Profile::Steps(s, self.entry_radius_mm))
+            }
             (None, Some(slopes), None) => rising("slopes", slopes).map(Profile::Slopes),
-            (None, None, Some(random)) => random.check().map(|()| Profile::Steps(vec![], self.entry_radius_mm)),
+            (None, None, Some(random)) => random
+                .check()
+                .map(|()| Profile::Steps(vec![], self.entry_radius_mm)),
             _ => Err("a workpiece has steps, slopes or random".to_string()),
         }
     }
@@ -91,23 +95,41 @@ impl Workpiece {
 }
 
 fn rising(key: &str, pairs: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
-    if pairs.iter().any(|[length, depth]| !length.is_finite() || !depth.is_finite() || *depth < 0.0) {
-        return Err(format!("{key}: a pair is a length and a depth from 0 up, mm"));
+    if pairs
+        .iter()
+        .any(|[length, depth]| !length.is_finite() || !depth.is_finite() || *depth < 0.0)
+    {
+        return Err(format!(
+            "{key}: a pair is a length and a depth from 0 up, mm"
+        ));
     }
     match pairs.windows(2).find(|two| two[1][0] < two[0][0]) {
-        Some(two) => Err(format!("{key}: {} mm comes after {} mm", two[1][0], two[0][0])),
+        Some(two) => Err(format!(
+            "{key}: {} mm comes after {} mm",
+            two[1][0], two[0][0]
+        )),
         None => Ok(pairs.to_vec()),
     }
 }
 
 impl Random {
     fn check(&self) -> Result<(), String> {
-        let ordered = |[low, high]: [f64; 2], least: f64| low >= least && high >= low && high <= 1e6;
+        let ordered =
+            |[low, high]: [f64; 2], least: f64| low >= least && high >= low && high <= 1e6;
         if !(1..=MOST_SECTIONS).contains(&self.sections) {
-            return Err(format!("random: sections = {}: must be 1 to {MOST_SECTIONS}", self.sections));
+            return Err(format!(
+                "random: sections = {}: must be 1 to {MOST_SECTIONS}",
+                self.sections
+            ));
         }
-        if !ordered(self.section_mm, 1e-3) || !ordered(self.depth_mm, 0.0) || !(0.0..=1e6).contains(&self.start_mm) {
-            return Err("random: section_mm and depth_mm are the least and the most, start_mm a length".to_string());
+        if !ordered(self.section_mm, 1e-3)
+            || !ordered(self.depth_mm, 0.0)
+            || !(0.0..=1e6).contains(&self.start_mm)
+        {
+            return Err(
+                "random: section_mm and depth_mm are the least and the most, start_mm a length"
+                    .to_string(),
+            );
         }
         Ok(())
     }
@@ -139,7 +161,10 @@ impl Profile {
 fn stepped(walls: &[[f64; 2]], radius_mm: f64, length_mm: f64) -> f64 {
     let behind = walls.partition_point(|[wall, _]| *wall <= length_mm);
     let level = |index: usize| if index == 0 { 0.0 } else { walls[index - 1][1] };
-    let ahead = walls[behind..].iter().enumerate().take_while(|(_, [wall, _])| wall - length_mm <= radius_mm);
+    let ahead = walls[behind..]
+        .iter()
+        .enumerate()
+        .take_while(|(_, [wall, _])| wall - length_mm <= radius_mm);
     let entering = |(index, [wall, depth]): (usize, &[f64; 2])| {
         // The share of the cutter's width that is in the wall ahead.
         let angle = ((wall - length_mm) / radius_mm).acos();
@@ -150,8 +175,14 @@ fn stepped(walls: &[[f64; 2]], radius_mm: f64, length_mm: f64) -> f64 {
 
 fn sloped(corners: &[[f64; 2]], length_mm: f64) -> f64 {
     let next = corners.partition_point(|[corner, _]| *corner <= length_mm);
-    let last = corners.last().filter(|last| last[0] == length_mm).map_or(0.0, |last| last[1]);
-    let (Some(to), Some(from)) = (corners.get(next), next.checked_sub(1).map(|before| corners[before])) else {
+    let last = corners
+        .last()
+        .filter(|last| last[0] == length_mm)
+        .map_or(0.0, |last| last[1]);
+    let (Some(to), Some(from)) = (
+        corners.get(next),
+        next.checked_sub(1).map(|before| corners[before]),
+    ) else {
         return last;
     };
     from[1] + (to[1] - from[1]) * (length_mm - from[0]) / (to[0] - from[0])
@@ -164,12 +195,22 @@ mod tests {
     #[test]
     fn the_cutter_runs_into_a_step_over_its_radius() {
         let walls = Profile::Steps(vec![[8.0, 2.0], [18.0, 3.0], [48.0, 0.0]], 5.0);
-        for (length, depth) in [(2.9, 0.0), (3.0, 0.0), (8.0, 2.0), (10.0, 2.0), (18.0, 3.0), (48.0, 0.0), (90.0, 0.0)]
-        {
+        for (length, depth) in [
+            (2.9, 0.0),
+            (3.0, 0.0),
+            (8.0, 2.0),
+            (10.0, 2.0),
+            (18.0, 3.0),
+            (48.0, 0.0),
+            (90.0, 0.0),
+        ] {
             assert!((walls.depth_mm(length) - depth).abs() < 1e-12, "{length}");
         }
         let half = walls.depth_mm(5.5);
-        assert!((half - 2.0 * (2.0 * PI / 3.0 + (2.0 * PI / 3.0).sin()) / PI).abs() < 1e-12, "{half}");
+        assert!(
+            (half - 2.0 * (2.0 * PI / 3.0 + (2.0 * PI / 3.0).sin()) / PI).abs() < 1e-12,
+            "{half}"
+        );
         let sharp = Profile::Steps(vec![[8.0, 7.0]], 0.0);
         assert_eq!((sharp.depth_mm(7.999_999), sharp.depth_mm(8.0)), (0.0, 7.0));
     }
@@ -177,20 +218,39 @@ mod tests {
     #[test]
     fn slopes_are_straight_and_end() {
         let roof = Profile::Slopes(vec![[3.0, 1.5], [23.0, 4.5], [43.0, 1.5]]);
-        for (length, depth) in
-            [(2.9, 0.0), (3.0, 1.5), (13.0, 3.0), (23.0, 4.5), (42.0, 1.65), (43.0, 1.5), (43.1, 0.0)]
-        {
+        for (length, depth) in [
+            (2.9, 0.0),
+            (3.0, 1.5),
+            (13.0, 3.0),
+            (23.0, 4.5),
+            (42.0, 1.65),
+            (43.0, 1.5),
+            (43.1, 0.0),
+        ] {
             assert!((roof.depth_mm(length) - depth).abs() < 1e-12, "{length}");
         }
     }
 
     #[test]
     fn random_steps_repeat_and_stay_in_their_bounds() {
-        let random = Random { start_mm: 4.0, sections: 50, section_mm: [1.0, 6.0], depth_mm: [0.5, 4.5] };
+        let random = Random {
+            start_mm: 4.0,
+            sections: 50,
+            section_mm: [1.0, 6.0],
+            depth_mm: [0.5, 4.5],
+        };
         let walls = random.walls(7);
         assert_eq!((walls.len(), walls[0][0], walls[50][1]), (51, 4.0, 0.0));
-        assert!(walls.windows(2).all(|two| (1.0..=6.0).contains(&(two[1][0] - two[0][0]))));
-        assert!(walls[..50].iter().all(|wall| (0.5..=4.5).contains(&wall[1])));
+        assert!(
+            walls
+                .windows(2)
+                .all(|two| (1.0..=6.0).contains(&(two[1][0] - two[0][0])))
+        );
+        assert!(
+            walls[..50]
+                .iter()
+                .all(|wall| (0.5..=4.5).contains(&wall[1]))
+        );
         assert!(random.walls(7) == walls && random.walls(8) != walls);
     }
 }

@@ -12,7 +12,9 @@ pub fn context(fine_period_s: f64) -> PlannerContext {
 
 pub fn open(filter: &str, time_constant_ms: f64, context: &PlannerContext) -> Box<dyn Planner> {
     let options = format!("filter = \"{filter}\"\ntime_constant_ms = {time_constant_ms:?}");
-    tandem_after_interpolation::PLUGIN.planner(&options, context).unwrap()
+    tandem_after_interpolation::PLUGIN
+        .planner(&options, context)
+        .unwrap()
 }
 
 pub fn line(from: &AxisVector, to: &[f64], feed_mm_per_s: f64) -> Block {

@@ -8,15 +8,31 @@ use tandem_sdk::{Block, PlannerContext};
 pub fn context(accelerations: &[f64], fine_period_s: f64) -> PlannerContext {
     let limits: Vec<_> = accelerations.iter().map(|a| axis(*a)).collect();
     let context = tandem_rig::context(&limits, fine_period_s);
-    PlannerContext { rough_period_s: 10.0 * fine_period_s, ..context }
+    PlannerContext {
+        rough_period_s: 10.0 * fine_period_s,
+        ..context
+    }
 }
 
 /// Runs `blocks` through a planner, offering new blocks after every `step_s` of program time.
-pub fn run(context: &PlannerContext, options: &Options, blocks: &[Block], step_s: f64) -> Collected {
-    drive(&mut BlockOverlap::new(options, context).unwrap(), blocks, step_s)
+pub fn run(
+    context: &PlannerContext,
+    options: &Options,
+    blocks: &[Block],
+    step_s: f64,
+) -> Collected {
+    drive(
+        &mut BlockOverlap::new(options, context).unwrap(),
+        blocks,
+        step_s,
+    )
 }
 
 /// As published: `TA` decides, on whole ticks.
 pub fn published() -> Options {
-    Options { corner_control: CornerControl::Off, limits: LimitMode::Off, ..Options::default() }
+    Options {
+        corner_control: CornerControl::Off,
+        limits: LimitMode::Off,
+        ..Options::default()
+    }
 }

@@ -45,14 +45,22 @@ impl Watched {
     pub fn begin(&mut self, angle: f64, speed: f64) -> Known {
         let measured = self.axis.measure();
         let current_a = self.axis.measured_current_a();
-        let friction_nm = self.compensated.map_or(0.0, |(model, _)| model.torque_nm(self.last_command));
+        let friction_nm = self
+            .compensated
+            .map_or(0.0, |(model, _)| model.torque_nm(self.last_command));
         let inside = matches!(self.compensated, Some((_, Where::In)));
         let taken = if inside { friction_nm / KT } else { 0.0 };
         let outside = if inside { 0.0 } else { friction_nm };
-        let estimate_nm = self.observer.step(measured.speed_rad_per_s, current_a - taken) - outside;
+        let estimate_nm = self
+            .observer
+            .step(measured.speed_rad_per_s, current_a - taken)
+            - outside;
         self.last_command = speed;
         self.axis.control(angle, speed);
-        Known { current_nm: KT * current_a, estimate_nm }
+        Known {
+            current_nm: KT * current_a,
+            estimate_nm,
+        }
     }
 
     /// A tick under a constant cutting torque.

@@ -7,7 +7,9 @@ use tandem_force_control::observer::Observer;
 use tandem_sim::servo::{PLANT_STEP_S, ServoOptions};
 
 use crate::motion::{Known, Watched};
-use crate::rig::{J, KT, LEAD_MM, PERIOD_S, TURNS, case, close, cutting, number, observer, plant, servo};
+use crate::rig::{
+    J, KT, LEAD_MM, PERIOD_S, TURNS, case, close, cutting, number, observer, plant, servo,
+};
 
 #[test]
 fn the_published_coefficients_and_the_step_response() {
@@ -16,7 +18,12 @@ fn the_published_coefficients_and_the_step_response() {
     close("K_e", found.gain(), number(&unit["Ke"]), 1e-10);
     let (mut speed, mut last_a) = (0.0, 0.0);
     for (k, expected) in unit["xh"].as_array().unwrap().iter().enumerate() {
-        close(&format!("x2h({k})"), found.step(speed, last_a), number(expected), 1e-9);
+        close(
+            &format!("x2h({k})"),
+            found.step(speed, last_a),
+            number(expected),
+            1e-9,
+        );
         last_a = 0.02 * (0.3 * k as f64).sin();
         speed += PERIOD_S / J * (KT * last_a - 0.1);
     }
@@ -24,7 +31,12 @@ fn the_published_coefficients_and_the_step_response() {
 }
 
 /// A ramp to `feed`, a cut from 0.6 s to 0.8 s, a ramp down: what is known in each tick.
-fn ramp_cut(options: ServoOptions, observer: Observer, feed_mm_per_min: f64, ramp_s: f64) -> Vec<Known> {
+fn ramp_cut(
+    options: ServoOptions,
+    observer: Observer,
+    feed_mm_per_min: f64,
+    ramp_s: f64,
+) -> Vec<Known> {
     let mut watched = Watched::new(options, observer, 0.0, 3);
     let top = feed_mm_per_min / 60.0 * TURNS;
     let mut angle = 0.0;
@@ -48,9 +60,12 @@ fn acceleration_is_no_phantom_torque_for_the_observer() {
             number(&row["t_acc_s"]),
         );
         let air: Vec<&Known> = known[..600].iter().chain(&known[831..]).collect();
-        let most = |of: fn(&Known) -> f64| air.iter().map(|known| of(known).abs()).fold(0.0, f64::max);
+        let most =
+            |of: fn(&Known) -> f64| air.iter().map(|known| of(known).abs()).fold(0.0, f64::max);
         let mean = |of: fn(&Known) -> f64| known[631..800].iter().map(of).sum::<f64>() / 169.0;
-        let check = |key: &str, found: f64| close(&format!("{key} of {row}"), found, number(&row[key]), 1e-4);
+        let check = |key: &str, found: f64| {
+            close(&format!("{key} of {row}"), found, number(&row[key]), 1e-4)
+        };
         check("current_only_max_err_accdec", most(|k| k.current_nm));
         check("current_only_mean_cut", mean(|k| k.current_nm));
         check("observer_max_err_accdec", most(|k| k.estimate_nm));
@@ -61,9 +76,20 @@ fn acceleration_is_no_phantom_torque_for_the_observer() {
 #[test]
 fn a_wrong_inertia_leaves_its_share_of_the_acceleration() {
     let expected = number(&case("004_observer.json")["mismatch"]["max_phantom"]);
-    let options = ServoOptions { tuned_inertia_kg_m2: Some(1.8053e-4), ..servo("none") };
-    let known = ramp_cut(options, Observer::new(1.8053e-4, KT, PERIOD_S, 5e-3), 10_000.0, 0.1);
-    let most = known[..550].iter().map(|k| k.estimate_nm.abs()).fold(0.0, f64::max);
+    let options = ServoOptions {
+        tuned_inertia_kg_m2: Some(1.8053e-4),
+        ..servo("none")
+    };
+    let known = ramp_cut(
+        options,
+        Observer::new(1.8053e-4, KT, PERIOD_S, 5e-3),
+        10_000.0,
+        0.1,
+    );
+    let most = known[..550]
+        .iter()
+        .map(|k| k.estimate_nm.abs())
+        .fold(0.0, f64::max);
     close("phantom torque", most, expected, 2e-6);
 }
 
@@ -71,19 +97,31 @@ fn a_wrong_inertia_leaves_its_share_of_the_acceleration() {
 fn encoder_noise_by_time_constant() {
     let table = case("004_observer.json");
     for row in table["noise"].as_array().unwrap() {
-        let options =
-            ServoOptions { encoder_counts: number(&row["cpr"]) as u32, current_noise_ma: 5.0, ..servo("robot") };
+        let options = ServoOptions {
+            encoder_counts: number(&row["cpr"]) as u32,
+            current_noise_ma: 5.0,
+            ..servo("robot")
+        };
         let mut watched = Watched::new(options, observer(number(&row["tau_s"])), 0.0, 9);
         let speed = 150.0 / 60.0 * TURNS;
-        let known: Vec<Known> =
-            (0..8000_u32).map(|k| watched.tick(f64::from(k + 1) * PERIOD_S * speed, speed, 0.1)).collect();
+        let known: Vec<Known> = (0..8000_u32)
+            .map(|k| watched.tick(f64::from(k + 1) * PERIOD_S * speed, speed, 0.1))
+            .collect();
         let estimates: Vec<f64> = known[2000..].iter().map(|k| k.estimate_nm).collect();
-        let means: Vec<f64> = estimates.chunks(8).map(|c| c.iter().sum::<f64>() / 8.0).collect();
+        let means: Vec<f64> = estimates
+            .chunks(8)
+            .map(|c| c.iter().sum::<f64>() / 8.0)
+            .collect();
         let (mean, std_1ms) = mean_and_deviation(&estimates);
         let (_, std_8ms) = mean_and_deviation(&means);
         let tolerance = number(&table["tolerance"]["noise_rel"]);
         for (key, found) in [("std_1ms", std_1ms), ("std_8ms", std_8ms)] {
-            close(&format!("{key} of {row}"), found, number(&row[key]), tolerance * number(&row[key]));
+            close(
+                &format!("{key} of {row}"),
+                found,
+                number(&row[key]),
+                tolerance * number(&row[key]),
+            );
         }
         close("mean", mean, 0.11, 2e-4);
     }
@@ -114,15 +152,27 @@ pub fn check_circle(row: &Value, found: &CircleErrors, tolerance: impl Fn(&str) 
         ("resultant_rms_err_observer", found.rms_observer),
     ];
     for (key, found) in pairs {
-        close(&format!("{key} of {row}"), found, number(&row[key]), tolerance(key));
+        close(
+            &format!("{key} of {row}"),
+            found,
+            number(&row[key]),
+            tolerance(key),
+        );
     }
 }
 
 #[test]
 fn at_10_m_per_min_the_current_alone_is_28_percent_off() {
     let errors = circle(10_000.0, &servo("none"), None);
-    let (current, observed) = (errors.mean_current / 0.1 - 1.0, errors.mean_observer / 0.1 - 1.0);
-    println!("current alone {:+.1} %, observer {:+.2} %", 100.0 * current, 100.0 * observed);
+    let (current, observed) = (
+        errors.mean_current / 0.1 - 1.0,
+        errors.mean_observer / 0.1 - 1.0,
+    );
+    println!(
+        "current alone {:+.1} %, observer {:+.2} %",
+        100.0 * current,
+        100.0 * observed
+    );
     assert!((0.27..0.29).contains(&current) && observed.abs() < 1e-3);
 }
 
@@ -130,8 +180,17 @@ fn at_10_m_per_min_the_current_alone_is_28_percent_off() {
 fn figures_6_and_7() {
     for row in case("004_observer.json")["fig67"].as_array().unwrap() {
         let roof = row["case"].as_str().unwrap().contains("roof");
-        let workpiece = if roof { "slopes = [[2.0, 0.5], [12.0, 3.5]]" } else { "steps = [[0.0, 3.0]]" };
-        let mut watched = Watched::new(servo(row["friction"].as_str().unwrap()), observer(5e-3), 0.0, 1);
+        let workpiece = if roof {
+            "slopes = [[2.0, 0.5], [12.0, 3.5]]"
+        } else {
+            "steps = [[0.0, 3.0]]"
+        };
+        let mut watched = Watched::new(
+            servo(row["friction"].as_str().unwrap()),
+            observer(5e-3),
+            0.0,
+            1,
+        );
         let mut cutting = cutting(workpiece);
         let (mut t_s, mut command_mm, mut rows) = (0.0, 0.0, vec![]);
         while watched.axis.angle_rad / TURNS < 15.0 {
@@ -150,11 +209,20 @@ fn figures_6_and_7() {
             t_s += PERIOD_S;
         }
         let mean = |from: f64, to: f64, of: fn(&(f64, f64, f64)) -> f64| {
-            let within: Vec<f64> = rows.iter().filter(|r| r.0 >= from && r.0 < to).map(of).collect();
+            let within: Vec<f64> = rows
+                .iter()
+                .filter(|r| r.0 >= from && r.0 < to)
+                .map(of)
+                .collect();
             within.iter().sum::<f64>() / within.len() as f64
         };
         let check = |key: &str, found: f64| {
-            close(&format!("{key} of {row}"), found, number(&row[key]), 1e-3 * number(&row[key]) + 2e-5);
+            close(
+                &format!("{key} of {row}"),
+                found,
+                number(&row[key]),
+                1e-3 * number(&row[key]) + 2e-5,
+            );
         };
         check("est_3_6mm", mean(3.0, 6.0, |r| r.2));
         check("est_8_11mm", mean(8.0, 11.0, |r| r.2));
@@ -179,19 +247,29 @@ pub struct CircleErrors {
 pub fn circle(
     feed_mm_per_min: f64,
     options: &ServoOptions,
-    compensated: Option<(tandem_force_control::friction::FrictionModel, crate::motion::Where)>,
+    compensated: Option<(
+        tandem_force_control::friction::FrictionModel,
+        crate::motion::Where,
+    )>,
 ) -> CircleErrors {
     let radius = 20.0 * TAU / LEAD_MM;
     let turn = feed_mm_per_min / 60.0 / 20.0;
     let mut axes = [0, 1].map(|i| {
         let start = if i == 0 { radius } else { 0.0 };
-        let options = ServoOptions { velocity_feed_forward: 1.0, ..*options };
+        let options = ServoOptions {
+            velocity_feed_forward: 1.0,
+            ..*options
+        };
         let mut watched = Watched::new(options, observer(5e-3), start, 1 + i);
         watched.compensated = compensated;
         watched
     });
     let ticks = (TAU / turn / PERIOD_S) as u32 + 1;
-    let total = if ticks > 4000 { ticks + 2000 } else { 2 * ticks + 2000 };
+    let total = if ticks > 4000 {
+        ticks + 2000
+    } else {
+        2 * ticks + 2000
+    };
     let (mut errors, mut count) = (CircleErrors::default(), 0.0);
     for k in 1..=total {
         let phase = turn * f64::from(k) * PERIOD_S;

@@ -24,17 +24,24 @@ pub const TOOTH_S: f64 = 0.0333;
 
 /// A reference case.
 pub fn case(name: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/cases").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/cases")
+        .join(name);
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 pub fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 /// Says what differs by more than the tolerance.
 pub fn close(what: &str, found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "{what}: {found} instead of {expected} ± {tolerance}");
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{what}: {found} instead of {expected} ± {tolerance}"
+    );
 }
 
 /// A friction set of the published constants, as the plant has it.
@@ -46,7 +53,12 @@ pub fn plant_friction(set: &str) -> Friction {
         "machine_stribeck" => (0.06, 6e-4, 0.02),
         set => panic!("no friction set {set}"),
     };
-    Friction { coulomb_nm, viscous_nm_s_per_rad, stribeck_nm, ..Friction::default() }
+    Friction {
+        coulomb_nm,
+        viscous_nm_s_per_rad,
+        stribeck_nm,
+        ..Friction::default()
+    }
 }
 
 /// The same as the model that is compensated.
@@ -61,7 +73,10 @@ pub fn model_of(friction: &Friction) -> FrictionModel {
 }
 
 pub fn servo(friction: &str) -> ServoOptions {
-    ServoOptions { friction: plant_friction(friction), ..ServoOptions::default() }
+    ServoOptions {
+        friction: plant_friction(friction),
+        ..ServoOptions::default()
+    }
 }
 
 pub fn observer(time_constant_s: f64) -> Observer {
@@ -151,7 +166,11 @@ impl Setup {
 
     /// Drives to the end, or until the feed is zero for 0.5 s after the guard tripped, or 60 s.
     pub fn run(mut self) -> Ran {
-        let bounds = Bounds { reference_nm: 0.1, min_mm_per_s: 10.0 / 60.0, max_mm_per_s: 5.0 };
+        let bounds = Bounds {
+            reference_nm: 0.1,
+            min_mm_per_s: 10.0 / 60.0,
+            max_mm_per_s: 5.0,
+        };
         let programmed = self.feed_mm_per_min / 60.0;
         let mut law = self.law.map(|law| FeedLaw::new(law, bounds, programmed));
         let mut axis = ServoAxis::new(self.servo, 0.0, PERIOD_S, 5);
@@ -169,11 +188,22 @@ impl Setup {
                 let mean_nm = mean.of(self.mean_samples);
                 let mut asked = programmed;
                 if tick > 0 {
-                    if self.guard.as_mut().is_some_and(|guard| guard.trips(mean_nm)) {
+                    if self
+                        .guard
+                        .as_mut()
+                        .is_some_and(|guard| guard.trips(mean_nm))
+                    {
                         ran.tripped_s.get_or_insert(t_s);
                     }
-                    asked = law.as_mut().map_or(programmed, |law| law.next(programmed, mean_nm, true));
-                    ran.blocks.push(Block { t_s, mean_nm, asked_mm_per_min: asked * 60.0, s_mm });
+                    asked = law
+                        .as_mut()
+                        .map_or(programmed, |law| law.next(programmed, mean_nm, true));
+                    ran.blocks.push(Block {
+                        t_s,
+                        mean_nm,
+                        asked_mm_per_min: asked * 60.0,
+                        s_mm,
+                    });
                 }
                 if ran.tripped_s.is_some() {
                     asked = 0.0;
@@ -183,13 +213,21 @@ impl Setup {
             let last_command = feed_speed(&ran);
             command_mm += feed * PERIOD_S;
             let speed = axis.measure().speed_rad_per_s;
-            let friction_a = self.compensated.map_or(0.0, |model| model.torque_nm(last_command) / KT);
+            let friction_a = self
+                .compensated
+                .map_or(0.0, |model| model.torque_nm(last_command) / KT);
             let current_a = axis.measured_current_a();
             let estimate_nm = self.observer.step(speed, current_a - friction_a);
             mean.push(estimate_nm);
             axis.control(command_mm * TURNS, feed * TURNS);
             let (torque_nm, most_nm) = plant(&mut axis, &mut cutting, self.ripple, t_s);
-            ran.ticks.push(Tick { t_s, s_mm, torque_nm, most_nm, feed_mm_per_min: feed * 60.0 });
+            ran.ticks.push(Tick {
+                t_s,
+                s_mm,
+                torque_nm,
+                most_nm,
+                feed_mm_per_min: feed * 60.0,
+            });
         }
         ran
     }
@@ -197,13 +235,19 @@ impl Setup {
 
 /// The commanded speed of the tick before, rad/s.
 fn feed_speed(ran: &Ran) -> f64 {
-    ran.ticks.last().map_or(0.0, |tick| tick.feed_mm_per_min / 60.0 * TURNS)
+    ran.ticks
+        .last()
+        .map_or(0.0, |tick| tick.feed_mm_per_min / 60.0 * TURNS)
 }
 
 impl Ran {
     /// Ticks with the place between two lengths.
     pub fn window(&self, [from, to]: [f64; 2]) -> Vec<Tick> {
-        self.ticks.iter().filter(|tick| tick.s_mm >= from && tick.s_mm <= to).copied().collect()
+        self.ticks
+            .iter()
+            .filter(|tick| tick.s_mm >= from && tick.s_mm <= to)
+            .copied()
+            .collect()
     }
 
     pub fn time_s(&self) -> f64 {
@@ -211,12 +255,16 @@ impl Ran {
     }
 
     pub fn peak_nm(&self) -> f64 {
-        self.ticks.iter().fold(0.0, |most, tick| most.max(tick.most_nm))
+        self.ticks
+            .iter()
+            .fold(0.0, |most, tick| most.max(tick.most_nm))
     }
 }
 
 /// Root of the mean square.
 pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| {
+        (sum + value * value, count + 1.0)
+    });
     (sum / count).sqrt()
 }

@@ -9,8 +9,10 @@ use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Cursor, Leg, Route};
 
 /// Turns of the path in an interval that ask for more places, rad, and where these are.
-const MORE: [(f64, &[[f64; PLACES]]); 2] =
-    [(0.15, &[[0.125, 0.25, 0.375], [0.625, 0.75, 0.875]]), (0.06, &[[0.22, 0.36, 0.78]])];
+const MORE: [(f64, &[[f64; PLACES]]); 2] = [
+    (0.15, &[[0.125, 0.25, 0.375], [0.625, 0.75, 0.875]]),
+    (0.06, &[[0.22, 0.36, 0.78]]),
+];
 /// Knots of an interval that are looked at.
 const KNOTS: usize = 2;
 /// A try that lowers the speed to less than this share needs another motion: a rate on the present one would be found too,
@@ -44,7 +46,14 @@ pub struct Grid {
 
 impl Grid {
     /// Lays the grid of `intervals` along `motion`.
-    pub fn lay(&mut self, route: &Route, bounds: &Bounds, motion: &Rated, intervals: usize, slowdowns: &Slowdowns) {
+    pub fn lay(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        motion: &Rated,
+        intervals: usize,
+        slowdowns: &Slowdowns,
+    ) {
         self.points.clear();
         self.between.clear();
         self.places.clear();
@@ -53,7 +62,8 @@ impl Grid {
         // The end of an interval is the start of the next, but for the third derivative of the motion.
         let mut start: Option<(f64, AlongPath)> = None;
         for k in 0..intervals {
-            let states = [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
+            let states =
+                [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
             let mut turn = 0.0;
             let mut laid = [(Point::default(), Place::default()); PLACES];
             for (n, state) in states.iter().enumerate() {
@@ -70,11 +80,20 @@ impl Grid {
             }
             self.points.push(laid.map(|(point, _)| point));
             self.places.push(laid.map(|(_, place)| place));
-            let more = MORE.iter().find(|(much, _)| turn > *much).map_or(&[][..], |(_, more)| more);
+            let more = MORE
+                .iter()
+                .find(|(much, _)| turn > *much)
+                .map_or(&[][..], |(_, more)| more);
             for z in more {
                 self.look(route, bounds, motion, slowdowns, (k, *z), &mut cursor);
             }
-            self.look_at_knots(route, bounds, motion, slowdowns, (k, [states[0][0], states[2][0]]));
+            self.look_at_knots(
+                route,
+                bounds,
+                motion,
+                slowdowns,
+                (k, [states[0][0], states[2][0]]),
+            );
         }
     }
 
@@ -88,7 +107,14 @@ impl Grid {
         (interval, z): (usize, f64),
     ) {
         let around = [z / 2.0, z, f64::midpoint(z, 1.0)];
-        self.look(route, bounds, motion, slowdowns, (interval, around), &mut Cursor::default());
+        self.look(
+            route,
+            bounds,
+            motion,
+            slowdowns,
+            (interval, around),
+            &mut Cursor::default(),
+        );
     }
 
     /// Three more places of an interval.
@@ -106,7 +132,11 @@ impl Grid {
             let (at, leg) = route.at(state[0], cursor);
             place(leg, bounds, slowdowns, (&state, f64::INFINITY), &at)
         });
-        self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
+        self.between.push(Between {
+            interval,
+            z,
+            points: laid.map(|(point, _)| point),
+        });
         self.more.push(laid.map(|(_, place)| place));
     }
 
@@ -122,19 +152,38 @@ impl Grid {
         let mut cursor = Cursor::default();
         let mut from_mm = from_mm;
         for _ in 0..KNOTS {
-            let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) else { return };
+            let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) else {
+                return;
+            };
             from_mm = knot_mm;
             let at = motion.place(interval, knot_mm);
-            let z = [at, at, if at < 0.5 { f64::midpoint(at, 1.0) } else { at / 2.0 }];
+            let z = [
+                at,
+                at,
+                if at < 0.5 {
+                    f64::midpoint(at, 1.0)
+                } else {
+                    at / 2.0
+                },
+            ];
             let last = evaluate(&motion.coefficients, interval, z[2], motion.step_s);
             let state = evaluate(&motion.coefficients, interval, at, motion.step_s);
             let (other, _) = route.at(last[0], &mut cursor);
             let leg = route.find(knot_mm, &mut cursor);
             let step_cap = Leg::step_cap_mm_per_s(&sides, bounds);
             let [before, behind] = sides;
-            let laid = [(state, before, step_cap), (state, behind, step_cap), (last, other, f64::INFINITY)];
-            let laid = laid.map(|(state, at, cap)| place(leg, bounds, slowdowns, (&state, cap), &at));
-            self.between.push(Between { interval, z, points: laid.map(|(point, _)| point) });
+            let laid = [
+                (state, before, step_cap),
+                (state, behind, step_cap),
+                (last, other, f64::INFINITY),
+            ];
+            let laid =
+                laid.map(|(state, at, cap)| place(leg, bounds, slowdowns, (&state, cap), &at));
+            self.between.push(Between {
+                interval,
+                z,
+                points: laid.map(|(point, _)| point),
+            });
             self.more.push(laid.map(|(_, place)| place));
         }
     }
@@ -143,9 +192,17 @@ impl Grid {
     /// places.
     pub fn yield_at_start(&mut self) {
         let count = YIELDING.min(self.points.len());
-        let more = self.between.iter_mut().zip(&mut self.more).take_while(|(more, _)| more.interval < count);
+        let more = self
+            .between
+            .iter_mut()
+            .zip(&mut self.more)
+            .take_while(|(more, _)| more.interval < count);
         let more = more.map(|(more, places)| (&mut more.points, places));
-        for (points, places) in self.points[..count].iter_mut().zip(&mut self.places).chain(more) {
+        for (points, places) in self.points[..count]
+            .iter_mut()
+            .zip(&mut self.places)
+            .chain(more)
+        {
             for (point, place) in points.iter_mut().zip(places) {
                 place.yields = true;
                 place.most *= YIELDED[0];
@@ -158,12 +215,19 @@ impl Grid {
 
     /// What slowdowns leave of jerk and speed; false where the speed becomes so much less that the grid is to be laid anew.
     pub fn ease(&mut self, slowdowns: &Slowdowns) -> bool {
-        let points = self.points.iter_mut().chain(self.between.iter_mut().map(|more| &mut more.points));
+        let points = self
+            .points
+            .iter_mut()
+            .chain(self.between.iter_mut().map(|more| &mut more.points));
         let mut least = 1.0f64;
         for (points, places) in points.zip(self.places.iter().chain(&self.more)) {
             for (point, place) in points.iter_mut().zip(places) {
                 let [speed, jerk] = slowdowns.at(place.s_mm);
-                point.jerk_share = if place.yields { YIELDED[2] * jerk } else { jerk };
+                point.jerk_share = if place.yields {
+                    YIELDED[2] * jerk
+                } else {
+                    jerk
+                };
                 point.most = place.most * speed * speed;
                 least = least.min(speed / place.speed);
             }
@@ -181,7 +245,10 @@ fn place(
     at: &AlongPath,
 ) -> (Point, Place) {
     let [speed, jerk_share] = slowdowns.at(*s_mm);
-    let mut point = Point { jerk_share, ..Point::default() };
+    let mut point = Point {
+        jerk_share,
+        ..Point::default()
+    };
     for lane in 0..bounds.context.limits.axes().len() {
         let x1 = at.direction[lane];
         let x2 = at.curvature[lane];
@@ -190,7 +257,19 @@ fn place(
         point.second[lane] = x2 * s1 * s1 + x1 * s2;
         point.third[lane] = x3 * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;
     }
-    let most = if *s1 > 1e-9 { (leg.cap_mm_per_s(at, bounds).min(cap) / s1).powi(2) } else { f64::INFINITY };
+    let most = if *s1 > 1e-9 {
+        (leg.cap_mm_per_s(at, bounds).min(cap) / s1).powi(2)
+    } else {
+        f64::INFINITY
+    };
     point.most = speed * speed * most;
-    (point, Place { s_mm: *s_mm, most, speed, yields: false })
+    (
+        point,
+        Place {
+            s_mm: *s_mm,
+            most,
+            speed,
+            yields: false,
+        },
+    )
 }

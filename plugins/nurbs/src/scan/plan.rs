@@ -45,7 +45,11 @@ impl Planning for Scan {
 
     fn plan(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         let found = self.plan_rate(job, window);
-        let slow_s = if found { window.duration_s() } else { f64::INFINITY };
+        let slow_s = if found {
+            window.duration_s()
+        } else {
+            f64::INFINITY
+        };
         // A path so short and sharp that limits between samples count most.
         let doubtful = slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.begun_s;
         if job.rests() && doubtful {
@@ -67,14 +71,22 @@ impl Scan {
             if n == 1 {
                 self.begun_s = self.first.end().0;
             }
-            let kept_all = !self.dips(job, window) && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
+            let kept_all = !self.dips(job, window)
+                && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
             if !kept_all {
                 if n >= HOPELESS && kept.is_none() {
                     break;
                 }
                 continue;
             }
-            if n == TRIES || !ease(job.route, job.bounds, &window.motion.rated, &mut self.slowdowns) {
+            if n == TRIES
+                || !ease(
+                    job.route,
+                    job.bounds,
+                    &window.motion.rated,
+                    &mut self.slowdowns,
+                )
+            {
                 return true;
             }
             kept = Some(known);
@@ -82,7 +94,8 @@ impl Scan {
         if let Some(known) = kept {
             self.slowdowns.keep_first(known);
             self.solve(job, false, window);
-            return !self.dips(job, window) && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
+            return !self.dips(job, window)
+                && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
         }
         false
     }
@@ -94,7 +107,8 @@ impl Scan {
         for k in 0..rated.rate.intervals() {
             let (z, least) = rated.rate.least(k);
             if least <= 0.0 {
-                self.grid.look_closer(job.route, job.bounds, rated, &self.slowdowns, (k, z));
+                self.grid
+                    .look_closer(job.route, job.bounds, rated, &self.slowdowns, (k, z));
                 found = true;
             }
         }
@@ -103,9 +117,26 @@ impl Scan {
 
     /// The window as the form `windowed` plans it, where that takes less than `below_s`.
     fn plan_ramps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, below_s: f64) -> bool {
-        let Job { route, bounds, start, driven, end_mm, .. } = *job;
+        let Job {
+            route,
+            bounds,
+            start,
+            driven,
+            end_mm,
+            ..
+        } = *job;
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
-        let found = self.windowed.plan(&Job { route, bounds, start, driven, end_mm, before: None }, &mut self.window);
+        let found = self.windowed.plan(
+            &Job {
+                route,
+                bounds,
+                start,
+                driven,
+                end_mm,
+                before: None,
+            },
+            &mut self.window,
+        );
         std::mem::swap(&mut self.window.motion, &mut window.motion.ramps);
         let found = found && self.window.duration_s() < below_s;
         if found {
@@ -141,18 +172,29 @@ impl Scan {
         std::mem::swap(&mut motion.rate, &mut self.retimer.rate);
         let rate = &motion.rate;
         let step_s = motion.step_s;
-        lay_times(&mut window.times, (0..rate.intervals()).map(|k| rate.time_s(k, 1.0, step_s)));
+        lay_times(
+            &mut window.times,
+            (0..rate.intervals()).map(|k| rate.time_s(k, 1.0, step_s)),
+        );
     }
 
     /// The motion in pseudo-time; gives whether it goes to the end.
     fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
         let whole = self.first.make(job, &self.slowdowns);
         let (total_s, end_mm) = self.first.end();
-        let intervals = ((total_s / grid_s(job.bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS);
+        let intervals =
+            ((total_s / grid_s(job.bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
-        fill(&mut motion.coefficients, self.first.motion(job), grid, &job.start.state, end_mm);
-        self.grid.lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
+        fill(
+            &mut motion.coefficients,
+            self.first.motion(job),
+            grid,
+            &job.start.state,
+            end_mm,
+        );
+        self.grid
+            .lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
         if !job.rests() {
             self.grid.yield_at_start();
         }
@@ -163,7 +205,9 @@ impl Scan {
 /// Grid of pseudo-time, s: a quarter of the time in which an acceleration is built up.
 fn grid_s(bounds: &Bounds) -> f64 {
     let axes = bounds.context.limits.axes().iter();
-    let build_up_s = axes.map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3).fold(f64::INFINITY, f64::min);
+    let build_up_s = axes
+        .map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3)
+        .fold(f64::INFINITY, f64::min);
     let period_s = bounds.context.fine_period_s;
     (build_up_s / 4.0).clamp(period_s, (3.0 * period_s).max(0.008))
 }
@@ -173,5 +217,9 @@ fn lanes(bounds: &Bounds) -> LaneLimits {
     let all = |of: fn(&tandem_sdk::AxisLimits) -> f64| -> [f64; MAX_LANES] {
         std::array::from_fn(|i| axes.get(i).map_or(f64::INFINITY, of))
     };
-    LaneLimits { lanes: axes.len(), acceleration: all(|a| a.acceleration_mm_per_s2), jerk: all(|a| a.jerk_mm_per_s3) }
+    LaneLimits {
+        lanes: axes.len(),
+        acceleration: all(|a| a.acceleration_mm_per_s2),
+        jerk: all(|a| a.jerk_mm_per_s3),
+    }
 }

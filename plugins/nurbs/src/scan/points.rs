@@ -10,8 +10,12 @@ const NEAR: f64 = 0.995;
 /// What the next try aims at.
 const AIM: f64 = 0.985;
 /// Where it is looked at in an interval, and in one in which the path turns much.
-const PLACES: [&[f64]; 2] =
-    [&[1e-4, 0.25, 0.5, 0.75, 0.9999], &[1e-4, 0.08, 0.16, 0.25, 0.37, 0.5, 0.63, 0.75, 0.84, 0.92, 0.9999]];
+const PLACES: [&[f64]; 2] = [
+    &[1e-4, 0.25, 0.5, 0.75, 0.9999],
+    &[
+        1e-4, 0.08, 0.16, 0.25, 0.37, 0.5, 0.63, 0.75, 0.84, 0.92, 0.9999,
+    ],
+];
 /// Turn of the path in an interval that is much, rad.
 const TURN: f64 = 0.05;
 
@@ -39,16 +43,38 @@ pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, slowdowns: &mut Slow
         let knot = route.knot([from_mm, to_mm], &mut cursor);
         if let Some((knot_mm, sides)) = &knot {
             let [_, rest @ ..] = motion.derivatives(k, motion.place(k, *knot_mm));
-            worst = sides.iter().fold(worst, |worst, side| worst.max(jerk_share(bounds, side, rest)));
+            worst = sides.iter().fold(worst, |worst, side| {
+                worst.max(jerk_share(bounds, side, rest))
+            });
         }
         // What is near the limit here would be the next to exceed it. At a knot the rows of the grid see too little of it:
         // there the speed is lowered, with whose third power it goes.
         if worst > NEAR || faster > FASTER {
             let [from_mm, to_mm] = [-0.3, 1.3].map(|z| motion.derivatives(k, z)[0]);
-            let jerk = if worst > NEAR { (AIM / worst).max(0.5) } else { 1.0 };
-            let speed = if knot.is_some() && worst > POINT { jerk.cbrt() } else { 1.0 };
-            let speed = if faster > FASTER { speed.min(SLOWER / faster) } else { speed };
-            slowdowns.add(known, Slowdown { from_mm, to_mm, speed, jerk });
+            let jerk = if worst > NEAR {
+                (AIM / worst).max(0.5)
+            } else {
+                1.0
+            };
+            let speed = if knot.is_some() && worst > POINT {
+                jerk.cbrt()
+            } else {
+                1.0
+            };
+            let speed = if faster > FASTER {
+                speed.min(SLOWER / faster)
+            } else {
+                speed
+            };
+            slowdowns.add(
+                known,
+                Slowdown {
+                    from_mm,
+                    to_mm,
+                    speed,
+                    jerk,
+                },
+            );
         }
         over |= worst > POINT || faster > FASTER;
     }

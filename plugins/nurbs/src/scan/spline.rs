@@ -9,9 +9,12 @@ pub fn evaluate(coefficients: &[f64], k: usize, z: f64, step_s: f64) -> [f64; 4]
     let [c1, c2, c3] = [1, 2, 3].map(|n| coefficients[k + n] - base);
     let y = 1.0 - z;
     let zz = z * z;
-    let value =
-        ((3.0 * zz * z - 6.0 * zz + 4.0) * c1 + (-3.0 * zz * z + 3.0 * zz + 3.0 * z + 1.0) * c2 + zz * z * c3) / 6.0;
-    let first = ((3.0 * zz - 4.0 * z) * c1 + (-3.0 * zz + 2.0 * z + 1.0) * c2 + zz * c3) / 2.0 / step_s;
+    let value = ((3.0 * zz * z - 6.0 * zz + 4.0) * c1
+        + (-3.0 * zz * z + 3.0 * zz + 3.0 * z + 1.0) * c2
+        + zz * z * c3)
+        / 6.0;
+    let first =
+        ((3.0 * zz - 4.0 * z) * c1 + (-3.0 * zz + 2.0 * z + 1.0) * c2 + zz * c3) / 2.0 / step_s;
     let second = ((3.0 * z - 2.0) * c1 + (y - 2.0 * z) * c2 + z * c3) / (step_s * step_s);
     let third = (3.0 * c1 - 3.0 * c2 + c3) / (step_s * step_s * step_s);
     [base + value, first, second, third]
@@ -53,13 +56,29 @@ mod tests {
     #[test]
     fn a_spline_over_a_motion_with_a_sharp_stop_never_goes_back() {
         // It stops within one interval, and starts again.
-        let motion = |t: f64| if t < 0.5 { [t, -40.0] } else { [0.5 + 0.01 * (t - 0.5), 40.0] };
+        let motion = |t: f64| {
+            if t < 0.5 {
+                [t, -40.0]
+            } else {
+                [0.5 + 0.01 * (t - 0.5), 40.0]
+            }
+        };
         let intervals = 40;
         let step_s = 0.025;
         let end_mm = 0.505;
         let mut coefficients = vec![];
-        let start = State { s_mm: 0.0, speed_mm_per_s: 1.0, acceleration_mm_per_s2: 0.0 };
-        fill(&mut coefficients, motion, (intervals, step_s), &start, end_mm);
+        let start = State {
+            s_mm: 0.0,
+            speed_mm_per_s: 1.0,
+            acceleration_mm_per_s2: 0.0,
+        };
+        fill(
+            &mut coefficients,
+            motion,
+            (intervals, step_s),
+            &start,
+            end_mm,
+        );
         for look in 0..intervals * 20 {
             let z = f64::from(u32::try_from(look % 20).unwrap()) / 20.0;
             let [_, speed, ..] = evaluate(&coefficients, look / 20, z, step_s);

@@ -43,7 +43,10 @@ impl Timing {
         let last = self.nodes.len() - 1;
         self.nodes[last].speed_mm_per_s = 0.0;
         for i in (0..last).rev() {
-            let reached = reach(&self.nodes[i + 1], self.nodes[i + 1].s_mm - self.nodes[i].s_mm);
+            let reached = reach(
+                &self.nodes[i + 1],
+                self.nodes[i + 1].s_mm - self.nodes[i].s_mm,
+            );
             if i > 0 {
                 self.nodes[i].speed_mm_per_s = self.nodes[i].speed_mm_per_s.min(reached);
             }
@@ -52,7 +55,11 @@ impl Timing {
         let mut t = 0.0;
         self.steps.push((t, self.nodes[0].s_mm));
         for pair in self.nodes.windows(2) {
-            let rest = if pair[0].speed_mm_per_s == 0.0 || pair[1].speed_mm_per_s == 0.0 { 1.5 } else { 1.0 };
+            let rest = if pair[0].speed_mm_per_s == 0.0 || pair[1].speed_mm_per_s == 0.0 {
+                1.5
+            } else {
+                1.0
+            };
             let way = pair[1].s_mm - pair[0].s_mm;
             t += rest * 2.0 * way / (pair[0].speed_mm_per_s + pair[1].speed_mm_per_s);
             self.steps.push((t, pair[1].s_mm));
@@ -104,7 +111,11 @@ impl Timing {
             let bend = leg.course.counted_length(&at.curvature).max(1e-9);
             let step = (0.05 / bend).clamp(2e-3, 0.05).min(cap * NODE_S).max(1e-3);
             // No sliver before the end.
-            s_mm = if end_mm - s_mm < 1.5 * step { end_mm.max(s_mm) } else { s_mm + step };
+            s_mm = if end_mm - s_mm < 1.5 * step {
+                end_mm.max(s_mm)
+            } else {
+                s_mm + step
+            };
         }
     }
 }
@@ -124,5 +135,7 @@ fn node(leg: &Leg, at: &AlongPath, bounds: &Bounds, slowdowns: &Slowdowns, s_mm:
 fn reach(from: &Node, way_mm: f64) -> f64 {
     let v = from.speed_mm_per_s;
     let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way_mm;
-    (ramp * ramp).cbrt().min((v * v + 1.6 * from.acceleration * way_mm).sqrt())
+    (ramp * ramp)
+        .cbrt()
+        .min((v * v + 1.6 * from.acceleration * way_mm).sqrt())
 }

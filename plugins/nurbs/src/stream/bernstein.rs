@@ -15,7 +15,10 @@ pub fn bernstein<const N: usize>(powers: &[f64; N], duration_s: f64) -> [f64; N]
         power *= duration_s;
     }
     std::array::from_fn(|j| {
-        Table::<N>::SHARES[j].iter().zip(&scaled).fold(0.0, |sum, (share, value)| sum + share * value)
+        Table::<N>::SHARES[j]
+            .iter()
+            .zip(&scaled)
+            .fold(0.0, |sum, (share, value)| sum + share * value)
     })
 }
 
@@ -43,7 +46,9 @@ impl<const N: usize> Table<N> {
 /// The largest value of a polynomial by its Bernstein coefficients: not below it, and where it is above `enough` no more
 /// than 1e-9 of the coefficients above it.
 pub fn highest<const N: usize>(coefficients: &[f64; N], enough: f64) -> f64 {
-    let size = coefficients.iter().fold(0.0f64, |most, c| most.max(c.abs()));
+    let size = coefficients
+        .iter()
+        .fold(0.0f64, |most, c| most.max(c.abs()));
     higher(coefficients, enough, CLOSE * size, HALVINGS)
 }
 
@@ -54,7 +59,10 @@ pub fn largest<const N: usize>(coefficients: &[f64; N], enough: f64) -> f64 {
 }
 
 fn higher<const N: usize>(coefficients: &[f64; N], enough: f64, close: f64, halvings: u32) -> f64 {
-    let most = coefficients.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let most = coefficients
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
     let reached = coefficients[0].max(coefficients[N - 1]);
     if most <= enough || most - reached <= close || halvings == 0 {
         return most;
@@ -70,7 +78,9 @@ fn higher<const N: usize>(coefficients: &[f64; N], enough: f64, close: f64, halv
     }
     let enough = enough.max(reached);
     let found = higher(&left, enough, close, halvings - 1);
-    found.max(higher(&right, enough.max(found), close, halvings - 1)).max(reached)
+    found
+        .max(higher(&right, enough.max(found), close, halvings - 1))
+        .max(reached)
 }
 
 #[cfg(test)]
@@ -93,10 +103,14 @@ mod tests {
         for powers in all {
             for duration_s in [0.1, 0.7, 1.0, 2.5] {
                 let b = bernstein(&powers, duration_s);
-                let looks = (0..=10_000).map(|n| value(&powers, duration_s * f64::from(n) / 1e4).abs());
+                let looks =
+                    (0..=10_000).map(|n| value(&powers, duration_s * f64::from(n) / 1e4).abs());
                 let seen = looks.fold(0.0, f64::max);
                 let bound = largest(&b, 0.0);
-                assert!(bound >= seen - 1e-12 && bound <= seen * (1.0 + 1e-6) + 1e-12, "{powers:?}: {bound} {seen}");
+                assert!(
+                    bound >= seen - 1e-12 && bound <= seen * (1.0 + 1e-6) + 1e-12,
+                    "{powers:?}: {bound} {seen}"
+                );
                 // What is enough ends the search, and the bound still holds.
                 assert!(largest(&b, 10.0 * seen + 1.0) >= seen - 1e-12, "{powers:?}");
             }

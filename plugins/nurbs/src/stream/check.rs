@@ -65,8 +65,16 @@ impl Worst {
         Slowdown {
             from_mm,
             to_mm,
-            speed: if self.speed > 1.0 { (0.9985 / self.speed).max(0.3) } else { 1.0 },
-            jerk: if over > 1.0 { (0.995 / over).max(0.5) } else { 1.0 },
+            speed: if self.speed > 1.0 {
+                (0.9985 / self.speed).max(0.3)
+            } else {
+                1.0
+            },
+            jerk: if over > 1.0 {
+                (0.995 / over).max(0.5)
+            } else {
+                1.0
+            },
         }
     }
 }
@@ -82,8 +90,18 @@ pub enum Look {
 
 /// Samples the window into its memory, with the samples before it in front, and compares. Where a limit is exceeded,
 /// `slowdowns` get what would keep it.
-pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, slowdowns: &mut Slowdowns) -> Worst {
-    let Job { route, bounds, start, .. } = job;
+pub fn check<M: Motion, N>(
+    job: &Job<N>,
+    window: &mut Window<M>,
+    look: Look,
+    slowdowns: &mut Slowdowns,
+) -> Worst {
+    let Job {
+        route,
+        bounds,
+        start,
+        ..
+    } = job;
     window.samples.clear();
     window.samples.extend(start.history);
     window.bounds.clear();
@@ -93,10 +111,25 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, slo
     let period_s = bounds.context.fine_period_s;
     let duration_s = window.duration_s();
     let known = slowdowns.count();
-    if let Some(lost) = window.times.windows(2).position(|ends| !ends[1].is_finite()) {
+    if let Some(lost) = window
+        .times
+        .windows(2)
+        .position(|ends| !ends[1].is_finite())
+    {
         let from_mm = window.motion.at(lost, 0.0).s_mm;
-        slowdowns.add(known, Slowdown { from_mm, to_mm: from_mm + LOST_MM, speed: 0.5, jerk: 1.0 });
-        return Worst { speed: f64::NAN, ..Worst::default() };
+        slowdowns.add(
+            known,
+            Slowdown {
+                from_mm,
+                to_mm: from_mm + LOST_MM,
+                speed: 0.5,
+                jerk: 1.0,
+            },
+        );
+        return Worst {
+            speed: f64::NAN,
+            ..Worst::default()
+        };
     }
     let mut cursor = Cursor::default();
     let mut worst = Worst::default();
@@ -109,9 +142,19 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, slo
         let state = window.at(t.min(duration_s));
         // No limit says that a motion goes forward.
         if state.speed_mm_per_s < -BACK_MM_PER_S || !state.speed_mm_per_s.is_finite() {
-            slowdowns
-                .add(known, Slowdown { from_mm: before_mm[0], to_mm: before_mm[2] + LOST_MM, speed: 0.5, jerk: 1.0 });
-            return Worst { speed: f64::NAN, ..worst };
+            slowdowns.add(
+                known,
+                Slowdown {
+                    from_mm: before_mm[0],
+                    to_mm: before_mm[2] + LOST_MM,
+                    speed: 0.5,
+                    jerk: 1.0,
+                },
+            );
+            return Worst {
+                speed: f64::NAN,
+                ..worst
+            };
         }
         let (at, leg) = route.at(state.s_mm, &mut cursor);
         note_reserve(window, bounds, &at, state.speed_mm_per_s);
@@ -121,8 +164,15 @@ pub fn check<M: Motion, N>(job: &Job<N>, window: &mut Window<M>, look: Look, slo
         window.bounds.push(here.bound);
         if !here.is_kept() {
             // Where the speed is taken back it becomes higher beside that: a period more on both sides.
-            let beside_mm = if here.speed > 1.0 { state.s_mm - first } else { 0.0 };
-            slowdowns.add(known, here.slowdown(before_mm[0] - beside_mm, state.s_mm + beside_mm));
+            let beside_mm = if here.speed > 1.0 {
+                state.s_mm - first
+            } else {
+                0.0
+            };
+            slowdowns.add(
+                known,
+                here.slowdown(before_mm[0] - beside_mm, state.s_mm + beside_mm),
+            );
         }
         worst.join(&here);
         before_mm = [before_mm[1], before_mm[2], state.s_mm];
@@ -150,13 +200,24 @@ fn check_segments<M: Motion, N>(
     let mut at = driven.at;
     let mut segment = Segment::rest(&driven.at, 0.0);
     while let Some(ahead) = route.filter(|_| from_s < duration_s) {
-        segment.flags =
-            SegmentFlags(if ahead.front().block.kind == BlockKind::Rapid { SegmentFlags::RAPID.0 } else { 0 });
-        let Drawn { until_s, leg_over } = draw(&ahead, bounds, window, &Pen { from_s, at: &at }, &mut segment);
+        segment.flags = SegmentFlags(if ahead.front().block.kind == BlockKind::Rapid {
+            SegmentFlags::RAPID.0
+        } else {
+            0
+        });
+        let Drawn { until_s, leg_over } = draw(
+            &ahead,
+            bounds,
+            window,
+            &Pen { from_s, at: &at },
+            &mut segment,
+        );
         from_s = until_s;
         if segment.duration_s > 0.0 {
             at = segment.position(segment.duration_s);
-            worst.join(&judge_last(&mut trail, &ahead, bounds, &segment, known, slowdowns));
+            worst.join(&judge_last(
+                &mut trail, &ahead, bounds, &segment, known, slowdowns,
+            ));
         }
         if leg_over {
             route = ahead.behind_front();
@@ -164,7 +225,9 @@ fn check_segments<M: Motion, N>(
     }
     let mut rest = Segment::rest(&at, 3.0 * bounds.context.fine_period_s);
     rest.path[0] = segment.path_mm(segment.duration_s);
-    worst.join(&judge_last(&mut trail, job.route, bounds, &rest, known, slowdowns));
+    worst.join(&judge_last(
+        &mut trail, job.route, bounds, &rest, known, slowdowns,
+    ));
     window.trail = trail;
     worst
 }
@@ -179,15 +242,26 @@ fn judge_last(
     slowdowns: &mut Slowdowns,
 ) -> Worst {
     trail.push(segment, bounds);
-    let Found { mut worst, from_mm, to_mm, stepped } = trail.judge(bounds);
+    let Found {
+        mut worst,
+        from_mm,
+        to_mm,
+        stepped,
+    } = trail.judge(bounds);
     if worst.is_kept() {
         return worst;
     }
     let middle_s = 0.5 * segment.duration_s;
-    let (at, speed) =
-        (route.at(segment.path_mm(middle_s), &mut Cursor::default()).0, segment.path_speed_mm_per_s(middle_s));
+    let (at, speed) = (
+        route
+            .at(segment.path_mm(middle_s), &mut Cursor::default())
+            .0,
+        segment.path_speed_mm_per_s(middle_s),
+    );
     let axes = bounds.context.limits.axes().iter().enumerate();
-    let turns = axes.map(|(axis, limits)| at.curvature[axis].abs() * speed * speed / limits.acceleration_mm_per_s2);
+    let turns = axes.map(|(axis, limits)| {
+        at.curvature[axis].abs() * speed * speed / limits.acceleration_mm_per_s2
+    });
     if worst.acceleration > 1.0 && turns.fold(0.0, f64::max) > TURNING {
         // What turning takes goes with the square of the speed.
         worst.speed = worst.speed.max(worst.acceleration.sqrt());
@@ -196,7 +270,11 @@ fn judge_last(
     if stepped {
         worst.speed = worst.speed.max(worst.acceleration).max(worst.jerk);
     }
-    let (from_mm, to_mm) = if from_mm <= to_mm { (from_mm, to_mm) } else { (to_mm, from_mm) };
+    let (from_mm, to_mm) = if from_mm <= to_mm {
+        (from_mm, to_mm)
+    } else {
+        (to_mm, from_mm)
+    };
     slowdowns.add(known, worst.slowdown(from_mm, to_mm));
     worst
 }
@@ -204,7 +282,10 @@ fn judge_last(
 /// What a sample leaves for a stop.
 fn note_reserve<M>(window: &mut Window<M>, bounds: &Bounds, at: &AlongPath, speed: f64) {
     window.most_mm_per_s = window.most_mm_per_s.max(speed);
-    let mut reserve = Reserve { stop_mm_per_s2: f64::INFINITY, stop_mm_per_s3: f64::INFINITY };
+    let mut reserve = Reserve {
+        stop_mm_per_s2: f64::INFINITY,
+        stop_mm_per_s3: f64::INFINITY,
+    };
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
         let along = at.direction[axis].abs();
         let turning = at.direction[axis].signum() * at.curvature[axis] * speed * speed;
@@ -229,7 +310,9 @@ fn compare(
     let feed = state.speed_mm_per_s / leg.feed_mm_per_s;
     let mut chord_share = 0.0;
     let mean_mm_per_s = (state.s_mm - before_mm) / bounds.context.fine_period_s;
-    here.speed = here.speed.max(state.speed_mm_per_s.max(mean_mm_per_s) / (leg.feed_mm_per_s * (1.0 - 1e-9)));
+    here.speed = here
+        .speed
+        .max(state.speed_mm_per_s.max(mean_mm_per_s) / (leg.feed_mm_per_s * (1.0 - 1e-9)));
     if before_mm < state.s_mm && !rapid {
         let curved = leg.course.counted_length(&at.curvature);
         let chord = chord_error_mm(route, bounds, (before_mm, state.s_mm), samples, curved);
@@ -238,7 +321,11 @@ fn compare(
         here.speed = here.speed.max(chord_share);
     }
     let shares = [feed, velocity, here.acceleration, here.jerk, chord_share];
-    here.bound = BINDS.iter().zip(shares).find(|((_, from), share)| share > from).map(|((bound, _), _)| *bound);
+    here.bound = BINDS
+        .iter()
+        .zip(shares)
+        .find(|((_, from), share)| share > from)
+        .map(|((bound, _), _)| *bound);
     here
 }
 
@@ -248,11 +335,21 @@ pub fn differences(bounds: &Bounds, samples: &[AxisVector], rapid: bool) -> Wors
     let rate = 1.0 / bounds.context.fine_period_s;
     let mut here = Worst::default();
     for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
-        let [d0, d1, d2] = [p1[axis] - p0[axis], p2[axis] - p1[axis], p3[axis] - p2[axis]];
-        let most = if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s };
+        let [d0, d1, d2] = [
+            p1[axis] - p0[axis],
+            p2[axis] - p1[axis],
+            p3[axis] - p2[axis],
+        ];
+        let most = if rapid {
+            limits.rapid_mm_per_s
+        } else {
+            limits.feed_mm_per_s
+        };
         here.speed = here.speed.max((d2 * rate).abs() / most);
         let acceleration = (d2 - d1).abs() * rate * rate;
-        here.acceleration = here.acceleration.max(acceleration / (AIM * limits.acceleration_mm_per_s2));
+        here.acceleration = here
+            .acceleration
+            .max(acceleration / (AIM * limits.acceleration_mm_per_s2));
         let jerk = (d2 - 2.0 * d1 + d0).abs() * rate * rate * rate;
         here.jerk = here.jerk.max(jerk / (AIM * limits.jerk_mm_per_s3));
     }
@@ -271,7 +368,9 @@ fn chord_error_mm(
     let way_mm = to_mm - from_mm;
     let far_mm = FAR * bounds.chord_error_mm;
     let axes = bounds.context.axes.count();
-    let dot = |a: &AxisVector, b: &AxisVector| -> f64 { a.0[..axes].iter().zip(b.0).map(|(a, b)| a * b).sum() };
+    let dot = |a: &AxisVector, b: &AxisVector| -> f64 {
+        a.0[..axes].iter().zip(b.0).map(|(a, b)| a * b).sum()
+    };
     // Half of that error would be no reason to look.
     if curvature * way_mm * way_mm < 1e-3 * far_mm {
         return 0.0;
@@ -286,10 +385,16 @@ fn chord_error_mm(
     let mut off = |share: f64| {
         let point = route.at(from_mm + share * way_mm, &mut cursor).0.position - start;
         let along = dot(&point, &chord);
-        (dot(&point, &point) - along * along / squared).max(0.0).sqrt()
+        (dot(&point, &point) - along * along / squared)
+            .max(0.0)
+            .sqrt()
     };
     let middle = off(0.5);
-    if middle < far_mm { middle } else { middle.max(off(0.25)).max(off(0.75)) }
+    if middle < far_mm {
+        middle
+    } else {
+        middle.max(off(0.25)).max(off(0.75))
+    }
 }
 
 /// The largest jerk of an axis as a share of its limit, at a place passed with a speed and its derivatives.

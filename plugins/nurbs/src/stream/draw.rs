@@ -47,42 +47,91 @@ pub struct Pen<'a> {
 /// another goes on it has no duration. Velocity and acceleration of both ends are met, and the position of the end; it keeps to
 /// the travel as the path does. It is the same segment whenever it is drawn from there: what was judged is what is driven. Does
 /// not allocate.
-pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: &Pen, segment: &mut Segment) -> Drawn {
+pub fn draw<M: Motion>(
+    route: &Route,
+    bounds: &Bounds,
+    window: &Window<M>,
+    pen: &Pen,
+    segment: &mut Segment,
+) -> Drawn {
     let from_s = pen.from_s;
     let k = window.interval(from_s);
     let border_s = window.times[k + 1];
     let context = &bounds.context;
-    let asked_s = from_s + context.rough_period_s.max(4.0 * context.fine_period_s).max(MIN_S);
-    let mut until_s = if border_s - asked_s < MIN_S { border_s } else { asked_s };
+    let asked_s = from_s
+        + context
+            .rough_period_s
+            .max(4.0 * context.fine_period_s)
+            .max(MIN_S);
+    let mut until_s = if border_s - asked_s < MIN_S {
+        border_s
+    } else {
+        asked_s
+    };
     let mut cursor = Cursor::default();
     // The last way of a rest takes long where jerk is low: near the end is the end only where the window ends.
     let leg_end_mm = route.front().end_mm;
     let same_mm = route.front().same_mm();
     let duration_s = window.duration_s();
-    let is_over =
-        |end: &State, until_s: f64| end.s_mm >= leg_end_mm || until_s >= duration_s && end.s_mm > leg_end_mm - same_mm;
+    let is_over = |end: &State, until_s: f64| {
+        end.s_mm >= leg_end_mm || until_s >= duration_s && end.s_mm > leg_end_mm - same_mm
+    };
     let start = window.at_in(k, from_s);
     match first_break(route.front(), window, k, [from_s, until_s]) {
         Some(Break::Knot(break_s)) => until_s = break_s,
         Some(Break::Over) => {
-            fill(route, &mut cursor, (pen, [&start, &start]), 0.0, segment, sliver);
-            return Drawn { until_s: from_s, leg_over: true };
+            fill(
+                route,
+                &mut cursor,
+                (pen, [&start, &start]),
+                0.0,
+                segment,
+                sliver,
+            );
+            return Drawn {
+                until_s: from_s,
+                leg_over: true,
+            };
         }
         None => {}
     }
     let mut end = window.at_in(k, until_s);
     if until_s - from_s < MIN_S {
-        fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, sliver);
+        fill(
+            route,
+            &mut cursor,
+            (pen, [&start, &end]),
+            until_s - from_s,
+            segment,
+            sliver,
+        );
         // At the end of the travel it meets its end: what it drifts is more than rounding there.
         if !stays(bounds, segment, false) {
-            fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
+            fill(
+                route,
+                &mut cursor,
+                (pen, [&start, &end]),
+                until_s - from_s,
+                segment,
+                hermite,
+            );
         }
-        return Drawn { until_s, leg_over: is_over(&end, until_s) };
+        return Drawn {
+            until_s,
+            leg_over: is_over(&end, until_s),
+        };
     }
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
     let least_s = least_s(bounds, pen.at);
     for _ in 0..MAX_HALVINGS {
-        fill(route, &mut cursor, (pen, [&start, &end]), until_s - from_s, segment, hermite);
+        fill(
+            route,
+            &mut cursor,
+            (pen, [&start, &end]),
+            until_s - from_s,
+            segment,
+            hermite,
+        );
         if until_s - from_s < 2.0 * least_s
             || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment, true)
         {
@@ -91,15 +140,19 @@ pub fn draw<M: Motion>(route: &Route, bounds: &Bounds, window: &Window<M>, pen: 
         until_s = f64::midpoint(from_s, until_s);
         end = window.at_in(k, until_s);
     }
-    Drawn { until_s, leg_over: is_over(&end, until_s) }
+    Drawn {
+        until_s,
+        leg_over: is_over(&end, until_s),
+    }
 }
 
 /// The shortest segment through both its ends whose jerk is not that of rounding of positions, s: in a sharp turn the path asks
 /// for it. A quintic whose ends are off by e has 60·e/T³ of that.
 fn least_s(bounds: &Bounds, at: &AxisVector) -> f64 {
     let lanes = bounds.context.limits.axes().iter().zip(at.0);
-    let noise =
-        lanes.map(|(limits, x)| 60.0 * f64::EPSILON * x.abs().max(1.0) / limits.jerk_mm_per_s3).fold(0.0, f64::max);
+    let noise = lanes
+        .map(|(limits, x)| 60.0 * f64::EPSILON * x.abs().max(1.0) / limits.jerk_mm_per_s3)
+        .fold(0.0, f64::max);
     (noise / NOISE).cbrt().clamp(SHARP_S, MIN_S)
 }
 
@@ -112,7 +165,12 @@ enum Break {
 }
 
 /// The first place between two times of interval `k` at which derivatives may jump, and that leaves more than slivers.
-fn first_break<M: Motion>(front: &Leg, window: &Window<M>, k: usize, [from_s, until_s]: [f64; 2]) -> Option<Break> {
+fn first_break<M: Motion>(
+    front: &Leg,
+    window: &Window<M>,
+    k: usize,
+    [from_s, until_s]: [f64; 2],
+) -> Option<Break> {
     let [from_mm, until_mm] = [from_s, until_s].map(|t_s| window.at_in(k, t_s).s_mm);
     let mut known_mm = from_mm;
     loop {
@@ -150,12 +208,17 @@ fn fill(
         let at = route.at_side(end.s_mm, side, cursor);
         let v = end.speed_mm_per_s;
         let a = end.acceleration_mm_per_s2;
-        [at.position, at.direction * v, at.direction * a + at.curvature * (v * v)]
+        [
+            at.position,
+            at.direction * v,
+            at.direction * a + at.curvature * (v * v),
+        ]
     });
     states[0][0] = *pen.at;
     let [from, to] = &states;
     for axis in 0..MAX_AXES {
-        segment.coefficients[axis] = through(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
+        segment.coefficients[axis] =
+            through(from.map(|v| v[axis]), to.map(|v| v[axis]), duration_s);
     }
     let along = ends.map(|end| [end.s_mm, end.speed_mm_per_s, end.acceleration_mm_per_s2]);
     segment.path = through(along[0], along[1], duration_s);
@@ -178,15 +241,21 @@ fn sliver(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
 /// where the segment meets its ends: no shorter one mends that.
 fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
     let period_s = bounds.context.fine_period_s;
-    bounds.context.limits.axes().iter().zip(&segment.coefficients).all(|(limits, c)| {
-        let rounding = 2.0 * f64::EPSILON * c[0].abs().max(1.0) / period_s;
-        let low = limits.min_mm - rounding;
-        let high = limits.max_mm + rounding;
-        let b = bernstein(c, segment.duration_s);
-        let beyond = |end: f64| end < low || end > high;
-        meets_ends && (beyond(b[0]) || beyond(b[5]))
-            || highest(&b, high) <= high && highest(&b.map(|v| -v), -low) <= -low
-    })
+    bounds
+        .context
+        .limits
+        .axes()
+        .iter()
+        .zip(&segment.coefficients)
+        .all(|(limits, c)| {
+            let rounding = 2.0 * f64::EPSILON * c[0].abs().max(1.0) / period_s;
+            let low = limits.min_mm - rounding;
+            let high = limits.max_mm + rounding;
+            let b = bernstein(c, segment.duration_s);
+            let beyond = |end: f64| end < low || end > high;
+            meets_ends && (beyond(b[0]) || beyond(b[5]))
+                || highest(&b, high) <= high && highest(&b.map(|v| -v), -low) <= -low
+        })
 }
 
 /// A quintic that is off by e in its middle has a third derivative that is off by 384·e/T³ at its ends.

@@ -73,14 +73,17 @@ impl Leg {
 
     /// How far the path goes on from `s_mm` without a feature of its own, mm.
     pub fn smooth_for_mm(&self, s_mm: f64, place: &mut Place) -> f64 {
-        self.course.smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
+        self.course
+            .smooth_for_mm(self.stretch, (s_mm - self.start_mm).max(0.0), place)
     }
 
     /// Path coordinates of the leg that are the same but for rounding differ by less, mm: where a rotary axis turns much on
     /// little way, a nanometre of that is more than rounding.
     pub fn same_mm(&self) -> f64 {
         let rounding = 8.0 * f64::EPSILON * self.end_mm.abs();
-        SAME_MM.min(SAME_SHARE * (self.end_mm - self.start_mm)).max(rounding)
+        SAME_MM
+            .min(SAME_SHARE * (self.end_mm - self.start_mm))
+            .max(rounding)
     }
 
     /// How far beside its ends and knots derivatives are taken, mm.
@@ -102,9 +105,17 @@ impl Leg {
     /// Highest speed at a point: feed, chord error, axis speeds and turning.
     pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
         let curvature = self.course.counted_length(&at.curvature);
-        let chord = chord_feed_mm_per_s(curvature, bounds.chord_error_mm, bounds.context.fine_period_s);
+        let chord = chord_feed_mm_per_s(
+            curvature,
+            bounds.chord_error_mm,
+            bounds.context.fine_period_s,
+        );
         let along = bounds.context.limits.along(&at.direction);
-        let axes = if self.block.kind == BlockKind::Rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s };
+        let axes = if self.block.kind == BlockKind::Rapid {
+            along.rapid_mm_per_s
+        } else {
+            along.feed_mm_per_s
+        };
         let mut cap = self.feed_mm_per_s.min(chord).min(axes);
         for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
             let bend = at.curvature[axis].abs();
@@ -121,7 +132,8 @@ impl Leg {
         let period_s = bounds.context.fine_period_s;
         let axes = bounds.context.limits.axes().iter().enumerate();
         let caps = axes.map(|(axis, limits)| {
-            let turn = (behind.direction[axis] - before.direction[axis]).abs() / (period_s * period_s);
+            let turn =
+                (behind.direction[axis] - before.direction[axis]).abs() / (period_s * period_s);
             let bend = (behind.curvature[axis] - before.curvature[axis]).abs() / period_s;
             let jerk = STEP * limits.jerk_mm_per_s3;
             2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
@@ -145,14 +157,21 @@ impl Leg {
     /// direction there either.
     fn beside(&self, s_mm: f64, inward_mm: f64) -> Option<AlongPath> {
         let places = [s_mm, s_mm + inward_mm].map(|s| self.at(s, &mut Place::default()));
-        places.into_iter().find(|at| at.direction != AxisVector::ZERO)
+        places
+            .into_iter()
+            .find(|at| at.direction != AxisVector::ZERO)
     }
 
     /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
     pub fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
-        let ends = self.beside(self.end_mm, -self.beside_mm()).zip(next.beside(next.start_mm, next.beside_mm()));
-        let Some((before, after)) = ends else { return false };
-        let straight = (0..MAX_AXES).all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
+        let ends = self
+            .beside(self.end_mm, -self.beside_mm())
+            .zip(next.beside(next.start_mm, next.beside_mm()));
+        let Some((before, after)) = ends else {
+            return false;
+        };
+        let straight = (0..MAX_AXES)
+            .all(|axis| (after.direction[axis] - before.direction[axis]).abs() <= STRAIGHT);
         let feed_mm_per_s = self.feed_mm_per_s.min(next.feed_mm_per_s);
         straight && Self::step_cap_mm_per_s(&[before, after], bounds) >= WORTH * feed_mm_per_s
     }
@@ -160,14 +179,25 @@ impl Leg {
 
 impl Least {
     /// Of the axes that move at some of a few places of a stretch, which is to be driven at `feed_mm_per_s`.
-    pub fn on(course: &Course, stretch: usize, bounds: &Bounds, rapid: bool, feed_mm_per_s: f64) -> Self {
+    pub fn on(
+        course: &Course,
+        stretch: usize,
+        bounds: &Bounds,
+        rapid: bool,
+        feed_mm_per_s: f64,
+    ) -> Self {
         let length_mm = course.stretches()[stretch].length_mm;
         let mut place = Place::default();
         let mut least = [f64::INFINITY; 2];
-        let directions = [0.0, 0.23, 0.47, 0.71, 1.0].map(|s| course.at(stretch, s * length_mm, &mut place).direction);
+        let directions = [0.0, 0.23, 0.47, 0.71, 1.0]
+            .map(|s| course.at(stretch, s * length_mm, &mut place).direction);
         let tops = directions.map(|direction| {
             let along = bounds.context.limits.along(&direction);
-            if rapid { along.rapid_mm_per_s } else { along.feed_mm_per_s }
+            if rapid {
+                along.rapid_mm_per_s
+            } else {
+                along.feed_mm_per_s
+            }
         });
         let speed_mm_per_s = tops.into_iter().fold(0.0, f64::max).min(feed_mm_per_s);
         for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
@@ -178,10 +208,21 @@ impl Least {
             // A joint that is a sum of axes may move further than the path; so may a rotary axis, where a place at which the
             // linear ones nearly stand still says nothing of the others.
             let joint = axis >= bounds.context.axes.count();
-            let share = if joint { along.iter().copied().fold(1.0, f64::max) } else { least_of(&along).max(1.0) };
-            least = [least[0].min(limits.acceleration_mm_per_s2 / share), least[1].min(limits.jerk_mm_per_s3 / share)];
+            let share = if joint {
+                along.iter().copied().fold(1.0, f64::max)
+            } else {
+                least_of(&along).max(1.0)
+            };
+            least = [
+                least[0].min(limits.acceleration_mm_per_s2 / share),
+                least[1].min(limits.jerk_mm_per_s3 / share),
+            ];
         }
-        Self { speed_mm_per_s, acceleration_mm_per_s2: least[0], jerk_mm_per_s3: least[1] }
+        Self {
+            speed_mm_per_s,
+            acceleration_mm_per_s2: least[0],
+            jerk_mm_per_s3: least[1],
+        }
     }
 }
 

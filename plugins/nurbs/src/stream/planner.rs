@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use tandem_motion::blocks::{limited_by_feed, report};
 use tandem_motion::stream::{Blocks, Emitted, Next, Planned, Stream, Windows};
 use tandem_sdk::{
-    AxisVector, Block, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags, SegmentSink,
+    AxisVector, Block, BlockReport, LimitedBy, PlannerContext, PluginError, Segment, SegmentFlags,
+    SegmentSink,
 };
 
 use super::draw::{Drawn, Pen, draw};
@@ -49,7 +50,10 @@ impl<P: Planning> Streamer<P> {
     /// At rest.
     pub fn new(context: &PlannerContext, chord_error_mm: f64) -> Self {
         let ahead = PathAhead {
-            bounds: Bounds { context: *context, chord_error_mm },
+            bounds: Bounds {
+                context: *context,
+                chord_error_mm,
+            },
             queue: Queue::default(),
             planning: P::default(),
             window: Window::default(),
@@ -60,12 +64,17 @@ impl<P: Planning> Streamer<P> {
             recent: VecDeque::new(),
             at: context.position,
         };
-        Self { stream: Stream::new(&context.position), ahead }
+        Self {
+            stream: Stream::new(&context.position),
+            ahead,
+        }
     }
 
     /// Number of blocks that have not ended.
     pub fn blocks(&self) -> usize {
-        let ends = |item: &&Item| matches!(item, Item::Dwell(_)) || matches!(item, Item::Leg(leg) if leg.ends);
+        let ends = |item: &&Item| {
+            matches!(item, Item::Dwell(_)) || matches!(item, Item::Leg(leg) if leg.ends)
+        };
         self.ahead.queue.items.iter().filter(ends).count()
     }
 
@@ -97,7 +106,11 @@ impl<P: Planning> Streamer<P> {
     }
 
     /// Emits the next piece, at most `left_s` long; none where there is nothing.
-    pub fn emit(&mut self, left_s: f64, sink: &mut dyn SegmentSink) -> Result<Option<f64>, PluginError> {
+    pub fn emit(
+        &mut self,
+        left_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Option<f64>, PluginError> {
         self.stream.emit(&mut self.ahead, left_s, sink)
     }
 }
@@ -120,18 +133,37 @@ impl<P: Planning> Windows for PathAhead<P> {
     }
 
     fn plan_from_rest(&mut self, finished: bool) -> Result<f64, PluginError> {
-        let Some(route) = self.queue.route() else { return Err(self.no_way()) };
-        let state = State { s_mm: self.at_mm, ..State::default() };
+        let Some(route) = self.queue.route() else {
+            return Err(self.no_way());
+        };
+        let state = State {
+            s_mm: self.at_mm,
+            ..State::default()
+        };
         let first_tick_s = self.bounds.context.fine_period_s;
-        let start = Start { state, history: [self.position; 3], first_tick_s };
+        let start = Start {
+            state,
+            history: [self.position; 3],
+            first_tick_s,
+        };
         let (end_mm, closed) = self.queue.run_end(finished);
         self.at = self.position;
         self.recent.clear();
         let mut rest = Segment::rest(&self.position, 3.0 * first_tick_s);
         rest.path[0] = self.at_mm;
         self.recent.push_back(rest);
-        let driven = Driven { segments: &self.recent, at: self.at };
-        let job = Job { route: &route, bounds: &self.bounds, start, driven, end_mm, before: None };
+        let driven = Driven {
+            segments: &self.recent,
+            at: self.at,
+        };
+        let job = Job {
+            route: &route,
+            bounds: &self.bounds,
+            start,
+            driven,
+            end_mm,
+            before: None,
+        };
         if !self.planning.plan(&job, &mut self.window) {
             return Err(self.no_way());
         }
@@ -141,7 +173,9 @@ impl<P: Planning> Windows for PathAhead<P> {
     /// The next window, from the state in motion; where none keeps the limits, this one to its end.
     fn plan_on(&mut self, now_s: f64, finished: bool) -> Planned {
         let Some(route) = self.queue.route() else {
-            return Planned::SameWindow { commit_s: self.window.duration_s() };
+            return Planned::SameWindow {
+                commit_s: self.window.duration_s(),
+            };
         };
         let window = &self.window;
         let period_s = self.bounds.context.fine_period_s;
@@ -149,16 +183,34 @@ impl<P: Planning> Windows for PathAhead<P> {
         let count = (ticks + 1.0).max(0.0) as usize;
         let history = [0, 1, 2].map(|n| window.samples[count + n]);
         let first_tick_s = window.first_tick_s + count as f64 * period_s - now_s;
-        let start = Start { state: window.at(now_s), history, first_tick_s };
+        let start = Start {
+            state: window.at(now_s),
+            history,
+            first_tick_s,
+        };
         let (end_mm, closed) = self.queue.run_end(finished);
         let before = Some((&self.window, now_s));
-        let driven = Driven { segments: &self.recent, at: self.at };
-        let job = Job { route: &route, bounds: &self.bounds, start, driven, end_mm, before };
+        let driven = Driven {
+            segments: &self.recent,
+            at: self.at,
+        };
+        let job = Job {
+            route: &route,
+            bounds: &self.bounds,
+            start,
+            driven,
+            end_mm,
+            before,
+        };
         if self.planning.plan(&job, &mut self.next) {
             std::mem::swap(&mut self.window, &mut self.next);
-            Planned::NextWindow { commit_s: self.commit_s(closed) }
+            Planned::NextWindow {
+                commit_s: self.commit_s(closed),
+            }
         } else {
-            Planned::SameWindow { commit_s: self.window.motion.later_s(&self.window.times, now_s) }
+            Planned::SameWindow {
+                commit_s: self.window.motion.later_s(&self.window.times, now_s),
+            }
         }
     }
 
@@ -175,15 +227,22 @@ impl<P: Planning> Windows for PathAhead<P> {
         sink: &mut dyn SegmentSink,
     ) -> Emitted {
         let Some(route) = self.queue.route() else {
-            return Emitted { until_s: self.window.duration_s(), duration_s: 0.0 };
+            return Emitted {
+                until_s: self.window.duration_s(),
+                duration_s: 0.0,
+            };
         };
         let leg = route.front();
         if !blocks.is_reported(&leg.block) {
             blocks.begin(&leg.block, &self.block_report(leg, from_s), sink);
         }
         let mut segment = blocks.blank;
-        let pen = Pen { from_s, at: &self.at };
-        let Drawn { until_s, leg_over } = draw(&route, &self.bounds, &self.window, &pen, &mut segment);
+        let pen = Pen {
+            from_s,
+            at: &self.at,
+        };
+        let Drawn { until_s, leg_over } =
+            draw(&route, &self.bounds, &self.window, &pen, &mut segment);
         if segment.duration_s > 0.0 {
             self.remember(&segment);
         }
@@ -195,14 +254,21 @@ impl<P: Planning> Windows for PathAhead<P> {
             sink.segment(&self.by_program(&segment));
             blocks.has_begun();
         }
-        Emitted { until_s, duration_s: segment.duration_s }
+        Emitted {
+            until_s,
+            duration_s: segment.duration_s,
+        }
     }
 
     /// Rest where the window ends: exactly at the end of the block, where that is there.
     fn rest(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
         let end_mm = self.window.motion.end_mm();
         // The last segment may have gone over more legs than one, where those before the last take next to no time.
-        while let Some(leg) = self.queue.front().filter(|leg| leg.end_mm <= end_mm + leg.same_mm()) {
+        while let Some(leg) = self
+            .queue
+            .front()
+            .filter(|leg| leg.end_mm <= end_mm + leg.same_mm())
+        {
             if !blocks.is_reported(&leg.block) {
                 blocks.report(&self.block_report(leg, self.window.duration_s()), sink);
             }
@@ -215,7 +281,12 @@ impl<P: Planning> Windows for PathAhead<P> {
             self.position = route.at(end_mm, &mut Cursor::default()).0.position;
             self.at_mm = end_mm;
         }
-        blocks.rest(blocks.present(), &self.position, self.at_mm + self.from_mm, sink);
+        blocks.rest(
+            blocks.present(),
+            &self.position,
+            self.at_mm + self.from_mm,
+            sink,
+        );
     }
 }
 
@@ -236,9 +307,14 @@ impl<P: Planning> PathAhead<P> {
         if window.whole && (closed || whole_s < SHORT_S) {
             return whole_s;
         }
-        let stop_s = self.queue.route().map_or(0.0, |route| stop_s(&route, window.most_mm_per_s));
+        let stop_s = self
+            .queue
+            .route()
+            .map_or(0.0, |route| stop_s(&route, window.most_mm_per_s));
         let latest_s = whole_s - STOPS * stop_s;
-        window.motion.commit_s(&window.times, latest_s.max(0.5 * whole_s))
+        window
+            .motion
+            .commit_s(&window.times, latest_s.max(0.5 * whole_s))
     }
 
     /// A segment by the path coordinate of the program.
@@ -252,16 +328,28 @@ impl<P: Planning> PathAhead<P> {
     fn remember(&mut self, segment: &Segment) {
         self.at = segment.position(segment.duration_s);
         self.recent.push_back(*segment);
-        let mut behind_s: f64 = self.recent.iter().skip(1).map(|recent| recent.duration_s).sum();
+        let mut behind_s: f64 = self
+            .recent
+            .iter()
+            .skip(1)
+            .map(|recent| recent.duration_s)
+            .sum();
         while behind_s >= 3.0 * self.bounds.context.fine_period_s {
             self.recent.pop_front();
-            behind_s -= self.recent.front().map_or(f64::INFINITY, |first| first.duration_s);
+            behind_s -= self
+                .recent
+                .front()
+                .map_or(f64::INFINITY, |first| first.duration_s);
         }
     }
 
     fn leg_over(&mut self, segment: &mut Segment) {
         if let Some(Item::Leg(leg)) = self.queue.items.pop_front() {
-            self.position = if leg.ends { *leg.course.end() } else { segment.position(segment.duration_s) };
+            self.position = if leg.ends {
+                *leg.course.end()
+            } else {
+                segment.position(segment.duration_s)
+            };
             self.at_mm = leg.end_mm;
             if leg.ends {
                 segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
@@ -271,7 +359,9 @@ impl<P: Planning> PathAhead<P> {
 
     /// What the window leaves for a stop there.
     fn declare(&self, (from_s, until_s): (f64, f64), segment: &mut Segment) {
-        let reserve = self.window.reserve((from_s, until_s), self.bounds.context.fine_period_s);
+        let reserve = self
+            .window
+            .reserve((from_s, until_s), self.bounds.context.fine_period_s);
         let a = reserve.stop_mm_per_s2;
         let j = STOP_JERK * reserve.stop_mm_per_s3;
         let speeds = [from_s, until_s].map(|t_s| self.window.at(t_s).speed_mm_per_s);
@@ -289,8 +379,16 @@ impl<P: Planning> PathAhead<P> {
         let whole_s = window.duration_s();
         let state = window.at(from_s);
         let last = window.at(whole_s);
-        let until_s = if last.s_mm > end_mm + 1e-9 { window.time_at(end_mm, (from_s, whole_s)) } else { whole_s };
-        let speeds = window.times.iter().filter(|t| **t >= from_s && **t <= until_s).map(|t| window.at(*t));
+        let until_s = if last.s_mm > end_mm + 1e-9 {
+            window.time_at(end_mm, (from_s, whole_s))
+        } else {
+            whole_s
+        };
+        let speeds = window
+            .times
+            .iter()
+            .filter(|t| **t >= from_s && **t <= until_s)
+            .map(|t| window.at(*t));
         let peak = speeds.fold(state.speed_mm_per_s, |most, at| most.max(at.speed_mm_per_s));
         let end = window.at(until_s);
         let beyond_mm = (end_mm - end.s_mm).max(0.0);
@@ -300,12 +398,21 @@ impl<P: Planning> PathAhead<P> {
             Some(LimitedBy::Feed) => limited_by_feed(&leg.block),
             bound => bound.unwrap_or(LimitedBy::Jerk),
         };
-        report(leg.block.index, limited_by, [state.speed_mm_per_s, peak, end.speed_mm_per_s], time_s)
+        report(
+            leg.block.index,
+            limited_by,
+            [state.speed_mm_per_s, peak, end.speed_mm_per_s],
+            time_s,
+        )
     }
 }
 
 impl Leg {
     fn block_length_mm(&self) -> f64 {
-        self.course.stretches().iter().map(|stretch| stretch.length_mm).sum()
+        self.course
+            .stretches()
+            .iter()
+            .map(|stretch| stretch.length_mm)
+            .sum()
     }
 }

@@ -46,12 +46,19 @@ impl Queue {
                 ends: stretch + 1 == count,
                 joined: false,
                 feed_mm_per_s,
-                least: Least::on(&course, stretch, bounds, block.kind == BlockKind::Rapid, feed_mm_per_s),
+                least: Least::on(
+                    &course,
+                    stretch,
+                    bounds,
+                    block.kind == BlockKind::Rapid,
+                    feed_mm_per_s,
+                ),
             };
             self.end_mm = leg.end_mm;
             if let Some(Item::Leg(before)) = self.items.back_mut() {
                 let turns = before.course.stretches()[before.stretch].turns;
-                let rests = turns || leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
+                let rests =
+                    turns || leg.begins && (before.block.ends_at_rest() || block.starts_at_rest());
                 before.joined = !rests && before.runs_into(&leg, bounds);
             }
             self.items.push_back(Item::Leg(leg));
@@ -61,7 +68,9 @@ impl Queue {
     /// Moves the path coordinates so that the leg at the front begins at zero, and sums them up anew; gives by how much. Does
     /// not allocate.
     pub fn begin_at_zero(&mut self) -> f64 {
-        let Some(behind_mm) = self.front().map(|leg| leg.start_mm) else { return 0.0 };
+        let Some(behind_mm) = self.front().map(|leg| leg.start_mm) else {
+            return 0.0;
+        };
         self.end_mm = 0.0;
         for item in &mut self.items {
             if let Item::Leg(leg) = item {

@@ -39,13 +39,21 @@ pub struct Route<'a> {
 impl<'a> Route<'a> {
     /// Of `items`, which begin with the leg `front`.
     pub fn new(front: &'a Leg, items: &'a VecDeque<Item>) -> Self {
-        Self { front, first: 0, items }
+        Self {
+            front,
+            first: 0,
+            items,
+        }
     }
 
     /// The path from the next leg on; none where no leg follows.
     pub fn behind_front(&self) -> Option<Self> {
         let front = self.leg(1)?;
-        Some(Self { front, first: self.first + 1, items: self.items })
+        Some(Self {
+            front,
+            first: self.first + 1,
+            items: self.items,
+        })
     }
 
     /// The leg at the front.
@@ -86,8 +94,16 @@ impl<'a> Route<'a> {
             } else {
                 return leg;
             };
-            let Some(next) = self.leg(way) else { return leg };
-            (leg, *cursor) = (next, Cursor { leg: way, place: Place::default() });
+            let Some(next) = self.leg(way) else {
+                return leg;
+            };
+            (leg, *cursor) = (
+                next,
+                Cursor {
+                    leg: way,
+                    place: Place::default(),
+                },
+            );
         }
     }
 
@@ -111,8 +127,16 @@ impl<'a> Route<'a> {
             return at;
         }
         let beside = self.sides(s_mm, cursor)[side as usize];
-        let direction = if joint { beside.direction } else { at.direction };
-        AlongPath { position: at.position, direction, ..beside }
+        let direction = if joint {
+            beside.direction
+        } else {
+            at.direction
+        };
+        AlongPath {
+            position: at.position,
+            direction,
+            ..beside
+        }
     }
 
     /// How far the path goes on from `s_mm` without a feature of its own, mm.
@@ -122,7 +146,11 @@ impl<'a> Route<'a> {
     }
 
     /// The first knot behind one path coordinate and before another, mm, and the path on both sides of it.
-    pub fn knot(&self, [from_mm, to_mm]: [f64; 2], cursor: &mut Cursor) -> Option<(f64, [AlongPath; 2])> {
+    pub fn knot(
+        &self,
+        [from_mm, to_mm]: [f64; 2],
+        cursor: &mut Cursor,
+    ) -> Option<(f64, [AlongPath; 2])> {
         let leg = self.find(from_mm, cursor);
         let break_mm = if from_mm < leg.end_mm - leg.near_mm() {
             leg.next_break_mm(from_mm + leg.near_mm())
@@ -142,10 +170,18 @@ impl<'a> Route<'a> {
         let at_end = break_mm > leg.end_mm - leg.near_mm();
         let at_start = !at_end && break_mm < leg.start_mm + leg.near_mm();
         match (before.filter(|_| at_start), behind.filter(|_| at_end)) {
-            (_, Some(next)) => [near(leg, leg.end_mm - leg.beside_mm()), near(next, next.start_mm + next.beside_mm())],
-            (Some(last), _) => [near(last, last.end_mm - last.beside_mm()), near(leg, leg.start_mm + leg.beside_mm())],
+            (_, Some(next)) => [
+                near(leg, leg.end_mm - leg.beside_mm()),
+                near(next, next.start_mm + next.beside_mm()),
+            ],
+            (Some(last), _) => [
+                near(last, last.end_mm - last.beside_mm()),
+                near(leg, leg.start_mm + leg.beside_mm()),
+            ],
             // At an end where none joins, both are the end itself.
-            _ => [-1.0, 1.0].map(|sign| leg.at(break_mm + sign * leg.beside_mm(), &mut cursor.place)),
+            _ => {
+                [-1.0, 1.0].map(|sign| leg.at(break_mm + sign * leg.beside_mm(), &mut cursor.place))
+            }
         }
     }
 
@@ -155,17 +191,37 @@ impl<'a> Route<'a> {
         let leg = self.find(s_mm, cursor);
         let past_mm = 2.0 * leg.beside_mm();
         let starts = s_mm < leg.start_mm + past_mm && cursor.leg > 0;
-        let break_mm = if starts { leg.start_mm } else { leg.next_break_mm(s_mm - past_mm) };
+        let break_mm = if starts {
+            leg.start_mm
+        } else {
+            leg.next_break_mm(s_mm - past_mm)
+        };
         if break_mm >= s_mm + past_mm {
             return (f64::INFINITY, break_mm - s_mm);
         }
         let ends = break_mm >= leg.end_mm;
-        let next = if ends { self.leg(cursor.leg + 1).filter(|_| leg.joined) } else { Some(leg) };
-        let next_mm = next.map_or(f64::INFINITY, |leg| leg.next_break_mm(s_mm.max(break_mm) + leg.beside_mm()));
+        let next = if ends {
+            self.leg(cursor.leg + 1).filter(|_| leg.joined)
+        } else {
+            Some(leg)
+        };
+        let next_mm = next.map_or(f64::INFINITY, |leg| {
+            leg.next_break_mm(s_mm.max(break_mm) + leg.beside_mm())
+        });
         // Where legs join, the place has the lower of their speeds, whichever of them it is counted to.
-        let beside = if starts { self.leg(cursor.leg - 1) } else { next.filter(|_| ends) };
+        let beside = if starts {
+            self.leg(cursor.leg - 1)
+        } else {
+            next.filter(|_| ends)
+        };
         let cap = |leg: &Leg| leg.cap_mm_per_s(&leg.at(break_mm, &mut Place::default()), bounds);
         let cap = beside.map_or(f64::INFINITY, cap);
-        (cap.min(Leg::step_cap_mm_per_s(&self.sides(break_mm, cursor), bounds)), next_mm - s_mm)
+        (
+            cap.min(Leg::step_cap_mm_per_s(
+                &self.sides(break_mm, cursor),
+                bounds,
+            )),
+            next_mm - s_mm,
+        )
     }
 }

@@ -50,7 +50,12 @@ impl Slowdowns {
 
     /// Factors at `s_mm` of the speed caps and of the jerk limits.
     pub fn at(&self, s_mm: f64) -> [f64; 2] {
-        let here = self.0.iter().filter(|part| part.from_mm <= s_mm && s_mm <= part.to_mm);
-        here.fold([1.0; 2], |[speed, jerk], part| [speed * part.speed, jerk * part.jerk])
+        let here = self
+            .0
+            .iter()
+            .filter(|part| part.from_mm <= s_mm && s_mm <= part.to_mm);
+        here.fold([1.0; 2], |[speed, jerk], part| {
+            [speed * part.speed, jerk * part.jerk]
+        })
     }
 }

@@ -77,7 +77,10 @@ impl Trail {
             let [v, a, j] = rates(c);
             reached[lane] = [
                 largest(&bernstein(&v, h), top_mm_per_s(limits, rapid)),
-                largest(&bernstein(&[a[0], a[1], a[2], a[3]], h), limits.acceleration_mm_per_s2),
+                largest(
+                    &bernstein(&[a[0], a[1], a[2], a[3]], h),
+                    limits.acceleration_mm_per_s2,
+                ),
                 largest(&bernstein(&[j[0], j[1], j[2]], h), limits.jerk_mm_per_s3),
             ];
             if let Some(before) = self.spans.back() {
@@ -88,9 +91,23 @@ impl Trail {
         }
         let coefficients = segment.coefficients;
         let path = segment.path;
-        self.spans.push_back(Span { duration_s: segment.duration_s, coefficients, path, reached, steps, rapid, rests });
+        self.spans.push_back(Span {
+            duration_s: segment.duration_s,
+            coefficients,
+            path,
+            reached,
+            steps,
+            rapid,
+            rests,
+        });
         let most_s = PERIODS as f64 * bounds.context.fine_period_s;
-        let mut behind_s: f64 = self.spans.iter().rev().skip(1).map(|span| span.duration_s).sum();
+        let mut behind_s: f64 = self
+            .spans
+            .iter()
+            .rev()
+            .skip(1)
+            .map(|span| span.duration_s)
+            .sum();
         while let Some(first) = self.spans.front()
             && behind_s - first.duration_s >= most_s
         {
@@ -101,17 +118,30 @@ impl Trail {
 
     /// Every difference of samples that ends in the last segment, and velocity and acceleration at every point of it.
     pub fn judge(&self, bounds: &Bounds) -> Found {
-        let Some(head) = self.spans.back() else { return Found::default() };
+        let Some(head) = self.spans.back() else {
+            return Found::default();
+        };
         let period_s = bounds.context.fine_period_s;
-        let mut found = Found { from_mm: f64::INFINITY, to_mm: f64::NEG_INFINITY, ..Found::default() };
+        let mut found = Found {
+            from_mm: f64::INFINITY,
+            to_mm: f64::NEG_INFINITY,
+            ..Found::default()
+        };
         for (lane, limits) in bounds.context.limits.axes().iter().enumerate() {
             let around = self.around(lane, period_s);
             let tops = around.kinds.map(|there| f64::from(u8::from(there)));
             let top = (tops[0] * limits.feed_mm_per_s).max(tops[1] * limits.rapid_mm_per_s);
             let limit = [top, limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3];
             let steps = around.show(period_s);
-            let here = [head.reached[lane][0] / top_mm_per_s(limits, head.rapid), head.reached[lane][1] / limit[1]];
-            found.take(here, [head.path[0], polynomial(&head.path, head.duration_s)], false);
+            let here = [
+                head.reached[lane][0] / top_mm_per_s(limits, head.rapid),
+                head.reached[lane][1] / limit[1],
+            ];
+            found.take(
+                here,
+                [head.path[0], polynomial(&head.path, head.duration_s)],
+                false,
+            );
             for order in 1..=PERIODS {
                 let bound = around.reached[order - 1] + steps[order - 1];
                 let noise = noise(&head.coefficients[lane], order, period_s);
@@ -120,13 +150,23 @@ impl Trail {
                 }
                 // Without them it would be kept.
                 let stepped = around.reached[order - 1] <= limit[order - 1] * (1.0 + ROUNDING);
-                self.walk((lane, order), limit[order - 1], noise, stepped, period_s, &mut found);
+                self.walk(
+                    (lane, order),
+                    limit[order - 1],
+                    noise,
+                    stepped,
+                    period_s,
+                    &mut found,
+                );
                 let at_rest = bound / limit[order - 1];
                 if order == PERIODS && around.rests && at_rest > AT_REST {
                     found.take_order(
                         order,
                         at_rest,
-                        [self.back_mm(period_s), polynomial(&head.path, head.duration_s)],
+                        [
+                            self.back_mm(period_s),
+                            polynomial(&head.path, head.duration_s),
+                        ],
                         stepped,
                     );
                 }
@@ -189,8 +229,11 @@ impl Trail {
         period_s: f64,
         found: &mut Found,
     ) {
-        const WEIGHTS: [[f64; PERIODS + 1]; PERIODS] =
-            [[1.0, -1.0, 0.0, 0.0], [1.0, -2.0, 1.0, 0.0], [1.0, -3.0, 3.0, -1.0]];
+        const WEIGHTS: [[f64; PERIODS + 1]; PERIODS] = [
+            [1.0, -1.0, 0.0, 0.0],
+            [1.0, -2.0, 1.0, 0.0],
+            [1.0, -3.0, 3.0, -1.0],
+        ];
         let last = self.spans.len() - 1;
         let head = &self.spans[last];
         let mut places: [(usize, f64); PERIODS + 1] =
@@ -200,7 +243,11 @@ impl Trail {
         while done_s < head.duration_s {
             // To the next place where one of the samples comes to the end of its segment.
             let left = |(n, t_s): &(usize, f64)| self.spans[*n].duration_s - t_s;
-            let step_s = places[..=order].iter().map(left).fold(head.duration_s - done_s, f64::min).max(0.0);
+            let step_s = places[..=order]
+                .iter()
+                .map(left)
+                .fold(head.duration_s - done_s, f64::min)
+                .max(0.0);
             let base = head.coefficients[lane][0];
             let mut sum = [0.0; 6];
             for ((n, t_s), weight) in places.iter().zip(WEIGHTS[order - 1]).take(order + 1) {
@@ -213,7 +260,12 @@ impl Trail {
             if most > allowed {
                 let from_mm = polynomial(&self.spans[places[order].0].path, places[order].1);
                 let to_mm = polynomial(&head.path, done_s + step_s);
-                found.take_order(order, most / (limit * power(period_s, order)), [from_mm, to_mm], stepped);
+                found.take_order(
+                    order,
+                    most / (limit * power(period_s, order)),
+                    [from_mm, to_mm],
+                    stepped,
+                );
             }
             done_s += step_s;
             let mut moved = false;
@@ -247,7 +299,11 @@ impl Around {
     /// What its steps show in differences of order 1, 2 and 3 at most.
     fn show(&self, period_s: f64) -> [f64; PERIODS] {
         let ([p, v, a], per) = (self.steps, 1.0 / period_s);
-        [p * per, (p * per + v) * per, ((WORST[0] * p * per + WORST[1] * v) * per + WORST[2] * a) * per]
+        [
+            p * per,
+            (p * per + v) * per,
+            ((WORST[0] * p * per + WORST[1] * v) * per + WORST[2] * a) * per,
+        ]
     }
 }
 
@@ -275,7 +331,11 @@ impl Found {
 }
 
 fn top_mm_per_s(limits: &tandem_sdk::AxisLimits, rapid: bool) -> f64 {
-    if rapid { limits.rapid_mm_per_s } else { limits.feed_mm_per_s }
+    if rapid {
+        limits.rapid_mm_per_s
+    } else {
+        limits.feed_mm_per_s
+    }
 }
 
 /// What rounding of positions makes of a difference of `order`.

@@ -67,10 +67,16 @@ impl<M: Motion> Window<M> {
     pub fn reserve(&self, (from_s, to_s): (f64, f64), period_s: f64) -> Reserve {
         let tick = |t_s: f64| (t_s - self.first_tick_s) / period_s;
         let last = self.reserves.len().saturating_sub(1);
-        let [from, to] = [tick(from_s).floor().max(0.0) as usize, tick(to_s).ceil().max(0.0) as usize];
+        let [from, to] = [
+            tick(from_s).floor().max(0.0) as usize,
+            tick(to_s).ceil().max(0.0) as usize,
+        ];
         let around = &self.reserves[from.min(last)..(to + 1).min(self.reserves.len())];
         let least = |of: fn(&Reserve) -> f64| around.iter().map(of).fold(f64::INFINITY, f64::min);
-        Reserve { stop_mm_per_s2: least(|at| at.stop_mm_per_s2), stop_mm_per_s3: least(|at| at.stop_mm_per_s3) }
+        Reserve {
+            stop_mm_per_s2: least(|at| at.stop_mm_per_s2),
+            stop_mm_per_s3: least(|at| at.stop_mm_per_s3),
+        }
     }
 
     /// What binds most of the ticks between two times; none where nothing does.
@@ -79,7 +85,10 @@ impl<M: Motion> Window<M> {
         let to = tick(to_s).min(self.bounds.len());
         let inside = &self.bounds[tick(from_s).min(to)..to];
         let count = |bound: &LimitedBy| inside.iter().filter(|each| **each == Some(*bound)).count();
-        let kinds = BINDS.iter().map(|(bound, _)| *bound).filter(|bound| count(bound) > 0);
+        let kinds = BINDS
+            .iter()
+            .map(|(bound, _)| *bound)
+            .filter(|bound| count(bound) > 0);
         kinds.max_by_key(count)
     }
 
@@ -108,7 +117,11 @@ impl<M: Motion> Window<M> {
         let mut high = to_s;
         for _ in 0..50 {
             let middle = f64::midpoint(low, high);
-            if self.at(middle).s_mm < s_mm { low = middle } else { high = middle }
+            if self.at(middle).s_mm < s_mm {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         high
     }

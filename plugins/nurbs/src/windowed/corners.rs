@@ -40,14 +40,27 @@ pub struct Survey {
 impl Survey {
     /// Looks at the path from `start` to `end_mm`, or as far as it takes about `window_s`; the last corner is a rest.
     /// Gives whether it goes to the end.
-    pub fn make(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {
+    pub fn make(
+        &mut self,
+        start: Corner,
+        end_mm: f64,
+        window_s: f64,
+        look: &mut dyn FnMut(f64) -> Spot,
+    ) -> bool {
         let whole = self.look_around(start, end_mm, window_s, look);
-        self.feed_mm_per_s = self.places.iter().map(|place| place.speed_mm_per_s).fold(0.0, f64::max);
+        self.feed_mm_per_s = self
+            .places
+            .iter()
+            .map(|place| place.speed_mm_per_s)
+            .fold(0.0, f64::max);
         self.corners.clear();
         self.corners.push(start);
         self.find(look);
         if let Some(last) = self.places.last() {
-            self.corners.push(Corner { speed_mm_per_s: 0.0, ..*last });
+            self.corners.push(Corner {
+                speed_mm_per_s: 0.0,
+                ..*last
+            });
         }
         whole
     }
@@ -66,22 +79,38 @@ impl Survey {
         let start = self.corners.first().copied();
         let everywhere = ([f64::NEG_INFINITY, f64::INFINITY], share);
         for ([from_mm, to_mm], share) in std::iter::once(everywhere).chain(parts) {
-            let first = self.corners.partition_point(|corner| corner.at_mm < from_mm);
-            let inside = self.corners[first..].iter_mut().take_while(|corner| corner.at_mm <= to_mm);
+            let first = self
+                .corners
+                .partition_point(|corner| corner.at_mm < from_mm);
+            let inside = self.corners[first..]
+                .iter_mut()
+                .take_while(|corner| corner.at_mm <= to_mm);
             inside.for_each(|corner| corner.speed_mm_per_s *= share);
             // The part may be shorter than the way from one place to the next: those around it count too.
             let first = self.places.partition_point(|place| place.at_mm < from_mm);
             let behind = self.places.partition_point(|place| place.at_mm <= to_mm);
             let around = first.saturating_sub(1)..(behind + 1).min(self.places.len());
-            self.places[around].iter_mut().for_each(|place| place.speed_mm_per_s *= share);
+            self.places[around]
+                .iter_mut()
+                .for_each(|place| place.speed_mm_per_s *= share);
         }
         if let (Some(first), Some(start)) = (self.corners.first_mut(), start) {
             *first = start;
         }
-        self.feed_mm_per_s = self.places.iter().map(|place| place.speed_mm_per_s).fold(0.0, f64::max);
+        self.feed_mm_per_s = self
+            .places
+            .iter()
+            .map(|place| place.speed_mm_per_s)
+            .fold(0.0, f64::max);
     }
 
-    fn look_around(&mut self, start: Corner, end_mm: f64, window_s: f64, look: &mut dyn FnMut(f64) -> Spot) -> bool {
+    fn look_around(
+        &mut self,
+        start: Corner,
+        end_mm: f64,
+        window_s: f64,
+        look: &mut dyn FnMut(f64) -> Spot,
+    ) -> bool {
         self.places.clear();
         self.tangential = None;
         let mut at_mm = start.at_mm;
@@ -89,8 +118,14 @@ impl Survey {
         let mut speed = start.speed_mm_per_s;
         loop {
             let spot = look(at_mm);
-            self.places.push(Corner { at_mm, speed_mm_per_s: spot.speed_mm_per_s });
-            self.tangential = Some(self.tangential.map_or(spot.tangential, |least| least.min(&spot.tangential)));
+            self.places.push(Corner {
+                at_mm,
+                speed_mm_per_s: spot.speed_mm_per_s,
+            });
+            self.tangential = Some(
+                self.tangential
+                    .map_or(spot.tangential, |least| least.min(&spot.tangential)),
+            );
             let ahead_mm = end_mm - at_mm;
             if ahead_mm <= 0.0 {
                 return true;
@@ -100,14 +135,23 @@ impl Survey {
             }
             // No sliver before the end or a knot.
             let near_mm = ahead_mm.min(spot.knot_mm);
-            let step_mm = if near_mm < 1.5 * spot.step_mm { near_mm } else { spot.step_mm };
-            let faster = (speed * speed + 2.0 * spot.tangential.acceleration_mm_per_s2 * step_mm).sqrt();
+            let step_mm = if near_mm < 1.5 * spot.step_mm {
+                near_mm
+            } else {
+                spot.step_mm
+            };
+            let faster =
+                (speed * speed + 2.0 * spot.tangential.acceleration_mm_per_s2 * step_mm).sqrt();
             let next = faster.min(spot.speed_mm_per_s);
             // Beside a cusp both are next to nothing, though the way is driven in the time from rest to rest.
             let rests_s = 4.0 * (step_mm / (2.0 * spot.tangential.jerk_mm_per_s3)).cbrt();
             time_s += rests_s.min(2.0 * step_mm / (speed + next));
             speed = next;
-            at_mm = if step_mm == ahead_mm { end_mm } else { at_mm + step_mm };
+            at_mm = if step_mm == ahead_mm {
+                end_mm
+            } else {
+                at_mm + step_mm
+            };
         }
     }
 
@@ -116,14 +160,27 @@ impl Survey {
         let mut i = 1;
         while i + 1 < self.places.len() {
             let speed = self.places[i].speed_mm_per_s;
-            let level = self.places[i..].iter().take_while(|c| c.speed_mm_per_s == speed).count();
+            let level = self.places[i..]
+                .iter()
+                .take_while(|c| c.speed_mm_per_s == speed)
+                .count();
             let after = self.places.get(i + level).map_or(0.0, |c| c.speed_mm_per_s);
-            if speed < self.feed_mm_per_s && self.places[i - 1].speed_mm_per_s > speed && after > speed {
+            if speed < self.feed_mm_per_s
+                && self.places[i - 1].speed_mm_per_s > speed
+                && after > speed
+            {
                 let between = (self.places[i - 1].at_mm, self.places[i + level].at_mm);
-                let corner = lowest(between, self.sections, &mut |at_mm| look(at_mm).speed_mm_per_s);
+                let corner = lowest(between, self.sections, &mut |at_mm| {
+                    look(at_mm).speed_mm_per_s
+                });
                 // At a knot the speed may be lower than anywhere beside it.
                 let place = self.places[i];
-                self.corners.push(if place.speed_mm_per_s < corner.speed_mm_per_s { place } else { corner });
+                self.corners
+                    .push(if place.speed_mm_per_s < corner.speed_mm_per_s {
+                        place
+                    } else {
+                        corner
+                    });
             }
             i += level;
         }
@@ -131,7 +188,11 @@ impl Survey {
 }
 
 /// The lowest place between two others, by golden section.
-fn lowest((mut from, mut to): (f64, f64), sections: usize, speed: &mut dyn FnMut(f64) -> f64) -> Corner {
+fn lowest(
+    (mut from, mut to): (f64, f64),
+    sections: usize,
+    speed: &mut dyn FnMut(f64) -> f64,
+) -> Corner {
     let share = 0.5 * (5.0f64.sqrt() - 1.0);
     let mut inner = [to - share * (to - from), from + share * (to - from)];
     let mut speeds = inner.map(&mut *speed);
@@ -151,7 +212,10 @@ fn lowest((mut from, mut to): (f64, f64), sections: usize, speed: &mut dyn FnMut
         }
     }
     let n = usize::from(speeds[1] < speeds[0]);
-    Corner { at_mm: inner[n], speed_mm_per_s: speeds[n] }
+    Corner {
+        at_mm: inner[n],
+        speed_mm_per_s: speeds[n],
+    }
 }
 
 /// The limit between the places of a survey, straight from one to the next.
@@ -174,7 +238,11 @@ impl<'a> Limit<'a> {
             self.at += 1;
         }
         if self.places[self.at].at_mm > at_mm {
-            self.at = self.places.partition_point(|place| place.at_mm <= at_mm).max(1) - 1;
+            self.at = self
+                .places
+                .partition_point(|place| place.at_mm <= at_mm)
+                .max(1)
+                - 1;
         }
         let [a, b] = [self.places[self.at], self.places[self.at + 1]];
         let share = ((at_mm - a.at_mm) / (b.at_mm - a.at_mm)).clamp(0.0, 1.0);
@@ -185,7 +253,9 @@ impl<'a> Limit<'a> {
 impl Tangential {
     fn min(&self, other: &Self) -> Self {
         Self {
-            acceleration_mm_per_s2: self.acceleration_mm_per_s2.min(other.acceleration_mm_per_s2),
+            acceleration_mm_per_s2: self
+                .acceleration_mm_per_s2
+                .min(other.acceleration_mm_per_s2),
             jerk_mm_per_s3: self.jerk_mm_per_s3.min(other.jerk_mm_per_s3),
         }
     }

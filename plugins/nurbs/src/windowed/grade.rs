@@ -23,7 +23,10 @@ pub struct Grade {
 impl Grade {
     /// The same everywhere.
     pub fn even(least: Tangential) -> Self {
-        Self { least, eased: Vec::new() }
+        Self {
+            least,
+            eased: Vec::new(),
+        }
     }
 
     /// Forgets where there is less.
@@ -36,14 +39,21 @@ impl Grade {
         let [end_mm, end, ..] = ramp.at(ramp.duration_s);
         let rises = end > ramp.speed[0];
         let before = self.share([ramp.start_mm, end_mm], rises);
-        self.eased.push(Eased { ends_mm: [ramp.start_mm, end_mm], rises, jerk: before * jerk });
+        self.eased.push(Eased {
+            ends_mm: [ramp.start_mm, end_mm],
+            rises,
+            jerk: before * jerk,
+        });
     }
 
     /// For ramps between two path coordinates: up and down.
     pub fn between(&self, ends_mm: [f64; 2]) -> [Tangential; 2] {
         [true, false].map(|rises| {
             let jerk_mm_per_s3 = self.share(ends_mm, rises) * self.least.jerk_mm_per_s3;
-            Tangential { jerk_mm_per_s3, ..self.least }
+            Tangential {
+                jerk_mm_per_s3,
+                ..self.least
+            }
         })
     }
 
@@ -52,8 +62,12 @@ impl Grade {
         let touch_mm = 1e-3 * (to_mm - from_mm);
         let here = |eased: &&Eased| {
             let overlap_mm = to_mm.min(eased.ends_mm[1]) - from_mm.max(eased.ends_mm[0]);
-            eased.rises == rises && overlap_mm > touch_mm.min(1e-3 * (eased.ends_mm[1] - eased.ends_mm[0]))
+            eased.rises == rises
+                && overlap_mm > touch_mm.min(1e-3 * (eased.ends_mm[1] - eased.ends_mm[0]))
         };
-        self.eased.iter().filter(here).fold(1.0, |least, eased| least.min(eased.jerk))
+        self.eased
+            .iter()
+            .filter(here)
+            .fold(1.0, |least, eased| least.min(eased.jerk))
     }
 }

@@ -14,11 +14,17 @@ impl Motion for Ramps {
     fn at(&self, k: usize, t_s: f64) -> State {
         let [s_mm, speed_mm_per_s, acceleration_mm_per_s2, _] = self.0[k].at(t_s);
         // Below zero it is the rounding of a ramp to rest.
-        State { s_mm, speed_mm_per_s: speed_mm_per_s.max(0.0), acceleration_mm_per_s2 }
+        State {
+            s_mm,
+            speed_mm_per_s: speed_mm_per_s.max(0.0),
+            acceleration_mm_per_s2,
+        }
     }
 
     fn end_mm(&self) -> f64 {
-        self.0.last().map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0])
+        self.0
+            .last()
+            .map_or(0.0, |ramp| ramp.at(ramp.duration_s)[0])
     }
 
     /// At the latest time where the speed is level there, else at the last border before, where there is no
@@ -36,6 +42,10 @@ impl Motion for Ramps {
 
     /// A later border.
     fn later_s(&self, times: &[f64], now_s: f64) -> f64 {
-        times.iter().copied().find(|t| *t > now_s + LATER_S).unwrap_or(times[times.len() - 1])
+        times
+            .iter()
+            .copied()
+            .find(|t| *t > now_s + LATER_S)
+            .unwrap_or(times[times.len() - 1])
     }
 }

@@ -24,7 +24,11 @@ const EVERYWHERE: usize = 2;
 const TRIES: [usize; 2] = [12, 30];
 
 /// As published.
-pub const CARE: Care = Care { look_s: 0.2e-3, over: 1e-4, rounds: 40 };
+pub const CARE: Care = Care {
+    look_s: 0.2e-3,
+    over: 1e-4,
+    rounds: 40,
+};
 
 /// Samples of a window at most: slower than that is no motion.
 const MAX_SAMPLES: f64 = 4e5;
@@ -55,7 +59,10 @@ impl Planning for Windowed {
 
     fn plan(&mut self, job: &Job<Ramps>, window: &mut Window<Ramps>) -> bool {
         let rests = job.rests();
-        let mut slower = Slower { speed: 1.0, jerk: SHARE };
+        let mut slower = Slower {
+            speed: 1.0,
+            jerk: SHARE,
+        };
         self.slowdowns.keep_first(0);
         self.look_around(job, window);
         self.grade.iter_mut().for_each(Grade::level);
@@ -79,7 +86,11 @@ impl Planning for Windowed {
             } else if over > 1.0 {
                 slower.jerk *= (0.995 / over).max(0.8);
             }
-            slower.speed *= if rests && !worst.is_kept() && n >= TRIES[0] { 0.7 } else { 1.0 };
+            slower.speed *= if rests && !worst.is_kept() && n >= TRIES[0] {
+                0.7
+            } else {
+                1.0
+            };
         }
         false
     }
@@ -88,13 +99,24 @@ impl Planning for Windowed {
 impl Windowed {
     /// The path of the window: no try changes what it allows.
     fn look_around(&mut self, job: &Job<Ramps>, window: &mut Window<Ramps>) {
-        let Job { route, bounds, start, end_mm, .. } = *job;
+        let Job {
+            route,
+            bounds,
+            start,
+            end_mm,
+            ..
+        } = *job;
         let mut cursor = Cursor::default();
         let speed = start.state.speed_mm_per_s;
-        let begin = Corner { at_mm: start.state.s_mm, speed_mm_per_s: speed };
+        let begin = Corner {
+            at_mm: start.state.s_mm,
+            speed_mm_per_s: speed,
+        };
         let mut look = |at_mm: f64| spot(route, bounds, at_mm, &mut cursor);
         self.survey.sections = SECTIONS;
-        window.whole = self.survey.make(begin, end_mm, window_s(route, speed), &mut look);
+        window.whole = self
+            .survey
+            .make(begin, end_mm, window_s(route, speed), &mut look);
         self.survey.keep();
     }
 
@@ -103,9 +125,13 @@ impl Windowed {
         let mut limit = Limit::new(&self.survey.places);
         for part in self.slowdowns.since(known).filter(|part| part.jerk < 1.0) {
             let middle_mm = f64::midpoint(part.from_mm, part.to_mm);
-            let driven = window.at(window.time_at(middle_mm, (0.0, window.duration_s()))).speed_mm_per_s;
+            let driven = window
+                .at(window.time_at(middle_mm, (0.0, window.duration_s())))
+                .speed_mm_per_s;
             // It may be slower there than the limit, which is what becomes lower.
-            part.speed = part.speed.min(part.jerk.cbrt() * (driven / limit.at(middle_mm)).min(1.0));
+            part.speed = part
+                .speed
+                .min(part.jerk.cbrt() * (driven / limit.at(middle_mm)).min(1.0));
         }
     }
 
@@ -113,14 +139,28 @@ impl Windowed {
     fn ease(&mut self, job: &Job<Ramps>, window: &Window<Ramps>) -> bool {
         let mut limit = Limit::new(&self.survey.places);
         let grade = self.grade.as_mut();
-        grade.is_some_and(|grade| ease(job, &window.motion.0, &mut limit, grade, &mut self.slowdowns))
+        grade.is_some_and(|grade| {
+            ease(
+                job,
+                &window.motion.0,
+                &mut limit,
+                grade,
+                &mut self.slowdowns,
+            )
+        })
     }
 
     /// False where the speed at the start is too high for what follows, or a speed so low that the window has no end.
     fn solve(&mut self, job: &Job<Ramps>, slower: &Slower, window: &mut Window<Ramps>) -> bool {
-        let parts = self.slowdowns.parts().iter().map(|part| ([part.from_mm, part.to_mm], part.speed));
+        let parts = self
+            .slowdowns
+            .parts()
+            .iter()
+            .map(|part| ([part.from_mm, part.to_mm], part.speed));
         self.survey.slow(slower.speed, parts);
-        let Some(least) = self.survey.tangential else { return false };
+        let Some(least) = self.survey.tangential else {
+            return false;
+        };
         let least = Tangential {
             acceleration_mm_per_s2: slower.jerk * least.acceleration_mm_per_s2,
             jerk_mm_per_s3: slower.jerk * least.jerk_mm_per_s3,
@@ -130,8 +170,18 @@ impl Windowed {
         let corners = &mut self.survey.corners;
         let mut limit = Limit::new(&self.survey.places);
         let ramps = &mut window.motion.0;
-        self.rounds.make(corners, self.survey.feed_mm_per_s, grade, &mut limit, &CARE, ramps);
-        lay_times(&mut window.times, window.motion.0.iter().map(|ramp| ramp.duration_s));
+        self.rounds.make(
+            corners,
+            self.survey.feed_mm_per_s,
+            grade,
+            &mut limit,
+            &CARE,
+            ramps,
+        );
+        lay_times(
+            &mut window.times,
+            window.motion.0.iter().map(|ramp| ramp.duration_s),
+        );
         let most_s = MAX_SAMPLES * job.bounds.context.fine_period_s;
         corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
             && window.times.len() > 1
@@ -144,9 +194,15 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
     let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
     let speed_mm_per_s = leg.cap_mm_per_s(&at, bounds).min(step_cap);
-    let step_mm = (0.03 / bend).min(route.smooth_for_mm(at_mm, cursor)).clamp(1e-7, 0.05);
+    let step_mm = (0.03 / bend)
+        .min(route.smooth_for_mm(at_mm, cursor))
+        .clamp(1e-7, 0.05);
     // Where a rotary axis turns much on little way, that takes long.
-    let most_mm = if leg.course.is_straight() { STEP_S * leg.cap_mm_per_s(&at, bounds) } else { f64::INFINITY };
+    let most_mm = if leg.course.is_straight() {
+        STEP_S * leg.cap_mm_per_s(&at, bounds)
+    } else {
+        f64::INFINITY
+    };
     Spot {
         speed_mm_per_s,
         tangential: Tangential {

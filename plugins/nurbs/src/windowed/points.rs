@@ -19,7 +19,13 @@ const TURNING: f64 = 0.6;
 
 /// Takes something back where the jerk of an axis exceeds its limit: of the jerk of the ramp, which turning adds to, or where
 /// turning takes the most of it of the speed, with whose third power it goes. Gives whether there was such a place.
-pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Grade, slowdowns: &mut Slowdowns) -> bool {
+pub fn ease(
+    job: &Job<Ramps>,
+    ramps: &[Ramp],
+    limit: &mut Limit,
+    grade: &mut Grade,
+    slowdowns: &mut Slowdowns,
+) -> bool {
     let known = slowdowns.count();
     let mut found = false;
     let step_s = PART * job.bounds.context.fine_period_s;
@@ -40,7 +46,15 @@ pub fn ease(job: &Job<Ramps>, ramps: &[Ramp], limit: &mut Limit, grade: &mut Gra
                 // A ramp may be slower there than the limit of the speed, which is what becomes lower.
                 let way_mm = step_s * v;
                 let speed = (AIM / worst).cbrt().max(0.8) * (v / limit.at(s_mm)).min(1.0);
-                slowdowns.add(known, Slowdown { from_mm: s_mm - way_mm, to_mm: s_mm + way_mm, speed, jerk: 1.0 });
+                slowdowns.add(
+                    known,
+                    Slowdown {
+                        from_mm: s_mm - way_mm,
+                        to_mm: s_mm + way_mm,
+                        speed,
+                        jerk: 1.0,
+                    },
+                );
             }
         });
         if left < 1.0 {
@@ -60,7 +74,11 @@ fn look(job: &Job<Ramps>, ramp: &Ramp, step_s: f64, mut of: impl FnMut(&AlongPat
         let state = ramp.at(t_s);
         while let Some((knot_mm, sides)) = job.route.knot([from_mm, state[0]], &mut cursor) {
             // Near enough: the path is known on both sides of the knot, and the ramp hardly changes on the way.
-            let late_s = if state[1] > 0.0 { (state[0] - knot_mm) / state[1] } else { 0.0 };
+            let late_s = if state[1] > 0.0 {
+                (state[0] - knot_mm) / state[1]
+            } else {
+                0.0
+            };
             let at_knot = ramp.at((t_s - late_s).max(0.0));
             for side in &sides {
                 of(side, at_knot);

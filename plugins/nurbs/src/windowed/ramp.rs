@@ -31,7 +31,9 @@ impl Tangential {
         if change == 0.0 {
             return 0.0;
         }
-        (1.5 * change / self.acceleration_mm_per_s2).max((6.0 * change / self.jerk_mm_per_s3).sqrt()).max(MIN_S)
+        (1.5 * change / self.acceleration_mm_per_s2)
+            .max((6.0 * change / self.jerk_mm_per_s3).sqrt())
+            .max(MIN_S)
     }
 
     /// Way of that change, mm: a cubic is symmetric, so the mean speed is that of its ends.
@@ -44,7 +46,9 @@ impl Tangential {
         if most_mm_per_s <= from_mm_per_s {
             return most_mm_per_s;
         }
-        highest((from_mm_per_s, most_mm_per_s), |speed| way_mm - self.way_mm(from_mm_per_s, speed))
+        highest((from_mm_per_s, most_mm_per_s), |speed| {
+            way_mm - self.way_mm(from_mm_per_s, speed)
+        })
     }
 }
 
@@ -86,7 +90,11 @@ pub fn highest((least, most): (f64, f64), room: impl Fn(f64) -> f64) -> f64 {
 ///
 /// Equations (1) and (2) of the published method with the coefficients that meet the end conditions: as printed, b is the
 /// acceleration at the end and d has the other sign.
-pub fn cubic(speeds_mm_per_s: [f64; 2], accelerations_mm_per_s2: [f64; 2], duration_s: f64) -> [f64; 4] {
+pub fn cubic(
+    speeds_mm_per_s: [f64; 2],
+    accelerations_mm_per_s2: [f64; 2],
+    duration_s: f64,
+) -> [f64; 4] {
     let ([from, to], [start, end], t) = (speeds_mm_per_s, accelerations_mm_per_s2, duration_s);
     let c = 3.0 * (to - from) / (t * t) - (2.0 * start + end) / t;
     let d = 2.0 * (from - to) / (t * t * t) + (start + end) / (t * t);
@@ -98,8 +106,16 @@ impl Ramp {
     pub fn new(start_mm: f64, speeds_mm_per_s: [f64; 2], duration_s: f64) -> Self {
         let [from, to] = speeds_mm_per_s;
         let level = from == to || duration_s == 0.0;
-        let speed = if level { [from, 0.0, 0.0, 0.0] } else { cubic(speeds_mm_per_s, [0.0; 2], duration_s) };
-        Self { start_mm, duration_s, speed }
+        let speed = if level {
+            [from, 0.0, 0.0, 0.0]
+        } else {
+            cubic(speeds_mm_per_s, [0.0; 2], duration_s)
+        };
+        Self {
+            start_mm,
+            duration_s,
+            speed,
+        }
     }
 
     /// Path coordinate, speed, acceleration and jerk along the path at `t_s`.

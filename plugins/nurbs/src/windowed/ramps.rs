@@ -54,7 +54,11 @@ impl Rounds {
         self.pairs.clear();
         for _ in 0..care.rounds {
             self.limits.clear();
-            self.limits.extend(corners.windows(2).map(|ends| grade.between([ends[0].at_mm, ends[1].at_mm])));
+            self.limits.extend(
+                corners
+                    .windows(2)
+                    .map(|ends| grade.between([ends[0].at_mm, ends[1].at_mm])),
+            );
             propagate(corners, &self.limits);
             std::mem::swap(&mut self.pairs, &mut self.before);
             self.pairs.clear();
@@ -62,16 +66,25 @@ impl Rounds {
             let mut known = self.before.iter().peekable();
             for (ends, limits) in corners.windows(2).zip(&self.limits) {
                 let parts = ramps(&ends[0], &ends[1], feed_mm_per_s, limits);
-                while known.next_if(|pair| pair.ends[0].at_mm < ends[0].at_mm).is_some() {}
+                while known
+                    .next_if(|pair| pair.ends[0].at_mm < ends[0].at_mm)
+                    .is_some()
+                {}
                 // A pair looked at before, with the same speeds, has nothing new.
                 let found = match known.peek() {
                     Some(pair) if pair.ends == *ends => pair.found,
                     _ => parts.map(|ramp| worst(&ramp, limit, care)),
                 };
-                self.pairs.push(Pair { ends: [ends[0], ends[1]], found });
+                self.pairs.push(Pair {
+                    ends: [ends[0], ends[1]],
+                    found,
+                });
                 into.extend(parts.into_iter().filter(|ramp| ramp.duration_s > 0.0));
             }
-            let found = self.pairs.iter().flat_map(|pair| pair.found.into_iter().flatten());
+            let found = self
+                .pairs
+                .iter()
+                .flat_map(|pair| pair.found.into_iter().flatten());
             let count = corners.len();
             corners.extend(found);
             if corners.len() == count || corners.len() > MAX_CORNERS {
@@ -112,7 +125,10 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
         let allowed = limit.at(at_mm);
         if speed > most * allowed {
             most = speed / allowed;
-            found = Some(Corner { at_mm, speed_mm_per_s: allowed });
+            found = Some(Corner {
+                at_mm,
+                speed_mm_per_s: allowed,
+            });
         }
     }
     found

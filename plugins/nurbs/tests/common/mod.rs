@@ -10,11 +10,19 @@ use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, PlannerCon
 
 pub fn canonical(name: &str) -> (NurbsData, f64) {
     let case = case("002_nurbs_eval");
-    let curve = case["curves"].as_array().unwrap().iter().find(|c| c["name"] == name).unwrap();
+    let curve = case["curves"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|c| c["name"] == name)
+        .unwrap();
     let points = curve["control_points"].as_array().unwrap();
     let data = NurbsData {
         degree: curve["degree"].as_u64().unwrap() as usize,
-        control_points: points.iter().map(|p| AxisVector::from_slice(&numbers(p))).collect(),
+        control_points: points
+            .iter()
+            .map(|p| AxisVector::from_slice(&numbers(p)))
+            .collect(),
         weights: numbers(&curve["weights"]),
         knots: numbers(&curve["knots"]),
     };
@@ -32,9 +40,16 @@ pub fn curve_block(data: NurbsData, length_mm: f64, feed_mm_per_s: f64) -> Given
 
 /// A machine with two linear axes, 5000 mm/s² and 4e5 mm/s³, at a fine period of 2 ms.
 pub fn context(position: AxisVector) -> PlannerContext {
-    let axis =
-        AxisLimits { feed_mm_per_s: 1000.0, rapid_mm_per_s: 1000.0, jerk_mm_per_s3: 4e5, ..tandem_rig::axis(5000.0) };
-    PlannerContext { position, ..tandem_rig::context(&[axis; 2], 0.002) }
+    let axis = AxisLimits {
+        feed_mm_per_s: 1000.0,
+        rapid_mm_per_s: 1000.0,
+        jerk_mm_per_s3: 4e5,
+        ..tandem_rig::axis(5000.0)
+    };
+    PlannerContext {
+        position,
+        ..tandem_rig::context(&[axis; 2], 0.002)
+    }
 }
 
 /// All motion of `blocks`.

@@ -11,16 +11,30 @@ pub type Point = [f64; 3];
 
 /// Three linear axes: 250 mm/s, 1000 mm/s², 20 000 mm/s³.
 pub fn context(position: &Point, tolerance_mm: f64) -> PlannerContext {
-    let axis = AxisLimits { jerk_mm_per_s3: 20000.0, ..tandem_rig::axis(1000.0) };
+    let axis = AxisLimits {
+        jerk_mm_per_s3: 20000.0,
+        ..tandem_rig::axis(1000.0)
+    };
     let context = tandem_rig::context(&[axis; 3], 0.001);
-    PlannerContext { path_tolerance_mm: tolerance_mm, position: AxisVector::from_slice(position), ..context }
+    PlannerContext {
+        path_tolerance_mm: tolerance_mm,
+        position: AxisVector::from_slice(position),
+        ..context
+    }
 }
 
 /// Lines through `points`.
 pub fn lines(points: &[Point], feed_mm_per_s: f64) -> Vec<Block> {
-    let vectors: Vec<AxisVector> = points.iter().map(|point| AxisVector::from_slice(point)).collect();
+    let vectors: Vec<AxisVector> = points
+        .iter()
+        .map(|point| AxisVector::from_slice(point))
+        .collect();
     let pairs = vectors.windows(2).filter(|pair| pair[0] != pair[1]);
-    tandem_rig::numbered(pairs.map(|pair| tandem_rig::line(&pair[0], &pair[1], feed_mm_per_s)).collect())
+    tandem_rig::numbered(
+        pairs
+            .map(|pair| tandem_rig::line(&pair[0], &pair[1], feed_mm_per_s))
+            .collect(),
+    )
 }
 
 /// A part program of G1 lines with all axes, or a case with `points` and `limits`: points and feed, mm/s.
@@ -28,8 +42,12 @@ pub fn read(path: &str) -> (Vec<Point>, f64) {
     let text = std::fs::read_to_string(path).unwrap();
     if text.starts_with('{') {
         let case: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let numbers = |v: &serde_json::Value| -> Point { std::array::from_fn(|i| v[i].as_f64().unwrap_or(0.0)) };
-        let points = case["points"].as_array().map_or(vec![], |all| all.iter().map(numbers).collect());
+        let numbers = |v: &serde_json::Value| -> Point {
+            std::array::from_fn(|i| v[i].as_f64().unwrap_or(0.0))
+        };
+        let points = case["points"]
+            .as_array()
+            .map_or(vec![], |all| all.iter().map(numbers).collect());
         return (points, case["limits"]["feed"].as_f64().unwrap());
     }
     let (mut points, mut feed) = (vec![[0.0; 3]], 50.0);
@@ -40,9 +58,16 @@ pub fn read(path: &str) -> (Vec<Point>, f64) {
         if line.starts_with("G1X") {
             let number = |from: char, to: Option<char>| -> f64 {
                 let rest = line.split(from).nth(1).unwrap();
-                to.map_or(rest, |to| rest.split(to).next().unwrap()).trim().parse().unwrap()
+                to.map_or(rest, |to| rest.split(to).next().unwrap())
+                    .trim()
+                    .parse()
+                    .unwrap()
             };
-            points.push([number('X', Some('Y')), number('Y', Some('Z')), number('Z', None)]);
+            points.push([
+                number('X', Some('Y')),
+                number('Y', Some('Z')),
+                number('Z', None),
+            ]);
         }
     }
     (points, feed)
@@ -94,7 +119,10 @@ pub fn judge(samples: &[Point], points: &[Point]) -> Peaks {
     padded.extend(samples);
     padded.extend([samples[samples.len() - 1]; 4]);
     let differences = |values: &[Point]| -> Vec<Point> {
-        values.windows(2).map(|p| std::array::from_fn(|i| (p[1][i] - p[0][i]) * 1e3)).collect()
+        values
+            .windows(2)
+            .map(|p| std::array::from_fn(|i| (p[1][i] - p[0][i]) * 1e3))
+            .collect()
     };
     let most = |values: &[Point]| values.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
     let velocity = differences(&padded);
@@ -116,8 +144,15 @@ fn distance(p: &Point, a: &Point, b: &Point) -> f64 {
     let w: Point = std::array::from_fn(|i| p[i] - a[i]);
     let squared: f64 = d.iter().map(|v| v * v).sum();
     let along: f64 = d.iter().zip(&w).map(|(d, w)| d * w).sum();
-    let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (0..3).map(|i| (w[i] - share * d[i]).powi(2)).sum::<f64>().sqrt()
+    let share = if squared > 0.0 {
+        (along / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (0..3)
+        .map(|i| (w[i] - share * d[i]).powi(2))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// Chords whose box is looked at before they are.

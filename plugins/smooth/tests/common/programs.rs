@@ -6,8 +6,16 @@ use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 use super::{Point, lines};
 
 /// Kinds of programs.
-pub const KINDS: [&str; 8] =
-    ["corners 2-D", "corners 3-D", "wandering", "micro blocks", "noisy", "arcs and lines", "zigzag", "all lengths"];
+pub const KINDS: [&str; 8] = [
+    "corners 2-D",
+    "corners 3-D",
+    "wandering",
+    "micro blocks",
+    "noisy",
+    "arcs and lines",
+    "zigzag",
+    "all lengths",
+];
 
 /// Blocks of a program, and points along its path near enough to stand for it.
 pub fn program(seed: u64) -> (&'static str, Vec<Block>, Vec<Point>) {
@@ -28,12 +36,22 @@ pub fn program(seed: u64) -> (&'static str, Vec<Block>, Vec<Point>) {
 }
 
 /// Steps that turn by at most `turn_rad` each.
-fn walk(random: &mut Random, steps: usize, (low, high): (f64, f64), turn_rad: f64, space: bool) -> Vec<Point> {
+fn walk(
+    random: &mut Random,
+    steps: usize,
+    (low, high): (f64, f64),
+    turn_rad: f64,
+    space: bool,
+) -> Vec<Point> {
     let (mut at, mut heading, mut slope) = ([0.0; 3], 0.0f64, 0.0f64);
     let mut points = vec![at];
     for _ in 0..steps {
         heading += random.between(-turn_rad, turn_rad);
-        slope = if space { (slope + random.between(-turn_rad, turn_rad)).clamp(-1.5, 1.5) } else { 0.0 };
+        slope = if space {
+            (slope + random.between(-turn_rad, turn_rad)).clamp(-1.5, 1.5)
+        } else {
+            0.0
+        };
         let length = random.length(low, high);
         at[0] += length * heading.cos() * slope.cos();
         at[1] += length * heading.sin() * slope.cos();
@@ -49,14 +67,26 @@ fn curve(random: &mut Random, steps: usize, (low, high): (f64, f64), noise: f64)
     let waves = [random.between(0.3, 2.0), random.between(0.3, 2.0)];
     let at = |s: f64| {
         let angle = s / radius;
-        [radius * angle.sin(), radius * (1.0 - (waves[0] * angle).cos()), 0.4 * radius * (waves[1] * angle).sin()]
+        [
+            radius * angle.sin(),
+            radius * (1.0 - (waves[0] * angle).cos()),
+            0.4 * radius * (waves[1] * angle).sin(),
+        ]
     };
-    (0..=steps).map(|n| at(n as f64 * length).map(|v| v + random.between(-noise, noise))).collect()
+    (0..=steps)
+        .map(|n| at(n as f64 * length).map(|v| v + random.between(-noise, noise)))
+        .collect()
 }
 
 fn zigzag(random: &mut Random) -> Vec<Point> {
     let (length, angle) = (random.length(0.1, 3.0), random.between(0.2, 1.5));
-    let step = |n: i32| [f64::from(n) * length * angle.cos(), f64::from(n % 2) * length * angle.sin(), 0.0];
+    let step = |n: i32| {
+        [
+            f64::from(n) * length * angle.cos(),
+            f64::from(n % 2) * length * angle.sin(),
+            0.0,
+        ]
+    };
     (0..40).map(step).collect()
 }
 
@@ -72,18 +102,33 @@ fn arcs(random: &mut Random, feed: f64) -> (&'static str, Vec<Block>, Vec<Point>
         let mut block = Block::at(AxisVector::from_slice(&from));
         if random.below(2) == 0 {
             let length = random.length(0.2, 10.0);
-            at = [at[0] + length * heading.cos(), at[1] + length * heading.sin(), at[2]];
+            at = [
+                at[0] + length * heading.cos(),
+                at[1] + length * heading.sin(),
+                at[2],
+            ];
             (block.kind, block.length_mm) = (BlockKind::Line, length);
             points.push(at);
         } else {
             let (radius, sweep) = (random.length(0.05, 8.0), random.between(-4.0, 4.0));
-            let rise = if random.below(3) == 0 { random.between(-1.0, 1.0) } else { 0.0 };
+            let rise = if random.below(3) == 0 {
+                random.between(-1.0, 1.0)
+            } else {
+                0.0
+            };
             let side = sweep.signum();
-            let center = [at[0] - side * radius * heading.sin(), at[1] + side * radius * heading.cos()];
+            let center = [
+                at[0] - side * radius * heading.sin(),
+                at[1] + side * radius * heading.cos(),
+            ];
             let start = heading - side * std::f64::consts::FRAC_PI_2;
             let on = |share: f64| {
                 let angle = start + share * sweep;
-                [center[0] + radius * angle.cos(), center[1] + radius * angle.sin(), from[2] + share * rise]
+                [
+                    center[0] + radius * angle.cos(),
+                    center[1] + radius * angle.sin(),
+                    from[2] + share * rise,
+                ]
             };
             let count = (sweep.abs() * (radius / 8e-6).sqrt()).ceil() as usize;
             points.extend((1..=count).map(|n| on(n as f64 / count as f64)));

@@ -11,16 +11,30 @@ impl Drawn {
         text.key("rough_period_ms", self.rough_ms);
         text.key("fine_period_ms", self.fine_ms);
         text.table("[motion]");
-        let least_mm = if self.planner == Planner::Smooth { 2e-4 } else { 1e-4 };
+        let least_mm = if self.planner == Planner::Smooth {
+            2e-4
+        } else {
+            1e-4
+        };
         text.key("path_tolerance_mm", rounded(random.length(least_mm, 1.0)));
-        let difference = if random.below(2) == 0 { 0.0 } else { rounded(random.length(0.5, 2000.0)) };
+        let difference = if random.below(2) == 0 {
+            0.0
+        } else {
+            rounded(random.length(0.5, 2000.0))
+        };
         text.key("allowable_speed_difference_mm_per_min", difference);
         if random.below(4) == 0 {
-            text.key("allowable_speed_difference_deg_per_min", rounded(random.length(0.5, 2000.0)));
+            text.key(
+                "allowable_speed_difference_deg_per_min",
+                rounded(random.length(0.5, 2000.0)),
+            );
         }
         text.key("max_feed_ratio", self.max_feed_ratio);
         if random.below(2) == 0 {
-            text.key("time_constant_ms", rounded(random.length(self.fine_ms.max(1.0), 300.0)));
+            text.key(
+                "time_constant_ms",
+                rounded(random.length(self.fine_ms.max(1.0), 300.0)),
+            );
         }
         if !self.planner.keeps_jerk() {
             text.key("jerk", "\"report\"");
@@ -29,7 +43,11 @@ impl Drawn {
 
     /// Writes kinematics and joints; whether each joint is the axis of its place.
     pub(super) fn kinematics(&mut self, random: &mut Random, jerk: bool) -> bool {
-        let index = |letter: char| self.axes.iter().position(|axis| axis.letter == letter && !axis.rotary);
+        let index = |letter: char| {
+            self.axes
+                .iter()
+                .position(|axis| axis.letter == letter && !axis.rotary)
+        };
         let (x, y) = (index('X'), index('Y'));
         match (random.below(10), x, y) {
             (0 | 1, Some(x), Some(y)) if self.axes.len() <= 6 => self.corexy(random, jerk, x, y),
@@ -41,12 +59,21 @@ impl Drawn {
     }
 
     /// The limits of a joint that moves by `weight` for a unit of `axis`.
-    fn joint_limits(&mut self, random: &mut Random, jerk: bool, axis: usize, unit: &str, weight: f64) {
+    fn joint_limits(
+        &mut self,
+        random: &mut Random,
+        jerk: bool,
+        axis: usize,
+        unit: &str,
+        weight: f64,
+    ) {
         let axis = self.axes[axis];
         let mut of = |value: f64| rounded(value * weight.abs() * random.length(0.3, 4.0));
         let limits = [of(axis.feed), of(axis.acceleration), of(axis.jerk)];
-        self.text.key(&format!("max_feed_{unit}_per_min"), limits[0]);
-        self.text.key(&format!("max_acceleration_{unit}_per_s2"), limits[1]);
+        self.text
+            .key(&format!("max_feed_{unit}_per_min"), limits[0]);
+        self.text
+            .key(&format!("max_acceleration_{unit}_per_s2"), limits[1]);
         if jerk {
             self.text.key(&format!("max_jerk_{unit}_per_s3"), limits[2]);
         }
@@ -63,7 +90,11 @@ impl Drawn {
                 self.text.key("axis", format!("\"{letter}\""));
                 continue;
             }
-            self.text.table(if index == x { "[joints.belt1]" } else { "[joints.belt2]" });
+            self.text.table(if index == x {
+                "[joints.belt1]"
+            } else {
+                "[joints.belt2]"
+            });
             if random.below(2) == 0 {
                 let (low, high) = if index == x {
                     (of_x.low + of_y.low, of_x.high + of_y.high)
@@ -77,11 +108,15 @@ impl Drawn {
     }
 
     fn wrapped(&mut self, random: &mut Random, jerk: bool, wrapped: usize) {
-        let radius_mm = rounded(random.length(0.5, 500.0)) * if random.below(4) == 0 { -1.0 } else { 1.0 };
+        let radius_mm =
+            rounded(random.length(0.5, 500.0)) * if random.below(4) == 0 { -1.0 } else { 1.0 };
         self.text.table("[kinematics]");
         self.text.key("plugin", "\"wrapped-rotary\"");
         self.text.table("[kinematics.options]");
-        self.text.key("axis", format!("\"{}\"", self.axes[wrapped].letter.to_ascii_lowercase()));
+        self.text.key(
+            "axis",
+            format!("\"{}\"", self.axes[wrapped].letter.to_ascii_lowercase()),
+        );
         self.text.key("radius_mm", radius_mm);
         for index in 0..self.axes.len() {
             let letter = self.axes[index].letter.to_ascii_lowercase();
@@ -109,35 +144,65 @@ impl Drawn {
 
     pub(super) fn planner(&mut self, random: &mut Random) {
         self.text.table("[planner]");
-        self.text.key("plugin", format!("\"{}\"", self.planner.name()));
+        self.text
+            .key("plugin", format!("\"{}\"", self.planner.name()));
         let mut options: Vec<(&str, String)> = vec![];
         match self.planner {
             Planner::LookAhead if random.below(4) == 0 => {
-                options.push(("buffer_blocks", (random.length(2.0, 1000.0) as u64).to_string()));
+                options.push((
+                    "buffer_blocks",
+                    (random.length(2.0, 1000.0) as u64).to_string(),
+                ));
             }
             Planner::BlockOverlap => {
-                options.push(("limits", random.pick(&["\"slow\"", "\"stretch\""]).to_string()));
+                options.push((
+                    "limits",
+                    random.pick(&["\"slow\"", "\"stretch\""]).to_string(),
+                ));
                 if random.below(4) == 0 {
-                    options.push(("buffer_blocks", (random.length(4.0, 512.0) as u64).to_string()));
+                    options.push((
+                        "buffer_blocks",
+                        (random.length(4.0, 512.0) as u64).to_string(),
+                    ));
                 }
                 if random.below(6) == 0 {
                     options.push(("corner_control", "\"off\"".to_string()));
                 }
             }
             Planner::AfterInterpolation => {
-                options.push(("filter", random.pick(&["\"linear\"", "\"bell\"", "\"exponential\""]).to_string()));
-                options.push(("time_constant_ms", rounded(random.length(1.0, 200.0)).to_string()));
+                options.push((
+                    "filter",
+                    random
+                        .pick(&["\"linear\"", "\"bell\"", "\"exponential\""])
+                        .to_string(),
+                ));
+                options.push((
+                    "time_constant_ms",
+                    rounded(random.length(1.0, 200.0)).to_string(),
+                ));
             }
             Planner::Nurbs => {
-                options.push(("form", random.pick(&["\"scan\"", "\"windowed\""]).to_string()));
+                options.push((
+                    "form",
+                    random.pick(&["\"scan\"", "\"windowed\""]).to_string(),
+                ));
                 if random.below(3) == 0 {
-                    options.push(("chord_error_um", rounded(random.length(0.05, 100.0)).to_string()));
+                    options.push((
+                        "chord_error_um",
+                        rounded(random.length(0.05, 100.0)).to_string(),
+                    ));
                 }
             }
             Planner::Smooth if random.below(3) == 0 => {
                 options.push(("grid_ms", rounded(random.between(2.0, 20.0)).to_string()));
-                options.push(("window_ms", rounded(random.between(100.0, 2000.0)).to_string()));
-                options.push(("tolerance_share", rounded(random.between(0.5, 1.0)).to_string()));
+                options.push((
+                    "window_ms",
+                    rounded(random.between(100.0, 2000.0)).to_string(),
+                ));
+                options.push((
+                    "tolerance_share",
+                    rounded(random.between(0.5, 1.0)).to_string(),
+                ));
                 options.push(("rounds", (1 + random.below(4)).to_string()));
             }
             _ => {}
@@ -156,8 +221,14 @@ impl Drawn {
 
     pub(super) fn driver(&mut self, random: &mut Random, plain: bool) {
         let servo = random.below(8) == 0;
-        let linear: Vec<usize> = (0..self.axes.len()).filter(|axis| !self.axes[*axis].rotary).collect();
-        if plain && !servo && random.below(5) == 0 && !linear.is_empty() && self.planner != Planner::AfterInterpolation
+        let linear: Vec<usize> = (0..self.axes.len())
+            .filter(|axis| !self.axes[*axis].rotary)
+            .collect();
+        if plain
+            && !servo
+            && random.below(5) == 0
+            && !linear.is_empty()
+            && self.planner != Planner::AfterInterpolation
         {
             let axis = random.pick(&linear);
             let Axis { low, high, .. } = self.axes[axis];
@@ -169,7 +240,8 @@ impl Drawn {
             self.text.table("[[driver.options.switches]]");
             self.text.key("input", 3);
             self.text.key("joint", axis);
-            self.text.key(if above { "above_mm" } else { "below_mm" }, at_mm);
+            self.text
+                .key(if above { "above_mm" } else { "below_mm" }, at_mm);
             self.probe = Some(Surface { axis, at_mm, above });
             return;
         }
@@ -178,12 +250,16 @@ impl Drawn {
         if servo {
             self.text.table("[driver.options]");
             self.text.key("model", "\"second-order\"");
-            self.text.key("natural_frequency_hz", rounded(random.length(2.0, 200.0)));
+            self.text
+                .key("natural_frequency_hz", rounded(random.length(2.0, 200.0)));
         }
         if plain && random.below(12) == 0 {
             // What is lost or late on the way to the drives must not change what is sent.
             self.text.table("[[faults.wrap]]");
-            self.text.key("kind", random.pick(&["\"drop\"", "\"freeze\"", "\"duplicate\""]));
+            self.text.key(
+                "kind",
+                random.pick(&["\"drop\"", "\"freeze\"", "\"duplicate\""]),
+            );
             self.text.key("every", 2 + random.below(60));
         }
     }

@@ -22,11 +22,17 @@ impl Program<'_> {
 
     /// The axes of control points.
     fn curve_axes(&self) -> Vec<usize> {
-        ['X', 'Y', 'Z'].into_iter().filter_map(|letter| self.axis(letter)).collect()
+        ['X', 'Y', 'Z']
+            .into_iter()
+            .filter_map(|letter| self.axis(letter))
+            .collect()
     }
 
     fn here(&self) -> Point {
-        self.curve_axes().into_iter().map(|axis| self.at[axis]).collect()
+        self.curve_axes()
+            .into_iter()
+            .map(|axis| self.at[axis])
+            .collect()
     }
 
     /// A place up to `reach` from another in the first axes, within the travel.
@@ -36,8 +42,14 @@ impl Program<'_> {
         for (value, axis) in place.iter_mut().zip(axes).take(moving) {
             let of = self.machine.axes[axis];
             let step = self.random.between(-reach, reach);
-            let to = if (of.low..=of.high).contains(&(*value + step)) { *value + step } else { *value - step };
-            *value = self.written(to.clamp(of.low, of.high)).clamp(of.low, of.high);
+            let to = if (of.low..=of.high).contains(&(*value + step)) {
+                *value + step
+            } else {
+                *value - step
+            };
+            *value = self
+                .written(to.clamp(of.low, of.high))
+                .clamp(of.low, of.high);
         }
         place
     }
@@ -89,7 +101,10 @@ impl Program<'_> {
         let (middle, to) = (self.near(&from, reach, 2), self.near(&from, reach, 2));
         let digits = self.digits;
         let [i, j] = [middle[0] - from[0], middle[1] - from[1]];
-        self.line(&format!("G5.1 X{:.digits$} Y{:.digits$} I{i:.digits$} J{j:.digits$}", to[0], to[1]));
+        self.line(&format!(
+            "G5.1 X{:.digits$} Y{:.digits$} I{i:.digits$} J{j:.digits$}",
+            to[0], to[1]
+        ));
         self.arrive(&to);
     }
 
@@ -99,9 +114,14 @@ impl Program<'_> {
         let to = self.near(&from, reach, 2);
         let (second, third) = (self.near(&from, reach, 2), self.near(&to, reach, 2));
         let digits = self.digits;
-        let ([i, j], [p, q]) = ([second[0] - from[0], second[1] - from[1]], [third[0] - to[0], third[1] - to[1]]);
+        let ([i, j], [p, q]) = (
+            [second[0] - from[0], second[1] - from[1]],
+            [third[0] - to[0], third[1] - to[1]],
+        );
         let end = format!("X{:.digits$} Y{:.digits$}", to[0], to[1]);
-        self.line(&format!("G5 {end} I{i:.digits$} J{j:.digits$} P{p:.digits$} Q{q:.digits$}"));
+        self.line(&format!(
+            "G5 {end} I{i:.digits$} J{j:.digits$} P{p:.digits$} Q{q:.digits$}"
+        ));
         self.arrive(&to);
     }
 
@@ -120,7 +140,9 @@ impl Program<'_> {
     fn free_form(&mut self) {
         let order = self.random.below(4) + 3;
         let count = order + self.random.below(12);
-        let Some(reach) = self.reach(count) else { return };
+        let Some(reach) = self.reach(count) else {
+            return;
+        };
         let moving = 2 + self.random.below(2) as usize;
         let points = self.wander(count, reach, moving);
         self.through(order, &points, |_| 1.0);
@@ -134,7 +156,11 @@ impl Program<'_> {
         let mut points = vec![];
         for _ in 0..self.random.below(4) + 4 {
             let share = self.random.between(0.0, 1.0);
-            let on: Point = from.iter().zip(&to).map(|(a, b)| self.written(a + share * (b - a))).collect();
+            let on: Point = from
+                .iter()
+                .zip(&to)
+                .map(|(a, b)| self.written(a + share * (b - a)))
+                .collect();
             points.push(on);
         }
         self.through(4, &points, |_| 1.0);
@@ -163,7 +189,9 @@ impl Program<'_> {
     /// With knots of any multiplicity up to the degree: corners inside the curve.
     fn knotted(&mut self) {
         let (count, order) = (10u64, 4u64);
-        let Some(reach) = self.reach(count) else { return };
+        let Some(reach) = self.reach(count) else {
+            return;
+        };
         let mut points = vec![self.here()];
         points.extend(self.wander(count - 1, reach, 2));
         let mut knots = vec![0.0; order as usize];
@@ -175,7 +203,8 @@ impl Program<'_> {
         knots.extend(vec![knots[knots.len() - 1] + 1.0; order as usize]);
         let mut text = format!("G6.2 P{order} ");
         for (point, knot) in points.iter().zip(&knots) {
-            writeln!(text, "K{knot} {}R1", self.words(point)).expect("a text takes what is written");
+            writeln!(text, "K{knot} {}R1", self.words(point))
+                .expect("a text takes what is written");
         }
         for knot in &knots[count as usize..] {
             writeln!(text, "K{knot}").expect("a text takes what is written");

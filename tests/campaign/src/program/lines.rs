@@ -13,7 +13,11 @@ impl Program<'_> {
             let mut to = vec![];
             for axis in 0..self.at.len() {
                 if self.random.below(2) == 0 {
-                    let turns = if self.machine.axes[axis].rotary { self.random.pick(&[1.0, 1.0, 30.0]) } else { 1.0 };
+                    let turns = if self.machine.axes[axis].rotary {
+                        self.random.pick(&[1.0, 1.0, 30.0])
+                    } else {
+                        1.0
+                    };
                     to.push((axis, self.place(axis, reach * turns)));
                 }
             }
@@ -26,16 +30,26 @@ impl Program<'_> {
 
     /// A full circle or helix in X and Y; often one that touches an end of the travel.
     pub(super) fn circle(&mut self) {
-        let (Some(x), Some(y)) = (self.axis('X'), self.axis('Y')) else { return };
+        let (Some(x), Some(y)) = (self.axis('X'), self.axis('Y')) else {
+            return;
+        };
         let room = |axis: usize, at: f64, up: bool| {
             let of = self.machine.axes[axis];
             if up { of.high - at } else { at - of.low }
         };
         let (right, up) = (self.random.below(2) == 0, self.random.below(2) == 0);
-        let rooms = [room(x, self.at[x], right), room(y, self.at[y], up), room(y, self.at[y], !up)];
+        let rooms = [
+            room(x, self.at[x], right),
+            room(y, self.at[y], up),
+            room(y, self.at[y], !up),
+        ];
         let along_x = rooms[0].min(2.0 * rooms[1]).min(2.0 * rooms[2]) / 2.0;
         let touching = self.random.below(3) == 0;
-        let most = if touching { along_x } else { along_x.min(self.scale_mm * self.random.between(0.2, 2.0)) };
+        let most = if touching {
+            along_x
+        } else {
+            along_x.min(self.scale_mm * self.random.between(0.2, 2.0))
+        };
         let i = self.written(if touching { most } else { 0.99 * most });
         let radius_mm = i.abs();
         // Rounding may leave the travel.
@@ -57,13 +71,18 @@ impl Program<'_> {
 
     /// A part of a circle, by its radius.
     pub(super) fn arc(&mut self) {
-        let (Some(x), Some(y)) = (self.axis('X'), self.axis('Y')) else { return };
+        let (Some(x), Some(y)) = (self.axis('X'), self.axis('Y')) else {
+            return;
+        };
         let to = [x, y].map(|axis| self.place(axis, self.scale_mm));
         let from = [self.at[x], self.at[y]];
         let chord_mm = (to[0] - from[0]).hypot(to[1] - from[1]);
         let bent = self.random.length(0.5001, 50.0);
         let radius_mm = self.written(chord_mm * bent + 1e-4);
-        let sagitta_mm = radius_mm - (radius_mm * radius_mm - chord_mm * chord_mm / 4.0).max(0.0).sqrt();
+        let sagitta_mm = radius_mm
+            - (radius_mm * radius_mm - chord_mm * chord_mm / 4.0)
+                .max(0.0)
+                .sqrt();
         let inside = [x, y].into_iter().enumerate().all(|(n, axis)| {
             let of = self.machine.axes[axis];
             from[n].min(to[n]) - sagitta_mm >= of.low && from[n].max(to[n]) + sagitta_mm <= of.high
@@ -73,7 +92,10 @@ impl Program<'_> {
         }
         let word = self.random.pick(&["G2", "G3"]);
         let digits = self.digits;
-        self.line(&format!("{word} X{:.digits$} Y{:.digits$} R{radius_mm:.digits$}", to[0], to[1]));
+        self.line(&format!(
+            "{word} X{:.digits$} Y{:.digits$} R{radius_mm:.digits$}",
+            to[0], to[1]
+        ));
         (self.at[x], self.at[y]) = (to[0], to[1]);
     }
 
@@ -83,19 +105,29 @@ impl Program<'_> {
         if count < 2 {
             return None;
         }
-        let first = if self.random.below(3) > 0 { 0 } else { self.random.below(count - 1) as usize };
+        let first = if self.random.below(3) > 0 {
+            0
+        } else {
+            self.random.below(count - 1) as usize
+        };
         Some((first, first + 1))
     }
 
     /// A number of repetitions: sometimes so many that buffers fill.
     fn many(&mut self, most: u64) -> u64 {
-        let most = if self.random.below(12) == 0 { 16 * most } else { most };
+        let most = if self.random.below(12) == 0 {
+            16 * most
+        } else {
+            most
+        };
         self.random.below(most) + 3
     }
 
     /// A stretch of short chords along a bending path, as CAM writes it, with noise of the last digit.
     pub(super) fn chords(&mut self) {
-        let Some((a, b)) = self.two_axes() else { return };
+        let Some((a, b)) = self.two_axes() else {
+            return;
+        };
         let mut angle = self.random.between(0.0, TAU);
         let bend = self.random.pick(&[0.0, 0.001, 0.02, 0.2, 1.0]) * self.random.between(-1.0, 1.0);
         let step = self.scale_mm.min(5.0) * self.random.length(0.01, 1.0);
@@ -105,7 +137,10 @@ impl Program<'_> {
                 let of = this.machine.axes[axis];
                 this.written(this.at[axis] + by).clamp(of.low, of.high)
             };
-            let to = [(a, place(self, a, step * angle.cos())), (b, place(self, b, step * angle.sin()))];
+            let to = [
+                (a, place(self, a, step * angle.cos())),
+                (b, place(self, b, step * angle.sin())),
+            ];
             if !self.straight_to("G1", &to) {
                 return;
             }
@@ -114,7 +149,9 @@ impl Program<'_> {
 
     /// To and fro between two rails: corners of any angle at constant distances.
     pub(super) fn zigzag(&mut self) {
-        let Some((a, b)) = self.two_axes() else { return };
+        let Some((a, b)) = self.two_axes() else {
+            return;
+        };
         let (from, reach) = (self.at[b], self.scale_mm.min(20.0));
         let other = self.place(b, reach);
         let step = self.random.pick(&[0.0, 0.01, 0.3, 2.0]) * reach;
@@ -130,7 +167,9 @@ impl Program<'_> {
 
     /// Small figures with rapids between them.
     pub(super) fn marks(&mut self) {
-        let Some((a, b)) = self.two_axes() else { return };
+        let Some((a, b)) = self.two_axes() else {
+            return;
+        };
         let size = self.scale_mm.min(1.0) * self.random.length(0.03, 1.0);
         for _ in 0..self.many(30) {
             let [x, y] = [a, b].map(|axis| self.at[axis]);
@@ -153,7 +192,9 @@ impl Program<'_> {
 
     /// A probe, whether it touches or not, and the way back.
     pub(super) fn probe(&mut self) {
-        let Some(surface) = self.machine.probe else { return };
+        let Some(surface) = self.machine.probe else {
+            return;
+        };
         let (axis, letter) = (surface.axis, self.machine.axes[surface.axis].letter);
         let to = self.place(axis, self.scale_mm);
         let by = to - self.at[axis];
@@ -161,7 +202,11 @@ impl Program<'_> {
             return;
         }
         // A probe that touches already when it begins is a fault.
-        let touching = if surface.touches(self.at[axis]) { ["G38.5"; 2] } else { ["G38.3", "G31"] };
+        let touching = if surface.touches(self.at[axis]) {
+            ["G38.5"; 2]
+        } else {
+            ["G38.3", "G31"]
+        };
         let word = self.random.pick(&touching);
         self.line(&format!("{word} {letter}{to:.*}", self.digits));
         // Back to where it began, at most as far as to where the probe may have come.

@@ -1,6 +1,9 @@
 //! The host's part of the contract: what the fine loop sends, and what it waits for.
 
-use tandem_sdk::{Arm, Attached, AxisVector, Driver, Feedback, JointState, MAX_DELAY_PERIODS, PluginError, Setpoint};
+use tandem_sdk::{
+    Arm, Attached, AxisVector, Driver, Feedback, JointState, MAX_DELAY_PERIODS, PluginError,
+    Setpoint,
+};
 
 use super::watch::{STANDS_MM, Watch};
 use super::{Failed, JOINTS, context};
@@ -59,7 +62,10 @@ impl<'a> Host<'a> {
     /// The bits of all positions, and how often the heap was used.
     pub fn leave(self) -> (Vec<u64>, u64) {
         if !self.has_faulted {
-            self.report.skip("reset of faults", "no drive went into a fault, not by 200 silent periods either");
+            self.report.skip(
+                "reset of faults",
+                "no drive went into a fault, not by 200 silent periods either",
+            );
         }
         (self.bits, self.heap_uses)
     }
@@ -72,8 +78,15 @@ impl<'a> Host<'a> {
     pub fn start(&mut self) -> Result<(), Failed> {
         let attached = self.driver.start().map_err(failed("start"))?;
         self.judge_attached(&attached);
-        self.setpoint = Setpoint { position: attached.position, ..Setpoint::default() };
-        self.feedback = Feedback { position: attached.position, state: attached.state, ..Feedback::default() };
+        self.setpoint = Setpoint {
+            position: attached.position,
+            ..Setpoint::default()
+        };
+        self.feedback = Feedback {
+            position: attached.position,
+            state: attached.state,
+            ..Feedback::default()
+        };
         self.watch = Watch::new(&attached);
         Ok(())
     }
@@ -83,14 +96,23 @@ impl<'a> Host<'a> {
         self.report.judged(CHECK);
         for joint in 0..JOINTS {
             let (position, state) = (attached.position[joint], attached.state[joint]);
-            let mut find = |words: String| self.report.find(CHECK, format!("start: joint {joint}: {words}"));
+            let mut find = |words: String| {
+                self.report
+                    .find(CHECK, format!("start: joint {joint}: {words}"))
+            };
             if !position.is_finite() {
                 find(format!("its position is {position}"));
             }
             if !state.is_known() {
                 find(format!("its state is {}, which stands for none", state.0));
             }
-            if [JointState::Enabling, JointState::Enabled, JointState::Homing].contains(&state) {
+            if [
+                JointState::Enabling,
+                JointState::Enabled,
+                JointState::Homing,
+            ]
+            .contains(&state)
+            {
                 find(format!("it is {state:?} before it was told to be"));
             }
             if attached.delay_periods[joint] > MAX_DELAY_PERIODS {
@@ -100,10 +122,14 @@ impl<'a> Host<'a> {
                 ));
             }
             // What counts from power-on is known no better after a second start.
-            let moved =
-                self.left.filter(|_| attached.known >> joint & 1 == 1).map(|left| (left[joint] - position).abs());
+            let moved = self
+                .left
+                .filter(|_| attached.known >> joint & 1 == 1)
+                .map(|left| (left[joint] - position).abs());
             if let Some(moved) = moved.filter(|moved| *moved > STANDS_MM) {
-                find(format!("it was left {moved} from where it says that it stands"));
+                find(format!(
+                    "it was left {moved} from where it says that it stands"
+                ));
             }
         }
     }
@@ -123,7 +149,11 @@ impl<'a> Host<'a> {
         let period = self.setpoint.tick;
         answer.map_err(failed(&format!("exchange, period {period}")))?;
         self.watch.look(&self.setpoint, &self.feedback, self.report);
-        self.bits.extend(self.feedback.position.0[..JOINTS].iter().map(|v| v.to_bits()));
+        self.bits.extend(
+            self.feedback.position.0[..JOINTS]
+                .iter()
+                .map(|v| v.to_bits()),
+        );
         self.setpoint.reset = 0;
         Ok(())
     }
@@ -136,8 +166,12 @@ impl<'a> Host<'a> {
             self.follow_feedback();
             self.exchange()?;
             let on = [JointState::Enabling, JointState::Enabled];
-            if let Some(joint) = (0..JOINTS).find(|joint| on.contains(&self.feedback.state[*joint])) {
-                self.report.find(CHECK, format!("period {}: joint {joint} is", self.setpoint.tick));
+            if let Some(joint) = (0..JOINTS).find(|joint| on.contains(&self.feedback.state[*joint]))
+            {
+                self.report.find(
+                    CHECK,
+                    format!("period {}: joint {joint} is", self.setpoint.tick),
+                );
             }
         }
         Ok(())
@@ -168,10 +202,18 @@ impl<'a> Host<'a> {
                 return Ok(());
             }
         }
-        let joint = (0..JOINTS).find(|joint| self.held >> joint & 1 == 0).unwrap_or_default();
+        let joint = (0..JOINTS)
+            .find(|joint| self.held >> joint & 1 == 0)
+            .unwrap_or_default();
         let state = self.feedback.state[joint];
-        self.report.find(CHECK, format!("joint {joint} is {state:?} at the end of the driver's own enable_s"));
-        Err(("exchange".to_string(), PluginError::new(format!("joint {joint} is never enabled"))))
+        self.report.find(
+            CHECK,
+            format!("joint {joint} is {state:?} at the end of the driver's own enable_s"),
+        );
+        Err((
+            "exchange".to_string(),
+            PluginError::new(format!("joint {joint} is never enabled")),
+        ))
     }
 
     fn hold_what_is_enabled(&mut self) {
@@ -189,12 +231,17 @@ impl<'a> Host<'a> {
     /// Whether the joints that are enabled are where they are told to be, at rest.
     fn judge_place(&mut self, check: &'static str) {
         self.report.judged(check);
-        for joint in (0..JOINTS).filter(|joint| self.held >> joint & 1 == 1 && self.feedback.age_periods[*joint] == 0) {
+        for joint in (0..JOINTS)
+            .filter(|joint| self.held >> joint & 1 == 1 && self.feedback.age_periods[*joint] == 0)
+        {
             let away = (self.feedback.position[joint] - self.setpoint.position[joint]).abs();
             // What is no number is found by another check.
             if away > STANDS_MM {
                 let period = self.setpoint.tick;
-                self.report.find(check, format!("period {period}: joint {joint} is {away} from where it stood"));
+                self.report.find(
+                    check,
+                    format!("period {period}: joint {joint} is {away} from where it stood"),
+                );
             }
         }
     }
@@ -222,7 +269,10 @@ impl<'a> Host<'a> {
     fn judge_holding(&mut self, check: &'static str) {
         let states = &self.feedback.state[..JOINTS];
         if states.iter().any(|state| *state != JointState::Enabled) {
-            let words = format!("period {}: the drives were enabled and do not hold: {states:?}", self.setpoint.tick);
+            let words = format!(
+                "period {}: the drives were enabled and do not hold: {states:?}",
+                self.setpoint.tick
+            );
             self.report.find(check, words);
         }
     }
@@ -234,7 +284,11 @@ impl<'a> Host<'a> {
             let phase = (period + 1) as f64 / WAY_PERIODS as f64;
             let way = 5.0 * (std::f64::consts::PI * phase).sin().powi(2);
             self.aim(start + AxisVector::from_slice(&[way, -way, way / 2.0]));
-            self.setpoint.arm = if period < WAY_PERIODS / 2 { ARMED } else { Arm::default() };
+            self.setpoint.arm = if period < WAY_PERIODS / 2 {
+                ARMED
+            } else {
+                Arm::default()
+            };
             self.exchange()?;
             if self.is_in_trouble() {
                 self.recover()?;
@@ -268,14 +322,18 @@ impl<'a> Host<'a> {
         let most = periods(self.driver.describe().disable_s);
         for _ in 0..most {
             self.exchange()?;
-            let has_let_go =
-                |state: &JointState| [JointState::Disabled, JointState::Fault, JointState::Lost].contains(state);
+            let has_let_go = |state: &JointState| {
+                [JointState::Disabled, JointState::Fault, JointState::Lost].contains(state)
+            };
             if self.feedback.state[..JOINTS].iter().all(has_let_go) {
                 return self.wait(20);
             }
         }
         let states = &self.feedback.state[..JOINTS];
-        self.report.find(CHECK, format!("at the end of the driver's own disable_s the joints are {states:?}"));
+        self.report.find(
+            CHECK,
+            format!("at the end of the driver's own disable_s the joints are {states:?}"),
+        );
         Ok(())
     }
 
@@ -302,7 +360,9 @@ impl<'a> Host<'a> {
         }
         self.has_faulted = true;
         self.report.judged(CHECK);
-        let joint = (0..JOINTS).find(|joint| self.feedback.state[*joint] == JointState::Fault).unwrap_or_default();
+        let joint = (0..JOINTS)
+            .find(|joint| self.feedback.state[*joint] == JointState::Fault)
+            .unwrap_or_default();
         for enable in [1, 0, 1, 0] {
             self.setpoint.enable = enable;
             for _ in 0..20 {
@@ -310,7 +370,9 @@ impl<'a> Host<'a> {
                 self.exchange()?;
                 if !self.is_in_trouble() {
                     let (period, state) = (self.setpoint.tick, self.feedback.state[joint]);
-                    let words = format!("period {period}: joint {joint} was in fault and is {state:?} without a reset");
+                    let words = format!(
+                        "period {period}: joint {joint} was in fault and is {state:?} without a reset"
+                    );
                     self.report.find(CHECK, words);
                     return Ok(());
                 }
@@ -328,8 +390,14 @@ impl<'a> Host<'a> {
             }
         }
         let state = self.feedback.state[joint];
-        self.report.find(CHECK, format!("joint {joint} is {state:?} for the whole of enable_s behind a reset"));
-        Err(("exchange".to_string(), PluginError::new(format!("joint {joint} cannot be reset"))))
+        self.report.find(
+            CHECK,
+            format!("joint {joint} is {state:?} for the whole of enable_s behind a reset"),
+        );
+        Err((
+            "exchange".to_string(),
+            PluginError::new(format!("joint {joint} cannot be reset")),
+        ))
     }
 
     fn is_lost(&self) -> bool {
@@ -355,6 +423,10 @@ const SETTLING_PERIODS: u64 = 90;
 
 /// Whole fine periods of a time; half a minute where it is no time.
 fn periods(seconds: f64) -> u64 {
-    let seconds = if seconds.is_finite() { seconds.clamp(0.0, 30.0) } else { 30.0 };
+    let seconds = if seconds.is_finite() {
+        seconds.clamp(0.0, 30.0)
+    } else {
+        30.0
+    };
     (seconds / FINE_PERIOD_S).ceil() as u64 + 1
 }

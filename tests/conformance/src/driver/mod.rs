@@ -4,7 +4,8 @@ mod host;
 mod watch;
 
 use tandem_sdk::{
-    AxisVector, Driver, DriverContext, DriverDescription, Feedback, MAX_ENABLE_S, Plugin, PluginError, Setpoint,
+    AxisVector, Driver, DriverContext, DriverDescription, Feedback, MAX_ENABLE_S, Plugin,
+    PluginError, Setpoint,
 };
 
 use crate::machine::FINE_PERIOD_S;
@@ -18,7 +19,9 @@ const JOINTS: usize = 3;
 /// Judges a driver.
 pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     let open = |options: &str| plugin.driver(options);
-    let Some(driver) = crate::open(setup, report, open) else { return };
+    let Some(driver) = crate::open(setup, report, open) else {
+        return;
+    };
     let described = driver.describe();
     judge_description(&described, report);
     let simulated = described.simulated != 0;
@@ -28,16 +31,23 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     }
     judge_order(plugin, setup, report);
     let mut timing = Timing::new("exchange");
-    let Some(first) = live(driver, report, &mut timing) else { return };
+    let Some(first) = live(driver, report, &mut timing) else {
+        return;
+    };
     report.time([timing]);
     if !simulated {
         report.skip("determinism", "real drives do not repeat themselves");
         return;
     }
     report.judged("determinism");
-    let again = open(&setup.options).ok().and_then(|driver| live(driver, report, &mut Timing::new("exchange")));
+    let again = open(&setup.options)
+        .ok()
+        .and_then(|driver| live(driver, report, &mut Timing::new("exchange")));
     if again.is_none_or(|again| again != first) {
-        report.find("determinism", "the same setpoints get another feedback".to_string());
+        report.find(
+            "determinism",
+            "the same setpoints get another feedback".to_string(),
+        );
     }
 }
 
@@ -45,9 +55,15 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
 fn judge_description(described: &DriverDescription, report: &mut Report) {
     const CHECK: &str = "times for enabling and disabling";
     report.judged(CHECK);
-    for (key, seconds) in [("enable_s", described.enable_s), ("disable_s", described.disable_s)] {
+    for (key, seconds) in [
+        ("enable_s", described.enable_s),
+        ("disable_s", described.disable_s),
+    ] {
         if !(seconds > 0.0 && seconds <= MAX_ENABLE_S) {
-            report.find(CHECK, format!("{key} is {seconds}: no time in which it could be done"));
+            report.find(
+                CHECK,
+                format!("{key} is {seconds}: no time in which it could be done"),
+            );
         }
     }
 }
@@ -56,19 +72,30 @@ fn judge_description(described: &DriverDescription, report: &mut Report) {
 fn judge_order(plugin: Plugin, setup: &Setup, report: &mut Report) {
     const CHECK: &str = "calls out of order";
     report.judged(CHECK);
-    let Ok(mut driver) = plugin.driver(&setup.options) else { return };
+    let Ok(mut driver) = plugin.driver(&setup.options) else {
+        return;
+    };
     driver.quick_stop();
     let mut feedback = Feedback::default();
     let mut answers = vec![("check", driver.check(&context()))];
-    answers.push(("exchange before open", driver.exchange(&Setpoint::default(), &mut feedback)));
+    answers.push((
+        "exchange before open",
+        driver.exchange(&Setpoint::default(), &mut feedback),
+    ));
     answers.push(("start before open", driver.start().map(|_| ())));
     answers.push(("open", driver.open(&context())));
-    answers.push(("exchange before start", driver.exchange(&Setpoint::default(), &mut feedback)));
+    answers.push((
+        "exchange before start",
+        driver.exchange(&Setpoint::default(), &mut feedback),
+    ));
     answers.push(("start", driver.start().map(|_| ())));
     driver.send(&Setpoint::default());
     answers.push(("stop", driver.stop()));
     answers.push(("stop once more", driver.stop()));
-    answers.push(("exchange after stop", driver.exchange(&Setpoint::default(), &mut feedback)));
+    answers.push((
+        "exchange after stop",
+        driver.exchange(&Setpoint::default(), &mut feedback),
+    ));
     for (what, answer) in answers {
         if let Err(error) = answer
             && error.is_panic()
@@ -89,7 +116,10 @@ fn live(mut driver: Box<dyn Driver>, report: &mut Report, timing: &mut Timing) -
     const CHECK: &str = "lifecycle";
     report.judged(CHECK);
     let mut host = Host::new(driver.as_mut(), report, timing);
-    let answer = host.open().and_then(|()| first_day(&mut host)).and_then(|()| days_after(&mut host));
+    let answer = host
+        .open()
+        .and_then(|()| first_day(&mut host))
+        .and_then(|()| days_after(&mut host));
     let (bits, heap_uses) = host.leave();
     if let Err((method, error)) = answer {
         let check = if error.is_panic() { "panics" } else { CHECK };
@@ -100,7 +130,10 @@ fn live(mut driver: Box<dyn Driver>, report: &mut Report, timing: &mut Timing) -
     if !heap::counts() {
         report.skip("allocation", heap::NOT_COUNTED);
     } else if heap_uses > 0 {
-        report.find("allocation", format!("exchange and quick_stop use the heap {heap_uses} times"));
+        report.find(
+            "allocation",
+            format!("exchange and quick_stop use the heap {heap_uses} times"),
+        );
     } else {
         report.judged("allocation");
     }

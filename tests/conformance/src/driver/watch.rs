@@ -33,7 +33,10 @@ pub struct Watch {
 impl Watch {
     /// From where the joints stand.
     pub fn new(attached: &Attached) -> Self {
-        Self { aim: attached.position, ..Self::default() }
+        Self {
+            aim: attached.position,
+            ..Self::default()
+        }
     }
 
     /// One more exchange.
@@ -42,7 +45,11 @@ impl Watch {
         self.judge_latches(setpoint, feedback, report);
         for joint in 0..JOINTS {
             let step = (setpoint.position[joint] - self.aim[joint]).abs();
-            self.moving[joint] = if step > SURELY_MOVES_MM { self.moving[joint] + 1 } else { 0 };
+            self.moving[joint] = if step > SURELY_MOVES_MM {
+                self.moving[joint] + 1
+            } else {
+                0
+            };
             if let Some(last) = self.last {
                 self.judge_age(joint, setpoint.tick, [&last, feedback], report);
             }
@@ -57,19 +64,31 @@ impl Watch {
         const CHECK: &str = "age of feedback";
         report.judged(CHECK);
         let ages = [last.age_periods[joint], now.age_periods[joint]];
-        let said = |feedback: &Feedback| [feedback.position[joint], feedback.speed[joint]].map(f64::to_bits);
+        let said = |feedback: &Feedback| {
+            [feedback.position[joint], feedback.speed[joint]].map(f64::to_bits)
+        };
         let is_same = said(last) == said(now);
         if ages[1] > ages[0].saturating_add(1) {
-            let words = format!("it was {} periods old, and is {} a period later", ages[0], ages[1]);
+            let words = format!(
+                "it was {} periods old, and is {} a period later",
+                ages[0], ages[1]
+            );
             report.find(CHECK, format!("period {tick}: joint {joint}: {words}"));
         }
         if ages[1] > 0 && ages[1] == ages[0].saturating_add(1) && !is_same {
-            let words = format!("its feedback is {} periods old and not what was told then", ages[1]);
+            let words = format!(
+                "its feedback is {} periods old and not what was told then",
+                ages[1]
+            );
             report.find(CHECK, format!("period {tick}: joint {joint}: {words}"));
         }
-        let has_moved = self.moving[joint] > MAX_DELAY_PERIODS && now.state[joint] == JointState::Enabled;
+        let has_moved =
+            self.moving[joint] > MAX_DELAY_PERIODS && now.state[joint] == JointState::Enabled;
         if ages[1] == 0 && is_same && has_moved {
-            report.find(CHECK, format!("period {tick}: joint {joint} moves, and the old feedback is told as new"));
+            report.find(
+                CHECK,
+                format!("period {tick}: joint {joint} moves, and the old feedback is told as new"),
+            );
         }
         judge_lost(joint, tick, now, report);
     }
@@ -79,7 +98,12 @@ impl Watch {
         const CHECK: &str = "age of inputs";
         report.judged(CHECK);
         let Some(last) = self.last else { return };
-        for (input, (then, age)) in last.input_age_periods.into_iter().zip(now.input_age_periods).enumerate() {
+        for (input, (then, age)) in last
+            .input_age_periods
+            .into_iter()
+            .zip(now.input_age_periods)
+            .enumerate()
+        {
             let bit = |feedback: &Feedback| feedback.inputs >> input & 1;
             if age > then.saturating_add(1) {
                 report.find(
@@ -105,11 +129,22 @@ impl Watch {
             self.armed = Some((setpoint.arm, tick));
         }
         for latch in feedback.latches.iter().filter(|latch| latch.edge != 0) {
-            let came = Arm { input: latch.input, edge: latch.edge };
-            let mut find = |words: String| {
-                report.find(CHECK, format!("period {tick}, edge {} of input {}: {words}", came.edge, came.input));
+            let came = Arm {
+                input: latch.input,
+                edge: latch.edge,
             };
-            let armed = self.armed.is_some_and(|(arm, since)| arm == came && tick <= since + LATCH_PERIODS);
+            let mut find = |words: String| {
+                report.find(
+                    CHECK,
+                    format!(
+                        "period {tick}, edge {} of input {}: {words}",
+                        came.edge, came.input
+                    ),
+                );
+            };
+            let armed = self
+                .armed
+                .is_some_and(|(arm, since)| arm == came && tick <= since + LATCH_PERIODS);
             if !armed {
                 find("a latch of what was not armed".to_string());
             }
@@ -117,7 +152,10 @@ impl Watch {
             if !(0..JOINTS).any(|joint| caught(&joint)) {
                 find("a latch that caught no joint".to_string());
             }
-            if (0..JOINTS).filter(caught).any(|joint| !latch.position[joint].is_finite()) {
+            if (0..JOINTS)
+                .filter(caught)
+                .any(|joint| !latch.position[joint].is_finite())
+            {
                 find("a position that is no number".to_string());
             }
             if !(latch.before_s >= 0.0 && latch.before_s.is_finite()) {
@@ -132,12 +170,21 @@ fn judge_numbers(setpoint: &Setpoint, feedback: &Feedback, report: &mut Report) 
     report.judged(CHECK);
     let tick = setpoint.tick;
     let numbers = [feedback.position, feedback.speed, feedback.current_a];
-    if numbers.iter().any(|v| v.0[..JOINTS].iter().any(|v| !v.is_finite())) {
-        report.find(CHECK, format!("period {tick}: the feedback has a number that is not finite"));
+    if numbers
+        .iter()
+        .any(|v| v.0[..JOINTS].iter().any(|v| !v.is_finite()))
+    {
+        report.find(
+            CHECK,
+            format!("period {tick}: the feedback has a number that is not finite"),
+        );
     }
     if let Some(joint) = (0..JOINTS).find(|joint| !feedback.state[*joint].is_known()) {
         let number = feedback.state[joint].0;
-        report.find(CHECK, format!("period {tick}: the state of joint {joint} is {number}, which stands for none"));
+        report.find(
+            CHECK,
+            format!("period {tick}: the state of joint {joint} is {number}, which stands for none"),
+        );
     }
 }
 
@@ -146,7 +193,8 @@ fn judge_lost(joint: usize, tick: u64, now: &Feedback, report: &mut Report) {
     report.judged(CHECK);
     let age = now.age_periods[joint];
     if age > MOST_AGE && now.state[joint] != JointState::Lost {
-        let words = format!("joint {joint} was last heard of {age} periods ago, and is not told as lost");
+        let words =
+            format!("joint {joint} was last heard of {age} periods ago, and is not told as lost");
         report.find(CHECK, format!("period {tick}: {words}"));
     }
 }

@@ -57,7 +57,11 @@ impl Arc {
 
     /// Fraction of the nearest point, beyond the ends by less than half a turn.
     pub fn foot(&self, point: &Position) -> f64 {
-        if dot(&self.along, &self.along) == 0.0 { self.foot_in_plane(point) } else { self.foot_on_helix(point) }
+        if dot(&self.along, &self.along) == 0.0 {
+            self.foot_in_plane(point)
+        } else {
+            self.foot_on_helix(point)
+        }
     }
 
     /// A fraction within reach of the point, soon after the first one; `low` is out of reach and `nearest` within.
@@ -86,7 +90,8 @@ impl Arc {
     fn foot_on_helix(&self, point: &Position) -> f64 {
         let start = self.at(0.0);
         let chord = minus(&self.at(1.0), &start);
-        let mut fraction = (dot(&minus(point, &start), &chord) / dot(&chord, &chord)).clamp(0.0, 1.0);
+        let mut fraction =
+            (dot(&minus(point, &start), &chord) / dot(&chord, &chord)).clamp(0.0, 1.0);
         for _ in 0..NEWTON_STEPS {
             let step = self.newton_step(point, fraction);
             fraction -= step;
@@ -101,15 +106,24 @@ impl Arc {
     fn newton_step(&self, point: &Position, fraction: f64) -> f64 {
         let [first, second] = self.plane;
         let here = self.at(fraction);
-        let from_center = [here[first] - self.center_mm[0], here[second] - self.center_mm[1]];
+        let from_center = [
+            here[first] - self.center_mm[0],
+            here[second] - self.center_mm[1],
+        ];
         let mut velocity = self.along;
         velocity[first] = -self.sweep_rad * from_center[1];
         velocity[second] = self.sweep_rad * from_center[0];
         let off = minus(&here, point);
-        let bend = -self.sweep_rad.powi(2) * (off[first] * from_center[0] + off[second] * from_center[1]);
+        let bend =
+            -self.sweep_rad.powi(2) * (off[first] * from_center[0] + off[second] * from_center[1]);
         let speed_squared = dot(&velocity, &velocity);
         let slope = speed_squared + bend;
         // Near the axis of the helix the distance is not convex; a step of steepest descent is safe there.
-        dot(&off, &velocity) / if slope > 0.1 * speed_squared { slope } else { speed_squared }
+        dot(&off, &velocity)
+            / if slope > 0.1 * speed_squared {
+                slope
+            } else {
+                speed_squared
+            }
     }
 }

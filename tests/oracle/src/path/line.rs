@@ -16,7 +16,12 @@ pub struct Line {
 impl Line {
     pub fn new(from: Position, to: Position) -> Self {
         let along = minus(&to, &from);
-        Self { from, to, along, length_squared: dot(&along, &along) }
+        Self {
+            from,
+            to,
+            along,
+            length_squared: dot(&along, &along),
+        }
     }
 
     pub fn at(&self, fraction: f64) -> Position {

@@ -52,9 +52,14 @@ impl Nurbs {
     pub fn check(&self) -> Result<(), String> {
         let (points, order) = (self.points.len(), self.degree + 1);
         if points < order || self.weights.len() != points || self.knots.len() != points + order {
-            return Err(format!("a curve with {points} control points and {} knots", self.knots.len()));
+            return Err(format!(
+                "a curve with {points} control points and {} knots",
+                self.knots.len()
+            ));
         }
-        if self.knots.windows(2).any(|pair| pair[1] < pair[0]) || self.weights.iter().any(|&weight| weight <= 0.0) {
+        if self.knots.windows(2).any(|pair| pair[1] < pair[0])
+            || self.weights.iter().any(|&weight| weight <= 0.0)
+        {
             return Err("a curve with falling knots or a weight that is not positive".into());
         }
         Ok(())
@@ -78,7 +83,14 @@ impl Nurbs {
         let (degree, first) = (self.degree, span - self.degree);
         let mut points: Vec<(Position, f64)> = (first..=span)
             .map(|index| {
-                (plus_scaled(&Position::default(), self.weights[index], &self.points[index]), self.weights[index])
+                (
+                    plus_scaled(
+                        &Position::default(),
+                        self.weights[index],
+                        &self.points[index],
+                    ),
+                    self.weights[index],
+                )
             })
             .collect();
         let mut rate = (Position::default(), 0.0);
@@ -86,10 +98,16 @@ impl Nurbs {
             if level == degree {
                 let scale = degree as f64 / (self.knots[span + 1] - self.knots[span]);
                 let (before, after) = (points[degree - 1], points[degree]);
-                rate = (minus(&after.0, &before.0).map(|part| scale * part), scale * (after.1 - before.1));
+                rate = (
+                    minus(&after.0, &before.0).map(|part| scale * part),
+                    scale * (after.1 - before.1),
+                );
             }
             for index in (level..=degree).rev() {
-                let (low, high) = (self.knots[first + index], self.knots[span + 1 + index - level]);
+                let (low, high) = (
+                    self.knots[first + index],
+                    self.knots[span + 1 + index - level],
+                );
                 let share = (u - low) / (high - low);
                 let ((a, v), (b, w)) = (points[index - 1], points[index]);
                 points[index] = (plus_scaled(&a, share, &minus(&b, &a)), v + share * (w - v));
@@ -97,13 +115,22 @@ impl Nurbs {
         }
         let (at, weight) = points[degree];
         let position = at.map(|part| part / weight);
-        (position, plus_scaled(&rate.0, -rate.1, &position).map(|part| part / weight))
+        (
+            position,
+            plus_scaled(&rate.0, -rate.1, &position).map(|part| part / weight),
+        )
     }
 }
 
 impl Curve {
     fn new(nurbs: &Rc<Nurbs>, span: usize, from: f64, to: f64) -> Self {
-        let mut curve = Self { nurbs: Rc::clone(nurbs), span, from, to, length_mm: 0.0 };
+        let mut curve = Self {
+            nurbs: Rc::clone(nurbs),
+            span,
+            from,
+            to,
+            length_mm: 0.0,
+        };
         // What chords leave out goes with the square of their length: that of twice as long ones shows how much it is.
         let (sum_mm, coarse_mm) = (curve.chords_mm(CHORDS), curve.chords_mm(CHORDS / 2));
         curve.length_mm = sum_mm + (sum_mm - coarse_mm) / 3.0;
@@ -111,8 +138,12 @@ impl Curve {
     }
 
     fn chords_mm(&self, count: usize) -> f64 {
-        let ends: Vec<Position> = (0..=count).map(|step| self.at(step as f64 / count as f64)).collect();
-        ends.windows(2).map(|pair| distance(&pair[0], &pair[1])).sum()
+        let ends: Vec<Position> = (0..=count)
+            .map(|step| self.at(step as f64 / count as f64))
+            .collect();
+        ends.windows(2)
+            .map(|pair| distance(&pair[0], &pair[1]))
+            .sum()
     }
 
     fn cut(self, pieces: &mut Vec<Self>) {
@@ -132,13 +163,22 @@ impl Curve {
         if self.length_mm < SHORTEST_MM {
             return true;
         }
-        let ends: Vec<Position> = (0..=TRIED).map(|step| self.at(step as f64 / TRIED as f64)).collect();
-        let chords: Vec<Position> = ends.windows(2).map(|pair| minus(&pair[1], &pair[0])).collect();
-        let lengths: Vec<f64> = chords.iter().map(|chord| dot(chord, chord).sqrt()).collect();
+        let ends: Vec<Position> = (0..=TRIED)
+            .map(|step| self.at(step as f64 / TRIED as f64))
+            .collect();
+        let chords: Vec<Position> = ends
+            .windows(2)
+            .map(|pair| minus(&pair[1], &pair[0]))
+            .collect();
+        let lengths: Vec<f64> = chords
+            .iter()
+            .map(|chord| dot(chord, chord).sqrt())
+            .collect();
         let longest = lengths.iter().copied().fold(0.0, f64::max);
         let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
         let cosine = |i: usize, k: usize| dot(&chords[i], &chords[k]) / (lengths[i] * lengths[k]);
-        longest <= GREATEST_RATIO * shortest && (1..TRIED).all(|k| cosine(0, k) > GREATEST_TURN_RAD.cos())
+        longest <= GREATEST_RATIO * shortest
+            && (1..TRIED).all(|k| cosine(0, k) > GREATEST_TURN_RAD.cos())
     }
 
     fn parameter(&self, fraction: f64) -> f64 {
@@ -158,7 +198,11 @@ impl Curve {
     }
 
     pub fn reversed(&self) -> Self {
-        Self { from: self.to, to: self.from, ..self.clone() }
+        Self {
+            from: self.to,
+            to: self.from,
+            ..self.clone()
+        }
     }
 
     /// Fraction of the nearest point of the piece: the best of many points, improved.
@@ -182,7 +226,11 @@ impl Curve {
                 share /= 2.0;
             }
         }
-        if self.step(point, best).abs() < SETTLED { best } else { self.narrowed(point, best) }
+        if self.step(point, best).abs() < SETTLED {
+            best
+        } else {
+            self.narrowed(point, best)
+        }
     }
 
     /// `best` or a nearer point beside it, found without its steps: where the point is near the center of curvature they hardly
@@ -200,14 +248,22 @@ impl Curve {
             }
         }
         let found = f64::midpoint(low, high);
-        if off_mm(found) < off_mm(best) { found } else { best }
+        if off_mm(found) < off_mm(best) {
+            found
+        } else {
+            best
+        }
     }
 
     /// The step towards the place where the line to the point is square to the curve, as if the curve were straight.
     fn step(&self, point: &Position, fraction: f64) -> f64 {
         let (here, rate) = self.nurbs.evaluate(self.span, self.parameter(fraction));
         let squared = dot(&rate, &rate);
-        if squared > 0.0 { dot(&minus(point, &here), &rate) / squared / (self.to - self.from) } else { 0.0 }
+        if squared > 0.0 {
+            dot(&minus(point, &here), &rate) / squared / (self.to - self.from)
+        } else {
+            0.0
+        }
     }
 
     /// A fraction within reach of the point, soon after the first one; `low` is out of reach and `nearest` within.

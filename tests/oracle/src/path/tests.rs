@@ -12,8 +12,21 @@ fn at(x: f64, y: f64, z: f64) -> Position {
 }
 
 fn arc(radius_mm: f64, start_rad: f64, sweep_rad: f64, rise_mm: f64) -> Shape {
-    let (from, along, plane, center_mm) = (at(0.0, 0.0, 1.0), at(0.0, 0.0, rise_mm), [0, 1], [1.0, -2.0]);
-    Shape::Arc(Arc { from, along, plane, center_mm, radius_mm, start_rad, sweep_rad })
+    let (from, along, plane, center_mm) = (
+        at(0.0, 0.0, 1.0),
+        at(0.0, 0.0, rise_mm),
+        [0, 1],
+        [1.0, -2.0],
+    );
+    Shape::Arc(Arc {
+        from,
+        along,
+        plane,
+        center_mm,
+        radius_mm,
+        start_rad,
+        sweep_rad,
+    })
 }
 
 /// Lines, arcs and helices of a radius from 1 to 20 mm, as the reader cuts them.
@@ -21,22 +34,42 @@ fn shapes() -> impl Strategy<Value = Shape> {
     let coordinate = || -10.0..10.0_f64;
     let line = [coordinate(), coordinate(), coordinate()]
         .prop_map(|[x, y, z]| Shape::Line(Line::new(at(1.0, 1.0, 1.0), at(x, y, z))));
-    let curved = (1.0..20.0_f64, -3.0..3.0_f64, 0.05..0.39_f64, any::<bool>(), prop_oneof![Just(0.0), -5.0..5.0_f64]);
+    let curved = (
+        1.0..20.0_f64,
+        -3.0..3.0_f64,
+        0.05..0.39_f64,
+        any::<bool>(),
+        prop_oneof![Just(0.0), -5.0..5.0_f64],
+    );
     let curved = curved.prop_map(|(radius_mm, start_rad, sweep_rad, clockwise, rise_mm)| {
-        arc(radius_mm, start_rad, if clockwise { -sweep_rad } else { sweep_rad }, rise_mm)
+        arc(
+            radius_mm,
+            start_rad,
+            if clockwise { -sweep_rad } else { sweep_rad },
+            rise_mm,
+        )
     });
     prop_oneof![line, curved, curves()]
 }
 
 /// A piece of a rational curve of any degree.
 fn curves() -> impl Strategy<Value = Shape> {
-    let point = [-10.0..10.0_f64, -10.0..10.0_f64, -10.0..10.0_f64].prop_map(|[x, y, z]| at(x, y, z));
+    let point =
+        [-10.0..10.0_f64, -10.0..10.0_f64, -10.0..10.0_f64].prop_map(|[x, y, z]| at(x, y, z));
     let points = prop::collection::vec((point, 0.3..3.0_f64), 2..=6);
     (points, any::<prop::sample::Index>()).prop_map(|(points, which)| {
         let order = points.len();
-        let knots = (0..2 * order).map(|index| if index < order { 0.0 } else { 1.0 }).collect();
+        let knots = (0..2 * order)
+            .map(|index| if index < order { 0.0 } else { 1.0 })
+            .collect();
         let (points, weights) = points.into_iter().unzip();
-        let pieces = Nurbs { degree: order - 1, points, weights, knots }.pieces();
+        let pieces = Nurbs {
+            degree: order - 1,
+            points,
+            weights,
+            knots,
+        }
+        .pieces();
         Shape::Curve(which.get(&pieces).clone())
     })
 }
@@ -78,7 +111,14 @@ proptest! {
 fn a_point_half_way_to_the_axis_of_a_helix() {
     let helix = arc(10.0, 0.3, 0.39, 3.0);
     let middle = helix.at(0.6);
-    let inside = at(f64::midpoint(middle[0], 1.0), f64::midpoint(middle[1], -2.0), middle[2]);
+    let inside = at(
+        f64::midpoint(middle[0], 1.0),
+        f64::midpoint(middle[1], -2.0),
+        middle[2],
+    );
     let (fraction, off_mm) = helix.nearest(&inside, 0.0, 1.0);
-    assert!((fraction - 0.6).abs() < 1e-12 && (off_mm - 5.0).abs() < 1e-12, "{fraction} {off_mm}");
+    assert!(
+        (fraction - 0.6).abs() < 1e-12 && (off_mm - 5.0).abs() < 1e-12,
+        "{fraction} {off_mm}"
+    );
 }

@@ -22,17 +22,30 @@ const QUIET_M_CODES: [i32; 13] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 48, 49, 60, 61];
 impl State<'_> {
     /// Puts the codes of a line in force.
     pub fn modal_codes(&mut self, line: &mut Line) -> Result<LineCodes, String> {
-        let mut codes =
-            LineCodes { axis_words: AxisWords::Motion, once: None, machine_coordinates: false, ends: false };
+        let mut codes = LineCodes {
+            axis_words: AxisWords::Motion,
+            once: None,
+            machine_coordinates: false,
+            ends: false,
+        };
         // Units first: they hold for every other word of the line.
         for &code in line.g.iter().filter(|&&code| code == 200 || code == 210) {
             self.unit_mm = if code == 200 { 25.4 } else { 1.0 };
         }
-        if line.g.iter().filter(|&&code| matches!(code, 0..=30 | 310 | 382..=385)).count() > 1 {
+        if line
+            .g
+            .iter()
+            .filter(|&&code| matches!(code, 0..=30 | 310 | 382..=385))
+            .count()
+            > 1
+        {
             return Err("two motion words".into());
         }
         for code in std::mem::take(&mut line.g) {
-            if !self.geometry_code(code) && !self.path_code(code, line)? && !line_code(code, &mut codes)? {
+            if !self.geometry_code(code)
+                && !self.path_code(code, line)?
+                && !line_code(code, &mut codes)?
+            {
                 return Err(format!("unknown word G{}", f64::from(code) / 10.0));
             }
         }
@@ -45,7 +58,11 @@ impl State<'_> {
         match code {
             0 => self.motion = Some(Motion::Rapid),
             10 => self.motion = Some(Motion::Feed),
-            20 | 30 => self.motion = Some(Motion::Arc { clockwise: code == 20 }),
+            20 | 30 => {
+                self.motion = Some(Motion::Arc {
+                    clockwise: code == 20,
+                })
+            }
             382..=385 => self.motion = Some(Motion::Probe),
             800 => self.motion = None,
             170 => self.plane = [0, 1, 2],
@@ -70,7 +87,10 @@ impl State<'_> {
             640 => {
                 self.exact_stop = false;
                 // P0 asks for no tolerance of its own.
-                self.tolerance_mm = line.take('P').filter(|&tolerance| tolerance > 0.0).map(|mm| mm * self.unit_mm);
+                self.tolerance_mm = line
+                    .take('P')
+                    .filter(|&tolerance| tolerance > 0.0)
+                    .map(|mm| mm * self.unit_mm);
                 // Q joins collinear lines, which changes nothing of the path.
                 line.take('Q');
             }

@@ -22,7 +22,10 @@ pub struct Open {
 
 /// The code of a line that opens a curve or is one.
 pub fn code(line: &Line) -> Option<i32> {
-    line.g.iter().copied().find(|code| matches!(code, 50..=52 | 62))
+    line.g
+        .iter()
+        .copied()
+        .find(|code| matches!(code, 50..=52 | 62))
 }
 
 impl State<'_> {
@@ -36,12 +39,22 @@ impl State<'_> {
     }
 
     fn open(&mut self, fanuc: bool, line: &mut Line, number: usize) -> Result<(), String> {
-        let mut open =
-            Open { line: number, fanuc, order: None, points: vec![self.position], weights: vec![], knots: vec![] };
+        let mut open = Open {
+            line: number,
+            fanuc,
+            order: None,
+            points: vec![self.position],
+            weights: vec![],
+            knots: vec![],
+        };
         if fanuc {
             open.order = Some(line.take('P').map_or(4, |order| order as usize));
             for (axis, value) in self.take_axes(line)? {
-                let value = if self.incremental { self.position[axis] + value } else { value + self.offset_mm(axis) };
+                let value = if self.incremental {
+                    self.position[axis] + value
+                } else {
+                    value + self.offset_mm(axis)
+                };
                 if (value - self.position[axis]).abs() > 1e-5 {
                     return Err("G6.2 that does not begin where the machine stands".into());
                 }
@@ -50,7 +63,11 @@ impl State<'_> {
             open.knots.push(line.take('K').ok_or("G6.2 without K")?);
         } else {
             let bare = !crate::LETTERS.iter().any(|&letter| line.has(letter));
-            open.weights.push(if bare { line.take('P').unwrap_or(1.0) } else { 1.0 });
+            open.weights.push(if bare {
+                line.take('P').unwrap_or(1.0)
+            } else {
+                1.0
+            });
             open.order = line.take('L').map(|order| order as usize);
             if !bare {
                 self.add_point(&mut open, line, 'P')?;
@@ -92,8 +109,11 @@ impl State<'_> {
 
     fn add_point(&mut self, open: &mut Open, line: &mut Line, weight: char) -> Result<(), String> {
         for (axis, value) in self.take_axes(line)? {
-            self.position[axis] =
-                if self.incremental { self.position[axis] + value } else { value + self.offset_mm(axis) };
+            self.position[axis] = if self.incremental {
+                self.position[axis] + value
+            } else {
+                value + self.offset_mm(axis)
+            };
         }
         open.points.push(self.position);
         open.weights.push(line.take(weight).unwrap_or(1.0));
@@ -105,8 +125,17 @@ impl State<'_> {
         if !(2..=6).contains(&order) {
             return Err(format!("a curve of order {order}"));
         }
-        let knots = if open.fanuc { open.knots } else { uniform(order, count) };
-        let curve = Nurbs { degree: order - 1, points: open.points, weights: open.weights, knots };
+        let knots = if open.fanuc {
+            open.knots
+        } else {
+            uniform(order, count)
+        };
+        let curve = Nurbs {
+            degree: order - 1,
+            points: open.points,
+            weights: open.weights,
+            knots,
+        };
         self.add_curve(curve, open.line)
     }
 
@@ -119,7 +148,11 @@ impl State<'_> {
         }
         let start = self.position;
         for (axis, value) in self.take_axes(line)? {
-            self.position[axis] = if self.incremental { start[axis] + value } else { value + self.offset_mm(axis) };
+            self.position[axis] = if self.incremental {
+                start[axis] + value
+            } else {
+                value + self.offset_mm(axis)
+            };
         }
         let unit_mm = self.unit_mm;
         let mut beside = |from: &Position, letters: [char; 2]| {
@@ -136,7 +169,15 @@ impl State<'_> {
         points.push(self.position);
         let (order, weights) = (points.len(), vec![1.0; points.len()]);
         let knots = uniform(order, order);
-        self.add_curve(Nurbs { degree: order - 1, points, weights, knots }, number)
+        self.add_curve(
+            Nurbs {
+                degree: order - 1,
+                points,
+                weights,
+                knots,
+            },
+            number,
+        )
     }
 
     fn add_curve(&mut self, curve: Nurbs, number: usize) -> Result<(), String> {
@@ -152,5 +193,7 @@ impl State<'_> {
 
 /// Clamped knots, one apart inside.
 fn uniform(order: usize, points: usize) -> Vec<f64> {
-    (0..order + points).map(|index| index.max(order - 1).min(points) as f64).collect()
+    (0..order + points)
+        .map(|index| index.max(order - 1).min(points) as f64)
+        .collect()
 }

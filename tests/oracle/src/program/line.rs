@@ -43,7 +43,11 @@ impl Line {
     /// The first word that nobody took.
     pub fn left_over(&self) -> Option<String> {
         let index = self.values.iter().position(Option::is_some)?;
-        Some(format!("{}{}", char::from(b'A' + index as u8), self.values[index]?))
+        Some(format!(
+            "{}{}",
+            char::from(b'A' + index as u8),
+            self.values[index]?
+        ))
     }
 
     fn add(&mut self, letter: char, value: f64) -> Result<(), String> {
@@ -77,9 +81,13 @@ fn number(letter: char, rest: &str) -> Result<(f64, &str), String> {
         return Err(format!("unknown word {letter}{rest}"));
     }
     let signed = usize::from(rest.starts_with(['+', '-']));
-    let digits = rest[signed..].find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len() - signed);
+    let digits = rest[signed..]
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(rest.len() - signed);
     let (text, after) = rest.split_at(signed + digits);
-    let value = text.parse().map_err(|_| format!("unknown word {letter}{rest}"))?;
+    let value = text
+        .parse()
+        .map_err(|_| format!("unknown word {letter}{rest}"))?;
     Ok((value, after))
 }
 
@@ -98,5 +106,9 @@ pub fn without_comments(text: &str) -> Result<String, String> {
             _ => words.push(c.to_ascii_uppercase()),
         }
     }
-    if depth > 0 { Err("comment without an end".into()) } else { Ok(words) }
+    if depth > 0 {
+        Err("comment without an end".into())
+    } else {
+        Ok(words)
+    }
 }

@@ -21,13 +21,26 @@ const GREATEST_SWEEP_RAD: f64 = PI / 8.0;
 
 impl State<'_> {
     /// Moves to where the axis words of a line say.
-    pub fn move_axes(&mut self, line: &mut Line, codes: &LineCodes, number: usize) -> Result<(), String> {
+    pub fn move_axes(
+        &mut self,
+        line: &mut Line,
+        codes: &LineCodes,
+        number: usize,
+    ) -> Result<(), String> {
         let axes = self.take_axes(line)?;
         let is_arc = codes.once.is_none() && matches!(self.motion, Some(Motion::Arc { .. }));
-        if axes.is_empty() && !(is_arc && ['I', 'J', 'K', 'R'].into_iter().any(|letter| line.has(letter))) {
+        if axes.is_empty()
+            && !(is_arc
+                && ['I', 'J', 'K', 'R']
+                    .into_iter()
+                    .any(|letter| line.has(letter)))
+        {
             return Ok(());
         }
-        let motion = codes.once.or(self.motion).ok_or("axis words without a motion word")?;
+        let motion = codes
+            .once
+            .or(self.motion)
+            .ok_or("axis words without a motion word")?;
         if is_arc && codes.machine_coordinates {
             return Err("G53 with an arc".into());
         }
@@ -61,13 +74,20 @@ impl State<'_> {
     /// comes to rest beside the line is off its path.
     fn probed(&self, target: Position, number: usize) -> Position {
         let rest = self.rows.iter().rfind(|row| row.line as usize == number);
-        let Some(rest) = rest.filter(|_| target != self.position) else { return target };
+        let Some(rest) = rest.filter(|_| target != self.position) else {
+            return target;
+        };
         let line = path::Line::new(self.position, target);
         line.at(line.foot(&rest.command).clamp(0.0, 1.0))
     }
 
     /// Appends pieces of one block to the path.
-    pub fn append(&mut self, shapes: Vec<Shape>, motion: Motion, number: usize) -> Result<(), String> {
+    pub fn append(
+        &mut self,
+        shapes: Vec<Shape>,
+        motion: Motion,
+        number: usize,
+    ) -> Result<(), String> {
         if shapes.is_empty() {
             return Ok(());
         }
@@ -82,24 +102,35 @@ impl State<'_> {
         let feed = if motion == Motion::Rapid {
             Feed::Rapid
         } else {
-            let length_mm = shapes.iter().map(|shape| counted_length_mm(shape, &counted)).sum();
+            let length_mm = shapes
+                .iter()
+                .map(|shape| counted_length_mm(shape, &counted))
+                .sum();
             Feed::PerSecond(self.feed_per_s(length_mm, moves_linear)?)
         };
         let last = shapes.len() - 1;
-        self.elements.extend(shapes.into_iter().enumerate().map(|(index, shape)| Element {
-            line: number as u32,
-            shape,
-            feed,
-            moves_linear,
-            tolerance_mm: self.tolerance_mm.unwrap_or(self.machine.path_tolerance_mm),
-            exact_stop: (self.exact_stop || motion == Motion::Probe) && index == last,
-        }));
+        self.elements.extend(
+            shapes
+                .into_iter()
+                .enumerate()
+                .map(|(index, shape)| Element {
+                    line: number as u32,
+                    shape,
+                    feed,
+                    moves_linear,
+                    tolerance_mm: self.tolerance_mm.unwrap_or(self.machine.path_tolerance_mm),
+                    exact_stop: (self.exact_stop || motion == Motion::Probe) && index == last,
+                }),
+        );
         Ok(())
     }
 
     /// The programmed feed in mm/s, or deg/s where no linear axis moves.
     fn feed_per_s(&self, length_mm: f64, moves_linear: bool) -> Result<f64, String> {
-        let (feed, unit_mm) = self.feed.filter(|&(feed, _)| feed > 0.0).ok_or("motion without a feed")?;
+        let (feed, unit_mm) = self
+            .feed
+            .filter(|&(feed, _)| feed > 0.0)
+            .ok_or("motion without a feed")?;
         let per_minute = match (self.feed_mode, moves_linear) {
             (FeedMode::InverseTime, _) => feed * length_mm,
             (FeedMode::PerMinute, true) => feed * unit_mm,
@@ -111,8 +142,12 @@ impl State<'_> {
 
 /// Length over the axes that path speed counts.
 fn counted_length_mm(shape: &Shape, counted: &impl Fn(usize) -> bool) -> f64 {
-    let squares =
-        |along: &Position| (0..along.len()).filter(|&axis| counted(axis)).map(|axis| along[axis].powi(2)).sum();
+    let squares = |along: &Position| {
+        (0..along.len())
+            .filter(|&axis| counted(axis))
+            .map(|axis| along[axis].powi(2))
+            .sum()
+    };
     match shape {
         Shape::Line(_) => {
             let squared: f64 = squares(&minus(&shape.at(1.0), &shape.at(0.0)));
@@ -120,7 +155,8 @@ fn counted_length_mm(shape: &Shape, counted: &impl Fn(usize) -> bool) -> f64 {
         }
         Shape::Curve(_) => {
             let chord = |step: u32| {
-                let ends = [step, step + 1].map(|step| shape.at(f64::from(step) / f64::from(CHORDS)));
+                let ends =
+                    [step, step + 1].map(|step| shape.at(f64::from(step) / f64::from(CHORDS)));
                 let squared: f64 = squares(&minus(&ends[1], &ends[0]));
                 squared.sqrt()
             };
@@ -136,5 +172,7 @@ fn counted_length_mm(shape: &Shape, counted: &impl Fn(usize) -> bool) -> f64 {
 fn pieces(arc: &path::Arc) -> Vec<Shape> {
     let count = (arc.sweep_rad.abs() / GREATEST_SWEEP_RAD).ceil().max(1.0) as usize;
     let fraction = |index: usize| index as f64 / count as f64;
-    (0..count).map(|index| Shape::Arc(arc.part(fraction(index), fraction(index + 1)))).collect()
+    (0..count)
+        .map(|index| Shape::Arc(arc.part(fraction(index), fraction(index + 1))))
+        .collect()
 }

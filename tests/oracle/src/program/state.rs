@@ -94,7 +94,10 @@ impl<'a> State<'a> {
     pub fn into_path(self) -> Result<Path, String> {
         match self.curve {
             Some(_) => Err("a curve that is not complete".into()),
-            None => Ok(Path { elements: self.elements, end: self.position }),
+            None => Ok(Path {
+                elements: self.elements,
+                end: self.position,
+            }),
         }
     }
 
@@ -128,7 +131,11 @@ impl<'a> State<'a> {
 
     /// mm or degrees of an axis per unit of the program.
     pub fn scale(&self, axis: usize) -> f64 {
-        if self.machine.axis(axis).is_some_and(|axis| axis.rotary) { 1.0 } else { self.unit_mm }
+        if self.machine.axis(axis).is_some_and(|axis| axis.rotary) {
+            1.0
+        } else {
+            self.unit_mm
+        }
     }
 
     /// Takes the axis words out of a line: axis and value in mm or degrees.
@@ -136,7 +143,9 @@ impl<'a> State<'a> {
         let mut axes = Vec::new();
         for (axis, &letter) in LETTERS.iter().enumerate() {
             if let Some(value) = line.take(letter) {
-                self.machine.axis(axis).ok_or_else(|| format!("the machine has no axis {letter}"))?;
+                self.machine
+                    .axis(axis)
+                    .ok_or_else(|| format!("the machine has no axis {letter}"))?;
                 axes.push((axis, value * self.scale(axis)));
             }
         }
@@ -166,9 +175,17 @@ impl<'a> State<'a> {
         if self.incremental && !here {
             return Err("G10 L2 with G91: controls differ in what it means".into());
         }
-        let system = if system == 0.0 { self.work_system } else { system as usize - 1 };
+        let system = if system == 0.0 {
+            self.work_system
+        } else {
+            system as usize - 1
+        };
         for (axis, value) in self.take_axes(line)? {
-            let origin = if here { self.position[axis] - self.shift[axis] - value } else { value };
+            let origin = if here {
+                self.position[axis] - self.shift[axis] - value
+            } else {
+                value
+            };
             self.work_offsets[system][axis] = origin;
         }
         Ok(())
@@ -176,7 +193,8 @@ impl<'a> State<'a> {
 
     fn set_shift(&mut self, line: &mut Line) -> Result<(), String> {
         for (axis, value) in self.take_axes(line)? {
-            self.shift[axis] = self.position[axis] - self.work_offsets[self.work_system][axis] - value;
+            self.shift[axis] =
+                self.position[axis] - self.work_offsets[self.work_system][axis] - value;
         }
         Ok(())
     }

@@ -30,14 +30,22 @@ impl fmt::Display for Verdict {
 
 impl fmt::Display for Finding {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "sample {} ({:.6} s, line {}): ", self.sample, self.t_s, self.line)?;
+        write!(
+            out,
+            "sample {} ({:.6} s, line {}): ",
+            self.sample, self.t_s, self.line
+        )?;
         match (&self.joint, self.axis) {
             (Some(joint), _) => write!(out, "joint {joint} ")?,
             (None, Some(axis)) => write!(out, "{} ", LETTERS[axis])?,
             (None, None) => {}
         }
         let (what, unit) = self.kind.describe();
-        write!(out, "{what}: {:.9} {unit}, limit {:.9}", self.value, self.limit)
+        write!(
+            out,
+            "{what}: {:.9} {unit}, limit {:.9}",
+            self.value, self.limit
+        )
     }
 }
 
@@ -63,13 +71,22 @@ impl Kind {
 
 impl fmt::Display for Maxima {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let axes = self.axes.iter().map(|axis| (LETTERS[axis.axis].to_string(), axis));
-        let joints = self.joints.iter().map(|(name, joint)| (format!("joint {name}"), joint));
+        let axes = self
+            .axes
+            .iter()
+            .map(|axis| (LETTERS[axis.axis].to_string(), axis));
+        let joints = self
+            .joints
+            .iter()
+            .map(|(name, joint)| (format!("joint {name}"), joint));
         for (name, axis) in axes.chain(joints) {
             writeln!(
                 out,
                 "{name}: speed {:.6} /s, acceleration {:.6} /s², step {:.6} /s, jerk {:.3} /s³",
-                axis.velocity_mm_per_s, axis.acceleration_mm_per_s2, axis.speed_step_mm_per_s, axis.jerk_mm_per_s3
+                axis.velocity_mm_per_s,
+                axis.acceleration_mm_per_s2,
+                axis.speed_step_mm_per_s,
+                axis.jerk_mm_per_s3
             )?;
         }
         write!(

@@ -47,7 +47,10 @@ pub fn machine() -> Machine {
 
 /// A machine whose planner may not step speeds.
 pub fn smooth_machine() -> Machine {
-    Machine { planner: "smooth".into(), ..machine() }
+    Machine {
+        planner: "smooth".into(),
+        ..machine()
+    }
 }
 
 pub fn at(x: f64, y: f64, z: f64) -> Position {
@@ -67,7 +70,11 @@ impl Profile {
         let peak = peak.min(reachable);
         let up = (peak * peak - from * from) / (2.0 * acceleration);
         let down = (peak * peak - to * to) / (2.0 * acceleration);
-        self.stretches.extend([[from, peak, up], [peak, peak, length - up - down], [peak, to, down]]);
+        self.stretches.extend([
+            [from, peak, up],
+            [peak, peak, length - up - down],
+            [peak, to, down],
+        ]);
         self
     }
 
@@ -83,9 +90,16 @@ impl Profile {
     pub fn at(&self, t_s: f64) -> (f64, bool) {
         let (mut before, mut left) = (0.0, t_s);
         for &[from, to, length] in &self.stretches {
-            let duration = if length > 1e-12 { 2.0 * length / (from + to) } else { 0.0 };
+            let duration = if length > 1e-12 {
+                2.0 * length / (from + to)
+            } else {
+                0.0
+            };
             if left < duration {
-                return (before + from * left + (to - from) / duration * left * left / 2.0, false);
+                return (
+                    before + from * left + (to - from) / duration * left * left / 2.0,
+                    false,
+                );
             }
             left -= duration;
             before += length;
@@ -115,7 +129,9 @@ pub fn polyline(points: Vec<Position>) -> impl Fn(f64) -> Position {
         for pair in points.windows(2) {
             let piece = gap(&pair[0], &pair[1]);
             if left < piece {
-                return std::array::from_fn(|axis| pair[0][axis] + left / piece * (pair[1][axis] - pair[0][axis]));
+                return std::array::from_fn(|axis| {
+                    pair[0][axis] + left / piece * (pair[1][axis] - pair[0][axis])
+                });
             }
             left -= piece;
         }
@@ -124,7 +140,11 @@ pub fn polyline(points: Vec<Position>) -> impl Fn(f64) -> Position {
 }
 
 pub fn gap(a: &Position, b: &Position) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// A run that stops at every vertex.
@@ -142,7 +162,12 @@ pub fn trace(samples: &[Position]) -> Trace {
 }
 
 pub fn verdict(samples: &[Position], program: &str) -> Verdict {
-    judge(&trace(samples), program, &smooth_machine(), &Options::default())
+    judge(
+        &trace(samples),
+        program,
+        &smooth_machine(),
+        &Options::default(),
+    )
 }
 
 #[track_caller]

@@ -16,11 +16,26 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/policy", &["tandem-motion", "tandem-sdk"]),
     ("core/machine", &["tandem-sdk"]),
     ("core/rings", &["tandem-sdk"]),
-    ("core/state", &["tandem-gcode", "tandem-machine", "tandem-sdk"]),
+    (
+        "core/state",
+        &["tandem-gcode", "tandem-machine", "tandem-sdk"],
+    ),
     ("core/fine", &["tandem-rings", "tandem-sdk"]),
     ("core/trace", &["tandem-rings", "tandem-sdk"]),
-    ("core/recorder", &["tandem-fine", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"]),
-    ("core/rough", &["tandem-gcode", "tandem-rings", "tandem-sdk"]),
+    (
+        "core/recorder",
+        &[
+            "tandem-fine",
+            "tandem-machine",
+            "tandem-motion",
+            "tandem-rings",
+            "tandem-sdk",
+        ],
+    ),
+    (
+        "core/rough",
+        &["tandem-gcode", "tandem-rings", "tandem-sdk"],
+    ),
     (
         "core/host",
         &[
@@ -51,13 +66,23 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     (
         "core/estimate",
-        &["tandem-gcode", "tandem-host", "tandem-machine", "tandem-motion", "tandem-rings", "tandem-sdk"],
+        &[
+            "tandem-gcode",
+            "tandem-host",
+            "tandem-machine",
+            "tandem-motion",
+            "tandem-rings",
+            "tandem-sdk",
+        ],
     ),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     // It reads a table of the machine file, and no hardware.
     ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),
     ("hal-drivers/ethercat-emulator", &[]),
-    ("hal-drivers/ethercat", &["tandem-ethercat-emulator", "tandem-sdk"]),
+    (
+        "hal-drivers/ethercat",
+        &["tandem-ethercat-emulator", "tandem-sdk"],
+    ),
     ("hal-drivers", &["tandem-sdk"]),
     ("scripts", &[]),
     (
@@ -102,7 +127,11 @@ struct Package {
 
 impl Package {
     fn names(&self, section: &str) -> Vec<&String> {
-        self.manifest.get(section).and_then(|s| s.as_table()).map(|s| s.keys().collect()).unwrap_or_default()
+        self.manifest
+            .get(section)
+            .and_then(|s| s.as_table())
+            .map(|s| s.keys().collect())
+            .unwrap_or_default()
     }
 
     fn name(&self) -> &str {
@@ -111,35 +140,57 @@ impl Package {
 }
 
 fn packages() -> Vec<Package> {
-    let of_package = |file: &File| file.text.contains("\n[package]\n") || file.text.starts_with("[package]\n");
-    let manifests = files(&["Cargo.toml"]).into_iter().filter(|f| of_package(f) && !f.name.contains("fuzz"));
+    let of_package =
+        |file: &File| file.text.contains("\n[package]\n") || file.text.starts_with("[package]\n");
+    let manifests = files(&["Cargo.toml"])
+        .into_iter()
+        .filter(|f| of_package(f) && !f.name.contains("fuzz"));
     let parse = |file: File| {
         let folder = file.name.trim_end_matches("/Cargo.toml").to_string();
-        let manifest = file.text.parse().unwrap_or_else(|e| panic!("{}: {e}", file.name));
+        let manifest = file
+            .text
+            .parse()
+            .unwrap_or_else(|e| panic!("{}: {e}", file.name));
         Package { folder, manifest }
     };
     manifests.map(parse).collect()
 }
 
 fn rule<'a>(rules: &'a [(&str, &[&str])], folder: &str) -> Option<&'a [&'a str]> {
-    let is_in = |place: &str| folder.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
-    rules.iter().find(|(place, _)| is_in(place)).map(|(_, names)| *names)
+    let is_in = |place: &str| {
+        folder
+            .strip_prefix(place)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    rules
+        .iter()
+        .find(|(place, _)| is_in(place))
+        .map(|(_, names)| *names)
 }
 
 #[test]
 fn dependencies_point_one_way() {
     let packages = packages();
-    let ours: BTreeMap<&str, &str> = packages.iter().map(|p| (p.name(), p.folder.as_str())).collect();
+    let ours: BTreeMap<&str, &str> = packages
+        .iter()
+        .map(|p| (p.name(), p.folder.as_str()))
+        .collect();
     let mut findings = vec![];
     for package in packages.iter().filter(|p| p.folder != COMMAND) {
         let folder = &package.folder;
         let Some(allowed) = rule(ALLOWED, folder) else {
-            findings.push(format!("{folder}/Cargo.toml:1: no rule says what this package may depend on"));
+            findings.push(format!(
+                "{folder}/Cargo.toml:1: no rule says what this package may depend on"
+            ));
             continue;
         };
         for name in package.names("dependencies") {
             if ours.contains_key(name.as_str()) && !allowed.contains(&name.as_str()) {
-                findings.push(format!("{}: {} must not depend on {name}", place(folder, name), package.name()));
+                findings.push(format!(
+                    "{}: {} must not depend on {name}",
+                    place(folder, name),
+                    package.name()
+                ));
             }
         }
     }
@@ -150,7 +201,9 @@ fn dependencies_point_one_way() {
 fn hard_and_contract_crates_have_few_dependencies() {
     let mut findings = vec![];
     for package in packages() {
-        let Some(allowed) = rule(OTHERS, &package.folder) else { continue };
+        let Some(allowed) = rule(OTHERS, &package.folder) else {
+            continue;
+        };
         for name in package.names("dependencies") {
             if !name.starts_with("tandem-") && !allowed.contains(&name.as_str()) {
                 findings.push(format!(
@@ -167,11 +220,17 @@ fn hard_and_contract_crates_have_few_dependencies() {
 #[test]
 fn the_oracle_shares_nothing_with_what_it_judges() {
     let packages = packages();
-    let oracle = packages.iter().find(|p| p.folder == "tests/oracle").expect("the oracle is there");
+    let oracle = packages
+        .iter()
+        .find(|p| p.folder == "tests/oracle")
+        .expect("the oracle is there");
     for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
         for name in oracle.names(section) {
             let at = place("tests/oracle", name);
-            assert!(!name.starts_with("tandem"), "{at}: the oracle must not depend on {name}");
+            assert!(
+                !name.starts_with("tandem"),
+                "{at}: the oracle must not depend on {name}"
+            );
         }
     }
 }
@@ -180,6 +239,9 @@ fn the_oracle_shares_nothing_with_what_it_judges() {
 fn place(folder: &str, name: &str) -> String {
     let file = format!("{folder}/Cargo.toml");
     let text = crate::tree::read(&file);
-    let line = text.lines().position(|line| line.starts_with(name)).map_or(1, |index| index + 1);
+    let line = text
+        .lines()
+        .position(|line| line.starts_with(name))
+        .map_or(1, |index| index + 1);
     format!("{file}:{line}")
 }

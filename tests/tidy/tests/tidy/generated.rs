@@ -8,14 +8,24 @@ const END: &str = "<!-- end of the generated part -->\n";
 /// Compares the generated part of `file` with `text`, or replaces it.
 fn is_up_to_date(file: &str, text: &str) {
     let page = read(file);
-    let (before, rest) = page.split_once(BEGIN).unwrap_or_else(|| panic!("{file}: no line {BEGIN}"));
-    let (there, after) = rest.split_once(END).unwrap_or_else(|| panic!("{file}: no line {END}"));
+    let (before, rest) = page
+        .split_once(BEGIN)
+        .unwrap_or_else(|| panic!("{file}: no line {BEGIN}"));
+    let (there, after) = rest
+        .split_once(END)
+        .unwrap_or_else(|| panic!("{file}: no line {END}"));
     let wanted = format!("\n{text}\n");
     if std::env::var_os("UPDATE_DOCS").is_some() {
-        std::fs::write(root().join(file), [before, BEGIN, &wanted, END, after].concat()).unwrap();
+        std::fs::write(
+            root().join(file),
+            [before, BEGIN, &wanted, END, after].concat(),
+        )
+        .unwrap();
     } else if let Some(number) = difference(there, &wanted) {
         let line = before.lines().count() + 1 + number;
-        panic!("{file}:{line}: not what the code says; UPDATE_DOCS=1 cargo test -p tandem-tidy rewrites it");
+        panic!(
+            "{file}:{line}: not what the code says; UPDATE_DOCS=1 cargo test -p tandem-tidy rewrites it"
+        );
     }
 }
 

@@ -15,7 +15,10 @@ fn every_function_named_exists() {
         for path in paths(line) {
             count += 1;
             if !modules.has(path) {
-                findings.push(format!("{PAGE}:{}: {path}: there is no such function or type", index + 1));
+                findings.push(format!(
+                    "{PAGE}:{}: {path}: there is no such function or type",
+                    index + 1
+                ));
             }
         }
     }
@@ -33,9 +36,16 @@ fn paths(line: &str) -> impl Iterator<Item = &str> {
 fn a_name_that_does_not_exist_is_noticed() {
     let modules = Modules::read();
     assert!(modules.has("tandem_sdk::block::Block::at"));
-    for wrong in ["tandem_sdk::block::Block::nowhere", "tandem_sdk::blocks::Block::at", "tandem_sdk::segment::at", "at"]
-    {
+    for wrong in [
+        "tandem_sdk::block::Block::nowhere",
+        "tandem_sdk::blocks::Block::at",
+        "tandem_sdk::segment::at",
+        "at",
+    ] {
         assert!(!modules.has(wrong), "{wrong}");
     }
-    assert_eq!(paths("`tandem_a::b` of `Block` and `tandem_c::d`").collect::<Vec<_>>(), ["tandem_a::b", "tandem_c::d"]);
+    assert_eq!(
+        paths("`tandem_a::b` of `Block` and `tandem_c::d`").collect::<Vec<_>>(),
+        ["tandem_a::b", "tandem_c::d"]
+    );
 }

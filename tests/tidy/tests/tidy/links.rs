@@ -25,7 +25,9 @@ fn links_lead_somewhere() {
 
 /// What stands in `](…)`.
 fn targets(line: &str) -> impl Iterator<Item = &str> {
-    line.split("](").skip(1).filter_map(|rest| rest.split(')').next())
+    line.split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next())
 }
 
 fn follow(from: &str, text: &str, target: &str) -> Result<(), &'static str> {
@@ -44,21 +46,42 @@ fn follow(from: &str, text: &str, target: &str) -> Result<(), &'static str> {
     } else {
         return Err("there is no such file");
     };
-    let found = heading.is_empty() || there.lines().filter(|l| l.starts_with('#')).any(|l| anchor(l) == heading);
-    if found { Ok(()) } else { Err("there is no such heading") }
+    let found = heading.is_empty()
+        || there
+            .lines()
+            .filter(|l| l.starts_with('#'))
+            .any(|l| anchor(l) == heading);
+    if found {
+        Ok(())
+    } else {
+        Err("there is no such heading")
+    }
 }
 
 /// The anchor that a heading gets.
 fn anchor(heading: &str) -> String {
     let text = heading.trim_start_matches('#').trim().to_lowercase();
-    let kept = text.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    let kept = text
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
 #[test]
 fn anchors_and_targets() {
-    assert_eq!(anchor("## What `run` does, and why"), "what-run-does-and-why");
-    assert_eq!(targets("see [a](b.md) and ![c](d.png)").collect::<Vec<_>>(), ["b.md", "d.png"]);
-    assert!(follow("README.md", "# A b", "#a-b").is_ok() && follow("README.md", "# A b", "#c").is_err());
-    assert!(follow("docs/x.md", "", "../Cargo.toml").is_ok() && follow("docs/x.md", "", "Cargo.toml").is_err());
+    assert_eq!(
+        anchor("## What `run` does, and why"),
+        "what-run-does-and-why"
+    );
+    assert_eq!(
+        targets("see [a](b.md) and ![c](d.png)").collect::<Vec<_>>(),
+        ["b.md", "d.png"]
+    );
+    assert!(
+        follow("README.md", "# A b", "#a-b").is_ok() && follow("README.md", "# A b", "#c").is_err()
+    );
+    assert!(
+        follow("docs/x.md", "", "../Cargo.toml").is_ok()
+            && follow("docs/x.md", "", "Cargo.toml").is_err()
+    );
 }

@@ -11,7 +11,10 @@ fn no_file_names_a_place_outside_the_repository() {
     let mut findings = vec![];
     for file in files(&[""]) {
         for (number, line) in file.lines() {
-            if let Some(found) = [&absolute, &beside].into_iter().find(|place| line.contains(place.as_str())) {
+            if let Some(found) = [&absolute, &beside]
+                .into_iter()
+                .find(|place| line.contains(place.as_str()))
+            {
                 findings.push(format!("{}:{number}: names {found}", file.name));
             }
         }

@@ -27,14 +27,20 @@ impl Modules {
             return defines(&file.text, name);
         }
         let (module, owner) = parent.rsplit_once("::").unwrap_or(("", parent));
-        self.0.get(module).is_some_and(|file| has_method(&file.text, owner, name))
+        self.0
+            .get(module)
+            .is_some_and(|file| has_method(&file.text, owner, name))
     }
 }
 
 /// The name by which code calls a package.
 fn package(folder: &str) -> String {
-    let manifest = std::fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap_or_default();
-    let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")).unwrap_or_default();
+    let manifest =
+        std::fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap_or_default();
+    let name = manifest
+        .lines()
+        .find_map(|line| line.strip_prefix("name = \""))
+        .unwrap_or_default();
     name.trim_end_matches('"').replace('-', "_")
 }
 
@@ -49,7 +55,9 @@ fn module(package: &str, inside: &str) -> String {
 /// Whether the text holds a free function or a type called `name`.
 fn defines(text: &str, name: &str) -> bool {
     let kinds = ["fn", "struct", "enum", "trait", "type", "const", "static"];
-    text.lines().filter(|line| !line.starts_with(' ')).any(|line| kinds.iter().any(|kind| names(line, kind, name)))
+    text.lines()
+        .filter(|line| !line.starts_with(' '))
+        .any(|line| kinds.iter().any(|kind| names(line, kind, name)))
 }
 
 /// Whether the text holds a method `name` in an `impl` or `trait` of `owner`.
@@ -59,7 +67,11 @@ fn has_method(text: &str, owner: &str, name: &str) -> bool {
         if !line.starts_with(' ') && !line.is_empty() && !line.starts_with('}') {
             inside = names(line, "trait", owner) || implements(line, owner);
         }
-        if inside && line.starts_with("    ") && !line.starts_with("     ") && names(line, "fn", name) {
+        if inside
+            && line.starts_with("    ")
+            && !line.starts_with("     ")
+            && names(line, "fn", name)
+        {
             return true;
         }
     }
@@ -68,8 +80,12 @@ fn has_method(text: &str, owner: &str, name: &str) -> bool {
 
 /// Whether a line is the head of an `impl` of `owner`, with or without a trait.
 fn implements(line: &str, owner: &str) -> bool {
-    let Some(head) = line.strip_prefix("impl") else { return false };
-    let subject = head.split_once(" for ").map_or_else(|| without_generics(head), |(_, subject)| subject);
+    let Some(head) = line.strip_prefix("impl") else {
+        return false;
+    };
+    let subject = head
+        .split_once(" for ")
+        .map_or_else(|| without_generics(head), |(_, subject)| subject);
     word(subject.trim_start()) == owner
 }
 
@@ -94,7 +110,9 @@ fn names(line: &str, kind: &str, name: &str) -> bool {
 }
 
 fn word(text: &str) -> &str {
-    let end = text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
+    let end = text
+        .find(|c: char| !c.is_alphanumeric() && c != '_')
+        .unwrap_or(text.len());
     &text[..end]
 }
 
@@ -107,9 +125,25 @@ fn items_are_found() {
     ];
     let text = text.concat();
     let text = text.as_str();
-    assert!(defines(text, "free") && defines(text, "One") && !defines(text, "own") && !defines(text, "fre"));
-    assert!(has_method(text, "One", "own") && has_method(text, "Pump", "taken") && has_method(text, "Three", "asked"));
+    assert!(
+        defines(text, "free")
+            && defines(text, "One")
+            && !defines(text, "own")
+            && !defines(text, "fre")
+    );
+    assert!(
+        has_method(text, "One", "own")
+            && has_method(text, "Pump", "taken")
+            && has_method(text, "Three", "asked")
+    );
     assert!(has_method(text, "Pump", "given"));
-    assert!(!has_method(text, "Two", "own") && !has_method(text, "One", "taken") && !has_method(text, "One", "free"));
-    assert_eq!(module("tandem_recorder", "record/mod.rs"), "tandem_recorder::record");
+    assert!(
+        !has_method(text, "Two", "own")
+            && !has_method(text, "One", "taken")
+            && !has_method(text, "One", "free")
+    );
+    assert_eq!(
+        module("tandem_recorder", "record/mod.rs"),
+        "tandem_recorder::record"
+    );
 }

@@ -4,7 +4,12 @@ use super::*;
 use proptest::prelude::*;
 
 fn ends(start: Point, end: Point, clockwise: bool) -> Ends {
-    Ends { start, end, clockwise, turns: 1 }
+    Ends {
+        start,
+        end,
+        clockwise,
+        turns: 1,
+    }
 }
 
 fn one(parts: Result<Parts, Impossible>) -> ArcGeometry {
@@ -21,53 +26,107 @@ fn quarter_and_full_circles() {
     assert!((rest.sweep_rad + 1.5 * PI).abs() < 1e-15);
     let full = one(ends([10.0, 0.0], [10.0, 0.0], true).about([0.0, 0.0]));
     assert_eq!(full.sweep_rad, -TAU);
-    let three = one(Ends { turns: 3, ..ends([10.0, 0.0], [10.0, 0.0], false) }.about([0.0, 0.0]));
+    let three = one(Ends {
+        turns: 3,
+        ..ends([10.0, 0.0], [10.0, 0.0], false)
+    }
+    .about([0.0, 0.0]));
     assert_eq!(three.sweep_rad, 3.0 * TAU);
 }
 
 #[test]
 fn radius_arcs_take_the_short_or_the_long_way() {
     let short = one(ends([10.0, 0.0], [0.0, 10.0], false).of_radius(10.0));
-    assert!(distance(short.center_mm, [0.0, 0.0]) < 1e-12 && (short.sweep_rad - PI / 2.0).abs() < 1e-12);
+    assert!(
+        distance(short.center_mm, [0.0, 0.0]) < 1e-12 && (short.sweep_rad - PI / 2.0).abs() < 1e-12
+    );
     let long = one(ends([10.0, 0.0], [0.0, 10.0], false).of_radius(-10.0));
-    assert!(distance(long.center_mm, [10.0, 10.0]) < 1e-12 && (long.sweep_rad - 1.5 * PI).abs() < 1e-12);
+    assert!(
+        distance(long.center_mm, [10.0, 10.0]) < 1e-12 && (long.sweep_rad - 1.5 * PI).abs() < 1e-12
+    );
     let half = one(ends([10.0, 0.0], [-10.0, 0.0], true).of_radius(9.9999));
     assert!((half.radius_mm - 10.0).abs() < 1e-12 && (half.sweep_rad + PI).abs() < 1e-12);
-    assert_eq!(ends([0.0, 0.0], [20.0, 0.0], true).of_radius(9.0).unwrap_err().0, "arc-radius");
-    assert_eq!(ends([0.0, 0.0], [0.0, 0.0], true).of_radius(9.0).unwrap_err().0, "arc-ends");
+    assert_eq!(
+        ends([0.0, 0.0], [20.0, 0.0], true)
+            .of_radius(9.0)
+            .unwrap_err()
+            .0,
+        "arc-radius"
+    );
+    assert_eq!(
+        ends([0.0, 0.0], [0.0, 0.0], true)
+            .of_radius(9.0)
+            .unwrap_err()
+            .0,
+        "arc-ends"
+    );
 }
 
 #[test]
 fn radii_that_differ_too_much_are_refused_with_both() {
-    let (code, why) = ends([10.0, 0.0], [0.0, 10.02], false).about([0.0, 0.0]).unwrap_err();
+    let (code, why) = ends([10.0, 0.0], [0.0, 10.02], false)
+        .about([0.0, 0.0])
+        .unwrap_err();
     assert_eq!(code, "arc-radius");
-    assert_eq!(why, "the arc does not fit: its radius is 10.0000 mm at the start and 10.0200 mm at the end");
+    assert_eq!(
+        why,
+        "the arc does not fit: its radius is 10.0000 mm at the start and 10.0200 mm at the end"
+    );
 }
 
 #[test]
 fn extents_know_the_quadrants() {
     let arc = one(ends([10.0, 0.0], [0.0, -10.0], false).about([0.0, 0.0]));
-    let part = Part { arc, start: [10.0, 0.0], end: [0.0, -10.0] };
+    let part = Part {
+        arc,
+        start: [10.0, 0.0],
+        end: [0.0, -10.0],
+    };
     assert_eq!(extent(&part), [(-10.0, 10.0), (-10.0, 10.0)]);
     let arc = one(ends([10.0, 0.0], [0.0, 10.0], false).about([0.0, 0.0]));
-    let part = Part { arc, start: [10.0, 0.0], end: [0.0, 10.0] };
+    let part = Part {
+        arc,
+        start: [10.0, 0.0],
+        end: [0.0, 10.0],
+    };
     assert_eq!(extent(&part), [(0.0, 10.0), (0.0, 10.0)]);
 }
 
 #[test]
 fn nearly_closed_arcs_stay_on_the_programmed_circle() {
     // Moving the centre alone would shift it by 0.06 mm here, and by the whole radius in the second case.
-    for (end, turns) in [([10.001, 0.2], 1), ([10.001, 0.2], 3), ([10.004, 0.0], 1), ([10.004, 0.0], 2)] {
+    for (end, turns) in [
+        ([10.001, 0.2], 1),
+        ([10.001, 0.2], 3),
+        ([10.004, 0.0], 1),
+        ([10.004, 0.0], 2),
+    ] {
         let clockwise = end[1] > 0.0;
-        let parts = Ends { turns, ..ends([10.0, 0.0], end, clockwise) }.about([0.0, 0.0]).unwrap();
-        let [first, last] = parts.as_slice() else { panic!("{parts:?}") };
-        assert_eq!((first.start, first.end, last.end), ([10.0, 0.0], last.start, end));
+        let parts = Ends {
+            turns,
+            ..ends([10.0, 0.0], end, clockwise)
+        }
+        .about([0.0, 0.0])
+        .unwrap();
+        let [first, last] = parts.as_slice() else {
+            panic!("{parts:?}")
+        };
+        assert_eq!(
+            (first.start, first.end, last.end),
+            ([10.0, 0.0], last.start, end)
+        );
         for part in [first, last] {
-            assert!(distance(part.arc.center_mm, [0.0, 0.0]) < 0.005 && (part.arc.radius_mm - 10.0).abs() < 0.005);
+            assert!(
+                distance(part.arc.center_mm, [0.0, 0.0]) < 0.005
+                    && (part.arc.radius_mm - 10.0).abs() < 0.005
+            );
             assert!((distance(part.end, part.arc.center_mm) - part.arc.radius_mm).abs() < 1e-12);
         }
         let swept = first.arc.sweep_rad + last.arc.sweep_rad;
-        assert!((swept.abs() - TAU * f64::from(turns)).abs() < 0.03, "{swept}");
+        assert!(
+            (swept.abs() - TAU * f64::from(turns)).abs() < 0.03,
+            "{swept}"
+        );
     }
 }
 

@@ -13,8 +13,16 @@ const ROUNDING: f64 = 1e-9;
 /// What the centre of the tool follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Track {
-    Line { through: Point, direction: Point },
-    Circle { center: Point, radius_mm: f64, outside: bool, clockwise: bool },
+    Line {
+        through: Point,
+        direction: Point,
+    },
+    Circle {
+        center: Point,
+        radius_mm: f64,
+        outside: bool,
+        clockwise: bool,
+    },
 }
 
 /// How two tracks join.
@@ -56,13 +64,21 @@ pub(super) fn dot(a: Point, b: Point) -> f64 {
 ///
 /// # Errors
 /// The tracks do not meet: the tool does not fit into the corner.
-pub(super) fn join(directions: [Point; 2], side: f64, tracks: [&Track; 2], end: Point) -> Result<Corner, ()> {
+pub(super) fn join(
+    directions: [Point; 2],
+    side: f64,
+    tracks: [&Track; 2],
+    end: Point,
+) -> Result<Corner, ()> {
     let [before, after] = directions;
     // Positive towards the side of the tool.
     let turn = side * (before[0] * after[1] - before[1] * after[0]).atan2(dot(before, after));
     let back = turn.abs() > PI - STRAIGHT_ON;
     // Over a round top and straight down beside it: above and beside is the only way that does not cut.
-    let over_the_top = back && tracks.iter().any(|track| matches!(track, Track::Circle { outside: true, .. }));
+    let over_the_top = back
+        && tracks
+            .iter()
+            .any(|track| matches!(track, Track::Circle { outside: true, .. }));
     if turn.abs() < STRAIGHT_ON {
         return Ok(Corner::Straight);
     }
@@ -76,41 +92,96 @@ pub(super) fn join(directions: [Point; 2], side: f64, tracks: [&Track; 2], end: 
 fn way_back(track: &Track, place: Point, end: Point) -> f64 {
     let way = match track {
         Track::Line { direction, .. } => dot([end[0] - place[0], end[1] - place[1]], *direction),
-        Track::Circle { center, radius_mm, clockwise, .. } => {
+        Track::Circle {
+            center,
+            radius_mm,
+            clockwise,
+            ..
+        } => {
             let angle = |at: Point| (at[1] - center[1]).atan2(at[0] - center[0]);
-            let turned = if *clockwise { angle(place) - angle(end) } else { angle(end) - angle(place) };
+            let turned = if *clockwise {
+                angle(place) - angle(end)
+            } else {
+                angle(end) - angle(place)
+            };
             // What lies a rounding ahead is no whole turn behind.
             radius_mm * ((turned + ROUNDING).rem_euclid(TAU) - ROUNDING)
         }
     };
-    if way < -ROUNDING * 10.0 { f64::INFINITY } else { way }
+    if way < -ROUNDING * 10.0 {
+        f64::INFINITY
+    } else {
+        way
+    }
 }
 
 /// Where two tracks meet: of two places the one that shortens the first track, which ends at `end`, least.
 fn meet(tracks: [&Track; 2], end: Point) -> Option<Point> {
     let places = match tracks {
-        [Track::Line { through: p, direction: d }, Track::Line { through: q, direction: e }] => {
+        [
+            Track::Line {
+                through: p,
+                direction: d,
+            },
+            Track::Line {
+                through: q,
+                direction: e,
+            },
+        ] => {
             let cross = d[0] * e[1] - d[1] * e[0];
             let way = ((q[0] - p[0]) * e[1] - (q[1] - p[1]) * e[0]) / cross;
             let place = along(*p, *d, way);
             [place, place]
         }
-        [Track::Line { through, direction }, Track::Circle { center, radius_mm, .. }]
-        | [Track::Circle { center, radius_mm, .. }, Track::Line { through, direction }] => {
-            let foot = along(*through, *direction, dot([center[0] - through[0], center[1] - through[1]], *direction));
+        [
+            Track::Line { through, direction },
+            Track::Circle {
+                center, radius_mm, ..
+            },
+        ]
+        | [
+            Track::Circle {
+                center, radius_mm, ..
+            },
+            Track::Line { through, direction },
+        ] => {
+            let foot = along(
+                *through,
+                *direction,
+                dot([center[0] - through[0], center[1] - through[1]], *direction),
+            );
             let half = (radius_mm * radius_mm - distance(foot, *center).powi(2)).sqrt();
-            [along(foot, *direction, half), along(foot, *direction, -half)]
+            [
+                along(foot, *direction, half),
+                along(foot, *direction, -half),
+            ]
         }
-        [Track::Circle { center: c, radius_mm: r, .. }, Track::Circle { center: e, radius_mm: s, .. }] => {
+        [
+            Track::Circle {
+                center: c,
+                radius_mm: r,
+                ..
+            },
+            Track::Circle {
+                center: e,
+                radius_mm: s,
+                ..
+            },
+        ] => {
             let between = distance(*c, *e);
             let way = (between * between + r * r - s * s) / (2.0 * between);
             let half = (r * r - way * way).sqrt();
             let towards = unit(*c, *e);
             let foot = along(*c, towards, way);
-            [along(foot, beside(towards, 1.0), half), along(foot, beside(towards, 1.0), -half)]
+            [
+                along(foot, beside(towards, 1.0), half),
+                along(foot, beside(towards, 1.0), -half),
+            ]
         }
     };
-    let finite = places.into_iter().filter(|place| place.iter().all(|value| value.is_finite()));
+    let finite = places
+        .into_iter()
+        .filter(|place| place.iter().all(|value| value.is_finite()));
     finite.min_by(|a, b| way_back(tracks[0], *a, end).total_cmp(&way_back(tracks[0], *b, end)))
 }
 
@@ -126,20 +197,43 @@ mod tests {
     fn corners_are_told_apart_by_the_side_of_the_tool() {
         // Along X to the origin, then up, the tool left by 1 (inside) or right by 1 (outside).
         let directions = [[1.0, 0.0], [0.0, 1.0]];
-        let tracks = [line([0.0, 1.0], directions[0]), line([-1.0, 0.0], directions[1])];
-        assert_eq!(join(directions, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]), Ok(Corner::Inside([-1.0, 1.0])));
-        assert_eq!(join(directions, -1.0, [&tracks[0], &tracks[1]], [0.0, -1.0]), Ok(Corner::Round));
+        let tracks = [
+            line([0.0, 1.0], directions[0]),
+            line([-1.0, 0.0], directions[1]),
+        ];
+        assert_eq!(
+            join(directions, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]),
+            Ok(Corner::Inside([-1.0, 1.0]))
+        );
+        assert_eq!(
+            join(directions, -1.0, [&tracks[0], &tracks[1]], [0.0, -1.0]),
+            Ok(Corner::Round)
+        );
         let on = [directions[0], [1.0, 0.01]];
-        assert_eq!(join(on, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]), Ok(Corner::Straight));
+        assert_eq!(
+            join(on, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]),
+            Ok(Corner::Straight)
+        );
     }
 
     #[test]
     fn tracks_meet_where_the_first_is_shortened_least_or_not_at_all() {
-        let circle = |x, radius_mm| Track::Circle { center: [x, 0.0], radius_mm, outside: true, clockwise: true };
+        let circle = |x, radius_mm| Track::Circle {
+            center: [x, 0.0],
+            radius_mm,
+            outside: true,
+            clockwise: true,
+        };
         let across = line([-9.0, 3.0], [1.0, 0.0]);
-        assert_eq!(meet([&across, &circle(0.0, 5.0)], [-3.0, 3.0]), Some([-4.0, 3.0]));
+        assert_eq!(
+            meet([&across, &circle(0.0, 5.0)], [-3.0, 3.0]),
+            Some([-4.0, 3.0])
+        );
         assert_eq!(meet([&across, &circle(0.0, 2.0)], [-5.0, 3.0]), None);
         // Two round tops side by side: the clockwise one comes from above.
-        assert_eq!(meet([&circle(0.0, 5.0), &circle(6.0, 5.0)], [5.0, 0.0]), Some([3.0, 4.0]));
+        assert_eq!(
+            meet([&circle(0.0, 5.0), &circle(6.0, 5.0)], [5.0, 0.0]),
+            Some([3.0, 4.0])
+        );
     }
 }

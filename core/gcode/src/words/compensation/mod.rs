@@ -21,7 +21,14 @@ use crate::state::path::NO_MOVE;
 use corner::{Corner, Track, along, beside, distance, dot, unit};
 
 pub(super) const WORDS: &[Word] = &[
-    Word::new("G40", Group::CutterRadius, "", "radius compensation off", Action::Act(off), "G40"),
+    Word::new(
+        "G40",
+        Group::CutterRadius,
+        "",
+        "radius compensation off",
+        Action::Act(off),
+        "G40",
+    ),
     Word::new(
         "G41",
         Group::CutterRadius,
@@ -140,7 +147,10 @@ impl Compensation {
 
     /// The word in force.
     pub fn word(&self) -> &'static str {
-        WORDS.iter().find(|word| word.tenths == self.code).map_or("G40", |word| word.code)
+        WORDS
+            .iter()
+            .find(|word| word.tenths == self.code)
+            .map_or("G40", |word| word.code)
     }
 
     /// A line was wrong.
@@ -170,7 +180,10 @@ impl Compensation {
 
 fn on_by_table(line: &mut Line, side: f64) -> Checked<()> {
     // D0 is the tool in the spindle too.
-    let number = line.words.integer(b'D', 0..=tool::MAX_TOOL)?.filter(|number| *number != 0);
+    let number = line
+        .words
+        .integer(b'D', 0..=tool::MAX_TOOL)?
+        .filter(|number| *number != 0);
     let number = number.unwrap_or(line.state.tools.in_spindle);
     let diameter_mm = tool::diameter_of(line, number)?;
     on(line, side, diameter_mm)
@@ -179,7 +192,9 @@ fn on_by_table(line: &mut Line, side: f64) -> Checked<()> {
 fn on_by_diameter(line: &mut Line, side: f64) -> Checked<()> {
     let Some(diameter) = line.words.get(b'D') else {
         let message = format!("{} needs D, the diameter of the tool", code(line));
-        return Err(line.orders.fault(Group::CutterRadius, "word-missing", message));
+        return Err(line
+            .orders
+            .fault(Group::CutterRadius, "word-missing", message));
     };
     if !matches!(line.words.integer(b'L', 0..=9)?, None | Some(0 | 9)) {
         let message = "L1 to L8 are tools whose tip lies beside their centre: only round tools (L0, L9) are known";
@@ -190,14 +205,23 @@ fn on_by_diameter(line: &mut Line, side: f64) -> Checked<()> {
 }
 
 fn code(line: &Line) -> &'static str {
-    line.orders.get(Group::CutterRadius).map_or("G41", |word| word.code)
+    line.orders
+        .get(Group::CutterRadius)
+        .map_or("G41", |word| word.code)
 }
 
 fn on(line: &mut Line, side: f64, diameter_mm: f64) -> Checked<()> {
-    let refuse = |message: String| Err(line.orders.fault(Group::CutterRadius, "compensation", message));
+    let refuse = |message: String| {
+        Err(line
+            .orders
+            .fault(Group::CutterRadius, "compensation", message))
+    };
     let before = &line.state.compensation;
     if before.code != 400 {
-        return refuse(format!("{} is on already: G40 must come before", before.word()));
+        return refuse(format!(
+            "{} is on already: G40 must come before",
+            before.word()
+        ));
     }
     if line.state.modes.plane == Plane::Yz {
         return refuse("radius compensation works in the planes XY (G17) and ZX (G18)".into());
@@ -206,15 +230,30 @@ fn on(line: &mut Line, side: f64, diameter_mm: f64) -> Checked<()> {
     let programmed = plane.map(|axis| line.state.path.position[axis]);
     // A negative diameter is one on the other side.
     let side = if diameter_mm < 0.0 { -side } else { side };
-    let (code, radius_mm) =
-        (line.orders.get(Group::CutterRadius).map_or(410, |word| word.tenths), diameter_mm.abs() / 2.0);
-    line.state.compensation = Compensation { code, side, radius_mm, programmed, plane, ..Compensation::default() };
+    let (code, radius_mm) = (
+        line.orders
+            .get(Group::CutterRadius)
+            .map_or(410, |word| word.tenths),
+        diameter_mm.abs() / 2.0,
+    );
+    line.state.compensation = Compensation {
+        code,
+        side,
+        radius_mm,
+        programmed,
+        plane,
+        ..Compensation::default()
+    };
     Ok(())
 }
 
 /// G40, and the end of a program: what is kept back ends beside its end.
 pub(crate) fn off(line: &mut Line) -> Checked<()> {
-    let done = if line.state.compensation.holds() { flush_here(line) } else { Ok(()) };
+    let done = if line.state.compensation.holds() {
+        flush_here(line)
+    } else {
+        Ok(())
+    };
     line.state.compensation = Compensation::default();
     done
 }
@@ -230,26 +269,48 @@ fn flush_here(line: &mut Line) -> Checked<()> {
 pub(crate) fn refuse_company(line: &Line) -> Checked<()> {
     let word = line.state.compensation.word();
     let refuse = |group, other: &str, why: &str| {
-        Err(line.orders.fault(group, "compensation", format!("{other} {why} while {word} is on: G40 must come before")))
+        Err(line.orders.fault(
+            group,
+            "compensation",
+            format!("{other} {why} while {word} is on: G40 must come before"),
+        ))
     };
-    for group in
-        [Group::Units, Group::Plane, Group::CoordinateSystem, Group::ToolLength, Group::ToolChange, Group::User]
-    {
+    for group in [
+        Group::Units,
+        Group::Plane,
+        Group::CoordinateSystem,
+        Group::ToolLength,
+        Group::ToolChange,
+        Group::User,
+    ] {
         if let Some(other) = line.orders.get(group)
             && !changes_nothing(line, other.tenths, group)
         {
             return refuse(group, other.code, "cannot act");
         }
     }
-    if line.orders.get(Group::InputOutput).is_some_and(|other| other.tenths == 660) {
+    if line
+        .orders
+        .get(Group::InputOutput)
+        .is_some_and(|other| other.tenths == 660)
+    {
         return refuse(Group::InputOutput, "M66", "cannot wait");
     }
-    if let Some(other) = line.orders.get(Group::NonModal).filter(|other| other.tenths != 40) {
+    if let Some(other) = line
+        .orders
+        .get(Group::NonModal)
+        .filter(|other| other.tenths != 40)
+    {
         return refuse(Group::NonModal, other.code, "cannot act");
     }
     match line.orders.motion {
-        Some(MotionMode::Word(other)) if !matches!(other.shape(), Some(Shape::Straight | Shape::Arc)) => {
-            let message = format!("{} does not go with {word}: G40 must come before", other.code);
+        Some(MotionMode::Word(other))
+            if !matches!(other.shape(), Some(Shape::Straight | Shape::Arc)) =>
+        {
+            let message = format!(
+                "{} does not go with {word}: G40 must come before",
+                other.code
+            );
             Err(line.motion_fault("compensation", message))
         }
         _ => Ok(()),
@@ -270,7 +331,8 @@ fn changes_nothing(line: &Line, tenths: u16, group: Group) -> bool {
                 }
         }
         Group::CoordinateSystem => {
-            crate::lasting::system_code(line.state.coordinates.active()) == super::written('G', tenths)
+            crate::lasting::system_code(line.state.coordinates.active())
+                == super::written('G', tenths)
         }
         _ => false,
     }
@@ -283,7 +345,10 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
     }
     let plane = line.state.compensation.plane;
     let to = plane.map(|axis| line.state.path.position[axis]);
-    let (side, radius_mm) = (line.state.compensation.side, line.state.compensation.radius_mm);
+    let (side, radius_mm) = (
+        line.state.compensation.side,
+        line.state.compensation.radius_mm,
+    );
     let from = if line.state.compensation.fresh {
         let at = plane.map(|axis| line.state.path.last_end[axis]);
         if distance(at, to) <= radius_mm {
@@ -299,7 +364,10 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
     }
     let direction = unit(from, to);
     let end = along(to, beside(direction, side), radius_mm);
-    let track = Track::Line { through: end, direction };
+    let track = Track::Line {
+        through: end,
+        direction,
+    };
     let fresh = line.state.compensation.fresh;
     let feed_mm_per_s = feed(line, kind, distance(from, to))?;
     if !fresh {
@@ -316,8 +384,13 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
     if line.state.compensation.is_lost(line.state.path.uncertain) {
         return pass(line);
     }
-    let (side, radius_mm) = (line.state.compensation.side, line.state.compensation.radius_mm);
-    let Some(first) = parts.as_slice().first() else { return Ok(()) };
+    let (side, radius_mm) = (
+        line.state.compensation.side,
+        line.state.compensation.radius_mm,
+    );
+    let Some(first) = parts.as_slice().first() else {
+        return Ok(());
+    };
     let sweep_rad: f64 = parts.as_slice().iter().map(|part| part.arc.sweep_rad).sum();
     let length_mm = first.arc.radius_mm * sweep_rad.abs();
     let mut center = first.arc.center_mm;
@@ -331,7 +404,8 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
     if line.state.compensation.fresh {
         let at = plane.map(|axis| line.state.path.last_end[axis]);
         if distance(at, ends.end) <= radius_mm {
-            let message = "the first arc with radius compensation must be longer than the radius of the tool";
+            let message =
+                "the first arc with radius compensation must be longer than the radius of the tool";
             return Err(entry_fault(line, message));
         }
         // The arc that leaves from where the tool stands, and ends beside the end in the same direction.
@@ -339,7 +413,10 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
         let cosine = dot(unit(end, at), towards);
         let out = distance(end, at) / 2.0 / cosine;
         if !out.is_finite() || cosine.abs() < NO_MOVE {
-            return Err(entry_fault(line, "the tool cannot enter by this arc: its radius is too large for it"));
+            return Err(entry_fault(
+                line,
+                "the tool cannot enter by this arc: its radius is too large for it",
+            ));
         }
         center = along(end, towards, out);
     } else {
@@ -351,12 +428,26 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
             );
             return Err(line.motion_fault("compensation", message));
         }
-        let offset_mm = if inside { first.arc.radius_mm - radius_mm } else { first.arc.radius_mm + radius_mm };
-        let track = Track::Circle { center, radius_mm: offset_mm, outside: !inside, clockwise };
+        let offset_mm = if inside {
+            first.arc.radius_mm - radius_mm
+        } else {
+            first.arc.radius_mm + radius_mm
+        };
+        let track = Track::Circle {
+            center,
+            radius_mm: offset_mm,
+            outside: !inside,
+            clockwise,
+        };
         turn(line, begins, &track, (BlockKind::Line, feed_mm_per_s))?;
     }
     let block = template(line, end, BlockKind::Arc, feed_mm_per_s);
-    let bend = Bend { center, clockwise, turns: ends.turns, sweep_rad: sweep_rad.abs() };
+    let bend = Bend {
+        center,
+        clockwise,
+        turns: ends.turns,
+        sweep_rad: sweep_rad.abs(),
+    };
     begin(line, Held::Arc(Box::new(block), bend), ends_in, ends.end);
     Ok(())
 }
@@ -379,7 +470,11 @@ fn feed(line: &Line, kind: BlockKind, length_mm: f64) -> Checked<f64> {
     let plane = line.state.compensation.plane;
     let mut across = line.state.path.block_end() - line.state.path.last_end;
     [across[plane[0]], across[plane[1]]] = [0.0; 2];
-    let across_mm = if line.moves_linear(&across) { line.config.axes.path_length(&across) } else { 0.0 };
+    let across_mm = if line.moves_linear(&across) {
+        line.config.axes.path_length(&across)
+    } else {
+        0.0
+    };
     line.feed(length_mm.hypot(across_mm), true)
 }
 
@@ -389,10 +484,16 @@ fn template(line: &mut Line, end: Point, kind: BlockKind, feed_mm_per_s: f64) ->
     let mut to = line.state.path.block_end();
     [to[plane[0]], to[plane[1]]] = end;
     if line.state.spindle.surface.is_some() {
-        let radius_mm = spindle::radius_mm(line, &line.state.path.last_end).max(spindle::radius_mm(line, &to));
+        let radius_mm =
+            spindle::radius_mm(line, &line.state.path.last_end).max(spindle::radius_mm(line, &to));
         spindle::follow_radius(line, radius_mm);
     }
-    Block { kind, end: to, feed_mm_per_s, ..line.state.blank_block() }
+    Block {
+        kind,
+        end: to,
+        feed_mm_per_s,
+        ..line.state.blank_block()
+    }
 }
 
 /// A move across the plane, kept back with what it follows.
@@ -409,7 +510,13 @@ fn across(line: &mut Line, plane: [usize; 2], kind: BlockKind) -> Checked<()> {
         BlockKind::Rapid => f64::INFINITY,
         _ => line.feed(length_mm, line.moves_linear(&displacement))?,
     };
-    let block = Block { kind, end: to, length_mm, feed_mm_per_s, ..line.state.blank_block() };
+    let block = Block {
+        kind,
+        end: to,
+        length_mm,
+        feed_mm_per_s,
+        ..line.state.blank_block()
+    };
     line.state.path.last_end = to;
     line.state.path.at_rest = false;
     keep(line, Held::Across(Box::new(block)))
@@ -423,7 +530,11 @@ fn begin(line: &mut Line, held: Held, direction: Point, programmed: Point) {
     line.state.path.at_rest = false;
     let compensation = &mut line.state.compensation;
     compensation.held.push(held);
-    (compensation.fresh, compensation.direction, compensation.programmed) = (false, direction, programmed);
+    (
+        compensation.fresh,
+        compensation.direction,
+        compensation.programmed,
+    ) = (false, direction, programmed);
 }
 
 fn keep(line: &mut Line, held: Held) -> Checked<()> {
@@ -438,13 +549,26 @@ fn keep(line: &mut Line, held: Held) -> Checked<()> {
 }
 
 /// The corner between what is kept back and a move that begins in `direction`.
-fn turn(line: &mut Line, direction: Point, track: &Track, move_of: (BlockKind, f64)) -> Checked<()> {
+fn turn(
+    line: &mut Line,
+    direction: Point,
+    track: &Track,
+    move_of: (BlockKind, f64),
+) -> Checked<()> {
     let compensation = &line.state.compensation;
     let plane = compensation.plane;
-    let (side, radius_mm, corner) = (compensation.side, compensation.radius_mm, compensation.programmed);
+    let (side, radius_mm, corner) = (
+        compensation.side,
+        compensation.radius_mm,
+        compensation.programmed,
+    );
     let before = compensation.direction;
     let end = along(corner, beside(before, side), radius_mm);
-    let joined = match compensation.held.iter().find(|held| matches!(held, Held::Line(..) | Held::Arc(..))) {
+    let joined = match compensation
+        .held
+        .iter()
+        .find(|held| matches!(held, Held::Line(..) | Held::Arc(..)))
+    {
         Some(Held::Arc(_, bend)) => {
             let way = if bend.clockwise { -1.0 } else { 1.0 };
             let last = Track::Circle {
@@ -455,17 +579,37 @@ fn turn(line: &mut Line, direction: Point, track: &Track, move_of: (BlockKind, f
             };
             corner::join([before, direction], side, [&last, track], end)
         }
-        _ => corner::join([before, direction], side, [&Track::Line { through: end, direction: before }, track], end),
+        _ => corner::join(
+            [before, direction],
+            side,
+            [
+                &Track::Line {
+                    through: end,
+                    direction: before,
+                },
+                track,
+            ],
+            end,
+        ),
     };
     let Ok(joined) = joined else {
-        return Err(gouge(line, held_line(line), "the tool does not fit into the corner between them"));
+        return Err(gouge(
+            line,
+            held_line(line),
+            "the tool does not fit into the corner between them",
+        ));
     };
     match joined {
         Corner::Straight => flush(line, plane, end),
         Corner::Inside(place) => flush(line, plane, place),
         Corner::Round => {
             flush(line, plane, end)?;
-            round(line, [end, along(corner, beside(direction, side), radius_mm)], corner, move_of)
+            round(
+                line,
+                [end, along(corner, beside(direction, side), radius_mm)],
+                corner,
+                move_of,
+            )
         }
     }
 }
@@ -478,7 +622,10 @@ fn round(
     (kind, feed_mm_per_s): (BlockKind, f64),
 ) -> Checked<()> {
     let plane = line.state.compensation.plane;
-    let mut block = Block { feed_mm_per_s, ..line.state.blank_block() };
+    let mut block = Block {
+        feed_mm_per_s,
+        ..line.state.blank_block()
+    };
     [block.end[plane[0]], block.end[plane[1]]] = to;
     if kind == BlockKind::Rapid {
         block.kind = BlockKind::Rapid;
@@ -488,16 +635,26 @@ fn round(
         return Ok(());
     }
     let clockwise = line.state.compensation.side > 0.0;
-    let bend = Bend { center: corner, clockwise, turns: 1, sweep_rad: f64::INFINITY };
+    let bend = Bend {
+        center: corner,
+        clockwise,
+        turns: 1,
+        sweep_rad: f64::INFINITY,
+    };
     bend_block(line, plane, &block, &bend)
 }
 
 /// The line of the move that is kept back.
 fn held_line(line: &Line) -> u32 {
-    let first = line.state.compensation.held.iter().find_map(|held| match held {
-        Held::Line(block, _) | Held::Arc(block, _) | Held::Across(block) => Some(block.line),
-        Held::Event(_) => None,
-    });
+    let first = line
+        .state
+        .compensation
+        .held
+        .iter()
+        .find_map(|held| match held {
+            Held::Line(block, _) | Held::Arc(block, _) | Held::Across(block) => Some(block.line),
+            Held::Event(_) => None,
+        });
     first.unwrap_or(line.state.line)
 }
 
@@ -524,8 +681,7 @@ fn flush(line: &mut Line, plane: [usize; 2], end: Point) -> Checked<()> {
                 let block = place(plane, *block, at, end);
                 let way = [0, 1].map(|i| block.end[plane[i]] - block.start[plane[i]]);
                 if keeps.is_some_and(|direction| dot(direction, way) < -NO_MOVE) {
-                    let why =
-                        "the corner lies before the start of the first, and the tool would cut into what stands there";
+                    let why = "the corner lies before the start of the first, and the tool would cut into what stands there";
                     return Err(gouge(line, block.line, why));
                 }
                 at = Some(emit_straight(line, plane, block)?);
@@ -588,7 +744,10 @@ fn check_end(line: &Line, plane: [usize; 2], block: &Block) -> Checked<()> {
 
 /// Says which line a fault belongs to, that shows only in a later one.
 fn beside_line(mut fault: Fault, line: u32) -> Fault {
-    let _ = write!(fault.message, "; the tool is driven beside the path of line {line}");
+    let _ = write!(
+        fault.message,
+        "; the tool is driven beside the path of line {line}"
+    );
     fault
 }
 
@@ -600,15 +759,31 @@ fn bend_block(line: &mut Line, plane: [usize; 2], block: &Block, bend: &Bend) ->
         return Ok(());
     }
     let unequal = (distance(start, bend.center) - distance(end, bend.center)).abs();
-    let ends = Ends { start, end, clockwise: bend.clockwise, turns: bend.turns };
-    let parts = ends.about(bend.center).map_err(|(_, why)| gouge(line, block.line, &why))?;
-    let swept: f64 = parts.as_slice().iter().map(|part| part.arc.sweep_rad.abs()).sum();
+    let ends = Ends {
+        start,
+        end,
+        clockwise: bend.clockwise,
+        turns: bend.turns,
+    };
+    let parts = ends
+        .about(bend.center)
+        .map_err(|(_, why)| gouge(line, block.line, &why))?;
+    let swept: f64 = parts
+        .as_slice()
+        .iter()
+        .map(|part| part.arc.sweep_rad.abs())
+        .sum();
     if swept > bend.sweep_rad + LONGER.max(unequal) {
-        return Err(gouge(line, block.line, "the corner lies before the start of the first, which is an arc"));
+        return Err(gouge(
+            line,
+            block.line,
+            "the corner lies before the start of the first, which is an arc",
+        ));
     }
     for part in parts.as_slice() {
         for (axis, (low, high)) in plane.into_iter().zip(extent(part)) {
-            line.check_travel(axis, low, high).map_err(|fault| beside_line(fault, block.line))?;
+            line.check_travel(axis, low, high)
+                .map_err(|fault| beside_line(fault, block.line))?;
         }
     }
     let mut helix = block.end - block.start;

@@ -5,20 +5,36 @@ use crate::testing::{blocks, ends, messages, short};
 /// Ends of the blocks in X and Y; an arc with its radius.
 fn path(program: &str) -> String {
     let shown = |b: &tandem_sdk::Block| {
-        let arc =
-            if b.kind == tandem_sdk::BlockKind::Arc { format!(" r{}", short(b.arc.radius_mm)) } else { String::new() };
+        let arc = if b.kind == tandem_sdk::BlockKind::Arc {
+            format!(" r{}", short(b.arc.radius_mm))
+        } else {
+            String::new()
+        };
         format!("{},{}{arc}", short(b.end[0]), short(b.end[1]))
     };
-    blocks(program).iter().map(shown).collect::<Vec<_>>().join(" ")
+    blocks(program)
+        .iter()
+        .map(shown)
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[test]
 fn inside_corners_are_cut_short_and_outside_ones_rounded() {
     // A tool of radius 1 left of the path: up is inside, down outside.
     let entry = "F60\nG41.1 D2 G1 X10\nX20";
-    assert_eq!(path(&format!("{entry}\nY10\nG40 X40")), "10,1 19,1 19,10 40,10");
-    assert_eq!(path(&format!("{entry}\nY-10\nG40 X40")), "10,1 20,1 21,0 r1 21,-10 40,-10");
-    assert_eq!(path("F60\nG42.1 D2 G1 X10\nX20\nY-10\nG40 X40"), "10,-1 19,-1 19,-10 40,-10");
+    assert_eq!(
+        path(&format!("{entry}\nY10\nG40 X40")),
+        "10,1 19,1 19,10 40,10"
+    );
+    assert_eq!(
+        path(&format!("{entry}\nY-10\nG40 X40")),
+        "10,1 20,1 21,0 r1 21,-10 40,-10"
+    );
+    assert_eq!(
+        path("F60\nG42.1 D2 G1 X10\nX20\nY-10\nG40 X40"),
+        "10,-1 19,-1 19,-10 40,-10"
+    );
     // Straight on there is no corner; the last move ends beside its end.
     assert_eq!(path(&format!("{entry}\nX30")), "10,1 20,1 30,1");
 }
@@ -26,10 +42,19 @@ fn inside_corners_are_cut_short_and_outside_ones_rounded() {
 #[test]
 fn arcs_keep_their_centres() {
     let entry = "F60\nG41.1 D2 G1 X10\nX20";
-    assert_eq!(path(&format!("{entry}\nG3 X30 Y10 J10\nG1 Y20\nG40 X0")), "10,1 20,1 29,10 r9 29,20 0,20");
-    assert_eq!(path(&format!("{entry}\nG2 X30 Y-10 J-10\nG1 Y-20\nG40 X0")), "10,1 20,1 31,-10 r11 31,-20 0,-20");
+    assert_eq!(
+        path(&format!("{entry}\nG3 X30 Y10 J10\nG1 Y20\nG40 X0")),
+        "10,1 20,1 29,10 r9 29,20 0,20"
+    );
+    assert_eq!(
+        path(&format!("{entry}\nG2 X30 Y-10 J-10\nG1 Y-20\nG40 X0")),
+        "10,1 20,1 31,-10 r11 31,-20 0,-20"
+    );
     // The line ends where it meets the circle: at 30 - √(11² - 1).
-    assert_eq!(path(&format!("{entry}\nG2 X40 I10\nG40 G1 X60")), "10,1 19.046,1 41,0 r11 60,0");
+    assert_eq!(
+        path(&format!("{entry}\nG2 X40 I10\nG40 G1 X60")),
+        "10,1 19.046,1 41,0 r11 60,0"
+    );
 }
 
 #[test]
@@ -58,12 +83,22 @@ fn what_stands_between_two_moves_waits_with_the_first() {
 #[test]
 fn what_would_cut_into_the_part_is_refused_with_both_lines() {
     let slot = messages("F60\nG41.1 D6 G1 X10\nX20\nY2\nX0\nG40 Y9");
-    assert!(slot[0].starts_with("5:1 [gouge]") && slot[0].contains("moves of the lines 4 and 5"), "{}", slot[0]);
+    assert!(
+        slot[0].starts_with("5:1 [gouge]") && slot[0].contains("moves of the lines 4 and 5"),
+        "{}",
+        slot[0]
+    );
     assert_eq!(slot.len(), 1, "what follows is not blamed: {slot:?}");
     let arc = messages("F60\nG41.1 D6 G1 X10\nX20\nG3 X24 Y2 I2 J1\nG40 G1 X0");
-    assert!(arc[0].contains("is not greater than that of the tool"), "{arc:?}");
+    assert!(
+        arc[0].contains("is not greater than that of the tool"),
+        "{arc:?}"
+    );
     let entry = messages("F60\nG41.1 D6 G1 X2\nG40");
-    assert!(entry[0].contains("must be longer than the radius"), "{entry:?}");
+    assert!(
+        entry[0].contains("must be longer than the radius"),
+        "{entry:?}"
+    );
 }
 
 #[test]
@@ -92,5 +127,8 @@ fn what_does_not_go_with_compensation_is_refused() {
         assert_eq!(messages(wrong).len(), 1, "{wrong}");
     }
     // What is so already may be said again.
-    assert_eq!(ends("F60 G41 D1 G1 X10\nG21 G17 G54 X20\nG40 G49 G1 X30 Y0").len(), 3);
+    assert_eq!(
+        ends("F60 G41 D1 G1 X10\nG21 G17 G54 X20\nG40 G49 G1 X30 Y0").len(),
+        3
+    );
 }

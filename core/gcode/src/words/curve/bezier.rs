@@ -19,15 +19,22 @@ pub(super) fn cubic(line: &mut Line) -> Checked<()> {
     let [x, y] = bezier_axes(line)?;
     let p = offset(line, b'P').zip(offset(line, b'Q'));
     let Some((p, q)) = p else {
-        return Err(line.motion_fault("nurbs", "G5 needs P and Q, the third control point from the end"));
+        return Err(line.motion_fault(
+            "nurbs",
+            "G5 needs P and Q, the third control point from the end",
+        ));
     };
-    let before = line.state.curves.tail.take().filter(|(index, _)| *index == line.state.path.next_index);
+    let before = line
+        .state
+        .curves
+        .tail
+        .take()
+        .filter(|(index, _)| *index == line.state.path.next_index);
     let [i, j] = match (offset(line, b'I'), offset(line, b'J'), before) {
         (Some(i), Some(j), _) => [i, j],
         (None, None, Some((_, [p, q]))) => [-p, -q],
         (None, None, None) => {
-            let why =
-                "G5 needs I and J, the second control point from the start: only a G5 behind another may lack them";
+            let why = "G5 needs I and J, the second control point from the start: only a G5 behind another may lack them";
             return Err(line.motion_fault("nurbs", why));
         }
         _ => return Err(line.motion_fault("nurbs", "G5 takes I and J both or neither")),
@@ -50,7 +57,10 @@ pub(super) fn quadratic(line: &mut Line) -> Checked<()> {
     let [x, y] = bezier_axes(line)?;
     let (i, j) = (offset(line, b'I'), offset(line, b'J'));
     if i.is_none() && j.is_none() {
-        return Err(line.motion_fault("nurbs", "G5.1 needs I or J, the middle control point from the start"));
+        return Err(line.motion_fault(
+            "nurbs",
+            "G5.1 needs I or J, the middle control point from the start",
+        ));
     }
     let (start, end) = (line.state.path.last_end, line.state.path.block_end());
     let mut middle = start;
@@ -60,7 +70,9 @@ pub(super) fn quadratic(line: &mut Line) -> Checked<()> {
 }
 
 fn offset(line: &Line, letter: u8) -> Option<f64> {
-    line.words.get(letter).map(|value| value * line.state.modes.unit_mm)
+    line.words
+        .get(letter)
+        .map(|value| value * line.state.modes.unit_mm)
 }
 
 fn bezier_axes(line: &Line) -> Checked<[usize; 2]> {
@@ -80,8 +92,15 @@ fn bezier(line: &mut Line, points: &[AxisVector], uncertain: u32) -> Checked<()>
         return Ok(());
     }
     let degree = points.len() - 1;
-    let knots = (0..2 * points.len()).map(|index| if index > degree { 1.0 } else { 0.0 }).collect();
+    let knots = (0..2 * points.len())
+        .map(|index| if index > degree { 1.0 } else { 0.0 })
+        .collect();
     let weights = vec![1.0; points.len()];
-    let data = NurbsData { degree, control_points: points.to_vec(), weights, knots };
+    let data = NurbsData {
+        degree,
+        control_points: points.to_vec(),
+        weights,
+        knots,
+    };
     push_curve(line, &Origin::line(line.state.line), data)
 }

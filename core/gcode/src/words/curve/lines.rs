@@ -25,7 +25,9 @@ pub(super) fn open_linuxcnc(line: &mut Line) -> Checked<()> {
     let start = line.state.path.position;
     line.advance();
     let opened = open_curve(line, Dialect::LinuxCnc, uncertain);
-    let Some(mut curve) = line.state.curves.open.take() else { return opened };
+    let Some(mut curve) = line.state.curves.open.take() else {
+        return opened;
+    };
     let done = opened.and_then(|()| first_linuxcnc(line, &mut curve, start));
     curve.broken |= done.is_err();
     line.state.curves.open = Some(curve);
@@ -66,11 +68,15 @@ pub(super) fn linuxcnc_line(line: &mut Line, curve: &mut Curve) -> Checked<bool>
 }
 
 fn linuxcnc_order(line: &Line, curve: &mut Curve) -> Checked<()> {
-    let Some(order) = line.words.integer(b'L', ORDERS)? else { return Ok(()) };
+    let Some(order) = line.words.integer(b'L', ORDERS)? else {
+        return Ok(());
+    };
     match curve.order {
-        Some(before) if before != order as usize => {
-            Err(line.words.fault(b'L', "nurbs", format!("L has been {before} on this curve: it has one order")))
-        }
+        Some(before) if before != order as usize => Err(line.words.fault(
+            b'L',
+            "nurbs",
+            format!("L has been {before} on this curve: it has one order"),
+        )),
         _ => {
             curve.order = Some(order as usize);
             Ok(())
@@ -97,7 +103,9 @@ pub(super) fn open_fanuc(line: &mut Line) -> Checked<()> {
     let start = line.state.path.position;
     line.advance();
     let opened = open_curve(line, Dialect::Fanuc, uncertain);
-    let Some(mut curve) = line.state.curves.open.take() else { return opened };
+    let Some(mut curve) = line.state.curves.open.take() else {
+        return opened;
+    };
     let done = opened.and_then(|()| first_fanuc(line, &mut curve, start));
     curve.broken |= done.is_err();
     line.state.curves.open = Some(curve);
@@ -105,7 +113,10 @@ pub(super) fn open_fanuc(line: &mut Line) -> Checked<()> {
 }
 
 fn first_fanuc(line: &mut Line, curve: &mut Curve, start: AxisVector) -> Checked<()> {
-    let order = line.words.integer(b'P', ORDERS)?.map_or(FANUC_ORDER, |order| order as usize);
+    let order = line
+        .words
+        .integer(b'P', ORDERS)?
+        .map_or(FANUC_ORDER, |order| order as usize);
     curve.order = Some(order);
     for axis in 0..line.letters.count() {
         let off = line.state.path.position[axis] - start[axis];
@@ -114,7 +125,9 @@ fn first_fanuc(line: &mut Line, curve: &mut Curve, start: AxisVector) -> Checked
                 "the first control point is not where the machine stands ({} off): the curve begins there",
                 show(off.abs())
             );
-            return Err(line.words.fault(line.letters.letter(axis), "nurbs", message));
+            return Err(line
+                .words
+                .fault(line.letters.letter(axis), "nurbs", message));
         }
     }
     line.state.path.position = start;
@@ -143,7 +156,10 @@ pub(super) fn fanuc_line(line: &mut Line, curve: &mut Curve) -> Checked<bool> {
         return Ok(alone + 1 == order);
     }
     if alone > 0 {
-        return Err(first_fault(line, "a control point after knots that stand alone: those end the curve"));
+        return Err(first_fault(
+            line,
+            "a control point after knots that stand alone: those end the curve",
+        ));
     }
     let weight = weight_of(line, b'R')?;
     line.advance();
@@ -159,32 +175,64 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
     let (order, index) = (curve.order.unwrap_or(FANUC_ORDER), curve.knots.len());
     let fault = |message: String| Err(line.words.fault(b'K', "nurbs", message));
     if let Some(before) = curve.knots.last().filter(|before| knot < **before) {
-        return fault(format!("knot {} is below the one before it, {}: knots never fall", show(knot), show(*before)));
+        return fault(format!(
+            "knot {} is below the one before it, {}: knots never fall",
+            show(knot),
+            show(*before)
+        ));
     }
     if index < order && curve.knots.first().is_some_and(|first| *first != knot) {
-        return fault(format!("the first {order} knots are equal: the curve begins at its first control point"));
+        return fault(format!(
+            "the first {order} knots are equal: the curve begins at its first control point"
+        ));
     }
     let (points, degree) = (curve.points.len(), order - 1);
     if index > points && curve.knots.last() != Some(&knot) {
-        return fault(format!("the last {order} knots are equal: the curve ends at its last control point"));
+        return fault(format!(
+            "the last {order} knots are equal: the curve ends at its last control point"
+        ));
     }
     if index < order {
         curve.knots.push(knot);
         return Ok(());
     }
-    let alike = curve.knots.iter().rev().take_while(|before| **before == knot).count();
+    let alike = curve
+        .knots
+        .iter()
+        .rev()
+        .take_while(|before| **before == knot)
+        .count();
     if index == points && alike > 0 {
         return fault(if alike == index {
             NurbsError::Empty(knot).to_string()
         } else {
-            NurbsError::End { value: knot, count: alike + order, degree }.to_string()
+            NurbsError::End {
+                value: knot,
+                count: alike + order,
+                degree,
+            }
+            .to_string()
         });
     }
     if index < points && alike == index {
-        return fault(NurbsError::End { value: knot, count: alike + 1, degree }.to_string());
+        return fault(
+            NurbsError::End {
+                value: knot,
+                count: alike + 1,
+                degree,
+            }
+            .to_string(),
+        );
     }
     if index < points && alike == degree {
-        return fault(NurbsError::Multiplicity { value: knot, count: order, degree }.to_string());
+        return fault(
+            NurbsError::Multiplicity {
+                value: knot,
+                count: order,
+                degree,
+            }
+            .to_string(),
+        );
     }
     curve.knots.push(knot);
     Ok(())
@@ -205,11 +253,17 @@ fn weight_of(line: &Line, letter: u8) -> Checked<f64> {
 fn only(line: &Line, letters: &str) -> Checked<()> {
     let axes = AXIS_MASK & !line.letters.mask;
     let foreign = !mask(letters) | axes;
-    let Some((letter, span)) = line.words.first_of(foreign) else { return Ok(()) };
+    let Some((letter, span)) = line.words.first_of(foreign) else {
+        return Ok(());
+    };
     if axes >> index(letter) & 1 != 0 {
         return Err(no_axis(letter, span, line.letters));
     }
-    let message = format!("{} has no place in this line of a curve{}", letter as char, line.words.exponent(letter));
+    let message = format!(
+        "{} has no place in this line of a curve{}",
+        letter as char,
+        line.words.exponent(letter)
+    );
     Err(Fault::new(span, "unused-word", message))
 }
 

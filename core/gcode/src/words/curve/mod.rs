@@ -101,11 +101,19 @@ impl Curve {
     fn missing_knots(&self) -> String {
         let order = self.order.unwrap_or(0);
         let alone = self.knots.len().saturating_sub(self.points.len());
-        format!("of the {order} knots (K) that stand alone behind the last control point {} are missing", order - alone)
+        format!(
+            "of the {order} knots (K) that stand alone behind the last control point {} are missing",
+            order - alone
+        )
     }
 
     fn data(self, degree: usize) -> NurbsData {
-        NurbsData { degree, control_points: self.points, weights: self.weights, knots: self.knots }
+        NurbsData {
+            degree,
+            control_points: self.points,
+            weights: self.weights,
+            knots: self.knots,
+        }
     }
 }
 
@@ -139,18 +147,26 @@ impl Curves {
     /// It does not, though the curve is not complete: the curve is given up.
     #[inline]
     pub fn goes_on(&mut self, words: &LineWords) -> Checked<bool> {
-        if self.open.is_none() { Ok(false) } else { self.is_of_curve(words) }
+        if self.open.is_none() {
+            Ok(false)
+        } else {
+            self.is_of_curve(words)
+        }
     }
 
     #[cold]
     fn is_of_curve(&mut self, words: &LineWords) -> Checked<bool> {
-        let Some(curve) = &self.open else { return Ok(false) };
+        let Some(curve) = &self.open else {
+            return Ok(false);
+        };
         let own = |tenths: u16| match curve.dialect {
             Dialect::LinuxCnc => matches!(tenths, 52 | 53),
             Dialect::Fanuc => tenths == 62,
         };
         let foreign = words.g.as_slice().iter().find(|code| !own(code.tenths));
-        let Some(code) = foreign.or(words.m.as_slice().first()) else { return Ok(true) };
+        let Some(code) = foreign.or(words.m.as_slice().first()) else {
+            return Ok(true);
+        };
         let message = match curve.dialect {
             Dialect::LinuxCnc if ends_curve(words) => {
                 "G5.3 ends a curve: no other G or M word stands in its line".to_string()
@@ -162,19 +178,30 @@ impl Curves {
                 )
             }
             Dialect::Fanuc => {
-                format!("the curve that line {} opens is not complete: {}", curve.line, curve.missing_knots())
+                format!(
+                    "the curve that line {} opens is not complete: {}",
+                    curve.line,
+                    curve.missing_knots()
+                )
             }
         };
         let known = curve.broken;
         self.open = None;
-        if known { Ok(false) } else { Err(Fault::new(code.span, "nurbs", message)) }
+        if known {
+            Ok(false)
+        } else {
+            Err(Fault::new(code.span, "nurbs", message))
+        }
     }
 
     /// The program ends: no curve may be open.
     pub fn end(&mut self) -> Checked<()> {
         match self.open.take() {
             Some(curve) if !curve.broken => {
-                let message = format!("the program ends within the curve that line {} opens", curve.line);
+                let message = format!(
+                    "the program ends within the curve that line {} opens",
+                    curve.line
+                );
                 Err(Fault::new(Span::new(0, 1), "nurbs", message))
             }
             _ => Ok(()),
@@ -193,7 +220,10 @@ pub(crate) fn open_curve(line: &mut Line, dialect: Dialect, uncertain: u32) -> C
         weights: Vec::new(),
         knots: Vec::new(),
         places: Places::default(),
-        inverse_time: line.words.get(b'F').filter(|_| line.state.modes.feed.mode == FeedMode::InverseTime),
+        inverse_time: line
+            .words
+            .get(b'F')
+            .filter(|_| line.state.modes.feed.mode == FeedMode::InverseTime),
         broken: uncertain != 0,
     });
     line.refuse_machine_coordinates()?;
@@ -203,7 +233,9 @@ pub(crate) fn open_curve(line: &mut Line, dialect: Dialect, uncertain: u32) -> C
 
 /// A line of the curve that is open.
 pub(crate) fn curve_line(line: &mut Line) -> Checked<()> {
-    let Some(mut curve) = line.state.curves.open.take() else { return Ok(()) };
+    let Some(mut curve) = line.state.curves.open.take() else {
+        return Ok(());
+    };
     let done = match curve.dialect {
         Dialect::LinuxCnc => lines::linuxcnc_line(line, &mut curve),
         Dialect::Fanuc => lines::fanuc_line(line, &mut curve),
@@ -214,7 +246,8 @@ pub(crate) fn curve_line(line: &mut Line) -> Checked<()> {
         Err(fault) => {
             // A broken curve of Fanuc's ends where a line without a knot comes.
             let known = std::mem::replace(&mut curve.broken, true);
-            line.state.curves.open = Some(curve).filter(|c| c.dialect == Dialect::Fanuc || !ends_curve(line.words));
+            line.state.curves.open =
+                Some(curve).filter(|c| c.dialect == Dialect::Fanuc || !ends_curve(line.words));
             return if known { Ok(()) } else { Err(fault) };
         }
     }
@@ -231,28 +264,48 @@ fn close_curve(line: &mut Line, mut curve: Curve) -> Checked<()> {
         return Ok(());
     }
     let order = curve.order.unwrap_or(0);
-    let weight = if curve.dialect == Dialect::LinuxCnc { b'P' } else { b'R' };
+    let weight = if curve.dialect == Dialect::LinuxCnc {
+        b'P'
+    } else {
+        b'R'
+    };
     if curve.dialect == Dialect::LinuxCnc {
         curve.knots = uniform_knots(order, curve.points.len());
     }
     let places = std::mem::take(&mut curve.places);
-    let origin = Origin { line: curve.line, inverse_time: curve.inverse_time, places, weight };
+    let origin = Origin {
+        line: curve.line,
+        inverse_time: curve.inverse_time,
+        places,
+        weight,
+    };
     push_curve(line, &origin, curve.data(order - 1))
 }
 
 /// Makes the block of a whole curve that begins at the programmed position.
 fn push_curve(line: &mut Line, origin: &Origin, data: NurbsData) -> Checked<()> {
     let made = Nurbs::new(&data, &line.config.axes);
-    let curve = made.map_err(|error| origin.blame(curve_fault(line, origin.line, &error), &error, &data))?;
+    let curve =
+        made.map_err(|error| origin.blame(curve_fault(line, origin.line, &error), &error, &data))?;
     check_curve_travel(line, &curve, origin)?;
     let length_mm = curve.length().mm;
     let feed_mm_per_s = match origin.inverse_time {
         Some(per_min) if per_min > 0.0 => length_mm * per_min / 60.0,
         _ => line.feed(length_mm, slides(line, &data))?,
     };
-    let end = *data.control_points.last().unwrap_or(&line.state.path.position);
+    let end = *data
+        .control_points
+        .last()
+        .unwrap_or(&line.state.path.position);
     let blank = line.state.blank_block();
-    let block = Block { kind: BlockKind::Nurbs, end, line: origin.line, length_mm, feed_mm_per_s, ..blank };
+    let block = Block {
+        kind: BlockKind::Nurbs,
+        end,
+        line: origin.line,
+        length_mm,
+        feed_mm_per_s,
+        ..blank
+    };
     line.state.path.position = end;
     line.state.path.advance_to(end);
     line.out.push(Item::Block(block, Some(Arc::new(data))));
@@ -270,15 +323,27 @@ fn curve_fault(line: &Line, opened: u32, error: &NurbsError) -> Fault {
 
 /// Whether a linear axis moves.
 fn slides(line: &Line, data: &NurbsData) -> bool {
-    data.control_points.iter().any(|point| line.moves_linear(&(*point - data.control_points[0])))
+    data.control_points
+        .iter()
+        .any(|point| line.moves_linear(&(*point - data.control_points[0])))
 }
 
 fn check_curve_travel(line: &Line, curve: &Nurbs, origin: &Origin) -> Checked<()> {
     for axis in 0..line.letters.count() {
         let ((low, high), (min, max)) = (curve.extent(axis), line.config.travel_mm[axis]);
         let beyond = |fault| {
-            let (limit, above) = if high > max { (max, true) } else { (min, false) };
-            origin.blame_travel(fault, curve, (axis, line.letters.letter(axis)), limit, above)
+            let (limit, above) = if high > max {
+                (max, true)
+            } else {
+                (min, false)
+            };
+            origin.blame_travel(
+                fault,
+                curve,
+                (axis, line.letters.letter(axis)),
+                limit,
+                above,
+            )
         };
         if high > low {
             line.check_travel(axis, low, high).map_err(beyond)?;
@@ -289,5 +354,7 @@ fn check_curve_travel(line: &Line, curve: &Nurbs, origin: &Origin) -> Checked<()
 
 /// Knots of LinuxCNC's curves: clamped, and one apart inside.
 fn uniform_knots(order: usize, points: usize) -> Vec<f64> {
-    (0..points + order).map(|index| index.clamp(order - 1, points) as f64 - (order - 1) as f64).collect()
+    (0..points + order)
+        .map(|index| index.clamp(order - 1, points) as f64 - (order - 1) as f64)
+        .collect()
 }

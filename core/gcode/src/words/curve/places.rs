@@ -25,13 +25,22 @@ impl Places {
     /// Moves `fault` to the word `letter` of the line `index`, or to the first word of that line. A line that is still
     /// being read keeps it.
     fn point_out(&self, mut fault: Fault, index: usize, letter: u8) -> Fault {
-        let Some((number, to)) = self.lines.get(index).copied() else { return fault };
-        let from = index.checked_sub(1).map_or(0, |before| self.lines[before].1);
+        let Some((number, to)) = self.lines.get(index).copied() else {
+            return fault;
+        };
+        let from = index
+            .checked_sub(1)
+            .map_or(0, |before| self.lines[before].1);
         let text = &self.text[from..to];
         let words = words(text);
-        let word = words.iter().find(|span| text[span.start as usize].eq_ignore_ascii_case(&letter));
+        let word = words
+            .iter()
+            .find(|span| text[span.start as usize].eq_ignore_ascii_case(&letter));
         fault.span = word.or(words.first()).copied().unwrap_or_default();
-        fault.line = Some(Box::new(SourceLine { number, text: text.to_vec() }));
+        fault.line = Some(Box::new(SourceLine {
+            number,
+            text: text.to_vec(),
+        }));
         fault
     }
 }
@@ -39,12 +48,18 @@ impl Places {
 /// Where the words of a line stand that could be read: not what is in comments and brackets, nor names of functions.
 fn words(text: &[u8]) -> Vec<Span> {
     let (mut words, mut depth, mut in_name) = (Vec::new(), 0_i32, false);
-    for (at, byte) in text.iter().enumerate().filter(|(_, byte)| !byte.is_ascii_whitespace()) {
+    for (at, byte) in text
+        .iter()
+        .enumerate()
+        .filter(|(_, byte)| !byte.is_ascii_whitespace())
+    {
         match byte {
             b'(' | b'[' | b'<' => depth += 1,
             b')' | b']' | b'>' => depth -= 1,
             b';' if depth == 0 => break,
-            letter if depth == 0 && letter.is_ascii_alphabetic() && !in_name => words.push(Span::new(at, at)),
+            letter if depth == 0 && letter.is_ascii_alphabetic() && !in_name => {
+                words.push(Span::new(at, at))
+            }
             _ => {}
         }
         in_name = byte.is_ascii_alphabetic();
@@ -69,7 +84,12 @@ pub(crate) struct Origin {
 impl Origin {
     /// A curve that stands in one line.
     pub fn line(line: u32) -> Self {
-        Self { line, inverse_time: None, places: Places::default(), weight: b'P' }
+        Self {
+            line,
+            inverse_time: None,
+            places: Places::default(),
+            weight: b'P',
+        }
     }
 
     /// Moves `fault` to the word that `error` is about, where it is about one.
@@ -80,26 +100,41 @@ impl Origin {
                 let by_size = |a: &usize, b: &usize| data.weights[*a].total_cmp(&data.weights[*b]);
                 let all = 0..data.weights.len();
                 let later = all.clone().min_by(by_size).max(all.rev().max_by(by_size));
-                self.places.point_out(fault, later.unwrap_or(0), self.weight)
+                self.places
+                    .point_out(fault, later.unwrap_or(0), self.weight)
             }
             NurbsError::Close { index, .. } => self.places.point_out(fault, index + 1, b'K'),
             // Between two knots all control points are alike in what counts: the second is the first that repeats it.
-            NurbsError::NotCounted { from, .. } => self.places.point_out(fault, span(from) - data.degree + 1, 0),
+            NurbsError::NotCounted { from, .. } => {
+                self.places
+                    .point_out(fault, span(from) - data.degree + 1, 0)
+            }
             _ => fault,
         }
     }
 
     /// Moves `fault` to the control point that draws the curve beyond `limit` on `axis`: with its weight it lies
     /// furthest out, `above` or below.
-    pub fn blame_travel(&self, fault: Fault, curve: &Nurbs, axis: (usize, u8), limit: f64, above: bool) -> Fault {
+    pub fn blame_travel(
+        &self,
+        fault: Fault,
+        curve: &Nurbs,
+        axis: (usize, u8),
+        limit: f64,
+        above: bool,
+    ) -> Fault {
         let out = |index: usize| {
             let (point, weight) = curve.control_point(index);
             weight * (point[axis.0] - limit) * if above { 1.0 } else { -1.0 }
         };
-        let furthest = (0..curve.points()).rev().max_by(|a, b| out(*a).total_cmp(&out(*b)));
+        let furthest = (0..curve.points())
+            .rev()
+            .max_by(|a, b| out(*a).total_cmp(&out(*b)));
         let mut fault = self.places.point_out(fault, furthest.unwrap_or(0), axis.1);
         if fault.line.is_some() {
-            fault.message.push_str("; this control point draws the curve there");
+            fault
+                .message
+                .push_str("; this control point draws the curve there");
         }
         fault
     }
@@ -117,8 +152,14 @@ mod tests {
                 .map(|s| text[s.start as usize..s.end as usize].to_string())
                 .collect::<Vec<_>>()
         };
-        assert_eq!(found("N7 X-1.5(Y9) y [2 + COS[3]]P 1 ; K4"), ["N7", "X-1.5", "y [2 + COS[3]]", "P 1"]);
-        assert_eq!(found("X ABS[-3] Y#<x y> R SIN[1]"), ["X ABS[-3]", "Y#<x y>", "R SIN[1]"]);
+        assert_eq!(
+            found("N7 X-1.5(Y9) y [2 + COS[3]]P 1 ; K4"),
+            ["N7", "X-1.5", "y [2 + COS[3]]", "P 1"]
+        );
+        assert_eq!(
+            found("X ABS[-3] Y#<x y> R SIN[1]"),
+            ["X ABS[-3]", "Y#<x y>", "R SIN[1]"]
+        );
         assert_eq!(found(" (X1) "), Vec::<String>::new());
     }
 }

@@ -26,21 +26,39 @@ fn a_hole_is_drilled_from_r_and_left_at_r() {
 
 #[test]
 fn g98_returns_to_the_level_of_the_first_hole_or_to_r() {
-    assert_eq!(heights("F60 G0 Z9\nG98 G81 X2 Z-3 R1\nX3 R4\nG80"), ["9", "9", "1", "-3", "9", "9", "4", "-3", "9"]);
-    assert_eq!(heights("F60 G0 Z1\nG98 G81 X2 Z-3 R4\nX3"), ["1", "4", "4", "-3", "4", "4", "-3", "4"]);
+    assert_eq!(
+        heights("F60 G0 Z9\nG98 G81 X2 Z-3 R1\nX3 R4\nG80"),
+        ["9", "9", "1", "-3", "9", "9", "4", "-3", "9"]
+    );
+    assert_eq!(
+        heights("F60 G0 Z1\nG98 G81 X2 Z-3 R4\nX3"),
+        ["1", "4", "4", "-3", "4", "4", "-3", "4"]
+    );
 }
 
 #[test]
 fn pecks_leave_the_hole_or_break_the_chip() {
-    assert_eq!(heights("F60 G0 Z1\nG73 Z-4 R1 Q2"), ["1", "-1", "-0.746", "-3", "-2.746", "-4", "1"]);
-    assert_eq!(heights("F60 G0 Z1\nG83 Z-2 R1 Q2"), ["1", "-1", "1", "-0.746", "-2", "1"]);
+    assert_eq!(
+        heights("F60 G0 Z1\nG73 Z-4 R1 Q2"),
+        ["1", "-1", "-0.746", "-3", "-2.746", "-4", "1"]
+    );
+    assert_eq!(
+        heights("F60 G0 Z1\nG83 Z-2 R1 Q2"),
+        ["1", "-1", "1", "-0.746", "-2", "1"]
+    );
 }
 
 #[test]
 fn incremental_cycles_repeat() {
     let all = ends("F60 G91 G81 X2 Y1 Z-2 R4 L2");
     let holes: Vec<_> = all.iter().filter(|end| end[2] == "2").collect();
-    assert_eq!(holes, [&["2".to_string(), "1".into(), "2".into()], &["4".to_string(), "2".into(), "2".into()]]);
+    assert_eq!(
+        holes,
+        [
+            &["2".to_string(), "1".into(), "2".into()],
+            &["4".to_string(), "2".into(), "2".into()]
+        ]
+    );
 }
 
 #[test]
@@ -69,17 +87,32 @@ fn tapping_turns_the_spindle_round_without_overrides() {
 #[test]
 fn what_a_cycle_lacks_is_named() {
     for (program, message) in [
-        ("F9\nG81 X1 Z-1", "G81 needs R, the level from which the feed begins"),
+        (
+            "F9\nG81 X1 Z-1",
+            "G81 needs R, the level from which the feed begins",
+        ),
         ("F9\nG81 X1 R1", "G81 needs Z, the bottom of the hole"),
         ("F9\nG81 X1 R1 Z2", "R lies below the bottom of the hole"),
         ("F9\nG82 X1 R1 Z0", "G82 needs P, the dwell in seconds"),
         ("F9\nG83 X1 R1 Z0", "G83 needs Q, the depth of a peck"),
-        ("F9\nG81 Z-1 R1\nG0 Z5\nG81 X1", "G81 needs R, the level from which the feed begins"),
-        ("F9\nG84 X1 R1 Z0", "G84 needs the spindle to turn clockwise (M3)"),
-        ("G81 X1 R1 Z0", "the feed is missing: no F has been set; G81 needs one"),
+        (
+            "F9\nG81 Z-1 R1\nG0 Z5\nG81 X1",
+            "G81 needs R, the level from which the feed begins",
+        ),
+        (
+            "F9\nG84 X1 R1 Z0",
+            "G84 needs the spindle to turn clockwise (M3)",
+        ),
+        (
+            "G81 X1 R1 Z0",
+            "the feed is missing: no F has been set; G81 needs one",
+        ),
         ("F9\nG83 X1 R1 Z-99 Q0.000001", "this line would make"),
     ] {
         let all = messages(program);
-        assert!(all.iter().any(|m| m.contains(message)), "{program}: {all:?}");
+        assert!(
+            all.iter().any(|m| m.contains(message)),
+            "{program}: {all:?}"
+        );
     }
 }
