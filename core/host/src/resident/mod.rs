@@ -23,6 +23,7 @@ use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
 use crate::run::job::{Conclusion, Job, Made};
 use crate::run::{begin, periods};
+use crate::setup::commands::with_user_commands;
 use crate::setup::ready::{Memory, Plugins, Ready};
 use crate::soft::soft_loop::{RunObserver, SoftLoop};
 use crate::switches::{Clock, Lead, Switches};
@@ -110,8 +111,17 @@ impl<'r> Resident<'r> {
     ///
     /// # Errors
     /// Plugins refuse, the drives cannot be reached, or what is asked does not go together.
-    pub fn attach(machine: Machine, registry: &'r Registry, clock: Clock) -> Result<Self, HostError> {
-        let switches = Switches { clock: Some(clock), unhomed: true, reset: true, ..Switches::default() };
+    pub fn attach(
+        machine: Machine,
+        registry: &'r Registry,
+        clock: Clock,
+    ) -> Result<Self, HostError> {
+        let switches = Switches {
+            clock: Some(clock),
+            unhomed: true,
+            reset: true,
+            ..Switches::default()
+        };
         let mut plugins = Plugins::of(&machine, registry)?;
         plugins.check_staying(&machine, switches)?;
         plugins.add_faults(&machine)?;
@@ -122,22 +132,43 @@ impl<'r> Resident<'r> {
         let Some((driver, attached)) = plugins.claim.into_parts() else {
             return Err(HostError::System("the drives are not claimed".to_string()));
         };
-        let mut unknown_axes = plugins.joints.axes_moved_by(!(attached.known | attached.homed));
+        let mut unknown_axes = plugins
+            .joints
+            .axes_moved_by(!(attached.known | attached.homed));
         if machine.require_homing {
             // As for a run: whatever the drives say, the machine file asks for it once.
-            unknown_axes |= machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis);
+            unknown_axes |= machine
+                .homing
+                .iter()
+                .fold(0, |axes, of| axes | 1 << of.axis);
         }
         let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
         if let Some(watch) = &watch {
             watch.begin(Arc::clone(&controls), Arc::clone(&status));
         }
-        let ready = Ready::of_source_on(&roster, machine.clone(), registry, None, |_| Box::new(Nothing), switches)?;
+        let ready = Ready::of_source_on(
+            &roster,
+            machine.clone(),
+            registry,
+            None,
+            |_| Box::new(Nothing),
+            switches,
+        )?;
         let shared = (Arc::clone(&controls), Arc::clone(&status));
         let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
         // How long exchanges take is measured of runs alone.
         let exchange = Arc::<ExchangeTimes>::default();
-        let driver = Box::new(exchange_time::Timed::new(driver, machine.fine_period_s, exchange));
-        let mut fine = Box::new(FineLoop::new(&made.config, made.end, driver, made.kinematics));
+        let driver = Box::new(exchange_time::Timed::new(
+            driver,
+            machine.fine_period_s,
+            exchange,
+        ));
+        let mut fine = Box::new(FineLoop::new(
+            &made.config,
+            made.end,
+            driver,
+            made.kinematics,
+        ));
         fine.stay();
         fine.begin_ended();
         let mut this = Self {
@@ -210,9 +241,21 @@ impl<'r> Resident<'r> {
     ///
     /// # Errors
     /// Everything that refuses: the program's errors, plugins, what does not go together.
-    pub fn program(&self, program: Program, switches: Switches, memory: &Memory) -> Result<PreparedJob, HostError> {
+    pub fn program(
+        &self,
+        program: Program,
+        switches: Switches,
+        memory: &Memory,
+    ) -> Result<PreparedJob, HostError> {
         let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
-        let ready = Ready::of_program_on(&self.roster, machine, self.registry, program, switches, memory)?;
+        let ready = Ready::of_program_on(
+            &self.roster,
+            machine,
+            self.registry,
+            program,
+            switches,
+            memory,
+        )?;
         Ok(self.prepared(ready, 0))
     }
 
@@ -227,8 +270,16 @@ impl<'r> Resident<'r> {
         switches: Switches,
     ) -> Result<PreparedJob, HostError> {
         let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
-        let make = |_: &Machine| source;
-        let ready = Ready::of_source_on(&self.roster, machine, self.registry, Some(name.to_string()), make, switches)?;
+        // Lines by hand run the machine's own commands too, and wait for them.
+        let make = |machine: &Machine| with_user_commands(machine, self.registry, switches, source);
+        let ready = Ready::of_source_on(
+            &self.roster,
+            machine,
+            self.registry,
+            Some(name.to_string()),
+            make,
+            switches,
+        )?;
         Ok(self.prepared(ready, 0))
     }
 
@@ -238,22 +289,40 @@ impl<'r> Resident<'r> {
     /// Plugins refuse, or the machine cannot be homed so.
     pub fn homing(&self, homing: Lead, axis: Option<usize>) -> Result<PreparedJob, HostError> {
         let mut machine = self.machine.clone();
-        machine.homing.retain(|of| axis.is_none_or(|axis| of.axis == axis));
-        let switches = Switches { home: Some(homing), unhomed: true, ..self.on_clock(Switches::default()) };
-        let homes = machine.homing.iter().fold(0, |axes, of| axes | 1 << of.axis);
-        let (name, make) = (Some("homing".to_string()), |machine: &Machine| homing(machine, None));
-        let ready = Ready::of_source_on(&self.roster, machine, self.registry, name, make, switches)?;
+        machine
+            .homing
+            .retain(|of| axis.is_none_or(|axis| of.axis == axis));
+        let switches = Switches {
+            home: Some(homing),
+            unhomed: true,
+            ..self.on_clock(Switches::default())
+        };
+        let homes = machine
+            .homing
+            .iter()
+            .fold(0, |axes, of| axes | 1 << of.axis);
+        let (name, make) = (Some("homing".to_string()), |machine: &Machine| {
+            homing(machine, None)
+        });
+        let ready =
+            Ready::of_source_on(&self.roster, machine, self.registry, name, make, switches)?;
         Ok(self.prepared(ready, homes))
     }
 
     fn on_clock(&self, switches: Switches) -> Switches {
-        Switches { clock: Some(self.clock), ..switches }
+        Switches {
+            clock: Some(self.clock),
+            ..switches
+        }
     }
 
     fn prepared(&self, ready: Ready, homes: u32) -> PreparedJob {
         let shared = (Arc::clone(&self.controls), Arc::clone(&self.status));
         let made = Made::of(ready, &self.attached, self.clock == Clock::Wall, shared);
-        PreparedJob { made: Box::new(made), homes }
+        PreparedJob {
+            made: Box::new(made),
+            homes,
+        }
     }
 
     /// Enables the drives where they stand; with `resets` their faults are reset first. The outcome's fault is that of a drive
@@ -261,8 +330,15 @@ impl<'r> Resident<'r> {
     ///
     /// # Errors
     /// The computer refuses, or plugins do.
-    pub fn enable(&mut self, resets: bool, observer: &mut dyn RunObserver) -> Result<JobOutcome, HostError> {
-        let switches = Switches { unhomed: true, ..Switches::default() };
+    pub fn enable(
+        &mut self,
+        resets: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<JobOutcome, HostError> {
+        let switches = Switches {
+            unhomed: true,
+            ..Switches::default()
+        };
         let job = self.source("enabling", Box::new(Nothing), switches)?;
         self.controls.let_go.store(false, Relaxed);
         self.controls.emergency_stop.store(false, Relaxed);
@@ -275,7 +351,11 @@ impl<'r> Resident<'r> {
     ///
     /// # Errors
     /// The computer refuses: the machine is as it was.
-    pub fn drive(&mut self, job: PreparedJob, observer: &mut dyn RunObserver) -> Result<JobOutcome, HostError> {
+    pub fn drive(
+        &mut self,
+        job: PreparedJob,
+        observer: &mut dyn RunObserver,
+    ) -> Result<JobOutcome, HostError> {
         self.drive_with(job, false, observer)
     }
 
@@ -287,7 +367,12 @@ impl<'r> Resident<'r> {
     ) -> Result<JobOutcome, HostError> {
         let started = Instant::now();
         let PreparedJob { made, homes } = job;
-        let Made { job, config, end, kinematics } = *made;
+        let Made {
+            job,
+            config,
+            end,
+            kinematics,
+        } = *made;
         let driver = Box::new(NoDriver);
         let mut fine = Box::new(FineLoop::new(&config, end, driver, kinematics));
         fine.stay();
@@ -295,7 +380,9 @@ impl<'r> Resident<'r> {
         self.engine.hand_over(fine, resets)?;
         if let Engine::Down(fine) = &mut self.engine {
             // A fault has ended the thread: it begins anew.
-            let Some(fine) = fine.take() else { return Err(HostError::System("the fine loop is gone".to_string())) };
+            let Some(fine) = fine.take() else {
+                return Err(HostError::System("the fine loop is gone".to_string()));
+            };
             self.engine = match self.clock {
                 Clock::Virtual => Engine::Here(fine),
                 Clock::Wall => self.thread(fine, false)?,
@@ -323,7 +410,12 @@ impl<'r> Resident<'r> {
     /// What was asked of the job that is over is not asked of the next one.
     fn clear_controls(&self) {
         let controls = &self.controls;
-        for flag in [&controls.hold, &controls.program_hold, &controls.abort, &controls.soft_fault] {
+        for flag in [
+            &controls.hold,
+            &controls.program_hold,
+            &controls.abort,
+            &controls.soft_fault,
+        ] {
             flag.store(false, Relaxed);
         }
         controls.jog.most_periods.store(0, Relaxed);
@@ -341,20 +433,32 @@ impl<'r> Resident<'r> {
             Engine::Down(Some(fine)) if end.is_none() => Some(fine),
             _ => None,
         };
-        let end = end.or_else(|| faulted.map(|fine| fine.job_end())).unwrap_or_default();
+        let end = end
+            .or_else(|| faulted.map(|fine| fine.job_end()))
+            .unwrap_or_default();
         let mut summary = conclusion.summary(soft_loop, &end.counters);
         let fault = faulted.and_then(|fine| fine.fault());
         if let (Some(fine), Some(fault)) = (faulted, &fault) {
             let late = summary.late_cause();
-            summary.fault = Some(conclusion.words(fault, fine, soft_loop.soft_cause(), late.as_deref()));
+            summary.fault =
+                Some(conclusion.words(fault, fine, soft_loop.soft_cause(), late.as_deref()));
         }
         summary.wall_time_s = started.elapsed().as_secs_f64();
         let aborted = soft_loop.aborted.is_some();
-        JobOutcome { summary, fault, position: end.position, left: end.left, aborted }
+        JobOutcome {
+            summary,
+            fault,
+            position: end.position,
+            left: end.left,
+            aborted,
+        }
     }
 
     /// Both loops in lockstep, to the end of the job; none where a fault ends it.
-    fn in_lockstep(&mut self, soft_loop: &mut SoftLoop<'_>) -> Result<Option<tandem_fine::JobEnd>, HostError> {
+    fn in_lockstep(
+        &mut self,
+        soft_loop: &mut SoftLoop<'_>,
+    ) -> Result<Option<tandem_fine::JobEnd>, HostError> {
         let patience = (PATIENCE_S / self.machine.fine_period_s) as u64;
         let (mut passed_s, mut stuck) = (f64::NAN, 0);
         while self.engine.is_attaching() {
@@ -393,7 +497,10 @@ impl<'r> Resident<'r> {
     }
 
     /// The soft side in real time, to the end of the job; none where a fault ends it.
-    fn in_real_time(&mut self, soft_loop: &mut SoftLoop<'_>) -> Result<Option<tandem_fine::JobEnd>, HostError> {
+    fn in_real_time(
+        &mut self,
+        soft_loop: &mut SoftLoop<'_>,
+    ) -> Result<Option<tandem_fine::JobEnd>, HostError> {
         loop {
             soft_loop.step();
             soft_loop.drain();
@@ -430,8 +537,12 @@ impl<'r> Resident<'r> {
         drain_plugin_log(&mut |line| observer.note(line));
         let before = self.engine.periods();
         let machine = &self.machine;
-        let Some(fine) = self.engine.fetch_faulted()? else { return Ok(None) };
-        let Some(fault) = fine.fault() else { return Ok(None) };
+        let Some(fine) = self.engine.fetch_faulted()? else {
+            return Ok(None);
+        };
+        let Some(fault) = fine.fault() else {
+            return Ok(None);
+        };
         let joints = crate::joints::JointSpace::of(machine, self.registry)?;
         let known = crate::messages::fault_text::Known {
             soft: None,
@@ -460,17 +571,24 @@ impl<'r> Resident<'r> {
     /// # Errors
     /// A driver could not release them, in words.
     pub fn stop(mut self, observer: &mut dyn RunObserver) -> Result<(), HostError> {
-        let most = ((self.roster.describe().disable_s + 1.0) / self.machine.rough_period_s).ceil() as u64;
+        let most =
+            ((self.roster.describe().disable_s + 1.0) / self.machine.rough_period_s).ceil() as u64;
         for _ in 0..most {
             if self.disable() || self.idle(observer)?.is_some() {
                 break;
             }
         }
-        let Some(fine) = self.engine.end()? else { return Ok(()) };
+        let Some(fine) = self.engine.end()? else {
+            return Ok(());
+        };
         let titles = self.roster.titles();
         let stopped = fine.into_driver().stop();
         drain_plugin_log(&mut |line| observer.note(line));
-        stopped.map_err(|e| HostError::System(format!("driver {titles}: the drives were not let go of: {e}")))
+        stopped.map_err(|e| {
+            HostError::System(format!(
+                "driver {titles}: the drives were not let go of: {e}"
+            ))
+        })
     }
 }
 
@@ -482,7 +600,10 @@ impl tandem_sdk::Driver for NoDriver {
         tandem_sdk::DriverDescription::simulated()
     }
 
-    fn open(&mut self, _context: &tandem_sdk::DriverContext) -> Result<(), tandem_sdk::PluginError> {
+    fn open(
+        &mut self,
+        _context: &tandem_sdk::DriverContext,
+    ) -> Result<(), tandem_sdk::PluginError> {
         Ok(())
     }
 
