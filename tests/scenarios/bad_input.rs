@@ -30,7 +30,7 @@ fn programs_that_cannot_run_say_why() {
     refused(b"F100\nG1 X1 C4\n", &["bad.ngc:2:7", "C"]);
     refused(b"F100\nG1 Xnan\n", &["bad.ngc:2:"]);
     refused(b"F100\nG1 X1e999\n", &["bad.ngc:2:"]);
-    refused(b"F100\nG41 D1\n", &["bad.ngc:2:1", "G41"]);
+    refused(b"F100\nG33 Z-1 K1\n", &["bad.ngc:2:1", "G33"]);
     refused(b"o100 sub\n", &["bad.ngc:1:1"]);
     refused(b"%\nF100\nG1 X1\n", &["%"]);
     refused(b"\x7fELF\x02\x01\x01\0\0\0\0", &["not a part program"]);

@@ -15,6 +15,7 @@ fn path(key: &Key) -> String {
         ("<driver>", "servo"),
         ("<input>", "door"),
         ("<name>", "vacuum"),
+        ("<command>", "m100"),
     ];
     names
         .iter()
