@@ -190,7 +190,7 @@ impl Driver for Double {
             .map(|joint| joint.name.as_str().to_string())
             .collect();
         self.note(|log| {
-            (log.opened, log.joints, log.names) = (log.opened + 1, context.joint_count, names)
+            (log.opened, log.joints, log.names) = (log.opened + 1, context.joint_count, names);
         });
         if self.plan.refuses_to_open {
             return Err(PluginError::of_option("name", "it is not there"));

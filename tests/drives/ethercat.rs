@@ -1,4 +1,9 @@
-//! EtherCAT drives behind the host, on the emulator and on virtual time: what goes wrong in any frame of a program.
+//! `EtherCAT` drives behind the host, on the emulator and on virtual time: what goes wrong in any frame of a program.
+
+#![allow(
+    clippy::format_push_string,
+    reason = "a machine file in pieces, once a test"
+)]
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

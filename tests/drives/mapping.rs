@@ -493,7 +493,7 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
                 );
                 let caught = (0..4).filter(|joint| latch.joints >> joint & 1 == 1);
                 caught.for_each(|joint| {
-                    assert_eq!(given.position[joint], latch.position[joint], "{case}")
+                    assert_eq!(given.position[joint], latch.position[joint], "{case}");
                 });
             }
         }

@@ -554,7 +554,7 @@ fn keys_jog_and_the_terminal_is_as_it_was() {
     let mut press = |key: &str| {
         keys.write_all(key.as_bytes())
             .and_then(|()| keys.flush())
-            .unwrap()
+            .unwrap();
     };
     let mut client = run.connect();
     client.wait("enabled", |s| s["state"] == "standstill");

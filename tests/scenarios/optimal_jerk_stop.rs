@@ -58,7 +58,7 @@ impl<'a> JerkPlan<'a> {
         for segment in segments {
             match pieces.last_mut() {
                 Some((_, last)) if segment.duration_s == 0.0 => {
-                    last.flags = last.flags.with(segment.flags)
+                    last.flags = last.flags.with(segment.flags);
                 }
                 _ if segment.duration_s == 0.0 => {}
                 _ => pieces.push((start_s, *segment)),

@@ -32,36 +32,32 @@ fn fences(page: &str) -> Vec<Fence> {
     let mut open: Option<(Fence, usize)> = None;
     for (index, line) in page.lines().enumerate() {
         let Some(kind) = line.trim_start().strip_prefix("```") else {
-            match &mut open {
-                Some((fence, indent)) => {
-                    let (blank, rest) = line.split_at((*indent).min(line.len()));
-                    assert!(
-                        blank.trim().is_empty(),
-                        "line {}: less indented than its fence",
-                        index + 1
-                    );
-                    fence.text += rest;
-                    fence.text.push('\n');
-                }
-                None => {
-                    before += line;
-                    before.push('\n');
-                }
+            if let Some((fence, indent)) = &mut open {
+                let (blank, rest) = line.split_at((*indent).min(line.len()));
+                assert!(
+                    blank.trim().is_empty(),
+                    "line {}: less indented than its fence",
+                    index + 1
+                );
+                fence.text += rest;
+                fence.text.push('\n');
+            } else {
+                before += line;
+                before.push('\n');
             }
             continue;
         };
-        match open.take() {
-            Some((fence, _)) => found.push(fence),
-            None => {
-                let indent = line.len() - line.trim_start().len();
-                let fence = Fence {
-                    line: index + 1,
-                    kind: kind.to_string(),
-                    text: String::new(),
-                    before: std::mem::take(&mut before),
-                };
-                open = Some((fence, indent));
-            }
+        if let Some((fence, _)) = open.take() {
+            found.push(fence);
+        } else {
+            let indent = line.len() - line.trim_start().len();
+            let fence = Fence {
+                line: index + 1,
+                kind: kind.to_string(),
+                text: String::new(),
+                before: std::mem::take(&mut before),
+            };
+            open = Some((fence, indent));
         }
     }
     assert!(open.is_none(), "a fence without an end");
@@ -227,7 +223,7 @@ fn every_page_with_an_output_is_judged() {
     let mut names = vec!["README.md".to_string(), "CONTRIBUTING.md".to_string()];
     for entry in fs::read_dir(root.join("docs")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
-        if name.ends_with(".md") {
+        if Path::new(&name).extension().is_some_and(|is| is == "md") {
             names.push(format!("docs/{name}"));
         }
     }

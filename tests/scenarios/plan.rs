@@ -31,7 +31,7 @@ impl Plan {
             // A rest without duration belongs to what comes before it.
             match pieces.last_mut() {
                 Some((_, last)) if segment.duration_s == 0.0 => {
-                    last.flags = last.flags.with(segment.flags)
+                    last.flags = last.flags.with(segment.flags);
                 }
                 _ if segment.duration_s == 0.0 => {}
                 _ => pieces.push((start_s, *segment)),

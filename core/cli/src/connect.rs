@@ -125,7 +125,7 @@ pub fn ask(options: &args::Ask) -> Result<u8, Box<dyn Error>> {
     }
     let mut early = vec![];
     let answer = connection.ask(&options.request, with, &mut |event| {
-        early.push(event.clone())
+        early.push(event.clone());
     });
     let ok = match answer {
         Ok(ok) => ok,

@@ -142,7 +142,7 @@ impl Corrections {
                 );
             }
             EventKind::HomeByDrive => {
-                say!("homing {letter}: by its drive, within {} s", event.value)
+                say!("homing {letter}: by its drive, within {} s", event.value);
             }
             EventKind::Homed => say!("homing {letter}: goes home, to {:.6} {unit}", home / scale),
             _ => {}

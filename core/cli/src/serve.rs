@@ -35,7 +35,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     let listen = if replays {
         Listen::default()
     } else {
-        doors(options, &machine)?
+        doors(options, &machine)
     };
     let store = store(options, &machine, replays)?;
     let lasting = store
@@ -156,17 +156,17 @@ pub fn default_socket(machine: &str) -> PathBuf {
         .join(format!("tandem-{name}.socket"))
 }
 
-fn doors(options: &args::Serve, machine: &Machine) -> Result<Listen, Box<dyn Error>> {
+fn doors(options: &args::Serve, machine: &Machine) -> Listen {
     let operator = &options.operator;
     let unix = operator
         .listen
         .clone()
         .unwrap_or_else(|| default_socket(&machine.name));
-    Ok(Listen {
+    Listen {
         unix: Some(unix),
         tcp: operator.listen_tcp,
         token_file: operator.token_file.clone(),
-    })
+    }
 }
 
 /// Lines of clients by fine periods; those that are empty or begin with # are left out.
@@ -207,9 +207,10 @@ fn explain(
     if let Some(address) = address {
         say!("  tcp     {address}");
     }
-    match state {
-        Some(path) => say!("  state   {}", path.display()),
-        None => say!("  state   none: what lasts ends with this process"),
+    if let Some(path) = state {
+        say!("  state   {}", path.display());
+    } else {
+        say!("  state   none: what lasts ends with this process");
     }
     if !enabled {
         say!("  the drives are not enabled: the request \"enable\" does");

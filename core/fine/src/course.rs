@@ -221,7 +221,7 @@ impl<'a> Place<'a> {
         while !rests && self.segment.is_none() {
             match self.course.entry(self.passed) {
                 Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => {
-                    rests = ends(segment)
+                    rests = ends(segment);
                 }
                 Some(Queued::Segment { segment, .. }) => self.segment = Some(segment),
                 Some(Queued::Event(_)) => {}

@@ -42,7 +42,7 @@
 //!
 //! What the segment carries. `Segment::step_velocity` is the lead at the start of the segment,
 //! `Segment::step_acceleration` the rate at which it is taken back; at local time t the continuous velocity is
-//! `velocity(t) − step_velocity + step_acceleration·t`. The governor limits σ²·(q″ + step_acceleration) + σ̇·(q′ −
+//! `velocity(t) − step_velocity + step_acceleration·t`. The governor limits σ²·(q″ + `step_acceleration`) + σ̇·(q′ −
 //! lead), with q the plan: the rate of σ·g. The steps themselves shrink with σ. So the same argument holds while the
 //! machine is held, slowed or starved. Planners of continuous velocity leave both fields zero.
 //!

@@ -71,7 +71,7 @@ impl Outputs {
             EventKind::Mist => self.switch_by(event, MIST),
             EventKind::Flood => self.switch_by(event, FLOOD),
             EventKind::DigitalOutput => {
-                self.switch_by(event, event.index.clamp(0, 63).unsigned_abs())
+                self.switch_by(event, event.index.clamp(0, 63).unsigned_abs());
             }
             EventKind::FeedOverride => self.override_permitted = on,
             EventKind::AdaptiveFeed => self.adaptive_permitted = on,

@@ -108,6 +108,7 @@ enum Phase {
 }
 
 /// The hard loop. [`FineLoop::tick`] runs on the fine thread and does not allocate; the rest is the host's.
+#[allow(clippy::struct_excessive_bools)] // each is about something else
 pub struct FineLoop {
     config: FineConfig,
     driver: Box<dyn Driver>,

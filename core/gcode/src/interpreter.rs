@@ -435,7 +435,7 @@ impl Interpreter {
             match &assignment.target {
                 Target::Numbered(number) => {
                     self.parameters
-                        .set_numbered(*number, assignment.value, assumed)
+                        .set_numbered(*number, assignment.value, assumed);
                 }
                 Target::Named(range) => {
                     if !self.parameters.set_named(

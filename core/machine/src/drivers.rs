@@ -279,7 +279,7 @@ fn owners<'a, T: Ord + std::fmt::Display>(
                             key,
                             node,
                         },
-                    )
+                    );
                 }
             }
         }

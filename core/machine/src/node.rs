@@ -121,7 +121,7 @@ pub fn merge(base: &mut Table, over: Table) {
                         origin: node.origin,
                         value,
                     },
-                )
+                );
             }
         }
     }

@@ -32,7 +32,7 @@ pub fn beside(file: &Path, name: &str) -> PathBuf {
 pub fn resolve_paths(table: &mut Table, path: &Path) {
     for (section, key) in FILES {
         each_table(table, &[section], &mut |section| {
-            resolve(section, key, path)
+            resolve(section, key, path);
         });
     }
     each_table(table, &["user_commands"], &mut |section| {
@@ -43,7 +43,7 @@ pub fn resolve_paths(table: &mut Table, path: &Path) {
     });
     for section in PLUGINS {
         each_table(table, section, &mut |section| {
-            resolve(section, "plugin", path)
+            resolve(section, "plugin", path);
         });
     }
 }

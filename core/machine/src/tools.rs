@@ -138,7 +138,7 @@ fn offsets(tool: &Section<'_>, key: &str, rotary: bool, axes: &Axes, offset: &mu
                 offset[axis] = if rotary { value.to_radians() } else { value };
             }
             Some(_) if rotary => {
-                section.refuse(name, "a linear axis is in mm; did you mean `offset_mm`?")
+                section.refuse(name, "a linear axis is in mm; did you mean `offset_mm`?");
             }
             Some(_) => section.refuse(
                 name,

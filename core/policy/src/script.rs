@@ -123,7 +123,7 @@ fn look(module: &Module, name: &str, wanted: &Wanted<'_>, wrong: &mut Vec<String
             ));
         }
         (Some(_), Wanted::Memory) => {
-            wrong.push(format!("its export {name} is no memory of its own"))
+            wrong.push(format!("its export {name} is no memory of its own"));
         }
         (Some(_), _) => wrong.push(format!("its export {name} is no function")),
     }

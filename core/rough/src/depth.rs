@@ -4,19 +4,19 @@
 //!
 //! Starvation must end on the path, inside what is queued. Each segment declares the path deceleration that the plan
 //! leaves everywhere in it, `Segment::stop_deceleration_mm_per_s2`, its own braking counted. The rough loop keeps the
-//! greatest path speed v and the smallest declared deceleration a_s of all that is queued and keeps at least
+//! greatest path speed v and the smallest declared deceleration `a_s` of all that is queued and keeps at least
 //!
 //! ```text
 //! v / (0.95·a_s) + a_s/(0.8·J) + two rough periods
 //! ```
 //!
-//! of program time in the ring, and three rough periods more as margin. v is the highest speed queued and a_s the least
-//! deceleration; where the longest v/a_s of a single segment is shorter, that counts, for σ falls by a_s/v at each
-//! place: where a rotary axis turns much on little path, both are small. a_s/J, the time in which the deceleration is
+//! of program time in the ring, and three rough periods more as margin. v is the highest speed queued and `a_s` the least
+//! deceleration; where the longest `v/a_s` of a single segment is shorter, that counts, for σ falls by `a_s/v` at each
+//! place: where a rotary axis turns much on little path, both are small. `a_s/J`, the time in which the deceleration is
 //! built up, is what segments of order 3 declare as the quotient of their two bounds on σ; it is zero for order 2.
 //! `0.95` is what the fine loop counts on, because the governor stays 0.1 % inside the limits and acts from the next
 //! period on. v/(2a) would do only for a plan that cruises: a plan that already brakes consumes its queue faster, and
-//! the fine loop counts on v/a_s. With half the depth a fast program starves without any stall, again and again;
+//! the fine loop counts on `v/a_s`. With half the depth a fast program starves without any stall, again and again;
 //! `core/host/tests/session/depth.rs` shows both. Motion starts, and starts again after starvation, when this depth or
 //! the end of the stream is queued, or the ring is full.
 //!
@@ -26,8 +26,8 @@
 //! rough period, the planner is asked for several at a time. It is still finite, blocks of 0.1 µm are short, and so the
 //! ring can be full before the depth is there. Then the machine is not late but too fast for what can be queued: the
 //! rough loop tells the fine loop the highest σ that a stop inside the ring allows, and the governor drives no faster
-//! (`Depth::most_rate`, counted in `queue_limited_samples`). Along the path σ²/2 falls by a_s/v per s of program time
-//! at most, so with E the integral of a_s/v over what is queued, and `t` the time that the rough loop may be late and
+//! (`Depth::most_rate`, counted in `queue_limited_samples`). Along the path σ²/2 falls by `a_s/v` per s of program time
+//! at most, so with E the integral of `a_s/v` over what is queued, and `t` the time that the rough loop may be late and
 //! the deceleration takes to build up, it is the greatest σ with
 //!
 //! ```text
@@ -39,7 +39,7 @@
 //! its periods: with time to spare it cannot happen. The same number keeps no more entries in a period than the fine
 //! loop looks at.
 //!
-//! For a_s to be large, turning must leave something to brake with. The planner lets turning take at most 0.8 of the
+//! For `a_s` to be large, turning must leave something to brake with. The planner lets turning take at most 0.8 of the
 //! acceleration of an axis. On a circle the deceleration left along the path is then at least min over φ of (1 −
 //! 0.8·cos φ)/sin φ = 0.6 of it.
 

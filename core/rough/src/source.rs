@@ -85,7 +85,7 @@ impl Source for Stream {
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         match rest.cause {
             RestCause::Abort | RestCause::Corrected | RestCause::Attached => {
-                self.set_position(rest.position)
+                self.set_position(rest.position);
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
                 self.provide_probe(&ProbeResult {

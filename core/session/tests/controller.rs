@@ -300,7 +300,9 @@ fn lines_that_come_in_time_are_planned_through() {
             .collect();
         says.ask(20_000, "status", json!({}));
         let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
-        ids.iter().for_each(|id| _ = told.ok(*id));
+        for id in &ids {
+            _ = told.ok(*id);
+        }
         let events = told.0.iter().filter(|told| told["told"]["event"] == "job");
         let jobs: Vec<f64> = events
             .map(|told| told["told"]["job"]["time_s"].as_f64().unwrap())
@@ -336,7 +338,9 @@ fn a_sender_that_stalls_stops_the_machine_on_the_path_and_goes_on_from_there() {
     }
     let end = says.ask(3000, "status", json!({}));
     let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
-    ids.iter().for_each(|id| _ = told.ok(*id));
+    for id in &ids {
+        _ = told.ok(*id);
+    }
     assert_eq!(told.ok(end)["position"]["x_mm"], 50.0);
     assert!(
         told.jobs().iter().all(|(_, outcome)| outcome == "done") && told.jobs().len() == 3,
@@ -378,7 +382,9 @@ fn every_request_has_one_answer_in_real_states() {
             |options| options.enable = enable,
             Box::new(NoKeeper),
         );
-        ids.iter().for_each(|id| _ = told.answer(*id));
+        for id in &ids {
+            _ = told.answer(*id);
+        }
         let state = match (name, enable) {
             (_, false) => ControllerState::Disabled,
             ("mill-homing.toml", _) => ControllerState::HomingNeeded,

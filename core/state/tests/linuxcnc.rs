@@ -1,4 +1,4 @@
-//! What is exported for LinuxCNC: read back it is the same, and LinuxCNC's own interpreter, rs274, agrees with ours on it.
+//! What is exported for `LinuxCNC`: read back it is the same, and `LinuxCNC`'s own interpreter, rs274, agrees with ours on it.
 //!
 //! The judge is the command `rs274` of Debian's package linuxcnc-uspace, on the path or named by `RS274`; where it is not
 //! installed nothing is judged, which the test prints. `JUDGE_SEED=17` judges one state.
@@ -15,7 +15,7 @@ use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector};
 use tandem_state::{LastingState, LinearUnit, LinuxCnc};
 
-/// What LinuxCNC's files keep of a value: nine decimals, in degrees or the unit.
+/// What `LinuxCNC`'s files keep of a value: nine decimals, in degrees or the unit.
 fn is_near(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-7
 }
@@ -24,7 +24,7 @@ fn is_near_vector(a: &AxisVector, b: &AxisVector) -> bool {
     a.0.iter().zip(&b.0).all(|(a, b)| is_near(*a, *b))
 }
 
-/// A state as a shop may have it: nothing is far away, nor so near to zero that LinuxCNC takes it for that.
+/// A state as a shop may have it: nothing is far away, nor so near to zero that `LinuxCNC` takes it for that.
 fn shop(random: &mut Random, axes: &Axes) -> LastingState {
     let mut state = any_state(random, axes);
     let near = |vector: AxisVector| {
@@ -241,10 +241,9 @@ fn linuxcnc_agrees_on_what_it_is_given() {
             .chain(state.parameters.keys())
             .copied()
             .collect();
-        let program: String = asked
-            .iter()
-            .map(|number| format!("(DEBUG,%.9f#{number})\n"))
-            .collect();
+        let program = asked.iter().fold(String::new(), |program, number| {
+            program + &format!("(DEBUG,%.9f#{number})\n")
+        });
         let theirs = judged(
             &judge,
             folder.path(),

@@ -72,7 +72,7 @@ impl<W: Write> Writer<W> {
             (Kind::Sample, self.previous)
         };
         self.put(kind, seed, |history, shape, bytes| {
-            history.encode(&row, shape, bytes)
+            history.encode(&row, shape, bytes);
         })?;
         self.records += 1;
         if is_key {
@@ -95,7 +95,7 @@ impl<W: Write> Writer<W> {
             ));
         }
         self.put(Kind::Command, self.header, |_, _, bytes| {
-            bytes.extend(text.as_bytes())
+            bytes.extend(text.as_bytes());
         })
     }
 

@@ -109,7 +109,7 @@ impl Device {
                 datagram.pass(frame);
             }
             Command::Logical { reads, writes } => {
-                self.logical(at_ns, datagram, frame, reads, writes)
+                self.logical(at_ns, datagram, frame, reads, writes);
             }
             Command::PositionReadOthersWrite => {
                 self.access(at_ns, datagram, frame, station == 0, station != 0);

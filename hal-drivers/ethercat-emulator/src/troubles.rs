@@ -70,7 +70,7 @@ impl crate::device::Device {
             What::MissedSync { pulses, .. } if on => self.esc.clock.sync.swallow = *pulses,
             What::Input { input, .. } => self.set_input(*input, on),
             What::Analog { input, value, .. } => {
-                self.set_analog_input(*input, if on { *value } else { 0 })
+                self.set_analog_input(*input, if on { *value } else { 0 });
             }
             _ => {}
         }

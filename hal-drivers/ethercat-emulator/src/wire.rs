@@ -245,7 +245,7 @@ impl Wire {
                 What::LostReply => fate.lost = Some(Lost::Reply),
                 What::Late { by_us } => fate.late_ns = (by_us * 1000.0) as u64,
                 What::Duplicate { after_us } => {
-                    fate.duplicate_ns = Some((after_us * 1000.0) as u64)
+                    fate.duplicate_ns = Some((after_us * 1000.0) as u64);
                 }
                 What::Swapped => fate.swapped = true,
                 What::Corrupt { byte, mask } => fate.corrupt = Some((byte, mask)),

@@ -69,7 +69,7 @@ impl Shared {
                     return Some(poisoned.into_inner());
                 }
                 Err(std::sync::TryLockError::WouldBlock) if begun.elapsed() < until => {
-                    std::hint::spin_loop()
+                    std::hint::spin_loop();
                 }
                 Err(std::sync::TryLockError::WouldBlock) => return None,
             }

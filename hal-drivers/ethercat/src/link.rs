@@ -170,7 +170,7 @@ impl Link {
         match self.opened {
             None => self.virtual_ns = self.virtual_ns.max(at_ns),
             Some(_) => {
-                std::thread::sleep(Duration::from_nanos(at_ns.saturating_sub(self.now_ns())))
+                std::thread::sleep(Duration::from_nanos(at_ns.saturating_sub(self.now_ns())));
             }
         }
     }

@@ -61,9 +61,9 @@ impl DriveFault {
             return;
         };
         if self.lost {
-            power.lose()
+            power.lose();
         } else {
-            power.fail(self.code)
+            power.fail(self.code);
         }
     }
 }

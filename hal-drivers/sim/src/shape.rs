@@ -87,9 +87,9 @@ pub(crate) fn edge(
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(low, high);
         if is_on(&at(middle)) == before {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     (at(high), high)

@@ -30,9 +30,9 @@ fn smallest(segment: &Segment, of: impl Fn(&Segment, f64) -> f64) -> f64 {
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
         if of(segment, a) < of(segment, b) {
-            high = b
+            high = b;
         } else {
-            low = a
+            low = a;
         }
     }
     of(segment, f64::midpoint(low, high)).min(of(segment, middle))

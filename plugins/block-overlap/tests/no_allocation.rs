@@ -17,7 +17,7 @@ fn a_steady_stream_does_not_allocate() {
     let blocks = lines(&(0..4000).map(at).collect::<Vec<_>>(), |_| 3000.0);
     for options in [Options::default(), published()] {
         let opening = heap_use_of(|| {
-            drop(BlockOverlap::new(&options, &context(&[1000.0; 3], 0.001)).unwrap())
+            drop(BlockOverlap::new(&options, &context(&[1000.0; 3], 0.001)).unwrap());
         });
         assert!(opening.allocations > 0, "the counter counts");
         let mut planner = BlockOverlap::new(&options, &context(&[1000.0; 3], 0.001)).unwrap();

@@ -100,9 +100,9 @@ impl LoopModel {
         while high - low > 0.005 * high && high > 1e-6 {
             let middle = f64::midpoint(low, high);
             if stable(middle) {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         low

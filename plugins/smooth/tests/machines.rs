@@ -96,7 +96,7 @@ fn program(random: &mut Random, context: &PlannerContext) -> Vec<Block> {
         match random.below(40) {
             0 => block.path_mode = PathMode::ExactStop,
             1 if block.kind == BlockKind::Line => {
-                (block.kind, block.feed_mm_per_s) = (BlockKind::Rapid, f64::INFINITY)
+                (block.kind, block.feed_mm_per_s) = (BlockKind::Rapid, f64::INFINITY);
             }
             _ => {}
         }

@@ -100,7 +100,7 @@ fn too_hard(options: &Options, context: &PlannerContext) -> Result<Bent, PluginE
 /// Everything 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     bent(options, context, |segment| {
-        segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01)
+        segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
     })
 }
 

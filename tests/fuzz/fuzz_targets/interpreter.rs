@@ -15,7 +15,7 @@ fn config() -> Config {
 }
 
 /// What a planner relies on.
-fn assert_sound(block: &Block, _curve: Option<Curve<'_'>>) -> Result<(), String> {
+fn assert_sound(block: &Block, _curve: Option<Curve<'_>>) -> Result<(), String> {
     assert!(block.start.is_finite() && block.end.is_finite() && block.length_mm.is_finite(), "{block:?}");
     assert_eq!(block.length_mm > 0.0, block.kind != BlockKind::Dwell, "{block:?}");
     assert!(block.feed_mm_per_s > 0.0 && block.dwell_s >= 0.0, "{block:?}");

@@ -76,7 +76,7 @@ impl FeedJudge<'_> {
             match element.feed {
                 Feed::Rapid => touched.rapids = true,
                 Feed::PerSecond(feed) if element.moves_linear => {
-                    raise(&mut touched.linear_mm_per_s, feed)
+                    raise(&mut touched.linear_mm_per_s, feed);
                 }
                 Feed::PerSecond(feed) => raise(&mut touched.rotary_deg_per_s, feed),
             }

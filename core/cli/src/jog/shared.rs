@@ -105,7 +105,7 @@ impl Shared {
             }
             // A key that is let go says no more than that.
             JogEnd::Late if !self.keys => {
-                self.say(&format!("{name} stopped: the keep-alive was late"))
+                self.say(&format!("{name} stopped: the keep-alive was late"));
             }
             _ => self.inner().said.clear(),
         }

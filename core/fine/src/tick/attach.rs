@@ -126,7 +126,7 @@ impl FineLoop {
                 self.attach.stage = Stage::Enabling;
             }
             Stage::Enabling if self.attach.held.count_ones() as usize == self.joints => {
-                self.stand_there()
+                self.stand_there();
             }
             _ => self.watch_time(&states),
         }

@@ -159,7 +159,7 @@ impl FineLoop {
         governor.look_no_more();
         if ratios.feed < config.max_feed_ratio {
             cursor.on_course((config.lane_count(), config.linear), |place| {
-                governor.look_ahead(place, ratios.feed)
+                governor.look_ahead(place, ratios.feed);
             });
         }
     }

@@ -223,7 +223,6 @@ impl Script {
             joints: 1,
             before_s: PERIOD_S / 2.0,
             position: self.position,
-            ..Latch::default()
         }
     }
 }

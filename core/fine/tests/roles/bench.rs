@@ -234,9 +234,9 @@ impl Bench {
         let input = self.input;
         let mut script = self.script();
         if old {
-            script.input_age[input as usize] = MAX_AGE + 1
+            script.input_age[input as usize] = MAX_AGE + 1;
         } else {
-            script.inputs ^= 1 << input
+            script.inputs ^= 1 << input;
         }
     }
 

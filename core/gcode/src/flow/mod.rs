@@ -203,7 +203,7 @@ impl Execution {
             Keyword::Call => return self.call(program, &entry, text),
             Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text, out),
             Keyword::Sub | Keyword::Else | Keyword::ElseIf => {
-                self.jump_behind(program, entry.close)?
+                self.jump_behind(program, entry.close)?;
             }
             Keyword::If => return self.choose(program, index),
             Keyword::While if entry.open != index => self.end_do(program, &entry)?,

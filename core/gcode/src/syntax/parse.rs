@@ -27,7 +27,7 @@ pub(crate) fn parse(
             byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
             b'#' => assignment(&mut scanner, context, words)?,
             letter @ (b'a'..=b'z' | b'A'..=b'Z') => {
-                word(letter.to_ascii_uppercase(), &mut scanner, context, words)?
+                word(letter.to_ascii_uppercase(), &mut scanner, context, words)?;
             }
             other => return Err(unexpected(other, scanner.here())),
         }

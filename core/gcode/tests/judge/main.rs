@@ -78,7 +78,7 @@ fn judge_all(kind: &str, count: u64, least_tenths: u64, program: fn(u64) -> Stri
         match difference(&text, &judge, &folder) {
             Some(why) => wrong.push(format!("JUDGE_SEED={seed}: {why}\n{text}")),
             None => {
-                taken += u64::from(ours(&folder.join("program.ngc"), &machine(&folder)).is_ok())
+                taken += u64::from(ours(&folder.join("program.ngc"), &machine(&folder)).is_ok());
             }
         }
     }

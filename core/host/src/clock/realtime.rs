@@ -49,7 +49,7 @@ fn stay_awake(notes: &mut Vec<String>) -> Option<File> {
         .map_err(|e| {
             notes.push(format!(
                 "{WAKE_UP_TIME} ({e}): an idle core may be slow to wake"
-            ))
+            ));
         })
         .ok()
 }

@@ -117,7 +117,6 @@ impl Roster {
                     gives_phase: all.gives_phase.max(one.gives_phase),
                     enable_s: all.enable_s.max(one.enable_s),
                     disable_s: all.disable_s.max(one.disable_s),
-                    ..all
                 }
             })
     }

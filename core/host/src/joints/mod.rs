@@ -7,7 +7,7 @@
 //!
 //! # Joints that are sums of axes
 //!
-//! A joint limit on a CoreXY couples two axes: |x″ + y″| ≤ A. There are three ways to keep it. Limits per axis that are
+//! A joint limit on a `CoreXY` couples two axes: |x″ + y″| ≤ A. There are three ways to keep it. Limits per axis that are
 //! narrow enough for every direction (A/2 each) waste most of the machine. A function of position and direction that a
 //! planner asks knows nothing of curvature, of the jerk of a junction, or of two blocks that overlap. What is done
 //! instead uses that everything a planner makes of a linear map is linear: directions, their steps at corners,

@@ -26,7 +26,7 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 const MAX_LAST_LINE: usize = 200;
 /// Times in a row that the rough loop finds everything driven before it is believed, as in manual input.
 const STANDING: u32 = 2;
-/// What a command gets for P or Q where the line has none, as in LinuxCNC.
+/// What a command gets for P or Q where the line has none, as in `LinuxCNC`.
 const NOT_GIVEN: f64 = -1.0;
 
 /// Source with the commands of the machine run where they stand. On simulated drives and in a dry run they are passed over.

@@ -62,9 +62,9 @@ impl Nurbs {
             for _ in 0..HALVINGS {
                 let middle = f64::midpoint(low, high);
                 if look(middle).1 < 0.0 {
-                    low = middle
+                    low = middle;
                 } else {
-                    high = middle
+                    high = middle;
                 }
             }
             // An axis that does not count and moves there would have to do so on no way at all, from rest as well.

@@ -142,7 +142,7 @@ impl Nurbs {
                     (halvings - 1, parts),
                     last,
                     found,
-                )
+                );
             };
             return halves.iter().for_each(look);
         }
@@ -169,9 +169,9 @@ impl Nurbs {
             let first = self.derivatives_in(span, middle).first;
             let along: f64 = first.0.iter().zip(line.0).map(|(a, b)| a * b).sum();
             if along * way > 0.0 {
-                high = middle
+                high = middle;
             } else {
-                low = middle
+                low = middle;
             }
         }
         high

@@ -135,9 +135,9 @@ pub fn quiet_linked_panics() {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
             if is_within() {
-                keep_place(info)
+                keep_place(info);
             } else {
-                before(info)
+                before(info);
             }
         }));
     });

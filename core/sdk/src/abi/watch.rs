@@ -141,7 +141,7 @@ pub fn beat() {
     PLACE.with(|place| {
         place
             .beats
-            .store(place.beats.load(Relaxed).wrapping_add(1), Relaxed)
+            .store(place.beats.load(Relaxed).wrapping_add(1), Relaxed);
     });
 }
 
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(nowhere, Method::None);
         calling(Method::PlannerAdvance, || {
             calling(Method::DriverExchange, || {
-                assert_eq!(look().1, Method::DriverExchange)
+                assert_eq!(look().1, Method::DriverExchange);
             });
             calling(Method::None, || assert_eq!(look().1, Method::None));
             assert_eq!(look(), (beats, Method::PlannerAdvance));
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(look(), (beats + 1, Method::None));
         drop(watched);
         calling(Method::PlannerAdvance, || {
-            assert_eq!(look(), (0, Method::None))
+            assert_eq!(look(), (0, Method::None));
         });
     }
 

@@ -1,6 +1,7 @@
 //! Where all requests come together: what is done at once is done here, the rest is ordered of the loop that drives.
 
 use std::collections::VecDeque;
+use std::fmt::Write as _;
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -454,7 +455,8 @@ impl Desk {
             if let Some(value) =
                 asked.number_if_any(&format!("{}_{unit}", letter.to_ascii_lowercase()))?
             {
-                words.push_str(&format!(" {letter}[{value:.9}]"));
+                // A string takes whatever is written to it.
+                let _ = write!(words, " {letter}[{value:.9}]");
             }
         }
         let lasting = match name {

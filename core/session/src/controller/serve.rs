@@ -144,11 +144,10 @@ impl<'r> Controller<'r> {
                 resets: false,
             });
         }
-        let server = match options.listen.is_nowhere() {
-            true => None,
-            false => Some(
-                Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?,
-            ),
+        let server = if options.listen.is_nowhere() {
+            None
+        } else {
+            Some(Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?)
         };
         let script = Script {
             lines: options.script.into(),
@@ -205,8 +204,7 @@ impl<'r> Controller<'r> {
                 }
             }
         }
-        self.script
-            .flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
+        Script::flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
         self.resident.stop(&mut Notes(tell))?;
         self.desk
             .keeper
@@ -457,20 +455,20 @@ impl Script {
                 .or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
             // Subscriptions live in real time, and are not for replays.
             let answer = talk.line(&line, &mut self.lease, Instant::now());
-            self.print(tick, Some(client), &answer.line, tell);
+            Self::print(tick, Some(client), &answer.line, tell);
         }
     }
 
-    fn print(&self, tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
+    fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
         if let Ok(told) = serde_json::from_str::<Value>(line) {
             tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
         }
     }
 
-    fn flush(&self, desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
+    fn flush(desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
         if clock == Clock::Virtual {
             for (client, line) in desk.take_post() {
-                self.print(tick, client, &line, tell);
+                Self::print(tick, client, &line, tell);
             }
         }
     }
@@ -572,8 +570,7 @@ impl RunObserver for Watch<'_> {
             self.desk.hub.controls().abort.store(true, Relaxed);
         }
         self.desk.tell_state();
-        self.script
-            .flush(self.desk, self.tick, self.clock, self.tell);
+        Script::flush(self.desk, self.tick, self.clock, self.tell);
     }
 
     fn before_tick(&mut self, uptime_periods: u64) {

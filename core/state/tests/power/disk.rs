@@ -276,7 +276,7 @@ unsafe extern "C" fn open(
             name,
             names_folder,
             gone_at_close,
-        })
+        });
     };
     ffi::SQLITE_OK
 }
@@ -432,7 +432,7 @@ unsafe extern "C" fn size(file: *mut ffi::sqlite3_file, out: *mut i64) -> c_int 
             *out = inside
                 .files
                 .get(name)
-                .map_or(0, |file| file.now.len() as i64)
+                .map_or(0, |file| file.now.len() as i64);
         });
     }
     ffi::SQLITE_OK

@@ -138,7 +138,7 @@ fn every_row_of_the_table() {
             ),
             // Of these only the bias is to be shown: it is in the form of the equations, not in the noise drawn.
             (false, Some("raw")) if expected.abs() > 0.2 => {
-                assert!(found < -0.2, "{label}: {found}")
+                assert!(found < -0.2, "{label}: {found}");
             }
             (false, Some("raw")) => close(
                 label,

@@ -64,7 +64,7 @@ fn acceleration_is_no_phantom_torque_for_the_observer() {
             |of: fn(&Known) -> f64| air.iter().map(|known| of(known).abs()).fold(0.0, f64::max);
         let mean = |of: fn(&Known) -> f64| known[631..800].iter().map(of).sum::<f64>() / 169.0;
         let check = |key: &str, found: f64| {
-            close(&format!("{key} of {row}"), found, number(&row[key]), 1e-4)
+            close(&format!("{key} of {row}"), found, number(&row[key]), 1e-4);
         };
         check("current_only_max_err_accdec", most(|k| k.current_nm));
         check("current_only_mean_cut", mean(|k| k.current_nm));

@@ -53,9 +53,9 @@ impl Rated {
         for _ in 0..30 {
             let middle = f64::midpoint(low, high);
             if evaluate(&self.coefficients, k, middle, self.step_s)[0] < s_mm {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         low

@@ -118,9 +118,9 @@ impl<M: Motion> Window<M> {
         for _ in 0..50 {
             let middle = f64::midpoint(low, high);
             if self.at(middle).s_mm < s_mm {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         high

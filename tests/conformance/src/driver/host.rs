@@ -98,7 +98,7 @@ impl<'a> Host<'a> {
             let (position, state) = (attached.position[joint], attached.state[joint]);
             let mut find = |words: String| {
                 self.report
-                    .find(CHECK, format!("start: joint {joint}: {words}"))
+                    .find(CHECK, format!("start: joint {joint}: {words}"));
             };
             if !position.is_finite() {
                 find(format!("its position is {position}"));

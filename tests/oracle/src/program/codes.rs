@@ -61,7 +61,7 @@ impl State<'_> {
             20 | 30 => {
                 self.motion = Some(Motion::Arc {
                     clockwise: code == 20,
-                })
+                });
             }
             382..=385 => self.motion = Some(Motion::Probe),
             800 => self.motion = None,

@@ -58,7 +58,7 @@ fn words(text: &[u8]) -> Vec<Span> {
             b')' | b']' | b'>' => depth -= 1,
             b';' if depth == 0 => break,
             letter if depth == 0 && letter.is_ascii_alphabetic() && !in_name => {
-                words.push(Span::new(at, at))
+                words.push(Span::new(at, at));
             }
             _ => {}
         }
