@@ -6,8 +6,10 @@
 pub mod controller;
 mod homing;
 pub mod jog;
+mod judge;
 mod mdi;
 pub mod operator;
+mod standing;
 
 pub use homing::{HOMING, Homing};
 pub use mdi::{MdiInput, MdiSession, NextLine};

@@ -10,13 +10,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::{Interpreter, Item, ProbeResult};
 use tandem_host::{
-    HostError, Left, Registry, Run, Switches, check_block, interpreter_config, moves_metal,
-    planner, with_user_commands,
+    HostError, Left, Registry, Run, Switches, interpreter_config, moves_metal, planner,
+    with_user_commands,
 };
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause, Switched};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, NurbsData, Planner};
+use tandem_sdk::AxisVector;
+
+use crate::judge::LineJudge;
+use crate::standing::Standing;
 
 /// What the operator says next.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,14 +72,13 @@ impl<'a> MdiSession<'a> {
         let simulated = !moves_metal(&machine, registry);
         let mut interpreter = Interpreter::new(interpreter_config(&machine, simulated, switches));
         interpreter.set_file("input");
-        let judge = planner(&machine, registry)?;
+        let judge = LineJudge::new(machine.clone(), planner(&machine, registry)?);
         let manual = Manual {
-            machine: machine.clone(),
             judge,
             interpreter,
             input,
             lines: 0,
-            standing: 0,
+            standing: Standing::default(),
             busy: false,
         };
         Ok(Self {
@@ -118,61 +120,28 @@ impl<'a> MdiSession<'a> {
         let mut manual = lock(&self.manual);
         manual.interpreter.set_position(position);
         manual.interpreter.set_switched_off();
-        (manual.busy, manual.standing) = (false, 0);
+        manual.busy = false;
+        manual.standing.moves();
     }
 }
 
-/// Times in a row that the rough loop finds everything driven before it is believed: the fine loop says so once a period,
-/// and may have taken a segment since.
-const STANDING: u32 = 2;
-
 struct Manual {
-    machine: Machine,
-    /// A planner that only judges blocks.
-    judge: Box<dyn Planner>,
+    judge: LineJudge,
     interpreter: Interpreter,
     input: Box<dyn MdiInput>,
     lines: u32,
-    /// How often in a row everything was driven.
-    standing: u32,
+    standing: Standing,
     /// A line is being driven.
     busy: bool,
 }
 
 impl Manual {
-    /// Interprets a line and has every block of it judged; where it is refused nothing has changed.
+    /// Takes a line whose every block can be driven; where it is refused nothing has changed.
     fn interpret(&mut self, text: &str, items: &mut Vec<Item>) -> Result<(), String> {
-        let mut tried = self.interpreter.clone();
-        let before = items.len();
-        let judged = tried
-            .line(self.lines, text.as_bytes(), items)
-            .map_err(|e| e.to_string())
-            .and_then(|()| {
-                let mut blocks = items[before..].iter();
-                let place = |why: String| format!("input:{}: {why}", self.lines);
-                blocks.try_for_each(|item| self.judge(item)).map_err(place)
-            });
-        if judged.is_err() {
-            items.truncate(before);
-            return judged;
-        }
-        // M2 ends a program, not the session.
-        items.retain(|item| !matches!(item, Item::End));
-        tried.go_on();
-        self.interpreter = tried;
+        let (behind, judged) = self.judge.judge(&self.interpreter, self.lines, text)?;
+        items.extend(judged);
+        self.interpreter = behind;
         Ok(())
-    }
-
-    fn judge(&self, item: &Item) -> Result<(), String> {
-        let Item::Block(block, curve) = item else {
-            return Ok(());
-        };
-        check_block(
-            &self.machine,
-            self.judge.as_ref(),
-            block,
-            curve.as_deref().map(NurbsData::curve),
-        )
     }
 }
 
@@ -182,8 +151,8 @@ struct Lines(Arc<Mutex<Manual>>);
 impl Source for Lines {
     fn may_go_on(&mut self, driven: bool) -> bool {
         let mut manual = lock(&self.0);
-        manual.standing = if driven { manual.standing + 1 } else { 0 };
-        if manual.standing < STANDING {
+        manual.standing.look(driven);
+        if !manual.standing.is_still() {
             return false;
         }
         if manual.busy {
@@ -215,7 +184,8 @@ impl Source for Lines {
                 manual.input.refused(&why);
                 continue;
             }
-            (manual.busy, manual.standing) = (true, 0);
+            manual.busy = true;
+            manual.standing.moves();
             manual.input.begins();
             return Ok(true);
         }
@@ -242,7 +212,7 @@ impl Source for Lines {
                 });
             }
         }
-        manual.standing = 0;
+        manual.standing.moves();
         true
     }
 }

@@ -221,28 +221,8 @@ impl Ready {
             program,
             &parts::interpreter_config(&machine, simulated, switches),
         )?;
-        let source = parts::source(
-            &machine,
-            registry,
-            stream,
-            switches,
-            policy.as_ref(),
-            &plugins.joints,
-        )?;
-        let ready = Self::new(
-            machine,
-            registry,
-            Some(name),
-            source,
-            policy,
-            plugins,
-            passed.report,
-            switches,
-        )?;
-        Ok(Self {
-            entries: passed.entries,
-            ..ready
-        })
+        let parts = (name, stream, plugins, policy);
+        Self::of_stream(machine, registry, parts, passed, switches)
     }
 
     /// Checks the whole program and makes everything for it, on drives that another has claimed, from where the machine stands
@@ -269,6 +249,19 @@ impl Ready {
         let name = program.name().to_string();
         let mut stream = Stream::new(program, &config)?;
         stream.tell(memory.ledger.clone());
+        let parts = (name, stream, plugins, policy);
+        Self::of_stream(machine, registry, parts, passed, switches)
+    }
+
+    /// What both kinds of program have in common once everything was checked: the stream, under its name, becomes the source.
+    fn of_stream(
+        machine: Machine,
+        registry: &Registry,
+        parts: (String, Stream, Plugins, Option<PolicyHost>),
+        passed: Passed,
+        switches: Switches,
+    ) -> Result<Self, HostError> {
+        let (name, stream, plugins, policy) = parts;
         let source = parts::source(
             &machine,
             registry,

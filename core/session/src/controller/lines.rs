@@ -4,17 +4,16 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_gcode::{Interpreter, Item, Lasting, Ledger, Moment, ProbeResult};
-use tandem_host::check_block;
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, NurbsData, Planner};
+use tandem_sdk::{AxisVector, Planner};
+
+use crate::judge::LineJudge;
+use crate::standing::Standing;
 
 /// Lines that may wait before they are planned.
-const MOST_WAITING: usize = 1000;
-
-/// Times in a row that the rough loop finds everything driven before it is believed.
-const STANDING: u32 = 2;
+const MAX_WAITING: usize = 1000;
 
 /// A line that was judged: whose it is, and the block behind it.
 #[derive(Clone, Copy, Debug)]
@@ -29,9 +28,7 @@ pub struct Judged {
 
 /// What is true between jobs, and the lines that are read ahead of it. Shared by who judges and who drives.
 pub struct Lines {
-    machine: Machine,
-    /// A planner that only judges blocks.
-    judge: Box<dyn Planner>,
+    judge: LineJudge,
     /// Modes, offsets, parameters and tools as the path has made them true.
     standing: Interpreter,
     /// The same behind the last line that was judged.
@@ -48,7 +45,7 @@ pub struct Lines {
     open: bool,
     /// A job of lines is driven, whether it takes more or comes to its end.
     driving: bool,
-    standing_still: u32,
+    stands: Standing,
 }
 
 /// Shared lines.
@@ -65,8 +62,7 @@ impl Lines {
     pub fn new(machine: &Machine, judge: Box<dyn Planner>, mut standing: Interpreter) -> Self {
         standing.set_file("input");
         Self {
-            machine: machine.clone(),
-            judge,
+            judge: LineJudge::new(machine.clone(), judge),
             ahead: standing.clone(),
             standing,
             told: None,
@@ -77,7 +73,7 @@ impl Lines {
             asks: false,
             open: false,
             driving: false,
-            standing_still: 0,
+            stands: Standing::default(),
         }
     }
 
@@ -116,9 +112,9 @@ impl Lines {
                     .to_string(),
             );
         }
-        if self.waiting.len() >= MOST_WAITING {
+        if self.waiting.len() >= MAX_WAITING {
             return Err(format!(
-                "{MOST_WAITING} lines wait already: send this one when they are driven"
+                "{MAX_WAITING} lines wait already: send this one when they are driven"
             ));
         }
         let begins = !self.driving && self.waiting.is_empty();
@@ -128,30 +124,12 @@ impl Lines {
             self.ahead.keep_moments();
             (self.count, self.told) = (0, None);
         }
-        let (mut tried, mut items) = (self.ahead.clone(), vec![]);
         let number = self.count + 1;
-        let first_block = tried.next_block();
-        tried
-            .line(number, text.as_bytes(), &mut items)
-            .map_err(|e| e.to_string())?;
-        for item in &items {
-            let Item::Block(block, curve) = item else {
-                continue;
-            };
-            let judged = check_block(
-                &self.machine,
-                self.judge.as_ref(),
-                block,
-                curve.as_deref().map(NurbsData::curve),
-            );
-            judged.map_err(|why| format!("input:{number}: {why}"))?;
-        }
+        let first_block = self.ahead.next_block();
+        let (mut tried, items) = self.judge.judge(&self.ahead, number, text)?;
         self.asks = items
             .iter()
             .any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
-        // M2 ends a program, not the conversation.
-        items.retain(|item| !matches!(item, Item::End));
-        tried.go_on();
         if let Some(moment) = tried.moment_since(&mut self.told) {
             self.ledger.push(first_block, moment);
         }
@@ -209,7 +187,8 @@ impl Lines {
             self.standing.set_switched_off();
         }
         self.standing.set_position(position);
-        (self.open, self.driving, self.standing_still) = (false, false, 0);
+        (self.open, self.driving) = (false, false);
+        self.stands.moves();
         self.asks &= goes_on;
         if goes_on {
             return vec![];
@@ -226,7 +205,8 @@ impl LineSource {
     /// A job takes lines from here on.
     pub fn begin(lines: &SharedLines) -> Self {
         let mut inner = lock(lines);
-        (inner.open, inner.driving, inner.standing_still) = (true, true, 0);
+        (inner.open, inner.driving) = (true, true);
+        inner.stands.moves();
         drop(inner);
         Self(Arc::clone(lines))
     }
@@ -239,20 +219,20 @@ impl Source for LineSource {
 
     fn may_go_on(&mut self, driven: bool) -> bool {
         let mut inner = lock(&self.0);
-        inner.standing_still = if driven { inner.standing_still + 1 } else { 0 };
+        inner.stands.look(driven);
         true
     }
 
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         let mut inner = lock(&self.0);
         while let Some(next) = inner.waiting.pop_front() {
-            inner.standing_still = 0;
+            inner.stands.moves();
             items.extend(next);
             if !items.is_empty() {
                 return Ok(true);
             }
         }
-        inner.open = inner.standing_still < STANDING;
+        inner.open = !inner.stands.is_still();
         Ok(inner.open)
     }
 

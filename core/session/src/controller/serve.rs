@@ -22,9 +22,7 @@ use super::talk::{Office, Protocol2};
 use crate::HOMING;
 use crate::jog::JogController;
 use crate::operator::{Lease, Listen, OperatorHub, Server, Talk};
-
-/// Times in a row that everything is found driven before it is believed.
-const STANDING: u32 = 2;
+use crate::standing::Standing;
 
 /// What a controller is asked for.
 pub struct Options {
@@ -188,17 +186,7 @@ impl<'r> Controller<'r> {
                 Some(order) => self.obey(order, tell)?,
                 None if self.clock == Clock::Virtual && self.script.lines.is_empty() => break,
                 None => {
-                    let mut watch = Watch::new(
-                        &self.desk,
-                        &mut self.script,
-                        tell,
-                        Mode::Idle,
-                        self.clock,
-                        0.0,
-                    );
-                    let fault = self.resident.idle(&mut watch)?;
-                    watch.period();
-                    if let Some(words) = fault {
+                    if let Some(words) = self.idle(tell)? {
                         self.desk.fault(&words);
                     }
                 }
@@ -211,6 +199,21 @@ impl<'r> Controller<'r> {
             .record(&lock(&self.desk.lines).standing().lasting());
         drop(self.server);
         Ok(())
+    }
+
+    /// One rough period in which nothing is driven; the fault that ends the enabled state in it, in words.
+    fn idle(&mut self, tell: Tell<'_>) -> Result<Option<String>, HostError> {
+        let mut watch = Watch::new(
+            &self.desk,
+            &mut self.script,
+            tell,
+            Mode::Idle,
+            self.clock,
+            0.0,
+        );
+        let fault = self.resident.idle(&mut watch)?;
+        watch.period();
+        Ok(fault)
     }
 
     fn obey(&mut self, order: Order, tell: Tell<'_>) -> Result<(), HostError> {
@@ -233,7 +236,7 @@ impl<'r> Controller<'r> {
             Order::Jog => {
                 let source = Box::new(Jogs {
                     desk: Arc::clone(&self.desk),
-                    standing: 0,
+                    standing: Standing::default(),
                 });
                 let switches = Switches {
                     unhomed: true,
@@ -249,15 +252,7 @@ impl<'r> Controller<'r> {
             Order::Enable { from, resets } => self.enable(from, resets, tell)?,
             Order::Disable { from } => {
                 while !self.resident.disable() {
-                    let mut watch = Watch::new(
-                        &self.desk,
-                        &mut self.script,
-                        tell,
-                        Mode::Idle,
-                        self.clock,
-                        0.0,
-                    );
-                    self.resident.idle(&mut watch)?;
+                    self.idle(tell)?;
                 }
                 let mut inner = self.desk.lock();
                 (inner.enabled, inner.order) = (false, None);
@@ -582,16 +577,16 @@ impl RunObserver for Watch<'_> {
 /// The jogs that wait, as the rough loop pulls them, until none does.
 struct Jogs {
     desk: Arc<Desk>,
-    standing: u32,
+    standing: Standing,
 }
 
 impl Source for Jogs {
     fn may_go_on(&mut self, driven: bool) -> bool {
-        self.standing = if driven { self.standing + 1 } else { 0 };
-        if self.standing >= STANDING {
+        self.standing.look(driven);
+        if self.standing.is_still() {
             let _ = self.desk.jogs.arrived();
         }
-        self.standing >= STANDING
+        self.standing.is_still()
     }
 
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
@@ -603,7 +598,7 @@ impl Source for Jogs {
             );
         }
         if !items.is_empty() {
-            self.standing = 0;
+            self.standing.moves();
         }
         Ok(!items.is_empty() || !self.desk.jogs.is_still())
     }
@@ -611,7 +606,7 @@ impl Source for Jogs {
     fn provide_input(&mut self, _value: f64) {}
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
-        self.standing = 0;
+        self.standing.moves();
         let _ = self.desk.jogs.rests(rest);
         true
     }

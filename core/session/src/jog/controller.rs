@@ -13,7 +13,7 @@ use tandem_sdk::{AxisVector, Block, BlockKind, PathMode, Planner};
 use super::message::{Jog, JogEnd, JogRest, Reach};
 
 /// Steps that may wait behind the one that moves.
-const MOST_WAITING: usize = 16;
+const MAX_WAITING: usize = 16;
 
 /// The jogs of a machine. Keys, sockets and scripts share it; soft side, never waits for the fine loop.
 pub struct JogController {
@@ -239,8 +239,8 @@ impl JogController {
             // Where it starts is known when what moves has come to rest: it is judged then.
             return Ok(Some(true));
         }
-        if inner.waiting.len() >= MOST_WAITING {
-            return Err(format!("{MOST_WAITING} steps wait already"));
+        if inner.waiting.len() >= MAX_WAITING {
+            return Err(format!("{MAX_WAITING} steps wait already"));
         }
         if !controls.jog.let_go.load(Relaxed) {
             let start = inner.moving.map_or(inner.position, |moving| moving.end);

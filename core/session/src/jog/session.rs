@@ -11,6 +11,7 @@ use tandem_sdk::AxisVector;
 
 use super::controller::JogController;
 use super::message::JogRest;
+use crate::standing::Standing;
 
 /// The operator's side of a session. Called on the soft side.
 pub trait JogInput: Send {
@@ -76,7 +77,7 @@ impl<'a> JogSession<'a> {
         let source = Jogging {
             jogs: Arc::clone(&self.jogs),
             input: Arc::clone(&self.input),
-            standing: 0,
+            standing: Standing::default(),
         };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(
@@ -114,16 +115,11 @@ impl<'a> JogSession<'a> {
     }
 }
 
-/// Times in a row that the rough loop finds everything driven before it is believed: the fine loop says so once a period,
-/// and may have taken a segment since.
-const STANDING: u32 = 2;
-
 /// The session as the rough loop pulls it.
 struct Jogging {
     jogs: Arc<JogController>,
     input: SharedInput,
-    /// How often in a row everything was driven.
-    standing: u32,
+    standing: Standing,
 }
 
 impl Jogging {
@@ -143,8 +139,8 @@ impl Source for Jogging {
     }
 
     fn may_go_on(&mut self, driven: bool) -> bool {
-        self.standing = if driven { self.standing + 1 } else { 0 };
-        if self.standing < STANDING {
+        self.standing.look(driven);
+        if !self.standing.is_still() {
             return false;
         }
         if let Some(rest) = self.jogs.arrived() {
@@ -159,7 +155,7 @@ impl Source for Jogging {
             self.input().refused(&why);
         }
         if !items.is_empty() {
-            self.standing = 0;
+            self.standing.moves();
         }
         Ok(more)
     }
@@ -167,7 +163,7 @@ impl Source for Jogging {
     fn provide_input(&mut self, _value: f64) {}
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
-        self.standing = 0;
+        self.standing.moves();
         if let Some(rest) = self.jogs.rests(rest) {
             self.input().rested(&self.jogs, &rest);
         }

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Write};
 /// Telemetry is kept only while less than this waits, bytes.
 const TELEMETRY_BYTES: usize = 8 * 1024;
 /// A client that lets this much wait is closed: it asks and does not read, bytes.
-const MOST_BYTES: usize = 64 * 1024;
+const MAX_BYTES: usize = 64 * 1024;
 
 /// Lines on their way to a client.
 #[derive(Debug, Default)]
@@ -19,7 +19,7 @@ impl Outbox {
     /// An answer; `false` where the client has let too many of them wait.
     #[must_use]
     pub fn answer(&mut self, line: &str) -> bool {
-        let fits = self.bytes.len() + line.len() <= MOST_BYTES;
+        let fits = self.bytes.len() + line.len() <= MAX_BYTES;
         if fits {
             self.bytes.extend_from_slice(line.as_bytes());
         }

@@ -11,7 +11,7 @@ use rustix::rand::{GetRandomFlags, getrandom};
 /// Random bytes of a new token.
 const BYTES: usize = 32;
 /// Shortest token that is taken from a file.
-const LEAST_CHARACTERS: usize = 16;
+const MIN_CHARACTERS: usize = 16;
 
 /// The token of `path`; a random one in a new file of mode 0600 where there is none.
 ///
@@ -29,9 +29,9 @@ pub fn of_file(path: &Path) -> Result<String, String> {
         }
         let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
         let token = text.trim();
-        if token.chars().count() < LEAST_CHARACTERS {
+        if token.chars().count() < MIN_CHARACTERS {
             return Err(format!(
-                "the token in it has fewer than {LEAST_CHARACTERS} characters"
+                "the token in it has fewer than {MIN_CHARACTERS} characters"
             ));
         }
         Ok(token.to_string())
