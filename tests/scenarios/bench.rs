@@ -285,14 +285,14 @@ fn may_follow(from: MachineState, to: MachineState) -> bool {
 }
 
 /// Samples after which a run is one that does not end.
-const MOST_SAMPLES: usize = 4_000_000;
+const MAX_SAMPLES: usize = 4_000_000;
 
 #[derive(Default)]
 struct Kept(Vec<Sample>);
 
 impl RunObserver for Kept {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
-        assert!(self.0.len() < MOST_SAMPLES, "the run does not end");
+        assert!(self.0.len() < MAX_SAMPLES, "the run does not end");
         self.0.push(*sample);
     }
 }

@@ -33,7 +33,7 @@ fn falling_and_rising(random: &mut Random) -> (Vec<f64>, String) {
 
 /// Share of the speed asked for that a sample has at least. It is not 1 where a plan changes its speed by half within a period,
 /// in which the rate of program time is linear: 0.88 is the least of these machines.
-const LEAST_SHARE: f64 = 0.8;
+const MIN_SHARE: f64 = 0.8;
 
 /// Between the first and the last sample at the least of the feeds asked for, none is slower.
 fn expect_no_dip(ran: &Ran, feeds: &[f64], ratio: f64) -> Result<(), String> {
@@ -59,7 +59,7 @@ fn expect_no_dip(ran: &Ran, feeds: &[f64], ratio: f64) -> Result<(), String> {
         .rposition(|sample| reached(&sample))
         .unwrap_or(first);
     for sample in &moving[first..=last] {
-        if sample.feed_mm_per_s < asked(sample.line) * LEAST_SHARE {
+        if sample.feed_mm_per_s < asked(sample.line) * MIN_SHARE {
             let (at, least) = (sample.feed_mm_per_s * 60.0, asked(sample.line) * 60.0);
             return Err(format!(
                 "tick {}, line {}: {at:.3} mm/min, asked {least:.3}",

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 use crate::harness::{mill, root};
 
 /// Most that a file may hold in [`limited`], in the blocks of 512 or 1024 bytes of the shell that is there.
-const MOST_BLOCKS: u32 = 60;
+const MAX_BLOCKS: u32 = 60;
 
 /// What a run left.
 struct Ran {
@@ -63,14 +63,14 @@ impl Ran {
     }
 }
 
-/// Runs an example where no file may grow beyond [`MOST_BLOCKS`].
+/// Runs an example where no file may grow beyond [`MAX_BLOCKS`].
 fn limited(program: &str, files: &[(&str, &str)], arguments: &[&str]) -> Ran {
     let folder = TempDir::new().unwrap();
     let mut command = Command::new("sh");
     // A signal that is ignored stays ignored behind exec: the write fails instead.
     command.args([
         "-c",
-        &format!("trap '' XFSZ; ulimit -f {MOST_BLOCKS}; exec \"$@\""),
+        &format!("trap '' XFSZ; ulimit -f {MAX_BLOCKS}; exec \"$@\""),
         "sh",
     ]);
     command

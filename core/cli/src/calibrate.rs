@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_estimate::diagnose::{Evidence, Fitted, LEAST_R2, LinearFit, MOST_RMS, fit_all, linear};
+use tandem_estimate::diagnose::{Evidence, Fitted, LinearFit, MAX_RMS, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::{Experiment, Measured};
 use tandem_estimate::polygon::Timed;
 use tandem_estimate::{Choice, measurements, model_file};
@@ -170,11 +170,11 @@ fn chosen(
     }
     let name = best.choice.name();
     Err(format!(
-        "the best fit is {name}, with R2 {:.4} and a residual of {:.1} % (rms), where {LEAST_R2} and {:.0} % are asked for: \
+        "the best fit is {name}, with R2 {:.4} and a residual of {:.1} % (rms), where {MIN_R2} and {:.0} % are asked for: \
          this is {kind}. A machine that Tandem drives is estimated exactly with --model simulate.",
         best.feeds.r2,
         100.0 * best.rms,
-        100.0 * MOST_RMS
+        100.0 * MAX_RMS
     ))
 }
 
@@ -208,13 +208,13 @@ fn regression(
     } else {
         print("equation (11): no corners were measured; the published coefficients stay\n");
     }
-    if short.r2 < LEAST_R2
-        || long.is_some_and(|long| long.r2 < LEAST_R2)
+    if short.r2 < MIN_R2
+        || long.is_some_and(|long| long.r2 < MIN_R2)
         || !evidence.is_constant_time()
     {
         return Err(format!(
             "the linear regression does not describe this machine: equation (9) explains R2 = {:.3} of the minimum feeds, \
-             where {LEAST_R2} is asked for. It holds where a short block takes the same time whatever its length; here that \
+             where {MIN_R2} is asked for. It holds where a short block takes the same time whatever its length; here that \
              time differs by {:.0} % between sides of one polygon. This is {kind}. Leave --model out for the form that fits.",
             short.r2,
             100.0 * evidence.block_time_spread

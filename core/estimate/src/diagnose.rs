@@ -12,9 +12,9 @@ use crate::polygon::Timed;
 use crate::regression::{CORRECTED_LONG, Coefficients, Switch, long_terms};
 
 /// Least share of the variance of the mean feeds that a model has to explain.
-pub const LEAST_R2: f64 = 0.99;
+pub const MIN_R2: f64 = 0.99;
 /// Greatest root mean square of the relative residuals of the times.
-pub const MOST_RMS: f64 = 0.03;
+pub const MAX_RMS: f64 = 0.03;
 
 /// By how much the fit may be worse with blocks of whole ticks, where the control's period is known.
 const TICK_RMS: f64 = 1e-3;
@@ -71,7 +71,7 @@ impl Fitted {
 
     /// Whether it describes the machine.
     pub fn is_good(&self) -> bool {
-        self.feeds.r2 >= LEAST_R2 && self.rms <= MOST_RMS
+        self.feeds.r2 >= MIN_R2 && self.rms <= MAX_RMS
     }
 
     /// Its constants, in a line.

@@ -7,7 +7,7 @@ use crate::law::stop_s;
 /// Share of the jerk that is counted on where the plan changes.
 const SHARE: f64 = 0.8;
 /// Change of the change of σ in a period.
-const MOST_CHANGE: f64 = 0.02;
+const MAX_CHANGE: f64 = 0.02;
 /// Below this share of the limits a plan goes straight on at constant speed.
 const STEADY: f64 = 1e-3;
 
@@ -63,7 +63,7 @@ impl Outlook {
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             jerk: limits.map(|l| l.jerk_mm_per_s3),
             horizon_s: limits[..axes].iter().map(change_s).fold(0.0, f64::max),
-            most_change_per_s2: MOST_CHANGE / (period_s * period_s),
+            most_change_per_s2: MAX_CHANGE / (period_s * period_s),
             path_jerk_mm_per_s3: f64::INFINITY,
             rate_change_per_s2: f64::INFINITY,
             share: 1.0,

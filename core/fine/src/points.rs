@@ -1,6 +1,6 @@
 //! Where the plan goes within one fine period: velocity and acceleration at the points that matter.
 
-use tandem_rings::MOST_ENTRIES;
+use tandem_rings::MAX_ENTRIES;
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags};
 
 /// One point of the plan, per axis and per s of program time.
@@ -31,7 +31,7 @@ pub struct Points {
 
 impl Points {
     /// Most segments looked at in one period: those that pass in it, and the ones at its ends.
-    pub const SEGMENTS: usize = MOST_ENTRIES + 4;
+    pub const SEGMENTS: usize = MAX_ENTRIES + 4;
     const POINTS: usize = 3 * Self::SEGMENTS;
 
     /// No points; the limits are those of the machine's `axes` first axes.

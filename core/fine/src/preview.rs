@@ -3,7 +3,7 @@
 //!
 //! The queue is looked at once, a bounded number of entries in a period, ahead of the place that moves.
 
-use tandem_rings::{MOST_ENTRIES, Queued};
+use tandem_rings::{MAX_ENTRIES, Queued};
 use tandem_sdk::{Segment, SegmentFlags};
 
 use crate::cursor::Cursor;
@@ -37,7 +37,7 @@ impl Mark {
 }
 
 /// Entries looked at in a period: more than may be driven in one.
-const ENTRIES: usize = 2 * MOST_ENTRIES;
+const ENTRIES: usize = 2 * MAX_ENTRIES;
 /// Most marks; where there are more, neighbours are merged to the earlier place and the lower feed.
 const MARKS: usize = 64;
 

@@ -21,7 +21,7 @@ use tandem_sdk::{
 const COUNT_MM: f64 = 1e-3;
 const JOINTS: usize = 3;
 /// Reports of rests that nobody has taken, at most.
-const MOST_RESTS: usize = 8;
+const MAX_RESTS: usize = 8;
 
 /// Three joints with so many periods to be enabled in.
 fn three(script: Script, enable_periods: u64) -> Bench {
@@ -605,7 +605,7 @@ fn an_abort_that_finds_no_room_for_its_report_acts_when_the_joints_hold() {
     );
     attach(&mut bench, 20).unwrap();
     let controls = Arc::clone(&bench.host.controls);
-    while bench.rough.rests.slots() < MOST_RESTS {
+    while bench.rough.rests.slots() < MAX_RESTS {
         controls.abort.store(true, Relaxed);
         bench.ticks(1);
     }

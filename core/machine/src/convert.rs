@@ -7,7 +7,7 @@ use crate::problems::{Origin, Problems};
 use crate::shown::{dotted, shorten};
 
 /// Deeper than any configuration, far from what would exhaust the stack.
-pub const MOST_DEPTH: usize = 64;
+pub const MAX_DEPTH: usize = 64;
 
 /// Turns the tables and values of one source into nodes; what does not fit is reported.
 pub struct Convert<'a> {
@@ -57,8 +57,8 @@ impl<'a> Convert<'a> {
     }
 
     fn nested(&mut self, value: &DeValue<'_>, origin: Origin) -> Value {
-        if self.depth >= MOST_DEPTH {
-            self.report(origin, format!("nested more than {MOST_DEPTH} levels deep"));
+        if self.depth >= MAX_DEPTH {
+            self.report(origin, format!("nested more than {MAX_DEPTH} levels deep"));
             return Value::Wrong;
         }
         self.depth += 1;

@@ -80,7 +80,7 @@ const DRIVE_WITHIN_S: f64 = 60.0;
 const LAST_METHOD: u32 = 127;
 
 /// Greatest torque that can be stated as a limit, percent of the rated one: what servo drives give for seconds.
-const MOST_TORQUE_PERCENT: f64 = 300.0;
+const MAX_TORQUE_PERCENT: f64 = 300.0;
 
 /// The keys of `[homing.<axis>]`, which carry their unit in their name.
 struct Keys {
@@ -134,13 +134,13 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet) -> Option<AxisHoming> 
     };
     refuse_other_unit(section, &keys, &other, rotary);
     let max_torque_percent = section.positive("max_torque_percent").filter(|percent| {
-        if *percent > MOST_TORQUE_PERCENT {
+        if *percent > MAX_TORQUE_PERCENT {
             section.refuse(
                 "max_torque_percent",
-                format!("must be at most {MOST_TORQUE_PERCENT}, not {percent}"),
+                format!("must be at most {MAX_TORQUE_PERCENT}, not {percent}"),
             );
         }
-        *percent <= MOST_TORQUE_PERCENT
+        *percent <= MAX_TORQUE_PERCENT
     });
     if section.has("drive_method") {
         return by_drive(section, axis, max_torque_percent, &keys);

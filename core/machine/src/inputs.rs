@@ -6,10 +6,10 @@ use crate::section::Section;
 
 /// Age above which an input counts as tripped where the file states none, ms. A few lost frames are not a door that opens;
 /// and no operator waits longer for a hold than for the plan, which takes a rough period of 8 ms.
-const MAX_AGE_MS: f64 = 10.0;
+const DEFAULT_MAX_AGE_MS: f64 = 10.0;
 
 /// Greatest age that can be stated, ms: drivers count ages in 65 535 periods at most, at any fine period down to 0.1 ms.
-const MOST_AGE_MS: f64 = 5000.0;
+const MAX_AGE_MS: f64 = 5000.0;
 
 /// What an input means to the fine loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,11 +110,13 @@ fn one(table: &Section<'_>, name: &str) -> Option<Input> {
         .choice("role", &ROLES.map(|(word, role)| (word, Some(role))))
         .flatten();
     let normally_closed = table.truth("normally_closed").unwrap_or(true);
-    let max_age_ms = table.at_least("max_age_ms", 0.0).unwrap_or(MAX_AGE_MS);
-    if max_age_ms > MOST_AGE_MS {
+    let max_age_ms = table
+        .at_least("max_age_ms", 0.0)
+        .unwrap_or(DEFAULT_MAX_AGE_MS);
+    if max_age_ms > MAX_AGE_MS {
         table.refuse(
             "max_age_ms",
-            format!("must be at most {MOST_AGE_MS}, not {max_age_ms}"),
+            format!("must be at most {MAX_AGE_MS}, not {max_age_ms}"),
         );
     }
     let input = table.required("input", |table, key| table.whole(key, 0, LAST_INPUT))?;

@@ -19,7 +19,7 @@ const FORMAT: i64 = 1;
 const LONGEST_FILE: u64 = 1 << 20;
 
 /// Most files that one machine is made of.
-const MOST_FILES: usize = 64;
+const MAX_FILES: usize = 64;
 
 /// Reads files; `None` wherever something is so wrong that looking further would only add noise.
 pub struct Loader<'a> {
@@ -101,12 +101,12 @@ impl<'a> Loader<'a> {
         self.refuse_cycle(&canonical, path, from)?;
         self.files += 1;
         let bytes = match read(path) {
-            Ok(bytes) if self.files <= MOST_FILES => bytes,
+            Ok(bytes) if self.files <= MAX_FILES => bytes,
             Ok(_) => {
                 return self.refuse(
                     path,
                     from,
-                    &format!("the machine is made of more than {MOST_FILES} files"),
+                    &format!("the machine is made of more than {MAX_FILES} files"),
                 );
             }
             Err(error) => return self.refuse(path, from, &format!("cannot be read: {error}")),

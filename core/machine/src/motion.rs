@@ -3,7 +3,7 @@
 use crate::section::Section;
 
 /// Most fine periods in a rough one: the rough loop keeps every sample of its period.
-const MOST_FINE_PERIODS: f64 = 10_000.0;
+const MAX_FINE_PERIODS: f64 = 10_000.0;
 
 /// What a stated jerk limit means to a planner that keeps only velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -194,9 +194,9 @@ fn fine_periods(loops: &Section<'_>, rough: f64, fine: f64) -> Option<u32> {
         );
         return None;
     }
-    if count > MOST_FINE_PERIODS {
+    if count > MAX_FINE_PERIODS {
         let most = format!(
-            "the rough period, {rough} ms, is more than {MOST_FINE_PERIODS} fine periods of {fine} ms"
+            "the rough period, {rough} ms, is more than {MAX_FINE_PERIODS} fine periods of {fine} ms"
         );
         loops.refuse(key, most);
         return None;

@@ -2,7 +2,7 @@
 
 use toml::de::DeValue;
 
-use crate::convert::{Convert, MOST_DEPTH};
+use crate::convert::{Convert, MAX_DEPTH};
 use crate::node::{Node, Table, Value};
 use crate::problems::{Origin, Problems};
 
@@ -26,7 +26,7 @@ pub fn apply(root: &mut Table, key: &str, value: &str, problems: &Problems) {
 fn refusal(path: &[&str]) -> Option<&'static str> {
     match path.first() {
         _ if path.contains(&"") => Some("a part of the path is empty"),
-        _ if path.len() > MOST_DEPTH => Some("the path is nested too deep"),
+        _ if path.len() > MAX_DEPTH => Some("the path is nested too deep"),
         Some(&"format" | &"include") => Some("belongs to the file and cannot be overridden"),
         _ => None,
     }

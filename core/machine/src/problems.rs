@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{MachineError, Place, Problem};
 
 /// After so many problems the rest is not looked for: it would hide the first ones.
-const MOST_PROBLEMS: usize = 100;
+const MAX_PROBLEMS: usize = 100;
 
 /// Where a value was written: which text, and the byte in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,7 +81,7 @@ impl Problems {
 
     /// Whether so much is wrong that looking further helps nobody.
     pub fn is_full(&self) -> bool {
-        self.found.borrow().len() >= MOST_PROBLEMS
+        self.found.borrow().len() >= MAX_PROBLEMS
     }
 
     /// Notes that `key` was proposed in place of an unknown one: it need not be reported as missing too.
@@ -115,7 +115,7 @@ impl Problems {
         if self.is_full() {
             problems.extend(problems.last().cloned().map(|last| Problem {
                 key: String::new(),
-                what: format!("{MOST_PROBLEMS} problems so far; the rest is not listed"),
+                what: format!("{MAX_PROBLEMS} problems so far; the rest is not listed"),
                 ..last
             }));
         }

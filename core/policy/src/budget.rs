@@ -1,7 +1,7 @@
 //! What a script may use.
 
 /// Largest module, bytes.
-pub const MOST_BYTES: usize = 1 << 20;
+pub const MAX_BYTES: usize = 1 << 20;
 /// Stack that a script may use, bytes.
 pub const SOFT_STACK_BYTES: usize = 128 * 1024;
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wasmtime::{Config, Module, Store};
 
-use crate::budget::{MOST_BYTES, SOFT_STACK_BYTES};
+use crate::budget::{MAX_BYTES, SOFT_STACK_BYTES};
 use crate::error::Refusal;
 use crate::script::Script;
 
@@ -47,10 +47,10 @@ impl Engine {
     /// # Errors
     /// What is wrong with the module.
     pub fn compile(&self, bytes: &[u8]) -> Result<Script, Refusal> {
-        if bytes.len() > MOST_BYTES {
+        if bytes.len() > MAX_BYTES {
             return Err(Refusal::TooLarge {
                 bytes: bytes.len(),
-                most: MOST_BYTES,
+                most: MAX_BYTES,
             });
         }
         let mut hasher = DefaultHasher::new();

@@ -5,13 +5,13 @@ use crate::error::Refusal;
 use crate::parameters::Parameter;
 
 /// Parameters that a module may declare.
-const MOST_PARAMETERS: u32 = 64;
+const MAX_PARAMETERS: u32 = 64;
 /// Bytes of a name or description.
-const MOST_TEXT: u32 = 2048;
+const MAX_TEXT: u32 = 2048;
 /// Bytes of a structure in an array.
-const MOST_STRIDE: u32 = 4096;
+const MAX_STRIDE: u32 = 4096;
 /// Bytes of state that survive a reload.
-const MOST_STATE: u32 = 65_536;
+const MAX_STATE: u32 = 65_536;
 
 /// Where a module wants its data.
 #[derive(Clone, Debug)]
@@ -59,9 +59,9 @@ impl Layout {
             )));
         }
         let state_bytes = at(abi::layout::STATE_BYTES)?;
-        if state_bytes > MOST_STATE {
+        if state_bytes > MAX_STATE {
             return Err(wrong(format!(
-                "the state has {state_bytes} bytes, {MOST_STATE} are allowed"
+                "the state has {state_bytes} bytes, {MAX_STATE} are allowed"
             )));
         }
         let place = |address: u32, bytes: usize, what| region(memory, address, bytes, what);
@@ -103,9 +103,9 @@ impl Table {
                 parameters: vec![],
             });
         }
-        if count > MOST_PARAMETERS {
+        if count > MAX_PARAMETERS {
             return Err(wrong(format!(
-                "{count} parameters, {MOST_PARAMETERS} are allowed"
+                "{count} parameters, {MAX_PARAMETERS} are allowed"
             )));
         }
         let stride = stride(
@@ -180,9 +180,9 @@ fn parameter(memory: &[u8], at: usize, utf16: bool) -> Result<Parameter, Refusal
 }
 
 fn read_text(memory: &[u8], address: u32, bytes: u32, utf16: bool) -> Result<String, Refusal> {
-    if bytes > MOST_TEXT {
+    if bytes > MAX_TEXT {
         return Err(wrong(format!(
-            "a text of {bytes} bytes, {MOST_TEXT} are allowed"
+            "a text of {bytes} bytes, {MAX_TEXT} are allowed"
         )));
     }
     let start = region(memory, address, bytes as usize, "a text")?;
@@ -204,7 +204,7 @@ fn read_text(memory: &[u8], address: u32, bytes: u32, utf16: bool) -> Result<Str
 }
 
 fn stride(bytes: u32, least: usize, what: &str) -> Result<usize, Refusal> {
-    let fits = (least as u32..=MOST_STRIDE).contains(&bytes) && bytes.is_multiple_of(8);
+    let fits = (least as u32..=MAX_STRIDE).contains(&bytes) && bytes.is_multiple_of(8);
     if fits {
         Ok(bytes as usize)
     } else {

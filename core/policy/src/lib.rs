@@ -40,7 +40,7 @@ mod window;
 mod without;
 
 pub use bounds::{Bounds, Tuning};
-pub use budget::{Budget, MOST_BYTES, SOFT_STACK_BYTES};
+pub use budget::{Budget, MAX_BYTES, SOFT_STACK_BYTES};
 pub use counters::Counters;
 #[cfg(feature = "scripts")]
 pub use engine::Engine;

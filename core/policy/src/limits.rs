@@ -5,7 +5,7 @@ use wasmtime::{ResourceLimiter, Result, bail};
 use crate::budget::Budget;
 
 /// Elements of all tables together.
-const MOST_ELEMENTS: usize = 4096;
+const MAX_ELEMENTS: usize = 4096;
 
 /// What an instance has and may have; what it was refused last, for the message.
 #[derive(Debug)]
@@ -54,11 +54,11 @@ impl ResourceLimiter for Limits {
         desired: usize,
         _maximum: Option<usize>,
     ) -> Result<bool> {
-        if desired <= MOST_ELEMENTS {
+        if desired <= MAX_ELEMENTS {
             return Ok(true);
         }
         self.refuse(format!(
-            "a table of {desired} elements, {MOST_ELEMENTS} are allowed"
+            "a table of {desired} elements, {MAX_ELEMENTS} are allowed"
         ))
     }
 

@@ -7,7 +7,7 @@ use tandem_sdk::{Axes, AxisVector};
 use crate::record::TraceCsv;
 
 /// Most stops kept one by one; all are counted.
-pub const MOST_STOPS: usize = 1000;
+pub const MAX_STOPS: usize = 1000;
 
 /// One stop: a hold, a program stop, starvation, an abort or a fault.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -43,7 +43,7 @@ pub struct StopWatch {
     open: bool,
     /// Rate of program time before it, and speed: what "slower" is compared with.
     before: (f64, f64),
-    /// The first [`MOST_STOPS`].
+    /// The first [`MAX_STOPS`].
     pub stops: Vec<Stop>,
     /// How many there were.
     pub count: u64,
@@ -87,7 +87,7 @@ impl StopWatch {
 
     fn begin(&mut self, sample: &Sample) {
         self.count += 1;
-        if self.stops.len() == MOST_STOPS {
+        if self.stops.len() == MAX_STOPS {
             return;
         }
         self.open = true;
@@ -220,6 +220,6 @@ mod tests {
     fn many_stops_are_counted_and_the_first_thousand_kept() {
         let one = [(4.0, StopCause::None), (0.0, StopCause::Starvation)];
         let watch = watched(&one.repeat(1200));
-        assert_eq!((watch.count, watch.stops.len()), (1200, MOST_STOPS));
+        assert_eq!((watch.count, watch.stops.len()), (1200, MAX_STOPS));
     }
 }

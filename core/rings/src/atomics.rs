@@ -31,14 +31,14 @@ pub const STOP_SHARE: f64 = 0.95;
 pub const STOP_JERK_SHARE: f64 = 0.8;
 
 /// Most entries of the ring that the fine loop looks at in one period, whatever the period.
-pub const MOST_ENTRIES: usize = 250;
+pub const MAX_ENTRIES: usize = 250;
 
 /// Entries of the ring that the fine loop comes past in one period at most: each may be a cache miss and takes up to a
 /// tenth of a µs for every axis, and a period of 1 ms has time for 250.
 pub fn most_entries_a_period(fine_period_s: f64) -> usize {
     const FEWEST: f64 = 60.0;
     const PER_S: f64 = 250_000.0;
-    (fine_period_s * PER_S).clamp(FEWEST, MOST_ENTRIES as f64) as usize
+    (fine_period_s * PER_S).clamp(FEWEST, MAX_ENTRIES as f64) as usize
 }
 
 /// How far the queue reaches, and what it takes to stop within it. Written by the rough loop after each push.

@@ -14,7 +14,7 @@ mod sample;
 mod switched;
 
 pub use atomics::{
-    AtomicF64, Depth, MOST_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period,
+    AtomicF64, Depth, MAX_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period,
 };
 pub use controls::{Controls, JogControls, JointStatus, SpindleStatus, Status};
 pub use counts::Counts;

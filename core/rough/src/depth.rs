@@ -127,7 +127,7 @@ pub const SERVED_FOR_PERIODS: f64 = 2.0;
 const HALVINGS: u32 = 20;
 
 /// The rate at least, for a queue whose segments leave no deceleration at all: the machine has to get out of it.
-const LEAST_RATE: f64 = 1e-3;
+const MIN_RATE: f64 = 1e-3;
 
 impl QueueDepth {
     /// Nothing queued. `factor` is the share of the worst stop that is asked for, 1 but in tests.
@@ -214,7 +214,7 @@ impl QueueDepth {
     pub fn rate_for_entries(&self) -> f64 {
         self.dense
             .max()
-            .map_or(1.0, |negative| (-negative).max(LEAST_RATE))
+            .map_or(1.0, |negative| (-negative).max(MIN_RATE))
     }
 
     /// Highest rate of program time from which the machine comes to rest between `now_s` and `wall_s`, where the queue gets
@@ -235,7 +235,7 @@ impl QueueDepth {
             let rate = f64::midpoint(good, bad);
             *(if fits(rate) { &mut good } else { &mut bad }) = rate;
         }
-        good.max(LEAST_RATE)
+        good.max(MIN_RATE)
     }
 
     /// Smallest stop deceleration queued, mm/s²; infinite where nothing moves.

@@ -106,7 +106,7 @@ impl RoughError {
 }
 
 /// How often in one rough period a planner may emit less than half of what it is asked for, though more is to come.
-const MOST_SHORT_ADVANCES: u32 = 1000;
+const MAX_SHORT_ADVANCES: u32 = 1000;
 
 /// Rough periods that are queued beyond what the worst stop asks for.
 const MARGIN_PERIODS: f64 = 3.0;
@@ -245,7 +245,7 @@ impl RoughLoop {
                 ));
             }
             short += u32::from(emitted_s < advance_s / 2.0);
-            if short > MOST_SHORT_ADVANCES {
+            if short > MAX_SHORT_ADVANCES {
                 return Err(planner_error(
                     None,
                     "advance emits a little at a time, and hardly gets on",

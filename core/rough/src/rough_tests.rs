@@ -105,7 +105,7 @@ fn a_planner_that_says_it_emitted_and_did_not_is_named_within_one_period() {
         .expect_err("nothing was emitted")
         .to_string();
     assert!(error.contains("hardly gets on"), "{error}");
-    assert!(calls.load(Relaxed) <= u64::from(MOST_SHORT_ADVANCES) + 1);
+    assert!(calls.load(Relaxed) <= u64::from(MAX_SHORT_ADVANCES) + 1);
 }
 
 #[test]

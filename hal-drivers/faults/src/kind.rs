@@ -3,7 +3,7 @@
 use tandem_sdk::{AxisVector, Feedback, MAX_AXES, Setpoint};
 
 /// Longest delay, fine periods.
-pub const MOST_DELAY: u64 = 1000;
+pub const MAX_DELAY: u64 = 1000;
 
 /// What is wrong with the feedback of a corrupted joint.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use tandem_sdk::{AxisVector, MAX_AXES};
 use toml::{Table, Value};
 
 use crate::entry::{Entry, Refusal};
-use crate::kind::{Corruption, Kind, MOST_DELAY, Mask};
+use crate::kind::{Corruption, Kind, MAX_DELAY, Mask};
 use crate::nearest::unknown;
 use crate::schedule::{Rate, When};
 use crate::wrapper::Plan;
@@ -119,10 +119,10 @@ impl Entry<'_> {
         let Some(periods) = periods else {
             return self.refuse("", "has no periods: how late do setpoints come?");
         };
-        if periods > MOST_DELAY {
+        if periods > MAX_DELAY {
             return self.refuse(
                 "periods",
-                &format!("{periods} are too many: at most {MOST_DELAY}"),
+                &format!("{periods} are too many: at most {MAX_DELAY}"),
             );
         }
         let (from_tick, until_tick) = self.window()?;

@@ -7,7 +7,7 @@
 //! their own, which a test drives. Tick 0 is no heartbeat: the host repeats it until the program starts.
 
 /// More periods than this are not made up for at once, so that an exchange takes bounded time.
-const MOST_MISSED: u64 = 1000;
+const MAX_MISSED: u64 = 1000;
 
 /// Counts silent periods; trips after more than `limit` of them in a row.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,7 @@ impl Watchdog {
         self.period = now.max(tick);
         self.heard = self.heard.max(tick);
         Heard {
-            missed: tick.saturating_sub(now).min(MOST_MISSED),
+            missed: tick.saturating_sub(now).min(MAX_MISSED),
             fresh,
         }
     }
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(hear(&mut watchdog, &[10]), heard(0, true));
         assert_eq!(
             hear(&mut watchdog, &[u64::MAX]),
-            heard(MOST_MISSED, true),
+            heard(MAX_MISSED, true),
             "bounded"
         );
         assert_eq!(

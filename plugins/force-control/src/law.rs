@@ -23,7 +23,7 @@ pub enum Law {
 }
 
 /// The smallest torque that the law [`Law::Ratio`] divides by, as a share of the reference.
-const LEAST_SHARE: f64 = 0.2;
+const MIN_SHARE: f64 = 0.2;
 
 /// What a law is bounded by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl FeedLaw {
                 wanted
             }
             Law::Ratio { exponent } => {
-                let least_nm = LEAST_SHARE * self.bounds.reference_nm;
+                let least_nm = MIN_SHARE * self.bounds.reference_nm;
                 let factor = (self.bounds.reference_nm / torque_nm.max(least_nm)).powf(exponent);
                 self.feed_mm_per_s * if may_rise { factor } else { factor.min(1.0) }
             }

@@ -11,7 +11,7 @@ use crate::mean::window;
 use crate::stability::LoopModel;
 
 /// Wrong inertia within which the loop is shown to stay stable, %.
-const MOST_INERTIA_DOUBT_PERCENT: f64 = 20.0;
+const MAX_INERTIA_DOUBT_PERCENT: f64 = 20.0;
 
 /// The name of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -356,7 +356,7 @@ impl AxisOptions {
             &name("confidence.inertia_percent"),
             self.confidence.inertia_percent,
             0.0,
-            MOST_INERTIA_DOUBT_PERCENT,
+            MAX_INERTIA_DOUBT_PERCENT,
         )
     }
 }

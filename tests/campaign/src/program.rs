@@ -11,9 +11,9 @@ use crate::bound::rest_to_rest_s;
 use crate::machine::{Drawn, Planner};
 
 /// Samples that a program is meant to take at most, were it driven with a rest at each block.
-const MOST_SAMPLES: f64 = 20_000.0;
+const MAX_SAMPLES: f64 = 20_000.0;
 /// Elements at most.
-const MOST_ELEMENTS: u64 = 400;
+const MAX_ELEMENTS: u64 = 400;
 
 /// A program in the making.
 pub struct Program<'a> {
@@ -34,7 +34,7 @@ pub struct Program<'a> {
 
 /// A program and the time that it takes about, s.
 pub fn draw(random: &mut Random, machine: &Drawn) -> (String, f64) {
-    let budget_s = MOST_SAMPLES * random.length(0.02, 1.0) * machine.fine_ms / 1000.0;
+    let budget_s = MAX_SAMPLES * random.length(0.02, 1.0) * machine.fine_ms / 1000.0;
     let widest = machine
         .axes
         .iter()
@@ -52,7 +52,7 @@ pub fn draw(random: &mut Random, machine: &Drawn) -> (String, f64) {
         random,
     };
     program.head();
-    for _ in 0..program.random.length(2.0, MOST_ELEMENTS as f64) as u64 {
+    for _ in 0..program.random.length(2.0, MAX_ELEMENTS as f64) as u64 {
         program.element();
         if program.left_s <= 0.0 {
             break;

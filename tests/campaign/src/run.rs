@@ -14,7 +14,7 @@ use crate::case::Case;
 use crate::verdict::{Asked, Report, judge};
 
 /// Samples after which a run is ended, whatever the bound says: a program that needs more is not what is drawn.
-pub const MOST_SAMPLES: usize = 600_000;
+pub const MAX_SAMPLES: usize = 600_000;
 /// Time without any motion at the end of a run that has taken too long, s: it stands still.
 const STILL_S: f64 = 0.2;
 
@@ -106,7 +106,7 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
     let bound_s = Bound::of(&program, &machine, &judging, asked.filter_s).map_err(wrong)?;
     let until_s = asked.last_tick as f64 * machine.fine_period_s
         + asked.stalled as f64 * machine.rough_period_s;
-    let most_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MOST_SAMPLES);
+    let most_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MAX_SAMPLES);
     let parsed = tandem_gcode::Program::open(&program).map_err(|e| wrong(e.to_string()))?;
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());

@@ -7,10 +7,10 @@ use toml::Table;
 
 use crate::case::Case;
 use crate::machine::Planner;
-use crate::run::{MOST_SAMPLES, Ran};
+use crate::run::{MAX_SAMPLES, Ran};
 
 /// Memory that a run may take, MB.
-const MOST_MEMORY_MB: f64 = 200.0;
+const MAX_MEMORY_MB: f64 = 200.0;
 /// Distance from the path that rounding and inverse functions are forgiven, mm.
 const ON_THE_PATH_MM: f64 = 2e-6;
 
@@ -277,7 +277,7 @@ pub fn judge(ran: &Ran, case: &Case, judging: &tandem_oracle::Machine, asked: &A
                 .and_then(|outcome| counted(outcome, asked))
         })
         .or_else(|| {
-            (memory_mb > MOST_MEMORY_MB)
+            (memory_mb > MAX_MEMORY_MB)
                 .then(|| Report::failed("memory", format!("{memory_mb:.0} MB")))
         });
     let clean = || Report {
@@ -303,7 +303,7 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
         );
         let kind = if still {
             "standstill"
-        } else if ran.most_samples == MOST_SAMPLES {
+        } else if ran.most_samples == MAX_SAMPLES {
             "too-long"
         } else {
             "slow"

@@ -15,10 +15,10 @@ use crate::verdict::Report;
 /// The argument that makes the binary a worker.
 pub const WORKER: &str = "worker";
 /// Address space of a worker, bytes: a run that asks for more aborts.
-const MOST_BYTES: u64 = 1 << 31;
+const MAX_BYTES: u64 = 1 << 31;
 
 /// Characters of what a worker said before it died that are told: a backtrace is long.
-const MOST_WORDS: usize = 300;
+const MAX_WORDS: usize = 300;
 
 /// The main loop of a worker: a folder comes in as a line, a report goes out as a line.
 ///
@@ -30,8 +30,8 @@ pub fn serve() -> std::io::Result<()> {
     let _ = setrlimit(
         Resource::As,
         Rlimit {
-            current: Some(MOST_BYTES),
-            maximum: Some(MOST_BYTES),
+            current: Some(MAX_BYTES),
+            maximum: Some(MAX_BYTES),
         },
     );
     let registry = registry();
@@ -181,7 +181,7 @@ impl Process {
             .wait()
             .map_or_else(|e| e.to_string(), |status| status.to_string());
         let words: Vec<String> = self.errors.iter().collect();
-        (status, words.join(" ").chars().take(MOST_WORDS).collect())
+        (status, words.join(" ").chars().take(MAX_WORDS).collect())
     }
 }
 

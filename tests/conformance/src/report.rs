@@ -16,7 +16,7 @@ pub struct Finding {
 }
 
 /// Most findings of one check; what is wrong everywhere is said once.
-const MOST_FINDINGS: usize = 5;
+const MAX_FINDINGS: usize = 5;
 
 /// The verdict on one plugin.
 #[derive(Clone, Debug)]
@@ -61,7 +61,7 @@ impl Report {
             .iter()
             .filter(|finding| finding.check == check)
             .count()
-            < MOST_FINDINGS
+            < MAX_FINDINGS
         {
             self.findings.push(Finding { check, words });
         }

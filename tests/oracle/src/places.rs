@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Looks at elements after which it is given up.
-const MOST_LOOKS: usize = 50_000_000;
+const MAX_LOOKS: usize = 50_000_000;
 
 /// The elements on which each sample may be, with the first fraction.
 pub struct Known {
@@ -58,7 +58,7 @@ pub fn find(
             element += 1;
             looks += 1;
         }
-        if known.places.len() == to || looks > MOST_LOOKS {
+        if known.places.len() == to || looks > MAX_LOOKS {
             return None;
         }
         known.begins.push(to);

@@ -65,7 +65,7 @@ pub fn feed(planner: &mut dyn Planner, blocks: &[impl Offer]) {
 }
 
 /// More calls of `advance` than any program needs.
-const MOST_CALLS: usize = 1_000_000;
+const MAX_CALLS: usize = 1_000_000;
 
 /// Gives `blocks` to the planner, as many at a time as it takes, and asks for `step_s` of motion, to the end.
 ///
@@ -78,7 +78,7 @@ pub fn stream(
     sink: &mut dyn SegmentSink,
 ) {
     let mut waiting = blocks.iter().peekable();
-    for _ in 0..MOST_CALLS {
+    for _ in 0..MAX_CALLS {
         while waiting
             .next_if(|block| block.offer(planner).unwrap() == Accepted::Accepted)
             .is_some()

@@ -36,7 +36,7 @@ pub struct Wrong {
 }
 
 /// Longest wait, s: an hour.
-const MOST_WAIT_S: f64 = 3600.0;
+const MAX_WAIT_S: f64 = 3600.0;
 
 /// Understands a line.
 ///
@@ -119,8 +119,8 @@ fn feed(word: Option<&str>) -> Result<f64, String> {
 
 fn wait(word: Option<&str>) -> Result<Line, String> {
     let seconds = number(word.ok_or("wait needs a time in s")?)?;
-    if seconds > MOST_WAIT_S {
-        return Err(format!("{seconds} s is longer than {MOST_WAIT_S} s"));
+    if seconds > MAX_WAIT_S {
+        return Err(format!("{seconds} s is longer than {MAX_WAIT_S} s"));
     }
     Ok(Line::Wait(seconds))
 }

@@ -1,6 +1,6 @@
 //! Calibration on the planners of this workspace, on made-up controls, and on the published measurements.
 
-use tandem_estimate::diagnose::{Evidence, Fitted, LEAST_R2, fit_all, linear};
+use tandem_estimate::diagnose::{Evidence, Fitted, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::Experiment;
 use tandem_estimate::polygon::{Polygon, Timed};
 use tandem_estimate::{Choice, Rule};
@@ -116,6 +116,6 @@ fn the_experiment_finds_what_kind_of_control_it_is() {
         )
         .unwrap();
         println!("{regression:?}");
-        assert_eq!(regression.short.r2 >= LEAST_R2, constant_time);
+        assert_eq!(regression.short.r2 >= MIN_R2, constant_time);
     }
 }

@@ -30,7 +30,7 @@ const SHARE: f64 = 0.8;
 const RESERVE: f64 = 1.0;
 /// Most that σ̈ may be lowered to, as a change of the change of σ in a period. The small steps of other approaches are for
 /// where next to nothing moves, and the speed is near the feed here.
-const MOST_CHANGE: f64 = 0.3;
+const MAX_CHANGE: f64 = 0.3;
 /// Rounds in which σ̈ is sought: what is wrong is squared by each.
 const ROUNDS: u32 = 5;
 /// To which change of σ in a period it is sought.
@@ -155,7 +155,7 @@ impl Governor {
             free
         };
         self.in_time(aim, below, here, outlook)
-            .max(-MOST_CHANGE / (h * h))
+            .max(-MAX_CHANGE / (h * h))
     }
 
     /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve or below it, and its mean
@@ -167,7 +167,7 @@ impl Governor {
         };
         let jerk = outlook
             .path_jerk_mm_per_s3
-            .min(limit * MOST_CHANGE / (h * h));
+            .min(limit * MAX_CHANGE / (h * h));
         let curve = Curve {
             jerk_mm_per_s3: SHARE * outlook.share * jerk,
             reserve_s: RESERVE * h,
@@ -280,7 +280,7 @@ impl Governor {
             ));
         }
         (
-            changes.nearest(-MOST_CHANGE / (self.period_s * self.period_s)),
+            changes.nearest(-MAX_CHANGE / (self.period_s * self.period_s)),
             rate,
         )
     }

@@ -20,7 +20,7 @@ const NONE_S: f64 = 1e-9;
 const HALVINGS: u32 = 4;
 /// Time in which σ must have become constant, in units of the longest a/J, and how many periods that may be.
 const LONGEST: f64 = 3.2;
-const MOST_PERIODS: f64 = 640.0;
+const MAX_PERIODS: f64 = 640.0;
 
 /// σ̈ of the periods of a way at whose end σ is constant, 1/s².
 #[derive(Debug)]
@@ -34,7 +34,7 @@ impl Steadying {
     /// A way without periods, with room for the longest.
     pub(super) fn new() -> Self {
         Self {
-            changes_per_s2: vec![0.0; MOST_PERIODS as usize].into_boxed_slice(),
+            changes_per_s2: vec![0.0; MAX_PERIODS as usize].into_boxed_slice(),
             count: 0,
             passed: 0,
         }
@@ -128,7 +128,7 @@ impl Governor {
     /// Whether σ becomes constant; the way that does it is noted in `self.tried`.
     fn steadies(&mut self, mut way: Way<'_>, outlook: &Outlook) -> bool {
         let h = self.period_s;
-        let periods = (LONGEST * outlook.horizon_s / h).clamp(16.0, MOST_PERIODS) as u32;
+        let periods = (LONGEST * outlook.horizon_s / h).clamp(16.0, MAX_PERIODS) as u32;
         self.tried.clear();
         for _ in 0..periods {
             if !(0.0..=1.0).contains(&way.sigma) {

@@ -8,7 +8,7 @@ use crate::fault::FaultKind;
 /// What the share of missed periods is looked at over, s.
 const WINDOW_S: f64 = 1.0;
 /// The same at most, in periods: 1 MHz, so that a period of nonsense asks for no nonsense of memory.
-const MOST_WINDOW_PERIODS: f64 = 1e6;
+const MAX_WINDOW_PERIODS: f64 = 1e6;
 
 /// What was missed in motion: in a row, and in the last second.
 ///
@@ -29,7 +29,7 @@ impl Missed {
     pub(super) fn new(config: &FineConfig) -> Self {
         let window = (WINDOW_S / config.period_s)
             .round()
-            .clamp(1.0, MOST_WINDOW_PERIODS);
+            .clamp(1.0, MAX_WINDOW_PERIODS);
         // A share that was written as a decimal number is not to lose a period by its last bit.
         let most = (config.missed.share * window * (1.0 + 4.0 * f64::EPSILON)).floor();
         let remembered = if most < window { most as usize + 1 } else { 0 };

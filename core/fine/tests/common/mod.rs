@@ -23,7 +23,7 @@ const PLANNED_MM_PER_S2: f64 = 200.0;
 pub const KEPT_OUTPUT: u32 = 3;
 
 /// What a plan at its limits accelerates with, mm/s²: planners leave a thousandth.
-const MOST_MM_PER_S2: f64 = 999.0;
+const MAX_MM_PER_S2: f64 = 999.0;
 
 /// Drives that follow exactly, until they are told to fail.
 struct Echo {
@@ -211,11 +211,11 @@ impl Bench {
 
     /// Queues the way from rest to a speed and back, with all that the axis has.
     pub fn peak(&mut self, peak_mm_per_s: f64) {
-        self.piece(0.0, MOST_MM_PER_S2, peak_mm_per_s / MOST_MM_PER_S2, false);
+        self.piece(0.0, MAX_MM_PER_S2, peak_mm_per_s / MAX_MM_PER_S2, false);
         self.piece(
             peak_mm_per_s,
-            -MOST_MM_PER_S2,
-            peak_mm_per_s / MOST_MM_PER_S2,
+            -MAX_MM_PER_S2,
+            peak_mm_per_s / MAX_MM_PER_S2,
             true,
         );
     }

@@ -4,12 +4,12 @@
 /// than the jitter of any computer, so that nothing is won by being quicker; and it is long enough to average jitter out.
 const TIME_CONSTANT_NS: f64 = 16e6;
 /// Most of a deviation that one period corrects: where periods are long, the loop stays far from half of what it can bear (2).
-const MOST_GAIN: f64 = 0.25;
+const MAX_GAIN: f64 = 0.25;
 /// How much of a period one correction moves the deadline at most: the drives see a period that is so much shorter or longer.
-const MOST_SHIFT: f64 = 0.05;
+const MAX_SHIFT: f64 = 0.05;
 /// How far two clocks drift apart at most, as a share of time. Quartzes keep 100 ppm; what is beyond ten times that is no drift,
 /// and learnt as one it would carry the deadlines away where the phase is not told.
-const MOST_DRIFT: f64 = 1e-3;
+const MAX_DRIFT: f64 = 1e-3;
 
 /// A proportional and integral controller that steers the deadlines of a loop by the phase of its exchanges.
 ///
@@ -23,7 +23,7 @@ const MOST_DRIFT: f64 = 1e-3;
 /// poles at `1 − p/2`, which do not swing at any period and lie within the unit circle by far, as `p` is 1/4 at most; so do
 /// those of half and of twice these gains. The integral holds the drift: 100 ppm, 100 ns in a period of 1 ms, leave no
 /// deviation. What the phase jitters by a standard deviation of σ moves the deadlines by one of `σ·√(5·p/8)`: where it is
-/// spread evenly over 100 µs, and T is 1 ms, by 6 µs. A correction beyond [`MOST_SHIFT`] is cut off, and the integral waits
+/// spread evenly over 100 µs, and T is 1 ms, by 6 µs. A correction beyond [`MAX_SHIFT`] is cut off, and the integral waits
 /// meanwhile, for it would take the way to the first lock for drift.
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseSteering {
@@ -45,13 +45,13 @@ impl PhaseSteering {
     /// A controller for this period that knows of no drift.
     pub fn new(period_ns: i64) -> Self {
         let period_ns = period_ns as f64;
-        let proportional = (period_ns / TIME_CONSTANT_NS).min(MOST_GAIN);
+        let proportional = (period_ns / TIME_CONSTANT_NS).min(MAX_GAIN);
         Self {
             proportional,
             integral: proportional * proportional / 4.0,
             most_phase_ns: 0.5 * period_ns,
-            most_shift_ns: MOST_SHIFT * period_ns,
-            most_drift_ns: MOST_DRIFT * period_ns,
+            most_shift_ns: MAX_SHIFT * period_ns,
+            most_drift_ns: MAX_DRIFT * period_ns,
             drift_ns: 0.0,
             rest_ns: 0.0,
         }

@@ -26,7 +26,7 @@ use crate::soft::strategy::FeedRunner;
 use crate::switches::Switches;
 
 /// Greatest time constant that a program may ask for where the machine states no range, s.
-const MOST_TIME_CONSTANT_S: f64 = 1.0;
+const MAX_TIME_CONSTANT_S: f64 = 1.0;
 
 /// The interpreter's view of the machine. A length of zero would drive a tool into the table: where there is no tool table, only
 /// `simulated` drives take it without being told.
@@ -38,7 +38,7 @@ pub fn interpreter_config(machine: &Machine, simulated: bool, switches: Switches
     config.time_constant_s = machine
         .motion
         .time_constant_range_s
-        .unwrap_or((machine.fine_period_s, MOST_TIME_CONSTANT_S));
+        .unwrap_or((machine.fine_period_s, MAX_TIME_CONSTANT_S));
     for (travel, axis) in config.travel_mm.iter_mut().zip(machine.limits.axes()) {
         *travel = (axis.min_mm, axis.max_mm);
     }

@@ -1,6 +1,6 @@
 //! What is wrong with a module, said so that its author can mend it.
 
-use tandem_policy::{Engine, MOST_BYTES};
+use tandem_policy::{Engine, MAX_BYTES};
 
 use crate::{compile, each, read, start};
 
@@ -96,7 +96,7 @@ fn parameters_that_do_not_fit_are_refused() {
 
 #[test]
 fn a_file_of_any_size_is_not_compiled() {
-    let text = compile(&vec![0; MOST_BYTES + 1]).err().unwrap().to_string();
+    let text = compile(&vec![0; MAX_BYTES + 1]).err().unwrap().to_string();
     assert_eq!(text, "1048577 bytes: a policy script has at most 1048576");
 }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::noise::Noise;
 
 /// Most sections of a random workpiece.
-const MOST_SECTIONS: usize = 10_000;
+const MAX_SECTIONS: usize = 10_000;
 
 /// A workpiece: the depth of cut over a length.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,9 +116,9 @@ impl Random {
     fn check(&self) -> Result<(), String> {
         let ordered =
             |[low, high]: [f64; 2], least: f64| low >= least && high >= low && high <= 1e6;
-        if !(1..=MOST_SECTIONS).contains(&self.sections) {
+        if !(1..=MAX_SECTIONS).contains(&self.sections) {
             return Err(format!(
-                "random: sections = {}: must be 1 to {MOST_SECTIONS}",
+                "random: sections = {}: must be 1 to {MAX_SECTIONS}",
                 self.sections
             ));
         }

@@ -13,7 +13,7 @@ pub const STANDS_MM: f64 = 0.05;
 const SURELY_MOVES_MM: f64 = 0.01;
 
 /// Fine periods without a word of a joint after which it is lost, whatever the driver's patience.
-const MOST_AGE: u32 = 250;
+const MAX_AGE: u32 = 250;
 
 /// How long after it was disarmed a latch may still be told: as long as feedback may be behind, and some lost frames.
 const LATCH_PERIODS: u64 = 50;
@@ -192,7 +192,7 @@ fn judge_lost(joint: usize, tick: u64, now: &Feedback, report: &mut Report) {
     const CHECK: &str = "lost joints";
     report.judged(CHECK);
     let age = now.age_periods[joint];
-    if age > MOST_AGE && now.state[joint] != JointState::Lost {
+    if age > MAX_AGE && now.state[joint] != JointState::Lost {
         let words =
             format!("joint {joint} was last heard of {age} periods ago, and is not told as lost");
         report.find(CHECK, format!("period {tick}: {words}"));

@@ -10,7 +10,7 @@ use tandem_sdk::{
 use crate::mischief::{Misbehave, Mischief, Options};
 
 /// Blocks taken ahead.
-const MOST_BLOCKS: usize = 8;
+const MAX_BLOCKS: usize = 8;
 
 pub struct Hostile {
     mischief: Mischief,
@@ -28,7 +28,7 @@ impl Hostile {
     pub fn open(options: &Options, _context: &PlannerContext) -> Result<Self, PluginError> {
         Ok(Self {
             mischief: Mischief::new(options)?,
-            blocks: VecDeque::with_capacity(MOST_BLOCKS),
+            blocks: VecDeque::with_capacity(MAX_BLOCKS),
             path_mm: 0.0,
             finished: false,
         })
@@ -103,7 +103,7 @@ impl Planner for Hostile {
 
     fn accept(&mut self, block: &Block, _curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let what = self.mischief.of("accept")?;
-        if self.blocks.len() == MOST_BLOCKS || what == Misbehave::Dawdle {
+        if self.blocks.len() == MAX_BLOCKS || what == Misbehave::Dawdle {
             return Ok(Accepted::Full);
         }
         self.blocks.push_back(*block);
