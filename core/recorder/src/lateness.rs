@@ -1,19 +1,18 @@
 //! How late the fine loop woke, as a histogram of fixed size.
 
-/// Buckets per doubling; below this many ns a bucket holds one ns. A percentile is exact to one part in this.
-const STEPS: u64 = 32;
-/// Values of 2³⁶ ns (69 s) and more share the last bucket.
-const BUCKETS: usize = 32 * STEPS as usize;
-/// Buckets a row of a drawn histogram holds: half a doubling.
-const ROW: usize = STEPS as usize / 2;
+use hdrhistogram::Histogram;
+
+/// Latest wake-up that is told from later ones, ns: 69 s. Later ones share the last bucket.
+const MAX_NS: u64 = 1 << 36;
+/// Significant digits of what is counted: a percentile is exact to a hundredth.
+const DIGITS: u8 = 2;
 
 /// Wake-ups counted by their lateness. The counts, the number and the maximum are exact.
 ///
-/// [`Lateness::new`] allocates (8 kB); [`Lateness::record`] runs on the fine thread and does not.
+/// [`Lateness::new`] allocates (32 kB); [`Lateness::record`] runs on the fine thread and does not.
 #[derive(Clone, Debug)]
 pub struct Lateness {
-    counts: Box<[u64; BUCKETS]>,
-    count: u64,
+    counts: Histogram<u64>,
     max_ns: u64,
 }
 
@@ -30,10 +29,13 @@ pub struct Row {
 
 impl Lateness {
     /// Nothing counted. Host; allocates.
+    ///
+    /// # Panics
+    /// Never: the bounds of the histogram are constants that it takes.
     pub fn new() -> Self {
         Self {
-            counts: Box::new([0; BUCKETS]),
-            count: 0,
+            counts: Histogram::new_with_bounds(1, MAX_NS, DIGITS)
+                .expect("its bounds are constants"),
             max_ns: 0,
         }
     }
@@ -46,15 +48,14 @@ impl Lateness {
     /// Counts so many wake-ups of the same lateness. Any thread; does not allocate.
     pub fn record_many(&mut self, late_ns: u64, count: u64) {
         if count > 0 {
-            self.counts[bucket(late_ns)] += count;
-            self.count += count;
+            self.counts.saturating_record_n(late_ns, count);
             self.max_ns = self.max_ns.max(late_ns);
         }
     }
 
     /// Wake-ups counted.
     pub fn count(&self) -> u64 {
-        self.count
+        self.counts.len()
     }
 
     /// The latest, ns.
@@ -65,36 +66,28 @@ impl Lateness {
     /// The lateness that `share` of the wake-ups kept, ns: the nearest rank, at the upper end of its bucket. 0 where
     /// nothing was counted.
     pub fn percentile_ns(&self, share: f64) -> u64 {
-        let rank = (share * self.count as f64).ceil().max(1.0) as u64;
-        let mut seen = 0;
-        let reached = self.counts.iter().position(|count| {
-            seen += count;
-            seen >= rank
-        });
-        reached.map_or(self.max_ns, |found| {
-            (lowest_ns(found + 1) - 1).min(self.max_ns)
-        })
+        self.counts.value_at_quantile(share).min(self.max_ns)
     }
 
     /// The counts by half doublings, from the first to the last that holds any.
     pub fn rows(&self) -> Vec<Row> {
-        let row = |(index, counts): (usize, &[u64])| Row {
-            from_ns: lowest_ns(index * ROW),
-            below_ns: lowest_ns((index + 1) * ROW),
-            count: counts.iter().sum(),
-        };
-        let mut rows: Vec<Row> = self
-            .counts
-            .chunks(ROW)
-            .enumerate()
-            .map(row)
-            .skip_while(|r| r.count == 0)
-            .collect();
-        rows.truncate(
-            rows.iter()
-                .rposition(|r| r.count > 0)
-                .map_or(0, |last| last + 1),
-        );
+        let mut rows: Vec<Row> = vec![];
+        for recorded in self.counts.iter_recorded() {
+            let of = row_of(recorded.value_iterated_to());
+            while let Some(last) = rows
+                .last()
+                .copied()
+                .filter(|last| last.below_ns < of.below_ns)
+            {
+                rows.push(row_of(last.below_ns));
+            }
+            if rows.is_empty() {
+                rows.push(of);
+            }
+            if let Some(last) = rows.last_mut() {
+                last.count += recorded.count_since_last_iteration();
+            }
+        }
         rows
     }
 }
@@ -105,22 +98,14 @@ impl Default for Lateness {
     }
 }
 
-/// The bucket of a value: linear below [`STEPS`], then as many buckets for each doubling.
-fn bucket(ns: u64) -> usize {
-    if ns < STEPS {
-        return ns as usize;
-    }
-    let shift = ns.ilog2() - STEPS.ilog2();
-    ((u64::from(shift) * STEPS + (ns >> shift)) as usize).min(BUCKETS - 1)
-}
-
-/// The smallest value of a bucket, ns.
-fn lowest_ns(bucket: usize) -> u64 {
-    let bucket = bucket as u64;
-    if bucket < STEPS {
-        bucket
-    } else {
-        (bucket % STEPS + STEPS) << (bucket / STEPS - 1)
+/// The row that counts `ns`: half of a doubling, but nothing shorter than 16 ns.
+fn row_of(ns: u64) -> Row {
+    let width_ns = 1 << ns.max(32).ilog2().saturating_sub(1);
+    let from_ns = ns / width_ns * width_ns;
+    Row {
+        from_ns,
+        below_ns: from_ns + width_ns,
+        count: 0,
     }
 }
 
@@ -129,16 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn buckets_join_without_gap_or_overlap() {
-        for index in 0..BUCKETS {
-            assert_eq!(bucket(lowest_ns(index)), index);
-            assert_eq!(bucket(lowest_ns(index + 1) - 1), index);
-        }
-        assert_eq!(bucket(u64::MAX), BUCKETS - 1);
-    }
-
-    #[test]
-    fn counts_are_exact_and_percentiles_to_a_bucket() {
+    fn counts_are_exact_and_percentiles_to_a_hundredth() {
         let mut lateness = Lateness::new();
         for us in 1..=1000 {
             lateness.record(us * 1000);
@@ -147,18 +123,44 @@ mod tests {
         assert_eq!((lateness.count(), lateness.max_ns()), (1001, 1_000_000));
         for (share, us) in [(0.5, 500.0), (0.99, 990.0), (0.999, 999.0)] {
             let found = lateness.percentile_ns(share) as f64 / 1000.0;
-            assert!(
-                found >= us && found <= us * (1.0 + 1.0 / STEPS as f64),
-                "{share}: {found}"
-            );
+            assert!(found >= us && found <= us * 1.01, "{share}: {found}");
         }
         assert_eq!(lateness.percentile_ns(1.0), 1_000_000);
+    }
+
+    #[test]
+    fn rows_join_without_gap_and_hold_what_lies_between_their_ends() {
+        let mut lateness = Lateness::new();
+        // Both ends of every half doubling up to 69 s, and the doublings between.
+        for shift in 4..36 {
+            for late_ns in [1_u64 << shift, 3 << (shift - 1)] {
+                lateness.record_many(late_ns - 1, 1);
+                lateness.record_many(late_ns, 1);
+            }
+        }
         let rows = lateness.rows();
-        assert_eq!(rows.iter().map(|row| row.count).sum::<u64>(), 1001);
-        assert!(
-            rows.windows(2)
-                .all(|pair| pair[0].below_ns == pair[1].from_ns)
+        assert_eq!(
+            rows.iter().map(|row| row.count).sum::<u64>(),
+            lateness.count()
         );
+        for pair in rows.windows(2) {
+            assert_eq!(pair[0].below_ns, pair[1].from_ns);
+        }
+        // Rows below 32 ns are wider, and of the last only the lower end is drawn.
+        for row in rows
+            .iter()
+            .filter(|row| row.from_ns >= 32 && row.below_ns < MAX_NS)
+        {
+            assert_eq!(row.count, 2, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_later_than_any_bucket_counts_in_the_last_and_stays_the_maximum() {
+        let mut lateness = Lateness::new();
+        lateness.record_many(u64::MAX, 2);
+        assert_eq!((lateness.count(), lateness.max_ns()), (2, u64::MAX));
+        assert_eq!(lateness.rows().len(), 1);
     }
 
     #[test]

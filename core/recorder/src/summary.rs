@@ -289,7 +289,7 @@ impl Summary {
     }
 }
 
-/// How late the fine loop woke, µs: percentiles to a thirtieth, the maximum exactly.
+/// How late the fine loop woke, µs: percentiles to a hundredth, the maximum exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LatenessUs {
     /// Half of the wake-ups were at most so late.
@@ -302,7 +302,7 @@ pub struct LatenessUs {
     pub max: f64,
 }
 
-/// What the rough loop took of a period (program, policy, planner), µs: percentiles to a thirtieth, the maximum exactly.
+/// What the rough loop took of a period (program, policy, planner), µs: percentiles to a hundredth, the maximum exactly.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanningUs {
     /// Half of the periods took at most so long.
