@@ -2,7 +2,7 @@
 
 use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 
-use super::circle::{Ends, Part, Parts, extent};
+use super::circle::{Ends, Part, Parts, extent, tolerance_mm};
 use super::modes::Plane;
 use super::{Action, Group, Shape, Word, compensation};
 use crate::fault::{Checked, Fault, Span};
@@ -44,6 +44,7 @@ fn arc(line: &mut Line, clockwise: bool) -> Checked<()> {
         end: pick(&end),
         clockwise,
         turns,
+        tolerance_mm: tolerance_mm(line.state.modes.unit_mm),
     };
     if plane.iter().any(|axis| uncertain >> axis & 1 != 0) {
         line.state.path.last_end = line.state.path.position;

@@ -6,9 +6,15 @@ use tandem_sdk::ArcGeometry;
 
 use crate::fault::show;
 
-/// Start and end radius may differ by this much, mm, or by [`RELATIVE`] of the radius: programs are rounded.
-const ABSOLUTE_MM: f64 = 0.005;
+/// Start and end radius may differ by what rounding to 0.01 mm, or to 0.001 inch, makes of them: LinuxCNC's values.
+const ROUNDED_MM: f64 = 0.02 * std::f64::consts::SQRT_2;
+const ROUNDED_INCH: f64 = 0.002 * std::f64::consts::SQRT_2;
+/// Where they differ by less than this of the radius they may differ by [`MOST`] times as much.
 const RELATIVE: f64 = 1e-3;
+const MOST: f64 = 100.0;
+/// An arc may leave the ring between its radii by this much, mm, and an arc by radius (R) may be short by it; by
+/// [`RELATIVE`] of the radius too.
+const ABSOLUTE_MM: f64 = 0.005;
 /// Largest change of the swept angle, rad, when the centre moves. More means that the ends lie radially apart, where the
 /// circle through both is a tiny one, far from what the program means.
 const SWEEP_CHANGE: f64 = 1.0;
@@ -26,6 +32,8 @@ pub(crate) struct Ends {
     pub clockwise: bool,
     /// 1 for an arc of at most one turn.
     pub turns: u32,
+    /// What [`tolerance_mm`] says of the units of the program.
+    pub tolerance_mm: f64,
 }
 
 /// An arc with its ends.
@@ -63,8 +71,22 @@ fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-fn tolerance(radius: f64) -> f64 {
+fn rounding(radius: f64) -> f64 {
     ABSOLUTE_MM.max(RELATIVE * radius)
+}
+
+/// How far an arc may leave the ring between its radii, mm.
+fn stray(radii: [f64; 2]) -> f64 {
+    rounding(radii[0].max(radii[1])).max((radii[0] - radii[1]).abs())
+}
+
+/// How much the radii of any arc may differ, mm, in a program whose unit is `unit_mm`.
+pub(crate) fn tolerance_mm(unit_mm: f64) -> f64 {
+    if unit_mm == 1.0 {
+        ROUNDED_MM
+    } else {
+        ROUNDED_INCH * unit_mm
+    }
 }
 
 impl Ends {
@@ -82,7 +104,7 @@ impl Ends {
             return Ok(Parts::one(part));
         }
         self.halves(center, radii).ok_or_else(|| {
-            let off = show(tolerance(radii[0].max(radii[1])));
+            let off = show(stray(radii));
             let why = format!(
                 "{}; no circle through both ends stays within {off} mm of it",
                 unequal(radii)
@@ -100,7 +122,13 @@ impl Ends {
                 "the radius of the arc is zero: its centre lies on its start".into(),
             ));
         }
-        if (radii[0] - radii[1]).abs() > tolerance(largest) {
+        let unlike = (radii[0] - radii[1]).abs();
+        let most = if unlike > RELATIVE * largest {
+            self.tolerance_mm
+        } else {
+            MOST * self.tolerance_mm
+        };
+        if unlike > most {
             return Err(("arc-radius", unequal(radii)));
         }
         Ok(radii)
@@ -110,8 +138,7 @@ impl Ends {
     fn near(&self, center: Point, chord: f64, radii: [f64; 2]) -> Option<Part> {
         let part = self.part(self.onto_bisector(center, chord));
         let turned = (part.arc.sweep_rad - self.part(center).arc.sweep_rad).abs();
-        let near = deviation(&part.arc, center, radii) <= tolerance(radii[0].max(radii[1]))
-            && turned <= SWEEP_CHANGE;
+        let near = deviation(&part.arc, center, radii) <= stray(radii) && turned <= SWEEP_CHANGE;
         near.then_some(part)
     }
 
@@ -178,7 +205,7 @@ impl Ends {
             return Err(("arc-ends", why.into()));
         }
         let half = chord / 2.0;
-        if half - radius.abs() > tolerance(radius.abs()) {
+        if half - radius.abs() > rounding(radius.abs()) {
             let (r, d) = (show(radius.abs()), show(chord));
             let why =
                 format!("the radius {r} mm is too small: the ends of the arc are {d} mm apart");

@@ -278,11 +278,7 @@ fn set_system(line: &mut Line) -> Checked<()> {
     let system = system(line)?;
     let mut origin = *line.state.coordinates.origin(system);
     for (axis, value) in line.named_axes() {
-        origin[axis] = if line.state.modes.absolute {
-            value
-        } else {
-            origin[axis] + value
-        };
+        origin[axis] = value;
     }
     if let Some(degrees) = line.words.get(b'R') {
         if degrees != 0.0 && !line.state.coordinates.can_rotate() {
@@ -433,7 +429,8 @@ mod tests {
         );
         assert_eq!(
             ends("G91 G10 L2 P1 X5\nG10 L2 P0 X5\nG90 G0 X0"),
-            [["10", "0", "0"]]
+            [["5", "0", "0"]],
+            "G91 has no effect on it"
         );
         assert_eq!(
             ends("G0 X10\nG92 X0 Y5\nX1 Y6\nG92.2\nX1\nG92.3\nX1\nG92.1\nX2")[1..],

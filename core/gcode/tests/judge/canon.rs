@@ -9,6 +9,8 @@ use super::compare::Move;
 
 /// What is said of a program that the judge does not end: some loops within repeats in subroutines keep it going for ever.
 pub const NEVER_ENDS: &str = "the judge does not end";
+/// What is said of a move that radius compensation would turn around, which the judge drives in some cases.
+pub const UNSEEN: &str = "the corner lies before the start of the first, and the tool would cut";
 const NO_END: &str = "File ended with no percent sign";
 const GIVE_UP_MS: u32 = 4000;
 /// Without a configuration its tool table is in inches.
@@ -44,6 +46,7 @@ struct Machine {
     tool: [f64; 3],
     rotation_deg: f64,
     plane: usize,
+    at: [f64; 3],
 }
 
 impl Machine {
@@ -65,14 +68,27 @@ impl Machine {
         };
         let end = place(numbers[0], numbers[1]);
         let center = place(numbers[2], numbers[3]);
-        // The order of this interpreter's planes: XY, YZ, ZX.
-        Move::Arc(
-            end,
+        let from = |point: [f64; 3]| {
             [
-                center[axes[0]] - end[axes[0]],
-                center[axes[1]] - end[axes[1]],
-            ],
-        )
+                center[axes[0]] - point[axes[0]],
+                center[axes[1]] - point[axes[1]],
+            ]
+        };
+        let radius = |point| {
+            let [a, b] = from(point);
+            a.hypot(b)
+        };
+        let (chord, sum) = (
+            (end[axes[0]] - self.at[axes[0]]).hypot(end[axes[1]] - self.at[axes[1]]),
+            radius(self.at) + radius(end),
+        );
+        let moves = if chord > 0.0 {
+            (radius(self.at) - radius(end)).abs() * sum / 2.0 / chord
+        } else {
+            0.0
+        };
+        // The order of this interpreter's planes: XY, YZ, ZX.
+        Move::Arc(end, from(end), moves)
     }
 }
 
@@ -172,6 +188,8 @@ fn read(text: &str) -> Vec<Move> {
             }
             _ => {}
         }
+        let last = moves.last().and_then(Move::end);
+        machine.at = last.unwrap_or(machine.at);
     }
     moves
 }

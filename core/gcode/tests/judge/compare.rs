@@ -12,8 +12,9 @@ pub enum Move {
     Rapid([f64; 3]),
     /// Its end.
     Line([f64; 3]),
-    /// End, and the distance of the centre from it in the two axes of the plane.
-    Arc([f64; 3], [f64; 2]),
+    /// End, the distance of the centre from it in the two axes of the plane, and how far the centre moves where an interpreter
+    /// makes the radii at both ends equal.
+    Arc([f64; 3], [f64; 2], f64),
     /// Seconds.
     Dwell(f64),
 }
@@ -24,7 +25,7 @@ const SAME_MM: f64 = 0.02;
 impl Move {
     pub fn end(&self) -> Option<[f64; 3]> {
         match self {
-            Self::Rapid(end) | Self::Line(end) | Self::Arc(end, _) => Some(*end),
+            Self::Rapid(end) | Self::Line(end) | Self::Arc(end, ..) => Some(*end),
             Self::Dwell(_) => None,
         }
     }
@@ -33,7 +34,10 @@ impl Move {
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME_MM);
         match (self, other) {
             (Self::Rapid(a), Self::Rapid(b)) | (Self::Line(a), Self::Line(b)) => near(a, b),
-            (Self::Arc(a, c), Self::Arc(b, d)) => near(a, b) && near(c, d),
+            (Self::Arc(a, c, unlike), Self::Arc(b, d, other)) => {
+                let apart = (c[0] - d[0]).hypot(c[1] - d[1]);
+                near(a, b) && apart < SAME_MM + unlike.max(*other)
+            }
             (Self::Dwell(a), Self::Dwell(b)) => (a - b).abs() < 1e-3,
             _ => false,
         }
@@ -129,6 +133,7 @@ fn step(block: &tandem_sdk::Block) -> Move {
                     block.arc.center_mm[0] - end[a],
                     block.arc.center_mm[1] - end[b],
                 ],
+                0.0,
             )
         }
         _ => Move::Line(end),

@@ -372,9 +372,12 @@ pub fn with_compensation(seed: u64) -> String {
             "G42.1 D0.5",
         ]);
         writer.line(&format!("G0 X0 Y0 Z0\n{word}\nG1 {a}20 {b}5"));
-        let mut at = [20.0, 5.0];
+        let mut contour = Contour {
+            at: [20.0, 5.0],
+            arc_towards: None,
+        };
         for _ in 0..2 + writer.below(6) {
-            at = contour_move(&mut writer, at, [a, b]);
+            contour = contour.go_on(&mut writer, [a, b]);
             if writer.below(5) == 0 {
                 let depth = writer.below(9);
                 writer.line(&format!("G1 {across}-{depth}"));
@@ -386,30 +389,52 @@ pub fn with_compensation(seed: u64) -> String {
     writer.text
 }
 
-/// A line, or an arc by its centre, from `at`; where it ends.
-fn contour_move(writer: &mut Writer, at: [f64; 2], [a, b]: [char; 2]) -> [f64; 2] {
-    let steps = [10.0, 15.0, -10.0, -15.0, 0.0, 20.0];
-    let mut step = [writer.random.pick(&steps), writer.random.pick(&steps)];
-    if step == [0.0; 2] {
-        step[0] = 10.0;
+/// Where a contour has come to, and the direction in which an arc has come there.
+struct Contour {
+    at: [f64; 2],
+    arc_towards: Option<f64>,
+}
+
+impl Contour {
+    /// A line, or an arc by its centre.
+    fn go_on(&self, writer: &mut Writer, [a, b]: [char; 2]) -> Self {
+        let steps = [10.0, 15.0, -10.0, -15.0, 0.0, 20.0];
+        let mut step = [writer.random.pick(&steps), writer.random.pick(&steps)];
+        if step == [0.0; 2] {
+            step[0] = 10.0;
+        }
+        let end = [self.at[0] + step[0], self.at[1] + step[1]];
+        let wants_line = writer.below(5) < 3;
+        // The centre lies on the line that halves the chord.
+        let share = writer.random.pick(&[0.0, 0.5, -0.5, 1.0]);
+        let center = [
+            step[0] / 2.0 - share * step[1],
+            step[1] / 2.0 + share * step[0],
+        ];
+        let word = writer.random.pick(&["G2", "G3"]);
+        let way = if word == "G3" { 1.0 } else { -1.0 };
+        let tangent = |from: [f64; 2]| (way * -from[0]).atan2(way * from[1]);
+        let begins = tangent([center[0], center[1]]);
+        // Where an arc turns back into an arc the judge rolls around the end also where that is a slot, and cuts.
+        let turns_back = self
+            .arc_towards
+            .is_some_and(|before| (before - begins).cos() < -0.99);
+        if wants_line || turns_back {
+            let word = if writer.below(8) == 0 { "G0" } else { "G1" };
+            writer.line(&format!("{word} {a}{:.4} {b}{:.4}", end[0], end[1]));
+            return Self {
+                at: end,
+                arc_towards: None,
+            };
+        }
+        let [i, j] = if a == 'Z' { ['K', 'I'] } else { ['I', 'J'] };
+        writer.line(&format!(
+            "{word} {a}{:.4} {b}{:.4} {i}{:.4} {j}{:.4}",
+            end[0], end[1], center[0], center[1]
+        ));
+        Self {
+            at: end,
+            arc_towards: Some(tangent([center[0] - step[0], center[1] - step[1]])),
+        }
     }
-    let end = [at[0] + step[0], at[1] + step[1]];
-    if writer.below(5) < 3 {
-        let word = if writer.below(8) == 0 { "G0" } else { "G1" };
-        writer.line(&format!("{word} {a}{:.4} {b}{:.4}", end[0], end[1]));
-        return end;
-    }
-    // The centre lies on the line that halves the chord.
-    let share = writer.random.pick(&[0.0, 0.5, -0.5, 1.0]);
-    let center = [
-        step[0] / 2.0 - share * step[1],
-        step[1] / 2.0 + share * step[0],
-    ];
-    let word = writer.random.pick(&["G2", "G3"]);
-    let [i, j] = if a == 'Z' { ['K', 'I'] } else { ['I', 'J'] };
-    writer.line(&format!(
-        "{word} {a}{:.4} {b}{:.4} {i}{:.4} {j}{:.4}",
-        end[0], end[1], center[0], center[1]
-    ));
-    end
 }

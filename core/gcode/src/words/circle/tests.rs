@@ -9,6 +9,7 @@ fn ends(start: Point, end: Point, clockwise: bool) -> Ends {
         end,
         clockwise,
         turns: 1,
+        tolerance_mm: tolerance_mm(1.0),
     }
 }
 
@@ -63,14 +64,39 @@ fn radius_arcs_take_the_short_or_the_long_way() {
 }
 
 #[test]
-fn radii_that_differ_too_much_are_refused_with_both() {
-    let (code, why) = ends([10.0, 0.0], [0.0, 10.02], false)
+fn radii_may_differ_as_in_linuxcnc() {
+    // An arc of a quarter, whose radius at the end is greater by `unlike`.
+    let about = |radius: f64, unlike: f64, unit_mm| {
+        Ends {
+            tolerance_mm: tolerance_mm(unit_mm),
+            ..ends([radius, 0.0], [0.0, radius + unlike], false)
+        }
         .about([0.0, 0.0])
-        .unwrap_err();
+    };
+    for (radius, unlike, unit_mm, fits) in [
+        (10.0, 0.0282, 1.0, true),
+        (10.0, 0.0284, 1.0, false),
+        (10.0, 0.0718, 25.4, true),
+        (10.0, 0.0719, 25.4, false),
+        (100.0, 0.1, 1.0, true),
+        (100.0, 0.1002, 1.0, false),
+        (4000.0, 2.82, 1.0, true),
+        (4000.0, 2.84, 1.0, false),
+        (9000.0, 7.18, 25.4, true),
+        (9000.0, 7.19, 25.4, false),
+    ] {
+        let parts = about(radius, unlike, unit_mm);
+        assert_eq!(parts.is_ok(), fits, "{radius} {unlike}: {parts:?}");
+        for part in parts.iter().flat_map(Parts::as_slice) {
+            let off = (part.arc.radius_mm - radius - unlike / 2.0).abs();
+            assert!(off <= unlike, "{part:?}");
+        }
+    }
+    let (code, why) = about(10.0, 0.03, 1.0).unwrap_err();
     assert_eq!(code, "arc-radius");
     assert_eq!(
         why,
-        "the arc does not fit: its radius is 10.0000 mm at the start and 10.0200 mm at the end"
+        "the arc does not fit: its radius is 10.0000 mm at the start and 10.0300 mm at the end"
     );
 }
 

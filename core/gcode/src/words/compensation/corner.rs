@@ -25,6 +25,21 @@ pub(super) enum Track {
     },
 }
 
+impl Track {
+    /// How much the programmed path bends away from the side of the tool, 1/mm.
+    fn bend(&self, tool_radius_mm: f64) -> f64 {
+        match self {
+            Self::Line { .. } => 0.0,
+            Self::Circle {
+                radius_mm,
+                outside: true,
+                ..
+            } => 1.0 / (radius_mm - tool_radius_mm),
+            Self::Circle { radius_mm, .. } => -1.0 / (radius_mm + tool_radius_mm),
+        }
+    }
+}
+
 /// How two tracks join.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Corner {
@@ -60,29 +75,33 @@ pub(super) fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-/// How the path joins where it goes from one direction into another; `end` is where the first track ends.
+/// How the path joins where it goes from one direction into another, with the side and the radius of the tool; `end` is where the
+/// first track ends.
 ///
 /// # Errors
 /// The tracks do not meet: the tool does not fit into the corner.
 pub(super) fn join(
     directions: [Point; 2],
-    side: f64,
+    (side, tool_radius_mm): (f64, f64),
     tracks: [&Track; 2],
     end: Point,
 ) -> Result<Corner, ()> {
     let [before, after] = directions;
     // Positive towards the side of the tool.
     let turn = side * (before[0] * after[1] - before[1] * after[0]).atan2(dot(before, after));
-    let back = turn.abs() > PI - STRAIGHT_ON;
-    // Over a round top and straight down beside it: above and beside is the only way that does not cut.
-    let over_the_top = back
-        && tracks
-            .iter()
-            .any(|track| matches!(track, Track::Circle { outside: true, .. }));
     if turn.abs() < STRAIGHT_ON {
         return Ok(Corner::Straight);
     }
-    if (turn < 0.0 || back) && !over_the_top {
+    let back = turn.abs() > PI - STRAIGHT_ON;
+    // Where the path turns back, only its bends tell a thin wall, around which the tool rolls, from a slot that ends in a
+    // point, as over a round top and straight down beside it: in that one the tool stays where it is as wide as the tool.
+    let slot = back
+        && tracks
+            .map(|track| track.bend(tool_radius_mm))
+            .iter()
+            .sum::<f64>()
+            > ROUNDING;
+    if (turn < 0.0 || back) && !slot {
         return Ok(Corner::Round);
     }
     meet(tracks, end).map(Corner::Inside).ok_or(())
@@ -113,6 +132,16 @@ fn way_back(track: &Track, place: Point, end: Point) -> f64 {
     } else {
         way
     }
+}
+
+/// Half the length of a chord at a distance from the centre of a circle; NaN where the distance is greater than the radius by
+/// more than rounding.
+fn half_chord(radius_mm: f64, distance: f64) -> f64 {
+    let inside = (radius_mm - distance.abs()) / radius_mm;
+    if inside.abs() < ROUNDING {
+        return 0.0;
+    }
+    radius_mm * (inside * (1.0 + distance.abs() / radius_mm)).sqrt()
 }
 
 /// Where two tracks meet: of two places the one that shortens the first track, which ends at `end`, least.
@@ -150,7 +179,7 @@ fn meet(tracks: [&Track; 2], end: Point) -> Option<Point> {
                 *direction,
                 dot([center[0] - through[0], center[1] - through[1]], *direction),
             );
-            let half = (radius_mm * radius_mm - distance(foot, *center).powi(2)).sqrt();
+            let half = half_chord(*radius_mm, distance(foot, *center));
             [
                 along(foot, *direction, half),
                 along(foot, *direction, -half),
@@ -170,7 +199,7 @@ fn meet(tracks: [&Track; 2], end: Point) -> Option<Point> {
         ] => {
             let between = distance(*c, *e);
             let way = (between * between + r * r - s * s) / (2.0 * between);
-            let half = (r * r - way * way).sqrt();
+            let half = half_chord(*r, way);
             let towards = unit(*c, *e);
             let foot = along(*c, towards, way);
             [
@@ -202,18 +231,69 @@ mod tests {
             line([-1.0, 0.0], directions[1]),
         ];
         assert_eq!(
-            join(directions, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]),
+            join(directions, (1.0, 1.0), [&tracks[0], &tracks[1]], [0.0, 1.0]),
             Ok(Corner::Inside([-1.0, 1.0]))
         );
         assert_eq!(
-            join(directions, -1.0, [&tracks[0], &tracks[1]], [0.0, -1.0]),
+            join(
+                directions,
+                (-1.0, 1.0),
+                [&tracks[0], &tracks[1]],
+                [0.0, -1.0]
+            ),
             Ok(Corner::Round)
         );
         let on = [directions[0], [1.0, 0.01]];
         assert_eq!(
-            join(on, 1.0, [&tracks[0], &tracks[1]], [0.0, 1.0]),
+            join(on, (1.0, 1.0), [&tracks[0], &tracks[1]], [0.0, 1.0]),
             Ok(Corner::Straight)
         );
+    }
+
+    #[test]
+    fn where_the_path_turns_back_its_bends_tell_a_slot_from_a_wall() {
+        // Up along a track with the tool on its left, and down along another.
+        let directions = [[0.0, 1.0], [0.0, -1.0]];
+        let arc = |radius_mm: f64, outside: bool, x: f64| Track::Circle {
+            center: [x, 0.0],
+            radius_mm,
+            outside,
+            clockwise: outside,
+        };
+        let wall = line([-1.0, 0.0], directions[0]);
+        let back = line([1.0, 0.0], directions[1]);
+        let join = |first: Track, second: Track| {
+            join(directions, (1.0, 1.0), [&first, &second], [-1.0, 0.0])
+        };
+        assert_eq!(join(wall, back), Ok(Corner::Round));
+        assert_eq!(join(wall, arc(9.0, false, 10.0)), Ok(Corner::Round));
+        assert!(matches!(
+            join(wall, arc(11.0, true, -10.0)),
+            Ok(Corner::Inside(_))
+        ));
+        // Beside a round top of radius 10 and in a round of radius 20: between the two the tool stops.
+        let top = arc(11.0, true, 10.0);
+        assert!(matches!(
+            join(top, arc(19.0, false, 20.0)),
+            Ok(Corner::Inside(_))
+        ));
+        assert_eq!(join(top, arc(4.0, false, 5.0)), Ok(Corner::Round));
+        // Back on the same circle there is no slot, and in a slightly larger one no room.
+        assert_eq!(join(top, arc(9.0, false, 10.0)), Ok(Corner::Round));
+        assert_eq!(join(top, arc(9.5, false, 10.5)), Err(()));
+    }
+
+    #[test]
+    fn a_line_may_touch_a_circle() {
+        let circle = Track::Circle {
+            center: [0.0, 0.0],
+            radius_mm: 5.0,
+            outside: true,
+            clockwise: true,
+        };
+        let touching = line([-3.0, 5.0 + 1e-12], [1.0, 0.0]);
+        let place = meet([&touching, &circle], [3.0, 5.0]).unwrap();
+        assert!(distance(place, [0.0, 5.0]) < 1e-6, "{place:?}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use tandem_sdk::{AxisVector, Block, BlockKind};
 
 use super::arc;
-use super::circle::{Ends, Parts, Point, extent};
+use super::circle::{Ends, Parts, Point, extent, tolerance_mm};
 use super::modes::Plane;
 use super::{Action, Group, Shape, Word, spindle, tool};
 use crate::fault::{Checked, Fault};
@@ -562,6 +562,7 @@ fn turn(
         compensation.radius_mm,
         compensation.programmed,
     );
+    let tool = (side, radius_mm);
     let before = compensation.direction;
     let end = along(corner, beside(before, side), radius_mm);
     let joined = match compensation
@@ -577,11 +578,11 @@ fn turn(
                 outside: side * way < 0.0,
                 clockwise: bend.clockwise,
             };
-            corner::join([before, direction], side, [&last, track], end)
+            corner::join([before, direction], tool, [&last, track], end)
         }
         _ => corner::join(
             [before, direction],
-            side,
+            tool,
             [
                 &Track::Line {
                     through: end,
@@ -764,6 +765,7 @@ fn bend_block(line: &mut Line, plane: [usize; 2], block: &Block, bend: &Bend) ->
         end,
         clockwise: bend.clockwise,
         turns: bend.turns,
+        tolerance_mm: tolerance_mm(line.state.modes.unit_mm),
     };
     let parts = ends
         .about(bend.center)
