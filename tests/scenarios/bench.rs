@@ -8,12 +8,9 @@ use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switche
 use tandem_machine::Machine;
 use tandem_oracle::{Options, Row, Trace, Verdict, judge};
 use tandem_recorder::TraceCsv;
-use tandem_rig::{CASES_VARIABLE, record_case};
+use tandem_rig::{Bent, CASES_VARIABLE, record_case};
 use tandem_rings::{MachineState, Sample};
-use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext,
-    PlannerDescription, PluginError, RawOptions, Segment, SegmentSink, local_plugin,
-};
+use tandem_sdk::{Planner, PlannerContext, PluginError, RawOptions, Segment, local_plugin};
 
 use crate::harness::mill;
 
@@ -330,78 +327,33 @@ thread_local! {
 }
 
 /// The look-ahead planner; what it emits is kept.
-fn watched(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
-    Ok(Watched {
-        inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?,
-        boast: 1.0,
-    })
+fn watched(options: &RawOptions, context: &PlannerContext) -> Result<Bent, PluginError> {
+    let inner = tandem_look_ahead::PLUGIN.planner(&options.0, context)?;
+    Ok(kept(inner, 1.0))
 }
 
 /// The planner inside the tolerance; what it emits is kept.
-fn watched_smooth(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
-    Ok(Watched {
-        inner: tandem_smooth::PLUGIN.planner(&options.0, context)?,
-        boast: 1.0,
-    })
+fn watched_smooth(options: &RawOptions, context: &PlannerContext) -> Result<Bent, PluginError> {
+    let inner = tandem_smooth::PLUGIN.planner(&options.0, context)?;
+    Ok(kept(inner, 1.0))
 }
 
 /// The planner of curves; what it emits is kept.
-fn watched_nurbs(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
-    Ok(Watched {
-        inner: tandem_nurbs::PLUGIN.planner(&options.0, context)?,
-        boast: 1.0,
-    })
+fn watched_nurbs(options: &RawOptions, context: &PlannerContext) -> Result<Bent, PluginError> {
+    let inner = tandem_nurbs::PLUGIN.planner(&options.0, context)?;
+    Ok(kept(inner, 1.0))
 }
 
 /// The same as `watched`, and it declares to leave twice the deceleration to stop with: half the depth of the ring.
-fn boastful(options: &RawOptions, context: &PlannerContext) -> Result<Watched, PluginError> {
-    Ok(Watched {
-        inner: tandem_look_ahead::PLUGIN.planner(&options.0, context)?,
-        boast: 2.0,
+fn boastful(options: &RawOptions, context: &PlannerContext) -> Result<Bent, PluginError> {
+    let inner = tandem_look_ahead::PLUGIN.planner(&options.0, context)?;
+    Ok(kept(inner, 2.0))
+}
+
+/// What it emits is kept, and it declares `boast` times the deceleration that it leaves to stop with.
+fn kept(inner: Box<dyn Planner>, boast: f64) -> Bent {
+    Bent::of(inner).emits(move |segment| {
+        segment.stop_deceleration_mm_per_s2 *= boast;
+        EMITTED.with_borrow_mut(|emitted| emitted.push(*segment));
     })
-}
-
-struct Watched {
-    inner: Box<dyn Planner>,
-    boast: f64,
-}
-
-struct WatchedSink<'a>(&'a mut dyn SegmentSink, f64);
-
-impl SegmentSink for WatchedSink<'_> {
-    fn segment(&mut self, segment: &Segment) {
-        let mut segment = *segment;
-        segment.stop_deceleration_mm_per_s2 *= self.1;
-        EMITTED.with_borrow_mut(|emitted| emitted.push(segment));
-        self.0.segment(&segment);
-    }
-    fn block(&mut self, report: &BlockReport) {
-        self.0.block(report);
-    }
-}
-
-impl Planner for Watched {
-    fn describe(&self) -> PlannerDescription {
-        self.inner.describe()
-    }
-    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.inner.check(block, curve)
-    }
-    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        self.inner.accept(block, curve)
-    }
-    fn finish(&mut self) {
-        self.inner.finish();
-    }
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
-        self.inner
-            .advance(duration_s, &mut WatchedSink(sink, self.boast))
-    }
-    fn reset(&mut self, position: &AxisVector) {
-        self.inner.reset(position);
-    }
 }

@@ -7,11 +7,9 @@ use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_oracle::Kind;
 use tandem_recorder::TraceCsv;
+use tandem_rig::Bent;
 use tandem_rings::Sample;
-use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext,
-    PlannerDescription, Plugin, PluginError, Segment, SegmentSink,
-};
+use tandem_sdk::{PlannerContext, Plugin, PluginError};
 
 use crate::harness::{judge_trace, mill};
 
@@ -42,13 +40,8 @@ optimist!(too_hard, |context| context
 fn too_keen(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
     let mut keen = *context;
     keen.max_feed_ratio = 1.01;
-    let bend = |segment: &mut Segment| segment.feed_mm_per_s *= 1.01;
-    let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent {
-        inner: LookAhead::new(options, &keen)?,
-        bend,
-        allowed,
-    })
+    let bent = declared(LookAhead::new(options, &keen)?, context);
+    Ok(bent.emits(|segment| segment.feed_mm_per_s *= 1.01))
 }
 
 /// Steps where blocks meet twice as large as allowed, not declared.
@@ -59,86 +52,28 @@ fn too_abrupt(options: &Options, context: &PlannerContext) -> Result<Bent, Plugi
         .axes
         .iter_mut()
         .for_each(|axis| axis.speed_difference_mm_per_s *= 4.0);
-    let inner = LookAhead::new(options, &rough)?;
-    Ok(Bent {
-        inner,
-        bend: |_| {},
-        allowed: context.limits.axes.map(|a| a.speed_difference_mm_per_s),
-    })
+    Ok(declared(LookAhead::new(options, &rough)?, context))
 }
 
 /// Off the path by a hundredth of a millimetre in Z, everywhere between the ends.
 fn off_the_path(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    let bend = |segment: &mut Segment| {
+    let bent = declared(LookAhead::new(options, context)?, context);
+    Ok(bent.emits(|segment| {
         let at = segment.coefficients[0][0] / 40.0;
         segment.coefficients[2][0] += 1e-3 * (std::f64::consts::PI * at.clamp(0.0, 1.0)).sin();
-    };
-    let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent {
-        inner: LookAhead::new(options, context)?,
-        bend,
-        allowed,
-    })
+    }))
 }
 
 /// Everything 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    let bend = |segment: &mut Segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
+    let bent = declared(LookAhead::new(options, context)?, context);
+    Ok(bent.emits(|segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01)))
+}
+
+/// Says that its steps of speed are those that the machine of `context` allows.
+fn declared(inner: LookAhead, context: &PlannerContext) -> Bent {
     let allowed = context.limits.axes.map(|a| a.speed_difference_mm_per_s);
-    Ok(Bent {
-        inner: LookAhead::new(options, context)?,
-        bend,
-        allowed,
-    })
-}
-
-/// Changes what another planner emits.
-struct Bent {
-    inner: LookAhead,
-    bend: fn(&mut Segment),
-    allowed: [f64; 8],
-}
-
-struct BentSink<'a>(&'a mut dyn SegmentSink, fn(&mut Segment));
-
-impl SegmentSink for BentSink<'_> {
-    fn segment(&mut self, segment: &Segment) {
-        let mut segment = *segment;
-        (self.1)(&mut segment);
-        self.0.segment(&segment);
-    }
-    fn block(&mut self, report: &BlockReport) {
-        self.0.block(report);
-    }
-}
-
-impl Planner for Bent {
-    fn describe(&self) -> PlannerDescription {
-        PlannerDescription {
-            speed_difference_mm_per_s: self.allowed,
-            ..self.inner.describe()
-        }
-    }
-    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.inner.check(block, curve)
-    }
-    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        self.inner.accept(block, curve)
-    }
-    fn finish(&mut self) {
-        self.inner.finish();
-    }
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
-        self.inner
-            .advance(duration_s, &mut BentSink(sink, self.bend))
-    }
-    fn reset(&mut self, position: &AxisVector) {
-        self.inner.reset(position);
-    }
+    Bent::new(inner).describes(move |description| description.speed_difference_mm_per_s = allowed)
 }
 
 struct Tracing(TraceCsv);

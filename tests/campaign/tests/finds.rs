@@ -10,106 +10,39 @@ use tandem_campaign::verdict::{Report, judge};
 use tandem_campaign::worker::Worker;
 use tandem_host::Registry;
 use tandem_look_ahead::{LookAhead, Options};
-use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Planner, PlannerContext,
-    PlannerDescription, Plugin, PluginError, Segment, SegmentSink,
-};
-
-/// Changes what the look-ahead planner emits.
-struct Bent {
-    inner: LookAhead,
-    bend: fn(&mut Segment),
-    /// It has more to emit, whatever the program says.
-    endless: bool,
-}
-
-struct BentSink<'a>(&'a mut dyn SegmentSink, fn(&mut Segment));
-
-impl SegmentSink for BentSink<'_> {
-    fn segment(&mut self, segment: &Segment) {
-        let mut segment = *segment;
-        (self.1)(&mut segment);
-        self.0.segment(&segment);
-    }
-    fn block(&mut self, report: &BlockReport) {
-        self.0.block(report);
-    }
-}
-
-impl Planner for Bent {
-    fn describe(&self) -> PlannerDescription {
-        self.inner.describe()
-    }
-    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.inner.check(block, curve)
-    }
-    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        self.inner.accept(block, curve)
-    }
-    fn finish(&mut self) {
-        self.inner.finish();
-    }
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
-        let answer = self
-            .inner
-            .advance(duration_s, &mut BentSink(sink, self.bend))?;
-        if self.endless && answer.done == 1 {
-            sink.segment(&Segment::rest(
-                &AxisVector::from_slice(&[40.0, 3.0]),
-                duration_s,
-            ));
-            return Ok(Advanced {
-                duration_s,
-                done: 0,
-            });
-        }
-        Ok(answer)
-    }
-    fn reset(&mut self, position: &AxisVector) {
-        self.inner.reset(position);
-    }
-}
-
-fn bent(
-    options: &Options,
-    context: &PlannerContext,
-    bend: fn(&mut Segment),
-) -> Result<Bent, PluginError> {
-    Ok(Bent {
-        inner: LookAhead::new(options, context)?,
-        bend,
-        endless: false,
-    })
-}
+use tandem_rig::Bent;
+use tandem_sdk::{Advanced, AxisVector, PlannerContext, Plugin, PluginError, Segment};
 
 /// Every axis accelerates 1 % too hard.
-fn too_hard(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
+fn too_hard(options: &Options, context: &PlannerContext) -> Result<LookAhead, PluginError> {
     let mut context = *context;
     context
         .limits
         .axes
         .iter_mut()
         .for_each(|axis| axis.acceleration_mm_per_s2 *= 1.01);
-    bent(options, &context, |_| ())
+    LookAhead::new(options, &context)
 }
 
 /// Everything 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    bent(options, context, |segment| {
-        segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
-    })
+    let bent = Bent::new(LookAhead::new(options, context)?);
+    Ok(bent.emits(|segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01)))
 }
 
 /// It rests at the end and never says so.
 fn endless(options: &Options, context: &PlannerContext) -> Result<Bent, PluginError> {
-    Ok(Bent {
-        endless: true,
-        ..bent(options, context, |_| ())?
-    })
+    let bent = Bent::new(LookAhead::new(options, context)?);
+    Ok(bent.advances(|duration_s, sink, advanced| {
+        if advanced.done == 1 {
+            let end = AxisVector::from_slice(&[40.0, 3.0]);
+            sink.segment(&Segment::rest(&end, duration_s));
+            *advanced = Advanced {
+                duration_s,
+                done: 0,
+            };
+        }
+    }))
 }
 
 const MACHINE: &str = "format = 1

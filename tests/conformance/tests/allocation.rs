@@ -3,10 +3,10 @@
 #![allow(clippy::unnecessary_wraps)] // the form of constructors
 
 use tandem_conformance::{CountingAllocator, Setup, judge};
+use tandem_rig::Echo;
 use tandem_sdk::{
-    Answer, Attached, AxisVector, Driver, DriverContext, DriverDescription, FeedStrategy, Feedback,
-    Kinematics, KinematicsContext, Plugin, PluginError, Setpoint, StrategyContext, Window,
-    local_plugin,
+    Answer, AxisVector, FeedStrategy, Kinematics, KinematicsContext, Plugin, PluginError,
+    StrategyContext, Window, local_plugin,
 };
 
 #[global_allocator]
@@ -45,32 +45,12 @@ impl Uses {
     }
 }
 
-struct Drives(Uses, usize, AxisVector);
-
-impl Driver for Drives {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        (self.1, self.2) = (context.joint_count as usize, context.start_position);
+fn drives(options: &Options) -> Echo {
+    let uses = Uses::new(options);
+    Echo::new(move |_, _| {
+        uses.now();
         Ok(())
-    }
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::at(self.2))
-    }
-    fn exchange(
-        &mut self,
-        setpoint: &Setpoint,
-        feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        feedback.follow(setpoint, self.1);
-        self.0.now();
-        Ok(())
-    }
-    fn quick_stop(&mut self) {}
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
+    })
 }
 
 struct Feeds(Uses);
@@ -118,7 +98,7 @@ fn assert_found(plugin: Plugin, call: u64) {
 #[test]
 fn one_use_of_the_heap_is_found() {
     assert_found(
-        local_plugin!(driver "drives" = |o: &Options| Ok(Drives(Uses::new(o), 0, AxisVector::ZERO))),
+        local_plugin!(driver "drives" = |o: &Options| Ok(drives(o))),
         1500,
     );
     assert_found(

@@ -1,18 +1,22 @@
-//! A planner driven without the loops: machines, blocks, what comes out, reference cases. The planners' tests and benches
-//! share it.
+//! A planner driven without the loops: machines, blocks, what comes out, reference cases; and doubles of drives and planners.
+//! Tests and benches share it.
 
+mod bent;
 mod blocks;
 mod cases;
 mod collected;
 mod drive;
+mod echo;
 mod machine;
 mod random;
 mod record;
 
+pub use bent::Bent;
 pub use blocks::{arc, line, lines, numbered, program};
 pub use cases::{assert_close, case, numbers, points};
 pub use collected::Collected;
 pub use drive::{Away, Given, Offer, drive, feed, stream};
+pub use echo::Echo;
 pub use machine::{axis, context};
 pub use random::Random;
 pub use record::{CASES_VARIABLE, record_case};

@@ -5,11 +5,11 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
+use tandem_rig::Echo;
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Edge, Event,
-    EventKind, Feedback, JointState, Kinematics, Limits, PluginError, Segment, SegmentFlags,
-    Setpoint, StopOn,
+    AxisLimits, AxisVector, Edge, Event, EventKind, Kinematics, Limits, PluginError, Segment,
+    SegmentFlags, StopOn,
 };
 
 /// Fine period, s.
@@ -24,57 +24,6 @@ pub const KEPT_OUTPUT: u32 = 3;
 
 /// What a plan at its limits accelerates with, mm/s²: planners leave a thousandth.
 const MAX_MM_PER_S2: f64 = 999.0;
-
-/// Drives that follow exactly, until they are told to fail.
-struct Echo {
-    failing: Arc<AtomicBool>,
-    spoiled: Arc<AtomicBool>,
-    quick_stops: Arc<AtomicU64>,
-}
-
-impl Driver for Echo {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-
-    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
-        Ok(())
-    }
-
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::default())
-    }
-
-    fn exchange(
-        &mut self,
-        setpoint: &Setpoint,
-        feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        feedback.position = setpoint.position;
-        feedback.speed = setpoint.velocity;
-        if self.spoiled.load(Relaxed) {
-            feedback.position[0] = f64::NAN;
-        }
-        feedback.state.fill(if setpoint.enable == 0 {
-            JointState::Disabled
-        } else {
-            JointState::Enabled
-        });
-        if self.failing.load(Relaxed) {
-            Err(PluginError::fixed("the drives are lost"))
-        } else {
-            Ok(())
-        }
-    }
-
-    fn quick_stop(&mut self) {
-        self.quick_stops.fetch_add(1, Relaxed);
-    }
-
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
-}
 
 /// The fine loop under test.
 pub struct Bench {
@@ -137,16 +86,19 @@ impl Bench {
             segments: 64,
             samples: 64,
         });
-        let failing = Arc::new(AtomicBool::new(false));
-        let (spoiled, quick_stops) = (
-            Arc::new(AtomicBool::new(false)),
-            Arc::new(AtomicU64::new(0)),
-        );
-        let driver = Echo {
-            failing: Arc::clone(&failing),
-            spoiled: Arc::clone(&spoiled),
-            quick_stops: Arc::clone(&quick_stops),
-        };
+        let (failing, spoiled): (Arc<AtomicBool>, Arc<AtomicBool>) = Default::default();
+        let (fails, spoils) = (Arc::clone(&failing), Arc::clone(&spoiled));
+        let driver = Echo::new(move |_, feedback| {
+            if spoils.load(Relaxed) {
+                feedback.position[0] = f64::NAN;
+            }
+            if fails.load(Relaxed) {
+                Err(PluginError::fixed("the drives are lost"))
+            } else {
+                Ok(())
+            }
+        });
+        let quick_stops = driver.quick_stops();
         let mut fine = FineLoop::new(&config, end, Box::new(driver), kinematics);
         fine.reset();
         Self {

@@ -3,11 +3,9 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_fine::{FineConfig, FineLoop};
+use tandem_rig::Echo;
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
-use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback,
-    JointState, Limits, MAX_AXES, PluginError, Segment, SegmentFlags, Setpoint,
-};
+use tandem_sdk::{AxisLimits, AxisVector, Limits, Segment, SegmentFlags};
 
 pub const PERIOD_S: f64 = 1e-3;
 
@@ -150,37 +148,6 @@ fn hermite(from: [f64; 3], to: [f64; 3], h: f64) -> [f64; 6] {
     ]
 }
 
-struct Echo;
-
-impl Driver for Echo {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
-        Ok(())
-    }
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::default())
-    }
-    fn exchange(
-        &mut self,
-        setpoint: &Setpoint,
-        feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
-        feedback.state = [if setpoint.enable == 0 {
-            JointState::Disabled
-        } else {
-            JointState::Enabled
-        }; MAX_AXES];
-        Ok(())
-    }
-    fn quick_stop(&mut self) {}
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
-}
-
 /// The fine loop with the whole plan queued.
 pub struct Machine {
     pub fine: FineLoop,
@@ -251,7 +218,7 @@ impl Machine {
         rough.depth.stop_deceleration_mm_per_s2.store(500.0);
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
-        let mut fine = FineLoop::new(&config, end, Box::new(Echo), None);
+        let mut fine = FineLoop::new(&config, end, Box::new(Echo::default()), None);
         fine.reset();
         let mut this = Self {
             fine,

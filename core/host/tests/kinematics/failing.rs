@@ -4,10 +4,8 @@ use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use tandem_sdk::{
-    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, Kinematics, Plugin,
-    PluginError, Setpoint, local_plugin,
-};
+use tandem_rig::Echo;
+use tandem_sdk::{AxisVector, Kinematics, Plugin, PluginError, Setpoint, local_plugin};
 
 use super::{ARM, Arm, run};
 
@@ -78,44 +76,23 @@ tandem_sdk::options! {
     }
 }
 
-/// Keeps what the drives are told. On the virtual clock everything runs on one thread.
-struct Recorder(Drives, usize, AxisVector);
-
+/// Drives that keep what they are told. On the virtual clock everything runs on one thread.
 pub fn driver() -> Plugin {
-    local_plugin!(driver "recorder" = |options: &Drives| Ok(Recorder(options.clone(), 0, AxisVector::ZERO)))
+    local_plugin!(driver "recorder" = |options: &Drives| Ok(recorder(options.fails_at)))
 }
 
-impl Driver for Recorder {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-    fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        (self.1, self.2) = (context.joint_count as usize, context.start_position);
-        Ok(())
-    }
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::at(self.2))
-    }
-    fn exchange(
-        &mut self,
-        setpoint: &Setpoint,
-        feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        feedback.follow(setpoint, self.1);
+fn recorder(fails_at: usize) -> Echo {
+    Echo::new(move |setpoint, _| {
         let exchanges = RECORDED.with_borrow_mut(|recorded| {
             recorded.push(*setpoint);
             recorded.len()
         });
-        if exchanges == self.0.fails_at {
+        if exchanges == fails_at {
             Err(PluginError::fixed("the wire is cut"))
         } else {
             Ok(())
         }
-    }
-    fn quick_stop(&mut self) {}
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
+    })
 }
 
 /// Velocity and acceleration of the drives of [`ARM`], mm or rad.

@@ -9,9 +9,9 @@ use tandem_host::{Clock, HostError, Outcome, Registry, Run, RunObserver, Switche
 use tandem_look_ahead::{LookAhead, Options};
 use tandem_machine::Machine;
 use tandem_recorder::JointPeaks;
+use tandem_rig::Bent;
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Kinematics, KinematicsContext,
-    NoOptions, Planner, PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
+    AxisVector, Kinematics, KinematicsContext, NoOptions, PlannerContext, PluginError,
 };
 
 /// A turning arm: joint 0 is its length, joint 1 its angle about a pivot 400 mm in front of the table.
@@ -95,48 +95,9 @@ fn too_fast(options: &Options, context: &PlannerContext) -> Opened<LookAhead> {
 
 /// The look-ahead planner, 1 % too far in X.
 fn too_far(options: &Options, context: &PlannerContext) -> Opened<Bent> {
-    Ok(Bent(LookAhead::new(options, context)?))
-}
-
-struct Bent(LookAhead);
-
-struct BentSink<'a>(&'a mut dyn SegmentSink);
-
-impl SegmentSink for BentSink<'_> {
-    fn segment(&mut self, segment: &Segment) {
-        let mut segment = *segment;
-        segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01);
-        self.0.segment(&segment);
-    }
-
-    fn block(&mut self, report: &BlockReport) {
-        self.0.block(report);
-    }
-}
-
-impl Planner for Bent {
-    fn describe(&self) -> PlannerDescription {
-        self.0.describe()
-    }
-    fn check(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        self.0.check(block, curve)
-    }
-    fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
-        self.0.accept(block, curve)
-    }
-    fn finish(&mut self) {
-        self.0.finish();
-    }
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
-        self.0.advance(duration_s, &mut BentSink(sink))
-    }
-    fn reset(&mut self, position: &AxisVector) {
-        self.0.reset(position);
-    }
+    let inner = LookAhead::new(options, context)?;
+    Ok(Bent::new(inner)
+        .emits(|segment| segment.coefficients[0].iter_mut().for_each(|c| *c *= 1.01)))
 }
 
 struct Nobody;
