@@ -211,7 +211,7 @@ impl Driver for EthercatDrives {
         }
     }
 
-    fn send(&mut self, setpoint: &Setpoint) {
+    fn send(&mut self, setpoint: &Setpoint) -> bool {
         let until = self.period() / 2;
         if let Some(shared) = self.shared.as_ref().filter(|_| self.running)
             && let Some(mut bus) = shared.try_bus(until)
@@ -221,6 +221,7 @@ impl Driver for EthercatDrives {
                 .store(shared.now_ns().max(1), Ordering::Release);
             bus.send(setpoint);
         }
+        true
     }
 
     fn exchange(

@@ -70,8 +70,8 @@ impl Driver for Timed {
         self.driver.start()
     }
 
-    fn send(&mut self, setpoint: &Setpoint) {
-        self.driver.send(setpoint);
+    fn send(&mut self, setpoint: &Setpoint) -> bool {
+        self.driver.send(setpoint)
     }
 
     fn exchange(

@@ -28,8 +28,8 @@ impl Driver for AtRest {
         self.driver.start()
     }
 
-    fn send(&mut self, setpoint: &Setpoint) {
-        self.driver.send(setpoint);
+    fn send(&mut self, setpoint: &Setpoint) -> bool {
+        self.driver.send(setpoint)
     }
 
     fn exchange(

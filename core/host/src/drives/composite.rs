@@ -43,14 +43,18 @@ impl Joints {
 
 /// One of the drivers, with what it is told and what it answers, in its own numbers.
 pub struct Part {
+    /// Among the drivers, from 0.
+    number: usize,
     driver: Box<dyn Driver>,
     share: Share,
     joints: Joints,
     title: String,
     setpoint: Setpoint,
     feedback: Feedback,
-    /// What it was told last had orders ([`has_orders`]).
-    has_orders: bool,
+    /// It has inputs or analog values.
+    measures: bool,
+    /// It begins its exchanges before those of others, as far as is known.
+    sends: bool,
     /// Its exchange has failed since the drives were last reset: nothing is known of its joints.
     has_failed: bool,
 }
@@ -60,21 +64,22 @@ impl Part {
     pub fn new(driver: Box<dyn Driver>, share: Share, title: String) -> Self {
         let (setpoint, feedback) = (Setpoint::default(), Feedback::default());
         Self {
+            number: 0,
             joints: Joints::of(&share),
+            measures: !(share.inputs.runs().is_empty() && share.analog.is_empty()),
             driver,
             share,
             title,
             setpoint,
             feedback,
-            has_orders: false,
+            sends: true,
             has_failed: false,
         }
     }
 
-    /// Takes its part of what the machine is told; `orders` says whether some of what is zero in most periods is not.
-    #[allow(clippy::inline_always)] // two calls of it in every period
-    #[inline(always)]
-    fn take(&mut self, whole: &Setpoint, orders: bool) {
+    /// Takes its part of what the machine is told in every period.
+    #[inline]
+    fn take(&mut self, whole: &Setpoint) {
         let (share, own) = (&self.share, &mut self.setpoint);
         own.enable = whole.enable;
         own.tick = whole.tick;
@@ -87,13 +92,9 @@ impl Part {
         if share.spindle {
             own.spindle_rad_per_s = whole.spindle_rad_per_s;
         }
-        if orders | self.has_orders {
-            self.take_orders(whole);
-        }
     }
 
     /// Takes what is zero in most periods.
-    #[cold]
     fn take_orders(&mut self, whole: &Setpoint) {
         let (share, own) = (&self.share, &mut self.setpoint);
         own.reset = whole.reset;
@@ -101,7 +102,6 @@ impl Part {
         own.limited = share.joints.to_own(u64::from(whole.limited)) as u32;
         own.arm = share.own_arm(whole.arm);
         self.has_failed &= whole.reset == 0;
-        self.has_orders = has_orders(whole);
     }
 
     /// Adds its answer to that of the machine; `latches` have been filled before it.
@@ -116,14 +116,8 @@ impl Part {
             whole.speed[joint] = own.speed[i];
             whole.current_a[joint] = own.current_a[i];
         }
-        whole.inputs |= share.inputs.to_machine(own.inputs);
-        for run in share.inputs.runs() {
-            let (to, from, count) = (run.machine as usize, run.own as usize, run.count as usize);
-            whole.input_age_periods[to..to + count]
-                .copy_from_slice(&own.input_age_periods[from..from + count]);
-        }
-        for (own, number) in own.analog.iter().zip(&share.analog) {
-            whole.analog[*number] = *own;
+        if self.measures {
+            self.give_measured(whole);
         }
         if share.spindle {
             whole.spindle_rad_per_s = own.spindle_rad_per_s;
@@ -139,6 +133,19 @@ impl Part {
             .fold(0, |edges, latch| edges | latch.edge);
         if caught | own.homed | u32::from(self.has_failed) != 0 {
             self.give_news(whole, latches);
+        }
+    }
+
+    fn give_measured(&self, whole: &mut Feedback) {
+        let (share, own) = (&self.share, &self.feedback);
+        whole.inputs |= share.inputs.to_machine(own.inputs);
+        for run in share.inputs.runs() {
+            let (to, from, count) = (run.machine as usize, run.own as usize, run.count as usize);
+            whole.input_age_periods[to..to + count]
+                .copy_from_slice(&own.input_age_periods[from..from + count]);
+        }
+        for (own, number) in own.analog.iter().zip(&share.analog) {
+            whole.analog[*number] = *own;
         }
     }
 
@@ -177,10 +184,11 @@ impl Part {
         *latches += 1;
     }
 
-    /// Its exchange has failed: what it knows gets older by a period. Whether it had not failed before: that is told once, and
-    /// from then on its joints are lost, and those of the others are waited for.
+    /// Its exchange has failed: what it knows gets older by a period. Where it had not failed before, that is told once, by who
+    /// is the first of a period; from then on its joints are lost, and those of the others are waited for.
     #[cold]
-    fn is_first_failure(&mut self) -> bool {
+    #[inline(never)]
+    fn fail(&mut self, error: PluginError, told: &mut Option<PluginError>, first: &AtomicUsize) {
         self.feedback
             .age_periods
             .iter_mut()
@@ -190,7 +198,10 @@ impl Part {
             .iter_mut()
             .for_each(|age| *age = age.saturating_add(1));
         self.feedback.latches = [Latch::default(); MAX_LATCHES];
-        !std::mem::replace(&mut self.has_failed, true)
+        if !std::mem::replace(&mut self.has_failed, true) && told.is_none() {
+            first.store(self.number, Relaxed);
+            *told = Some(error);
+        }
     }
 }
 
@@ -202,6 +213,10 @@ pub struct Composite {
     description: DriverDescription,
     /// Number of the part whose exchange failed first.
     failed: Arc<AtomicUsize>,
+    /// Some driver but the first begins its exchanges before those of others, as far as is known.
+    any_sends: bool,
+    /// What the drivers were told last had orders ([`has_orders`]).
+    had_orders: bool,
     /// How many latches were handed out last.
     latches: usize,
     /// Why an exchange of this period failed; not told yet.
@@ -210,36 +225,72 @@ pub struct Composite {
 
 impl Composite {
     /// `parts`, which describe themselves together as `description`; the number of the first that fails goes to `failed`.
-    pub fn new(parts: Vec<Part>, description: DriverDescription, failed: Arc<AtomicUsize>) -> Self {
+    pub fn new(
+        mut parts: Vec<Part>,
+        description: DriverDescription,
+        failed: Arc<AtomicUsize>,
+    ) -> Self {
+        for (number, part) in parts.iter_mut().enumerate() {
+            part.number = number;
+        }
         Self {
             parts,
             description,
             failed,
+            any_sends: true,
+            had_orders: false,
             latches: 0,
             failure: None,
         }
     }
 
-    /// Begins the exchanges of all, so that they wait for their answers together. That of the first comes next, and sends by
-    /// itself.
+    /// Tells each what is its, and those that send beforehand do so.
     #[inline]
-    fn send_all(&mut self, setpoint: &Setpoint) {
-        let Some((first, others)) = self.parts.split_first_mut() else {
-            return;
-        };
-        let orders = has_orders(setpoint);
-        for part in others {
-            part.take(setpoint, orders);
-            part.driver.send(&part.setpoint);
+    fn tell_all(&mut self, setpoint: &Setpoint) {
+        for part in &mut self.parts {
+            part.take(setpoint);
         }
-        first.take(setpoint, orders);
+        let orders = has_orders(setpoint);
+        if orders | self.had_orders {
+            self.order_all(setpoint, orders);
+        }
+        if self.any_sends {
+            self.send_all();
+        }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn order_all(&mut self, setpoint: &Setpoint, orders: bool) {
+        self.parts
+            .iter_mut()
+            .for_each(|part| part.take_orders(setpoint));
+        self.had_orders = orders;
+    }
+
+    /// Begins the exchanges, so that the drivers wait for their answers together. That of the first comes next, and sends by
+    /// itself.
+    #[inline(never)]
+    fn send_all(&mut self) {
+        self.any_sends = false;
+        for part in self.parts.iter_mut().skip(1).filter(|part| part.sends) {
+            part.sends = part.driver.send(&part.setpoint);
+            self.any_sends |= part.sends;
+        }
+    }
+
+    #[inline]
     fn forget(&mut self, feedback: &mut Feedback) {
         (feedback.homed, feedback.inputs, feedback.has_phase) = (0, 0, 0);
-        for latch in &mut feedback.latches[..self.latches] {
-            *latch = Latch::default();
+        if self.latches > 0 {
+            self.forget_latches(feedback);
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn forget_latches(&mut self, feedback: &mut Feedback) {
+        feedback.latches.fill(Latch::default());
         self.latches = 0;
     }
 }
@@ -269,7 +320,7 @@ impl Driver for Composite {
         };
         for index in 0..self.parts.len() {
             let part = &mut self.parts[index];
-            part.has_failed = false;
+            (part.has_failed, part.sends) = (false, true);
             match named(part.driver.start(), &part.title) {
                 Ok(own) => part.share.add_to(&mut attached, &own),
                 Err(error) => {
@@ -282,6 +333,7 @@ impl Driver for Composite {
                 }
             }
         }
+        self.any_sends = true;
         Ok(attached)
     }
 
@@ -290,15 +342,11 @@ impl Driver for Composite {
         setpoint: &Setpoint,
         feedback: &mut Feedback,
     ) -> Result<(), PluginError> {
-        self.send_all(setpoint);
+        self.tell_all(setpoint);
         self.forget(feedback);
-        for (index, part) in self.parts.iter_mut().enumerate() {
-            if let Err(error) = part.driver.exchange(&part.setpoint, &mut part.feedback)
-                && part.is_first_failure()
-                && self.failure.is_none()
-            {
-                self.failed.store(index, Relaxed);
-                self.failure = Some(error);
+        for part in &mut self.parts {
+            if let Err(error) = part.driver.exchange(&part.setpoint, &mut part.feedback) {
+                part.fail(error, &mut self.failure, &self.failed);
             }
             part.give(feedback, &mut self.latches);
         }

@@ -13,10 +13,7 @@ contract! {
     ref check(plugin, context: *const DriverContext) -> () = DriverCheck { plugin.check(&*context) }
     mut open(plugin, context: *const DriverContext) -> () = DriverOpen { plugin.open(&*context) }
     mut start(plugin) -> Attached = DriverStart { plugin.start() }
-    mut send(plugin, setpoint: *const Setpoint) -> () = DriverSend {
-        plugin.send(&*setpoint);
-        Ok(())
-    }
+    mut send(plugin, setpoint: *const Setpoint) -> u32 = DriverSend { Ok(u32::from(plugin.send(&*setpoint))) }
     mut exchange(plugin, setpoint: *const Setpoint, feedback: *mut Feedback) -> () = DriverExchange {
         plugin.exchange(&*setpoint, &mut *feedback)
     }
@@ -63,10 +60,14 @@ impl Driver for Linked {
         self.0.start()
     }
 
-    fn send(&mut self, setpoint: &Setpoint) {
-        // A panic is told by the exchange that follows.
-        if let Err(error) = self.0.send(setpoint) {
-            forget(error);
+    fn send(&mut self, setpoint: &Setpoint) -> bool {
+        match self.0.send(setpoint) {
+            Ok(sends) => sends != 0,
+            // A panic is told by the exchange that follows.
+            Err(error) => {
+                forget(error);
+                false
+            }
         }
     }
 

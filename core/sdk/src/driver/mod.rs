@@ -93,7 +93,12 @@ pub trait Driver: Send {
     /// `setpoint`, which the exchange of the same period is given again, so that the drivers wait for their answers together. An
     /// exchange without it sends by itself, as that of the driver does whose exchange comes first. Fine loop: no allocation, no
     /// lock, bounded time. A driver that sends and receives in one go leaves it out.
-    fn send(&mut self, _setpoint: &Setpoint) {}
+    ///
+    /// Gives whether the driver ever has something to begin here: who is told `false` need not ask again until the next
+    /// [`Driver::start`].
+    fn send(&mut self, _setpoint: &Setpoint) -> bool {
+        false
+    }
 
     /// One fine period: sends `setpoint`, fills `feedback`, which it is given as it left it. Fine loop: no allocation, no lock,
     /// bounded time.
