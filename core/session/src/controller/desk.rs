@@ -16,6 +16,7 @@ use tandem_machine::Machine;
 use tandem_rings::{MachineState, Status};
 use tandem_sdk::AxisVector;
 
+use super::described;
 use super::lines::{Judged, SharedLines, lock};
 use super::request::Asked;
 use super::states::{ControllerState, judge};
@@ -307,6 +308,8 @@ impl Desk {
             "history",
             "lease",
             "list",
+            "machine",
+            "tables",
             "emergency-stop",
             "hold",
             "abort",
@@ -356,6 +359,13 @@ impl Desk {
                 json!({ "jobs": inner.history, "alarms": inner.alarms }),
             )),
             "list" => self.list().map(Acted::Done),
+            "machine" => asked
+                .only(&[])
+                .map(|()| Acted::Done(described::machine(&self.machine))),
+            "tables" => asked.only(&[]).map(|()| {
+                let lasting = lock(&self.lines).standing().lasting();
+                Acted::Done(described::tables(&self.machine, &lasting))
+            }),
             "hold" => plain(Command::Hold),
             "resume" => plain(Command::Resume),
             "emergency-stop" => plain(Command::EmergencyStop),
@@ -412,7 +422,12 @@ impl Desk {
                 Ok(Acted::Done(json!({ "jog": "stop" })))
             }
             "jog" => {
-                self.jogs.ask(jog(asked)?.on(&self.machine.axes)?)?;
+                let jog = jog(asked)?.on(&self.machine.axes)?;
+                if asked.with.get("again") == Some(&json!(true)) {
+                    self.jogs.keep_alive(jog)?;
+                    return Ok(Acted::Done(json!({ "jog": asked.with.get("axis") })));
+                }
+                self.jogs.ask(jog)?;
                 let done = json!({ "jog": asked.with.get("axis") });
                 let waits = inner.mode == Mode::Jog || inner.order.is_some();
                 Ok(if waits {
@@ -759,6 +774,7 @@ fn jog(asked: &Asked) -> Result<JogMessage, String> {
         "distance_mm",
         "distance_deg",
         "direction",
+        "again",
         "feed_mm_per_min",
         "feed_deg_per_min",
     ])?;

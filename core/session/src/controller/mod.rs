@@ -1,6 +1,7 @@
 //! The controller that stays: one machine, job after job, and what lasts between them. Its protocol is a JSON line a request,
 //! on every door.
 
+mod described;
 mod desk;
 mod lines;
 mod request;

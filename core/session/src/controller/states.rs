@@ -61,13 +61,15 @@ impl ControllerState {
 
 /// Requests and, in the order of [`ControllerState`], whether each is done (`+`) or which of [`REASONS`] refuses it.
 #[rustfmt::skip]
-const TABLE: [(&str, &str); 28] = [
+const TABLE: [(&str, &str); 30] = [
     //                 E D N R J M P H S F
     ("status",         "++++++++++"),
     ("subscribe",      "++++++++++"),
     ("history",        "++++++++++"),
     ("lease",          "++++++++++"),
     ("list",           "++++++++++"),
+    ("machine",        "++++++++++"),
+    ("tables",         "++++++++++"),
     ("load",           "++++bbbbs+"),
     ("check",          "++++bbbbs+"),
     ("start",          "fdn+bbbbsf"),

@@ -17,12 +17,14 @@ const MAX_STRANGERS_LINE_BYTES: usize = 4096;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Requests that need no control lease.
-const FREE: [&str; 8] = [
+const FREE: [&str; 10] = [
     "status",
     "subscribe",
     "history",
     "lease",
     "list",
+    "machine",
+    "tables",
     "hold",
     "emergency-stop",
     "token",

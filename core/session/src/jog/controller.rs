@@ -107,6 +107,25 @@ impl JogController {
         Ok(())
     }
 
+    /// Keeps a jog alive, and begins none: a beat that was on its way for too long finds that the machine has stopped, and it
+    /// stays so.
+    ///
+    /// # Errors
+    /// The jog neither moves nor waits any more; nothing is changed.
+    pub fn keep_alive(&self, jog: Jog) -> Result<(), String> {
+        let inner = self.lock();
+        let lives = inner.controls.as_ref().filter(|controls| {
+            let moves = inner.moving.is_some_and(|moving| moving.jog == jog);
+            let waits = inner.waiting.front() == Some(&jog);
+            (moves && !controls.jog.let_go.load(Relaxed)) || waits
+        });
+        let Some(controls) = lives else {
+            return Err("the jog is over: what would keep it alive came too late".to_string());
+        };
+        controls.jog.beats.fetch_add(1, Relaxed);
+        Ok(())
+    }
+
     /// Lets go of what moves, and forgets what waits.
     pub fn let_go(&self) {
         let mut inner = self.lock();

@@ -33,3 +33,4 @@ pub use server::Server;
 pub(crate) use session::{Answer, MAX_OWNERS};
 pub use status::{Counters, Position, StatusLine};
 pub(crate) use token::is_same;
+pub use token::{is_same as is_same_token, new as new_token, of_file as token_of_file};

@@ -52,6 +52,14 @@ fn make(path: &Path) -> Result<(), String> {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(()),
         Err(error) => return Err(error.to_string()),
     };
+    writeln!(file, "{}", new()?).map_err(|e| e.to_string())
+}
+
+/// A random token.
+///
+/// # Errors
+/// The system has no random numbers.
+pub fn new() -> Result<String, String> {
     let mut random = [0_u8; BYTES];
     let filled = getrandom(&mut random, GetRandomFlags::empty()).map_err(|e| e.to_string())?;
     let mut text = String::new();
@@ -59,7 +67,7 @@ fn make(path: &Path) -> Result<(), String> {
         // Writing to a string does not fail.
         let _ = write!(text, "{byte:02x}");
     }
-    writeln!(file, "{text}").map_err(|e| e.to_string())
+    Ok(text)
 }
 
 /// Whether two tokens are the same, in a time that does not tell how far they agree.
