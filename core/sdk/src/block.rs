@@ -155,7 +155,9 @@ pub struct Block {
     /// What ends the motion early (probing, homing); such a block starts and ends at rest. Planners need not look at it:
     /// the host marks the segments of the block.
     pub stop_on: StopOn,
-    /// Sum of the offsets in force (work, G92, tool length), mm or rad: program coordinate = machine coordinate − offset.
+    /// The origin of the program in machine coordinates, mm or rad, from all that is in force (work, G92, tool length): program
+    /// coordinate = machine coordinate − offset. In a rotated coordinate system (G10 L2 R) X and Y of that difference are
+    /// still to be turned back by its angle, which blocks do not bear.
     pub offset: AxisVector,
     /// Tool in the spindle.
     pub tool: u32,

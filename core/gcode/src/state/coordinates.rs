@@ -23,7 +23,7 @@ pub(crate) struct Coordinates {
     /// What G92.3 restores.
     g92_stored: AxisVector,
     tool: AxisVector,
-    /// The sum in force.
+    /// The origin of the program in machine coordinates.
     total: AxisVector,
     /// Bit per axis whose offset follows from what the first pass has assumed.
     pub assumed: u32,
@@ -49,7 +49,8 @@ impl Coordinates {
         }
     }
 
-    /// The sum of all offsets in force. Where no rotation is, it is the way from program to machine coordinates.
+    /// The origin of the program in machine coordinates. Where no rotation is, it is the sum of the offsets, and the way from
+    /// program to machine coordinates.
     #[inline]
     pub fn total(&self) -> &AxisVector {
         &self.total
@@ -229,8 +230,8 @@ impl Coordinates {
     }
 
     fn sum_up(&mut self) {
-        self.total = self.origins[self.active] + self.g92 + self.tool;
         let rotation = self.rotations[self.active];
         self.turn = (rotation != 0.0).then(|| [rotation.cos(), rotation.sin()]);
+        self.total = self.to_machine(&AxisVector::ZERO);
     }
 }
